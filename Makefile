@@ -1,0 +1,66 @@
+# make demo    set up, run the main scenario as separate nodes, record it, check the recording, write the report
+# make test    set up, lint, run every test
+# make bench   set up, measure the graph and the core
+# make colcon  build src/ as a ROS 2 workspace and start a node from it
+# make clean   remove everything made here
+
+PYTHON ?= python3
+PACKAGES := pedestal_common ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_bringup
+ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
+PIP := -m pip --disable-pip-version-check install --quiet --use-pep517 --constraint constraints.txt
+DEMO := bags/runs/demo
+
+install: .venv/installed
+
+demo: install
+	rm -rf $(DEMO) $(DEMO).log
+	.venv/bin/pedestal run leo_pass --bag $(DEMO)
+	.venv/bin/pedestal verify $(DEMO)
+	.venv/bin/pedestal report $(DEMO)
+	@echo 'Report: $(CURDIR)/$(DEMO)/report.html'
+
+test: install
+	.venv/bin/ruff check .
+	.venv/bin/python -m pytest
+
+bench: install
+	.venv/bin/pedestal bench graph
+	.venv/bin/pedestal bench core
+
+# colcon leaves build/, install/ and log/ where it is called, so that is build/colcon/.
+colcon: .venv-colcon/installed
+	rm -rf build/colcon && mkdir -p build/colcon
+	cd build/colcon && ../../.venv-colcon/bin/colcon build --base-paths ../../src
+	. build/colcon/install/local_setup.sh && .venv-colcon/bin/python -m pytest test/test_colcon.py
+
+clean:
+	rm -rf .venv .venv-colcon build install log .pytest_cache .ruff_cache bags/runs src/*/build src/*/*.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.venv/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv/bin/pip
+	@echo 'Installing into .venv (the first time this takes some minutes) ...'
+	.venv/bin/python $(PIP) $(ROS) ruff $(foreach package,$(PACKAGES),--editable 'src/$(package)[test]')
+	@touch $@
+
+.venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip
+	@echo 'Installing into .venv-colcon ...'
+	.venv-colcon/bin/python $(PIP) $(ROS) colcon-common-extensions colcon-ros numpy numba rosbags
+	@touch $@
+
+# Debian and Ubuntu keep ensurepip in a package of its own, python3-venv. Where that is missing, pip comes from
+# the wheel in Debian's package python3-pip-whl, which `apt-get download` fetches without root.
+APT := apt-get -qq -o APT::Sandbox::User=root
+%/bin/pip:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+	    { echo 'Python 3.10 or newer is needed; name one: make PYTHON=python3.12'; exit 1; }
+	@rm -rf $*
+	@if $(PYTHON) -c 'import ensurepip' 2>/dev/null; then $(PYTHON) -m venv $*; else ( \
+	    $(PYTHON) -m venv --without-pip $* && cd $* && \
+	    { $(APT) download python3-pip-whl 2>/dev/null || \
+	        { $(APT) update && $(APT) download python3-pip-whl; }; } && \
+	    dpkg -x python3-pip-whl_*.deb . && wheel=$$(echo usr/share/python-wheels/pip-*.whl) && \
+	    PYTHONPATH=$$wheel bin/python -m pip install --quiet --no-index $$wheel && \
+	    rm -r usr python3-pip-whl_*.deb ); fi || \
+	    { rm -rf $*; echo 'This Python cannot make an environment with pip: sudo apt-get install python3-venv'; exit 1; }
+
+.PHONY: install demo test bench colcon clean

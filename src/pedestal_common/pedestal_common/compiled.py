@@ -1,0 +1,56 @@
+"""The one decorator of every compiled law.
+
+Strict IEEE arithmetic (no fastmath): a law gives the same bits wherever it is inlined, so a study, a
+node and a recomputed bag agree exactly, and NaN keeps its meaning on the topics.
+
+Numba's cache does not see that a callee in another file changed (numba documentation, "Notes on
+Caching"), so the cache lives in a folder named after all sources of the product.
+"""
+import functools
+import hashlib
+import importlib.util
+import os
+import pathlib
+import shutil
+import time
+
+import numba
+from numba.misc.appdirs import user_cache_dir
+
+COLUMNS = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
+KEPT_DAYS = 7.0
+_ROOT = pathlib.Path(numba.config.CACHE_DIR or user_cache_dir()) / 'pedestal'
+
+
+def _digest(packages) -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for package in packages:
+        spec = importlib.util.find_spec(package) if package != '__main__' else None
+        if spec is not None and spec.origin is not None:
+            for path in sorted(pathlib.Path(spec.origin).parent.rglob('*.py')):
+                digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@functools.cache
+def _cache_folder(package) -> str | None:
+    """The cache of one package's laws: named after its own sources and all it may call."""
+    columns = () if package == 'pedestal_common' else (package,) if package in COLUMNS else COLUMNS
+    folder = _ROOT / f'{package}-{_digest(("pedestal_common", *columns, package))}'
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        for other in _ROOT.iterdir():
+            if time.time() - other.stat().st_mtime > KEPT_DAYS * 86400:
+                shutil.rmtree(other, ignore_errors=True)
+    except OSError:
+        return None
+    return str(folder) if os.access(folder, os.W_OK) else None
+
+
+def compiled(law):
+    """Decorator of a law. Division by zero gives inf or NaN as in numpy, never an exception."""
+    folder = _cache_folder(law.__module__.partition('.')[0])
+    if folder is not None:
+        numba.config.CACHE_DIR = folder
+    return numba.njit(cache=folder is not None, error_model='numpy')(law)

@@ -1,0 +1,120 @@
+"""Line-of-sight geometry between beam, deck and earth. Angles in rad; frames as in the package docstring."""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def wrap(angle):
+    """The same angle in [-pi, pi)."""
+    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+@compiled
+def direction(azimuth, elevation):
+    """Unit vector (FLU, or north-west-up for earth angles) of an azimuth that turns clockwise."""
+    cos_el = math.cos(elevation)
+    return cos_el * math.cos(azimuth), -cos_el * math.sin(azimuth), math.sin(elevation)
+
+
+@compiled
+def angles(x, y, z):
+    """Azimuth (clockwise) and elevation of a vector (FLU or north-west-up) of any length."""
+    return math.atan2(-y, x), math.atan2(z, math.hypot(x, y))
+
+
+@compiled
+def earth_angles(east, north, up):
+    """Azimuth clockwise from north and elevation of an ENU vector."""
+    return angles(north, -east, up)
+
+
+@compiled
+def earth_direction(azimuth, elevation):
+    """ENU unit vector of an azimuth clockwise from north and an elevation."""
+    north, west, up = direction(azimuth, elevation)
+    return -west, north, up
+
+
+@compiled
+def to_earth(mat_ed, x, y, z):
+    """A deck vector (FLU) in ENU; mat_ed (3, 3) rotates deck -> earth."""
+    return (mat_ed[0, 0] * x + mat_ed[0, 1] * y + mat_ed[0, 2] * z,
+            mat_ed[1, 0] * x + mat_ed[1, 1] * y + mat_ed[1, 2] * z,
+            mat_ed[2, 0] * x + mat_ed[2, 1] * y + mat_ed[2, 2] * z)
+
+
+@compiled
+def to_deck(mat_ed, east, north, up):
+    """An ENU vector in the deck frame (FLU); the transpose of to_earth."""
+    return (mat_ed[0, 0] * east + mat_ed[1, 0] * north + mat_ed[2, 0] * up,
+            mat_ed[0, 1] * east + mat_ed[1, 1] * north + mat_ed[2, 1] * up,
+            mat_ed[0, 2] * east + mat_ed[1, 2] * north + mat_ed[2, 2] * up)
+
+
+@compiled
+def offsets(azimuth, elevation, x, y, z):
+    """How far a direction (same frame as the beam's angles) lies off the beam: (dX, dE).
+
+    dX is cross-elevation, positive the way azimuth grows, dE elevation. Azimuthal equidistant: the
+    length hypot(dX, dE) is the angle between beam and direction, exact up to 180 deg.
+    """
+    sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
+    b = ce * ca * x - ce * sa * y + se * z
+    c = -sa * x - ca * y
+    e = -se * ca * x + se * sa * y + ce * z
+    across = math.hypot(c, e)
+    if across == 0.0:
+        return 0.0, 0.0
+    scale = math.atan2(across, b) / across
+    return scale * c, scale * e
+
+
+@compiled
+def displaced(azimuth, elevation, cross_elevation, elevation_error):
+    """Azimuth and elevation of the direction that `offsets` saw: its inverse, the azimuth within pi of the beam's."""
+    off = math.hypot(cross_elevation, elevation_error)
+    sinc = math.sin(off) / off if off > 0.0 else 1.0
+    b, c, e = math.cos(off), sinc * cross_elevation, sinc * elevation_error
+    se, ce = math.sin(elevation), math.cos(elevation)
+    along, up = ce * b - se * e, se * b + ce * e
+    return azimuth + math.atan2(c, along), math.atan2(up, math.hypot(along, c))
+
+
+@compiled
+def rotation(qx, qy, qz, qw, mat):
+    """Fill mat (3, 3) with the rotation of a unit quaternion (x, y, z, w)."""
+    mat[0, 0], mat[0, 1], mat[0, 2] = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw)
+    mat[1, 0], mat[1, 1], mat[1, 2] = 2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw)
+    mat[2, 0], mat[2, 1], mat[2, 2] = 2 * (qx * qz - qy * qw), 2 * (qy * qz + qx * qw), 1 - 2 * (qx * qx + qy * qy)
+
+
+@compiled
+def quaternion(roll, pitch, yaw):
+    """Unit quaternion (x, y, z, w) deck -> earth of fixed-axis roll, pitch, yaw (REP 103: yaw 0 is east)."""
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    return (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
+
+
+@compiled
+def deck_rates(azimuth, elevation, wx, wy, wz):
+    """(dA/dt, dE/dt) of a fixed earth direction seen from a deck that turns with w (FLU) [rad/s].
+
+    reference/nav.md section 3.2 in FLU (there FRD: w_y and w_z change sign). Singular at the zenith.
+    """
+    along = wx * math.cos(azimuth) - wy * math.sin(azimuth)
+    return wz - math.tan(elevation) * along, wx * math.sin(azimuth) + wy * math.cos(azimuth)
+
+
+ASHORE = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+"""Quaternion (x, y, z, w) deck -> earth of a pedestal ashore: the bow points north."""
+
+
+def ashore_matrix() -> np.ndarray:
+    """mat_ed (3, 3) of a pedestal ashore."""
+    return np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

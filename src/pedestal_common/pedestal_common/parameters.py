@@ -1,0 +1,164 @@
+"""Parameters as frozen dataclasses: one declaration gives default, unit, range and description.
+
+The ROS side (declare, refuse, read) is in shell.py; this file knows no ROS.
+"""
+import dataclasses
+import math
+import typing
+
+import numpy as np
+
+
+class ParameterError(ValueError):
+    """A parameter is unknown or outside its range; the message names it, its value and what is allowed."""
+
+
+def parameter(default, low, high, unit, doc):
+    """A number (float or int, as annotated) between low and high inclusive."""
+    return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc})
+
+
+def choice(default, options, doc):
+    """A string out of options."""
+    return dataclasses.field(default=default, metadata={'options': tuple(options), 'doc': doc})
+
+
+def flag(default, doc):
+    """A bool."""
+    return dataclasses.field(default=default, metadata={'doc': doc})
+
+
+def text(default, doc):
+    """A string, or a tuple of strings, that only its reader can judge (a file, a TLE line, a list of names)."""
+    return dataclasses.field(default=default, metadata={'doc': doc})
+
+
+def group(cls, **changes):
+    """A nested dataclass, its defaults changed where named."""
+    return dataclasses.field(default_factory=lambda: cls(**changes), metadata={'group': True})
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameters:
+    """Base of every parameter dataclass; checks each field's range when it is made.
+
+    A subclass adds its cross-checks in `check`, raising ParameterError.
+    """
+
+    def __post_init__(self):
+        for field in dataclasses.fields(self):
+            _check_field(field, getattr(self, field.name))
+        self.check()
+
+    def check(self):
+        """Cross-checks between fields; overridden where two fields limit each other."""
+
+
+def _check_field(field, value):
+    meta, name = field.metadata, field.name
+    if 'low' in meta:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ParameterError(f'{name} = {value!r}: must be a number')
+        if field.type is int and not isinstance(value, int):
+            raise ParameterError(f'{name} = {value!r}: must be a whole number')
+        if not (math.isfinite(value) and meta['low'] <= value <= meta['high']):
+            raise ParameterError(f'{name} = {value:g} {meta["unit"]}: must be {meta["low"]:g} to {meta["high"]:g}')
+    elif 'options' in meta and value not in meta['options']:
+        raise ParameterError(f'{name} = {value!r}: must be one of {", ".join(meta["options"])}')
+    elif field.type is bool and not isinstance(value, bool):
+        raise ParameterError(f'{name} = {value!r}: must be true or false')
+    elif field.type is str and not isinstance(value, str):
+        raise ParameterError(f'{name} = {value!r}: must be text')
+
+
+def flatten(cls, prefix=''):
+    """Every leaf of a parameter dataclass as (dotted name, field); groups are walked."""
+    for field in dataclasses.fields(cls):
+        name = prefix + field.name
+        if field.metadata.get('group'):
+            yield from flatten(type(field.default_factory()), name + '.')
+        else:
+            yield name, field
+
+
+def defaults(cls):
+    """{dotted name: default} of a parameter dataclass, a group's own defaults included."""
+    return as_dict(cls())
+
+
+def as_dict(instance, prefix=''):
+    """{dotted name: value} of an instance."""
+    values = {}
+    for field in dataclasses.fields(instance):
+        value = getattr(instance, field.name)
+        if field.metadata.get('group'):
+            values.update(as_dict(value, f'{prefix}{field.name}.'))
+        else:
+            values[prefix + field.name] = value
+    return values
+
+
+def build(cls, values):
+    """An instance from {dotted name: value}; names left out keep their default.
+
+    Raises ParameterError for an unknown name (with the nearest known one) or a refused value.
+    """
+    known = [name for name, _ in flatten(cls)]
+    for name in values:
+        if name not in known:
+            import difflib
+            near = difflib.get_close_matches(name, known, n=1)
+            raise ParameterError(f'unknown parameter {name!r}' + (f'; did you mean {near[0]!r}?' if near else ''))
+    return _replace(cls(), values, '')
+
+
+def _replace(instance, values, prefix):
+    changes = {}
+    for field in dataclasses.fields(instance):
+        name = prefix + field.name
+        if field.metadata.get('group'):
+            changes[field.name] = _replace(getattr(instance, field.name), values, name + '.')
+        elif name in values:
+            value = values[name]
+            if field.type is float and isinstance(value, int) and not isinstance(value, bool):
+                value = float(value)
+            changes[field.name] = tuple(value) if isinstance(value, list) else value
+    try:
+        return dataclasses.replace(instance, **changes)
+    except ParameterError as error:
+        raise error if '.' in str(error).split(' = ')[0] else ParameterError(f'{prefix}{error}') from None
+
+
+def record_type(cls) -> np.dtype:
+    """The numpy record of a parameter dataclass: float -> f8, int and bool -> i8, a choice -> i8 (its
+    index among the options), a group -> nested record; free text is left out."""
+    fields = []
+    hints = typing.get_type_hints(cls)
+    for field in dataclasses.fields(cls):
+        if field.metadata.get('group'):
+            fields.append((field.name, record_type(type(field.default_factory()))))
+        elif 'options' in field.metadata or hints[field.name] in (int, bool):
+            fields.append((field.name, 'i8'))
+        elif hints[field.name] is float:
+            fields.append((field.name, 'f8'))
+    return np.dtype(fields, align=True)
+
+
+def _record_values(instance, cls):
+    values = []
+    for field in dataclasses.fields(cls):
+        value = getattr(instance, field.name)
+        if field.metadata.get('group'):
+            values.append(_record_values(value, type(field.default_factory())))
+        elif 'options' in field.metadata:
+            values.append(field.metadata['options'].index(value))
+        elif isinstance(value, (bool, int, float)):
+            values.append(value)
+    return tuple(values)
+
+
+def record(instance, cls=None) -> np.ndarray:
+    """An instance as a record array of shape (1,): the form the compiled steps take. cls: only the fields of this
+    base class, where the instance has more."""
+    cls = cls or type(instance)
+    return np.array([_record_values(instance, cls)], record_type(cls))

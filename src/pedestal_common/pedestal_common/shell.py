@@ -1,0 +1,451 @@
+"""The ROS shell every node shares: main, parameters, topics, step matching, diagnostics.
+
+A node is `class AcuNode(Shell)` with a parameter dataclass, the topics it reads and a `step`; everything
+it computes is in its column's compiled step.
+"""
+import collections
+import gc
+import importlib
+import os
+import pathlib
+import signal
+import sys
+import time
+import typing
+
+import rclpy
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    ParameterType,
+    SetParametersResult,
+)
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from pedestal_common import messages, parameters, topics
+
+QOS = {
+    'step': QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE, depth=1),
+    'state': QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                        durability=DurabilityPolicy.TRANSIENT_LOCAL),
+    'event': QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE),
+}
+
+OK, WARN, ERROR = 0, 1, 2
+SECOND = 1_000_000_000
+START_DEADLINE = 300.0
+"""Seconds a node waits for its graph: the others may be compiling their laws for the first time."""
+
+
+PARTING = 1.0
+"""Seconds a node that ends waits for readers to take what it published."""
+
+
+class GraphError(RuntimeError):
+    """The graph around a node is not what it must be; one line that names topic, stamp or node."""
+
+
+class GraphParameters(typing.NamedTuple):
+    """What every node is told about the run (ROS parameters `graph.*`)."""
+    pacing: str
+    nodes: tuple
+    deadline: float
+
+    @property
+    def lockstep(self):
+        return self.pacing == 'lockstep'
+
+
+class Stopped(Exception):  # noqa: N818  no error: the node was told to stop
+    """SIGINT or SIGTERM came while a node was waiting."""
+
+
+EXPECTED = (parameters.ParameterError, GraphError, ValueError, OSError, InvalidParameterTypeException,
+            InvalidParameterValueException, Stopped)
+"""What a node may end with in one line; anything else is a defect and shows its traceback."""
+
+_stop = []
+"""Not empty once SIGINT or SIGTERM has come to this process."""
+
+
+def message_class(type_name):
+    """The rclpy class of 'package/msg/Name'."""
+    package, _, name = type_name.split('/')
+    return getattr(importlib.import_module(f'{package}.msg'), name)
+
+
+def _descriptor(field, read_only):
+    meta = field.metadata
+    unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
+    descriptor = ParameterDescriptor(description=meta['doc'] + unit, read_only=read_only)
+    if 'options' in meta:
+        descriptor.additional_constraints = 'one of ' + ', '.join(meta['options'])
+    elif 'low' in meta and field.type is int:
+        descriptor.integer_range = [IntegerRange(from_value=int(meta['low']), to_value=int(meta['high']), step=0)]
+    elif 'low' in meta:
+        descriptor.floating_point_range = [
+            FloatingPointRange(from_value=float(meta['low']), to_value=float(meta['high']), step=0.0)]
+    return descriptor
+
+
+class Steps:
+    """Brings a node's inputs together: the trigger stamped t_k and, of each follower, the message due at t_k.
+
+    followers: {topic: latency in ns}; due is the newest trigger stamp <= t_k - latency (none at the start).
+    Lockstep waits for exactly that message. Realtime answers t_k at the latest when the trigger of the next
+    step arrives, with whatever newest message is there and None for a follower that sent nothing new.
+    `answer(stamp_ns, trigger_message, {topic: message or None})` is called once per step, in order.
+    """
+
+    def __init__(self, trigger, followers, lockstep, answer):
+        self._trigger, self._lockstep, self._answer = trigger, lockstep, answer
+        self._latency = dict(followers)
+        self._awaited = {topic: collections.deque() for topic in followers}
+        self._due = dict.fromkeys(followers)
+        self._arrived = {topic: collections.deque() for topic in followers}
+        self._last = dict.fromkeys((trigger, *followers))
+        self._pending = None
+        self._period = None
+        self.refused = 0
+        self.refusal = ''
+
+    def take(self, topic, stamp, message):
+        """One input has come; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
+        last = self._last[topic]
+        if last is not None and stamp <= last:
+            self._refuse(f'{topic} stamp went back from {last / SECOND:.6f} to {stamp / SECOND:.6f} s')
+            return
+        self._last[topic] = stamp
+        if topic == self._trigger:
+            if self._lockstep and last is not None:
+                if self._period is not None and stamp - last != self._period:
+                    raise GraphError(f'{topic} stamp jumped from {last / SECOND:.6f} to {stamp / SECOND:.6f} s; '
+                                     f'the period is {self._period / SECOND:.6f} s')
+                self._period = stamp - last
+            if self._pending is not None:
+                if self._lockstep:
+                    raise GraphError(f'{topic} stamped {stamp / SECOND:.6f} s came before step '
+                                     f'{self._pending[0] / SECOND:.6f} s was answered')
+                self._close()
+            self._pending = (stamp, message)
+            for name, awaited in self._awaited.items():
+                awaited.append(stamp)
+                self._due[name] = None
+                while awaited and awaited[0] <= stamp - self._latency[name]:
+                    self._due[name] = awaited.popleft()
+        else:
+            self._arrived[topic].append((stamp, message))
+        if self._pending is not None and all(map(self._ready, self._due)):
+            self._close()
+
+    def _refuse(self, reason):
+        if self._lockstep:
+            raise GraphError(reason)
+        self.refused += 1
+        self.refusal = reason
+
+    def _ready(self, topic):
+        due, arrived = self._due[topic], self._arrived[topic]
+        if due is None:
+            return True
+        while arrived and arrived[0][0] < due and len(arrived) > 1:
+            arrived.popleft()
+        if not arrived:
+            return False
+        if self._lockstep and arrived[0][0] != due:
+            raise GraphError(f'{topic} is stamped {arrived[0][0] / SECOND:.6f} s where {due / SECOND:.6f} s is due; '
+                             f'is its latency what this node was told ({self._latency[topic] / SECOND:.6f} s)?')
+        return arrived[0][0] >= due
+
+    def _close(self):
+        stamp, message = self._pending
+        self._pending = None
+        inputs = {}
+        for topic, arrived in self._arrived.items():
+            inputs[topic] = None
+            if self._lockstep:
+                if self._due[topic] is not None:
+                    inputs[topic] = arrived.popleft()[1]
+            else:
+                while arrived and arrived[0][0] <= stamp:
+                    inputs[topic] = arrived.popleft()[1]
+        self._answer(stamp, message, inputs)
+
+    @property
+    def pending_stamp(self):
+        """Stamp of the step that waits for its inputs [ns], or None."""
+        return None if self._pending is None else self._pending[0]
+
+    @property
+    def waiting_for(self):
+        """Topics the pending step still waits for."""
+        return [topic for topic in self._due if self._pending is not None and not self._ready(topic)]
+
+
+class Shell(Node):
+    """A node of the graph.
+
+    parameters_type: the column's dataclass; its fields become ROS parameters of the same dotted names.
+    live: prefixes of parameters that may change while running; the node then implements `reconfigure()`.
+    Raises parameters.ParameterError for an unknown or refused parameter.
+    """
+
+    def __init__(self, name, parameters_type, live=()):
+        super().__init__(name)
+        self.name = name
+        self._parameters_type = parameters_type
+        self._declare(live)
+        self.finished = False
+        self.failure = None
+        self._publishers_by_topic = {}
+        self._next_second = 0
+        self._stamp = 0
+        self._started = False
+        self._send_diagnostics = None
+
+    def _declare(self, live):
+        known = {'use_sim_time', 'start_type_description_service'}
+        self.declare_parameter('graph.pacing', 'realtime', ParameterDescriptor(
+            description='lockstep or realtime', read_only=True))
+        self.declare_parameter('graph.nodes', '', ParameterDescriptor(
+            description='names of the nodes of this run, comma separated; each waits for its readers among them',
+            read_only=True))
+        self.declare_parameter('graph.deadline', 60.0, ParameterDescriptor(
+            description='wall-clock time a silent node is waited for [s]', read_only=True,
+            floating_point_range=[FloatingPointRange(from_value=0.1, to_value=3600.0, step=0.0)]))
+        names = []
+        values = {}
+        for name, field in parameters.flatten(self._parameters_type):
+            names.append(name)
+            read_only = not any(name.startswith(prefix) for prefix in live)
+            value = self._defaults()[name]
+            if isinstance(value, tuple):
+                value = list(value)
+                descriptor = _descriptor(field, read_only)
+                descriptor.type = ParameterType.PARAMETER_STRING_ARRAY
+            else:
+                descriptor = _descriptor(field, read_only)
+            values[name] = self.declare_parameter(name, value, descriptor).value
+        known.update(names, ('graph.pacing', 'graph.nodes', 'graph.deadline'))
+        unknown = [name for name in self._parameter_overrides
+                   if name not in known and not name.startswith('qos_overrides')]
+        parameters.build(self._parameters_type, {**values, **dict.fromkeys(unknown)} if unknown else values)
+        self.parameters = parameters.build(self._parameters_type, values)
+        pacing = self.get_parameter('graph.pacing').value
+        if pacing not in ('lockstep', 'realtime'):
+            raise parameters.ParameterError(f"graph.pacing = '{pacing}': must be one of lockstep, realtime")
+        nodes = tuple(n for n in self.get_parameter('graph.nodes').value.replace(' ', '').split(',') if n)
+        for node in nodes:
+            if node not in topics.NODES:
+                raise parameters.ParameterError(f"graph.nodes names '{node}': must be of {', '.join(topics.NODES)}")
+        self.graph = GraphParameters(pacing, nodes, self.get_parameter('graph.deadline').value)
+        if live:
+            self.add_on_set_parameters_callback(self._on_set)
+            self.add_post_set_parameters_callback(self._post_set)
+
+    def _defaults(self):
+        return parameters.defaults(self._parameters_type)
+
+    def _changed(self, changes):
+        values = parameters.as_dict(self.parameters)
+        values.update({change.name: change.value for change in changes if change.name in values})
+        return parameters.build(self._parameters_type, values)
+
+    def _on_set(self, changes):
+        try:
+            self._changed(changes)
+        except parameters.ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _post_set(self, changes):
+        self.parameters = self._changed(changes)
+        self.reconfigure()
+
+    def reconfigure(self):
+        """`self.parameters` has changed; overridden by a node with live parameters."""
+
+    def writer(self, name):
+        """A function that publishes a message of messages.py on a topic of the table."""
+        topic = topics.BY_NAME[name]
+        publisher = self.create_publisher(message_class(topic.type), topic.name, QOS[topic.qos])
+        self._publishers_by_topic[topic] = publisher
+        to_bytes, publish = messages.serialize, publisher.publish
+        return lambda message: publish(to_bytes(message))
+
+    def reader(self, name, take):
+        """Call take(message) for every message on a topic of the table; broken bytes end the node with a reason."""
+        topic = topics.BY_NAME[name]
+        from_bytes, type_name = messages.deserialize, topic.type
+        self.create_subscription(message_class(topic.type), topic.name,
+                                 self._guarded(lambda data: take(from_bytes(data, type_name))), QOS[topic.qos],
+                                 raw=True)
+
+    def every(self, period, function):
+        """A timer on the steady wall clock [s]."""
+        return self.create_timer(period, self._guarded(function), clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _guarded(self, function):
+        """The same callback, an expected error kept for `main`: rclpy would print a traceback of its own first."""
+        def call(*args):
+            try:
+                function(*args)
+            except EXPECTED as error:
+                self.failure = self.failure or error
+                self.finished = True
+        return call
+
+    def follow(self, trigger, followers, answer):
+        """Read the trigger and its followers {topic: latency s}; call answer once per step (see Steps).
+
+        A trigger that is no topic is the node's own: it calls `self.steps.take(trigger, stamp, None)`. In lockstep a
+        step whose inputs stay away for the deadline ends the node with the names of the silent writers.
+        """
+        steps = Steps(trigger, {name: round(latency * SECOND) for name, latency in followers.items()},
+                      self.graph.lockstep, answer)
+        for name in (trigger, *followers):
+            if name in topics.BY_NAME:
+                self.reader(name, self._stamped(steps, name))
+        self.steps = steps
+        self._progress = (None, time.monotonic())
+        if self.graph.lockstep:
+            self.every(0.2, self._watch)
+
+    def _watch(self):
+        pending = self.steps.pending_stamp
+        if pending is None or self._progress[0] != pending:
+            self._progress = (pending, time.monotonic())
+        elif time.monotonic() - self._progress[1] > self.graph.deadline:
+            waiting = self.steps.waiting_for
+            silent = ', '.join(writer for name in waiting for writer in topics.BY_NAME[name].writers)
+            raise GraphError(f'no {", ".join(waiting)} for step {pending / SECOND:.6f} s after '
+                             f'{self.graph.deadline:g} s; silent: {silent}')
+
+    @staticmethod
+    def _stamped(steps, name):
+        nanoseconds = messages.nanoseconds
+        if name == 'clock':
+            return lambda message: steps.take(name, nanoseconds(message.clock), message)
+        return lambda message: steps.take(name, nanoseconds(message.header.stamp), message)
+
+    def diagnose_with(self, diagnose):
+        """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time,
+        in realtime at every second of the wall."""
+        self._diagnose = diagnose
+        self._send_diagnostics = self.writer('diagnostics')
+        if not self.graph.lockstep:
+            self.every(1.0, self._publish_diagnostics)
+
+    def _publish_diagnostics(self):
+        level, message, values = self._diagnose()
+        array = messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
+            level=level, name=self.name, message=message, hardware_id='pedestal',
+            values=[messages.KeyValue(key=key, value=value) for key, value in values])])
+        messages.put_stamp(array.header.stamp, self._stamp)
+        self._send_diagnostics(array)
+
+    def begin_step(self, stamp):
+        """To be called with t_k before anything of step k is published. The first call waits for the graph; in
+        lockstep every whole second publishes diagnostics."""
+        if not self._started:
+            self.await_graph()
+            self._started = True
+            self._next_second = -(-stamp // SECOND) * SECOND
+        self._stamp = stamp
+        if self.graph.lockstep and stamp >= self._next_second:
+            self._next_second = (stamp // SECOND + 1) * SECOND
+            self._publish_diagnostics()
+
+    def await_acknowledged(self):
+        """Wait until every reader has received all that this node published. Raises GraphError after the deadline: in
+        lockstep it is the recorder that is silent, for everyone else has answered the step before."""
+        for topic, publisher in self._publishers_by_topic.items():
+            if not publisher.wait_for_all_acked(Duration(seconds=self.graph.deadline)):
+                raise GraphError(f'a reader of {topic.name} took nothing for {self.graph.deadline:g} s; '
+                                 'silent: recorder')
+
+    def announce(self, send, message):
+        """Publish a latched message that has no stamp. In lockstep it keeps its place between two steps: what was
+        sent before has arrived everywhere before it, and it has before anything that follows."""
+        if self.graph.lockstep:
+            self.await_acknowledged()
+        send(message)
+        if self.graph.lockstep:
+            self.await_acknowledged()
+
+    def await_graph(self):
+        """Wait until every topic this node writes has all its readers of the run.
+
+        Raises GraphError after START_DEADLINE, or when another graph writes the same topics.
+        """
+        deadline = time.monotonic() + START_DEADLINE
+        for topic, publisher in self._publishers_by_topic.items():
+            wanted = topics.readers(topic, self.graph.nodes)
+            while publisher.get_subscription_count() < wanted:
+                if time.monotonic() > deadline:
+                    present = sorted(info.node_name for info in self.get_subscriptions_info_by_topic(topic.name))
+                    raise GraphError(f'{topic.name} has {publisher.get_subscription_count()} of {wanted} readers '
+                                     f'after {START_DEADLINE:g} s; present: {", ".join(present) or "none"}')
+                if _stop:
+                    raise Stopped
+                time.sleep(0.01)
+        for topic in self._publishers_by_topic:
+            if len(topic.writers) == 1 and self.count_publishers(topic.name) > 1:
+                raise GraphError(f'{topic.name} already has a writer: another graph runs on ROS_DOMAIN_ID '
+                                 f'{self.context.get_domain_id()}; set a free one')
+
+    def draining(self):
+        """Asked after the end: True while a node must go on receiving before `close`; overridden by the recorder."""
+        return False
+
+    def close(self):
+        """Called once before the node ends; overridden by a node that has something to put away. What was published
+        and is still on its way would die with the node, so it waits a little for the readers."""
+        for publisher in self._publishers_by_topic.values():
+            publisher.wait_for_all_acked(Duration(seconds=PARTING))
+
+
+def _executor():
+    try:
+        from rclpy.experimental.events_executor import EventsExecutor
+        return EventsExecutor()
+    except ImportError:
+        from rclpy.executors import SingleThreadedExecutor
+        return SingleThreadedExecutor()
+
+
+def main(node_class, args=None) -> int:
+    """Run a node until it is finished or told to stop; exit code 0, or 1 with one line on stderr."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: _stop.append(True))
+    os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(pathlib.Path(__file__).with_name('fastdds.xml')))
+    node = None
+    name = os.path.basename(sys.argv[0])
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = node_class()
+        name = node.get_name()
+        executor = _executor()
+        executor.add_node(node)
+        gc.freeze()
+        while not (_stop or node.finished) or node.draining():
+            executor.spin_once(timeout_sec=0.1)
+        node.close()
+        if node.failure is not None:
+            raise node.failure
+        return 0
+    except Stopped:
+        return 0
+    except EXPECTED as error:
+        print(f'{name}: error: {error}', file=sys.stderr)
+        return 1
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()

@@ -1,0 +1,78 @@
+"""The graph as one table: every topic with its type, writer, readers, QoS and rate. No ROS here.
+
+Qos
+    step    one message per drive step: reliable, keep all (nothing may be lost)
+    state   latched: reliable, transient local, depth 1
+    event   reliable, keep last 10
+Rate
+    step    one per drive step, stamped with the step (or the step it measured, where latency is modelled)
+    once    one at stamp 0, before the first step
+    second  one per writer at every whole second of the drive's time
+    change  whenever the value changes; has no stamp, belongs to the step its writer answers next
+"""
+import typing
+
+
+class Topic(typing.NamedTuple):
+    name: str
+    type: str
+    writers: tuple
+    readers: tuple
+    qos: str
+    rate: str
+    doc: str
+
+
+NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
+"""Names of the nodes; `operator` is whoever sends the ACU its program track (`pedestal run`)."""
+
+_ALL = NODES[:-2]
+
+TOPICS = (
+    Topic('clock', 'rosgraph_msgs/msg/Clock', ('adu',), ('ship_motion',), 'step', 'step',
+          "the drive's time"),
+    Topic('joint_states', 'sensor_msgs/msg/JointState', ('adu',), ('tracking_receiver', 'acu'), 'step', 'step',
+          'azimuth, elevation: encoder angle [rad], rate [rad/s], torque on the load [Nm]'),
+    Topic('adu/motor_states', 'sensor_msgs/msg/JointState', ('adu',), (), 'step', 'step',
+          'azimuth_motor_1 ... elevation_motor_2: shaft angle [rad], rate [rad/s], torque [Nm]'),
+    Topic('ship/truth', 'nav_msgs/msg/Odometry', ('ship_motion',), ('tracking_receiver', 'adu'), 'step', 'step',
+          'pose of base_link (FLU) in earth (ENU), twist in base_link'),
+    Topic('ship/imu/data_raw', 'sensor_msgs/msg/Imu', ('ship_motion',), ('ins',), 'step', 'step',
+          'specific force [m/s2] and angular rate [rad/s] (REP 145); orientation_covariance[0] = -1'),
+    Topic('ship/imu/data', 'sensor_msgs/msg/Imu', ('ins',), ('acu',), 'step', 'step',
+          'attitude deck -> earth and deck rate [rad/s] as the INS knows them'),
+    Topic('tracking_receiver/angle_error', 'geometry_msgs/msg/Vector3Stamped', ('tracking_receiver',), ('acu',),
+          'step', 'step', 'x cross-elevation error [rad], y elevation error [rad], z C/N0 [dB-Hz]; x, y NaN unlocked'),
+    Topic('target/truth', 'nav_msgs/msg/Odometry', ('tracking_receiver',), (), 'step', 'step',
+          'target position [m] and velocity [m/s] in the ENU frame of the station'),
+    Topic('acu/rate_command', 'sensor_msgs/msg/JointState', ('acu',), ('adu',), 'step', 'step',
+          'azimuth, elevation: velocity [rad/s], effort = feed-forward load torque [Nm]'),
+    Topic('acu/estimate', 'trajectory_msgs/msg/JointTrajectory', ('acu',), (), 'step', 'step',
+          'target azimuth, elevation as filtered (earth angles): angle [rad], rate, acceleration; NaN without one'),
+    Topic('acu/reference', 'trajectory_msgs/msg/JointTrajectory', ('acu',), (), 'step', 'step',
+          'what the position loop follows, deck angles: angle [rad], rate, acceleration'),
+    Topic('acu/mode', 'std_msgs/msg/String', ('acu',), (), 'state', 'change',
+          'standby, stow, preset, program or autotrack'),
+    Topic('acu/program_track', 'trajectory_msgs/msg/JointTrajectory', ('operator',), ('acu',), 'state', 'once',
+          'time-tagged azimuth, elevation (earth); one point is a preset (deck)'),
+    Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', _ALL, ('operator',), 'event', 'second',
+          'state of each node'),
+)
+
+BY_NAME = {topic.name: topic for topic in TOPICS}
+
+
+def written_by(node, graph):
+    """The topics `node` writes in a graph of these nodes, in table order."""
+    return [topic for topic in TOPICS if node in topic.writers and node in graph]
+
+
+def read_by(node, graph):
+    """The topics `node` reads for which the graph has a writer; the recorder reads every one."""
+    return [topic for topic in TOPICS
+            if (node in topic.readers or node == 'recorder') and any(w in graph for w in topic.writers)]
+
+
+def readers(topic, graph):
+    """How many subscriptions a topic must have before a graph of these nodes may start."""
+    return sum(node in graph for node in topic.readers) + ('recorder' in graph)

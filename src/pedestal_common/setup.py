@@ -1,0 +1,22 @@
+from setuptools import find_packages, setup
+
+package_name = 'pedestal_common'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        ('share/' + package_name, ['package.xml']),
+    ],
+    install_requires=['numpy', 'numba', 'rosbags'],
+    extras_require={'test': ['pytest', 'scipy']},
+    python_requires='>=3.10',
+    zip_safe=False,
+    maintainer='pedestal maintainers',
+    maintainer_email='pedestal@example.org',
+    description='What the packages of the pedestal share: line-of-sight geometry, parameters, topic table '
+                'and node shell.',
+    license='Apache-2.0',
+)

@@ -1,0 +1,83 @@
+"""Step matching: what a node waits for, in which order it answers, what it refuses."""
+import pytest
+
+from pedestal_common.shell import GraphError, Steps
+
+MS = 1_000_000
+
+
+def collect(followers, lockstep=True):
+    answers = []
+    steps = Steps('trigger', followers, lockstep,
+                  lambda stamp, message, inputs: answers.append((stamp // MS, message, dict(inputs))))
+    return steps, answers
+
+
+@pytest.mark.parametrize('order', [('trigger', 'a', 'b'), ('b', 'a', 'trigger'), ('a', 'trigger', 'b')])
+def test_lockstep_answers_once_when_all_have_come(order):
+    steps, answers = collect({'a': 0, 'b': 0})
+    for k in range(3):
+        for topic in order:
+            assert len(answers) == k
+            steps.take(topic, 5 * k * MS, f'{topic}{k}')
+        assert answers[-1] == (5 * k, f'trigger{k}', {'a': f'a{k}', 'b': f'b{k}'})
+
+
+def test_latency_makes_the_older_message_due():
+    steps, answers = collect({'a': 12 * MS})
+    for k in range(6):
+        steps.take('trigger', 5 * k * MS, k)
+        if k >= 3:
+            assert len(answers) == k
+            steps.take('a', 5 * (k - 3) * MS, f'a{k - 3}')
+    assert [inputs['a'] for _, _, inputs in answers] == [None, None, None, 'a0', 'a1', 'a2']
+
+
+def test_waiting_for_names_the_silent_topic():
+    steps, answers = collect({'a': 0, 'b': 0})
+    steps.take('trigger', 0, None)
+    steps.take('b', 0, None)
+    assert (steps.waiting_for, steps.pending_stamp, answers) == (['a'], 0, [])
+
+
+@pytest.mark.parametrize('stamps, words', [((0, 5, 5), 'went back'), ((0, 5, 3), 'went back'), ((0, 5, 15), 'jumped')])
+def test_lockstep_refuses_stamps_off_the_grid(stamps, words):
+    steps, _ = collect({})
+    with pytest.raises(GraphError, match=words):
+        for stamp in stamps:
+            steps.take('trigger', stamp * MS, None)
+
+
+def test_lockstep_names_a_wrong_latency():
+    steps, _ = collect({'a': 5 * MS})
+    steps.take('trigger', 0, None)
+    steps.take('trigger', 5 * MS, None)
+    with pytest.raises(GraphError, match='latency'):
+        steps.take('a', 5 * MS, None)
+
+
+def test_realtime_goes_on_without_a_silent_follower():
+    steps, answers = collect({'a': 0}, lockstep=False)
+    for k in range(3):
+        steps.take('trigger', 5 * k * MS, k)
+    assert answers == [(0, 0, {'a': None}), (5, 1, {'a': None})]
+    steps.take('a', 10 * MS, 'late')
+    assert answers[-1] == (10, 2, {'a': 'late'})
+
+
+def test_realtime_hands_over_the_newest_and_never_twice():
+    steps, answers = collect({'a': 0}, lockstep=False)
+    steps.take('trigger', 0, 0)
+    steps.take('trigger', 5 * MS, 1)
+    steps.take('a', 0, 'a0')
+    steps.take('trigger', 10 * MS, 2)
+    steps.take('trigger', 15 * MS, 3)
+    assert [inputs['a'] for _, _, inputs in answers] == [None, 'a0', None]
+
+
+def test_realtime_refuses_stamps_that_go_back_and_says_so():
+    steps, answers = collect({}, lockstep=False)
+    for stamp in (0, 5, 2, 10):
+        steps.take('trigger', stamp * MS, stamp)
+    assert [answer[0] for answer in answers] == [0, 5, 10]
+    assert steps.refused == 1 and 'went back' in steps.refusal
