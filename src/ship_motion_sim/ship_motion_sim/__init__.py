@@ -1,0 +1,28 @@
+"""How a ship moves on a seaway, what an IMU on it feels and what its INS reports.
+
+motion.step     time -> the ship's truth (stateless: the same seed and time give the same bits in any order)
+imu.step        truth -> specific force and angular rate as REP 145 wants them
+ins.step        stamp of an IMU message -> attitude and deck rate as a late and imperfect INS knows them
+
+Frames
+    earth   ENU tangent plane at the place where the ship is at t = 0.
+    deck    FLU: x to the bow, y to port, z up. roll about x (port side up), pitch about y (bow down), yaw
+            about z (to port) as fixed axes of REP 103; yaw 0 is east. A compass heading turns the other way:
+            yaw = 90 deg - heading, converted where the parameter is read.
+    mu      where a wave travels to, seen from the bow, clockwise: 0 following, 90 from port to starboard,
+            180 head sea.
+
+Units are SI and radians; a name that ends in _deg is in degrees.
+
+Symbols
+    Hs, Tp, wp      significant wave height [m], peak period [s], peak frequency [rad/s]
+    S(w)            one-sided wave spectrum, variance Hs^2/16                       [m2 s/rad]
+    gamma           peak enhancement of JONSWAP; 1 is Bretschneider (ITTC)          [-]
+    k               wave number w^2/g of deep water                                 [rad/m]
+    w_e             encounter frequency w - k U cos mu; negative when the ship overtakes the wave  [rad/s]
+    X               complex amplitude of one degree of freedom: x = sum Re(X e^{j(w_e t + phase)})
+    U               speed through the water along the mean heading                  [m/s]
+    w, dw           angular velocity of the deck against the earth, FLU, and its derivative  [rad/s, rad/s2]
+    f               specific force, FLU: at rest +g along z                         [m/s2]
+    mat_ed          rotation deck -> earth; quaternions are x, y, z, w and rotate the same way
+"""

@@ -1,0 +1,33 @@
+"""Gravity, rotation and radii of the earth: WGS-84 (NIMA TR8350.2, tables 3.1 to 3.4), nowhere else."""
+import math
+
+from pedestal_common.compiled import compiled
+
+SEMI_MAJOR = 6378137.0          # a [m]
+FLATTENING = 1.0 / 298.257223563
+RATE = 7.292115e-5              # [rad/s]
+GRAVITY_EQUATOR = 9.7803253359  # [m/s2]
+GRAVITY_POLE = 9.8321849378     # [m/s2]
+ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
+_SOMIGLIANA = (1.0 - FLATTENING) * GRAVITY_POLE / GRAVITY_EQUATOR - 1.0
+
+
+@compiled
+def gravity(latitude):
+    """Normal gravity on the ellipsoid [m/s2] at a geodetic latitude [rad] (Somigliana, TR8350.2 equation 4-1)."""
+    s2 = math.sin(latitude) ** 2
+    return GRAVITY_EQUATOR * (1.0 + _SOMIGLIANA * s2) / math.sqrt(1.0 - ECCENTRICITY2 * s2)
+
+
+@compiled
+def rate(latitude):
+    """Rotation of the earth in ENU [rad/s]: (east, north, up)."""
+    return 0.0, RATE * math.cos(latitude), RATE * math.sin(latitude)
+
+
+@compiled
+def radii(latitude):
+    """Radii of curvature [m] at a geodetic latitude [rad]: (along the meridian, across it)."""
+    w2 = 1.0 - ECCENTRICITY2 * math.sin(latitude) ** 2
+    across = SEMI_MAJOR / math.sqrt(w2)
+    return across * (1.0 - ECCENTRICITY2) / w2, across

@@ -1,0 +1,108 @@
+"""Parameters of ship, IMU and INS. `ship_motion_node` takes ShipMotionParameters, `ins_node` InsParameters;
+both hold the group `ship`, which must be the same in both (ins.step says when it is not)."""
+import dataclasses
+
+from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter
+
+SEED_MAX = 2 ** 31 - 1
+
+
+@dataclasses.dataclass(frozen=True)
+class HullParameters(Parameters):
+    """A ship of about 10 000 t. Its gains are plausible, not identified (reference/nav.md section 3.1)."""
+    length: float = parameter(145.0, 5.0, 500.0, 'm', 'length on the waterline')
+    beam: float = parameter(20.6, 1.0, 100.0, 'm', 'beam on the waterline')
+    draught: float = parameter(7.2, 0.2, 40.0, 'm', 'draught')
+    roll_gain: float = parameter(0.75, 0.0, 2.0, '-', 'roll per effective wave slope, static')
+    roll_period: float = parameter(13.0, 1.0, 60.0, 's', 'natural period of roll')
+    roll_damping: float = parameter(0.08, 0.005, 2.0, '-', 'damping ratio of roll')
+    pitch_period: float = parameter(6.8, 1.0, 60.0, 's', 'natural period of pitch')
+    pitch_damping: float = parameter(0.35, 0.005, 2.0, '-', 'damping ratio of pitch')
+    heave_period: float = parameter(7.2, 1.0, 60.0, 's', 'natural period of heave')
+    heave_damping: float = parameter(0.30, 0.005, 2.0, '-', 'damping ratio of heave')
+    yaw_gain: float = parameter(0.9, 0.0, 2.0, '-', 'yaw per turn of the orbital flow along the hull, static')
+    yaw_period: float = parameter(12.0, 1.0, 120.0, 's', 'natural period of yaw')
+    yaw_damping: float = parameter(0.7, 0.005, 2.0, '-', 'damping ratio of yaw')
+
+
+@dataclasses.dataclass(frozen=True)
+class PlainParameters(Parameters):
+    """A sine per degree of freedom, amplitude sin(2 pi t / period); the rest stands still."""
+    roll_amplitude_deg: float = parameter(10.0, 0.0, 60.0, 'deg', 'amplitude of roll')
+    roll_period: float = parameter(8.0, 0.5, 1000.0, 's', 'period of roll')
+    pitch_amplitude_deg: float = parameter(0.0, 0.0, 60.0, 'deg', 'amplitude of pitch')
+    pitch_period: float = parameter(6.0, 0.5, 1000.0, 's', 'period of pitch')
+    yaw_amplitude_deg: float = parameter(0.0, 0.0, 60.0, 'deg', 'amplitude of yaw about the mean heading')
+    yaw_period: float = parameter(12.0, 0.5, 1000.0, 's', 'period of yaw')
+    heave_amplitude: float = parameter(0.0, 0.0, 20.0, 'm', 'amplitude of heave')
+    heave_period: float = parameter(7.0, 0.5, 1000.0, 's', 'period of heave')
+
+
+@dataclasses.dataclass(frozen=True)
+class ShipParameters(Parameters):
+    """Sea, course and hull: everything the ship's truth depends on."""
+    motion: str = choice('waves', ('waves', 'plain'), 'waves from a spectrum, or plain sines')
+    sea_state: int = parameter(5, 0, 6, '-', '3 to 6 take height and period from the table; 0: as given below')
+    significant_height: float = parameter(0.0, 0.0, 20.0, 'm', 'Hs, with sea_state 0 only')
+    peak_period: float = parameter(0.0, 0.0, 25.0, 's', 'Tp, with sea_state 0 only')
+    gamma: float = parameter(3.3, 1.0, 10.0, '-', 'peak enhancement of JONSWAP; 1 is Bretschneider')
+    wave_angle_deg: float = parameter(45.0, 0.0, 360.0, 'deg',
+                                      'where the waves travel to, clockwise from the bow: 0 following, 180 head')
+    spread_deg: float = parameter(15.0, 0.0, 60.0, 'deg', 'standard deviation of the direction of single waves')
+    heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'mean heading, clockwise from north')
+    speed: float = parameter(7.0, 0.0, 25.0, 'm/s', 'along the mean heading')
+    latitude_deg: float = parameter(47.0, -89.0, 89.0, 'deg', 'geodetic latitude: gravity and earth rate')
+    seed: int = parameter(1, 0, SEED_MAX, '-', 'seed of the seaway')
+    hull: HullParameters = group(HullParameters)
+    plain: PlainParameters = group(PlainParameters)
+
+    def check(self):
+        if self.sea_state in (1, 2):
+            raise ParameterError(f'sea_state = {self.sea_state}: must be 3 to 6, or 0 for significant_height and '
+                                 'peak_period')
+        for name, low in (('significant_height', 0.01), ('peak_period', 3.0)):
+            value = getattr(self, name)
+            if self.sea_state == 0 and self.motion == 'waves' and value < low:
+                raise ParameterError(f'{name} = {value:g}: must be at least {low:g} with sea_state = 0')
+            if self.sea_state != 0 and value != 0.0:
+                raise ParameterError(f'{name} = {value:g}: must be 0 unless sea_state = 0')
+
+
+@dataclasses.dataclass(frozen=True)
+class ImuParameters(Parameters):
+    """Errors of the IMU; the defaults are gyrocompass grade: 0.01 deg/h, 0.005 deg/sqrt(h), 30 ug, 10 ug/sqrt(Hz)."""
+    gyro_bias_x: float = parameter(4.85e-8, -0.1, 0.1, 'rad/s', 'gyro bias along x')
+    gyro_bias_y: float = parameter(4.85e-8, -0.1, 0.1, 'rad/s', 'gyro bias along y')
+    gyro_bias_z: float = parameter(4.85e-8, -0.1, 0.1, 'rad/s', 'gyro bias along z')
+    gyro_noise: float = parameter(1.45e-6, 0.0, 0.01, 'rad/sqrt(s)', 'angle random walk')
+    accelerometer_bias_x: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along x')
+    accelerometer_bias_y: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along y')
+    accelerometer_bias_z: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along z')
+    accelerometer_noise: float = parameter(1e-4, 0.0, 1.0, 'm/s/sqrt(s)', 'velocity random walk')
+    seed: int = parameter(2, 0, SEED_MAX, '-', 'seed of the noise')
+
+
+@dataclasses.dataclass(frozen=True)
+class ShipMotionParameters(Parameters):
+    """ship_motion_node."""
+    ship: ShipParameters = group(ShipParameters)
+    imu: ImuParameters = group(ImuParameters)
+
+
+@dataclasses.dataclass(frozen=True)
+class InsParameters(Parameters):
+    """ins_node: how far and how late its attitude is. `ship` is the ship_motion node's."""
+    roll_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of roll')
+    pitch_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of pitch')
+    heading_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of heading, clockwise')
+    tilt_wander: float = parameter(1.7e-4, 0.0, 0.1, 'rad', 'rms of the slow error of roll and pitch')
+    heading_wander: float = parameter(5e-4, 0.0, 0.1, 'rad', 'rms of the slow error of heading')
+    wander_time: float = parameter(300.0, 0.1, 1e5, 's', 'correlation time of the slow errors')
+    tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')
+    heading_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of heading, per sample')
+    rate_noise: float = parameter(1.7e-4, 0.0, 0.1, 'rad/s', 'rms white noise of the deck rate, per axis and sample')
+    latency: float = parameter(0.005, 0.0, 0.25, 's', 'from measurement to release')
+    imu_tolerance: float = parameter(0.005, 1e-6, 1.0, 'rad/s',
+                                     'largest difference between the IMU and the ship as the INS knows it')
+    seed: int = parameter(3, 0, SEED_MAX, '-', 'seed of the errors')
+    ship: ShipParameters = group(ShipParameters)
