@@ -1,0 +1,320 @@
+"""The receiver as a whole: noise law, geometry, lock, latency, smoothing, what it does with bad input."""
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pedestal_common.line_of_sight import ashore_matrix
+from pedestal_common.parameters import ParameterError, build
+from tracking_receiver_sim import monopulse, receiver, target
+from tracking_receiver_sim.params import TrackingReceiverParameters
+
+PERIOD = 0.005
+BEAMWIDTH = 0.0175
+FIXED = {'target.kind': 'step', 'target.angle.azimuth': 0.3, 'target.angle.elevation': 0.6,
+         'target.angle.start': 1e6, 'receiver.range_exponent': 0.0}
+QUIET = FIXED | {'receiver.cn0_dbhz': 110.0}
+
+
+class Bench:
+    """A receiver with a beam to point; `run` takes steps and gives the outputs as an array."""
+
+    def __init__(self, values, period=PERIOD, duration=1000.0):
+        self.params = build(TrackingReceiverParameters, values)
+        self.target = target.build(self.params.target, duration)
+        self.constants = receiver.constants(self.params, period, self.target)
+        self.state = receiver.initial_state()
+        self.inputs = np.zeros(1, receiver.INPUTS)
+        self.inputs['mat_ed'], self.inputs['valid'], self.inputs['stamp_ns'] = ashore_matrix(), 1, -1
+        self.period_ns, self.next_ns = round(period * 1e9), 0
+        self.point(0.3, 0.6)
+
+    def point(self, azimuth, elevation):
+        self.inputs['azimuth'], self.inputs['elevation'] = azimuth, elevation
+
+    def run(self, steps=1, rng=None, stamps=None):
+        stamps = self.next_ns + self.period_ns * np.arange(steps) if stamps is None else stamps
+        count = receiver.normals_per_step(self.params)
+        outputs, out = np.zeros(1, receiver.OUTPUTS), np.zeros(len(stamps), receiver.OUTPUTS)
+        for k, stamp in enumerate(stamps):
+            self.inputs['stamp_ns'] = stamp
+            normals = np.zeros(count) if rng is None else rng.standard_normal(count)
+            receiver.step(self.state, self.constants, self.inputs, outputs, self.target.breaks,
+                          self.target.coefficients, normals)
+            out[k] = outputs[0]
+        self.next_ns = int(stamps[-1]) + self.period_ns
+        return out
+
+
+def errors(out):
+    return np.stack([out['cross_elevation'], out['elevation']], axis=1)
+
+
+@pytest.mark.parametrize('cn0_dbhz', [45.0, 52.0, 65.0])
+@pytest.mark.parametrize('samples', [1, 5])
+def test_noise_law(cn0_dbhz, samples):
+    bench = Bench(FIXED | {'receiver.cn0_dbhz': cn0_dbhz, 'receiver.samples_per_step': samples})
+    out = bench.run(8000, np.random.default_rng(3))[200:]
+    law = BEAMWIDTH / (1.6 * math.sqrt(2.0 * 10.0**(cn0_dbhz / 10.0) * PERIOD))
+    assert errors(out).std(axis=0) == pytest.approx([law, law], rel=0.05)
+    assert receiver.angle_noise(bench.params, cn0_dbhz, PERIOD) == pytest.approx(law, rel=1e-12)
+    assert np.abs(errors(out).mean(axis=0)).max() < 5.0 * law / math.sqrt(len(out))
+    assert 10.0 * np.log10(np.mean(10.0**(out['cn0_dbhz'] / 10.0))) == pytest.approx(cn0_dbhz, abs=0.1)
+
+
+def test_default_noise_is_about_30_millidegrees():
+    params = TrackingReceiverParameters()
+    sigma = receiver.angle_noise(params, params.receiver.cn0_dbhz, PERIOD)
+    assert math.degrees(sigma) == pytest.approx(0.03, abs=5e-4)
+
+
+def test_noise_grows_off_axis():
+    bench = Bench(FIXED | {'receiver.cn0_dbhz': 60.0})
+    v = 0.45
+    bench.point(0.3, 0.6 - v * BEAMWIDTH)
+    out = bench.run(8000, np.random.default_rng(4))[200:]
+    S, D = monopulse.sum_pattern(v), monopulse.difference_pattern(v, 1.6)
+    on_axis = BEAMWIDTH / (1.6 * math.sqrt(2.0 * 1e6 * PERIOD))
+    across, along = errors(out).std(axis=0)
+    assert across == pytest.approx(on_axis / S, rel=0.05)
+    assert along == pytest.approx(on_axis / S * math.sqrt(1.0 + (D / S)**2), rel=0.05)
+    assert along > 1.15 * across > 1.15 * 1.2 * on_axis
+
+
+def test_noise_in_the_sum_channel_does_not_lower_the_slope():
+    bench = Bench(FIXED | {'receiver.cn0_dbhz': 40.0, 'receiver.acquire_level_dbhz': 30.0,
+                           'receiver.lose_level_dbhz': 30.0})
+    bench.point(0.3, 0.6 - 0.2 * BEAMWIDTH)
+    seen = bench.run(20000, np.random.default_rng(11))[200:]['elevation'].mean() / BEAMWIDTH
+    assert seen == pytest.approx(monopulse.difference_pattern(0.2, 1.6) / monopulse.sum_pattern(0.2) / 1.6, rel=0.03)
+
+
+def test_recursion_noise_as_predicted():
+    bench = Bench(FIXED | {'receiver.cn0_dbhz': 55.0, 'receiver.smoothing': 'recursion'})
+    out = bench.run(12000, np.random.default_rng(5))[200:]
+    predicted = receiver.angle_noise(bench.params, 55.0, PERIOD)
+    assert errors(out).std(axis=0) == pytest.approx([predicted, predicted], rel=0.05)
+
+
+@pytest.mark.parametrize('elevation', [0.0, 1.0, 1.4])
+def test_azimuth_error_is_seen_as_cross_elevation(elevation):
+    bench = Bench(QUIET | {'target.angle.elevation': elevation})
+    off = 2e-3
+    bench.point(0.3 - off, elevation)
+    out = bench.run(300)[-1]
+    assert out['true_cross_elevation'] == pytest.approx(off * math.cos(elevation), rel=1e-4)
+    assert out['cross_elevation'] == pytest.approx(off * math.cos(elevation), rel=0.01)
+
+
+def test_error_signs_and_slope_factor():
+    bench = Bench(QUIET | {'antenna.slope_factor': 1.5})
+    bench.point(0.3, 0.6 - 1e-3)
+    out = bench.run(300)[-1]
+    assert out['true_elevation'] == pytest.approx(1e-3, rel=1e-6)
+    assert out['elevation'] == pytest.approx(1.5e-3, rel=0.01)
+
+
+def test_phase_error_and_cross_coupling():
+    bench = Bench(QUIET | {'antenna.phase_error': 0.5, 'antenna.cross_coupling': 0.2})
+    bench.point(0.3, 0.6 - 1e-3)
+    out = bench.run(300)[-1]
+    assert out['elevation'] == pytest.approx(1e-3 * math.cos(0.5) * math.cos(0.2), rel=0.01)
+    assert out['cross_elevation'] == pytest.approx(-1e-3 * math.cos(0.5) * math.sin(0.2), rel=0.01)
+
+
+@pytest.mark.parametrize('v, sense', [(0.2, 1), (-0.3, -1), (0.9, 1), (-1.2, -1), (1.3, -1), (1.5, -1), (1.66, -1),
+                                      (1.7, 1), (1.9, 1)])
+def test_s_curve_saturates_reverses_and_has_a_false_null(v, sense):
+    u = 3.735243 * v
+    S, D = math.cos(u) / (1.0 - (2.0 * u / math.pi)**2), math.sin(u) / (1.0 - (u / math.pi)**2)
+    expected = max(-0.7, min(D / S / 3.735243, 0.7))
+    bench = Bench(QUIET)
+    bench.point(0.3, 0.6 - v * BEAMWIDTH)
+    out = bench.run(600)[-1]
+    assert out['locked'] == 1
+    assert out['true_elevation'] == pytest.approx(v * BEAMWIDTH)
+    assert out['elevation'] / BEAMWIDTH == pytest.approx(expected, abs=1e-5)
+    assert out['elevation'] * sense > 0.0
+    assert abs(out['cross_elevation']) < 1e-12
+
+
+def test_geometry_on_a_tilted_moving_deck():
+    bench = Bench(QUIET)
+    rotation = Rotation.from_euler('ZYX', [0.7, -0.2, 0.3])
+    antenna = np.array([30.0, -20.0, 12.0])
+    position = 10e3 * np.array([math.cos(0.6) * math.sin(0.3), math.cos(0.6) * math.cos(0.3), math.sin(0.6)])
+    x, y, z = rotation.inv().apply(position - antenna)
+    bench.inputs['mat_ed'], bench.inputs['position'] = rotation.as_matrix(), antenna
+    bench.point(math.atan2(-y, x), math.atan2(z, math.hypot(x, y)) - 1e-3)
+    out = bench.run(300)[-1]
+    assert (out['true_cross_elevation'], out['true_elevation']) == pytest.approx((0.0, 1e-3), abs=1e-9)
+    assert out['target_position'] == pytest.approx(position, abs=1e-6)
+    assert out['elevation'] == pytest.approx(1e-3, rel=0.01)
+
+
+def test_lock_has_two_levels_and_two_times():
+    bench = Bench(FIXED | {'receiver.cn0_dbhz': 60.0, 'receiver.acquire_level_dbhz': 50.0,
+                           'receiver.lose_level_dbhz': 45.0, 'receiver.cn0_time_constant': 1e-3,
+                           'receiver.acquire_time': 0.1, 'receiver.lose_time': 0.05})
+    v = np.linspace(0.0, 1.2, 2000)
+    level = [60.0 + 20.0 * math.log10(monopulse.sum_pattern(x)) for x in v]
+
+    def point_to_level(dbhz):
+        bench.point(0.3, 0.6 - BEAMWIDTH * v[np.argmax(np.array(level) < dbhz)])
+
+    def locked(steps):
+        return bench.run(steps)['locked'].tolist()
+
+    assert locked(30) == [0] * 19 + [1] * 11
+    point_to_level(47.0)
+    assert locked(100) == [1] * 100
+    point_to_level(40.0)
+    lost = locked(30)
+    assert lost[:9] == [1] * 9 and lost[12:] == [0] * 18
+    point_to_level(47.0)
+    assert locked(100) == [0] * 100
+    out = bench.run(1)[0]
+    assert math.isnan(out['cross_elevation']) and math.isnan(out['elevation'])
+    assert out['status'] == receiver.NO_LOCK and out['cn0_dbhz'] == pytest.approx(47.0, abs=0.3)
+    bench.point(0.3, 0.6)
+    regained = locked(40)
+    assert sum(regained[:19]) == 0 and sum(regained[22:]) == 18
+
+
+@pytest.mark.parametrize('latency', [0.0, 0.005, 0.012, 0.1])
+def test_latency_is_exact(latency):
+    rng = np.random.default_rng(6)
+    stamps = np.cumsum(rng.integers(1, 9_000_000, 400))
+    prompt = Bench(FIXED).run(stamps=stamps, rng=np.random.default_rng(7))
+    late = Bench(FIXED | {'receiver.latency': latency}).run(stamps=stamps, rng=np.random.default_rng(7))
+    assert np.array_equal(prompt['stamp_ns'], stamps) and np.all(prompt['due'] == 1)
+    given = -1
+    for k, now in enumerate(stamps):
+        due = np.flatnonzero(stamps <= now - round(latency * 1e9))
+        newest = due[-1] if len(due) else -1
+        assert late['due'][k] == (newest > given)
+        if newest > given:
+            given = newest
+            assert late['stamp_ns'][k] == stamps[newest]
+            for name in ('cross_elevation', 'elevation', 'cn0_dbhz', 'locked'):
+                assert np.array_equal(late[name][k], prompt[name][newest], equal_nan=True)
+        else:
+            assert math.isnan(late['elevation'][k])
+    assert given >= 0 and late['locked'].any()
+
+
+def smoothing_bench(**changes):
+    return Bench(QUIET | {'receiver.smoothing': 'recursion', 'receiver.samples_per_step': 1} | changes, period=1e-3)
+
+
+def test_smoothing_minus_3_db_is_at_8_17_hz():
+    bench = smoothing_bench(**{'target.kind': 'sine', 'target.angle.start': 0.0, 'target.angle.frequency': 8.17,
+                               'target.angle.azimuth_amplitude': 0.0, 'target.angle.elevation_amplitude': 1e-4})
+    out = bench.run(3000)[1000:]
+    phase = 2.0 * math.pi * 8.17 * 1e-9 * out['stamp_ns']
+    basis = np.stack([np.sin(phase), np.cos(phase)], axis=1)
+    amplitude = np.hypot(*np.linalg.lstsq(basis, out['elevation'], rcond=None)[0])
+    assert amplitude / 1e-4 == pytest.approx(math.sqrt(0.5), abs=0.002)
+
+
+def test_smoothing_step_response():
+    bench = smoothing_bench(**{'target.angle.start': 1.0, 'target.angle.azimuth_amplitude': 0.0,
+                               'target.angle.elevation_amplitude': 1e-4})
+    out = bench.run(1100)[1000:]
+    assert out['elevation'] == pytest.approx(1e-4 * (1.0 - (1.0 - 1.0 / 20.0)**np.arange(1, 101)), abs=2e-8)
+
+
+def test_samples_follow_the_error_between_steps():
+    bench = Bench(QUIET | {'receiver.samples_per_step': 4})
+    bench.run(200)
+    bench.point(0.3, 0.6 - 1e-3)
+    assert bench.run(1)[0]['elevation'] == pytest.approx(1e-3 * (0.25 + 0.5 + 0.75 + 1.0) / 4.0, rel=0.01)
+
+
+def test_level_falls_with_range():
+    bench = Bench({'target.kind': 'flyby', 'target.flyby.speed': 200.0, 'target.flyby.closest_time': 0.0,
+                   'receiver.reference_range': 1000.0, 'receiver.cn0_dbhz': 60.0}, duration=20.0)
+    levels = []
+    for _ in range(3):
+        out = bench.run(1)[0]
+        for _ in range(1000):
+            e, n, u = out['target_position']
+            bench.point(math.atan2(e, n), math.atan2(u, math.hypot(e, n)))
+            out = bench.run(1)[0]
+        levels.append((math.sqrt(e * e + n * n + u * u), out['cn0_dbhz']))
+    for distance, cn0_dbhz in levels:
+        assert cn0_dbhz == pytest.approx(60.0 - 20.0 * math.log10(distance / 1000.0), abs=0.3)
+    assert levels[2][0] > 2.5 * levels[0][0] > 2500.0
+
+
+def test_target_below_the_horizon_gives_no_signal():
+    bench = Bench(FIXED | {'target.kind': 'ramp', 'target.angle.start': 1.0, 'target.angle.elevation': 0.01,
+                           'target.angle.azimuth_rate': 0.0, 'target.angle.elevation_rate': -0.01})
+    rng = np.random.default_rng(8)
+    bench.point(0.3, 0.005)
+    out = bench.run(1000, rng)
+    t = 1e-9 * out['stamp_ns']
+    assert np.all((out['status'] == receiver.BELOW_HORIZON) == (t > 2.0))
+    assert np.all(out['locked'][t > 2.5] == 0) and np.all(out['locked'][(t > 0.5) & (t < 1.9)] == 1)
+    assert np.all(np.isfinite(out['true_elevation'])) and np.all(np.isfinite(out['cn0_dbhz']))
+
+
+def test_past_the_track_the_target_is_not_valid():
+    bench = Bench({'target.kind': 'flyby', 'receiver.reference_range': 1000.0}, duration=0.1)
+    out = bench.run(2000)
+    inside = 1e-9 * out['stamp_ns'] <= 0.1 + target.MARGIN
+    assert np.array_equal(out['target_valid'], inside)
+    assert np.all(out['status'][~inside] == receiver.NO_TARGET)
+    assert np.all(np.isnan(out['target_position'][~inside])) and np.all(np.isnan(out['true_elevation'][~inside]))
+    assert np.all(np.isfinite(out['cn0_dbhz'])) and out['locked'][-1] == 0
+
+
+@pytest.mark.parametrize('field, value', [('valid', 0), ('azimuth', math.nan), ('elevation', math.inf),
+                                          ('mat_ed', math.nan), ('position', math.nan)])
+def test_bad_inputs_unlock_and_leave_no_trace(field, value):
+    bench = Bench(FIXED | {'receiver.cn0_dbhz': 60.0, 'receiver.smoothing': 'recursion'})
+    assert bench.run(200)[-1]['locked'] == 1
+    good = bench.inputs.copy()
+    bench.inputs[field] = value
+    out = bench.run(3)
+    assert np.all(out['status'] == receiver.NO_JOINTS) and np.all(out['locked'] == 0)
+    assert np.all(np.isnan(out['cross_elevation'])) and np.all(np.isnan(out['true_elevation']))
+    assert np.all(out['due'] == 1) and np.all(np.isfinite(out['cn0_dbhz']))
+    assert np.all(out['target_valid'] == 1)
+    bench.inputs[:] = good
+    out = bench.run(30)
+    assert out['locked'].tolist() == [0] * 19 + [1] * 11
+    assert np.abs(errors(out[19:])).max() < 1e-9
+
+
+def test_stamps_that_do_not_increase_are_named_and_change_nothing():
+    bench = Bench(FIXED)
+    bench.run(200)
+    before = bench.state.tobytes()
+    out = bench.run(stamps=np.array([995_000_000, 0, -5_000_000]))
+    assert np.all(out['status'] == receiver.STAMP_ORDER) and np.all(out['due'] == 0)
+    assert np.all(np.isnan(out['elevation'])) and bench.state.tobytes() == before
+    assert bench.run(stamps=np.array([1_000_000_000]))[0]['status'] == receiver.LOCKED
+
+
+def test_same_normals_give_the_same_bits():
+    values = {'receiver.latency': 0.02, 'receiver.smoothing': 'recursion'}
+    runs = [Bench(values, duration=60.0).run(500, np.random.default_rng(9)).tobytes() for _ in range(2)]
+    assert runs[0] == runs[1]
+    assert runs[0] != Bench(values, duration=60.0).run(500, np.random.default_rng(10)).tobytes()
+
+
+def test_latency_that_does_not_fit_the_ring_is_refused():
+    with pytest.raises(ParameterError, match='latency = 0.5 s: must be below 511 periods of 0.0005 s'):
+        Bench(FIXED | {'receiver.latency': 0.5}, period=5e-4)
+
+
+@pytest.mark.parametrize('values, message', [
+    ({'receiver.acquire_level_dbhz': 30.0}, 'lose_level_dbhz'),
+    ({'target.leo_pass.culmination_low_deg': 80.0}, 'culmination_low_deg'),
+    ({'antenna.beamwidth': math.nan}, 'beamwidth'),
+    ({'target.kind': 'rocket'}, 'kind')])
+def test_bad_parameters_are_refused(values, message):
+    with pytest.raises(ParameterError, match=message):
+        build(TrackingReceiverParameters, values)

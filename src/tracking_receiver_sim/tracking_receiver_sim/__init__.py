@@ -1,0 +1,22 @@
+"""Targets and the monopulse tracking receiver that sees them.
+
+receiver.py composes the column and owns `step`; below it target.py (where the target is) and
+monopulse.py (what the receiver's channels make of an error); params.py holds every number.
+
+Frames: the station's ENU frame for targets (axes fixed to the earth at the station), deck FLU and the
+beam's offsets as in pedestal_common. Time of a target runs from the start of the run (stamp 0).
+
+Symbols
+    theta3      half-power beamwidth of the sum pattern                             [rad]
+    k_m         slope of difference over sum per beamwidth, on the beam axis        [-]
+    v           offset from the beam in beamwidths                                  [-]
+    S, D        sum and difference voltage patterns, S(0) = 1                       [-]
+    s, d        complex channel voltages of one sub-sample, unit noise power        [-]
+    C/N0        carrier to noise density of the sum channel on the beam axis        [Hz] or [dB-Hz]
+    tau         integration time of one sub-sample                                  [s]
+    n           samples of the smoothing recursion                                  [-]
+    beta        cross-coupling angle: rotation of the error axes                    [rad]
+    phi         post-comparator phase error                                         [rad]
+    dX, dE      cross-elevation and elevation of the target off the beam            [rad]
+    e, n, u     east, north, up                                                     [m]
+"""

@@ -1,0 +1,131 @@
+"""Parameters of targets and tracking receiver: default, range, unit, meaning."""
+import dataclasses
+import math
+
+from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
+
+KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp')
+LEO_PASS, TRACK_FILE, FLYBY, SINE, STEP, RAMP = range(6)
+
+SMOOTHINGS = ('none', 'recursion')
+NO_SMOOTHING, RECURSION = range(2)
+
+
+@dataclasses.dataclass(frozen=True)
+class StationParameters(Parameters):
+    """Where the pedestal stands (WGS84); used by leo_pass and track_file."""
+    latitude_deg: float = parameter(47.4, -90.0, 90.0, 'deg', 'geodetic latitude')
+    longitude_deg: float = parameter(8.5, -180.0, 360.0, 'deg', 'longitude, east positive')
+    height: float = parameter(500.0, -500.0, 9000.0, 'm', 'height above the ellipsoid')
+
+
+@dataclasses.dataclass(frozen=True)
+class LeoPassParameters(Parameters):
+    """A satellite pass by SGP4."""
+    line_1: str = text('1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
+                       'first line of the TLE')
+    line_2: str = text('2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482',
+                       'second line of the TLE')
+    start_time: str = text('', 'UTC of the start, ISO 8601; empty: the run is centred on a culmination')
+    culmination_low_deg: float = parameter(30.0, 0.0, 90.0, 'deg', 'lowest culmination the pass finder takes')
+    culmination_high_deg: float = parameter(70.0, 0.0, 90.0, 'deg', 'highest culmination the pass finder takes')
+    search_days: float = parameter(3.0, 0.1, 30.0, 'd', 'how far past the TLE epoch the pass finder looks')
+
+    def check(self):
+        if self.culmination_low_deg >= self.culmination_high_deg:
+            raise ParameterError(f'culmination_low_deg = {self.culmination_low_deg:g} deg: must be below '
+                                 f'culmination_high_deg = {self.culmination_high_deg:g} deg')
+
+
+@dataclasses.dataclass(frozen=True)
+class TrackFileParameters(Parameters):
+    """A recorded track: CSV with columns time_s, latitude_deg, longitude_deg, altitude_m (WGS84)."""
+    path: str = text('', 'CSV file')
+    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first row')
+    max_gap: float = parameter(10.0, 0.01, 600.0, 's', 'largest time between two rows')
+
+
+@dataclasses.dataclass(frozen=True)
+class FlybyParameters(Parameters):
+    """A straight, level, uniform pass; azimuth grows along it. Paper 000's UAV by default."""
+    closest_distance: float = parameter(500.0, 0.0, 1e6, 'm', 'closest distance over ground')
+    height: float = parameter(100.0, -1000.0, 1e6, 'm', 'height above the station')
+    speed: float = parameter(15.0, 0.0, 8000.0, 'm/s', 'ground speed')
+    heading: float = parameter(math.pi / 2, -2 * math.pi, 2 * math.pi, 'rad', 'course clockwise from north')
+    closest_time: float = parameter(30.0, -1e4, 1e6, 's', 'time of closest approach')
+
+
+@dataclasses.dataclass(frozen=True)
+class AngleParameters(Parameters):
+    """Targets sine, step and ramp: earth angles about a centre, at a fixed range, moving from `start` on."""
+    azimuth: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'centre, clockwise from north')
+    elevation: float = parameter(0.6, 0.0, math.pi / 2, 'rad', 'centre')
+    range: float = parameter(10e3, 10.0, 1e9, 'm', 'distance of the target')
+    start: float = parameter(0.0, 0.0, 1e6, 's', 'when the motion starts')
+    azimuth_amplitude: float = parameter(0.01, -math.pi, math.pi, 'rad', 'sine and step: azimuth amplitude')
+    elevation_amplitude: float = parameter(0.01, -math.pi, math.pi, 'rad', 'sine and step: elevation amplitude')
+    frequency: float = parameter(0.1, 0.0, 50.0, 'Hz', 'sine: frequency')
+    azimuth_rate: float = parameter(0.01, -10.0, 10.0, 'rad/s', 'ramp: azimuth rate')
+    elevation_rate: float = parameter(0.0, -10.0, 10.0, 'rad/s', 'ramp: elevation rate')
+
+
+@dataclasses.dataclass(frozen=True)
+class TargetParameters(Parameters):
+    """What there is to track."""
+    kind: str = choice('leo_pass', KINDS, 'which target')
+    station: StationParameters = group(StationParameters)
+    leo_pass: LeoPassParameters = group(LeoPassParameters)
+    track_file: TrackFileParameters = group(TrackFileParameters)
+    flyby: FlybyParameters = group(FlybyParameters)
+    angle: AngleParameters = group(AngleParameters)
+
+
+@dataclasses.dataclass(frozen=True)
+class AntennaParameters(Parameters):
+    """Sum and difference channels; the defaults are an X-band dish of 2.4 m."""
+    beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', 'theta3: half-power beamwidth of the sum pattern')
+    slope: float = parameter(1.6, 0.5, 1.867, '1', 'k_m: difference over sum per beamwidth; 1.867: lossless')
+    slope_factor: float = parameter(1.0, 0.1, 5.0, '1', 'true slope over the slope the receiver assumes')
+    cross_coupling: float = parameter(0.0, -math.pi, math.pi, 'rad', 'beta: rotation of the error axes')
+    phase_error: float = parameter(0.0, -math.pi, math.pi, 'rad', 'phi: post-comparator phase error')
+
+
+@dataclasses.dataclass(frozen=True)
+class ReceiverParameters(Parameters):
+    """Level, sampling, smoothing, lock, delay."""
+    cn0_dbhz: float = parameter(46.4, 0.0, 120.0, 'dB-Hz', 'C/N0 on the beam axis at the reference range')
+    reference_range: float = parameter(500e3, 1.0, 1e10, 'm', 'range at which cn0_dbhz holds')
+    range_exponent: float = parameter(2.0, 0.0, 4.0, '1', 'C/N0 falls with this power of range; 0: constant')
+    horizon_mask: float = parameter(0.0, -math.pi / 2, math.pi / 2, 'rad', 'no signal from below this elevation')
+    samples_per_step: int = parameter(5, 1, 100, '1', 'channel samples per drive step')
+    smoothing: str = choice('none', SMOOTHINGS, "none: mean over the step; recursion: paper 002's over the samples")
+    smoothing_samples: int = parameter(20, 1, 10000, '1', 'n of the recursion')
+    full_scale: float = parameter(0.7, 0.1, 100.0, 'beamwidths', 'largest error the detector puts out')
+    agc_time_constant: float = parameter(0.05, 1e-3, 10.0, 's', 'smoothing of the sum power that normalises')
+    cn0_time_constant: float = parameter(0.1, 1e-3, 10.0, 's', 'smoothing of the published C/N0')
+    acquire_level_dbhz: float = parameter(39.0, 0.0, 120.0, 'dB-Hz', 'lock after acquire_time above this')
+    lose_level_dbhz: float = parameter(36.0, 0.0, 120.0, 'dB-Hz', 'unlock after lose_time below this')
+    acquire_time: float = parameter(0.1, 0.0, 10.0, 's', 'time above the upper level before lock')
+    lose_time: float = parameter(0.05, 0.0, 10.0, 's', 'time below the lower level before loss')
+    latency: float = parameter(0.0, 0.0, 0.5, 's', 'from measurement to output')
+
+    def check(self):
+        if self.lose_level_dbhz > self.acquire_level_dbhz:
+            raise ParameterError(f'lose_level_dbhz = {self.lose_level_dbhz:g} dB-Hz: must not be above '
+                                 f'acquire_level_dbhz = {self.acquire_level_dbhz:g} dB-Hz')
+
+
+@dataclasses.dataclass(frozen=True)
+class TrackingReceiverParameters(Parameters):
+    """Parameters of tracking_receiver_node."""
+    target: TargetParameters = group(TargetParameters)
+    antenna: AntennaParameters = group(AntennaParameters)
+    receiver: ReceiverParameters = group(ReceiverParameters)
+    seed: int = parameter(1, 0, 2**31 - 1, '1', 'of the receiver noise')
+
+
+@dataclasses.dataclass(frozen=True)
+class TrackingReceiverNodeParameters(TrackingReceiverParameters):
+    """Parameters of tracking_receiver_node: the receiver and the run it is built for."""
+    period: float = parameter(5e-3, 1e-4, 1.0, 's', 'drive step T')
+    duration: float = parameter(3600.0, 0.1, 86400.0, 's', 'how long the target is laid out for')

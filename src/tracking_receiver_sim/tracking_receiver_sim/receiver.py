@@ -1,0 +1,260 @@
+"""The monopulse tracking receiver: where the target is, what the channels see of it, what is published.
+
+One `step` per drive step. Between the previous step and this one the true error runs in a straight line;
+along it `samples_per_step` samples of sum and difference voltages are taken, the last one at the stamp. Each
+is turned into an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the detector's
+full scale, then smoothed: none is the mean of the step's samples, recursion is paper 002's eq. (1) over the samples.
+
+Voltages are scaled so that one channel's noise has unit power in one sample: the carrier power on axis is
+C/N0 tau, and the receiver, which knows its own noise floor, takes 1 off the sum power it measures.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import earth_angles, offsets, to_deck
+from pedestal_common.parameters import ParameterError
+from tracking_receiver_sim import target
+from tracking_receiver_sim.monopulse import channels, detect, thermal_noise
+from tracking_receiver_sim.params import RECURSION, SMOOTHINGS
+
+STATUSES = ('locked', 'no lock', 'target below the horizon', 'target outside its track', 'joint states not valid',
+            'stamp not after the one before')
+LOCKED, NO_LOCK, BELOW_HORIZON, NO_TARGET, NO_JOINTS, STAMP_ORDER = range(6)
+
+NORMALS_PER_SAMPLE = 6
+"""Real and imaginary noise of the sum and of the two difference channels."""
+RING = 512
+"""Results that can be on their way to the output at once."""
+POWER_FLOOR = 0.01
+"""Least carrier power over noise power in one sample that the C/N0 estimate reports (-20 dB)."""
+
+STATE = np.dtype([
+    ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'),
+    ('agc_power', 'f8'), ('level_power', 'f8'), ('smooth_cross_elevation', 'f8'), ('smooth_elevation', 'f8'),
+    ('locked', 'i8'), ('timer_ns', 'i8'),
+    ('written', 'i8'), ('released', 'i8'),
+    ('ring_stamp_ns', 'i8', RING), ('ring_locked', 'i8', RING),
+    ('ring_cross_elevation', 'f8', RING), ('ring_elevation', 'f8', RING), ('ring_cn0_dbhz', 'f8', RING)], align=True)
+"""error_known: cross_elevation, elevation hold the true error at stamp_ns; timer_ns: time past a lock level;
+written, released: results put into the ring and taken from it since the start."""
+
+CONSTANTS = np.dtype([
+    ('target', target.TARGET),
+    ('beamwidth', 'f8'), ('slope', 'f8'), ('angle_scale', 'f8'), ('full_scale', 'f8'),
+    ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'),
+    ('samples', 'i8'), ('tau', 'f8'), ('period_ns', 'i8'), ('agc_gain', 'f8'), ('level_gain', 'f8'),
+    ('smoothing', 'i8'), ('smoothing_gain', 'f8'),
+    ('power', 'f8'), ('reference_range', 'f8'), ('half_exponent', 'f8'), ('horizon_mask', 'f8'),
+    ('acquire_power', 'f8'), ('lose_power', 'f8'), ('acquire_ns', 'i8'), ('lose_ns', 'i8'),
+    ('latency_ns', 'i8')], align=True)
+"""slope: true k_m; angle_scale: theta3 over the k_m the receiver assumes;
+powers: carrier power in one sample over noise power in one sample."""
+
+INPUTS = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
+                   ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3)], align=True)
+"""Step's stamp [ns]; joint states there and fresh (0 or 1); beam on the deck [rad]; true attitude deck -> earth;
+ENU position of the antenna against the station [m]."""
+
+OUTPUTS = np.dtype([
+    ('due', 'i8'), ('stamp_ns', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
+    ('locked', 'i8'), ('status', 'i8'),
+    ('true_cross_elevation', 'f8'), ('true_elevation', 'f8'),
+    ('target_valid', 'i8'), ('target_position', 'f8', 3), ('target_velocity', 'f8', 3)], align=True)
+"""due: 1 when a result comes out in this step; then stamp_ns (of its measurement), errors [rad] (NaN while not
+locked), C/N0 and locked belong to it. The rest belongs to this step: status (index into STATUSES), true error
+[rad], target ENU [m, m/s]; NaN where not known."""
+
+
+def constants(params, period, built) -> np.ndarray:
+    """The (1,) CONSTANTS of TrackingReceiverParameters, a drive step of `period` [s] and a target.Target."""
+    antenna, receiver = params.antenna, params.receiver
+    if receiver.latency >= (RING - 1) * period:
+        raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RING - 1} periods of '
+                             f'{period:g} s')
+    tau = period / receiver.samples_per_step
+    c = np.zeros(1, CONSTANTS)
+    c['target'], c['beamwidth'] = built.constants, antenna.beamwidth
+    c['slope'] = antenna.slope * antenna.slope_factor
+    c['angle_scale'] = antenna.beamwidth / antenna.slope
+    c['full_scale'] = receiver.full_scale * antenna.beamwidth
+    c['cos_beta'], c['sin_beta'] = math.cos(antenna.cross_coupling), math.sin(antenna.cross_coupling)
+    c['cos_phi'], c['sin_phi'] = math.cos(antenna.phase_error), math.sin(antenna.phase_error)
+    c['samples'], c['tau'], c['period_ns'] = receiver.samples_per_step, tau, round(period * 1e9)
+    c['agc_gain'] = -math.expm1(-tau / receiver.agc_time_constant)
+    c['level_gain'] = -math.expm1(-tau / receiver.cn0_time_constant)
+    c['smoothing'] = SMOOTHINGS.index(receiver.smoothing)
+    c['smoothing_gain'] = 1.0 / receiver.smoothing_samples
+    c['power'] = _hertz(receiver.cn0_dbhz) * tau
+    c['reference_range'], c['half_exponent'] = receiver.reference_range, 0.5 * receiver.range_exponent
+    c['horizon_mask'] = receiver.horizon_mask
+    c['acquire_power'] = _hertz(receiver.acquire_level_dbhz) * tau
+    c['lose_power'] = _hertz(receiver.lose_level_dbhz) * tau
+    c['acquire_ns'], c['lose_ns'] = round(receiver.acquire_time * 1e9), round(receiver.lose_time * 1e9)
+    c['latency_ns'] = round(receiver.latency * 1e9)
+    return c
+
+
+def initial_state() -> np.ndarray:
+    """The (1,) STATE before the first step: noise in the channels, not locked."""
+    s = np.zeros(1, STATE)
+    s['stamp_ns'], s['agc_power'], s['level_power'] = -1, 1.0, 1.0
+    return s
+
+
+def normals_per_step(params) -> int:
+    """How many standard normals `step` takes of TrackingReceiverParameters' receiver."""
+    return NORMALS_PER_SAMPLE * params.receiver.samples_per_step
+
+
+def angle_noise(params, cn0_dbhz, period):
+    """Predicted 1-sigma of one published error on axis [rad] at a C/N0 [dB-Hz] and a drive step [s]."""
+    antenna, receiver = params.antenna, params.receiver
+    tau = period / receiver.samples_per_step
+    one_sample = thermal_noise(antenna.beamwidth, antenna.slope, _hertz(cn0_dbhz), tau)
+    if receiver.smoothing == 'recursion':
+        return one_sample / math.sqrt(2.0 * receiver.smoothing_samples - 1.0)
+    return one_sample / math.sqrt(receiver.samples_per_step)
+
+
+def _hertz(cn0_dbhz):
+    return 10.0**(0.1 * cn0_dbhz)
+
+
+@compiled
+def inputs_known(i):
+    """Whether joint states, attitude and position are there and finite."""
+    total = i.azimuth + i.elevation
+    for row in range(3):
+        total += i.position[row] + i.mat_ed[row, 0] + i.mat_ed[row, 1] + i.mat_ed[row, 2]
+    return i.valid != 0 and math.isfinite(total)
+
+
+@compiled
+def carrier_amplitude(c, e, n, u):
+    """Sum voltage on axis from a target at an ENU vector [m] of the antenna; 0 below the horizon mask."""
+    _, elevation = earth_angles(e, n, u)
+    if not elevation >= c.horizon_mask:
+        return 0.0
+    distance = max(math.sqrt(e * e + n * n + u * u), 1.0)
+    return math.sqrt(c.power) * (c.reference_range / distance)**c.half_exponent
+
+
+@compiled
+def sample(s, c, amplitude, v_x, v_e, normals, first):
+    """One sample of the channels: (cross-elevation, elevation) error [rad]; moves the AGC and level filters."""
+    half = math.sqrt(0.5)
+    S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
+    s_real, s_imag = amplitude * S + half * normals[first], half * normals[first + 1]
+    power = s_real * s_real + s_imag * s_imag
+    s.agc_power += c.agc_gain * (power - s.agc_power)
+    s.level_power += c.level_gain * (power - s.level_power)
+    # The AGC's range ends where the carrier is no stronger than the noise.
+    gain = c.angle_scale / max(s.agc_power - 1.0, 1.0)
+    x = gain * detect(amplitude * D_x, s_real, s_imag, c.cos_phi, c.sin_phi,
+                      half * normals[first + 2], half * normals[first + 3])
+    e = gain * detect(amplitude * D_e, s_real, s_imag, c.cos_phi, c.sin_phi,
+                      half * normals[first + 4], half * normals[first + 5])
+    return max(-c.full_scale, min(x, c.full_scale)), max(-c.full_scale, min(e, c.full_scale))
+
+
+@compiled
+def measure(s, c, amplitude, dX, dE, normals):
+    """(cross-elevation, elevation) [rad] of one step, true error running from the state's to (dX, dE)."""
+    from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (dX, dE)
+    sum_x, sum_e = 0.0, 0.0
+    for k in range(c.samples):
+        part = (k + 1.0) / c.samples
+        x, e = sample(s, c, amplitude, (from_X + part * (dX - from_X)) / c.beamwidth,
+                      (from_E + part * (dE - from_E)) / c.beamwidth, normals, NORMALS_PER_SAMPLE * k)
+        sum_x += x
+        sum_e += e
+        s.smooth_cross_elevation += c.smoothing_gain * (x - s.smooth_cross_elevation)
+        s.smooth_elevation += c.smoothing_gain * (e - s.smooth_elevation)
+    if c.smoothing == RECURSION:
+        return s.smooth_cross_elevation, s.smooth_elevation
+    return sum_x / c.samples, sum_e / c.samples
+
+
+@compiled
+def lock(s, c, elapsed_ns):
+    """Lock with two levels: gained after acquire_ns above the upper one, lost after lose_ns below the lower."""
+    power = s.level_power - 1.0
+    if s.locked != 0:
+        crossed, wait = power < c.lose_power, c.lose_ns
+    else:
+        crossed, wait = power > c.acquire_power, c.acquire_ns
+    s.timer_ns = s.timer_ns + elapsed_ns if crossed else 0
+    if crossed and s.timer_ns >= wait:
+        s.locked, s.timer_ns = 1 - s.locked, 0
+
+
+@compiled
+def delay(s, c, o, stamp_ns, cross_elevation, elevation, cn0_dbhz):
+    """Put a result into the ring and release the newest measured at or before stamp_ns - latency."""
+    slot = s.written % RING
+    s.ring_stamp_ns[slot], s.ring_locked[slot] = stamp_ns, s.locked
+    s.ring_cross_elevation[slot], s.ring_elevation[slot] = cross_elevation, elevation
+    s.ring_cn0_dbhz[slot] = cn0_dbhz
+    s.written += 1
+    s.released = max(s.released, s.written - RING)
+    while s.released < s.written and s.ring_stamp_ns[s.released % RING] <= stamp_ns - c.latency_ns:
+        slot = s.released % RING
+        s.released += 1
+        o.due, o.stamp_ns, o.locked = 1, s.ring_stamp_ns[slot], s.ring_locked[slot]
+        o.cross_elevation, o.elevation = s.ring_cross_elevation[slot], s.ring_elevation[slot]
+        o.cn0_dbhz = s.ring_cn0_dbhz[slot]
+
+
+@compiled
+def forget(o):
+    """Outputs of a step that knows nothing yet."""
+    o.due, o.stamp_ns, o.locked = 0, 0, 0
+    o.cross_elevation, o.elevation, o.cn0_dbhz = math.nan, math.nan, math.nan
+    o.true_cross_elevation, o.true_elevation = math.nan, math.nan
+    o.target_valid = 0
+    for axis in range(3):
+        o.target_position[axis], o.target_velocity[axis] = math.nan, math.nan
+
+
+@compiled
+def step(state, constants, inputs, outputs, breaks, coefficients, normals):
+    """One drive step: STATE, CONSTANTS, INPUTS, OUTPUTS of shape (1,), breaks and coefficients of the Target,
+    normals (normals_per_step,). Never raises: OUTPUTS' status says what is missing."""
+    s, c, i, o = state[0], constants[0], inputs[0], outputs[0]
+    forget(o)
+    if i.stamp_ns <= s.stamp_ns:
+        o.status = STAMP_ORDER
+        return
+    elapsed_ns = i.stamp_ns - s.stamp_ns if s.stamp_ns >= 0 else c.period_ns
+    s.stamp_ns = i.stamp_ns
+
+    valid, e, n, u, v_e, v_n, v_u = target.state(c.target, breaks, coefficients, 1e-9 * i.stamp_ns)
+    o.target_valid = valid
+    o.target_position[0], o.target_position[1], o.target_position[2] = e, n, u
+    o.target_velocity[0], o.target_velocity[1], o.target_velocity[2] = v_e, v_n, v_u
+
+    known = inputs_known(i)
+    cross_elevation, elevation = math.nan, math.nan
+    if known:
+        dX, dE, amplitude = 0.0, 0.0, 0.0
+        if valid:
+            e, n, u = e - i.position[0], n - i.position[1], u - i.position[2]
+            x, y, z = to_deck(i.mat_ed, e, n, u)
+            dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
+            amplitude = carrier_amplitude(c, e, n, u)
+            o.true_cross_elevation, o.true_elevation = dX, dE
+        cross_elevation, elevation = measure(s, c, amplitude, dX, dE, normals)
+        s.cross_elevation, s.elevation = dX, dE
+        s.error_known = valid
+        lock(s, c, elapsed_ns)
+        o.status = (NO_TARGET if valid == 0 else BELOW_HORIZON if amplitude == 0.0 else
+                    LOCKED if s.locked != 0 else NO_LOCK)
+    else:
+        s.error_known, s.locked, s.timer_ns = 0, 0, 0
+        o.status = NO_JOINTS
+    if s.locked == 0:
+        cross_elevation, elevation = math.nan, math.nan
+    cn0_dbhz = 10.0 * math.log10(max(s.level_power - 1.0, POWER_FLOOR) / c.tau)
+    delay(s, c, o, i.stamp_ns, cross_elevation, elevation, cn0_dbhz)

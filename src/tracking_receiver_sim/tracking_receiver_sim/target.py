@@ -1,0 +1,357 @@
+"""Where the target is: every kind as one thing the compiled receiver can evaluate at any time.
+
+Trajectories (leo_pass, track_file, flyby) become piecewise cubics in the station's ENU frame when they are
+built, so a step needs neither SGP4 nor a file; angle targets (sine, step, ramp) are closed forms. Before
+the first and past the last break a trajectory is not valid: no position, rather than an extrapolated one.
+
+leo_pass: SGP4 position and velocity at every KNOT_SPACING, joined by cubic Hermite pieces: within 1 mm and
+15 mm/s of SGP4 itself, whose velocity is 10 mm/s off the derivative of its own position. Against skyfield:
+0.3 mdeg with UT1 = UTC, which is taken here; the true UT1 - UTC (up to 0.9 s of earth rotation) moves an ISS
+pass by up to 0.04 deg (7 mdeg on the default pass). SGP4's own error is kilometres within days.
+
+track_file: a cubic spline through the fixes. Measured on a real 1 Hz helicopter flight it predicts left-out
+fixes as well as PCHIP or Akima pieces (9 m, the jitter of the fixes), with half their peak acceleration; in
+a 3 m/s^2 turn its velocity is right to 1e-4 m/s where PCHIP, flattening every extremum, is 1.3 m/s off.
+"""
+import csv
+import datetime
+import math
+import typing
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.optimize import minimize_scalar
+from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
+from sgp4.io import compute_checksum
+from sgp4.propagation import gstime
+
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import earth_angles, earth_direction
+from pedestal_common.parameters import record, record_type
+from tracking_receiver_sim.params import KINDS, RAMP, SINE, STEP, AngleParameters
+
+EARTH_RADIUS, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
+"""WGS84 [m], [-]."""
+EARTH_RATE = 7.29211514670698e-5
+"""Of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
+KNOT_SPACING = 1.0
+"""Between SGP4 knots [s]."""
+SEARCH_SPACING = 20.0
+"""Between the pass finder's looks [s]; a LEO pass lasts minutes."""
+MARGIN = 5.0
+"""How far a leo_pass or flyby is laid out before and past the run [s], for a program track that looks ahead."""
+TLE_AGE = 30.0
+"""Largest time between TLE epoch and start_time [days]: past it SGP4 says nothing about the satellite."""
+COLUMNS = {'time_s': (-1e12, 1e12), 'latitude_deg': (-90.0, 90.0), 'longitude_deg': (-180.0, 360.0),
+           'altitude_m': (-1000.0, 1e8)}
+"""Of a track file, with the range of each."""
+TLE_NUMBERS = (
+    {'epoch year': (18, 20), 'epoch day': (20, 32)},
+    {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
+     'mean anomaly': (43, 51), 'mean motion': (52, 63)})
+"""Columns of the fields of both TLE lines that must be numbers."""
+
+TARGET = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))], align=True)
+
+
+class TargetError(ValueError):
+    """A target cannot be built; one line naming file or TLE line, row, field and value."""
+
+
+class Target(typing.NamedTuple):
+    """A target built for one run.
+
+    constants: (1,) TARGET record; breaks: (n + 1,) times [s]; coefficients: (4, n, 3), highest power first,
+    of (t - breaks[i]), ENU [m]; start_time: UTC of stamp 0 in ISO 8601, empty where the target has no date.
+    """
+    constants: np.ndarray
+    breaks: np.ndarray
+    coefficients: np.ndarray
+    start_time: str = ''
+
+
+@compiled
+def on_track(breaks, coefficients, t):
+    """(valid, e, n, u, ve, vn, vu) [m, m/s] of a piecewise cubic; NaN and 0 outside its breaks."""
+    if not breaks[0] <= t <= breaks[-1]:
+        return 0, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
+    low, high = 0, len(breaks) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if breaks[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    x, c = t - breaks[low], coefficients[:, low]
+    return (1,
+            ((c[0, 0] * x + c[1, 0]) * x + c[2, 0]) * x + c[3, 0],
+            ((c[0, 1] * x + c[1, 1]) * x + c[2, 1]) * x + c[3, 1],
+            ((c[0, 2] * x + c[1, 2]) * x + c[2, 2]) * x + c[3, 2],
+            (3.0 * c[0, 0] * x + 2.0 * c[1, 0]) * x + c[2, 0],
+            (3.0 * c[0, 1] * x + 2.0 * c[1, 1]) * x + c[2, 1],
+            (3.0 * c[0, 2] * x + 2.0 * c[1, 2]) * x + c[2, 2])
+
+
+@compiled
+def in_angles(kind, angle, t):
+    """(1, e, n, u, ve, vn, vu) [m, m/s] of a sine, step or ramp in earth azimuth and elevation."""
+    tau = t - angle.start
+    A, E, A_dot, E_dot = angle.azimuth, angle.elevation, 0.0, 0.0
+    if tau >= 0.0:
+        if kind == SINE:
+            w = 2.0 * math.pi * angle.frequency
+            A, A_dot = A + angle.azimuth_amplitude * math.sin(w * tau), angle.azimuth_amplitude * w * math.cos(w * tau)
+            E += angle.elevation_amplitude * math.sin(w * tau)
+            E_dot = angle.elevation_amplitude * w * math.cos(w * tau)
+        elif kind == STEP:
+            A, E = A + angle.azimuth_amplitude, E + angle.elevation_amplitude
+        elif kind == RAMP:
+            A, A_dot = A + angle.azimuth_rate * tau, angle.azimuth_rate
+            E, E_dot = E + angle.elevation_rate * tau, angle.elevation_rate
+    r = angle.range
+    e, n, u = earth_direction(A, E)
+    sin_A, cos_A, sin_E, cos_E = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
+    return (1, r * e, r * n, r * u,
+            r * (A_dot * cos_E * cos_A - E_dot * sin_E * sin_A),
+            r * (-A_dot * cos_E * sin_A - E_dot * sin_E * cos_A),
+            r * E_dot * cos_E)
+
+
+@compiled
+def state(target, breaks, coefficients, t):
+    """(valid, e, n, u, ve, vn, vu): ENU position [m] and velocity [m/s] at t [s]; target is a TARGET record."""
+    if target.kind == SINE or target.kind == STEP or target.kind == RAMP:
+        return in_angles(target.kind, target.angle, t)
+    return on_track(breaks, coefficients, t)
+
+
+@compiled
+def _look_angles(constants, breaks, coefficients, times, azimuth, elevation, distance):
+    for i in range(len(times)):
+        valid, e, n, u, _, _, _ = state(constants[0], breaks, coefficients, times[i])
+        azimuth[i], elevation[i] = earth_angles(e, n, u)
+        distance[i] = math.sqrt(e * e + n * n + u * u)
+
+
+def look_angles(built, times):
+    """(azimuth, elevation, range) [rad, rad, m] from the station at times [s], each (n,).
+
+    Azimuth clockwise from north in (-pi, pi]; NaN where the target is not valid.
+    """
+    times = np.ascontiguousarray(times, float)
+    azimuth, elevation, distance = np.empty((3, len(times)))
+    _look_angles(built.constants, built.breaks, built.coefficients, times, azimuth, elevation, distance)
+    return azimuth, elevation, distance
+
+
+def build(params, duration) -> Target:
+    """A Target from TargetParameters for a run of `duration` [s] from stamp 0; raises TargetError."""
+    builder = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}.get(params.kind, _angles)
+    breaks, coefficients, start_time = builder(params, duration)
+    constants = np.zeros(1, TARGET)
+    constants['kind'], constants['angle'] = KINDS.index(params.kind), record(params.angle)
+    return Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), start_time)
+
+
+def _angles(params, duration):
+    return np.array([0.0, duration]), np.zeros((4, 1, 3)), ''
+
+
+def _flyby(params, duration):
+    flyby = params.flyby
+    east, north = math.sin(flyby.heading), math.cos(flyby.heading)
+    velocity = flyby.speed * np.array([east, north, 0.0])
+    closest = np.array([-flyby.closest_distance * north, flyby.closest_distance * east, flyby.height])
+    coefficients = np.zeros((4, 1, 3))
+    coefficients[2, 0] = velocity
+    coefficients[3, 0] = closest - velocity * (MARGIN + flyby.closest_time)
+    return np.array([-MARGIN, duration + MARGIN]), coefficients, ''
+
+
+def geocentric(latitude, longitude, height):
+    """Earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or numbers."""
+    e2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
+    N = EARTH_RADIUS / np.sqrt(1.0 - e2 * np.sin(latitude)**2)
+    return np.stack([(N + height) * np.cos(latitude) * np.cos(longitude),
+                     (N + height) * np.cos(latitude) * np.sin(longitude),
+                     (N * (1.0 - e2) + height) * np.sin(latitude)], axis=-1)
+
+
+def _station(station):
+    """Earth-fixed position (3,) [m] and rotation (3, 3) earth-fixed -> ENU of a station."""
+    latitude, longitude = math.radians(station.latitude_deg), math.radians(station.longitude_deg)
+    sp, cp, sl, cl = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
+    to_enu = np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
+    return geocentric(latitude, longitude, station.height), to_enu
+
+
+# leo_pass
+
+def satellite(leo_pass) -> Satrec:
+    """The SGP4 record of a LeoPassParameters; raises TargetError when the TLE is not one."""
+    lines = leo_pass.line_1.rstrip(), leo_pass.line_2.rstrip()
+    for number, line in enumerate(lines, 1):
+        name = f'TLE line {number}'
+        if len(line) != 69 or not line.isascii():
+            raise TargetError(f'{name}: {len(line)} characters, must be 69 of ASCII: {line!r}')
+        if not line.startswith(f'{number} '):
+            raise TargetError(f'{name}: line number {line[:2]!r}, must be {f"{number} "!r}')
+        checksum = str(compute_checksum(line))
+        if line[68] != checksum:
+            raise TargetError(f'{name}: checksum {line[68]!r}, must be {checksum!r}: {line!r}')
+        for field, (first, end) in TLE_NUMBERS[number - 1].items():
+            if not line[first:end].replace('.', '', 1).strip().isdigit():
+                raise TargetError(f'{name}: {field} {line[first:end]!r} is not a number')
+    if lines[0][2:7] != lines[1][2:7]:
+        raise TargetError(f'TLE line 2: satellite {lines[1][2:7]!r}, must be {lines[0][2:7]!r} as in line 1')
+    found = Satrec.twoline2rv(*lines, WGS72)
+    if found.error:
+        raise TargetError(f'TLE of satellite {lines[0][2:7]}: {SGP4_ERRORS[found.error]}')
+    return found
+
+
+def _satellite_enu(found, station, julian, fraction, times):
+    """ENU position [m] and velocity against the earth [m/s], each (n, 3), at times [s] past julian + fraction."""
+    fractions = fraction + times / 86400.0
+    error, position, velocity = found.sgp4_array(np.full(len(times), julian), fractions)
+    if error.any():
+        i = int(np.argmax(error != 0))
+        raise TargetError(f'TLE of satellite {found.satnum_str}: {_iso(julian, fractions[i])}: '
+                          f'{SGP4_ERRORS[int(error[i])]}')
+    theta = gstime(julian) + EARTH_RATE * 86400.0 * fractions
+    c, s = np.cos(theta), np.sin(theta)
+    to_fixed = np.zeros((len(times), 3, 3))
+    to_fixed[:, 0, 0], to_fixed[:, 0, 1], to_fixed[:, 1, 0], to_fixed[:, 1, 1], to_fixed[:, 2, 2] = c, s, -s, c, 1.0
+    r = np.einsum('nij,nj->ni', to_fixed, 1e3 * position)
+    v = np.einsum('nij,nj->ni', to_fixed, 1e3 * velocity) - np.cross([0.0, 0.0, EARTH_RATE], r)
+    origin, to_enu = _station(station)
+    return (r - origin) @ to_enu.T, v @ to_enu.T
+
+
+def _elevations(found, station, julian, fraction, times):
+    enu, _ = _satellite_enu(found, station, julian, fraction, times)
+    return np.degrees(np.arctan2(enu[:, 2], np.hypot(enu[:, 0], enu[:, 1])))
+
+
+def culmination(params, found):
+    """Time [s] past the TLE epoch of the first culmination between the two limits of LeoPassParameters."""
+    leo_pass, low, high = params.leo_pass, params.leo_pass.culmination_low_deg, params.leo_pass.culmination_high_deg
+
+    def depth(t):
+        return -_elevations(found, params.station, found.jdsatepoch, found.jdsatepochF, np.array([t]))[0]
+
+    best = -math.inf
+    for day in np.arange(0.0, leo_pass.search_days, 1.0):
+        seconds = 86400.0 * min(1.0, leo_pass.search_days - day)
+        times = 86400.0 * day + np.arange(-SEARCH_SPACING, seconds + 1.5 * SEARCH_SPACING, SEARCH_SPACING)
+        elevation = _elevations(found, params.station, found.jdsatepoch, found.jdsatepochF, times)
+        for i in range(1, len(times) - 1):
+            if elevation[i] > max(0.0, elevation[i - 1]) and elevation[i] >= elevation[i + 1]:
+                peak = minimize_scalar(depth, bounds=(times[i - 1], times[i + 1]), method='bounded',
+                                       options={'xatol': 1e-3})
+                if low <= -peak.fun <= high:
+                    return peak.x
+                best = max(best, -peak.fun)
+    reached = f'highest outside is {best:.1f} deg' if math.isfinite(best) else 'it never rises'
+    raise TargetError(f'satellite {found.satnum_str}: no culmination between {low:g} and {high:g} deg within '
+                      f'{leo_pass.search_days:g} days of the TLE epoch ({reached}) at latitude '
+                      f'{params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg')
+
+
+def _start(params, found, duration):
+    """(Julian day, fraction) of stamp 0; the pass finder's is a whole second of UTC."""
+    if not params.leo_pass.start_time:
+        start = culmination(params, found) - 0.5 * duration + 0.5
+        return _julian(_datetime(found.jdsatepoch, found.jdsatepochF + start / 86400.0).replace(microsecond=0))
+    try:
+        start = datetime.datetime.fromisoformat(params.leo_pass.start_time.replace('Z', '+00:00'))
+    except ValueError:
+        raise TargetError(f'start_time = {params.leo_pass.start_time!r}: must be UTC as ISO 8601, '
+                          'for example 2019-12-10T06:00:00') from None
+    if start.tzinfo is not None:
+        start = start.astimezone(datetime.timezone.utc)
+    julian, fraction = _julian(start)
+    age = julian - found.jdsatepoch + fraction - found.jdsatepochF
+    if abs(age) > TLE_AGE:
+        raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the TLE epoch '
+                          f'{_iso(found.jdsatepoch, found.jdsatepochF)}, must be within {TLE_AGE:g}')
+    return julian, fraction
+
+
+def _datetime(julian, fraction):
+    """Calendar time of a Julian date, to the millisecond."""
+    since_2000 = datetime.timedelta(days=julian - 2451544.5) + datetime.timedelta(days=fraction)
+    return datetime.datetime(2000, 1, 1) + datetime.timedelta(milliseconds=round(since_2000.total_seconds() * 1e3))
+
+
+def _julian(when):
+    return jday(when.year, when.month, when.day, when.hour, when.minute, when.second + when.microsecond * 1e-6)
+
+
+def _iso(julian, fraction):
+    return _datetime(julian, fraction).isoformat(timespec='milliseconds') + 'Z'
+
+
+def _leo_pass(params, duration):
+    found = satellite(params.leo_pass)
+    julian, fraction = _start(params, found, duration)
+    knots = np.arange(-MARGIN, duration + MARGIN + KNOT_SPACING, KNOT_SPACING)
+    position, velocity = _satellite_enu(found, params.station, julian, fraction, knots)
+    if position[:, 2].max() < 0.0:
+        raise TargetError(f'satellite {found.satnum_str}: below the horizon from {_iso(julian, fraction)} for '
+                          f'{duration:g} s at latitude {params.station.latitude_deg:g}, longitude '
+                          f'{params.station.longitude_deg:g} deg')
+    spline = CubicHermiteSpline(knots, position, velocity)
+    return spline.x, spline.c, _iso(julian, fraction)
+
+
+# track_file
+
+def read_track(path, max_gap) -> np.ndarray:
+    """The rows of a track file, (n, 4) in the order of COLUMNS; rows at most max_gap [s] apart."""
+    rows = []
+    try:
+        with open(path, newline='', encoding='utf-8-sig') as file:
+            reader = csv.DictReader(file)
+            missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
+            if missing:
+                raise TargetError(f'{path}: line 1: column {missing[0]!r} is missing')
+            for row in reader:
+                rows.append([_cell(path, reader.line_num, name, row[name]) for name in COLUMNS])
+                step = rows[-1][0] - rows[-2][0] if len(rows) > 1 else max_gap
+                if not 0.0 < step <= max_gap:
+                    raise TargetError(f'{path}: line {reader.line_num}: time_s = {rows[-1][0]:.10g}: {step:g} s after '
+                                      f'the row before, must be above 0 and at most max_gap = {max_gap:g} s')
+    except OSError as error:
+        raise TargetError(f'{path}: {error.strerror}') from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise TargetError(f'{path}: not a CSV text file: {error}') from None
+    if len(rows) < 4:
+        raise TargetError(f'{path}: {len(rows)} rows, must be at least 4')
+    return np.array(rows)
+
+
+def _cell(path, line, name, cell):
+    low, high = COLUMNS[name]
+    try:
+        value = float(cell)
+    except (TypeError, ValueError):
+        raise TargetError(f'{path}: line {line}: {name} = {cell!r}: must be a number') from None
+    if not low <= value <= high:
+        raise TargetError(f'{path}: line {line}: {name} = {value:g}: must be {low:g} to {high:g}')
+    return value
+
+
+def _track_file(params, duration):
+    track = params.track_file
+    if not track.path:
+        raise TargetError('track_file.path is empty: must name a CSV file')
+    time, latitude, longitude, altitude = read_track(track.path, track.max_gap).T
+    time = time - time[0] - track.start
+    if time[-1] <= 0.0:
+        raise TargetError(f'{track.path}: start = {track.start:g} s: must be before the end of the track at '
+                          f'{time[-1] + track.start:g} s')
+    origin, to_enu = _station(params.station)
+    enu = (geocentric(np.radians(latitude), np.radians(longitude), altitude) - origin) @ to_enu.T
+    spline = CubicSpline(time, enu)
+    return spline.x, spline.c, ''
