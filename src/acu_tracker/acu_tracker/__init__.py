@@ -1,0 +1,27 @@
+"""The antenna control unit: from the receiver's angle error to the rate command of the drive.
+
+`control_unit.step` runs once per drive step:
+    error + encoder -> y -> `tracker` (Kalman filter per axis) -> prediction to the instant of the command
+    -> `deck_reference` (earth -> deck) -> `shaper` -> `position_loop` -> rate and torque.
+`modes` decides which target is followed. Frames and angles as in `pedestal_common`.
+
+Symbols
+    alpha           manoeuvre frequency of the 'current' statistical model              [1/s]
+    a_max, abar     largest and mean acceleration of the target                         [rad/s2]
+    sigma_a         standard deviation of the acceleration about abar                   [rad/s2]
+    T, x = alpha T  time between two errors; the same without a unit                    [s], [-]
+    X = (x1 x2 x3)  estimate: angle, rate, acceleration                                 [rad, rad/s, rad/s2]
+    Phi, U, Q, P    transition, input, process noise, covariance of X
+    y, R, nu, S     measured angle, its variance, innovation, variance of the innovation
+    A, E            azimuth (clockwise), elevation; dA, ddA ... their time derivatives  [rad, rad/s, rad/s2]
+    w, dw           rate and angular acceleration of the deck, FLU                      [rad/s, rad/s2]
+    t_k             stamp of the drive step                                             [s]
+    t_m             middle of the interval in which the command is in force             [s]
+    v, a, j         rate, acceleration, jerk of the shaped reference                    [rad/s, ...]
+    h0, r           filter step and acceleration of Han's fhan                          [s], [rad/s2]
+    Kp, Ki, Kd      gains of the position loop                                          [1/s], [1/s2], [-]
+    J, Tc           inertia and Coulomb friction seen at the load                       [kg m2], [Nm]
+    theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
+
+References: paper 000 (Ma Jijun et al. 2023, 'current' statistical model filter of an antenna); Han 2009 (fhan).
+"""

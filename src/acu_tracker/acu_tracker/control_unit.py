@@ -1,0 +1,419 @@
+"""The antenna control unit: one `step` per drive step, from encoders, receiver error and attitude to the rate command.
+
+The estimate lives in earth angles when a ship attitude is given, otherwise in deck angles.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker import deck_reference, modes, position_loop, program_track, shaper, tracker
+from acu_tracker.history import LENGTH, bracket, history_type, push
+from acu_tracker.params import AcuParameters
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import displaced, earth_angles, earth_direction, rotation, to_earth
+from pedestal_common.parameters import record, record_type
+
+INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
+                  'step_gap')
+"""Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
+(_STAMP, _ENCODER, _ERROR, _ERROR_STAMP, _ERROR_GATED, _ATTITUDE, _PROGRAM, _PRESET,
+ _STEP_GAP) = (1 << i for i in range(len(INVALID_INPUTS)))
+
+INPUTS = np.dtype([
+    ('stamp', 'f8'),                                                            # t_k [s]
+    ('position', 'f8', (2,)), ('velocity', 'f8', (2,)), ('encoder_valid', 'i8'),  # deck azimuth, elevation
+    ('error_stamp', 'f8'), ('error_valid', 'i8'),                               # 0: none came, or unlocked
+    ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
+    ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
+    ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
+    ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
+    ('request', 'i8'),                                                          # mode code, -1 none
+    ('program_count', 'i8'),                                                    # rows of the table in use
+    ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
+], align=True)
+
+OUTPUTS = np.dtype([
+    ('mode', 'i8'), ('reason', 'i8'), ('request_result', 'i8'),                 # -1 none, 0 refused, 1 accepted
+    ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
+    ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
+    ('reference', 'f8', (2, 3)),                                                # deck angle, rate, acceleration at t_k
+    ('innovation', 'f8', (2,)), ('nis', 'f8', (2,)),                            # nu, nu2/S; NaN: no error this step
+    ('coasting', 'i8'), ('locked', 'i8'), ('invalid_input', 'i8'),
+    ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
+], align=True)
+
+_AXIS = np.dtype([('position', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'),    # shaped reference at its stamp
+                  ('integral', 'f8'), ('command', 'f8')], align=True)
+STATE = np.dtype([
+    ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'), ('stabilised', 'i8'),
+    ('encoder', history_type(2)),                                               # azimuth, elevation
+    ('attitude', history_type(10)),                                             # quaternion, w, dw
+    ('reference', history_type(6)),                                             # shaped: angle, rate, acceleration x 2
+    ('tracker', tracker.TRACKER), ('azimuth', _AXIS), ('elevation', _AXIS),
+    ('turn', 'f8'),                                                            # raw azimuth last followed
+    ('preset', 'f8', (2,)),
+    ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
+], align=True)
+
+CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('ahead', 'f8')], align=True)
+
+
+def constants(params) -> np.ndarray:
+    """Constants (1,) of an AcuParameters: the parameters and `ahead` = t_m - t_k [s]."""
+    c = np.zeros(1, CONSTANTS)
+    c['p'] = record(params, AcuParameters)
+    c['ahead'] = params.command_delay + 0.5 * params.period
+    return c
+
+
+def initial_state(params) -> np.ndarray:
+    """State (1,) before the first step: standby, the initial mode pending."""
+    s = np.zeros(1, STATE)
+    s['stamp'] = -math.inf
+    s['pending'] = modes.MODES.index(params.initial_mode)
+    s['preset'] = params.azimuth.preset, params.elevation.preset
+    return s
+
+
+@compiled
+def take_encoder(s, u):
+    """Remember the encoders of this step; False where they are not to be used."""
+    ok = u.encoder_valid and math.isfinite(u.position[0] + u.position[1] + u.velocity[0] + u.velocity[1])
+    if ok:
+        row = push(s.encoder, u.stamp)
+        s.encoder.sample[row, 0], s.encoder.sample[row, 1] = u.position[0], u.position[1]
+    return ok
+
+
+@compiled
+def take_attitude(s, p, u):
+    """Remember a new attitude with its rate and low-passed angular acceleration; False where it is unusable."""
+    q, w = u.quaternion, u.deck_rate
+    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    if not (u.attitude_valid and abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
+        return False
+    h = s.attitude
+    last = h.newest
+    T = u.attitude_stamp - h.stamp[last] if h.count > 0 else math.inf
+    if not (T > 0.0 and u.attitude_stamp <= u.stamp):
+        return T == 0.0
+    row = push(h, u.attitude_stamp)
+    # One sign of the quaternion, so that neighbours can be averaged.
+    dot = 0.0
+    for i in range(4):
+        dot += q[i] * h.sample[last, i]
+    for i in range(4):
+        h.sample[row, i] = q[i] / norm if dot >= 0.0 else -q[i] / norm
+    for i in range(3):
+        h.sample[row, 4 + i] = w[i]
+        h.sample[row, 7 + i] = 0.0
+        if T <= p.attitude_timeout:
+            before = h.sample[last, 7 + i]
+            rise = (w[i] - h.sample[last, 4 + i]) / T
+            h.sample[row, 7 + i] = before + T / (p.attitude_smoothing + T) * (rise - before)
+    return True
+
+
+@compiled
+def attitude_at(s, p, t):
+    """Set s.mat_ed, s.w, s.dw to the attitude at t: between two samples, or predicted from the last one."""
+    h = s.attitude
+    last = h.sample[h.newest]
+    T = t - h.stamp[h.newest]
+    if h.count == 0 or T > p.attitude_timeout:
+        return False
+    if T >= 0.0:
+        for i in range(3):
+            s.dw[i] = last[7 + i]
+            s.w[i] = last[4 + i] + T * last[7 + i]
+        half = 0.5 * T * T
+        x, y, z, w = deck_reference.turned(
+            last[0], last[1], last[2], last[3], T * last[4] + half * last[7], T * last[5] + half * last[8],
+            T * last[6] + half * last[9])
+    else:
+        i, j, f = bracket(h, t)
+        if i < 0:
+            return False
+        a, b = h.sample[i], h.sample[j]
+        for k in range(3):
+            s.w[k] = a[4 + k] + f * (b[4 + k] - a[4 + k])
+            s.dw[k] = b[7 + k]
+        x, y, z, w = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), \
+            a[3] + f * (b[3] - a[3])
+    norm = math.sqrt(x * x + y * y + z * z + w * w)
+    rotation(x / norm, y / norm, z / norm, w / norm, s.mat_ed)
+    return True
+
+
+@compiled
+def take_error(s, p, u, o):
+    """Filter y = encoder at the stamp of the error, displaced by the error, in earth angles on a ship."""
+    e = p.tracker.receiver
+    if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
+        return _ERROR
+    i, j, f = bracket(s.encoder, u.error_stamp)
+    if i < 0:
+        return _ERROR_STAMP
+    a, b = s.encoder.sample[i], s.encoder.sample[j]
+    azimuth, elevation = displaced(a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), u.cross_elevation, u.elevation)
+    if u.stabilised:
+        if not attitude_at(s, p, u.error_stamp):
+            return _ATTITUDE
+        # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
+        y, x, z = earth_direction(azimuth, elevation)
+        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, x, -y, z))
+    R = tracker.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e.beamwidth, e.slope, e.integration,
+                               e.sigma_floor)
+    cos_el = max(math.cos(elevation), 0.01)
+    outcome, o.innovation[0], o.innovation[1], o.nis[0], o.nis[1] = tracker.observe(
+        s.tracker, p.tracker, p.azimuth.a_max, p.elevation.a_max, u.error_stamp, azimuth, elevation,
+        R / (cos_el * cos_el), R)
+    if outcome == tracker.STALE:
+        o.innovation[:] = math.nan
+        o.nis[:] = math.nan
+        return _ERROR_STAMP
+    return _ERROR_GATED if outcome == tracker.GATED else 0
+
+
+@compiled
+def seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
+    """Deck angles of a target at t, given in the estimate's frame."""
+    if s.stabilised and attitude_at(s, p, t):
+        return deck_reference.deck_angles(s.mat_ed, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2],
+                                          A, dA, ddA, E, dE, ddE)
+    return A, dA, ddA, E, dE, ddE
+
+
+@compiled
+def program_target(s, p, times, angles, t):
+    """Deck angles of the program track at t; the azimuth not yet on a turn."""
+    A, dA, ddA = program_track.interpolated(times, angles, t, 0)
+    E, dE, ddE = program_track.interpolated(times, angles, t, 1)
+    return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
+
+
+@compiled
+def outside(azimuth, elevation, p):
+    """OUTSIDE_LIMITS if deck angles cannot be pointed at, else NONE; NaN is outside."""
+    a, e = p.azimuth.limits, p.elevation.limits
+    inside = a.low <= azimuth <= a.high and e.low <= elevation <= e.high
+    return modes.NONE if inside else modes.OUTSIDE_LIMITS
+
+
+@compiled
+def change_mode(s, p, o, times, angles, t_m, request):
+    """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
+    flags = 0
+    encoder_ok = s.encoder.count > 0 and s.encoder.stamp[s.encoder.newest] == s.stamp
+    attitude_ok = not s.stabilised or attitude_at(s, p, s.stamp)
+    lost = not s.tracker.running or s.stamp - s.tracker.stamp > p.tracker.coast_time
+    program = program_track.status(times, s.stamp)
+    wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)
+    if program == modes.NONE and attitude_ok and wanted:
+        A, _, _, E, _, _ = program_target(s, p, times, angles, t_m)
+        if not math.isfinite(A + E):
+            program, flags = modes.NO_PROGRAM, _PROGRAM
+        else:
+            low, high = p.azimuth.limits.low, p.azimuth.limits.high
+            program = outside(deck_reference.nearest_turn(A, s.turn, low, high, 0.0, 0.0), E, p)
+    o.locked = tracker.locked(s.tracker, p.tracker, s.stamp)
+    mode, reason, result = modes.next_mode(
+        s.mode, request, encoder_ok, attitude_ok, program, outside(p.azimuth.stow, p.elevation.stow, p),
+        outside(s.preset[0], s.preset[1], p), o.locked, lost, p.tracker.handover)
+    if result == modes.ACCEPTED:
+        s.pending = modes.NO_REQUEST
+        if mode == modes.PROGRAM:
+            s.tracker.in_a_row = 0
+    if reason != modes.NONE:
+        s.reason = reason
+    if s.mode == modes.AUTOTRACK and lost:
+        s.tracker.running = 0
+    if mode != s.mode:
+        s.mode, s.entered = mode, 1
+    return result, flags
+
+
+@compiled
+def request(state, constants, inputs, outputs, mode, program_times, program_angles):
+    """Ask for a mode between two steps; True when granted. outputs.mode and .reason tell what is now.
+
+    It is decided on what the last step knew, and takes effect on the command of the next step.
+    """
+    s, o = state[0], outputs[0]
+    rows = max(inputs[0].program_count, 0)
+    result, _ = change_mode(s, constants[0].p, o, program_times[:rows], program_angles[:rows],
+                            s.stamp + constants[0].ahead, mode)
+    o.mode, o.reason, o.request_result = s.mode, s.reason, result
+    return result == modes.ACCEPTED
+
+
+@compiled
+def seat(s, u):
+    """Targets := actual. The shaped reference starts at the encoders' angle and rate."""
+    s.reference.count = 0
+    row = push(s.reference, u.stamp)
+    s.azimuth.position, s.azimuth.rate, s.azimuth.acceleration = u.position[0], u.velocity[0], 0.0
+    s.elevation.position, s.elevation.rate, s.elevation.acceleration = u.position[1], u.velocity[1], 0.0
+    s.azimuth.integral = s.elevation.integral = 0.0
+    s.turn = u.position[0]
+    remember(s, row)
+
+
+@compiled
+def remember(s, row):
+    """Keep the shaped reference of both axes for the instant when the encoders meet it."""
+    r = s.reference.sample[row]
+    r[0], r[1], r[2] = s.azimuth.position, s.azimuth.rate, s.azimuth.acceleration
+    r[3], r[4], r[5] = s.elevation.position, s.elevation.rate, s.elevation.acceleration
+
+
+@compiled
+def planned(history, first, t, out):
+    """The reference that was planned for t into out (3,): angle (cubic Hermite), rate, acceleration."""
+    i, j, f = bracket(history, t)
+    if i < 0:
+        i = j = (history.newest + 1 - history.count) % LENGTH
+    a, b = history.sample[i], history.sample[j]
+    T = history.stamp[j] - history.stamp[i]
+    d, m0, m1 = b[first] - a[first], T * a[first + 1], T * b[first + 1]
+    out[0] = a[first] + f * (m0 + f * (3.0 * d - 2.0 * m0 - m1 + f * (m0 + m1 - 2.0 * d)))
+    out[1] = a[first + 1] + f * (b[first + 1] - a[first + 1])
+    out[2] = a[first + 2] + f * (b[first + 2] - a[first + 2])
+
+
+@compiled
+def raw_target(s, p, times, angles, t_m):
+    """Deck (A, dA, ddA, E, dE, ddE) at t_m of what the mode follows, the azimuth on the turn that fits."""
+    if s.mode == modes.STOW:
+        s.turn = s.azimuth.position
+        return p.azimuth.stow, 0.0, 0.0, p.elevation.stow, 0.0, 0.0
+    if s.mode == modes.PRESET:
+        s.turn = s.azimuth.position
+        return s.preset[0], 0.0, 0.0, s.preset[1], 0.0, 0.0
+    below = above = 0.0
+    if s.mode == modes.PROGRAM:
+        A, dA, ddA, E, dE, ddE = program_target(s, p, times, angles, t_m)
+        if s.entered:
+            below, above = program_track.azimuth_travel(times, angles, t_m)
+    else:
+        T = t_m - s.tracker.stamp
+        A, dA, ddA = tracker.outlook(s.tracker.azimuth, T, p.tracker.alpha)
+        E, dE, ddE = tracker.outlook(s.tracker.elevation, T, p.tracker.alpha)
+        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t_m, A, dA, ddA, E, dE, ddE)
+    s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
+    return s.turn, dA, ddA, E, dE, ddE
+
+
+@compiled
+def follow(axis, p, raw, raw_rate, raw_acceleration, dt, o, index):
+    """Shape the raw reference of one axis to dt after the last."""
+    r = p.shaper
+    raw, raw_rate, raw_acceleration, o.angle_limited[index] = shaper.held_inside(
+        raw, raw_rate, raw_acceleration, p.limits.low, p.limits.high, r.acceleration,
+        r.h0 + r.acceleration / r.jerk)
+    axis.position, axis.rate, axis.acceleration, o.rate_limited[index], o.acceleration_limited[index] = shaper.shape(
+        axis.position, axis.rate, axis.acceleration, raw, raw_rate, raw_acceleration, dt, r.rate, r.acceleration,
+        r.jerk, r.h0)
+
+
+@compiled
+def command(axis, p, u, dt, o, index):
+    """Close the position loop of one axis on the reference planned for t_k."""
+    planned_angle, planned_rate = o.reference[index, 0], o.reference[index, 1]
+    axis.command, axis.integral, rate_limited, acceleration_limited = position_loop.rate_command(
+        planned_angle - u.position[index], planned_rate - u.velocity[index], axis.integral, axis.command, axis.rate,
+        dt, p.position_loop, p.limits)
+    o.rate_limited[index] |= rate_limited
+    o.acceleration_limited[index] |= acceleration_limited
+    o.torque[index] = position_loop.torque_feedforward(axis.rate, axis.acceleration, p.position_loop)
+
+
+@compiled
+def rest(axis, limits, dt, o, index):
+    """Bring the rate command of one axis to zero within its acceleration."""
+    axis.command, _, o.acceleration_limited[index] = position_loop.limited(
+        0.0, axis.command, dt, limits.rate, limits.acceleration)
+    axis.integral = 0.0
+
+
+@compiled
+def clear(o):
+    """Outputs of a step in which nothing has happened yet."""
+    o.request_result, o.coasting, o.invalid_input = modes.NO_REQUEST, 0, 0
+    o.torque[:] = 0.0
+    o.innovation[:] = math.nan
+    o.nis[:] = math.nan
+    o.estimate[:] = math.nan
+    o.reference[:] = 0.0
+    o.angle_limited[:] = 0
+    o.rate_limited[:] = 0
+    o.acceleration_limited[:] = 0
+
+
+@compiled
+def step(state, constants, inputs, outputs, program_times, program_angles):
+    """One drive step; arrays (1,) of STATE, CONSTANTS, INPUTS, OUTPUTS, the table (n,) [s] and (n, 2) [rad] earth.
+
+    A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
+    """
+    s, u, o = state[0], inputs[0], outputs[0]
+    p = constants[0].p
+    dt = u.stamp - s.stamp
+    if not (dt > 0.0 and math.isfinite(u.stamp)):
+        o.invalid_input = _STAMP
+        o.request_result = modes.NO_REQUEST if u.request == modes.NO_REQUEST else modes.REFUSED
+        o.reason = modes.BAD_STAMP
+        return
+    clear(o)
+    rows = max(u.program_count, 0)
+    times, angles = program_times[:rows], program_angles[:rows]
+    jumped = dt > p.step_gap
+    flags = _STEP_GAP if jumped and math.isfinite(s.stamp) else 0
+    dt = p.period if jumped else dt
+    s.stamp = u.stamp
+
+    encoder_ok = take_encoder(s, u)
+    if not encoder_ok:
+        flags |= _ENCODER
+    if u.stabilised != s.stabilised:
+        s.stabilised, s.tracker.running = u.stabilised, 0
+    if u.stabilised and not take_attitude(s, p, u):
+        flags |= _ATTITUDE
+    if u.error_valid:
+        flags |= take_error(s, p, u, o)
+    if u.preset_valid:
+        if math.isfinite(u.preset[0] + u.preset[1]):
+            s.preset[0], s.preset[1] = u.preset[0], u.preset[1]
+        else:
+            flags |= _PRESET
+
+    t_m = u.stamp + constants[0].ahead
+    rested = s.mode == modes.STANDBY
+    waiting = s.mode == modes.STANDBY and u.request == modes.NO_REQUEST
+    result, program_flags = change_mode(s, p, o, times, angles, t_m, s.pending if waiting else u.request)
+    o.request_result = modes.NO_REQUEST if waiting else result
+    if encoder_ok and (rested or jumped):
+        seat(s, u)
+    if s.mode == modes.STANDBY:
+        rest(s.azimuth, p.azimuth.limits, dt, o, 0)
+        rest(s.elevation, p.elevation.limits, dt, o, 1)
+        o.reference[0, 0], o.reference[1, 0] = s.azimuth.position, s.elevation.position
+    else:
+        A, dA, ddA, E, dE, ddE = raw_target(s, p, times, angles, t_m)
+        ahead = t_m - s.reference.stamp[s.reference.newest]
+        follow(s.azimuth, p.azimuth, A, dA, ddA, ahead, o, 0)
+        follow(s.elevation, p.elevation, E, dE, ddE, ahead, o, 1)
+        remember(s, push(s.reference, t_m))
+        planned(s.reference, 0, u.stamp, o.reference[0])
+        planned(s.reference, 3, u.stamp, o.reference[1])
+        command(s.azimuth, p.azimuth, u, dt, o, 0)
+        command(s.elevation, p.elevation, u, dt, o, 1)
+        s.entered = 0
+        o.coasting = s.mode == modes.AUTOTRACK and u.stamp - s.tracker.stamp > p.tracker.coast_after
+
+    o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
+    o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
+    if s.tracker.running:
+        T = u.stamp - s.tracker.stamp
+        o.estimate[0, 0], o.estimate[0, 1], o.estimate[0, 2] = tracker.outlook(s.tracker.azimuth, T, p.tracker.alpha)
+        o.estimate[1, 0], o.estimate[1, 1], o.estimate[1, 2] = tracker.outlook(s.tracker.elevation, T, p.tracker.alpha)

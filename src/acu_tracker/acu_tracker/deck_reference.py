@@ -1,0 +1,85 @@
+"""Angles, rates and accelerations of an earth direction seen from a moving deck, and the deck's predicted attitude.
+
+Exact: the unit vector is differentiated twice, u_d = M' u, u_d' = M' u' - w x u_d, and so on
+(reference/nav.md 3.2 in FLU; u_d'' = M' u'' - 2 w x M' u' - dw x u_d + w x (w x u_d)).
+"""
+import math
+
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import to_deck, wrap
+
+
+@compiled
+def moving_direction(A, dA, ddA, E, dE, ddE):
+    """ENU unit vector of earth angles, its first and second derivative: nine floats."""
+    sA, cA, sE, cE = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
+    dh, ddh = -sE * dE, -cE * dE * dE - sE * ddE
+    ds, dds = cA * dA, cA * ddA - sA * dA * dA
+    dc, ddc = -sA * dA, -sA * ddA - cA * dA * dA
+    return (cE * sA, cE * cA, sE,
+            dh * sA + cE * ds, dh * cA + cE * dc, cE * dE,
+            ddh * sA + 2.0 * dh * ds + cE * dds, ddh * cA + 2.0 * dh * dc + cE * ddc, cE * ddE - sE * dE * dE)
+
+
+@compiled
+def moving_angles(x, y, z, dx, dy, dz, ddx, ddy, ddz):
+    """(A, dA, ddA, E, dE, ddE) of a moving FLU unit vector; A clockwise from the bow.
+
+    Singular at the zenith: within 1e-6 rad of it the rates are those at 1e-6 rad.
+    """
+    rho2 = max(x * x + y * y, 1e-12)
+    rho = math.sqrt(rho2)
+    dA = (y * dx - x * dy) / rho2
+    ddA = (y * ddx - x * ddy - 2.0 * dA * (x * dx + y * dy)) / rho2
+    dE = dz / rho
+    return math.atan2(-y, x), dA, ddA, math.atan2(z, rho), dE, (ddz + z * dE * dE) / rho
+
+
+@compiled
+def cross(ax, ay, az, bx, by, bz):
+    """a x b."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@compiled
+def deck_angles(mat_ed, wx, wy, wz, dwx, dwy, dwz, A, dA, ddA, E, dE, ddE):
+    """Deck (A, dA, ddA, E, dE, ddE) of earth angles; mat_ed (3, 3) deck -> earth, w, dw of the deck in FLU."""
+    e, n, u, de, dn, du, dde, ddn, ddu = moving_direction(A, dA, ddA, E, dE, ddE)
+    x, y, z = to_deck(mat_ed, e, n, u)
+    ex, ey, ez = to_deck(mat_ed, de, dn, du)
+    fx, fy, fz = to_deck(mat_ed, dde, ddn, ddu)
+    cx, cy, cz = cross(wx, wy, wz, x, y, z)
+    ax, ay, az = cross(dwx, dwy, dwz, x, y, z)
+    # w x (2 M' u' - w x u_d)
+    bx, by, bz = cross(wx, wy, wz, 2.0 * ex - cx, 2.0 * ey - cy, 2.0 * ez - cz)
+    return moving_angles(x, y, z, ex - cx, ey - cy, ez - cz, fx - bx - ax, fy - by - ay, fz - bz - az)
+
+
+@compiled
+def turned(qx, qy, qz, qw, rx, ry, rz):
+    """The attitude after the deck has turned by the rotation vector r [rad] (FLU): q (x) exp(r/2)."""
+    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
+    k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
+    ex, ey, ez, ew = k * rx, k * ry, k * rz, math.cos(0.5 * angle)
+    return (qw * ex + qx * ew + qy * ez - qz * ey, qw * ey - qx * ez + qy * ew + qz * ex,
+            qw * ez + qx * ey - qy * ex + qz * ew, qw * ew - qx * ex - qy * ey - qz * ez)
+
+
+@compiled
+def nearest_turn(azimuth, near, low, high, below, above):
+    """The azimuth on the turn from which the travel (below <= 0 <= above) stays inside low..high, nearest to `near`.
+
+    Where no turn holds the whole travel, one that holds the azimuth itself; otherwise simply the nearest.
+    """
+    nearest = near + wrap(azimuth - near)
+    best, score = nearest, math.inf
+    for i in range(-2, 3):
+        candidate = nearest + 2.0 * math.pi * i
+        away = abs(candidate - near)
+        if candidate < low or candidate > high:
+            away += 2e6
+        elif candidate + below < low or candidate + above > high:
+            away += 1e6
+        if away < score:
+            best, score = candidate, away
+    return best

@@ -1,0 +1,37 @@
+"""Stamped samples of the last steps, and where an instant lies among them."""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+LENGTH = 64
+
+
+def history_type(width) -> np.dtype:
+    """Ring of LENGTH stamps [s] with `width` numbers each; `count` in use, `newest` the row of the last."""
+    return np.dtype([('stamp', 'f8', (LENGTH,)), ('sample', 'f8', (LENGTH, width)),
+                     ('newest', 'i8'), ('count', 'i8')], align=True)
+
+
+@compiled
+def push(history, stamp):
+    """The row for a sample that is newer than all others; the caller fills it."""
+    history.newest = (history.newest + 1) % LENGTH
+    history.stamp[history.newest] = stamp
+    history.count = min(history.count + 1, LENGTH)
+    return history.newest
+
+
+@compiled
+def bracket(history, t):
+    """(older row, newer row, fraction between them) around the instant t; rows -1 where t is outside."""
+    newer = history.newest
+    if history.count == 0 or not t <= history.stamp[newer]:
+        return -1, -1, 0.0
+    if t == history.stamp[newer]:
+        return newer, newer, 0.0
+    for _ in range(history.count - 1):
+        older = (newer - 1) % LENGTH
+        if history.stamp[older] <= t:
+            return older, newer, (t - history.stamp[older]) / (history.stamp[newer] - history.stamp[older])
+        newer = older
+    return -1, -1, 0.0

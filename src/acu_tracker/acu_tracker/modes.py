@@ -1,0 +1,67 @@
+"""The mode machine: which target the antenna follows, and why. One pure transition function."""
+from pedestal_common.compiled import compiled
+
+MODES = ('standby', 'stow', 'preset', 'program', 'autotrack')
+STANDBY, STOW, PRESET, PROGRAM, AUTOTRACK = range(len(MODES))
+
+REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'attitude invalid', 'no program track',
+           'before program track', 'after program track', 'receiver not locked', 'outside limits', 'unknown mode',
+           'stamp does not advance')
+(NONE, REQUESTED, LOCKED, SIGNAL_LOST, ENCODER_INVALID, ATTITUDE_INVALID, NO_PROGRAM,
+ BEFORE_PROGRAM, AFTER_PROGRAM, NOT_LOCKED, OUTSIDE_LIMITS, UNKNOWN_MODE, BAD_STAMP) = range(len(REASONS))
+
+NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
+
+
+@compiled
+def obstacle(request, encoder_ok, attitude_ok, program, stow, preset, locked):
+    """Why a mode cannot be entered now, NONE if it can. `program`, `stow`, `preset`: NONE or their own obstacle."""
+    if request == STANDBY:
+        return NONE
+    if request < STANDBY or request > AUTOTRACK:
+        return UNKNOWN_MODE
+    if not encoder_ok:
+        return ENCODER_INVALID
+    if request == STOW:
+        return stow
+    if request == PRESET:
+        return preset
+    if not attitude_ok:
+        return ATTITUDE_INVALID
+    if request == PROGRAM:
+        return program
+    return NONE if locked else NOT_LOCKED
+
+
+@compiled
+def next_mode(mode, request, encoder_ok, attitude_ok, program, stow, preset, locked, lost, handover):
+    """(mode, reason, result) of one step.
+
+    request     mode asked for, NO_REQUEST for none
+    locked      the receiver has delivered long enough and the filter has converged
+    lost        the coast time is over
+    handover    program -> autotrack by itself once locked
+    reason      NONE where nothing happened
+    """
+    result = NO_REQUEST
+    if request != NO_REQUEST:
+        why = obstacle(request, encoder_ok, attitude_ok, program, stow, preset, locked)
+        if why == NONE:
+            return request, REQUESTED, ACCEPTED
+        result = REFUSED
+    else:
+        why = NONE
+    if mode == STANDBY:
+        return mode, why, result
+    if not encoder_ok:
+        return STANDBY, ENCODER_INVALID, result
+    if mode == PROGRAM or mode == AUTOTRACK:
+        if not attitude_ok:
+            return STANDBY, ATTITUDE_INVALID, result
+        if mode == PROGRAM and locked and handover:
+            return AUTOTRACK, LOCKED, result
+        if mode == PROGRAM and program != NONE and program != OUTSIDE_LIMITS:
+            return STANDBY, program, result
+        if mode == AUTOTRACK and lost:
+            return (PROGRAM if program == NONE else STANDBY), SIGNAL_LOST, result
+    return mode, why, result

@@ -1,0 +1,147 @@
+"""Parameters of the antenna control unit."""
+import dataclasses
+import math
+
+from acu_tracker.history import LENGTH
+from acu_tracker.modes import MODES
+from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class ReceiverLaw(Parameters):
+    """The receiver's thermal noise as the control unit knows it: sigma = theta3 / (k_m sqrt(2 C/N0 tau))."""
+
+    beamwidth: float = parameter(0.0209, 1e-5, 1.0, 'rad', '3 dB beamwidth theta3 of the sum pattern')
+    slope: float = parameter(1.6, 0.1, 10.0, '', 'monopulse slope k_m: difference over sum per beamwidth')
+    integration: float = parameter(0.005, 1e-6, 10.0, 's', 'integration time tau of one error')
+    sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not fall with C/N0 (encoder, phase)')
+
+
+@dataclasses.dataclass(frozen=True)
+class TrackerParameters(Parameters):
+    """The target filter and what it takes for a lock."""
+
+    alpha: float = parameter(0.1, 1e-4, 100.0, '1/s', "manoeuvre frequency of the 'current' statistical model: one "
+                             'over the time an acceleration lasts')
+    sigma_a_floor: float = parameter(0.3, 0.0, 1.0, '', 'least sigma_a over a_max; without it the filter locks')
+    gate: float = parameter(25.0, 1.0, 1e6, '', 'largest nu2/S of both axes together that is believed')
+    gate_restart: int = parameter(20, 1, 100000, '', 'errors refused in a row before the filter restarts on them')
+    restart_gap: float = parameter(1.0, 1e-3, 1000.0, 's', 'gap between errors after which the filter restarts')
+    initial_rate: float = parameter(0.1, 1e-6, 100.0, 'rad/s', 'standard deviation of the rate at the start')
+    lock_count: int = parameter(100, 1, 100000, '', 'errors believed in a row before program hands over')
+    coast_after: float = parameter(0.1, 1e-3, 100.0, 's', 'time without an error after which autotrack coasts')
+    coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack is left')
+    handover: bool = flag(True, 'program hands over to autotrack by itself once locked')
+    receiver: ReceiverLaw = group(ReceiverLaw)
+
+    def check(self):
+        if self.coast_time < self.coast_after:
+            raise ParameterError(f'coast_time = {self.coast_time:g} s: must be at least coast_after = '
+                                 f'{self.coast_after:g} s')
+
+
+@dataclasses.dataclass(frozen=True)
+class PositionLoop(Parameters):
+    """PID on the position error, rate and torque feed-forward."""
+
+    kp: float = parameter(20.0, 0.0, 500.0, '1/s', 'proportional gain')
+    ki: float = parameter(20.0, 0.0, 1e4, '1/s2', 'integral gain')
+    kd: float = parameter(0.0, 0.0, 1.0, '', 'derivative gain')
+    rate_feedforward: float = parameter(1.0, 0.0, 2.0, '', 'share of the reference rate fed forward')
+    inertia: float = parameter(280.0, 0.0, 1e9, 'kg m2', 'load and motors, seen at the load')
+    friction: float = parameter(60.0, 0.0, 1e7, 'Nm', 'Coulomb friction Tc fed forward')
+    friction_rate: float = parameter(0.002, 1e-6, 1.0, 'rad/s', 'rate at which 76 % of the friction is fed forward')
+
+
+@dataclasses.dataclass(frozen=True)
+class Shaper(Parameters):
+    """What the shaped reference may ask of the axis."""
+
+    rate: float = parameter(2.3, 1e-4, 100.0, 'rad/s', 'largest rate')
+    acceleration: float = parameter(30.0, 1e-4, 1000.0, 'rad/s2', 'largest acceleration')
+    jerk: float = parameter(4000.0, 1e-3, 1e6, 'rad/s3', 'largest jerk')
+    h0: float = parameter(0.02, 1e-4, 10.0, 's', "filter step of Han's fhan; longer: smoother, more lag")
+
+    def check(self):
+        if self.acceleration > 1.5 * self.jerk * self.h0:
+            raise ParameterError(f'h0 = {self.h0:g} s: must be at least acceleration / (1.5 jerk) = '
+                                 f'{self.acceleration / (1.5 * self.jerk):g} s, or the end of a move rings')
+
+
+@dataclasses.dataclass(frozen=True)
+class Limits(Parameters):
+    """Limits of the axis; the rate command never leaves them."""
+
+    low: float = parameter(-1.5 * math.pi, -20.0, 20.0, 'rad', 'lowest deck angle')
+    high: float = parameter(1.5 * math.pi, -20.0, 20.0, 'rad', 'highest deck angle')
+    rate: float = parameter(2.45, 1e-4, 100.0, 'rad/s', 'largest rate command')
+    acceleration: float = parameter(40.0, 1e-4, 1000.0, 'rad/s2', 'largest change of the rate command over time')
+
+    def check(self):
+        if self.low >= self.high:
+            raise ParameterError(f'low = {self.low:g} rad: must be below high = {self.high:g} rad')
+
+
+@dataclasses.dataclass(frozen=True)
+class AxisParameters(Parameters):
+    """One axis."""
+
+    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
+    stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode stow')
+    preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
+    position_loop: PositionLoop = group(PositionLoop)
+    shaper: Shaper = group(Shaper)
+    limits: Limits = group(Limits)
+
+    def check(self):
+        for name in ('stow', 'preset'):
+            if not self.limits.low <= getattr(self, name) <= self.limits.high:
+                raise ParameterError(f'{name} = {getattr(self, name):g} rad: must be limits.low to limits.high, '
+                                     f'{self.limits.low:g} to {self.limits.high:g}')
+        for name in ('rate', 'acceleration'):
+            if getattr(self.shaper, name) > getattr(self.limits, name):
+                raise ParameterError(f'shaper.{name} = {getattr(self.shaper, name):g}: must be at most '
+                                     f'limits.{name} = {getattr(self.limits, name):g}')
+
+
+@dataclasses.dataclass(frozen=True)
+class Elevation(AxisParameters):
+    """Elevation: a lighter axis on its own limits."""
+
+    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
+    stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'deck angle of mode stow')
+    preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
+    position_loop: PositionLoop = group(PositionLoop, inertia=288.0, friction=45.0)
+    shaper: Shaper = group(Shaper, rate=1.4, acceleration=20.0)
+    limits: Limits = group(Limits, low=-0.09, high=1.66, rate=1.57)
+
+
+@dataclasses.dataclass(frozen=True)
+class AcuParameters(Parameters):
+    """The antenna control unit."""
+
+    period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')
+    step_gap: float = parameter(0.05, 1e-3, 10.0, 's', 'gap between drive steps after which targets := actual')
+    command_delay: float = parameter(0.0, 0.0, 1.0, 's', 'known delay from t_k until the command is in force')
+    initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
+    attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
+    attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')
+    tracker: TrackerParameters = group(TrackerParameters)
+    azimuth: AxisParameters = group(AxisParameters)
+    elevation: Elevation = group(Elevation)
+
+    def check(self):
+        if self.command_delay > (LENGTH - 4) * self.period:
+            raise ParameterError(f'command_delay = {self.command_delay:g} s: must be 0 to {LENGTH - 4} periods, '
+                                 f'{(LENGTH - 4) * self.period:g} s')
+        if self.step_gap < 1.5 * self.period:
+            raise ParameterError(f'step_gap = {self.step_gap:g} s: must be at least 1.5 periods, '
+                                 f'{1.5 * self.period:g} s')
+
+
+@dataclasses.dataclass(frozen=True)
+class AcuNodeParameters(AcuParameters):
+    """Parameters of acu_node: the control unit and, for lockstep, how late its inputs are."""
+
+    receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', "lockstep: latency of the receiver's errors")
+    attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: latency of the attitude')

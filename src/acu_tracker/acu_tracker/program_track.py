@@ -1,0 +1,101 @@
+"""A time-tagged table of directions: cubic Hermite interpolation with parabolic slopes, so the rate is continuous."""
+import math
+
+import numpy as np
+
+from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import wrap
+
+MAX_ROWS = 100_000
+
+
+class ProgramTrackError(ValueError):
+    """A table that cannot be followed; the message names row, value and what is allowed."""
+
+
+def checked(times, angles):
+    """A table as arrays times (n,) [s], angles (n, 2) [rad azimuth, elevation]; ProgramTrackError if it is none."""
+    times, angles = np.array(times, float), np.array(angles, float)
+    if times.ndim != 1 or angles.shape != (len(times), 2):
+        raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
+    if not 2 <= len(times) <= MAX_ROWS:
+        raise ProgramTrackError(f'program track has {len(times)} rows; must be 2 to {MAX_ROWS}')
+    bad = np.flatnonzero(~(np.isfinite(times) & np.isfinite(angles).all(axis=1)))
+    if bad.size:
+        raise ProgramTrackError(f'program track row {bad[0]}: {times[bad[0]]} s {angles[bad[0]]} rad; must be finite')
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if back.size:
+        raise ProgramTrackError(f'program track row {back[0] + 1}: time {times[back[0] + 1]:g} s; '
+                                f'must be after {times[back[0]]:g} s')
+    high = np.flatnonzero(np.abs(angles[:, 1]) > 0.5 * math.pi)
+    if high.size:
+        raise ProgramTrackError(f'program track row {high[0]}: elevation {angles[high[0], 1]:g} rad; '
+                                'must be -1.5708 to 1.5708')
+    return times, angles
+
+
+@compiled
+def status(times, t):
+    """NONE if the table covers t [s], otherwise the reason."""
+    if len(times) < 2:
+        return NO_PROGRAM
+    if t < times[0]:
+        return BEFORE_PROGRAM
+    return NONE if t <= times[-1] else AFTER_PROGRAM
+
+
+@compiled
+def row_at(times, t):
+    """The row i with times[i] <= t < times[i + 1]; the first or last interval outside the table."""
+    low, high = 0, len(times) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def _difference(angles, i, axis):
+    difference = angles[i + 1, axis] - angles[i, axis]
+    return wrap(difference) if axis == 0 else difference
+
+
+@compiled
+def _slope(times, angles, i, axis):
+    """Rate at row i of the parabola through its neighbours; at the ends through the nearest three rows."""
+    if len(times) == 2:
+        return _difference(angles, 0, axis) / (times[1] - times[0])
+    m = min(max(i, 1), len(times) - 2)
+    before, after = times[m] - times[m - 1], times[m + 1] - times[m]
+    d0, d1 = _difference(angles, m - 1, axis) / before, _difference(angles, m, axis) / after
+    bend = (d1 - d0) / (before + after)
+    return d0 + bend * (before + 2.0 * (times[i] - times[m]))
+
+
+@compiled
+def interpolated(times, angles, t, axis):
+    """(angle, rate, acceleration) of axis 0 (azimuth, the short way round) or 1 (elevation) at t [s]."""
+    i = row_at(times, t)
+    T = times[i + 1] - times[i]
+    x = (t - times[i]) / T
+    y0, d = angles[i, axis], _difference(angles, i, axis)
+    m0, m1 = T * _slope(times, angles, i, axis), T * _slope(times, angles, i + 1, axis)
+    c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
+    return (y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
+            (2.0 * c2 + 6.0 * x * c3) / (T * T))
+
+
+@compiled
+def azimuth_travel(times, angles, t):
+    """(below, above) [rad] that the azimuth still travels from its value at t until the end of the table."""
+    first = row_at(times, t)
+    here = interpolated(times, angles, t, 0)[0] - angles[first, 0]
+    at, below, above = 0.0, 0.0, 0.0
+    for i in range(first, len(times) - 1):
+        at += _difference(angles, i, 0)
+        below, above = min(below, at - here), max(above, at - here)
+    return below, above

@@ -1,0 +1,70 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from acu_tracker import deck_reference
+
+LOW, HIGH = -1.5 * math.pi, 1.5 * math.pi
+
+
+def attitude(t):
+    """Deck -> earth on a rough day: yaw, pitch, roll all moving."""
+    return Rotation.from_euler('ZYX', [0.7 + 0.05 * math.sin(0.3 * t), 0.08 * math.sin(0.9 * t + 1),
+                                       0.17 * math.sin(0.785 * t)])
+
+
+def body_rate(t, h=1e-4):
+    return (attitude(t - h).inv() * attitude(t + h)).as_rotvec() / (2 * h)
+
+
+def earth(t):
+    return 1.0 + 0.03 * t + 0.002 * t * t, 0.5 + 0.02 * t - 0.001 * t * t
+
+
+def deck_by_rotation(t):
+    A, E = earth(t)
+    x, y, z = attitude(t).inv().apply([math.cos(E) * math.sin(A), math.cos(E) * math.cos(A), math.sin(E)])
+    return np.array([math.atan2(-y, x), math.asin(z)])
+
+
+@pytest.mark.parametrize('t', [0.0, 1.7, 4.4, 9.1])
+def test_deck_angles_rates_and_accelerations(t):
+    w = body_rate(t)
+    dw = (body_rate(t + 1e-3) - body_rate(t - 1e-3)) / 2e-3
+    A, E = earth(t)
+    got = deck_reference.deck_angles(attitude(t).as_matrix(), *w, *dw, A, 0.03 + 0.004 * t, 0.004, E, 0.02 - 0.002 * t,
+                                     -0.002)
+    got = np.array(got).reshape(2, 3)
+    h = 1e-3
+    before, here, after = (deck_by_rotation(t + d) for d in (-h, 0.0, h))
+    np.testing.assert_allclose(got[:, 0], here, atol=1e-13)
+    np.testing.assert_allclose(got[:, 1], (after - before) / (2 * h), atol=2e-7)
+    np.testing.assert_allclose(got[:, 2], (after - 2 * here + before) / h**2, atol=2e-6)
+
+
+def test_the_zenith_gives_finite_numbers():
+    got = deck_reference.deck_angles(np.eye(3), 0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.5 * math.pi, 0.01, 0.0)
+    assert np.isfinite(got).all()
+    assert np.isfinite(deck_reference.moving_angles(0.0, 0.0, 1.0, 0.1, 0.0, 0.0, 0.0, 0.0, -0.01)).all()
+
+
+def test_turned_is_the_rotation_by_a_vector():
+    rng = np.random.default_rng(1)
+    for size in (0.0, 1e-9, 0.1, 2.0):
+        q, r = Rotation.from_rotvec(rng.normal(size=3)), size * rng.normal(size=3)
+        got = Rotation.from_quat(deck_reference.turned(*q.as_quat(), *r))
+        assert (got.inv() * q * Rotation.from_rotvec(r)).magnitude() < 1e-14
+
+
+@pytest.mark.parametrize('azimuth, near, travel, expected', [
+    (0.5, 0.4, (0, 0), 0.5),
+    (-3.0, 3.0, (0, 0), 2 * math.pi - 3.0),
+    (-1.4, 4.7, (0, 0), -1.4),                  # 2 pi - 1.4 = 4.88 lies behind the limit
+    (3.0, 4.0, (0, 2.0), 3.0 - 2 * math.pi),    # the travel would hit the limit on the near turn
+    (3.0, 4.0, (-1.0, 0), 3.0),
+    (3.0, 4.0, (-9.0, 9.0), 3.0),               # no turn holds all of it
+])
+def test_nearest_turn(azimuth, near, travel, expected):
+    assert deck_reference.nearest_turn(azimuth, near, LOW, HIGH, *travel) == pytest.approx(expected, abs=1e-12)

@@ -1,0 +1,88 @@
+import pytest
+
+from acu_tracker import modes
+from acu_tracker.modes import (
+    ACCEPTED,
+    AFTER_PROGRAM,
+    ATTITUDE_INVALID,
+    AUTOTRACK,
+    BEFORE_PROGRAM,
+    ENCODER_INVALID,
+    LOCKED,
+    NO_PROGRAM,
+    NO_REQUEST,
+    NONE,
+    NOT_LOCKED,
+    OUTSIDE_LIMITS,
+    PRESET,
+    PROGRAM,
+    REFUSED,
+    REQUESTED,
+    SIGNAL_LOST,
+    STANDBY,
+    STOW,
+    UNKNOWN_MODE,
+)
+
+GOOD = dict(encoder_ok=True, attitude_ok=True, program=NONE, stow=NONE, preset=NONE, locked=True, lost=False,
+            handover=False)
+ARGUMENTS = tuple(GOOD)
+
+
+def next_mode(mode, request=NO_REQUEST, **changes):
+    values = {**GOOD, **changes}
+    return modes.next_mode(mode, request, *(values[name] for name in ARGUMENTS))
+
+
+@pytest.mark.parametrize('mode', range(5))
+@pytest.mark.parametrize('request_', range(5))
+def test_every_mode_is_reached_from_every_mode(mode, request_):
+    assert next_mode(mode, request_) == (request_, REQUESTED, ACCEPTED)
+
+
+@pytest.mark.parametrize('request_, changes, reason', [
+    (STOW, dict(stow=OUTSIDE_LIMITS), OUTSIDE_LIMITS),
+    (PRESET, dict(preset=OUTSIDE_LIMITS), OUTSIDE_LIMITS),
+    (PROGRAM, dict(program=NO_PROGRAM), NO_PROGRAM),
+    (PROGRAM, dict(program=BEFORE_PROGRAM), BEFORE_PROGRAM),
+    (PROGRAM, dict(program=AFTER_PROGRAM), AFTER_PROGRAM),
+    (PROGRAM, dict(program=OUTSIDE_LIMITS), OUTSIDE_LIMITS),
+    (PROGRAM, dict(attitude_ok=False), ATTITUDE_INVALID),
+    (AUTOTRACK, dict(attitude_ok=False), ATTITUDE_INVALID),
+    (AUTOTRACK, dict(locked=False), NOT_LOCKED),
+    (STOW, dict(encoder_ok=False), ENCODER_INVALID),
+    (5, {}, UNKNOWN_MODE),
+    (-2, {}, UNKNOWN_MODE),
+])
+def test_refusals_name_the_reason_and_change_nothing(request_, changes, reason):
+    for mode in (STANDBY, STOW):
+        if changes.get('encoder_ok', True) or mode == STANDBY:
+            assert next_mode(mode, request_, **changes) == (mode, reason, REFUSED)
+
+
+def test_standby_is_never_refused():
+    assert next_mode(AUTOTRACK, STANDBY, encoder_ok=False, attitude_ok=False) == (STANDBY, REQUESTED, ACCEPTED)
+
+
+@pytest.mark.parametrize('mode, changes, expected', [
+    (PROGRAM, dict(handover=True), (AUTOTRACK, LOCKED)),
+    (PROGRAM, dict(handover=False), (PROGRAM, NONE)),
+    (PROGRAM, dict(handover=True, locked=False), (PROGRAM, NONE)),
+    (PROGRAM, dict(program=AFTER_PROGRAM), (STANDBY, AFTER_PROGRAM)),
+    (PROGRAM, dict(program=NO_PROGRAM), (STANDBY, NO_PROGRAM)),
+    (PROGRAM, dict(program=OUTSIDE_LIMITS), (PROGRAM, NONE)),
+    (PROGRAM, dict(attitude_ok=False), (STANDBY, ATTITUDE_INVALID)),
+    (AUTOTRACK, dict(lost=True), (PROGRAM, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=True, program=AFTER_PROGRAM), (STANDBY, SIGNAL_LOST)),
+    (AUTOTRACK, dict(locked=False), (AUTOTRACK, NONE)),
+    (AUTOTRACK, dict(attitude_ok=False), (STANDBY, ATTITUDE_INVALID)),
+    (PRESET, dict(attitude_ok=False), (PRESET, NONE)),
+    (STOW, dict(attitude_ok=False, lost=True), (STOW, NONE)),
+    (STANDBY, dict(encoder_ok=False, handover=True), (STANDBY, NONE)),
+] + [(mode, dict(encoder_ok=False), (STANDBY, ENCODER_INVALID)) for mode in (STOW, PRESET, PROGRAM, AUTOTRACK)])
+def test_what_happens_by_itself(mode, changes, expected):
+    assert next_mode(mode, **changes) == (*expected, NO_REQUEST)
+
+
+def test_a_refused_request_does_not_stop_a_fault():
+    assert next_mode(AUTOTRACK, 9, encoder_ok=False) == (STANDBY, ENCODER_INVALID, REFUSED)

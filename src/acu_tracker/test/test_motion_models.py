@@ -1,0 +1,90 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.linalg import expm
+
+from acu_tracker import motion_models
+
+CASES = [(0.1, 0.01), (0.5, 0.005), (0.5, 0.0999), (0.7, 0.3), (2.0, 0.24999), (2.0, 0.25001), (5.0, 0.4), (1.0, 3.0)]
+
+
+def van_loan(alpha, T):
+    """Phi and q of the continuous model by one matrix exponential (Van Loan 1978)."""
+    A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -alpha]])
+    # Scaled to T = 1, so that the blocks of small T keep their digits.
+    S = np.diag([1.0, T, T * T])
+    A = S @ A @ np.linalg.inv(S) * T
+    G = np.zeros((3, 3))
+    G[2, 2] = 1.0
+    block = expm(np.block([[-A, G], [np.zeros((3, 3)), A.T]]))
+    phi = block[3:, 3:].T
+    S = np.linalg.inv(S)
+    return S @ phi @ np.linalg.inv(S), S @ (phi @ block[:3, 3:]) @ S.T * T**5
+
+
+def symmetric(q11, q12, q13, q22, q23, q33):
+    return np.array([[q11, q12, q13], [q12, q22, q23], [q13, q23, q33]])
+
+
+@pytest.mark.parametrize('alpha, T', CASES)
+def test_transition_and_noise_against_van_loan(alpha, T):
+    phi, q = van_loan(alpha, T)
+    f13, f23, f33 = motion_models.transition(alpha, T)
+    np.testing.assert_allclose([[1, T, f13], [0, 1, f23], [0, 0, f33]], phi, rtol=1e-11, atol=1e-300)
+    np.testing.assert_allclose(symmetric(*motion_models.process_noise(alpha, T)), q, rtol=2e-9)
+
+
+@pytest.mark.parametrize('alpha, T', CASES)
+def test_noise_against_quadrature(alpha, T):
+    def g(s):
+        x = alpha * s
+        if x < 1e-3:
+            return s * s * (0.5 - x / 6 + x * x / 24), s * (1 - x / 2 + x * x / 6 - x**3 / 24), math.exp(-x)
+        return (x + math.expm1(-x)) / alpha**2, -math.expm1(-x) / alpha, math.exp(-x)
+
+    pairs = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+    integrals = [quad(lambda s, i, j: g(s)[i] * g(s)[j], 0, T, args=(i, j), epsabs=0, epsrel=1e-10)[0]
+                 for i, j in pairs]
+    np.testing.assert_allclose(motion_models.process_noise(alpha, T), integrals, rtol=1e-8)
+
+
+@pytest.mark.parametrize('alpha', [1e-4, 0.1, 0.5])
+@pytest.mark.parametrize('T', [1e-4, 0.005, 0.01])
+def test_noise_stays_definite_for_small_alpha_t(alpha, T):
+    scale = np.diag([T**-2.5, T**-1.5, T**-0.5])
+    q = scale @ symmetric(*motion_models.process_noise(alpha, T)) @ scale
+    # In the limit of white jerk.
+    np.testing.assert_allclose(q, [[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1]], rtol=0.02)
+    assert np.linalg.eigvalsh(q).min() > 1e-4
+
+
+@pytest.mark.parametrize('alpha, T', CASES)
+def test_mean_input_is_the_response_to_a_constant_acceleration(alpha, T):
+    f13, f23, f33 = motion_models.transition(alpha, T)
+    # Phi X + U abar = Phi1 X where abar is the estimated acceleration (paper 000, eq. 6).
+    np.testing.assert_allclose(np.add(motion_models.mean_input(alpha, T), (f13, f23, f33)), (T * T / 2, T, 1.0),
+                               rtol=1e-12)
+    u1 = quad(lambda s: alpha * s * s / 2 * math.exp(-alpha * (T - s)), 0, T, epsabs=0)[0]
+    assert motion_models.mean_input(alpha, T)[0] == pytest.approx(u1, rel=1e-8)
+
+
+def test_modified_rayleigh_variance_by_quadrature():
+    a_max, abar = 3.0, 1.2
+    mu2 = (a_max - abar)**2 * 2 / math.pi
+
+    def density(a):
+        return (a_max - a) / mu2 * math.exp(-(a_max - a)**2 / (2 * mu2))
+
+    mean = quad(lambda a: a * density(a), -60, a_max, epsabs=1e-13, limit=400)[0]
+    variance = quad(lambda a: (a - mean)**2 * density(a), -60, a_max, epsabs=1e-13, limit=400)[0]
+    assert mean == pytest.approx(abar, abs=1e-9)
+    assert variance == pytest.approx(0.885296, abs=5e-7)
+    assert motion_models.acceleration_variance(abar, a_max, 0.0) == pytest.approx(variance, rel=1e-9)
+    assert motion_models.acceleration_variance(-abar, a_max, 0.0) == pytest.approx(variance, rel=1e-9)
+
+
+def test_floor_holds_beyond_a_max():
+    for abar in (2.9, 3.0, 10.0, -10.0):
+        assert motion_models.acceleration_variance(abar, 3.0, 0.3) == pytest.approx(0.81)

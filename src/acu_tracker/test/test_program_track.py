@@ -1,0 +1,83 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from acu_tracker import program_track
+from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
+
+
+def table(n=40, seed=2):
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.5, 1.5, n))
+    return times, np.column_stack([3.0 + 0.05 * times, 0.6 + 0.1 * np.sin(0.2 * times)])
+
+
+def wrapped(angles):
+    out = angles.copy()
+    out[:, 0] = (out[:, 0] + math.pi) % (2 * math.pi) - math.pi
+    return out
+
+
+def test_is_the_hermite_spline_with_parabolic_slopes():
+    times, angles = table()
+    slopes = np.gradient(angles, times, axis=0, edge_order=2)
+    spline = CubicHermiteSpline(times, angles, slopes)
+    for t in np.linspace(times[0], times[-1] - 1e-9, 500):
+        for axis in (0, 1):
+            got = program_track.interpolated(times, wrapped(angles), t, axis)
+            expected = [spline(t, derivative)[axis] for derivative in range(3)]
+            turns = 2 * math.pi * round((got[0] - expected[0]) / (2 * math.pi)) if axis == 0 else 0.0
+            np.testing.assert_allclose(np.subtract(got, (turns, 0, 0)), expected, atol=1e-11)
+
+
+def test_quadratic_is_reproduced_and_two_rows_are_a_line():
+    times = np.array([0.0, 1.0, 2.5, 3.0])
+    angles = np.column_stack([0.1 * times**2, 0.2 - 0.05 * times**2])
+    for t in (0.0, 0.7, 1.0, 2.9, 3.0, 3.01):
+        np.testing.assert_allclose(program_track.interpolated(times, angles, t, 0), (0.1 * t * t, 0.2 * t, 0.2),
+                                   atol=1e-13)
+    line = program_track.interpolated(times[:2], angles[:2], 0.25, 0)
+    np.testing.assert_allclose(line, (0.025, 0.1, 0.0), atol=1e-15)
+
+
+def test_rate_is_continuous_over_rows_and_the_north_crossing():
+    times, angles = table()
+    for row in times[1:-1]:
+        for axis in (0, 1):
+            before = program_track.interpolated(times, wrapped(angles), row - 1e-9, axis)
+            after = program_track.interpolated(times, wrapped(angles), row + 1e-9, axis)
+            assert before[1] == pytest.approx(after[1], abs=1e-8)
+
+
+def test_status():
+    times, _ = table()
+    assert program_track.status(times, times[0]) == NONE
+    assert program_track.status(times, times[-1]) == NONE
+    assert program_track.status(times, times[0] - 1e-6) == BEFORE_PROGRAM
+    assert program_track.status(times, times[-1] + 1e-6) == AFTER_PROGRAM
+    assert program_track.status(times[:1], times[0]) == NO_PROGRAM
+
+
+def test_travel_until_the_end():
+    times = np.arange(5.0)
+    angles = np.zeros((5, 2))
+    angles[:, 0] = (3.0, -3.0, -2.5, 3.0, 2.0)
+    below, above = program_track.azimuth_travel(times, angles, 1.0)
+    assert above == pytest.approx(0.5)
+    assert below == pytest.approx(2.0 - (2 * math.pi - 3.0))
+
+
+@pytest.mark.parametrize('times, angles, words', [
+    ([0.0], [[0, 0]], '1 rows'),
+    ([0.0, 1.0], [[0, 0]], 'times (2,), angles (1, 2)'),
+    ([0.0, math.nan], [[0, 0], [1, 0]], 'row 1'),
+    ([0.0, 1.0], [[0, math.inf], [1, 0]], 'row 0'),
+    ([0.0, 2.0, 2.0], [[0, 0]] * 3, 'row 2: time 2 s; must be after 2'),
+    ([0.0, 2.0], [[0, 0], [0, 1.6]], 'row 1: elevation 1.6 rad'),
+])
+def test_bad_tables_are_named(times, angles, words):
+    with pytest.raises(program_track.ProgramTrackError) as error:
+        program_track.checked(times, angles)
+    assert words in str(error.value) and '\n' not in str(error.value)
