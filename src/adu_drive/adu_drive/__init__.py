@@ -1,0 +1,26 @@
+"""The antenna drive unit: two axes, each with two motors that take the lash out of one bull gear.
+
+    drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
+    axis          one axis: sensors, speed loop, two current loops, plant
+    speed_loop, bias, current_loop, pi, travel, encoder         the controller's laws
+    motor, gear_train, friction                                 the plant's laws
+
+Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
+(it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
+
+Symbols
+    theta, omega      angle [rad], rate [rad/s] of a motor shaft (index 1, 2) or of the load (no index)
+    T                 torque [Nm]: per motor on its shaft; T_1,2 = T +- T_b
+    T_b               bias torque that keeps the two pinions on opposite flanks [Nm]
+    N                 ratio motor : load = planetary reducer x pinion on bull gear
+    J_m, J            inertia of rotor + reducer + pinion on the motor shaft; of the load [kg m2]
+    i_d, i_q          phase currents in rotor coordinates, amplitude invariant [A]
+    v_d, v_q          phase voltages likewise [V]
+    R, L, psi, p      phase resistance [ohm], inductance [H], flux linkage [Wb], pole pairs
+    K_t               torque constant 1.5 p psi [Nm/A]
+    K_p, K_i          gains of a PI controller
+    k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis
+    z                 LuGre bristle deflection [rad]; sigma_0, sigma_1 its stiffness and damping
+    T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]
+    h                 plant sub-step 50 us; current loops 100 us, speed loop 0.5 ms
+"""

@@ -1,0 +1,202 @@
+"""ROS shell of the antenna drive unit: owns the drive's time, publishes the encoders, obeys rate commands."""
+import json
+import sys
+import time
+
+import numpy as np
+from std_srvs.srv import Trigger
+
+from adu_drive import drive_unit
+from adu_drive.params import AduNodeParameters
+from pedestal_common import messages, shell
+
+STEP = 'step'
+"""The drive's own trigger among its inputs."""
+
+ACKNOWLEDGED_STEPS = 1000
+"""Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so
+a slow recorder slows the run and loses nothing."""
+
+
+class AduNode(shell.Shell):
+
+    def __init__(self):
+        super().__init__('adu', AduNodeParameters)
+        p = self.parameters
+        self.constants = drive_unit.constants(p)
+        self.state = drive_unit.initial_state(p)
+        self.inputs = np.zeros(1, drive_unit.INPUTS)
+        self.outputs = np.zeros(1, drive_unit.OUTPUTS)
+        drive_unit.step(self.state.copy(), self.constants, self.inputs, self.outputs.copy())
+        drive_unit.read(self.state, self.constants, self.outputs)
+
+        self.period_ns = round(p.period * shell.SECOND)
+        self.timeout_ns = round(p.command_timeout * p.period * shell.SECOND)
+        self.steps_to_go = round(p.duration / p.period) if p.duration > 0.0 else None
+        self.on_ship = 'ship_motion' in self.graph.nodes
+        self.k = 0
+        self.lost_steps = self.late_ticks = 0
+        self.command = None
+        self.command_stamp = None
+        self.stale = False
+        self.emergency = False
+        self.refused = ''
+        self.truth = None
+        self.deck_rate = np.zeros(3)
+        self.begun = self.heard = time.monotonic()
+
+        self.clock_message = messages.Clock(clock=messages.Time(sec=0, nanosec=0))
+        self.joints = messages.joint_state(messages.AXES)
+        self.motors = messages.joint_state(messages.MOTORS)
+        self.send_joints = self.writer('joint_states')
+        self.send_motors = self.writer('adu/motor_states')
+        self.send_clock = self.writer('clock')
+        self.create_service(Trigger, 'adu/emergency_stop', self.on_emergency_stop)
+        self.create_service(Trigger, 'adu/reset_faults', self.on_reset_faults)
+        self.diagnose_with(self.diagnose)
+
+        followers = {'acu/rate_command': 0.0, **({'ship/truth': 0.0} if self.on_ship else {})}
+        if self.graph.lockstep:
+            self.follow(STEP, followers, self.answered)
+        else:
+            self.reader('acu/rate_command', self.on_command)
+            if self.on_ship:
+                self.reader('ship/truth', self.on_truth)
+        self.start_timer = self.every(0.001, self.start)
+
+    def start(self):
+        """Step 0, once the graph is complete; in realtime the steady timer begins here."""
+        self.start_timer.cancel()
+        self.await_graph()
+        self.begun = self.heard = time.monotonic()
+        self.publish_step()
+        if not self.graph.lockstep:
+            self.every(self.parameters.period, self.tick)
+
+    def publish_step(self):
+        """joint_states, motor_states and clock of step k."""
+        stamp = self.k * self.period_ns
+        self.begin_step(stamp)
+        if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
+            self.await_acknowledged()
+        outputs = self.outputs[0]
+        for message in (self.joints, self.motors):
+            messages.put_stamp(message.header.stamp, stamp)
+        messages.put_stamp(self.clock_message.clock, stamp)
+        for i, axis in enumerate(messages.AXES):
+            out = outputs[axis]
+            self.joints.position[i] = out['position']
+            self.joints.velocity[i] = out['velocity']
+            self.joints.effort[i] = out['torque']
+            self.motors.position[2 * i:2 * i + 2] = out['motor_position']
+            self.motors.velocity[2 * i:2 * i + 2] = out['motor_velocity']
+            self.motors.effort[2 * i:2 * i + 2] = out['motor_torque']
+        self.send_motors(self.motors)
+        self.send_clock(self.clock_message)
+        self.send_joints(self.joints)
+        if self.graph.lockstep:
+            self.steps.take(STEP, stamp, None)
+
+    def answered(self, _stamp, _trigger, inputs):
+        """Lockstep: the command stamped t_k (and the ship's truth) has come."""
+        self.command = inputs['acu/rate_command']
+        self.advance(True, inputs.get('ship/truth'))
+
+    def on_command(self, message):
+        """Realtime: the latest command wins; one that is not newer, or from the future, is refused."""
+        stamp = messages.nanoseconds(message.header.stamp)
+        if self.command_stamp is not None and stamp <= self.command_stamp:
+            self.refused = f'stamp went back from {self.command_stamp / 1e9:.3f} to {stamp / 1e9:.3f} s'
+        elif stamp > self.k * self.period_ns:
+            self.refused = f'stamp {stamp / 1e9:.3f} s lies ahead of the drive ({self.k * self.period_ns / 1e9:.3f} s)'
+        else:
+            self.command, self.command_stamp = message, stamp
+
+    def on_truth(self, message):
+        self.truth = message
+
+    def tick(self):
+        """Realtime: one period has passed on the steady clock."""
+        if self.finished:
+            return
+        stamp = self.k * self.period_ns
+        age = stamp - self.command_stamp if self.command_stamp is not None else stamp
+        self.lost_steps += age > 0
+        self.stale = age > self.timeout_ns or self.command is None
+        self.late_ticks += time.monotonic() - self.heard > 1.5 * self.parameters.period
+        self.heard = time.monotonic()
+        self.advance(not self.stale, self.truth)
+
+    def advance(self, follow, truth):
+        """Integrate from t_k to t_k+1 and publish, or end after the last step."""
+        if self.k == self.steps_to_go:
+            self.end()
+            return
+        inputs = self.inputs[0]
+        if self.command is not None:
+            names = self.command.name
+            rates = messages.by_name(names, self.command.velocity, messages.AXES)
+            torques = messages.by_name(names, self.command.effort, messages.AXES)
+            for axis, rate, torque in zip(messages.AXES, rates, torques):
+                inputs[axis]['rate'], inputs[axis]['torque'] = rate, torque
+        inputs['enable'] = follow and not self.emergency
+        if truth is not None:
+            w = truth.twist.twist.angular
+            rate = np.array((w.x, w.y, w.z))
+            inputs['base_acceleration'] = (rate - self.deck_rate) / self.parameters.period if self.k else 0.0
+            self.deck_rate = rate
+        drive_unit.step(self.state, self.constants, self.inputs, self.outputs)
+        self.k += 1
+        self.publish_step()
+
+    def end(self):
+        """The last step has been answered: say how it went and finish."""
+        wall = time.monotonic() - self.begun
+        self.await_acknowledged()
+        print(json.dumps({'steps': self.k, 'wall_s': wall, 'realtime_factor': self.k * self.parameters.period / wall,
+                          'lost_steps': int(self.lost_steps), 'late_ticks': int(self.late_ticks)}), flush=True)
+        self.finished = True
+
+    def on_emergency_stop(self, _request, response):
+        self.emergency = True
+        self.inputs[0]['enable'] = 0
+        response.success = True
+        response.message = 'axes are stopping and stay stopped until adu/reset_faults'
+        return response
+
+    def on_reset_faults(self, _request, response):
+        moving = [axis for axis in messages.AXES if abs(self.outputs[0][axis]['velocity']) > 1e-3]
+        response.success = not (self.emergency and moving)
+        if response.success:
+            self.emergency = False
+            self.refused = ''
+            response.message = 'drive enabled'
+        else:
+            response.message = f'refused: {" and ".join(moving)} still moves'
+        return response
+
+    def diagnose(self):
+        outputs = self.outputs[0]
+        values = [(f'{axis} {name}', '1' if outputs[axis][name] else '0') for axis in messages.AXES
+                  for name in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
+        values += [('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
+                   ('late_ticks', str(int(self.late_ticks)))]
+        if self.emergency:
+            return shell.ERROR, 'emergency stop', values
+        if outputs['invalid_command']:
+            return shell.ERROR, 'acu/rate_command holds NaN or infinity: stopping', values
+        if self.stale:
+            return shell.ERROR, f'no new acu/rate_command for {self.timeout_ns / 1e9:g} s: stopping', values
+        if self.refused:
+            return shell.WARN, f'acu/rate_command refused: {self.refused}', values
+        if any(outputs[axis]['end_stop'] for axis in messages.AXES):
+            return shell.WARN, 'at an end stop', values
+        return shell.OK, 'following', values
+
+
+def main(args=None):
+    return shell.main(AduNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

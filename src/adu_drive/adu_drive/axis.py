@@ -1,0 +1,179 @@
+"""One axis: encoders, speed loop, two current loops, two motors, gear train and load.
+
+`speed_control`, `current_control` and `plant_step` are called at their own periods by drive_unit.step; they work on
+the records `s` (state) and `c` (constants) of the axis, built here as nested dictionaries.
+"""
+import math
+
+from adu_drive import bias, current_loop, encoder, friction, gear_train, motor, pi, speed_loop, travel
+from adu_drive.params import SPEED_PERIOD
+from pedestal_common.compiled import compiled
+
+CURRENT_TICKS = 5
+"""Current-loop periods in one speed-loop period."""
+
+CURRENT_PERIOD = SPEED_PERIOD / CURRENT_TICKS
+
+
+def _motor_constants(m, loop, per_rad, h):
+    w = 2.0 * math.pi * loop.bandwidth
+    return {'p': float(m.pole_pairs), 'psi': m.flux_linkage, 'L': m.inductance, 'K_t': m.torque_constant,
+            'per_K_t': 1.0 / m.torque_constant, 'h_L': h / m.inductance,
+            'q_R': 1.0 / (1.0 + h * m.resistance / m.inductance), 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
+            'h_J': h / m.inertia, 'q_B': 1.0 / (1.0 + h * m.viscous / m.inertia),
+            'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_PERIOD, 'v_max': m.voltage,
+            'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad, 'speed': 1.0 / per_rad / SPEED_PERIOD}
+
+
+def constants(p, h):
+    """Hoisted constants of one axis (AxisParameters) for a plant sub-step h [s]: nested dictionary."""
+    per_rad = 2.0 ** p.encoder.load_bits / (2.0 * math.pi)
+    motor_per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
+    N = p.gear_train.ratio
+    return {
+        'motor_1': _motor_constants(p.motor_1, p.current_loop, motor_per_rad, h),
+        'motor_2': _motor_constants(p.motor_2, p.current_loop, motor_per_rad, h),
+        'N': N, 'per_N': 1.0 / N, 'per_2N': 0.5 / N, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
+        'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * SPEED_PERIOD,
+        'K_d': p.speed_loop.differential_damping,
+        'T_b': p.bias.torque, 'out': p.bias.out, 'per_fade': 1.0 / (p.bias.out - p.bias.hold),
+        'bias_gain': 1.0 - math.exp(-SPEED_PERIOD / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
+        'k': p.gear_train.stiffness, 'c': p.gear_train.damping, 'half_lash': 0.5 * p.gear_train.lash,
+        'h': h, 'J': p.load.inertia, 'h_J': h / p.load.inertia,
+        'q_B': 1.0 / (1.0 + h * p.load.viscous / p.load.inertia), 'unbalance': p.load.unbalance,
+        'T_c': p.friction.coulomb, 'T_sc': p.friction.breakaway - p.friction.coulomb,
+        'per_v2': p.friction.stribeck_rate ** -2, 'sigma_0': p.friction.stiffness,
+        'h_sigma_0': h * p.friction.stiffness, 'sigma_1_h': p.friction.damping / h,
+        'rate_max': p.limits.rate, 'a': p.limits.deceleration, 'ramp': p.limits.deceleration * SPEED_PERIOD,
+        'lower': p.limits.lower, 'upper': p.limits.upper, 'K': p.limits.approach,
+        'stop_lower': p.limits.lower - p.limits.buffer, 'stop_upper': p.limits.upper + p.limits.buffer,
+        'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping}
+
+
+def _motor_at_rest(m, g, T, theta, per_rad):
+    """A motor that holds T [Nm] at standstill, its pinion pressed on the flank, load at theta."""
+    i_q = T / m.torque_constant
+    flank = math.copysign(0.5 * g.lash, T) if T != 0.0 else 0.0
+    angle = g.ratio * (theta + flank + T * g.ratio / g.stiffness)
+    return {'i_d': 0.0, 'i_q': i_q, 'i_ref': i_q, 'v_d': 0.0, 'v_q': m.resistance * i_q,
+            'sum_d': 0.0, 'sum_q': m.resistance * i_q, 'omega': 0.0, 'theta': angle,
+            'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0, 'torque_ref': T, 'limited': 0}
+
+
+def initial_state(p, theta, external):
+    """State of one axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary."""
+    per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
+    T = -0.5 * external / p.gear_train.ratio
+    T_b = bias.scheduled.py_func(T, p.bias.torque, p.bias.out, 1.0 / (p.bias.out - p.bias.hold))
+    return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, theta, per_rad),
+            'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, theta, per_rad),
+            'theta': theta, 'omega': 0.0, 'z': 0.0,
+            'sum': T, 'bias': T_b, 'rate': 0.0,
+            'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0}
+
+
+@compiled
+def _measured_speed(m, k):
+    """Motor speed [rad/s]: encoder difference over the last speed-loop period (0.25 ms old on average)."""
+    return (encoder.counts(m.theta, k.per_rad) - m.count) * k.speed
+
+
+@compiled
+def _sense(m, k):
+    m.measured = _measured_speed(m, k)
+    m.count = encoder.counts(m.theta, k.per_rad)
+
+
+@compiled
+def _realised(m, k):
+    """Torque [Nm] the motor made of what was asked: the current's own once the voltage circle has cut it."""
+    return k.K_t * m.i_q if m.limited else m.torque_ref
+
+
+@compiled
+def speed_control(s, c, rate, torque, enable):
+    """One speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references."""
+    m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
+    _sense(m1, k1)
+    _sense(m2, k2)
+
+    if enable:
+        wanted = min(max(rate, -c.rate_max), c.rate_max)
+        feed_forward = torque * c.per_2N
+    else:
+        wanted = s.rate - min(max(s.rate, -c.ramp), c.ramp)
+        feed_forward = 0.0
+        s.stopping = 1
+    position = c.rad * encoder.counts(s.theta, c.per_rad)
+    s.rate = min(max(wanted, -travel.approach_rate(position - c.lower, c.K, c.a)),
+                 travel.approach_rate(c.upper - position, c.K, c.a))
+    if s.rate != wanted:
+        feed_forward = 0.0
+        s.end_stop = 1
+
+    error = c.N * s.rate - 0.5 * (m1.measured + m2.measured)
+    T = speed_loop.torque(error, s.sum, c.K_p, feed_forward)
+    s.bias += c.bias_gain * (bias.scheduled(T, c.T_b, c.out, c.per_fade) - s.bias)
+    m1.torque_ref, m2.torque_ref, limited = speed_loop.shared(
+        T, s.bias, m1.measured, m2.measured, c.K_d, k1.limit, k2.limit)
+    excess = T - 0.5 * (_realised(m1, k1) + _realised(m2, k2))
+    s.sum = pi.integral(s.sum, error, c.K_iT, excess if limited or m1.limited or m2.limited else 0.0)
+    m1.i_ref = m1.torque_ref * k1.per_K_t
+    m2.i_ref = m2.torque_ref * k2.per_K_t
+
+    s.torque_limited |= limited
+    s.voltage_limited |= m1.limited | m2.limited
+    m1.limited = 0
+    m2.limited = 0
+
+
+@compiled
+def current_control(m, k):
+    """One current-loop period of one motor: current reference to phase voltages."""
+    m.v_d, m.v_q, m.sum_d, m.sum_q, limited = current_loop.voltages(
+        m.i_d, m.i_q, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L, k.psi, k.v_max)
+    m.limited |= limited
+
+
+@compiled
+def plant_step(s, c, external):
+    """One plant sub-step h under an external load torque [Nm]: semi-implicit Euler, new currents into the
+    speeds, new speeds into the angles; implicit in R, viscous friction and bristle."""
+    m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
+    m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, k1.q_R)
+    m2.i_d, m2.i_q = motor.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, k2.q_R)
+
+    mesh_1 = gear_train.mesh_torque(m1.theta * c.per_N - s.theta, m1.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
+    mesh_2 = gear_train.mesh_torque(m2.theta * c.per_N - s.theta, m2.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
+    bearing, s.z = friction.lugre(s.z, s.omega, c.T_c, c.T_sc, c.per_v2, c.sigma_0, c.h_sigma_0, c.sigma_1_h, c.h)
+    stop = travel.buffer_torque(s.theta, s.omega, c.stop_lower, c.stop_upper, c.k_stop, c.c_stop)
+
+    m1.omega = motor.speed(m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
+    m2.omega = motor.speed(m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
+    s.omega = (s.omega + c.h_J * (mesh_1 + mesh_2 + external + stop - bearing)) * c.q_B
+
+    m1.theta += c.h * m1.omega
+    m2.theta += c.h * m2.omega
+    s.theta += c.h * s.omega
+
+
+@compiled
+def read(s, c, y):
+    """Outputs of the axis now: what its sensors and controllers know, and the true load beside it."""
+    m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
+    y.position = c.rad * encoder.counts(s.theta, c.per_rad)
+    y.motor_position[0] = k1.rad * encoder.counts(m1.theta, k1.per_rad)
+    y.motor_position[1] = k2.rad * encoder.counts(m2.theta, k2.per_rad)
+    y.motor_velocity[0] = _measured_speed(m1, k1)
+    y.motor_velocity[1] = _measured_speed(m2, k2)
+    y.velocity = c.per_2N * (y.motor_velocity[0] + y.motor_velocity[1])
+    y.motor_torque[0] = k1.K_t * m1.i_q
+    y.motor_torque[1] = k2.K_t * m2.i_q
+    y.torque = c.N * (y.motor_torque[0] + y.motor_torque[1])
+    y.bias = s.bias
+    y.torque_limited = s.torque_limited
+    y.voltage_limited = s.voltage_limited
+    y.end_stop = s.end_stop
+    y.stopping = s.stopping
+    y.load_position = s.theta
+    y.load_velocity = s.omega

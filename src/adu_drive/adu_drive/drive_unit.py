@@ -1,0 +1,186 @@
+"""The antenna drive unit: two axes over one control period T, from commands at t_k to encoders at t_k+1.
+
+Sub-steps inside: speed loop 0.5 ms, current loops 100 us, plant 50 us, all in one compiled call.
+"""
+import math
+
+import numpy as np
+
+from adu_drive import axis
+from adu_drive.params import AduParameters, whole_speed_periods
+from pedestal_common.compiled import compiled
+
+RING = 128
+"""Commands kept for the transport delay: more than MAX_DELAY over the shortest period."""
+
+LARGEST = 1e6
+"""Inputs beyond this (rad/s, Nm, rad/s2), infinite or NaN are not believed."""
+
+_AXIS_INPUTS = np.dtype([('rate', 'f8'), ('torque', 'f8'), ('wind', 'f8')], align=True)
+
+INPUTS = np.dtype([('azimuth', _AXIS_INPUTS), ('elevation', _AXIS_INPUTS),
+                   ('base_acceleration', 'f8', (3,)), ('enable', 'i8')], align=True)
+"""Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm], wind torque on
+the load [Nm]. base_acceleration: angular acceleration of the deck, FLU [rad/s2].
+enable 1: follow, 0: controlled stop."""
+
+_AXIS_OUTPUTS = np.dtype([
+    ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
+    ('motor_position', 'f8', (2,)), ('motor_velocity', 'f8', (2,)), ('motor_torque', 'f8', (2,)), ('bias', 'f8'),
+    ('torque_limited', 'i8'), ('voltage_limited', 'i8'), ('end_stop', 'i8'), ('stopping', 'i8'),
+    ('load_position', 'f8'), ('load_velocity', 'f8')], align=True)
+
+OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8')], align=True)
+"""At t_k+1, per axis:
+
+position          load encoder [rad]
+velocity          mean motor speed / N [rad/s], from the motor encoders over the last 0.5 ms
+torque            of both motors on the load axis, from their currents [Nm]
+motor_position, motor_velocity, motor_torque    of motor 1 and 2 on the shaft: encoder, its difference, K_t i_q
+bias              T_b [Nm]
+torque_limited, voltage_limited                 1 when it happened within the period
+end_stop          1 when the end of travel cut the rate command within the period
+stopping          1 when not enabled within the period: ramped to standstill, then held there
+load_position, load_velocity                    the truth, for tests and studies; never published
+
+invalid_command   1 when an input of this call was not finite (or beyond LARGEST): the command counts as enable 0,
+                  a disturbance as 0
+"""
+
+
+def _record(values):
+    """A (1,) record of a nested dictionary: int -> i8, float -> f8, array and dictionary nested."""
+    fields = {name: _record(value) if isinstance(value, dict) else np.asarray(value)[np.newaxis]
+              for name, value in values.items()}
+    record = np.zeros(1, np.dtype([(name, field.dtype, field.shape[1:]) for name, field in fields.items()],
+                                  align=True))
+    for name, field in fields.items():
+        record[name] = field
+    return record
+
+
+def _constants(params, substeps):
+    h = axis.CURRENT_PERIOD / substeps
+    return _record({'azimuth': axis.constants(params.azimuth, h), 'elevation': axis.constants(params.elevation, h),
+                    'wind_azimuth': params.wind.azimuth, 'wind_elevation': params.wind.elevation,
+                    'speed_ticks': whole_speed_periods('period', params.period),
+                    'delay_ticks': whole_speed_periods('transport_delay', params.transport_delay),
+                    'substeps': substeps})
+
+
+def _initial_state(params):
+    axes = {}
+    for name in ('azimuth', 'elevation'):
+        p, theta = getattr(params, name), getattr(params, f'initial_{name}')
+        external = getattr(params.wind, name) - p.load.unbalance * math.cos(theta)
+        axes[name] = axis.initial_state(p, theta, external)
+    return _record({**axes, 'rate': np.zeros((RING, 2)), 'torque': np.zeros((RING, 2)),
+                    'enable': np.zeros(RING, np.int64), 'k': 0})
+
+
+CONSTANTS = _constants(AduParameters(), 2).dtype
+STATE = _initial_state(AduParameters()).dtype
+"""One dtype object for all records: numba knows it again at once, an equal one it compares anew (3 us a call)."""
+
+
+def constants(params: AduParameters, substeps: int = 2) -> np.ndarray:
+    """Hoisted constants, (1,) record; `substeps` plant sub-steps in a current-loop period (2: h = 50 us)."""
+    return _constants(params, substeps).view(CONSTANTS)
+
+
+def initial_state(params: AduParameters) -> np.ndarray:
+    """At rest at the initial angles, in balance with constant wind and unbalance, bias in place: (1,) record."""
+    return _initial_state(params).view(STATE)
+
+
+@compiled
+def _believed(x):
+    return abs(x) <= LARGEST
+
+
+@compiled
+def inertial_torques(azimuth, J_azimuth, J_elevation, x, y, z):
+    """Torques [Nm] on azimuth and elevation when the deck accelerates with (x, y, z) [rad/s2] about its FLU axes.
+
+    The load lags behind the deck: -J (n . acceleration) about the axis n of growing angle: azimuth grows clockwise,
+    n = (0, 0, -1); elevation lifts the beam (cos A, -sin A, 0) towards +z, n = (-sin A, -cos A, 0).
+    """
+    return J_azimuth * z, J_elevation * (x * math.sin(azimuth) + y * math.cos(azimuth))
+
+
+@compiled
+def _external(s, c, u):
+    """External torques [Nm] on the two loads, constant over the period, and whether every input was believable."""
+    x, y, z = u.base_acceleration[0], u.base_acceleration[1], u.base_acceleration[2]
+    azimuth, elevation = s.azimuth.theta, s.elevation.theta
+    T_azimuth = c.wind_azimuth - c.azimuth.unbalance * math.cos(azimuth)
+    T_elevation = c.wind_elevation - c.elevation.unbalance * math.cos(elevation)
+    believed = True
+    if _believed(x) and _believed(y) and _believed(z):
+        inertial_azimuth, inertial_elevation = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
+        T_azimuth += inertial_azimuth
+        T_elevation += inertial_elevation
+    else:
+        believed = False
+    if _believed(u.azimuth.wind) and _believed(u.elevation.wind):
+        T_azimuth += u.azimuth.wind
+        T_elevation += u.elevation.wind
+    else:
+        believed = False
+    return T_azimuth, T_elevation, believed
+
+
+@compiled
+def _receive(s, u, disturbance_believed):
+    """Put the command of step k into the ring; returns whether it was believable."""
+    slot = s.k % RING
+    believed = (disturbance_believed and _believed(u.azimuth.rate) and _believed(u.azimuth.torque)
+                and _believed(u.elevation.rate) and _believed(u.elevation.torque))
+    s.enable[slot] = 1 if believed and u.enable == 1 else 0
+    if believed:
+        s.rate[slot, 0], s.rate[slot, 1] = u.azimuth.rate, u.elevation.rate
+        s.torque[slot, 0], s.torque[slot, 1] = u.azimuth.torque, u.elevation.torque
+    return believed
+
+
+@compiled
+def _clear(s):
+    s.torque_limited = 0
+    s.voltage_limited = 0
+    s.end_stop = 0
+    s.stopping = 0
+
+
+@compiled
+def read(state, constants, outputs):
+    """Outputs as they are now, nothing integrated: at t_0, before the first step."""
+    s, c, y = state[0], constants[0], outputs[0]
+    axis.read(s.azimuth, c.azimuth, y.azimuth)
+    axis.read(s.elevation, c.elevation, y.elevation)
+
+
+@compiled
+def step(state, constants, inputs, outputs):
+    """One control period from t_k to t_k+1. All four are (1,) records; state and outputs are written."""
+    s, c, u = state[0], constants[0], inputs[0]
+    az, el, c_az, c_el = s.azimuth, s.elevation, c.azimuth, c.elevation
+    T_az, T_el, believed = _external(s, c, u)
+    outputs[0].invalid_command = 0 if _receive(s, u, believed) else 1
+    _clear(az)
+    _clear(el)
+    for j in range(c.speed_ticks):
+        tick = s.k * c.speed_ticks + j - c.delay_ticks
+        slot = (tick // c.speed_ticks) % RING     # before the first command: a slot still empty, enable 0
+        enable = s.enable[slot]
+        axis.speed_control(az, c_az, s.rate[slot, 0], s.torque[slot, 0], enable)
+        axis.speed_control(el, c_el, s.rate[slot, 1], s.torque[slot, 1], enable)
+        for _ in range(axis.CURRENT_TICKS):
+            axis.current_control(az.motor_1, c_az.motor_1)
+            axis.current_control(az.motor_2, c_az.motor_2)
+            axis.current_control(el.motor_1, c_el.motor_1)
+            axis.current_control(el.motor_2, c_el.motor_2)
+            for _ in range(c.substeps):
+                axis.plant_step(az, c_az, T_az)
+                axis.plant_step(el, c_el, T_el)
+    s.k += 1
+    read(state, constants, outputs)

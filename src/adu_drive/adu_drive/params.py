@@ -1,0 +1,185 @@
+"""Parameters of the drive. Motor data: paper 000, table 1 (line values halved to phase values);
+what the paper leaves open: reference/servo.md section 1."""
+import dataclasses
+import math
+
+from pedestal_common.parameters import ParameterError, Parameters, group, parameter
+
+SPEED_PERIOD = 0.5e-3
+"""Period of the speed loop [s]; five current-loop periods."""
+
+MAX_DELAY = 0.1
+"""Longest transport delay [s]."""
+
+
+def whole_speed_periods(name, value):
+    """How many speed-loop periods `value` [s] is; ParameterError when not a whole number."""
+    periods = round(value / SPEED_PERIOD)
+    if abs(value / SPEED_PERIOD - periods) > 1e-6:
+        raise ParameterError(f'{name} = {value:g} s: must be a multiple of {SPEED_PERIOD:g} s (the speed loop)')
+    return periods
+
+
+@dataclasses.dataclass(frozen=True)
+class MotorParameters(Parameters):
+    resistance: float = parameter(0.868, 0.01, 100.0, 'ohm', 'phase resistance')
+    inductance: float = parameter(10.0995e-3, 1e-4, 1.0, 'H', 'phase inductance, d = q')
+    flux_linkage: float = parameter(0.4219, 1e-3, 10.0, 'Wb', 'of the magnets')
+    pole_pairs: int = parameter(4, 1, 50, '', 'pole pairs')
+    voltage: float = parameter(310.0, 10.0, 2000.0, 'V', 'largest phase voltage, peak: 380 V line')
+    torque_limit: float = parameter(90.0, 0.1, 10000.0, 'Nm', 'short-time limit, 3x rated')
+    inertia: float = parameter(0.0085, 1e-5, 10.0, 'kg m2', 'rotor, reducer and pinion on the motor shaft')
+    friction: float = parameter(0.4, 0.0, 100.0, 'Nm', 'Coulomb friction')
+    friction_speed: float = parameter(0.5, 0.1, 100.0, 'rad/s', 'rate over which friction changes its sign')
+    viscous: float = parameter(0.003, 0.0, 10.0, 'Nms/rad', 'viscous friction')
+
+    @property
+    def torque_constant(self):
+        return 1.5 * self.pole_pairs * self.flux_linkage
+
+
+@dataclasses.dataclass(frozen=True)
+class CurrentLoopParameters(Parameters):
+    bandwidth: float = parameter(300.0, 10.0, 800.0, 'Hz', 'K_p = w L, K_i = w R')
+
+
+@dataclasses.dataclass(frozen=True)
+class SpeedLoopParameters(Parameters):
+    proportional: float = parameter(6.0, 0.0, 1000.0, 'Nms/rad', 'per motor, on its shaft')
+    integral: float = parameter(200.0, 0.0, 1e5, 'Nm/rad', 'per motor, on its shaft')
+    differential_damping: float = parameter(0.0, 0.0, 10.0, 'Nms/rad', 'on the speed difference of the motors')
+
+
+@dataclasses.dataclass(frozen=True)
+class BiasParameters(Parameters):
+    """torque 0 = off, hold 0 = linear fade, hold beyond the torque limit = constant."""
+    torque: float = parameter(12.0, 0.0, 1000.0, 'Nm', 'bias per motor')
+    hold: float = parameter(14.0, 0.0, 10000.0, 'Nm', 'held up to this torque demand per motor')
+    out: float = parameter(45.0, 0.1, 20000.0, 'Nm', 'gone at this torque demand per motor')
+    lag: float = parameter(0.010, 0.0, 1.0, 's', 'time constant')
+
+    def check(self):
+        if self.out <= self.hold:
+            raise ParameterError(f'out = {self.out:g} Nm: must be above hold = {self.hold:g}')
+
+
+@dataclasses.dataclass(frozen=True)
+class GearTrainParameters(Parameters):
+    reducer_ratio: float = parameter(8.0, 1.0, 1000.0, '', 'planetary reducer')
+    pinion_ratio: float = parameter(8.0, 1.0, 100.0, '', 'bull gear : pinion')
+    lash: float = parameter(1e-3, 0.0, 0.05, 'rad', 'total lash of one mesh on the load axis')
+    stiffness: float = parameter(5e6, 1e3, 1e9, 'Nm/rad', 'of one mesh on the load axis')
+    damping: float = parameter(5e3, 0.0, 1e6, 'Nms/rad', 'of one mesh on the load axis')
+
+    @property
+    def ratio(self):
+        return self.reducer_ratio * self.pinion_ratio
+
+
+@dataclasses.dataclass(frozen=True)
+class LoadParameters(Parameters):
+    inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'about the axis')
+    viscous: float = parameter(20.0, 0.0, 1e6, 'Nms/rad', 'viscous friction')
+    unbalance: float = parameter(0.0, -1e5, 1e5, 'Nm', 'gravity torque at angle 0, pulls the angle down')
+
+
+@dataclasses.dataclass(frozen=True)
+class FrictionParameters(Parameters):
+    """LuGre friction of the load bearing."""
+    coulomb: float = parameter(60.0, 0.01, 1e5, 'Nm', 'sliding')
+    breakaway: float = parameter(80.0, 0.01, 1e5, 'Nm', 'static')
+    stribeck_rate: float = parameter(2e-3, 1e-5, 1.0, 'rad/s', 'rate at which the static part is gone')
+    stiffness: float = parameter(2e5, 1.0, 1e9, 'Nm/rad', 'of the bristles')
+    damping: float = parameter(400.0, 0.0, 1e6, 'Nms/rad', 'of the bristles')
+
+    def check(self):
+        if self.breakaway < self.coulomb:
+            raise ParameterError(f'breakaway = {self.breakaway:g} Nm: must be at least coulomb = {self.coulomb:g}')
+
+
+@dataclasses.dataclass(frozen=True)
+class LimitParameters(Parameters):
+    rate: float = parameter(2.45, 0.01, 20.0, 'rad/s', 'largest rate command')
+    deceleration: float = parameter(20.0, 0.01, 500.0, 'rad/s2', 'of the controlled stop and before the end of travel')
+    lower: float = parameter(math.radians(-270.0), -20.0, 20.0, 'rad', 'travel that may be commanded')
+    upper: float = parameter(math.radians(270.0), -20.0, 20.0, 'rad', 'travel that may be commanded')
+    approach: float = parameter(10.0, 0.5, 50.0, '1/s', 'rate per distance close to the end of travel')
+    buffer: float = parameter(math.radians(2.0), 0.0, 1.0, 'rad', 'from the end of travel to the buffer')
+    buffer_stiffness: float = parameter(2e6, 1e3, 1e9, 'Nm/rad', 'mechanical end stop')
+    buffer_damping: float = parameter(2e4, 0.0, 1e6, 'Nms/rad', 'mechanical end stop')
+
+    def check(self):
+        if self.upper <= self.lower:
+            raise ParameterError(f'upper = {self.upper:g} rad: must be above lower = {self.lower:g}')
+
+
+@dataclasses.dataclass(frozen=True)
+class EncoderParameters(Parameters):
+    load_bits: int = parameter(22, 8, 32, 'bit', 'load encoder, per turn')
+    motor_bits: int = parameter(20, 8, 32, 'bit', 'motor encoders, per turn')
+
+
+@dataclasses.dataclass(frozen=True)
+class AxisParameters(Parameters):
+    motor_1: MotorParameters = group(MotorParameters)
+    motor_2: MotorParameters = group(MotorParameters, resistance=0.8655, inductance=10.0745e-3)
+    current_loop: CurrentLoopParameters = group(CurrentLoopParameters)
+    speed_loop: SpeedLoopParameters = group(SpeedLoopParameters)
+    bias: BiasParameters = group(BiasParameters)
+    gear_train: GearTrainParameters = group(GearTrainParameters)
+    load: LoadParameters = group(LoadParameters)
+    friction: FrictionParameters = group(FrictionParameters)
+    limits: LimitParameters = group(LimitParameters)
+    encoder: EncoderParameters = group(EncoderParameters)
+
+    def check(self):
+        for motor in (self.motor_1, self.motor_2):
+            top = 0.98 * motor.voltage / (motor.pole_pairs * motor.flux_linkage * self.gear_train.ratio)
+            if self.limits.rate > top:
+                raise ParameterError(f'limits.rate = {self.limits.rate:g} rad/s: the motors reach {top:g} at '
+                                     f'ratio {self.gear_train.ratio:g} and {motor.voltage:g} V')
+
+
+@dataclasses.dataclass(frozen=True)
+class WindParameters(Parameters):
+    azimuth: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'constant torque on the axis')
+    elevation: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'constant torque on the axis')
+
+
+@dataclasses.dataclass(frozen=True)
+class AduParameters(Parameters):
+    period: float = parameter(5e-3, 1e-3, 0.02, 's', 'control period T, one command each')
+    transport_delay: float = parameter(0.0, 0.0, MAX_DELAY, 's', 'a command takes effect this much later')
+    initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'at t = 0')
+    initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'at t = 0')
+    wind: WindParameters = group(WindParameters)
+    azimuth: AxisParameters = group(AxisParameters)
+    elevation: AxisParameters = group(
+        AxisParameters,
+        speed_loop=SpeedLoopParameters(proportional=3.2, integral=105.0),
+        gear_train=GearTrainParameters(reducer_ratio=10.0, pinion_ratio=9.0, lash=0.8e-3, stiffness=4e6, damping=4e3),
+        load=LoadParameters(inertia=150.0, viscous=15.0, unbalance=40.0),
+        friction=FrictionParameters(coulomb=45.0, breakaway=60.0),
+        limits=LimitParameters(rate=1.7, lower=math.radians(-2.0), upper=math.radians(92.0)))
+
+    def check(self):
+        whole_speed_periods('period', self.period)
+        whole_speed_periods('transport_delay', self.transport_delay)
+        for name in ('azimuth', 'elevation'):
+            angle, limits = getattr(self, f'initial_{name}'), getattr(self, name).limits
+            if not limits.lower <= angle <= limits.upper:
+                raise ParameterError(f'initial_{name} = {angle:g} rad: must be {limits.lower:g} to {limits.upper:g}, '
+                                     f'the travel of the axis')
+
+
+@dataclasses.dataclass(frozen=True)
+class AduNodeParameters(AduParameters):
+    """Parameters of adu_node: the drive, how long it runs and when a command is stale."""
+    duration: float = parameter(0.0, 0.0, 86400.0, 's',
+                                "end after this much of the drive's time; 0: run until stopped")
+    command_timeout: int = parameter(10, 1, 10000, 'periods', 'realtime: a command older than this stops the axes')
+
+    def check(self):
+        super().check()
+        if self.duration and abs(self.duration / self.period - round(self.duration / self.period)) > 1e-6:
+            raise ParameterError(f'duration = {self.duration:g} s: must be a multiple of the period {self.period:g} s')

@@ -1,0 +1,25 @@
+"""Ends of travel: a rate command that stops in time, and the buffer behind it."""
+import math
+
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def approach_rate(distance, K, a):
+    """Largest rate [rad/s] towards an end of travel `distance` [rad] ahead; negative (back) once it is passed.
+
+    Braking at a [rad/s2] far out, proportional with K [1/s] close in; value and slope meet at a / K^2.
+    """
+    if distance * K * K <= a:
+        return K * distance
+    return math.sqrt(2.0 * a * distance - (a / K) ** 2)
+
+
+@compiled
+def buffer_torque(theta, omega, lower, upper, k, c):
+    """Torque [Nm] of the mechanical end stops on the load: spring and damper that push, never pull."""
+    if theta > upper:
+        return min(-k * (theta - upper) - c * omega, 0.0)
+    if theta < lower:
+        return max(-k * (theta - lower) - c * omega, 0.0)
+    return 0.0
