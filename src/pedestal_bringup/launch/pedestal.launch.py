@@ -1,0 +1,42 @@
+"""ros2 launch pedestal_bringup pedestal.launch.py scenario:=uav_flyby [pacing:=lockstep] [duration:=60.0] [bag:=D]"""
+import pathlib
+import tempfile
+
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction, RegisterEventHandler
+from launch.event_handlers import OnProcessExit
+from launch.events import Shutdown
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+from launch import LaunchDescription
+from pedestal_bringup import graph, scenario
+
+
+def start(context):
+    """The nodes of the scenario with the parameters `pedestal run` would give them."""
+    given = {name: LaunchConfiguration(name).perform(context) for name in ('scenario', 'pacing', 'duration', 'bag')}
+    chosen = scenario.load(given['scenario'], pacing=given['pacing'] or None,
+                           duration=float(given['duration']) if given['duration'] else None)
+    file = pathlib.Path(tempfile.mkdtemp(prefix='pedestal-')) / 'parameters.yaml'
+    file.write_text(graph.parameter_file(chosen, chosen.header.pacing, given['bag'] or graph.free_bag(chosen.name)))
+    actions = []
+    for name in chosen.nodes:
+        if name == 'operator':
+            actions.append(ExecuteProcess(cmd=['pedestal', 'program', given['scenario']], output='screen'))
+            continue
+        package, module = scenario.NODE_KINDS[name].module.split('.')
+        node = Node(package=package, executable=module, name=name, parameters=[str(file)], output='screen')
+        actions.append(node)
+        if name == 'adu':
+            end = OnProcessExit(target_action=node, on_exit=[EmitEvent(event=Shutdown())])
+            actions.append(RegisterEventHandler(end))
+    return actions
+
+
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument('scenario', default_value='leo_pass'),
+        DeclareLaunchArgument('pacing', default_value=''),
+        DeclareLaunchArgument('duration', default_value=''),
+        DeclareLaunchArgument('bag', default_value=''),
+        OpaqueFunction(function=start)])

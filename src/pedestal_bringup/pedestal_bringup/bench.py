@@ -1,0 +1,145 @@
+"""`pedestal bench`: ratios measured in one run on this machine, each against its floor."""
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+import llvmlite.binding
+import numba
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from adu_drive import axis, drive_unit
+from adu_drive.params import AduParameters
+from pedestal_bringup import bag, bare_ring, closed_loop, graph, scenario, solve_ivp_axis
+from pedestal_common.compiled import compiled
+
+ROUNDS = 3
+RING_STEPS = 3000
+RUN_SECONDS = 15.0
+LATENCY_SECONDS = 10.0
+CORE_SECONDS = 20.0
+
+
+def row(case, metric, value, unit, target=None):
+    return {'case': case, 'metric': metric, 'value': value, 'unit': unit, 'paper': None, 'target': target}
+
+
+def show(title, rows):
+    table = Table(title=title, title_justify='left')
+    for column in ('case', 'metric', 'value', 'unit', 'target'):
+        table.add_column(column, justify='right' if column in ('value', 'target') else 'left')
+    for r in rows:
+        table.add_row(r['case'], r['metric'], f'{r["value"]:.4g}', r['unit'], r['target'] or '')
+    Console().print(table)
+
+
+def bare_lap():
+    """Lap time [us] of the bare ring: as many processes, the same messages, no work."""
+    environment = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ}
+    processes = {role: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.bare_ring', role, str(RING_STEPS)],
+                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True)
+                 for role in bare_ring.ROLES}
+    try:
+        said, complaint = processes['adu'].communicate(timeout=120.0)
+    except subprocess.TimeoutExpired:
+        raise RuntimeError('the bare ring did not close within 120 s') from None
+    finally:
+        for process in processes.values():
+            process.terminate()
+        for process in processes.values():
+            process.wait(timeout=20.0)
+    if not said:
+        raise RuntimeError(f'the bare ring failed: {complaint.strip()}')
+    return json.loads(said.splitlines()[-1])['lap_us']
+
+
+def graph_run(folder, number, pacing, seconds):
+    """(Outcome, bag folder) of a run of the demo scenario."""
+    path = pathlib.Path(folder) / f'run-{number}'
+    return graph.run(scenario.load('leo_pass', pacing=pacing, duration=seconds), path, lambda seconds: None), path
+
+
+def latencies(path):
+    """Wall-clock times [s] from the publication of joint_states(t_k) to that of rate_command(t_k), a realtime bag."""
+    sent = {topic: {log: published for _, log, published, _ in bag.read(path).raw(topic)}
+            for topic in ('joint_states', 'acu/rate_command')}
+    return np.array([(published - sent['joint_states'][stamp]) * 1e-9
+                     for stamp, published in sent['acu/rate_command'].items() if stamp in sent['joint_states']])
+
+
+def bench_graph():
+    """Lap of the lockstep graph against the bare ring, interleaved; latency in realtime."""
+    bare, laps, factors = [], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(ROUNDS):
+            bare.append(bare_lap())
+            outcome, _ = graph_run(folder, number, 'lockstep', RUN_SECONDS)
+            laps.append(outcome.drive['wall_s'] / outcome.drive['steps'] * 1e6)
+            factors.append(outcome.drive['realtime_factor'])
+        outcome, path = graph_run(folder, 'realtime', 'realtime', LATENCY_SECONDS)
+        latency = latencies(path)
+    lap, floor = statistics.median(laps), statistics.median(bare)
+    rows = [row('graph', 'lap_us', lap, 'us'), row('graph', 'bare_ring_us', floor, 'us'),
+            row('graph', 'ratio', lap / floor, '', '<= 1.6'),
+            row('graph', 'realtime_factor', statistics.median(factors), '', '>= 4'),
+            row('realtime', 'latency_p50_us', float(np.percentile(latency, 50)) * 1e6, 'us'),
+            row('realtime', 'latency_p99_us', float(np.percentile(latency, 99)) * 1e6, 'us'),
+            row('realtime', 'lost_steps', outcome.drive['lost_steps'], '')]
+    show(f'lockstep ring, median of {ROUNDS} interleaved rounds, {len(os.sched_getaffinity(0))} cores', rows)
+    return rows
+
+
+def best_of(function, repeats=5):
+    """Shortest wall time [s] of some calls."""
+    times = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - begun)
+    return min(times)
+
+
+SUBSTEPS = 2 * 100
+"""Plant sub-steps of both axes in one drive step of 5 ms."""
+SOLVE_IVP_TICKS = 100
+
+
+@compiled
+def _drive_steps(state, constants, inputs, outputs, count):
+    for _ in range(count):
+        drive_unit.step(state, constants, inputs, outputs)
+
+
+def bench_core():
+    """The compiled core against its targets and against the same axis through scipy."""
+    params = AduParameters(initial_elevation=0.7)
+    state, constants = drive_unit.initial_state(params), drive_unit.constants(params)
+    inputs, outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
+    inputs['azimuth']['rate'], inputs['elevation']['rate'], inputs['enable'] = 0.02, -0.01, 1
+    _drive_steps(state, constants, inputs, outputs, 200)
+    count = 500
+    substep = best_of(lambda: _drive_steps(state, constants, inputs, outputs, count)) / count / SUBSTEPS * 1e9
+
+    loop = scenario.load('ship_pass', duration=CORE_SECONDS)
+    closed_loop.run(closed_loop.cores(loop))
+    runs = [closed_loop.cores(loop) for _ in range(5)]
+    factor = CORE_SECONDS / best_of(lambda: closed_loop.run(runs.pop()))
+
+    tick = axis.CURRENT_PERIOD
+    scipy_time = best_of(lambda: solve_ivp_axis.run(params.azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)
+    scipy_substep = scipy_time / SOLVE_IVP_TICKS / 2 * 1e9
+    rows = [row('core', 'substep_ns', substep, 'ns', '<= 45'),
+            row('core', 'realtime_factor', factor, '', '>= 200'),
+            row('solve_ivp', 'substep_ns', scipy_substep, 'ns'),
+            row('solve_ivp', 'ratio', scipy_substep / substep, '')]
+    show(f'compiled core, one core of {llvmlite.binding.get_host_cpu_name()}, numba {numba.__version__}', rows)
+    return rows
+
+
+BENCHES = {'core': bench_core, 'graph': bench_graph}

@@ -1,0 +1,170 @@
+"""The command line `pedestal`: thin verbs over graph, bag, report and bench."""
+import argparse
+import contextlib
+import json
+import math
+import pathlib
+import signal
+import sys
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from pedestal_common.parameters import ParameterError
+
+EXIT_STOPPED = 130
+
+
+def main(args=None) -> int:
+    """Exit code 0; 1 with one line on stderr for anything that went wrong; 2 for a wrong command line."""
+    parser = _parser()
+    options = parser.parse_args(args)
+    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    try:
+        return options.verb(options)
+    except (ParameterError, ValueError, RuntimeError, OSError) as error:
+        print(f'pedestal: error: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('pedestal: stopped', file=sys.stderr)
+        return EXIT_STOPPED
+
+
+def _parser():
+    parser = argparse.ArgumentParser(prog='pedestal', description='The control system of a tracking antenna: run it, '
+                                     'record it, look at it.')
+    verbs = parser.add_subparsers(title='verbs', required=True, metavar='VERB')
+
+    run = verbs.add_parser('run', help='run a scenario as separate nodes and record it')
+    run.add_argument('scenario', help='name (see `pedestal scenarios`) or path of a .yaml')
+    run.add_argument('--pacing', choices=('lockstep', 'realtime'), help='default: what the scenario says')
+    run.add_argument('--duration', type=float, metavar='S', help="length of the run in the drive's time")
+    run.add_argument('--seed', type=int, metavar='N', help='seed of every noise stream')
+    run.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='default: bags/runs/SCENARIO-N')
+    run.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
+    run.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
+                     help='change a parameter, as acu.position_loop.azimuth.Kp=20; may be repeated')
+    run.set_defaults(verb=_run)
+
+    scenarios = verbs.add_parser('scenarios', help='list the scenarios')
+    scenarios.set_defaults(verb=_scenarios)
+
+    program = verbs.add_parser('program', help='send the program track of a scenario to a running ACU')
+    program.add_argument('scenario')
+    program.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE')
+    program.set_defaults(verb=_program)
+
+    verify = verbs.add_parser('verify', help='prove that a recording is complete; exit code 1 with the gaps if not')
+    verify.add_argument('bag', type=pathlib.Path)
+    verify.set_defaults(verb=_verify)
+
+    report = verbs.add_parser('report', help='write a recording as one HTML file with its figures')
+    report.add_argument('bag', type=pathlib.Path)
+    report.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
+    report.add_argument('--png', type=pathlib.Path, metavar='DIR', help='also write each figure as PNG')
+    report.set_defaults(verb=_report)
+
+    bench = verbs.add_parser('bench', help='measure this machine: the lockstep ring, or the compiled core')
+    bench.add_argument('what', nargs='?', choices=('graph', 'core'), help='default: both')
+    bench.add_argument('--json', type=pathlib.Path, metavar='FILE')
+    bench.set_defaults(verb=_bench)
+    return parser
+
+
+@contextlib.contextmanager
+def _progress(duration):
+    """A function progress(seconds): a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda seconds: None
+        return
+    columns = (TextColumn('{task.description}'), BarColumn(), TextColumn('{task.completed:.0f} / {task.total:.0f} s'),
+               TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task('starting nodes (the first start compiles the laws)', total=duration)
+
+        def advance(seconds):
+            bar.update(task, completed=seconds, description='running' if seconds > 0.0 else None)
+        yield advance
+
+
+def _run(options):
+    from pedestal_bringup import graph, results, scenario
+    from pedestal_bringup.bag import read
+    from pedestal_bringup.verify import verify
+    chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
+    bag = options.bag or graph.free_bag(chosen.name)
+    if bag.exists():
+        raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
+    with _progress(chosen.header.duration) as progress:
+        try:
+            outcome = graph.run(chosen, bag, progress)
+        except KeyboardInterrupt:
+            print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+            return EXIT_STOPPED
+    values = results.summary(results.tracking(read(bag)))
+    values['lost_steps'] = (float(outcome.drive['lost_steps']), '')
+    values['realtime_factor'] = (outcome.drive['realtime_factor'], '')
+    values['messages'] = (float(outcome.recorder['messages']), '')
+    _show(f'{chosen.name}: {chosen.header.title}', values)
+    print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
+    if options.json:
+        _write_json(options.json, {'name': chosen.name, 'rows': results.rows(chosen.name, values),
+                                   'mcap_sha256': outcome.recorder['sha256']})
+    check = verify(bag)
+    if not check.complete:
+        raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
+    return 0
+
+
+def _show(title, values):
+    table = Table(title=title, title_justify='left')
+    table.add_column('metric')
+    table.add_column('value', justify='right')
+    table.add_column('unit')
+    for metric, (value, unit) in values.items():
+        table.add_row(metric, f'{value:.6g}' if math.isfinite(value) else 'not measured', unit)
+    Console().print(table)
+
+
+def _write_json(path, content):
+    path.write_text(json.dumps(content, indent=1) + '\n')
+
+
+def _scenarios(_options):
+    from pedestal_bringup import scenario
+    for name, title in scenario.available().items():
+        print(f'{name:14} {title}')
+    return 0
+
+
+def _program(options):
+    from pedestal_bringup import graph, scenario
+    return graph.send_program(scenario.load(options.scenario, options.param))
+
+
+def _verify(options):
+    from pedestal_bringup.verify import verify
+    check = verify(options.bag)
+    print('\n'.join(check.lines()))
+    return 0 if check.complete else 1
+
+
+def _report(options):
+    from pedestal_bringup import report
+    print(report.write(options.bag, options.output, options.png))
+    return 0
+
+
+def _bench(options):
+    from pedestal_bringup import bench
+    content = {'name': 'bench', 'rows': []}
+    for what in (options.what,) if options.what else bench.BENCHES:
+        content['rows'] += bench.BENCHES[what]()
+    if options.json:
+        _write_json(options.json, content)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,207 @@
+"""Starts the nodes of a scenario as processes, watches over them, and ends them in order."""
+import dataclasses
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import rclpy
+import yaml
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from pedestal_bringup.program import program_message, program_table
+from pedestal_bringup.scenario import NODE_KINDS
+from pedestal_common import messages, parameters
+from pedestal_common.shell import Shell
+
+LOG_LINES = 8
+STOP_TIME = 20.0
+
+
+class RunError(RuntimeError):
+    """A run ended before its time; the message names the node, the reason and its last log lines."""
+
+
+@dataclasses.dataclass
+class Outcome:
+    """What a finished run says of itself: the last JSON line of the drive and of the recorder."""
+    drive: dict
+    recorder: dict
+
+
+class Operator(Shell):
+    """Sends the program track and listens to the diagnostics of the others."""
+
+    def __init__(self, table):
+        super().__init__('operator', parameters.Parameters)
+        self.time = 0.0
+        self.heard = {}
+        self.reader('diagnostics', self._take)
+        if table is not None:
+            self.writer('acu/program_track')(program_message(*table))
+
+    def _take(self, array):
+        self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
+        for status in array.status:
+            self.heard[status.name] = time.monotonic()
+
+    def silent(self, limit):
+        """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""
+        last = min(self.heard, key=self.heard.get, default=None)
+        return last if last is not None and time.monotonic() - self.heard[last] > limit else None
+
+
+def free_bag(scenario):
+    """bags/runs/SCENARIO-N with the first N that is free."""
+    number = 1
+    while True:
+        bag = pathlib.Path('bags') / 'runs' / f'{scenario}-{number}'
+        if not bag.exists():
+            return bag
+        number += 1
+
+
+def environment(log):
+    """The environment of every node: loopback discovery unless told otherwise, ROS logs beside the run's."""
+    return {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ, 'ROS_LOG_DIR': str(log)}
+
+
+def parameter_file(scenario, pacing, bag):
+    """The scenario as a ROS 2 parameter file, every node told of the graph it is in."""
+    sections = yaml.safe_load(scenario.as_yaml())
+    for node in NODE_KINDS:
+        sections.setdefault(node, {'ros__parameters': {}})['ros__parameters'].update({
+            'graph.pacing': pacing, 'graph.nodes': ','.join(scenario.nodes),
+            'graph.deadline': scenario.header.deadline})
+    sections['recorder']['ros__parameters']['bag'] = str(bag)
+    return yaml.safe_dump(sections)
+
+
+class Graph:
+    """The processes of one run. Use as a context: leaving it stops whatever still runs."""
+
+    def __init__(self, scenario, bag):
+        self.scenario = scenario
+        self.bag = pathlib.Path(bag)
+        self.log = self.bag.with_name(self.bag.name + '.log')
+        self.processes = {}
+
+    def __enter__(self):
+        self.log.mkdir(parents=True, exist_ok=True)
+        file = self.log / 'parameters.yaml'
+        file.write_text(parameter_file(self.scenario, self.scenario.header.pacing, self.bag))
+        for node in self.scenario.nodes:
+            if node in NODE_KINDS:
+                with open(self.log / f'{node}.log', 'wb') as output:
+                    self.processes[node] = subprocess.Popen(
+                        [sys.executable, '-m', NODE_KINDS[node].module, '--ros-args', '--params-file', str(file)],
+                        stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+                        env=environment(self.log), start_new_session=True)
+        return self
+
+    def __exit__(self, *_):
+        for node in sorted(self.processes, key=lambda name: name == 'recorder'):
+            self.stop(node)
+
+    def stop(self, node):
+        """Ask a node to end and wait; kill it when it does not listen. Returns its exit code."""
+        process = self.processes[node]
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGCONT)
+        try:
+            return process.wait(timeout=STOP_TIME)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return process.wait()
+
+    def last_lines(self, node):
+        """The end of a node's log."""
+        lines = (self.log / f'{node}.log').read_text(errors='replace').strip().splitlines()
+        return lines[-LOG_LINES:]
+
+    def result(self, node):
+        """The JSON object on the last line of a node's log."""
+        for line in reversed(self.last_lines(node)):
+            if line.startswith('{'):
+                return json.loads(line)
+        raise RunError(f'{node} ended without its result; its log is {self.log / (node + ".log")}')
+
+    def ended(self):
+        """{node: exit code} of the processes that have ended."""
+        return {node: process.returncode for node, process in self.processes.items() if process.poll() is not None}
+
+    def failure(self, unheard=None):
+        """The error of a run in which a node has ended before its time, or `unheard` says nothing any more."""
+        time.sleep(0.5)
+        early = {node: code for node, code in self.ended().items() if code != 0 or node not in ('adu', 'recorder')}
+        lines = {node: self.last_lines(node) for node in self.processes}
+        said = '\n'.join(line for node in early for line in lines[node])
+        accused = ','.join(re.findall(r'silent: ([\w, ]+)', said)).replace(' ', '').split(',')
+        killed = [node for node, code in early.items() if code < 0]
+        silent = [node for node in self.processes if node in accused and node not in early] or [
+            node for node in (unheard,) if node is not None and node not in early]
+        culprit = (killed or silent or list(early))[0]
+        if culprit in killed:
+            reason = f'died by signal {signal.Signals(-early[culprit]).name}'
+        elif culprit in silent:
+            reason = f'was silent for {self.scenario.header.deadline:g} s'
+        else:
+            reason = f'ended before the run did, with exit code {early[culprit]}'
+        log = '\n'.join(f'  | {line}' for line in lines[culprit]) or '  | (it logged nothing)'
+        others = ''.join(f'\n  {node}: {lines[node][-1]}' for node in early if node != culprit and lines[node])
+        return RunError(f'{culprit} {reason}; its last log lines ({self.log / (culprit + ".log")}):\n{log}{others}')
+
+
+def run(scenario, bag, progress):
+    """Run a scenario to its end and return its Outcome.
+
+    progress(drive time [s]) is called as the run goes on. Raises RunError when a node fails, KeyboardInterrupt after
+    a clean stop. The recording up to then stays readable.
+    """
+    table = program_table(scenario) if scenario.header.program.source != 'none' else None
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        with Graph(scenario, bag) as graph:
+            operator = Operator(table)
+            executor = SingleThreadedExecutor()
+            executor.add_node(operator)
+            while graph.ended().get('adu') != 0:
+                executor.spin_once(timeout_sec=0.1)
+                progress(operator.time)
+                if any(code != 0 or node not in ('adu', 'recorder') for node, code in graph.ended().items()):
+                    raise graph.failure(operator.silent(scenario.header.deadline))
+                if operator.silent(2.0 * scenario.header.deadline):
+                    raise graph.failure(operator.silent(2.0 * scenario.header.deadline))
+            progress(scenario.header.duration)
+            for node in graph.processes:
+                if node not in ('adu', 'recorder') and graph.stop(node) != 0:
+                    raise graph.failure()
+            if graph.stop('recorder') != 0:
+                raise graph.failure()
+            operator.destroy_node()
+            return Outcome(graph.result('adu'), graph.result('recorder'))
+    finally:
+        rclpy.try_shutdown()
+
+
+def send_program(scenario) -> int:
+    """Send a scenario's program track to a running ACU and keep it latched until Ctrl-C."""
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        operator = Operator(program_table(scenario))
+        executor = SingleThreadedExecutor()
+        executor.add_node(operator)
+        while True:
+            executor.spin_once(timeout_sec=0.2)
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        rclpy.try_shutdown()

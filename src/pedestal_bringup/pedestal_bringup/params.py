@@ -1,0 +1,17 @@
+"""Parameters of the recorder node."""
+import dataclasses
+
+from pedestal_common.parameters import ParameterError, Parameters, parameter, text
+
+
+@dataclasses.dataclass(frozen=True)
+class RecorderParameters(Parameters):
+    """What is recorded where. `scenario` and `seed` go into the bag, to say how it was made."""
+    bag: str = text('recording', 'directory of the bag; must not exist')
+    duration: float = parameter(0.0, 0.0, 86400.0, 's', "end at this stamp of the drive's time; 0: when told to stop")
+    scenario: str = text('', 'name of the scenario of the run')
+    seed: int = parameter(1, 0, 2**31 - 1, '', 'seed of the run')
+
+    def check(self):
+        if not self.bag:
+            raise ParameterError("bag = '': must be a directory that does not exist")

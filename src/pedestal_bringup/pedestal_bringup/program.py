@@ -1,0 +1,32 @@
+"""The program track an operator sends before a pass: the predicted target as time-tagged azimuth and elevation."""
+import numpy as np
+
+from pedestal_common import messages
+from tracking_receiver_sim import target
+
+
+def program_table(scenario):
+    """(times (n,) s, angles (n, 2) earth azimuth (unwrapped), elevation [rad]) of a scenario's prediction.
+
+    From stamp 0 until two intervals past the end, so that the end of the run lies inside; where the target is not
+    known, it stands at its first or last known place.
+    """
+    program, duration = scenario.header.program, scenario.header.duration
+    built = target.build(scenario.node_parameters('tracking_receiver').target, duration)
+    times = np.arange(0.0, duration + 2.0 * program.interval, program.interval)
+    known = np.clip(times - program.time_offset, built.breaks[0], built.breaks[-1])
+    azimuth, elevation, _ = target.look_angles(built, known)
+    return times, np.column_stack((np.unwrap(azimuth) + program.azimuth_offset, elevation + program.elevation_offset))
+
+
+def program_message(times, angles):
+    """The table as the JointTrajectory of `acu/program_track`."""
+    points = []
+    for time, (azimuth, elevation) in zip(times, angles):
+        point = messages.trajectory_point()
+        point.positions[:] = azimuth, elevation
+        nanoseconds = round(time * 1e9)
+        point.time_from_start = messages.Duration(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+        point.velocities = point.accelerations = np.zeros(0)
+        points.append(point)
+    return messages.joint_trajectory('earth', points)

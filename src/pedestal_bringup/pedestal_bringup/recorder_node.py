@@ -1,0 +1,256 @@
+"""The recorder: every topic of the graph into a bag, raw, nothing lost unsaid."""
+import collections
+import hashlib
+import importlib.metadata
+import inspect
+import json
+import struct
+import sys
+import time
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from pedestal_bringup.bag import BagError, Writer
+from pedestal_bringup.columns import STAMPED
+from pedestal_bringup.params import RecorderParameters
+from pedestal_bringup.step_order import OrderError, StepOrder
+from pedestal_common import messages, parameters, topics
+from pedestal_common.shell import ERROR, OK, SECOND, WARN, GraphError, Shell, message_class
+from pedestal_common.shell import main as shell_main
+
+QUIET = 0.5
+DRAIN = 4.0
+"""At the end the recorder goes on until nothing came for QUIET seconds, for DRAIN seconds at the most; all of DRAIN
+when others were heard but a topic of every step was not: Fast DDS repeats what a reader missed while it was being
+discovered with the next heartbeat of the writer, by default every 3 s."""
+
+PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
+            'pedestal_bringup')
+
+_stamp_of = struct.Struct('<iI').unpack_from
+
+
+def _versions():
+    for package in PACKAGES:
+        try:
+            yield f'version.{package}', importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            pass
+
+
+class RecorderNode(Shell):
+    """Lockstep: in the order of steps (StepOrder). Realtime: as it comes, published at the writer's wall time."""
+
+    def __init__(self):
+        super().__init__('recorder', RecorderParameters)
+        nodes = self.graph.nodes
+        if self.graph.lockstep and not nodes:
+            raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
+        recorded = topics.read_by('recorder', nodes) if nodes else topics.TOPICS
+        self._bag = Writer(self.parameters.bag, recorded, {
+            'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
+            **dict(_versions())})
+        self._order = StepOrder(recorded, nodes, self._bag.write)
+        self._end = round(self.parameters.duration * SECOND) or None
+        self._lost = collections.Counter()
+        self._broken = 0
+        self._taken = [0] * len(recorded)
+        self._of_every_step = [index for index, topic in enumerate(recorded) if topic.rate == 'step']
+        self._error = None
+        self._quiet = None
+        self.diagnose_with(self._diagnosis)
+        for index, topic in enumerate(recorded):
+            self._record(index, topic)
+        if not self.graph.lockstep:
+            self.every(1.0, self._flush)
+
+    def _record(self, index, topic):
+        """Subscribe with unlimited history, whatever the writer keeps: a reader's own queue must drop nothing."""
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.qos == 'state' else DurabilityPolicy.VOLATILE
+        profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                             durability=durability)
+        self.create_subscription(message_class(topic.type), topic.name, self._callback(index, topic), profile,
+                                 raw=True)
+
+    def _callback(self, index, topic):
+        put = self._in_step(index, topic) if self.graph.lockstep else self._as_it_comes(index, topic)
+        checked = len(topic.writers) == 1
+        expected = 1 if topic.qos == 'step' and self.graph.nodes else 0
+        taken = self._taken
+
+        def take(data, info=None):
+            nonlocal expected
+            if info is None:
+                data, info = data
+            taken[index] += 1
+            try:
+                if checked:
+                    number = info['publication_sequence_number']
+                    if number != expected:
+                        self._gap(index, topic, number, expected)
+                        expected = number or 0
+                    expected += 1
+                put(data, info)
+            except (BagError, OrderError) as error:
+                self._fail(str(error))
+
+        # EventsExecutor (rclpy 7.1.6) hands a callback of two arguments one pair; SingleThreadedExecutor hands it two.
+        take.__signature__ = inspect.signature(lambda data, info: None)
+        return take
+
+    def _gap(self, index, topic, number, expected):
+        """The writer's sequence number is not the next one; expected 0: nothing was heard of this writer so far."""
+        if number is None or expected == 0 or number == 1:
+            return
+        if number < expected:
+            self._fail(f'{topic.name} has more than one writer: another graph runs on ROS_DOMAIN_ID '
+                       f'{self.context.get_domain_id()}; set a free one')
+            return
+        self._lost[topic.name] += number - expected
+        self._bag.skip(index, number - expected)
+        if self.graph.lockstep:
+            self._fail(self._losses())
+
+    def _losses(self):
+        return 'lost ' + ', '.join(f'{count} of {name}' for name, count in self._lost.items())
+
+    def _fail(self, reason):
+        """End with this reason; raised in a callback it would come with rclpy's own traceback on stderr."""
+        self._error = self._error or reason
+        self.finished = True
+
+    def _stamp_in(self, data):
+        """The stamp in a message's bytes; None when there is none."""
+        if len(data) >= 12:
+            seconds, nanoseconds = _stamp_of(data, 4)
+            if seconds >= 0 and nanoseconds < SECOND:
+                return seconds * SECOND + nanoseconds
+        self._broken += 1
+        return None
+
+    def _sender(self, data):
+        """Whose diagnostics these are; '' when they cannot be read."""
+        try:
+            return messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticArray').status[0].name
+        except (ValueError, IndexError):
+            self._broken += 1
+            return ''
+
+    def _in_step(self, index, topic):
+        order, stamp_in, slot = self._order, self._stamp_in, self._order.slot(topic.name)
+
+        def put(data, _):
+            stamp = stamp_in(data)
+            if stamp is None:
+                order.take_odd(index, data)
+            else:
+                order.take(slot, stamp, data)
+            return stamp
+
+        def put_clock(data, info):
+            self._tick(put(data, info))
+
+        def put_mode(data, _):
+            order.take_mode(index, data)
+
+        def put_diagnostics(data, _):
+            sender, stamp = self._sender(data), stamp_in(data)
+            sender_slot = order.slot(topic.name, sender)
+            if sender != self.name:
+                if sender_slot is None or stamp is None:
+                    order.take_odd(index, data)
+                else:
+                    order.take(sender_slot, stamp, data)
+
+        return {'clock': put_clock, 'acu/mode': put_mode, 'diagnostics': put_diagnostics}.get(topic.name, put)
+
+    def _as_it_comes(self, index, topic):
+        write, stamp_in = self._bag.write, self._stamp_in
+
+        def put(data, info):
+            stamp = stamp_in(data)
+            write(index, self._stamp if stamp is None else stamp, info['source_timestamp'], data)
+            return stamp
+
+        def put_clock(data, info):
+            self._tick(put(data, info))
+
+        def put_unstamped(data, info):
+            write(index, self._stamp, info['source_timestamp'], data)
+
+        def put_diagnostics(data, info):
+            if self._sender(data) != self.name:
+                put(data, info)
+
+        if topic.type not in STAMPED:
+            return put_unstamped
+        return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
+
+    def _tick(self, stamp):
+        """The drive's time has come this far."""
+        if stamp is None:
+            return
+        if self.graph.lockstep and stamp // SECOND > self._stamp // SECOND:
+            self._publish_diagnostics()
+        self._stamp = stamp
+        if self._end is not None and stamp >= self._end:
+            self.finished = True
+
+    def _flush(self):
+        try:
+            self._bag.flush()
+        except BagError as error:
+            self._fail(str(error))
+
+    def _diagnosis(self):
+        level, message = OK, 'recording'
+        if self._broken or self._order.odd:
+            level, message = WARN, 'recording; some messages have no valid or no proper stamp'
+        if self._lost:
+            level, message = ERROR, self._losses()
+        return level, message, [('messages', str(self._bag.messages)), ('waiting steps', str(self._order.waiting)),
+                                ('lost', str(self._lost.total())), ('without valid stamp', str(self._broken)),
+                                ('out of order', str(self._order.odd))]
+
+    def draining(self):
+        now = time.monotonic()
+        if self._error is not None:
+            return False
+        if self._end is not None and self._order.written >= self._end and not self._order.waiting:
+            return False
+        taken = sum(self._taken)
+        if self._quiet is None:
+            self._quiet, self._drain_end = (now, taken), now + DRAIN
+        elif taken != self._quiet[1]:
+            self._quiet = now, taken
+        unheard = taken and not all(self._taken[index] for index in self._of_every_step)
+        return now < self._drain_end and (unheard or now < self._quiet[0] + QUIET)
+
+    def close(self):
+        try:
+            self._order.finish()
+        except BagError as error:
+            self._fail(str(error))
+        try:
+            self._bag.close()
+        except BagError as error:
+            self._fail(str(error))
+        digest = hashlib.sha256()
+        with open(self._bag.file, 'rb') as file:
+            while block := file.read(1 << 20):
+                digest.update(block)
+            size = file.tell()
+        print(json.dumps({'bag': str(self._bag.path), 'messages': sum(self._bag.counts), 'lost': self._lost.total(),
+                          'sha256': digest.hexdigest(), 'bytes': size}), flush=True)
+        if self._error is None and self._lost:
+            self._error = self._losses()
+        if self._error is not None:
+            raise GraphError(self._error)
+
+
+def main(args=None):
+    return shell_main(RecorderNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,157 @@
+"""What a recorded run achieved: pointing against truth, filter noise, lock, lost steps. Shared by run and report."""
+import dataclasses
+import math
+
+import numpy as np
+
+from pedestal_common import line_of_sight
+from pedestal_common.compiled import compiled
+
+SETTLING = 2.0
+"""Seconds after the first hand-over to autotrack that are left out of every statistic."""
+
+
+@compiled
+def _pointing(azimuth, elevation, target, ship, quaternions, cross, up, beam_earth):
+    """Fill the pointing error (cross-elevation, elevation) and the beam's earth angles of every row."""
+    mat_ed = np.empty((3, 3))
+    for k in range(azimuth.size):
+        line_of_sight.rotation(quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3], mat_ed)
+        x, y, z = line_of_sight.to_deck(mat_ed, target[k, 0] - ship[k, 0], target[k, 1] - ship[k, 1],
+                                        target[k, 2] - ship[k, 2])
+        cross[k], up[k] = line_of_sight.offsets(azimuth[k], elevation[k], x, y, z)
+        x, y, z = line_of_sight.direction(azimuth[k], elevation[k])
+        east, north, height = line_of_sight.to_earth(mat_ed, x, y, z)
+        beam_earth[k, 0], beam_earth[k, 1] = line_of_sight.earth_angles(east, north, height)
+
+
+@dataclasses.dataclass
+class Tracking:
+    """A run as arrays on the drive's steps; angles in rad, NaN where nothing was measured.
+
+    t (n,) s; azimuth, elevation (n,) encoders; cross_elevation, elevation_error (n,) true error;
+    measured (n, 2) receiver errors and cn0 (n,) at their stamp; filtered (n, 2) estimate minus encoder, as
+    cross-elevation and elevation; beam_earth (n, 2); target_earth (n, 2) and range (n,) m; mode (n,) text;
+    tracking (n,) bool: in autotrack and settled.
+    """
+    t: np.ndarray
+    azimuth: np.ndarray
+    elevation: np.ndarray
+    cross_elevation: np.ndarray
+    elevation_error: np.ndarray
+    measured: np.ndarray
+    cn0: np.ndarray
+    filtered: np.ndarray
+    beam_earth: np.ndarray
+    target_earth: np.ndarray
+    range: np.ndarray
+    mode: np.ndarray
+    tracking: np.ndarray
+
+
+def _on_grid(t, table, columns):
+    """Columns of a table at the stamps t; NaN where the topic has no message of that stamp."""
+    out = np.full((t.size, len(columns)), np.nan)
+    if table is not None and len(table['t']):
+        _, here, there = np.intersect1d(np.round(t * 1e9), np.round(table['t'] * 1e9), return_indices=True)
+        for i, column in enumerate(columns):
+            out[here, i] = table[column][there]
+    return out
+
+
+def tracking(bag) -> Tracking:
+    """The Tracking of a bag (bag.Bag). Raises ValueError when it has no joint_states or target/truth."""
+    missing = [name for name in ('joint_states', 'target/truth') if name not in bag.topics]
+    if missing:
+        raise ValueError(f'{bag.path}: no {" and no ".join(missing)} in it, so nothing can be compared with the truth')
+    joints = bag.table('joint_states')
+    t = joints['t']
+    azimuth, elevation = joints['azimuth.position'], joints['elevation.position']
+    target = _on_grid(t, bag.table('target/truth'), ('position.x', 'position.y', 'position.z'))
+    if 'ship/truth' in bag.topics:
+        truth = bag.table('ship/truth')
+        ship = _on_grid(t, truth, ('position.x', 'position.y', 'position.z'))
+        quaternions = _on_grid(t, truth, ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w'))
+    else:
+        ship = np.zeros((t.size, 3))
+        quaternions = np.tile(line_of_sight.ASHORE, (t.size, 1))
+    cross, up, beam_earth = np.empty(t.size), np.empty(t.size), np.empty((t.size, 2))
+    _pointing(azimuth, elevation, target, ship, quaternions, cross, up, beam_earth)
+    relative = target - ship
+    target_earth = np.column_stack((np.arctan2(relative[:, 0], relative[:, 1]),
+                                    np.arctan2(relative[:, 2], np.hypot(relative[:, 0], relative[:, 1]))))
+
+    def optional(topic):
+        return bag.table(topic) if topic in bag.topics else None
+
+    error = _on_grid(t, optional('tracking_receiver/angle_error'), ('x', 'y', 'z'))
+    estimate = _on_grid(t, optional('acu/estimate'), ('azimuth.position', 'elevation.position'))
+    seen_from = beam_earth if 'ship/truth' in bag.topics else np.column_stack((azimuth, elevation))
+    filtered = np.column_stack((_wrap(estimate[:, 0] - seen_from[:, 0]) * np.cos(estimate[:, 1]),
+                                estimate[:, 1] - seen_from[:, 1]))
+    mode = modes(bag, t)
+    automatic = mode == 'autotrack'
+    start = t[automatic][0] + SETTLING if automatic.any() else math.inf
+    return Tracking(t, azimuth, elevation, cross, up, error[:, :2], error[:, 2], filtered, beam_earth, target_earth,
+                    np.linalg.norm(relative, axis=1), mode, automatic & (t >= start))
+
+
+def modes(bag, t):
+    """The ACU's mode at every stamp t ('' before the first)."""
+    if 'acu/mode' not in bag.topics:
+        return np.full(t.size, '')
+    table = bag.table('acu/mode')
+    index = np.searchsorted(table['t'], t + 1e-9, side='right') - 1
+    return np.where(index >= 0, np.array(['', *table['data']])[index + 1], '')
+
+
+def _wrap(angle):
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def _rms(values):
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(values**2))) if values.size else math.nan
+
+
+def summary(run: Tracking) -> dict:
+    """{metric: (value, unit)} over the settled autotrack part of a run; NaN when it never tracked.
+
+    single_sample_noise_deg: rms of the receiver's error minus the true one, per axis and sample;
+    noise_reduction: that divided by the rms error of the filtered line of sight against truth.
+    """
+    on = run.tracking
+    degrees = math.degrees(1.0)
+    true = np.column_stack((run.cross_elevation, run.elevation_error))[on]
+    off = np.hypot(true[:, 0], true[:, 1]) * degrees
+    raw = (run.measured[on] - true) * degrees
+    filtered = (run.filtered[on] - true) * degrees
+    locked = np.isfinite(run.measured[:, 0])
+    noise = _rms(raw)
+    values = {
+        'pointing_rms_deg': (_rms(true) * degrees, 'deg'),
+        'pointing_max_deg': (float(off.max()) if off.size else math.nan, 'deg'),
+        'cross_elevation_rms_deg': (_rms(true[:, 0]) * degrees, 'deg'),
+        'elevation_rms_deg': (_rms(true[:, 1]) * degrees, 'deg'),
+        'cross_elevation_max_deg': (_max(true[:, 0]) * degrees, 'deg'),
+        'elevation_max_deg': (_max(true[:, 1]) * degrees, 'deg'),
+        'single_sample_noise_deg': (noise, 'deg'),
+        'pointing_to_noise': (_rms(true) * degrees / noise, ''),
+        'noise_reduction_cross_elevation': (_rms(raw[:, 0]) / _rms(filtered[:, 0]), ''),
+        'noise_reduction_elevation': (_rms(raw[:, 1]) / _rms(filtered[:, 1]), ''),
+        'noise_reduction': (noise / _rms(filtered), ''),
+        'lock_time_s': (float(run.t[locked][0]) if locked.any() else math.nan, 's'),
+        'autotrack_time_s': (float(np.sum(run.mode == 'autotrack') * np.median(np.diff(run.t))), 's'),
+        'evaluated_time_s': (float(np.sum(on) * np.median(np.diff(run.t))), 's'),
+    }
+    return values
+
+
+def _max(values):
+    return float(np.nanmax(np.abs(values))) if values.size else math.nan
+
+
+def rows(case, values):
+    """The rows of a --json file: value null where it could not be measured."""
+    return [{'case': case, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
+             'paper': None, 'target': None} for metric, (value, unit) in values.items()]

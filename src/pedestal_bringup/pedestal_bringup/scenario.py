@@ -1,0 +1,206 @@
+"""Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
+
+`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged.
+"""
+import dataclasses
+import difflib
+import importlib.resources
+import pathlib
+import typing
+
+import yaml
+
+from acu_tracker.params import AcuNodeParameters
+from adu_drive.params import AduNodeParameters
+from pedestal_bringup.params import RecorderParameters
+from pedestal_common import parameters
+from ship_motion_sim.params import InsParameters, ShipMotionParameters
+from tracking_receiver_sim.params import TrackingReceiverNodeParameters
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgramParameters(parameters.Parameters):
+    """The program track the operator sends the ACU before the run: the target as predicted, with its error."""
+    source: str = parameters.choice('target', ('target', 'none'), 'what the table is made of')
+    interval: float = parameters.parameter(1.0, 0.05, 60.0, 's', 'time between two points')
+    time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
+    azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
+    elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
+
+
+@dataclasses.dataclass(frozen=True)
+class ScenarioParameters(parameters.Parameters):
+    """The header of a scenario."""
+    title: str = parameters.text('', 'one line for people')
+    duration: float = parameters.parameter(60.0, 0.1, 86400.0, 's', "length of the run in the drive's time")
+    pacing: str = parameters.choice('lockstep', ('lockstep', 'realtime'), 'who waits for whom')
+    seed: int = parameters.parameter(1, 0, 2**31 - 1, '', 'seed of every noise stream')
+    ship: bool = parameters.flag(False, 'the pedestal stands on a ship: ship_motion and ins take part')
+    deadline: float = parameters.parameter(60.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
+    program: ProgramParameters = parameters.group(ProgramParameters)
+
+
+class NodeKind(typing.NamedTuple):
+    module: str
+    parameters: type
+
+
+NODE_KINDS = {
+    'ship_motion': NodeKind('ship_motion_sim.ship_motion_node', ShipMotionParameters),
+    'ins': NodeKind('ship_motion_sim.ins_node', InsParameters),
+    'tracking_receiver': NodeKind('tracking_receiver_sim.tracking_receiver_node', TrackingReceiverNodeParameters),
+    'acu': NodeKind('acu_tracker.acu_node', AcuNodeParameters),
+    'adu': NodeKind('adu_drive.adu_node', AduNodeParameters),
+    'recorder': NodeKind('pedestal_bringup.recorder_node', RecorderParameters),
+}
+
+
+class ScenarioError(ValueError):
+    """A scenario is unknown or says something that is not allowed; one line naming file, node, key and value."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    """A checked scenario: its header and, for each node that takes part, the values that differ from the defaults."""
+    name: str
+    header: ScenarioParameters
+    values: dict
+
+    @property
+    def nodes(self):
+        """Nodes that take part, in the order of topics.NODES; the operator where there is a program track."""
+        ship = ('ship_motion', 'ins') if self.header.ship else ()
+        operator = ('operator',) if self.header.program.source != 'none' else ()
+        return (*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator)
+
+    def node_parameters(self, node):
+        """The parameter dataclass of one node as this scenario sets it."""
+        return parameters.build(NODE_KINDS[node].parameters, self.values.get(node, {}))
+
+    def as_yaml(self):
+        """The scenario as a ROS 2 parameter file."""
+        sections = {'scenario': parameters.as_dict(self.header), **self.values}
+        return yaml.safe_dump({node: {'ros__parameters': {key: list(value) if isinstance(value, tuple) else value
+                                                          for key, value in values.items()}}
+                               for node, values in sections.items()}, sort_keys=True)
+
+
+def _folder():
+    return importlib.resources.files('pedestal_bringup') / 'scenarios'
+
+
+def available():
+    """{name: title} of the scenarios that come with the product."""
+    found = {}
+    for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
+        if entry.name.endswith('.yaml'):
+            sections = yaml.safe_load(entry.read_text())
+            found[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
+    return found
+
+
+def _text(name_or_path):
+    path = pathlib.Path(name_or_path)
+    if path.suffix in ('.yaml', '.yml'):
+        try:
+            return path.stem, path.read_text()
+        except OSError as error:
+            raise ScenarioError(f'scenario file {path}: {error.strerror}') from None
+    entry = _folder() / f'{name_or_path}.yaml'
+    if not entry.is_file():
+        names = list(available())
+        near = difflib.get_close_matches(name_or_path, names, n=1)
+        hint = f'did you mean {near[0]!r}? ' if near else ''
+        raise ScenarioError(f'unknown scenario {name_or_path!r}; {hint}there are {", ".join(names)} '
+                            '(or give a path that ends in .yaml)')
+    return name_or_path, entry.read_text()
+
+
+def _dotted(tree, prefix=''):
+    flat = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            flat.update(_dotted(value, f'{prefix}{key}.'))
+        else:
+            flat[f'{prefix}{key}'] = value
+    return flat
+
+
+def _sections(name, content):
+    try:
+        tree = yaml.safe_load(content)
+    except yaml.YAMLError as error:
+        raise ScenarioError(f'scenario {name}: no valid YAML: {" ".join(str(error).split())}') from None
+    if not isinstance(tree, dict) or 'scenario' not in tree:
+        raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
+    sections = {}
+    for section, body in tree.items():
+        if section != 'scenario' and section not in NODE_KINDS:
+            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(NODE_KINDS)}')
+        if not isinstance(body, dict) or list(body) != ['ros__parameters']:
+            raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
+        sections[section] = _dotted(body['ros__parameters'] or {})
+    return sections
+
+
+def parse_override(text):
+    """'node.key=value' -> (node, key, value); the value is read as YAML."""
+    left, equals, right = text.partition('=')
+    node, dot, key = left.partition('.')
+    if not (equals and dot and key):
+        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.position_loop.azimuth.Kp=20')
+    if node not in (*NODE_KINDS, 'scenario'):
+        raise ScenarioError(f'--param {text!r}: {node!r} is no node; there are {", ".join(NODE_KINDS)}, scenario')
+    return node, key, yaml.safe_load(right)
+
+
+def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
+    """A Scenario from a name or a YAML path.
+
+    overrides: texts 'node.key=value'. seed, duration and pacing replace the header's where given.
+    Raises ScenarioError for anything unknown or out of range.
+    """
+    name, content = _text(name_or_path)
+    sections = _sections(name, content)
+    for override in overrides:
+        node, key, value = parse_override(override)
+        sections.setdefault(node, {})[key] = value
+    header_values = sections.pop('scenario')
+    for key, value in (('seed', seed), ('duration', duration), ('pacing', pacing)):
+        if value is not None:
+            header_values[key] = value
+    header = _checked(name, 'scenario', ScenarioParameters, header_values)
+    for node in NODE_KINDS:
+        sections.setdefault(node, {})
+    _spread(name, sections, header, seed)
+    for node, values in sections.items():
+        _checked(name, node, NODE_KINDS[node].parameters, values)
+    return Scenario(name, header, sections)
+
+
+def _spread(name, sections, header, seed):
+    """What several nodes must agree on, said once: length and period of the run, seeds, ship, latencies."""
+    for node in ('adu', 'recorder', 'tracking_receiver'):
+        sections[node]['duration'] = header.duration
+    sections['recorder'].update(scenario=name, seed=header.seed)
+    for node, key in (('ship_motion', 'ship.seed'), ('ship_motion', 'imu.seed'), ('ins', 'seed'),
+                      ('tracking_receiver', 'seed')):
+        if seed is not None or key not in sections[node]:
+            sections[node][key] = header.seed
+    for key, value in sections['ship_motion'].items():
+        if key.startswith('ship.'):
+            sections['ins'][key] = value
+    if 'period' in sections['adu']:
+        for node in ('acu', 'tracking_receiver'):
+            sections[node].setdefault('period', sections['adu']['period'])
+    for told, node, key in (('receiver_latency', 'tracking_receiver', 'receiver.latency'),
+                            ('attitude_latency', 'ins', 'latency')):
+        if key in sections[node]:
+            sections['acu'].setdefault(told, sections[node][key])
+
+
+def _checked(name, section, parameters_type, values):
+    try:
+        return parameters.build(parameters_type, values)
+    except parameters.ParameterError as error:
+        raise ScenarioError(f'scenario {name}, {section}: {error}') from None

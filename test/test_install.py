@@ -1,0 +1,148 @@
+"""The six packages as pip installs them, and the rules of who may import whom."""
+import ast
+import pathlib
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree
+from importlib import metadata
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parents[1]
+EXECUTABLES = {
+    'pedestal_common': {},
+    'ship_motion_sim': {'ship_motion_node': 'ship_motion_sim.ship_motion_node:main',
+                        'ins_node': 'ship_motion_sim.ins_node:main'},
+    'tracking_receiver_sim': {'tracking_receiver_node': 'tracking_receiver_sim.tracking_receiver_node:main'},
+    'acu_tracker': {'acu_node': 'acu_tracker.acu_node:main'},
+    'adu_drive': {'adu_node': 'adu_drive.adu_node:main'},
+    'pedestal_bringup': {'recorder_node': 'pedestal_bringup.recorder_node:main',
+                         'pedestal': 'pedestal_bringup.cli:main'},
+}
+PACKAGES = tuple(EXECUTABLES)
+COLUMNS = PACKAGES[1:5]
+MESSAGES = ('_msgs', '_interfaces', '_srvs')
+
+
+def modules(package):
+    return sorted((ROOT / 'src' / package / package).rglob('*.py'))
+
+
+def imported(path):
+    """Top-level names of everything a file imports, inside functions too."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition('.')[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield node.module.partition('.')[0]
+
+
+@pytest.fixture(scope='module')
+def installed(tmp_path_factory):
+    """A folder with the six packages as `pip install` (not editable) lays them out.
+
+    Built from copies, because setuptools leaves build/ in the sources it builds; needs no network.
+    """
+    folder = tmp_path_factory.mktemp('install')
+    for package in PACKAGES:
+        shutil.copytree(ROOT / 'src' / package, folder / 'src' / package,
+                        ignore=shutil.ignore_patterns('build', '*.egg-info', '__pycache__', 'test'))
+    done = subprocess.run(
+        [sys.executable, '-m', 'pip', '--disable-pip-version-check', 'install', '--quiet', '--no-index', '--no-deps',
+         '--no-build-isolation', '--target', folder / 'site', *(folder / 'src' / package for package in PACKAGES)],
+        capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / 'site'
+
+
+def manifest(package):
+    return xml.etree.ElementTree.parse(ROOT / 'src' / package / 'package.xml').getroot()
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_pip_installs_commands_and_ros_files(installed, package):
+    [distribution] = metadata.distributions(name=package, path=[str(installed)])
+    commands = {entry.name: entry.value for entry in distribution.entry_points if entry.group == 'console_scripts'}
+    assert commands == EXECUTABLES[package]
+    assert all((installed / 'bin' / command).is_file() for command in commands)
+    assert (installed / 'share' / 'ament_index' / 'resource_index' / 'packages' / package).is_file()
+    assert (installed / 'share' / package / 'package.xml').is_file()
+    assert not (installed / 'test').exists()
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_pip_and_ros_say_the_same(installed, package):
+    [distribution] = metadata.distributions(name=package, path=[str(installed)])
+    said = manifest(package)
+    author = said.find('maintainer')
+    assert (said.findtext('name'), said.findtext('version'), said.findtext('description'), said.findtext('license'),
+            author.text, author.get('email')) == tuple(
+        distribution.metadata[key]
+        for key in ('Name', 'Version', 'Summary', 'License', 'Maintainer', 'Maintainer-email'))
+
+
+def test_one_version():
+    assert len({manifest(package).findtext('version') for package in PACKAGES}) == 1
+
+
+def test_scenarios_and_launch_files_are_installed(installed):
+    source = ROOT / 'src' / 'pedestal_bringup'
+    scenarios = {path.name for path in (source / 'pedestal_bringup' / 'scenarios').glob('*.yaml')}
+    launch = {path.name for path in (source / 'launch').glob('*.py')}
+    assert 'leo_pass.yaml' in scenarios and 'pedestal.launch.py' in launch
+    assert {path.name for path in (installed / 'pedestal_bringup' / 'scenarios').iterdir()} == scenarios
+    assert {path.name for path in (installed / 'share' / 'pedestal_bringup' / 'config').iterdir()} == scenarios
+    assert {path.name for path in (installed / 'share' / 'pedestal_bringup' / 'launch').glob('*.py')} == launch
+
+
+@pytest.mark.parametrize('package', [package for package in PACKAGES if EXECUTABLES[package]])
+def test_every_command_leads_to_a_function(installed, package, run_process):
+    lines = ['import importlib, pathlib',
+             f'assert pathlib.Path(importlib.import_module({package!r}).__file__).is_relative_to({str(installed)!r})']
+    for target in EXECUTABLES[package].values():
+        module, _, function = target.partition(':')
+        lines.append(f'assert callable(importlib.import_module({module!r}).{function})')
+    done = run_process([sys.executable, '-c', '\n'.join(lines)], 120.0, PYTHONPATH=str(installed))
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_installed_command_finds_its_scenarios(installed, run_process):
+    done = run_process([installed / 'bin' / 'pedestal', 'scenarios'], 120.0, PYTHONPATH=str(installed))
+    assert done.returncode == 0, done.stderr
+    assert 'leo_pass' in done.stdout
+
+
+@pytest.mark.parametrize('package', COLUMNS)
+def test_only_nodes_know_ros(package):
+    offenders = [f'{path.name} imports {name}' for path in modules(package) if not path.name.endswith('_node.py')
+                 for name in imported(path) if name == 'rclpy' or name.endswith(MESSAGES)]
+    assert offenders == []
+
+
+@pytest.mark.parametrize('package', COLUMNS)
+def test_laws_load_without_ros(package, run_process):
+    names = [f'{package}.{path.stem}' for path in modules(package)
+             if not path.name.endswith('_node.py') and path.stem != '__init__']
+    assert names
+    code = f'import sys, importlib\nsys.modules["rclpy"] = None\nfor name in {names}: importlib.import_module(name)'
+    done = run_process([sys.executable, '-c', code], 120.0)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize('package', COLUMNS + PACKAGES[:1])
+def test_columns_never_import_each_other(package):
+    allowed = {package, 'pedestal_common'}
+    offenders = [f'{path.name} imports {name}' for path in modules(package)
+                 for name in imported(path) if name in PACKAGES and name not in allowed]
+    assert offenders == []
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_imports_are_declared(package):
+    """Every ROS or sibling package that is imported stands in package.xml."""
+    launch = sorted((ROOT / 'src' / package / 'launch').glob('*.py'))
+    used = {name for path in modules(package) + launch for name in imported(path) if name != package}
+    ros = {name for name in used if name in PACKAGES or name in ('rclpy', 'launch', 'launch_ros')
+           or name.endswith(MESSAGES)}
+    assert ros <= {entry.text for entry in manifest(package).findall('exec_depend')}
