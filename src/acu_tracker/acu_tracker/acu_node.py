@@ -107,18 +107,18 @@ class AcuNode(shell.Shell):
         self.announce(self.send_mode, messages.String(data=modes.MODES[self.announced]))
 
     def publish_step(self, stamp):
+        """The rate command, which the drive waits for, then what is only looked at."""
         outputs = self.outputs[0]
-        messages.put_stamp(self.estimate.header.stamp, stamp)
-        messages.put_stamp(self.reference.header.stamp, stamp)
         messages.put_stamp(self.command.header.stamp, stamp)
-        for message, values in ((self.estimate, outputs['estimate']), (self.reference, outputs['reference'])):
-            point = message.points[0]
-            point.positions[:], point.velocities[:], point.accelerations[:] = values.T
         self.command.velocity[:] = outputs['rate']
         self.command.effort[:] = outputs['torque']
-        self.send_estimate(self.estimate)
-        self.send_reference(self.reference)
         self.send_command(self.command)
+        for message, send, values in ((self.estimate, self.send_estimate, outputs['estimate']),
+                                      (self.reference, self.send_reference, outputs['reference'])):
+            messages.put_stamp(message.header.stamp, stamp)
+            point = message.points[0]
+            point.positions[:], point.velocities[:], point.accelerations[:] = values.T
+            send(message)
 
     def service(self, mode):
         """The callback of a mode's service: asks the mode machine at once and answers with what it reads back."""

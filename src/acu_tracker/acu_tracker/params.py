@@ -11,7 +11,7 @@ from pedestal_common.parameters import ParameterError, Parameters, choice, flag,
 class ReceiverLaw(Parameters):
     """The receiver's thermal noise as the control unit knows it: sigma = theta3 / (k_m sqrt(2 C/N0 tau))."""
 
-    beamwidth: float = parameter(0.0209, 1e-5, 1.0, 'rad', '3 dB beamwidth theta3 of the sum pattern')
+    beamwidth: float = parameter(0.0175, 1e-5, 1.0, 'rad', '3 dB beamwidth theta3 of the sum pattern')
     slope: float = parameter(1.6, 0.1, 10.0, '', 'monopulse slope k_m: difference over sum per beamwidth')
     integration: float = parameter(0.005, 1e-6, 10.0, 's', 'integration time tau of one error')
     sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not fall with C/N0 (encoder, phase)')

@@ -74,26 +74,26 @@ class AduNode(shell.Shell):
             self.every(self.parameters.period, self.tick)
 
     def publish_step(self):
-        """joint_states, motor_states and clock of step k."""
+        """joint_states, clock and motor_states of step k; what the others wait for goes first."""
         stamp = self.k * self.period_ns
         self.begin_step(stamp)
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
         outputs = self.outputs[0]
-        for message in (self.joints, self.motors):
-            messages.put_stamp(message.header.stamp, stamp)
+        azimuth, elevation = outputs['azimuth'], outputs['elevation']
+        joints, motors = self.joints, self.motors
+        messages.put_stamp(joints.header.stamp, stamp)
+        joints.position[:] = azimuth['position'], elevation['position']
+        joints.velocity[:] = azimuth['velocity'], elevation['velocity']
+        joints.effort[:] = azimuth['torque'], elevation['torque']
+        self.send_joints(joints)
         messages.put_stamp(self.clock_message.clock, stamp)
-        for i, axis in enumerate(messages.AXES):
-            out = outputs[axis]
-            self.joints.position[i] = out['position']
-            self.joints.velocity[i] = out['velocity']
-            self.joints.effort[i] = out['torque']
-            self.motors.position[2 * i:2 * i + 2] = out['motor_position']
-            self.motors.velocity[2 * i:2 * i + 2] = out['motor_velocity']
-            self.motors.effort[2 * i:2 * i + 2] = out['motor_torque']
-        self.send_motors(self.motors)
         self.send_clock(self.clock_message)
-        self.send_joints(self.joints)
+        messages.put_stamp(motors.header.stamp, stamp)
+        for field, values in (('motor_position', motors.position), ('motor_velocity', motors.velocity),
+                              ('motor_torque', motors.effort)):
+            values[:2], values[2:] = azimuth[field], elevation[field]
+        self.send_motors(motors)
         if self.graph.lockstep:
             self.steps.take(STEP, stamp, None)
 

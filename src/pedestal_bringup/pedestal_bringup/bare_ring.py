@@ -34,7 +34,7 @@ class Ring(Node):
 
     def __init__(self, role, steps):
         super().__init__(role)
-        self.steps, self.lap, self.begun, self.finished = steps, 0, 0.0, False
+        self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
         step_topics = [topic for topic in topics.TOPICS if topic.rate == 'step']
         self.writers = [(self.create_publisher(shell.message_class(topic.type), topic.name, shell.QOS['step']),
                          _filled(topic.type), topics.readers(topic, ROLES))
@@ -56,6 +56,12 @@ class Ring(Node):
             self.send()
 
     def ignore(self, _message):
+        pass
+
+    def draining(self):
+        return False
+
+    def close(self):
         pass
 
     def pass_on(self, _message):

@@ -50,6 +50,10 @@ def _parser():
     scenarios = verbs.add_parser('scenarios', help='list the scenarios')
     scenarios.set_defaults(verb=_scenarios)
 
+    listed = verbs.add_parser('parameters', help='list the parameters of a node: default, range, unit, meaning')
+    listed.add_argument('node', help='acu, adu, tracking_receiver, ship_motion, ins, recorder or scenario')
+    listed.set_defaults(verb=_parameters)
+
     program = verbs.add_parser('program', help='send the program track of a scenario to a running ACU')
     program.add_argument('scenario')
     program.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE')
@@ -135,6 +139,20 @@ def _scenarios(_options):
     from pedestal_bringup import scenario
     for name, title in scenario.available().items():
         print(f'{name:14} {title}')
+    return 0
+
+
+def _parameters(options):
+    from pedestal_bringup import scenario
+    from pedestal_common import parameters
+    parameters_type = scenario.parameters_of(options.node)
+    values = parameters.defaults(parameters_type)
+    for name, field in parameters.flatten(parameters_type):
+        meta = field.metadata
+        allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ' | '.join(meta.get('options', ()))
+        unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
+        value = f'{values[name]:g}' if isinstance(values[name], float) else str(values[name])
+        print(f'{name:42} {value:>14}  {allowed:24} {meta["doc"]}{unit}')
     return 0
 
 

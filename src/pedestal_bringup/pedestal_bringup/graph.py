@@ -11,6 +11,7 @@ import time
 
 import rclpy
 import yaml
+from rcl_interfaces.srv import GetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
@@ -21,6 +22,8 @@ from pedestal_common.shell import Shell
 
 LOG_LINES = 8
 STOP_TIME = 20.0
+ANSWER_TIME = 2.0
+"""Seconds a node has to answer a parameter service before it counts as stuck."""
 
 
 class RunError(RuntimeError):
@@ -54,6 +57,19 @@ class Operator(Shell):
         """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""
         last = min(self.heard, key=self.heard.get, default=None)
         return last if last is not None and time.monotonic() - self.heard[last] > limit else None
+
+    def stuck(self, nodes, executor):
+        """Those of the nodes whose process does not even answer a parameter service."""
+        clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in nodes}
+        answers = {}
+        deadline = time.monotonic() + ANSWER_TIME
+        while time.monotonic() < deadline and not (len(answers) == len(clients) and all(
+                answer.done() for answer in answers.values())):
+            for node, client in clients.items():
+                if node not in answers and client.service_is_ready():
+                    answers[node] = client.call_async(GetParameters.Request())
+            executor.spin_once(timeout_sec=0.02)
+        return [node for node in nodes if node not in answers or not answers[node].done()]
 
 
 def free_bag(scenario):
@@ -136,8 +152,11 @@ class Graph:
         """{node: exit code} of the processes that have ended."""
         return {node: process.returncode for node, process in self.processes.items() if process.poll() is not None}
 
-    def failure(self, unheard=None):
-        """The error of a run in which a node has ended before its time, or `unheard` says nothing any more."""
+    def failure(self, stuck, unheard=None):
+        """The error of a run in which a node has ended before its time, or `unheard` says nothing any more.
+
+        stuck(nodes) -> those that do not answer. A node may accuse one that itself waits for the node that is stuck.
+        """
         time.sleep(0.5)
         early = {node: code for node, code in self.ended().items() if code != 0 or node not in ('adu', 'recorder')}
         lines = {node: self.last_lines(node) for node in self.processes}
@@ -146,6 +165,9 @@ class Graph:
         killed = [node for node, code in early.items() if code < 0]
         silent = [node for node in self.processes if node in accused and node not in early] or [
             node for node in (unheard,) if node is not None and node not in early]
+        if silent and not killed:
+            mute = stuck([node for node in self.processes if node not in early])
+            silent = [node for node in silent if node in mute] or mute or silent
         culprit = (killed or silent or list(early))[0]
         if culprit in killed:
             reason = f'died by signal {signal.Signals(-early[culprit]).name}'
@@ -172,19 +194,23 @@ def run(scenario, bag, progress):
             operator = Operator(table)
             executor = SingleThreadedExecutor()
             executor.add_node(operator)
+
+            def stuck(nodes):
+                return operator.stuck(nodes, executor)
+
             while graph.ended().get('adu') != 0:
                 executor.spin_once(timeout_sec=0.1)
                 progress(operator.time)
                 if any(code != 0 or node not in ('adu', 'recorder') for node, code in graph.ended().items()):
-                    raise graph.failure(operator.silent(scenario.header.deadline))
+                    raise graph.failure(stuck, operator.silent(scenario.header.deadline))
                 if operator.silent(2.0 * scenario.header.deadline):
-                    raise graph.failure(operator.silent(2.0 * scenario.header.deadline))
+                    raise graph.failure(stuck, operator.silent(2.0 * scenario.header.deadline))
             progress(scenario.header.duration)
             for node in graph.processes:
                 if node not in ('adu', 'recorder') and graph.stop(node) != 0:
-                    raise graph.failure()
+                    raise graph.failure(stuck)
             if graph.stop('recorder') != 0:
-                raise graph.failure()
+                raise graph.failure(stuck)
             operator.destroy_node()
             return Outcome(graph.result('adu'), graph.result('recorder'))
     finally:

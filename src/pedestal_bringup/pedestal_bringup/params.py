@@ -6,10 +6,11 @@ from pedestal_common.parameters import ParameterError, Parameters, parameter, te
 
 @dataclasses.dataclass(frozen=True)
 class RecorderParameters(Parameters):
-    """What is recorded where. `scenario` and `seed` go into the bag, to say how it was made."""
+    """What is recorded where. `scenario`, `seed` and `beamwidth` go into the bag, to say how it was made."""
     bag: str = text('recording', 'directory of the bag; must not exist')
     duration: float = parameter(0.0, 0.0, 86400.0, 's', "end at this stamp of the drive's time; 0: when told to stop")
     scenario: str = text('', 'name of the scenario of the run')
+    beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', "half-power beamwidth, for the report's scale")
     seed: int = parameter(1, 0, 2**31 - 1, '', 'seed of the run')
 
     def check(self):

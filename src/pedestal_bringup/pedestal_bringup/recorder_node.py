@@ -49,6 +49,7 @@ class RecorderNode(Shell):
         recorded = topics.read_by('recorder', nodes) if nodes else topics.TOPICS
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
+            'beamwidth': self.parameters.beamwidth,
             **dict(_versions())})
         self._order = StepOrder(recorded, nodes, self._bag.write)
         self._end = round(self.parameters.duration * SECOND) or None

@@ -12,17 +12,26 @@ SETTLING = 2.0
 
 
 @compiled
-def _pointing(azimuth, elevation, target, ship, quaternions, cross, up, beam_earth):
-    """Fill the pointing error (cross-elevation, elevation) and the beam's earth angles of every row."""
-    mat_ed = np.empty((3, 3))
-    for k in range(azimuth.size):
-        line_of_sight.rotation(quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3], mat_ed)
+def _pointing(beam, target, ship, attitude, known_attitude, estimate, error, filtered, beam_earth):
+    """Fill, per row: the pointing error and the filtered error (cross-elevation, elevation), the beam's earth angles.
+
+    attitude is the true one, known_attitude the INS's, in whose earth angles the estimate is given.
+    """
+    mat_ed, known = np.empty((3, 3)), np.empty((3, 3))
+    for k in range(len(beam)):
+        azimuth, elevation = beam[k, 0], beam[k, 1]
+        line_of_sight.rotation(attitude[k, 0], attitude[k, 1], attitude[k, 2], attitude[k, 3], mat_ed)
         x, y, z = line_of_sight.to_deck(mat_ed, target[k, 0] - ship[k, 0], target[k, 1] - ship[k, 1],
                                         target[k, 2] - ship[k, 2])
-        cross[k], up[k] = line_of_sight.offsets(azimuth[k], elevation[k], x, y, z)
-        x, y, z = line_of_sight.direction(azimuth[k], elevation[k])
+        error[k, 0], error[k, 1] = line_of_sight.offsets(azimuth, elevation, x, y, z)
+        x, y, z = line_of_sight.direction(azimuth, elevation)
         east, north, height = line_of_sight.to_earth(mat_ed, x, y, z)
         beam_earth[k, 0], beam_earth[k, 1] = line_of_sight.earth_angles(east, north, height)
+        line_of_sight.rotation(known_attitude[k, 0], known_attitude[k, 1], known_attitude[k, 2], known_attitude[k, 3],
+                               known)
+        east, north, height = line_of_sight.earth_direction(estimate[k, 0], estimate[k, 1])
+        x, y, z = line_of_sight.to_deck(known, east, north, height)
+        filtered[k, 0], filtered[k, 1] = line_of_sight.offsets(azimuth, elevation, x, y, z)
 
 
 @dataclasses.dataclass
@@ -30,8 +39,8 @@ class Tracking:
     """A run as arrays on the drive's steps; angles in rad, NaN where nothing was measured.
 
     t (n,) s; azimuth, elevation (n,) encoders; cross_elevation, elevation_error (n,) true error;
-    measured (n, 2) receiver errors and cn0 (n,) at their stamp; filtered (n, 2) estimate minus encoder, as
-    cross-elevation and elevation; beam_earth (n, 2); target_earth (n, 2) and range (n,) m; mode (n,) text;
+    measured (n, 2) receiver errors and cn0 (n,) at their stamp; filtered (n, 2) the estimate seen from the
+    beam, as cross-elevation and elevation; beam_earth (n, 2); target_earth (n, 2) and range (n,) m; mode (n,) text;
     tracking (n,) bool: in autotrack and settled.
     """
     t: np.ndarray
@@ -64,36 +73,33 @@ def tracking(bag) -> Tracking:
     missing = [name for name in ('joint_states', 'target/truth') if name not in bag.topics]
     if missing:
         raise ValueError(f'{bag.path}: no {" and no ".join(missing)} in it, so nothing can be compared with the truth')
+
+    def on_grid(topic, columns):
+        return _on_grid(t, bag.table(topic) if topic in bag.topics else None, columns)
+
     joints = bag.table('joint_states')
     t = joints['t']
-    azimuth, elevation = joints['azimuth.position'], joints['elevation.position']
-    target = _on_grid(t, bag.table('target/truth'), ('position.x', 'position.y', 'position.z'))
+    beam = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
+    target = on_grid('target/truth', ('position.x', 'position.y', 'position.z'))
+    quaternion = ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w')
     if 'ship/truth' in bag.topics:
-        truth = bag.table('ship/truth')
-        ship = _on_grid(t, truth, ('position.x', 'position.y', 'position.z'))
-        quaternions = _on_grid(t, truth, ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w'))
+        ship = on_grid('ship/truth', ('position.x', 'position.y', 'position.z'))
+        attitude, known_attitude = on_grid('ship/truth', quaternion), on_grid('ship/imu/data', quaternion)
     else:
         ship = np.zeros((t.size, 3))
-        quaternions = np.tile(line_of_sight.ASHORE, (t.size, 1))
-    cross, up, beam_earth = np.empty(t.size), np.empty(t.size), np.empty((t.size, 2))
-    _pointing(azimuth, elevation, target, ship, quaternions, cross, up, beam_earth)
+        attitude = known_attitude = np.tile(line_of_sight.ASHORE, (t.size, 1))
+    measured = on_grid('tracking_receiver/angle_error', ('x', 'y', 'z'))
+    estimate = on_grid('acu/estimate', ('azimuth.position', 'elevation.position'))
+    error, filtered, beam_earth = np.empty((3, t.size, 2))
+    _pointing(beam, target, ship, attitude, known_attitude, estimate, error, filtered, beam_earth)
     relative = target - ship
     target_earth = np.column_stack((np.arctan2(relative[:, 0], relative[:, 1]),
                                     np.arctan2(relative[:, 2], np.hypot(relative[:, 0], relative[:, 1]))))
-
-    def optional(topic):
-        return bag.table(topic) if topic in bag.topics else None
-
-    error = _on_grid(t, optional('tracking_receiver/angle_error'), ('x', 'y', 'z'))
-    estimate = _on_grid(t, optional('acu/estimate'), ('azimuth.position', 'elevation.position'))
-    seen_from = beam_earth if 'ship/truth' in bag.topics else np.column_stack((azimuth, elevation))
-    filtered = np.column_stack((_wrap(estimate[:, 0] - seen_from[:, 0]) * np.cos(estimate[:, 1]),
-                                estimate[:, 1] - seen_from[:, 1]))
     mode = modes(bag, t)
     automatic = mode == 'autotrack'
     start = t[automatic][0] + SETTLING if automatic.any() else math.inf
-    return Tracking(t, azimuth, elevation, cross, up, error[:, :2], error[:, 2], filtered, beam_earth, target_earth,
-                    np.linalg.norm(relative, axis=1), mode, automatic & (t >= start))
+    return Tracking(t, beam[:, 0], beam[:, 1], error[:, 0], error[:, 1], measured[:, :2], measured[:, 2], filtered,
+                    beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode, automatic & (t >= start))
 
 
 def modes(bag, t):
@@ -103,10 +109,6 @@ def modes(bag, t):
     table = bag.table('acu/mode')
     index = np.searchsorted(table['t'], t + 1e-9, side='right') - 1
     return np.where(index >= 0, np.array(['', *table['data']])[index + 1], '')
-
-
-def _wrap(angle):
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def _rms(values):
@@ -151,7 +153,10 @@ def _max(values):
     return float(np.nanmax(np.abs(values))) if values.size else math.nan
 
 
+TARGETS = {'pointing_to_noise': '<= 0.4', 'lost_steps': '0', 'realtime_factor': '>= 4 in lockstep'}
+
+
 def rows(case, values):
     """The rows of a --json file: value null where it could not be measured."""
     return [{'case': case, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
-             'paper': None, 'target': None} for metric, (value, unit) in values.items()]
+             'paper': None, 'target': TARGETS.get(metric)} for metric, (value, unit) in values.items()]

@@ -143,14 +143,22 @@ def _sections(name, content):
     return sections
 
 
+def parameters_of(node):
+    """The parameter dataclass of a node or of the header `scenario`; ScenarioError for any other name."""
+    if node == 'scenario':
+        return ScenarioParameters
+    if node not in NODE_KINDS:
+        raise ScenarioError(f'{node!r} is no node; there are {", ".join(NODE_KINDS)}, scenario')
+    return NODE_KINDS[node].parameters
+
+
 def parse_override(text):
     """'node.key=value' -> (node, key, value); the value is read as YAML."""
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
         raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.position_loop.azimuth.Kp=20')
-    if node not in (*NODE_KINDS, 'scenario'):
-        raise ScenarioError(f'--param {text!r}: {node!r} is no node; there are {", ".join(NODE_KINDS)}, scenario')
+    parameters_of(node)
     return node, key, yaml.safe_load(right)
 
 
@@ -174,15 +182,18 @@ def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
         sections.setdefault(node, {})
     _spread(name, sections, header, seed)
     for node, values in sections.items():
-        _checked(name, node, NODE_KINDS[node].parameters, values)
+        typed = parameters.as_dict(_checked(name, node, parameters_of(node), values))
+        sections[node] = {key: typed[key] for key in values}
     return Scenario(name, header, sections)
 
 
 def _spread(name, sections, header, seed):
-    """What several nodes must agree on, said once: length and period of the run, seeds, ship, latencies."""
+    """What several nodes must agree on, said once: length and period of the run, seeds, ship, latencies, beam."""
     for node in ('adu', 'recorder', 'tracking_receiver'):
         sections[node]['duration'] = header.duration
     sections['recorder'].update(scenario=name, seed=header.seed)
+    if 'antenna.beamwidth' in sections['tracking_receiver']:
+        sections['recorder']['beamwidth'] = sections['tracking_receiver']['antenna.beamwidth']
     for node, key in (('ship_motion', 'ship.seed'), ('ship_motion', 'imu.seed'), ('ins', 'seed'),
                       ('tracking_receiver', 'seed')):
         if seed is not None or key not in sections[node]:
@@ -194,6 +205,9 @@ def _spread(name, sections, header, seed):
         for node in ('acu', 'tracking_receiver'):
             sections[node].setdefault('period', sections['adu']['period'])
     for told, node, key in (('receiver_latency', 'tracking_receiver', 'receiver.latency'),
+                            ('tracker.receiver.beamwidth', 'tracking_receiver', 'antenna.beamwidth'),
+                            ('tracker.receiver.slope', 'tracking_receiver', 'antenna.slope'),
+                            ('tracker.receiver.integration', 'adu', 'period'),
                             ('attitude_latency', 'ins', 'latency')):
         if key in sections[node]:
             sections['acu'].setdefault(told, sections[node][key])

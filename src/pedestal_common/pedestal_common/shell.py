@@ -446,6 +446,9 @@ def main(node_class, args=None) -> int:
         print(f'{name}: error: {error}', file=sys.stderr)
         return 1
     finally:
+        # It ends anyway; Python's own end would give a late signal its deadly default back.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
