@@ -18,7 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from pedestal_bringup.program import program_message, program_table
 from pedestal_bringup.scenario import NODE_KINDS
 from pedestal_common import messages, parameters
-from pedestal_common.shell import Shell
+from pedestal_common.shell import Shell, set_middleware_defaults
 
 LOG_LINES = 8
 STOP_TIME = 20.0
@@ -82,11 +82,6 @@ def free_bag(scenario):
         number += 1
 
 
-def environment(log):
-    """The environment of every node: loopback discovery unless told otherwise, ROS logs beside the run's."""
-    return {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ, 'ROS_LOG_DIR': str(log)}
-
-
 def parameter_file(scenario, pacing, bag):
     """The scenario as a ROS 2 parameter file, every node told of the graph it is in."""
     sections = yaml.safe_load(scenario.as_yaml())
@@ -117,7 +112,7 @@ class Graph:
                     self.processes[node] = subprocess.Popen(
                         [sys.executable, '-m', NODE_KINDS[node].module, '--ros-args', '--params-file', str(file)],
                         stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-                        env=environment(self.log), start_new_session=True)
+                        env={**os.environ, 'ROS_LOG_DIR': str(self.log)}, start_new_session=True)
         return self
 
     def __exit__(self, *_):
@@ -187,7 +182,7 @@ def run(scenario, bag, progress):
     a clean stop. The recording up to then stays readable.
     """
     table = program_table(scenario) if scenario.header.program.source != 'none' else None
-    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    set_middleware_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         with Graph(scenario, bag) as graph:
@@ -219,7 +214,7 @@ def run(scenario, bag, progress):
 
 def send_program(scenario) -> int:
     """Send a scenario's program track to a running ACU and keep it latched until Ctrl-C."""
-    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    set_middleware_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         operator = Operator(program_table(scenario))

@@ -411,6 +411,13 @@ class Shell(Node):
             publisher.wait_for_all_acked(Duration(seconds=PARTING))
 
 
+def set_middleware_defaults():
+    """What DDS of this process and its children does unless the user says otherwise: talk to this machine only, and
+    answer acknowledgements promptly (fastdds.xml). To be called before rclpy.init."""
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(pathlib.Path(__file__).with_name('fastdds.xml')))
+
+
 def _executor():
     try:
         from rclpy.experimental.events_executor import EventsExecutor
@@ -424,7 +431,7 @@ def main(node_class, args=None) -> int:
     """Run a node until it is finished or told to stop; exit code 0, or 1 with one line on stderr."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: _stop.append(True))
-    os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(pathlib.Path(__file__).with_name('fastdds.xml')))
+    set_middleware_defaults()
     node = None
     name = os.path.basename(sys.argv[0])
     try:
