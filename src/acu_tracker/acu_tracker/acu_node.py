@@ -1,11 +1,12 @@
 """ROS shell of the antenna control unit: answers every receiver error with a rate command; modes by service."""
+import math
 import sys
 
 import numpy as np
 from std_srvs.srv import Trigger
 
 from acu_tracker import control_unit, modes, program_track
-from acu_tracker.params import AcuNodeParameters
+from acu_tracker.params import AcuParameters
 from pedestal_common import messages, shell
 
 ERROR, ATTITUDE = 'tracking_receiver/angle_error', 'ship/imu/data'
@@ -14,19 +15,20 @@ ERROR, ATTITUDE = 'tracking_receiver/angle_error', 'ship/imu/data'
 class AcuNode(shell.Shell):
 
     def __init__(self):
-        super().__init__('acu', AcuNodeParameters, live=('tracker', 'azimuth', 'elevation'))
+        super().__init__('acu', AcuParameters, live=('tracker', 'azimuth', 'elevation'))
         p = self.parameters
         self.constants = control_unit.constants(p)
         self.state = control_unit.initial_state(p)
         self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
         self.times, self.angles = np.zeros(0), np.zeros((0, 2))
-        self.inputs[0]['request'] = modes.NO_REQUEST
         self.outputs[0]['mode'] = modes.STANDBY
+        self.outputs['innovation'] = self.outputs['nis'] = math.nan
         control_unit.step(self.state.copy(), self.constants, self.inputs, self.outputs.copy(), self.times, self.angles)
         control_unit.request(self.state.copy(), self.constants, self.inputs, self.outputs.copy(), modes.STANDBY,
                              self.times, self.angles)
         self.announced = None
         self.refused = ''
+        self.invalid = 0
         self.waiting = 'operator' in self.graph.nodes and self.graph.lockstep
         self.held = None
 
@@ -54,17 +56,15 @@ class AcuNode(shell.Shell):
     def on_program(self, message):
         """A table of two or more points is a program track in earth angles, one point a preset in deck angles."""
         try:
-            columns = [message.joint_names.index(axis) for axis in messages.AXES]
-            times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 for point in message.points]
-            angles = [[point.positions[column] for column in columns] for point in message.points]
+            times, angles = rows(message)
             if len(angles) == 1:
                 self.inputs[0]['preset'], self.inputs[0]['preset_valid'] = angles[0], 1
             else:
                 start = messages.nanoseconds(message.header.stamp) * 1e-9
-                self.times, self.angles = program_track.checked(np.array(times) + start, angles)
+                self.times, self.angles = program_track.checked(times + start, angles)
                 self.inputs[0]['program_count'] = len(self.times)
             self.refused = ''
-        except (ValueError, IndexError) as error:
+        except ValueError as error:
             self.refused = f'acu/program_track refused: {error}'
             self.get_logger().warning(self.refused)
         self.waiting = False
@@ -97,6 +97,7 @@ class AcuNode(shell.Shell):
             inputs['deck_rate'] = w.x, w.y, w.z
         control_unit.step(self.state, self.constants, self.inputs, self.outputs, self.times, self.angles)
         inputs['preset_valid'] = 0
+        self.invalid |= int(outputs['invalid_input'])
         self.begin_step(stamp)
         if outputs['mode'] != self.announced:
             self.announce_mode()
@@ -140,15 +141,19 @@ class AcuNode(shell.Shell):
         return response
 
     def diagnose(self):
+        """What is now, and every invalid input since the last diagnosis."""
         outputs = self.outputs[0]
         mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
-        invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if outputs['invalid_input'] >> i & 1]
+        invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.invalid >> i & 1]
+        self.invalid = 0
         values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
                   ('coasting', str(int(outputs['coasting']))), ('invalid_input', ' '.join(invalid))]
         for axis, limited in zip(messages.AXES, np.transpose([outputs[f'{kind}_limited'] for kind in
                                                               ('angle', 'rate', 'acceleration')])):
             values.append((f'{axis} limited', ' '.join(kind for kind, on in zip(('angle', 'rate', 'acceleration'),
                                                                                  limited) if on)))
+        for axis, innovation, nis in zip(messages.AXES, outputs['innovation'], outputs['nis']):
+            values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
         if self.refused:
             return shell.WARN, self.refused, values
         if self.steps.refused:
@@ -156,6 +161,19 @@ class AcuNode(shell.Shell):
         if invalid:
             return shell.ERROR, f'invalid input: {" ".join(invalid)}', values
         return (shell.WARN if outputs['coasting'] else shell.OK), f'{mode} ({reason})', values
+
+
+def rows(message):
+    """(times after the stamp (n,) [s], angles (n, 2) [rad]) of a JointTrajectory; ValueError when not there."""
+    if not set(messages.AXES) <= set(message.joint_names):
+        raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(messages.AXES)}')
+    columns = [message.joint_names.index(axis) for axis in messages.AXES]
+    for row, point in enumerate(message.points):
+        if len(point.positions) != len(message.joint_names):
+            raise ValueError(f'row {row}: {len(point.positions)} positions; must be {len(message.joint_names)}')
+    times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 for point in message.points]
+    angles = [[point.positions[column] for column in columns] for point in message.points]
+    return np.array(times), np.reshape(angles, (-1, len(columns)))
 
 
 def main(args=None):

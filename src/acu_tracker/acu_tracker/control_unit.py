@@ -27,13 +27,12 @@ INPUTS = np.dtype([
     ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
-    ('request', 'i8'),                                                          # mode code, -1 none
     ('program_count', 'i8'),                                                    # rows of the table in use
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
 ], align=True)
 
 OUTPUTS = np.dtype([
-    ('mode', 'i8'), ('reason', 'i8'), ('request_result', 'i8'),                 # -1 none, 0 refused, 1 accepted
+    ('mode', 'i8'), ('reason', 'i8'),                                            # codes of MODES and REASONS
     ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
     ('reference', 'f8', (2, 3)),                                                # deck angle, rate, acceleration at t_k
@@ -201,12 +200,18 @@ def outside(azimuth, elevation, p):
 
 
 @compiled
+def overdue(s, p):
+    """How long [s] no error was believed, beyond the receiver's latency."""
+    return s.stamp - s.tracker.stamp - p.receiver_latency
+
+
+@compiled
 def change_mode(s, p, o, times, angles, t_m, request):
     """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
     flags = 0
     encoder_ok = s.encoder.count > 0 and s.encoder.stamp[s.encoder.newest] == s.stamp
-    attitude_ok = not s.stabilised or attitude_at(s, p, s.stamp)
-    lost = not s.tracker.running or s.stamp - s.tracker.stamp > p.tracker.coast_time
+    attitude_ok = not s.stabilised or attitude_at(s, p, t_m)
+    lost = not s.tracker.running or overdue(s, p) > p.tracker.coast_time
     program = program_track.status(times, s.stamp)
     wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)
     if program == modes.NONE and attitude_ok and wanted:
@@ -216,7 +221,7 @@ def change_mode(s, p, o, times, angles, t_m, request):
         else:
             low, high = p.azimuth.limits.low, p.azimuth.limits.high
             program = outside(deck_reference.nearest_turn(A, s.turn, low, high, 0.0, 0.0), E, p)
-    o.locked = tracker.locked(s.tracker, p.tracker, s.stamp)
+    o.locked = tracker.locked(s.tracker, p.tracker, overdue(s, p))
     mode, reason, result = modes.next_mode(
         s.mode, request, encoder_ok, attitude_ok, program, outside(p.azimuth.stow, p.elevation.stow, p),
         outside(s.preset[0], s.preset[1], p), o.locked, lost, p.tracker.handover)
@@ -243,7 +248,7 @@ def request(state, constants, inputs, outputs, mode, program_times, program_angl
     rows = max(inputs[0].program_count, 0)
     result, _ = change_mode(s, constants[0].p, o, program_times[:rows], program_angles[:rows],
                             s.stamp + constants[0].ahead, mode)
-    o.mode, o.reason, o.request_result = s.mode, s.reason, result
+    o.mode, o.reason = s.mode, s.reason
     return result == modes.ACCEPTED
 
 
@@ -339,7 +344,7 @@ def rest(axis, limits, dt, o, index):
 @compiled
 def clear(o):
     """Outputs of a step in which nothing has happened yet."""
-    o.request_result, o.coasting, o.invalid_input = modes.NO_REQUEST, 0, 0
+    o.coasting, o.invalid_input = 0, 0
     o.torque[:] = 0.0
     o.innovation[:] = math.nan
     o.nis[:] = math.nan
@@ -361,7 +366,6 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     dt = u.stamp - s.stamp
     if not (dt > 0.0 and math.isfinite(u.stamp)):
         o.invalid_input = _STAMP
-        o.request_result = modes.NO_REQUEST if u.request == modes.NO_REQUEST else modes.REFUSED
         o.reason = modes.BAD_STAMP
         return
     clear(o)
@@ -389,9 +393,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
 
     t_m = u.stamp + constants[0].ahead
     rested = s.mode == modes.STANDBY
-    waiting = s.mode == modes.STANDBY and u.request == modes.NO_REQUEST
-    result, program_flags = change_mode(s, p, o, times, angles, t_m, s.pending if waiting else u.request)
-    o.request_result = modes.NO_REQUEST if waiting else result
+    _, program_flags = change_mode(s, p, o, times, angles, t_m, s.pending if rested else modes.NO_REQUEST)
     if encoder_ok and (rested or jumped):
         seat(s, u)
     if s.mode == modes.STANDBY:
@@ -409,7 +411,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         command(s.azimuth, p.azimuth, u, dt, o, 0)
         command(s.elevation, p.elevation, u, dt, o, 1)
         s.entered = 0
-        o.coasting = s.mode == modes.AUTOTRACK and u.stamp - s.tracker.stamp > p.tracker.coast_after
+        o.coasting = s.mode == modes.AUTOTRACK and overdue(s, p) > p.tracker.coast_after
 
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command

@@ -1,6 +1,6 @@
-"""The 'current' statistical model of a target's motion: Phi, U, Q (paper 000, eq. 2, 4, 5).
+"""The 'current' statistical model of a target's motion: Phi, Q (paper 000, eq. 2, 4, 5).
 
-Corrected against the print: u1 has an inner 1/alpha; q22 has 1/(2 alpha^3); sigma_a^2 goes with the square.
+Corrected against the print: q22 has 1/(2 alpha^3); sigma_a^2 goes with the square.
 The closed forms of Q lose all digits for small x = alpha T (q11 is a difference of terms ~1 of size x^5), so
 below SERIES_BELOW the power series is used:
     q = int_0^T g(s) g(s)' ds,  g = (s^2/2 - alpha s^3/6 + ..., s - alpha s^2/2 + ..., e^(-alpha s)).
@@ -20,7 +20,6 @@ def _coefficients(first, count):
 
 _G1 = tuple(1.0 / math.factorial(k + 2) for k in _TERMS)
 _G2 = tuple(1.0 / math.factorial(k + 1) for k in _TERMS)
-_U1 = tuple(1.0 / math.factorial(k + 3) for k in _TERMS)
 _Q11 = _coefficients(4, lambda n: 2**n - 2 * n - 2)
 _Q12 = _coefficients(3, lambda n: 2**n - n - 2)
 _Q13 = _coefficients(2, lambda n: 2**n - n - 1)
@@ -45,16 +44,6 @@ def transition(alpha, T):
         return T * T * _series(_G1, x), T * _series(_G2, x), math.exp(-x)
     e = math.exp(-x)
     return (x - 1.0 + e) / alpha**2, (1.0 - e) / alpha, e
-
-
-@compiled
-def mean_input(alpha, T):
-    """(u1, u2, u3) of U, the effect of the mean acceleration abar (eq. 2); U = (T^2/2, T, 1) - third column of Phi."""
-    x = alpha * T
-    if x < SERIES_BELOW:
-        return x * T * T * _series(_U1, x), x * T * _series(_G1, x), -math.expm1(-x)
-    e = math.exp(-x)
-    return (-T + 0.5 * alpha * T * T + (1.0 - e) / alpha) / alpha, T - (1.0 - e) / alpha, 1.0 - e
 
 
 @compiled

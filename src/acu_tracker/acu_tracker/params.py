@@ -123,6 +123,8 @@ class AcuParameters(Parameters):
     period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')
     step_gap: float = parameter(0.05, 1e-3, 10.0, 's', 'gap between drive steps after which targets := actual')
     command_delay: float = parameter(0.0, 0.0, 1.0, 's', 'known delay from t_k until the command is in force')
+    receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', "known latency of the receiver's errors")
+    attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: latency of the attitude')
     initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
     attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')
@@ -131,17 +133,14 @@ class AcuParameters(Parameters):
     elevation: Elevation = group(Elevation)
 
     def check(self):
-        if self.command_delay > (LENGTH - 4) * self.period:
-            raise ParameterError(f'command_delay = {self.command_delay:g} s: must be 0 to {LENGTH - 4} periods, '
-                                 f'{(LENGTH - 4) * self.period:g} s')
+        for name in ('command_delay', 'receiver_latency', 'attitude_latency'):
+            if getattr(self, name) > (LENGTH - 4) * self.period:
+                raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {LENGTH - 4} periods, '
+                                     f'{(LENGTH - 4) * self.period:g} s')
+        longest = self.attitude_timeout - self.command_delay - 0.5 * self.period
+        if self.attitude_latency >= longest:
+            raise ParameterError(f'attitude_latency = {self.attitude_latency:g} s: must be below attitude_timeout - '
+                                 f'command_delay - half a period = {longest:g} s')
         if self.step_gap < 1.5 * self.period:
             raise ParameterError(f'step_gap = {self.step_gap:g} s: must be at least 1.5 periods, '
                                  f'{1.5 * self.period:g} s')
-
-
-@dataclasses.dataclass(frozen=True)
-class AcuNodeParameters(AcuParameters):
-    """Parameters of acu_node: the control unit and, for lockstep, how late its inputs are."""
-
-    receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', "lockstep: latency of the receiver's errors")
-    attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: latency of the attitude')

@@ -5,6 +5,7 @@ import numpy as np
 
 from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
 from pedestal_common.compiled import compiled
+from pedestal_common.interval import interval
 from pedestal_common.line_of_sight import wrap
 
 MAX_ROWS = 100_000
@@ -46,19 +47,6 @@ def status(times, t):
 
 
 @compiled
-def row_at(times, t):
-    """The row i with times[i] <= t < times[i + 1]; the first or last interval outside the table."""
-    low, high = 0, len(times) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if times[middle] <= t:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@compiled
 def _difference(angles, i, axis):
     difference = angles[i + 1, axis] - angles[i, axis]
     return wrap(difference) if axis == 0 else difference
@@ -79,7 +67,7 @@ def _slope(times, angles, i, axis):
 @compiled
 def interpolated(times, angles, t, axis):
     """(angle, rate, acceleration) of axis 0 (azimuth, the short way round) or 1 (elevation) at t [s]."""
-    i = row_at(times, t)
+    i = interval(times, t)
     T = times[i + 1] - times[i]
     x = (t - times[i]) / T
     y0, d = angles[i, axis], _difference(angles, i, axis)
@@ -92,7 +80,7 @@ def interpolated(times, angles, t, axis):
 @compiled
 def azimuth_travel(times, angles, t):
     """(below, above) [rad] that the azimuth still travels from its value at t until the end of the table."""
-    first = row_at(times, t)
+    first = interval(times, t)
     here = interpolated(times, angles, t, 0)[0] - angles[first, 0]
     at, below, above = 0.0, 0.0, 0.0
     for i in range(first, len(times) - 1):

@@ -93,6 +93,6 @@ def observe(t, c, a_max_azimuth, a_max_elevation, stamp, azimuth, elevation, R_a
 
 
 @compiled
-def locked(t, c, now):
-    """Enough errors believed in a row, converged, and the last one fresh."""
-    return t.running and t.in_a_row >= c.lock_count and t.converged and now - t.stamp <= c.coast_after
+def locked(t, c, overdue):
+    """Enough errors believed in a row, converged, and the next one not overdue by more than coast_after [s]."""
+    return t.running and t.in_a_row >= c.lock_count and t.converged and overdue <= c.coast_after

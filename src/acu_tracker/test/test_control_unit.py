@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from acu_tracker import control_unit, modes
 from acu_tracker.control_unit import INVALID_INPUTS
 from acu_tracker.modes import AUTOTRACK, MODES, PRESET, PROGRAM, REASONS, STANDBY, STOW
-from acu_tracker.params import AcuNodeParameters, AcuParameters
+from acu_tracker.params import AcuParameters
 from pedestal_common import line_of_sight
 from pedestal_common.parameters import ParameterError, build
 
@@ -35,7 +35,7 @@ class Rig:
 
     def __init__(self, target=lambda t: (0.5, 0.6), at=(0.4, 0.5), attitude=level, stabilised=False, delay=0.0,
                  error_latency=0.0, sigma=0.0, **parameters):
-        params = build(AcuParameters, {'command_delay': delay, **parameters})
+        params = build(AcuParameters, {'command_delay': delay, 'receiver_latency': error_latency, **parameters})
         self.params, self.target, self.attitude = params, target, attitude
         self.delay, self.latency = delay, error_latency
         self.constants, self.state = control_unit.constants(params), control_unit.initial_state(params)
@@ -55,9 +55,9 @@ class Rig:
     def error(self, t, angle):
         return line_of_sight.offsets(*angle, *line_of_sight.direction(*self.deck(t)))
 
-    def step(self, request=-1, **changes):
+    def step(self, **changes):
         u, t = self.inputs, self.k * T
-        u['stamp'], u['position'], u['velocity'], u['request'] = t, self.angle, self.velocity, request
+        u['stamp'], u['position'], u['velocity'] = t, self.angle, self.velocity
         u['encoder_valid'], u['cn0_dbhz'] = 1, 70.0
         self.passed.append((t, *self.error(t, self.angle)))
         late = 1 + round(self.latency / T)
@@ -74,6 +74,10 @@ class Rig:
         self.angle = self.angle + T * self.velocity
         self.k += 1
         return self.outputs[0]
+
+    def ask(self, mode):
+        return control_unit.request(self.state, self.constants, self.inputs, self.outputs, mode, self.times,
+                                    self.angles)
 
     def run(self, seconds, **changes):
         """Steps of this many seconds; columns: rates (2), pointing error (2)."""
@@ -119,11 +123,21 @@ def test_parameters_are_checked():
             build(AcuParameters, {name: value})
 
 
-def test_constants_of_the_node_s_parameters_are_those_of_the_unit():
-    unit, node = (control_unit.constants(build(cls, {'azimuth.a_max': 0.123, 'command_delay': 0.01}))
-                  for cls in (AcuParameters, AcuNodeParameters))
-    assert unit.tobytes() == node.tobytes()
-    assert unit['p']['azimuth']['a_max'] == 0.123 and unit['ahead'] == 0.0125
+@pytest.mark.parametrize('values, line', [
+    ({'receiver_latency': 0.31}, 'receiver_latency = 0.31 s: must be 0 to 60 periods, 0.3 s'),
+    ({'attitude_latency': 0.31, 'attitude_timeout': 1.0}, 'attitude_latency = 0.31 s: must be 0 to 60 periods, 0.3 s'),
+    ({'attitude_latency': 0.2}, 'attitude_latency = 0.2 s: must be below attitude_timeout - '
+                                'command_delay - half a period = 0.1975 s'),
+])
+def test_latencies_that_cannot_be_bridged_are_refused(values, line):
+    with pytest.raises(ParameterError) as error:
+        build(AcuParameters, values)
+    assert str(error.value) == line
+
+
+def test_constants_hold_the_parameters():
+    c = control_unit.constants(build(AcuParameters, {'azimuth.a_max': 0.123, 'command_delay': 0.01}))
+    assert c['p']['azimuth']['a_max'] == 0.123 and c['ahead'] == 0.0125
 
 
 @pytest.mark.parametrize('delay, latency', [(0.0, 0.0), (0.01, 0.0), (0.02, 0.015)])
@@ -151,19 +165,18 @@ def test_what_the_known_delay_is_worth():
 
 def test_request_between_two_steps():
     rig = Rig(moving)
-    arguments = rig.state, rig.constants, rig.inputs, rig.outputs
-    assert not control_unit.request(*arguments, STOW, rig.times, rig.angles)
+    assert not rig.ask(STOW)
     assert (rig.mode, rig.reason) == ('standby', 'encoder invalid')
     rig.run(0.5)
-    assert not control_unit.request(*arguments, PROGRAM, rig.times, rig.angles)
+    assert not rig.ask(PROGRAM)
     assert (rig.mode, rig.reason) == ('standby', 'no program track')
     rig.program()
-    assert control_unit.request(*arguments, PROGRAM, rig.times, rig.angles)
+    assert rig.ask(PROGRAM)
     assert rig.mode == 'program'
     rates = rig.run(2.0)[:, :2]
     assert rig.mode == 'autotrack'
     assert np.abs(np.diff(rates, axis=0, prepend=0.0)).max() <= rig.params.azimuth.limits.acceleration * T
-    assert control_unit.request(*arguments, STANDBY, rig.times, rig.angles)
+    assert rig.ask(STANDBY)
     rig.run(0.1)
     assert rig.mode == 'standby' and not np.any(rig.outputs['rate'])
 
@@ -251,12 +264,13 @@ def test_every_mode_moves_without_a_bump():
     rig = Rig(moving, at=(0.3, 0.3), **QUICK, **{'elevation.stow': 0.4})
     rig.program()
     largest = np.array([rig.params.azimuth.limits.acceleration, rig.params.elevation.limits.acceleration]) * T
+    rig.step()
     commands = [np.zeros(2)]
     for request, seconds, mode in ((STOW, 2.0, 'stow'), (PRESET, 2.0, 'preset'), (PROGRAM, 0.05, 'program'),
-                                   (-1, 3.0, 'autotrack'), (STANDBY, 1.0, 'standby')):
+                                   (None, 3.0, 'autotrack'), (STANDBY, 1.0, 'standby')):
         reference = rig.angle.copy()
-        o = rig.step(request)
-        assert o['request_result'] == (-1 if request == -1 else 1)
+        assert request is None or rig.ask(request)
+        o = rig.step()
         assert np.abs(o['reference'][:, 0] - rig.inputs['position'][0]).max() < 1e-2
         commands.append(o['rate'].copy())
         for _ in range(round(seconds / T)):
@@ -288,6 +302,21 @@ def test_handover_and_back_are_smooth():
     assert np.abs(rows[100:, 2:]).max() < 5e-5
 
 
+def test_a_known_latency_is_no_loss():
+    """Errors 0.2 s late, twice coast_after: locks, and coasts and gives up as late as with prompt errors."""
+    rig = Rig(moving, error_latency=0.2, initial_mode='autotrack', **QUICK, **{'tracker.coast_time': 0.15})
+    errors = rig.run(12.0)[:, 2:]
+    assert rig.mode == 'autotrack' and rig.outputs['coasting'][0] == 0
+    assert np.abs(errors[-400:]).max() < 2e-6
+    rig.receiver_on = False
+    rig.run(0.095)
+    assert rig.outputs['coasting'][0] == 0
+    rig.run(0.02)
+    assert rig.mode == 'autotrack' and rig.outputs['coasting'][0] == 1
+    rig.run(0.05)
+    assert (rig.mode, rig.reason) == ('standby', 'signal lost')
+
+
 def test_loss_without_a_program_ends_in_standby():
     rig = Rig(moving, initial_mode='autotrack', **QUICK, **{'tracker.coast_time': 0.5})
     rig.run(2.0)
@@ -314,8 +343,8 @@ def test_requests_are_refused_with_the_reason():
     rig.receiver_on = False
 
     def refused(request, **changes):
-        o = rig.step(request, **changes)
-        assert o['request_result'] == 0 and o['mode'] == STANDBY
+        rig.step(**changes)
+        assert not rig.ask(request) and rig.mode == 'standby'
         return rig.reason
 
     assert refused(PROGRAM) == 'no program track'
@@ -327,16 +356,17 @@ def test_requests_are_refused_with_the_reason():
     assert refused(PROGRAM) == 'outside limits'
     rig.program()
     rig.angles[1, 0] = math.nan
-    assert refused(PROGRAM) == 'no program track' and 'program' in rig.invalid
+    assert refused(PROGRAM) == 'no program track'
     assert refused(AUTOTRACK) == 'receiver not locked'
     assert refused(PRESET, preset=(0.0, 3.0), preset_valid=1) == 'outside limits'
     assert refused(17) == 'unknown mode'
     assert refused(STOW, position=(math.nan, 0.0)) == 'encoder invalid'
     fresh = Rig(stabilised=True)
     fresh.program()
-    o = fresh.step(PROGRAM, attitude_valid=0)
-    assert o['request_result'] == 0 and fresh.reason == 'attitude invalid' and 'attitude' in fresh.invalid
-    assert fresh.step(PROGRAM)['request_result'] == 1
+    fresh.step(attitude_valid=0)
+    assert not fresh.ask(PROGRAM) and fresh.reason == 'attitude invalid' and 'attitude' in fresh.invalid
+    fresh.step()
+    assert fresh.ask(PROGRAM)
 
 
 def test_initial_mode_waits_until_it_can_be():
@@ -344,9 +374,13 @@ def test_initial_mode_waits_until_it_can_be():
     rig.run(0.1)
     assert (rig.mode, rig.reason) == ('standby', 'no program track')
     rig.program()
+    rig.angles[1, 0] = math.nan
+    rig.step()
+    assert (rig.mode, rig.reason, rig.invalid) == ('standby', 'no program track', {'program'})
+    rig.program()
     rig.run(0.1)
     assert rig.mode == 'program'
-    assert rig.step(STANDBY)['request_result'] == 1
+    assert rig.ask(STANDBY)
     rig.run(0.1)
     assert rig.mode == 'standby'
 
@@ -386,7 +420,8 @@ def test_nan_is_flagged_and_never_spreads(field, value, flag, first):
     assert flag in rig.invalid and np.isfinite(o['rate']).all() and np.isfinite(o['torque']).all()
     if flag == 'encoder' and not first:
         assert (rig.mode, rig.reason) == ('standby', 'encoder invalid')
-        rig.step(AUTOTRACK)
+        rig.step()
+        assert rig.ask(AUTOTRACK)
     rows = rig.run(2.0)
     assert np.isfinite(rows).all() and not rig.invalid and rig.mode == 'autotrack'
     assert np.abs(rows[-1, 2:]).max() < 1e-4
@@ -397,8 +432,8 @@ def test_stamp_that_does_not_advance_changes_nothing(stamp):
     rig = Rig(moving, initial_mode='autotrack', **QUICK)
     rig.run(1.0)
     before, rate = rig.state.copy(), rig.outputs['rate'].copy()
-    o = rig.step(STOW, stamp=stamp)
-    assert rig.invalid == {'stamp'} and o['request_result'] == 0 and rig.reason == 'stamp does not advance'
+    rig.step(stamp=stamp)
+    assert rig.invalid == {'stamp'} and rig.reason == 'stamp does not advance'
     assert rig.state.tobytes() == before.tobytes()
     np.testing.assert_array_equal(rig.outputs['rate'], rate)
 
@@ -438,6 +473,19 @@ def test_attitude_lost_ends_autotrack_after_the_timeout():
     assert rig.mode == 'autotrack' and 'attitude' in rig.invalid
     rig.run(0.1, attitude_valid=0)
     assert (rig.mode, rig.reason) == ('standby', 'attitude invalid')
+
+
+def test_earth_angles_are_never_taken_for_deck_angles():
+    """The attitude fails for the instant of the command before it does for the present one."""
+    rig = Rig(lambda t: (1.1, 0.7), attitude=rolling, stabilised=True, delay=0.1, initial_mode='program',
+              at=(0.5, 0.6), **{'tracker.handover': False})
+    rig.program()
+    rig.run(5.0)
+    before = rig.outputs['reference'][0][0, 0]
+    for _ in range(60):
+        rig.step(attitude_valid=0)
+        assert abs(rig.outputs['reference'][0][0, 0] - before) < 0.08
+    assert rig.mode == 'standby'
 
 
 def test_late_attitude_is_predicted_with_rate_and_acceleration():

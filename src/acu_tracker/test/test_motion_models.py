@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import expm
 
-from acu_tracker import motion_models
+from acu_tracker import motion_models, tracker
 
 CASES = [(0.1, 0.01), (0.5, 0.005), (0.5, 0.0999), (0.7, 0.3), (2.0, 0.24999), (2.0, 0.25001), (5.0, 0.4), (1.0, 3.0)]
 
@@ -61,13 +61,18 @@ def test_noise_stays_definite_for_small_alpha_t(alpha, T):
 
 
 @pytest.mark.parametrize('alpha, T', CASES)
-def test_mean_input_is_the_response_to_a_constant_acceleration(alpha, T):
+def test_prediction_is_phi_x_plus_u_abar(alpha, T):
+    """tracker.predict takes Phi1 X for Phi X + U abar, abar the estimated acceleration (paper 000, eq. 2, 6)."""
+    X = np.array([0.3, -0.2, 0.15])
+    axis = np.zeros(1, tracker.AXIS)
+    axis['x1'], axis['x2'], axis['x3'] = X
     f13, f23, f33 = motion_models.transition(alpha, T)
-    # Phi X + U abar = Phi1 X where abar is the estimated acceleration (paper 000, eq. 6).
-    np.testing.assert_allclose(np.add(motion_models.mean_input(alpha, T), (f13, f23, f33)), (T * T / 2, T, 1.0),
-                               rtol=1e-12)
-    u1 = quad(lambda s: alpha * s * s / 2 * math.exp(-alpha * (T - s)), 0, T, epsabs=0)[0]
-    assert motion_models.mean_input(alpha, T)[0] == pytest.approx(u1, rel=1e-8)
+    Phi = np.array([[1, T, f13], [0, 1, f23], [0, 0, f33]])
+    # u1 with the inner 1/alpha that the print lacks; rise = 1 - e^(-alpha T).
+    rise = -math.expm1(-alpha * T)
+    U = np.array([(-T + alpha * T * T / 2 + rise / alpha) / alpha, T - rise / alpha, rise])
+    predicted = tracker.predict(axis[0], T, alpha, 1.0, 0.3)[:3]
+    np.testing.assert_allclose(predicted, Phi @ X + U * X[2], rtol=1e-12)
 
 
 def test_modified_rayleigh_variance_by_quadrature():

@@ -41,7 +41,9 @@ class AduNode(shell.Shell):
         self.stale = False
         self.emergency = False
         self.refused = ''
+        self.invalid = ''
         self.truth = None
+        self.truth_stamp = None
         self.deck_rate = np.zeros(3)
         self.begun = self.heard = time.monotonic()
 
@@ -141,13 +143,22 @@ class AduNode(shell.Shell):
                 inputs[axis]['rate'], inputs[axis]['torque'] = rate, torque
         inputs['enable'] = follow and not self.emergency
         if truth is not None:
-            w = truth.twist.twist.angular
-            rate = np.array((w.x, w.y, w.z))
-            inputs['base_acceleration'] = (rate - self.deck_rate) / self.parameters.period if self.k else 0.0
-            self.deck_rate = rate
+            self.take_truth(truth, inputs)
         drive_unit.step(self.state, self.constants, self.inputs, self.outputs)
+        if self.outputs[0]['invalid_command']:
+            self.invalid = 'acu/rate_command' if np.isfinite(inputs['base_acceleration']).all() else 'ship/truth'
         self.k += 1
         self.publish_step()
+
+    def take_truth(self, truth, inputs):
+        """The deck's angular acceleration from two successive truths and their stamps."""
+        stamp = messages.nanoseconds(truth.header.stamp)
+        w = truth.twist.twist.angular
+        rate = np.array((w.x, w.y, w.z))
+        if self.truth_stamp is not None and stamp > self.truth_stamp:
+            inputs['base_acceleration'] = (rate - self.deck_rate) / ((stamp - self.truth_stamp) * 1e-9)
+        if np.isfinite(rate).all() and stamp != self.truth_stamp:
+            self.deck_rate, self.truth_stamp = rate, stamp
 
     def end(self):
         """The last step has been answered: say how it went and finish."""
@@ -176,15 +187,17 @@ class AduNode(shell.Shell):
         return response
 
     def diagnose(self):
+        """What is now, and the topic that held no number since the last diagnosis."""
         outputs = self.outputs[0]
+        invalid, self.invalid = self.invalid, ''
         values = [(f'{axis} {name}', '1' if outputs[axis][name] else '0') for axis in messages.AXES
                   for name in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
         values += [('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
                    ('late_ticks', str(int(self.late_ticks)))]
         if self.emergency:
             return shell.ERROR, 'emergency stop', values
-        if outputs['invalid_command']:
-            return shell.ERROR, 'acu/rate_command holds NaN or infinity: stopping', values
+        if invalid:
+            return shell.ERROR, f'{invalid} holds NaN or infinity: stopping', values
         if self.stale:
             return shell.ERROR, f'no new acu/rate_command for {self.timeout_ns / 1e9:g} s: stopping', values
         if self.refused:

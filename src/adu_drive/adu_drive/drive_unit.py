@@ -22,7 +22,7 @@ INPUTS = np.dtype([('azimuth', _AXIS_INPUTS), ('elevation', _AXIS_INPUTS),
                    ('base_acceleration', 'f8', (3,)), ('enable', 'i8')], align=True)
 """Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm], wind torque on
 the load [Nm]. base_acceleration: angular acceleration of the deck, FLU [rad/s2].
-enable 1: follow, 0: controlled stop."""
+enable 1: follow, 0: controlled stop, at once whatever the delay."""
 
 _AXIS_OUTPUTS = np.dtype([
     ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
@@ -136,7 +136,7 @@ def _receive(s, u, disturbance_believed):
     slot = s.k % RING
     believed = (disturbance_believed and _believed(u.azimuth.rate) and _believed(u.azimuth.torque)
                 and _believed(u.elevation.rate) and _believed(u.elevation.torque))
-    s.enable[slot] = 1 if believed and u.enable == 1 else 0
+    s.enable[slot] = 1 if believed else 0
     if believed:
         s.rate[slot, 0], s.rate[slot, 1] = u.azimuth.rate, u.elevation.rate
         s.torque[slot, 0], s.torque[slot, 1] = u.azimuth.torque, u.elevation.torque
@@ -171,7 +171,7 @@ def step(state, constants, inputs, outputs):
     for j in range(c.speed_ticks):
         tick = s.k * c.speed_ticks + j - c.delay_ticks
         slot = (tick // c.speed_ticks) % RING     # before the first command: a slot still empty, enable 0
-        enable = s.enable[slot]
+        enable = s.enable[slot] if u.enable == 1 else 0
         axis.speed_control(az, c_az, s.rate[slot, 0], s.torque[slot, 0], enable)
         axis.speed_control(el, c_el, s.rate[slot, 1], s.torque[slot, 1], enable)
         for _ in range(axis.CURRENT_TICKS):

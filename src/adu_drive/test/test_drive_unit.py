@@ -177,9 +177,18 @@ def test_runs_are_identical_from_python_and_from_compiled_code(drive):
 
 def test_transport_delay_in_whole_periods(drive):
     p = AduParameters(initial_elevation=0.7)
-    late = commanded(drive(dataclasses.replace(p, transport_delay=0.015)), COMMANDS)
+    late = commanded(drive(dataclasses.replace(p, transport_delay=0.015)), COMMANDS[:60])
     shifted = commanded(drive(p), [(0.0, 0.0, 0)] * 3 + COMMANDS)
-    assert late.tobytes() == shifted[:100].tobytes()
+    assert late.tobytes() == shifted[:60].tobytes()
+
+
+def test_a_stop_is_not_delayed_with_the_commands(drive):
+    """Stale commands and the emergency stop are the drive's own: they act in the period in which they are given."""
+    d = drive(AduParameters(transport_delay=0.1, initial_elevation=0.7)).run(0.3, azimuth=0.5)
+    assert not d.log['azimuth']['stopping'][-1]
+    d.step(azimuth=0.5, enable=0)
+    assert d.log['azimuth']['stopping'][-1]
+    assert d.log['azimuth']['load_velocity'][-1] < 0.49
 
 
 def test_transport_delay_in_speed_loop_periods(drive):

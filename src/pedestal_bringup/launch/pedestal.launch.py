@@ -22,7 +22,8 @@ def start(context):
     actions = []
     for name in chosen.nodes:
         if name == 'operator':
-            actions.append(ExecuteProcess(cmd=['pedestal', 'program', given['scenario']], output='screen'))
+            send = ['pedestal', 'program', given['scenario'], '--duration', str(chosen.header.duration)]
+            actions.append(ExecuteProcess(cmd=send, output='screen'))
             continue
         package, module = scenario.NODE_KINDS[name].module.split('.')
         node = Node(package=package, executable=module, name=name, parameters=[str(file)], output='screen')

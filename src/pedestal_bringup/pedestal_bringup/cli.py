@@ -20,7 +20,8 @@ def main(args=None) -> int:
     """Exit code 0; 1 with one line on stderr for anything that went wrong; 2 for a wrong command line."""
     parser = _parser()
     options = parser.parse_args(args)
-    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
         return options.verb(options)
     except (ParameterError, ValueError, RuntimeError, OSError) as error:
@@ -44,7 +45,7 @@ def _parser():
     run.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='default: bags/runs/SCENARIO-N')
     run.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     run.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                     help='change a parameter, as acu.position_loop.azimuth.Kp=20; may be repeated')
+                     help='change a parameter, as acu.azimuth.position_loop.kp=20; may be repeated')
     run.set_defaults(verb=_run)
 
     scenarios = verbs.add_parser('scenarios', help='list the scenarios')
@@ -56,6 +57,7 @@ def _parser():
 
     program = verbs.add_parser('program', help='send the program track of a scenario to a running ACU')
     program.add_argument('scenario')
+    program.add_argument('--duration', type=float, metavar='S', help='of the run it is for')
     program.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE')
     program.set_defaults(verb=_program)
 
@@ -100,6 +102,8 @@ def _run(options):
     bag = options.bag or graph.free_bag(chosen.name)
     if bag.exists():
         raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
+    if options.json and (options.json.is_dir() or not options.json.parent.is_dir()):
+        raise ValueError(f'--json {options.json}: must be a file in a directory that exists')
     with _progress(chosen.header.duration) as progress:
         try:
             outcome = graph.run(chosen, bag, progress)
@@ -158,7 +162,7 @@ def _parameters(options):
 
 def _program(options):
     from pedestal_bringup import graph, scenario
-    return graph.send_program(scenario.load(options.scenario, options.param))
+    return graph.send_program(scenario.load(options.scenario, options.param, duration=options.duration))
 
 
 def _verify(options):

@@ -7,7 +7,7 @@ import dataclasses
 
 import numpy as np
 
-from acu_tracker import control_unit, modes, program_track
+from acu_tracker import control_unit, program_track
 from adu_drive import drive_unit
 from pedestal_bringup.program import program_table
 from pedestal_common import line_of_sight, noise
@@ -52,7 +52,6 @@ def cores(scenario) -> Cores:
     if scenario.header.program.source != 'none':
         program = program_track.checked(*program_table(scenario))
     acu_inputs = np.zeros(1, control_unit.INPUTS)
-    acu_inputs['request'] = modes.NO_REQUEST
     acu_inputs['stabilised'] = scenario.header.ship
     acu_inputs['encoder_valid'] = 1
     acu_inputs['program_count'] = len(program[0])

@@ -1,4 +1,6 @@
 """Starts the nodes of a scenario as processes, watches over them, and ends them in order."""
+import contextlib
+import ctypes
 import dataclasses
 import json
 import os
@@ -22,6 +24,12 @@ from pedestal_common.shell import Shell, set_middleware_defaults
 
 LOG_LINES = 8
 STOP_TIME = 20.0
+DISCOVERY_TIME = 0.5
+"""Seconds a run looks for another graph on its domain before it starts its own."""
+
+REALTIME_SILENCE = 5.0
+"""Seconds without diagnostics (they come every second) after which a node of a realtime run counts as silent."""
+
 ANSWER_TIME = 2.0
 """Seconds a node has to answer a parameter service before it counts as stuck."""
 
@@ -40,13 +48,24 @@ class Outcome:
 class Operator(Shell):
     """Sends the program track and listens to the diagnostics of the others."""
 
-    def __init__(self, table):
+    def __init__(self):
         super().__init__('operator', parameters.Parameters)
         self.time = 0.0
         self.heard = {}
         self.reader('diagnostics', self._take)
-        if table is not None:
-            self.writer('acu/program_track')(program_message(*table))
+
+    def send(self, table):
+        """The program track, latched."""
+        self.writer('acu/program_track')(program_message(*table))
+
+    def refuse_company(self):
+        """Raise RunError when the nodes of another graph are on this domain: they would hear this one."""
+        deadline = time.monotonic() + DISCOVERY_TIME
+        while time.monotonic() < deadline:
+            names = self.get_node_names()
+            if names.count(self.name) > 1 or any(node in names for node in NODE_KINDS):
+                raise RunError(f'another graph runs on ROS_DOMAIN_ID {self.context.get_domain_id()}; set a free one')
+            time.sleep(0.02)
 
     def _take(self, array):
         self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
@@ -93,6 +112,21 @@ def parameter_file(scenario, pacing, bag):
     return yaml.safe_dump(sections)
 
 
+def _end_with_parent():
+    """In the child: SIGTERM when the supervisor dies, however it dies (prctl PR_SET_PDEATHSIG)."""
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
+
+
+@contextlib.contextmanager
+def uninterrupted():
+    """A second Ctrl-C does not cut the clean stop short."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 class Graph:
     """The processes of one run. Use as a context: leaving it stops whatever still runs."""
 
@@ -103,19 +137,27 @@ class Graph:
         self.processes = {}
 
     def __enter__(self):
-        self.log.mkdir(parents=True, exist_ok=True)
         file = self.log / 'parameters.yaml'
-        file.write_text(parameter_file(self.scenario, self.scenario.header.pacing, self.bag))
+        try:
+            self.log.mkdir(parents=True, exist_ok=True)
+            file.write_text(parameter_file(self.scenario, self.scenario.header.pacing, self.bag))
+        except OSError as error:
+            raise RunError(f'cannot record to {self.bag}: {error.filename}: {error.strerror}') from None
         for node in self.scenario.nodes:
             if node in NODE_KINDS:
                 with open(self.log / f'{node}.log', 'wb') as output:
                     self.processes[node] = subprocess.Popen(
                         [sys.executable, '-m', NODE_KINDS[node].module, '--ros-args', '--params-file', str(file)],
                         stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-                        env={**os.environ, 'ROS_LOG_DIR': str(self.log)}, start_new_session=True)
+                        env={**os.environ, 'ROS_LOG_DIR': str(self.log)}, start_new_session=True,
+                        preexec_fn=_end_with_parent)
         return self
 
     def __exit__(self, *_):
+        with uninterrupted():
+            self._stop_all()
+
+    def _stop_all(self):
         for node in sorted(self.processes, key=lambda name: name == 'recorder'):
             self.stop(node)
 
@@ -167,7 +209,7 @@ class Graph:
         if culprit in killed:
             reason = f'died by signal {signal.Signals(-early[culprit]).name}'
         elif culprit in silent:
-            reason = f'was silent for {self.scenario.header.deadline:g} s'
+            reason = 'has fallen silent'
         else:
             reason = f'ended before the run did, with exit code {early[culprit]}'
         log = '\n'.join(f'  | {line}' for line in lines[culprit]) or '  | (it logged nothing)'
@@ -185,21 +227,26 @@ def run(scenario, bag, progress):
     set_middleware_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
+        operator = Operator()
+        operator.refuse_company()
         with Graph(scenario, bag) as graph:
-            operator = Operator(table)
+            if table is not None:
+                operator.send(table)
             executor = SingleThreadedExecutor()
             executor.add_node(operator)
 
             def stuck(nodes):
                 return operator.stuck(nodes, executor)
 
+            deadline = scenario.header.deadline
+            patience = min(deadline, REALTIME_SILENCE) if scenario.header.pacing == 'realtime' else 2.0 * deadline
             while graph.ended().get('adu') != 0:
                 executor.spin_once(timeout_sec=0.1)
                 progress(operator.time)
                 if any(code != 0 or node not in ('adu', 'recorder') for node, code in graph.ended().items()):
-                    raise graph.failure(stuck, operator.silent(scenario.header.deadline))
-                if operator.silent(2.0 * scenario.header.deadline):
-                    raise graph.failure(stuck, operator.silent(2.0 * scenario.header.deadline))
+                    raise graph.failure(stuck, operator.silent(deadline))
+                if operator.silent(patience):
+                    raise graph.failure(stuck, operator.silent(patience))
             progress(scenario.header.duration)
             for node in graph.processes:
                 if node not in ('adu', 'recorder') and graph.stop(node) != 0:
@@ -217,7 +264,8 @@ def send_program(scenario) -> int:
     set_middleware_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        operator = Operator(program_table(scenario))
+        operator = Operator()
+        operator.send(program_table(scenario))
         executor = SingleThreadedExecutor()
         executor.add_node(operator)
         while True:

@@ -135,11 +135,6 @@ def _rows(head, rows, kind=''):
             '</tbody></table></div>')
 
 
-def _rms(values):
-    values = values[np.isfinite(values)]
-    return math.sqrt(np.mean(values**2)) if values.size else math.nan
-
-
 def _pointing(bag, recording, values):
     """Rows of the table of pointing and torques, per axis."""
     noise = values['single_sample_noise_deg'][0]
@@ -156,14 +151,15 @@ def _pointing(bag, recording, values):
                 'noise_reduction', unit='')]
     joints = _table(bag, 'joint_states')
     rows.append(['load torque, rms of the run',
-                 *(_number(_rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm')
+                 *(_number(results.rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm')
                    for axis in ('azimuth', 'elevation')), ''])
     return rows + _torques(recording)
 
 
 def _torques(recording):
     return [[f'torque of motor {i}, rms of the run',
-             *(_number(_rms(recording.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in ('azimuth', 'elevation')),
+             *(_number(results.rms(recording.motors[f'{axis}_motor_{i}.effort']), 'Nm')
+               for axis in ('azimuth', 'elevation')),
              ''] for i in (1, 2)] if recording.motors else []
 
 
@@ -180,7 +176,8 @@ def _loop(bag, check):
             late = np.percentile(np.abs(jitter), 99.0)
             rows += [['loop rate achieved (wall time)', _number((t.size - 1) / (wall[-1] - wall[0]) * 1e9, 'Hz')],
                      ['jitter of the step, wall time',
-                      f'{_rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, largest {np.abs(jitter).max():.3g} ms']]
+                      f'{results.rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
+                     f'largest {np.abs(jitter).max():.3g} ms']]
     lost = max([check.steps - topic.count for topic in check.topics
                 if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],
                default=0)
@@ -246,7 +243,7 @@ def _page(bag, recording):
         parts.append(_rows(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
                            _pointing(bag, recording, values), 'n'))
         parts.append('<p class="soft">Pointing and noise over the evaluated part: autotrack, from '
-                     f'{results.SETTLING:g} s after its start. Both axes: rms per axis, largest angle off the beam.'
+                     f'{results.SETTLING:g} s after its start. Both axes: all samples of both, per axis.'
                      '</p>')
         run_rows = [[label, _number(values[key][0], unit)] for label, key, unit in (
             ("receiver's single-sample noise", 'single_sample_noise_deg', 'deg'), ('first lock', 'lock_time_s', 's'),

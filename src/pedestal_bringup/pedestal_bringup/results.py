@@ -111,7 +111,8 @@ def modes(bag, t):
     return np.where(index >= 0, np.array(['', *table['data']])[index + 1], '')
 
 
-def _rms(values):
+def rms(values):
+    """Root mean square of the finite values; NaN when there are none."""
     values = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(values**2))) if values.size else math.nan
 
@@ -119,31 +120,32 @@ def _rms(values):
 def summary(run: Tracking) -> dict:
     """{metric: (value, unit)} over the settled autotrack part of a run; NaN when it never tracked.
 
+    pointing_*_deg: both axes together, per axis and sample (not the angle off the beam);
     single_sample_noise_deg: rms of the receiver's error minus the true one, per axis and sample;
     noise_reduction: that divided by the rms error of the filtered line of sight against truth.
     """
     on = run.tracking
     degrees = math.degrees(1.0)
     true = np.column_stack((run.cross_elevation, run.elevation_error))[on]
-    off = np.hypot(true[:, 0], true[:, 1]) * degrees
     raw = (run.measured[on] - true) * degrees
     filtered = (run.filtered[on] - true) * degrees
     locked = np.isfinite(run.measured[:, 0])
-    noise = _rms(raw)
+    noise = rms(raw)
     values = {
-        'pointing_rms_deg': (_rms(true) * degrees, 'deg'),
-        'pointing_max_deg': (float(off.max()) if off.size else math.nan, 'deg'),
-        'cross_elevation_rms_deg': (_rms(true[:, 0]) * degrees, 'deg'),
-        'elevation_rms_deg': (_rms(true[:, 1]) * degrees, 'deg'),
+        'pointing_rms_deg': (rms(true) * degrees, 'deg'),
+        'pointing_max_deg': (_max(true) * degrees, 'deg'),
+        'cross_elevation_rms_deg': (rms(true[:, 0]) * degrees, 'deg'),
+        'elevation_rms_deg': (rms(true[:, 1]) * degrees, 'deg'),
         'cross_elevation_max_deg': (_max(true[:, 0]) * degrees, 'deg'),
         'elevation_max_deg': (_max(true[:, 1]) * degrees, 'deg'),
         'single_sample_noise_deg': (noise, 'deg'),
-        'pointing_to_noise': (_rms(true) * degrees / noise, ''),
-        'noise_reduction_cross_elevation': (_rms(raw[:, 0]) / _rms(filtered[:, 0]), ''),
-        'noise_reduction_elevation': (_rms(raw[:, 1]) / _rms(filtered[:, 1]), ''),
-        'noise_reduction': (noise / _rms(filtered), ''),
+        'pointing_to_noise': (rms(true) * degrees / noise, ''),
+        'noise_reduction_cross_elevation': (rms(raw[:, 0]) / rms(filtered[:, 0]), ''),
+        'noise_reduction_elevation': (rms(raw[:, 1]) / rms(filtered[:, 1]), ''),
+        'noise_reduction': (noise / rms(filtered), ''),
         'lock_time_s': (float(run.t[locked][0]) if locked.any() else math.nan, 's'),
         'autotrack_time_s': (float(np.sum(run.mode == 'autotrack') * np.median(np.diff(run.t))), 's'),
+        'tracked_percent': (100.0 * float(np.mean(run.mode == 'autotrack')), '%'),
         'evaluated_time_s': (float(np.sum(on) * np.median(np.diff(run.t))), 's'),
     }
     return values

@@ -10,7 +10,7 @@ import typing
 
 import yaml
 
-from acu_tracker.params import AcuNodeParameters
+from acu_tracker.params import AcuParameters
 from adu_drive.params import AduNodeParameters
 from pedestal_bringup.params import RecorderParameters
 from pedestal_common import parameters
@@ -40,6 +40,15 @@ class ScenarioParameters(parameters.Parameters):
     program: ProgramParameters = parameters.group(ProgramParameters)
 
 
+class _Loader(yaml.SafeLoader):
+    """YAML's plain values, but a date stays the text it was written as."""
+
+
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag != 'tag:yaml.org,2002:timestamp']
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+
+
 class NodeKind(typing.NamedTuple):
     module: str
     parameters: type
@@ -49,10 +58,22 @@ NODE_KINDS = {
     'ship_motion': NodeKind('ship_motion_sim.ship_motion_node', ShipMotionParameters),
     'ins': NodeKind('ship_motion_sim.ins_node', InsParameters),
     'tracking_receiver': NodeKind('tracking_receiver_sim.tracking_receiver_node', TrackingReceiverNodeParameters),
-    'acu': NodeKind('acu_tracker.acu_node', AcuNodeParameters),
+    'acu': NodeKind('acu_tracker.acu_node', AcuParameters),
     'adu': NodeKind('adu_drive.adu_node', AduNodeParameters),
     'recorder': NodeKind('pedestal_bringup.recorder_node', RecorderParameters),
 }
+
+
+KNOWN = (
+    ('adu', 'period', 'acu', 'tracker.receiver.integration'),
+    ('adu', 'transport_delay', 'acu', 'command_delay'),
+    ('tracking_receiver', 'receiver.latency', 'acu', 'receiver_latency'),
+    ('tracking_receiver', 'antenna.beamwidth', 'acu', 'tracker.receiver.beamwidth'),
+    ('tracking_receiver', 'antenna.slope', 'acu', 'tracker.receiver.slope'),
+    ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
+    ('ins', 'latency', 'acu', 'attitude_latency'),
+)
+"""(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
 
 
 class ScenarioError(ValueError):
@@ -106,6 +127,8 @@ def _text(name_or_path):
             return path.stem, path.read_text()
         except OSError as error:
             raise ScenarioError(f'scenario file {path}: {error.strerror}') from None
+        except UnicodeDecodeError as error:
+            raise ScenarioError(f'scenario file {path}: no valid UTF-8 text at byte {error.start}') from None
     entry = _folder() / f'{name_or_path}.yaml'
     if not entry.is_file():
         names = list(available())
@@ -128,7 +151,7 @@ def _dotted(tree, prefix=''):
 
 def _sections(name, content):
     try:
-        tree = yaml.safe_load(content)
+        tree = yaml.load(content, Loader=_Loader)
     except yaml.YAMLError as error:
         raise ScenarioError(f'scenario {name}: no valid YAML: {" ".join(str(error).split())}') from None
     if not isinstance(tree, dict) or 'scenario' not in tree:
@@ -137,9 +160,11 @@ def _sections(name, content):
     for section, body in tree.items():
         if section != 'scenario' and section not in NODE_KINDS:
             raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(NODE_KINDS)}')
-        if not isinstance(body, dict) or list(body) != ['ros__parameters']:
+        whole = isinstance(body, dict) and list(body) == ['ros__parameters']
+        values = body['ros__parameters'] or {} if whole else None
+        if not isinstance(values, dict):
             raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
-        sections[section] = _dotted(body['ros__parameters'] or {})
+        sections[section] = _dotted(values)
     return sections
 
 
@@ -157,9 +182,12 @@ def parse_override(text):
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
-        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.position_loop.azimuth.Kp=20')
+        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.position_loop.kp=20')
     parameters_of(node)
-    return node, key, yaml.safe_load(right)
+    try:
+        return node, key, yaml.load(right, Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise ScenarioError(f'--param {text!r}: no valid YAML value: {" ".join(str(error).split())}') from None
 
 
 def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
@@ -179,7 +207,7 @@ def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
             header_values[key] = value
     header = _checked(name, 'scenario', ScenarioParameters, header_values)
     for node in NODE_KINDS:
-        sections.setdefault(node, {})
+        _checked(name, node, parameters_of(node), sections.setdefault(node, {}))
     _spread(name, sections, header, seed)
     for node, values in sections.items():
         typed = parameters.as_dict(_checked(name, node, parameters_of(node), values))
@@ -188,29 +216,32 @@ def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
 
 
 def _spread(name, sections, header, seed):
-    """What several nodes must agree on, said once: length and period of the run, seeds, ship, latencies, beam."""
+    """What several nodes must agree on, said once: length and period of the run, seeds, ship, latencies, beam.
+
+    Raises ScenarioError where a node was told something else.
+    """
+    def tell(node, key, value):
+        told = sections[node].setdefault(key, value)
+        if told != value:
+            raise ScenarioError(f'scenario {name}, {node}: {key} = {told}: must be {value}, as is said elsewhere; '
+                                'leave it out here')
+
     for node in ('adu', 'recorder', 'tracking_receiver'):
-        sections[node]['duration'] = header.duration
-    sections['recorder'].update(scenario=name, seed=header.seed)
-    if 'antenna.beamwidth' in sections['tracking_receiver']:
-        sections['recorder']['beamwidth'] = sections['tracking_receiver']['antenna.beamwidth']
+        tell(node, 'duration', header.duration)
+    tell('recorder', 'scenario', name)
+    tell('recorder', 'seed', header.seed)
     for node, key in (('ship_motion', 'ship.seed'), ('ship_motion', 'imu.seed'), ('ins', 'seed'),
                       ('tracking_receiver', 'seed')):
         if seed is not None or key not in sections[node]:
             sections[node][key] = header.seed
     for key, value in sections['ship_motion'].items():
         if key.startswith('ship.'):
-            sections['ins'][key] = value
-    if 'period' in sections['adu']:
-        for node in ('acu', 'tracking_receiver'):
-            sections[node].setdefault('period', sections['adu']['period'])
-    for told, node, key in (('receiver_latency', 'tracking_receiver', 'receiver.latency'),
-                            ('tracker.receiver.beamwidth', 'tracking_receiver', 'antenna.beamwidth'),
-                            ('tracker.receiver.slope', 'tracking_receiver', 'antenna.slope'),
-                            ('tracker.receiver.integration', 'adu', 'period'),
-                            ('attitude_latency', 'ins', 'latency')):
-        if key in sections[node]:
-            sections['acu'].setdefault(told, sections[node][key])
+            tell('ins', key, value)
+    for node in ('acu', 'tracking_receiver'):
+        tell(node, 'period', sections['adu'].get('period', parameters.defaults(parameters_of('adu'))['period']))
+    for owner, key, node, told in KNOWN:
+        if key in sections[owner]:
+            sections[node].setdefault(told, sections[owner][key])
 
 
 def _checked(name, section, parameters_type, values):

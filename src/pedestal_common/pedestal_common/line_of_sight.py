@@ -101,16 +101,6 @@ def quaternion(roll, pitch, yaw):
             cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
 
 
-@compiled
-def deck_rates(azimuth, elevation, wx, wy, wz):
-    """(dA/dt, dE/dt) of a fixed earth direction seen from a deck that turns with w (FLU) [rad/s].
-
-    reference/nav.md section 3.2 in FLU (there FRD: w_y and w_z change sign). Singular at the zenith.
-    """
-    along = wx * math.cos(azimuth) - wy * math.sin(azimuth)
-    return wz - math.tan(elevation) * along, wx * math.sin(azimuth) + wy * math.cos(azimuth)
-
-
 ASHORE = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
 """Quaternion (x, y, z, w) deck -> earth of a pedestal ashore: the bow points north."""
 

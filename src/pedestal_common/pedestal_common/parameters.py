@@ -112,6 +112,14 @@ def build(cls, values):
     return _replace(cls(), values, '')
 
 
+def _number(value):
+    """An int, or text such as 2e-3 that YAML 1.1 does not take for a number, as a float; anything else as it is."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return value
+
+
 def _replace(instance, values, prefix):
     changes = {}
     for field in dataclasses.fields(instance):
@@ -120,8 +128,8 @@ def _replace(instance, values, prefix):
             changes[field.name] = _replace(getattr(instance, field.name), values, name + '.')
         elif name in values:
             value = values[name]
-            if field.type is float and isinstance(value, int) and not isinstance(value, bool):
-                value = float(value)
+            if field.type is float and not isinstance(value, bool):
+                value = _number(value)
             changes[field.name] = tuple(value) if isinstance(value, list) else value
     try:
         return dataclasses.replace(instance, **changes)

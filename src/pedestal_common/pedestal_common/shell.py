@@ -412,10 +412,11 @@ class Shell(Node):
 
 
 def set_middleware_defaults():
-    """What DDS of this process and its children does unless the user says otherwise: talk to this machine only, and
-    answer acknowledgements promptly (fastdds.xml). To be called before rclpy.init."""
-    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(pathlib.Path(__file__).with_name('fastdds.xml')))
+    """What DDS of this process and its children does unless the user says otherwise: it talks to this machine only, on
+    loopback sockets, and acknowledges promptly (fastdds.xml). To be called before rclpy.init."""
+    if os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST') == 'LOCALHOST':
+        profiles = pathlib.Path(__file__).with_name('fastdds.xml')
+        os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(profiles))
 
 
 def _executor():

@@ -26,6 +26,7 @@ from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
 from pedestal_common.compiled import compiled
+from pedestal_common.interval import interval
 from pedestal_common.line_of_sight import earth_angles, earth_direction
 from pedestal_common.parameters import record, record_type
 from tracking_receiver_sim.params import KINDS, RAMP, SINE, STEP, AngleParameters
@@ -75,14 +76,8 @@ def on_track(breaks, coefficients, t):
     """(valid, e, n, u, ve, vn, vu) [m, m/s] of a piecewise cubic; NaN and 0 outside its breaks."""
     if not breaks[0] <= t <= breaks[-1]:
         return 0, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
-    low, high = 0, len(breaks) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if breaks[middle] <= t:
-            low = middle
-        else:
-            high = middle
-    x, c = t - breaks[low], coefficients[:, low]
+    i = interval(breaks, t)
+    x, c = t - breaks[i], coefficients[:, i]
     return (1,
             ((c[0, 0] * x + c[1, 0]) * x + c[2, 0]) * x + c[3, 0],
             ((c[0, 1] * x + c[1, 1]) * x + c[2, 1]) * x + c[3, 1],

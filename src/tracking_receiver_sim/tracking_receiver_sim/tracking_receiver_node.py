@@ -7,6 +7,8 @@ from pedestal_common import line_of_sight, messages, noise, shell
 from tracking_receiver_sim import receiver, target
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
+FAULTS = (receiver.NO_TARGET, receiver.NO_JOINTS, receiver.STAMP_ORDER)
+
 
 class TrackingReceiverNode(shell.Shell):
 
@@ -23,6 +25,7 @@ class TrackingReceiverNode(shell.Shell):
         receiver.step(self.state.copy(), self.constants, self.inputs, self.outputs, self.target.breaks,
                       self.target.coefficients, np.zeros(self.normals))
 
+        self.fault = receiver.LOCKED
         self.error = messages.Vector3Stamped(header=messages.header('beam'), vector=messages.vector3())
         self.truth = messages.odometry('earth', 'target')
         self.send_error = self.writer('tracking_receiver/angle_error')
@@ -43,6 +46,8 @@ class TrackingReceiverNode(shell.Shell):
             inputs['position'] = pose.position.x, pose.position.y, pose.position.z
         receiver.step(self.state, self.constants, self.inputs, self.outputs, self.target.breaks,
                       self.target.coefficients, self.rng.standard_normal(self.normals))
+        if outputs['status'] in FAULTS:
+            self.fault = int(outputs['status'])
         self.begin_step(stamp)
         if outputs['due']:
             messages.put_stamp(self.error.header.stamp, int(outputs['stamp_ns']))
@@ -57,16 +62,18 @@ class TrackingReceiverNode(shell.Shell):
         self.send_truth(self.truth)
 
     def diagnose(self):
+        """What is now, and the last fault since the last diagnosis."""
         outputs = self.outputs[0]
         status = int(outputs['status'])
+        fault, self.fault = self.fault, receiver.LOCKED
         values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
                   ('target', self.parameters.target.kind)]
         if self.target.start_time:
             values.append(('stamp_0_utc', self.target.start_time))
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
-        if status in (receiver.NO_TARGET, receiver.NO_JOINTS, receiver.STAMP_ORDER):
-            return shell.ERROR, receiver.STATUSES[status], values
+        if fault in FAULTS:
+            return shell.ERROR, receiver.STATUSES[fault], values
         return (shell.OK if status == receiver.LOCKED else shell.WARN), receiver.STATUSES[status], values
 
 
