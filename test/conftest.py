@@ -1,35 +1,62 @@
-"""Fixtures of the tests that start processes: an own ROS domain, and processes that cannot outlive their test."""
+"""Fixtures of the tests that start processes: ROS domains of their own, processes that cannot outlive their test, runs
+of `pedestal`, single nodes, and a client that talks to them."""
+import dataclasses
 import os
+import pathlib
 import random
 import signal
 import socket
 import subprocess
+import sys
+import time
 
 import pytest
 
 FIRST_PORT = 22119
 """Port of domain id 0 in the scheme of ROS's domain_coordinator; binding it reserves the id for this session."""
 
+START = 60.0
+"""Seconds within which nodes have started, also on a loaded machine."""
+
 
 @pytest.fixture(scope='session')
-def domain_id():
-    """A ROS_DOMAIN_ID of 1 to 100 that no other test session of this machine holds."""
-    for candidate in random.sample(range(1, 101), 100):
-        with socket.socket() as reservation:
+def reserve_domain():
+    """reserve() -> a ROS_DOMAIN_ID of 1 to 100 that no other test session of this machine holds. Each is given once:
+    Fast DDS remembers a killed process for 20 s."""
+    candidates = iter(random.sample(range(1, 101), 100))
+    reservations = []
+
+    def reserve():
+        for candidate in candidates:
+            reservation = socket.socket()
             try:
                 reservation.bind(('127.0.0.1', FIRST_PORT + candidate))
             except OSError:
+                reservation.close()
                 continue
-            yield candidate
-            return
-    pytest.fail('every ROS_DOMAIN_ID of 1 to 100 is taken')
+            reservations.append(reservation)
+            return candidate
+        pytest.fail('every ROS_DOMAIN_ID of 1 to 100 is taken')
+
+    yield reserve
+    for reservation in reservations:
+        reservation.close()
+
+
+@pytest.fixture(scope='session')
+def domain_id(reserve_domain):
+    return reserve_domain()
+
+
+def _environment(domain_id, folder):
+    return {**os.environ, 'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+            'ROS_LOG_DIR': str(folder / 'ros_log'), 'PYTHONUNBUFFERED': '1'}
 
 
 @pytest.fixture
 def environment(domain_id, tmp_path):
     """Environment of a node or of `pedestal`: the session's domain, loopback only, logs in the test's folder."""
-    return {**os.environ, 'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-            'ROS_LOG_DIR': str(tmp_path / 'ros_log'), 'PYTHONUNBUFFERED': '1'}
+    return _environment(domain_id, tmp_path)
 
 
 @pytest.fixture
@@ -39,9 +66,7 @@ def start_process(environment, tmp_path):
     started = []
 
     def start(command, **changes):
-        process = subprocess.Popen([str(part) for part in command], cwd=tmp_path, env={**environment, **changes},
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                   text=True, start_new_session=True)
+        process = _popen(command, tmp_path, {**environment, **changes})
         started.append(process)
         return process
 
@@ -55,16 +80,24 @@ def run_process(start_process):
     """run(command, timeout [s], **changes of the environment) -> CompletedProcess; fails the test, with what the
     process said, when it takes longer."""
     def run(command, timeout, **changes):
-        process = start_process(command, **changes)
-        try:
-            output, errors = process.communicate(timeout=timeout)
-        except subprocess.TimeoutExpired:
-            _kill_group(process)
-            output, errors = process.communicate()
-            pytest.fail(f'{" ".join(map(str, command))} ran longer than {timeout:g} s\n{output}\n{errors}')
-        return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
+        return _finished(start_process(command, **changes), timeout)
 
     return run
+
+
+def _popen(command, folder, environment):
+    return subprocess.Popen([str(part) for part in command], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def _finished(process, timeout):
+    try:
+        output, errors = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        _kill_group(process)
+        output, errors = process.communicate()
+        pytest.fail(f'{" ".join(map(str, process.args))} ran longer than {timeout:g} s\n{output}\n{errors}')
+    return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
 
 
 def _kill_group(process):
@@ -73,3 +106,209 @@ def _kill_group(process):
     except ProcessLookupError:
         pass
     process.wait()
+
+
+@dataclasses.dataclass
+class Run:
+    """A `pedestal run` as a process."""
+    process: subprocess.Popen
+    bag: pathlib.Path
+    domain_id: int
+
+    def __post_init__(self):
+        self.log = self.bag.with_name(self.bag.name + '.log')
+        self.json = self.bag.with_name(self.bag.name + '.json')
+
+    def pids(self):
+        """{module: pid} of the nodes that run."""
+        found = {}
+        for process in pathlib.Path('/proc').glob('[0-9]*'):
+            try:
+                arguments = (process / 'cmdline').read_text().split('\0')
+            except OSError:
+                continue
+            if str(self.log / 'parameters.yaml') in arguments:
+                found[arguments[2].rpartition('.')[2].removesuffix('_node')] = int(process.name)
+        return found
+
+    def signal(self, node, number):
+        os.kill(self.pids()[node], number)
+
+    def recorded(self, size=100_000):
+        """Whether this many bytes are in the bag: its first chunk, so the drive is well under way."""
+        assert self.process.poll() is None, self.process.communicate()
+        return sum(file.stat().st_size for file in self.bag.glob('*.mcap')) > size
+
+    def finish(self, timeout=60.0):
+        return _finished(self.process, timeout)
+
+    def kill(self):
+        _kill_group(self.process)
+        for pid in self.pids().values():
+            os.kill(pid, signal.SIGKILL)
+
+
+@pytest.fixture(scope='module')
+def start_run(reserve_domain, tmp_path_factory):
+    """start(scenario, *arguments, domain_id=None, bag=None, prefix=()) -> Run in a domain and a folder of its own."""
+    started = []
+
+    def start(scenario, *arguments, domain_id=None, bag=None, prefix=()):
+        folder = tmp_path_factory.mktemp('run')
+        domain = domain_id or reserve_domain()
+        run = Run(None, bag or folder / 'bag', domain)
+        command = [*prefix, sys.executable, '-m', 'pedestal_bringup.cli', 'run', scenario, '--bag', run.bag, '--json',
+                   run.json, *arguments]
+        run.process = _popen(command, folder, _environment(domain, folder))
+        started.append(run)
+        return run
+
+    yield start
+    for run in started:
+        run.kill()
+
+
+MODULES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'ins': 'ship_motion_sim.ins_node',
+           'tracking_receiver': 'tracking_receiver_sim.tracking_receiver_node', 'acu': 'acu_tracker.acu_node',
+           'adu': 'adu_drive.adu_node', 'recorder': 'pedestal_bringup.recorder_node'}
+
+
+@dataclasses.dataclass
+class NodeProcess:
+    process: subprocess.Popen
+    domain_id: int
+
+    def finish(self, timeout=START):
+        return _finished(self.process, timeout)
+
+
+@pytest.fixture(scope='module')
+def start_node(reserve_domain, tmp_path_factory):
+    """start(node, *ROS arguments) -> NodeProcess, alone in a domain of its own."""
+    started = []
+
+    def start(node, *arguments):
+        folder, domain = tmp_path_factory.mktemp(node), reserve_domain()
+        command = [sys.executable, '-m', MODULES[node], '--ros-args', *arguments]
+        started.append(NodeProcess(_popen(command, folder, _environment(domain, folder)), domain))
+        return started[-1]
+
+    yield start
+    for node in started:
+        _kill_group(node.process)
+
+
+class Client:
+    """Talks to nodes through rclpy: publishes and hears the messages of messages.py, calls services."""
+
+    def __init__(self, domain_id):
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        self.context = rclpy.Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain_id)
+        self.node = rclpy.create_node('client', context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.heard = {}
+        self.publishers = {}
+
+    def write(self, *names):
+        """Make publishers of these topics and wait until someone reads each."""
+        from pedestal_common import shell, topics
+        for name in names:
+            topic = topics.BY_NAME[name]
+            self.publishers[name] = self.node.create_publisher(shell.message_class(topic.type), name,
+                                                               shell.QOS[topic.qos])
+        self.until(lambda: all(publisher.get_subscription_count() for publisher in self.publishers.values()))
+        time.sleep(0.3)  # the readers' side of the discovery
+
+    def read(self, name, take=None):
+        """Hear a topic: messages go to self.heard[name] and to take; waits until someone writes it."""
+        from pedestal_common import messages, shell, topics
+        topic = topics.BY_NAME[name]
+        heard = self.heard[name] = []
+
+        def on_bytes(data):
+            heard.append(messages.deserialize(data, topic.type))
+            if take is not None:
+                take(heard[-1])
+        self.node.create_subscription(shell.message_class(topic.type), name, on_bytes, shell.QOS[topic.qos], raw=True)
+        self.until(lambda: self.node.count_publishers(name))
+
+    def publish(self, name, message):
+        from pedestal_common import messages
+        self.publishers[name].publish(messages.serialize(message))
+
+    def until(self, condition, timeout=START):
+        """Spin until condition() is true and return what it gave; fails the test after timeout [s]."""
+        deadline = time.monotonic() + timeout
+        while not (value := condition()):
+            assert time.monotonic() < deadline, f'nothing within {timeout:g} s'
+            self.executor.spin_once(timeout_sec=0.05)
+        return value
+
+    def call(self, name, service_type, request):
+        client = self.node.create_client(service_type, name)
+        try:
+            self.until(client.service_is_ready)
+            future = client.call_async(request)
+            self.until(future.done)
+            return future.result()
+        finally:
+            self.node.destroy_client(client)
+
+    def trigger(self, name):
+        """(success, message) of a std_srvs/Trigger."""
+        from std_srvs.srv import Trigger
+        response = self.call(name, Trigger, Trigger.Request())
+        return response.success, response.message
+
+    def diagnosed(self, text, timeout=10.0):
+        """Wait for a diagnostic that comes from now on and whose message holds the text; its DiagnosticStatus."""
+        heard = self.heard['diagnostics']
+        first = len(heard)
+
+        def found():
+            return [status for array in heard[first:] for status in array.status if text in status.message]
+        try:
+            return self.until(found, timeout)[0]
+        except AssertionError:
+            said = [status.message for array in heard[first:] for status in array.status]
+            pytest.fail(f'no diagnostic says {text!r}; said: {said}')
+
+    def close(self):
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+@pytest.fixture(scope='module')
+def connect():
+    """connect(domain_id) -> Client."""
+    clients = []
+    before = {name: os.environ.get(name) for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE',)}
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+    def open_client(domain_id):
+        clients.append(Client(domain_id))
+        return clients[-1]
+
+    yield open_client
+    for client in clients:
+        client.close()
+    for name, value in before.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
+
+
+@pytest.fixture
+def one_line():
+    """one_line(errors) -> the single line a refused command prints; fails the test on a traceback or more lines."""
+    def check(errors):
+        assert 'Traceback' not in errors, errors
+        lines = errors.strip().splitlines()
+        assert len(lines) == 1, errors
+        return lines[0]
+    return check
