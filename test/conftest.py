@@ -285,9 +285,10 @@ class Client:
 @pytest.fixture(scope='module')
 def connect():
     """connect(domain_id) -> Client."""
+    from pedestal_common import shell
     clients = []
-    before = {name: os.environ.get(name) for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE',)}
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    before = dict(os.environ)
+    shell.set_middleware_defaults()
 
     def open_client(domain_id):
         clients.append(Client(domain_id))
@@ -296,11 +297,8 @@ def connect():
     yield open_client
     for client in clients:
         client.close()
-    for name, value in before.items():
-        if value is None:
-            os.environ.pop(name, None)
-        else:
-            os.environ[name] = value
+    os.environ.clear()
+    os.environ.update(before)
 
 
 @pytest.fixture

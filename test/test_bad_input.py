@@ -1,0 +1,250 @@
+"""What a user can get wrong: parameters, files, disks, domains, stamps. One clear line each; never a traceback."""
+import math
+import signal
+import sys
+import time
+
+import pytest
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup import cli
+from pedestal_bringup.verify import verify
+from pedestal_common import messages
+
+TRACK_PATH = 'tracking_receiver.target.track_file.path'
+TRACK = 'time_s,latitude_deg,longitude_deg,altitude_m\n'
+ROWS = [f'{t},{47.4 + 1e-3 * t:.6f},8.52,1500' for t in range(20)]
+
+
+def refused(capsys, one_line, *arguments):
+    """The line with which `pedestal` refuses these arguments."""
+    assert cli.main([str(argument) for argument in arguments]) == 1
+    return one_line(capsys.readouterr().err)
+
+
+COMMAND_LINES = {
+    'unknown scenario': (['leo_pas'], ["unknown scenario 'leo_pas'; did you mean 'leo_pass'?", 'uav_flyby']),
+    'misspelt key': (['leo_pass', '--param', 'acu.azimuth.position_loop.kpp=20'],
+                     ["unknown parameter 'azimuth.position_loop.kpp'", "did you mean 'azimuth.position_loop.kp'?"]),
+    'misspelt node': (['leo_pass', '--param', 'acuu.period=0.005'], ["'acuu' is no node"]),
+    'no value': (['leo_pass', '--param', 'acu.period'], ['must be node.key=value']),
+    'broken value': (['leo_pass', '--param', 'acu.period=[1'], ['acu.period=[1']),
+    'range': (['leo_pass', '--param', 'adu.period=0.5'], ['adu: period = 0.5 s: must be 0.001 to 0.02']),
+    'NaN': (['leo_pass', '--param', 'tracking_receiver.receiver.cn0_dbhz=.nan'],
+            ['receiver.cn0_dbhz = nan dB-Hz: must be 0 to 120']),
+    'type': (['leo_pass', '--param', 'acu.azimuth.a_max=fast'], ["azimuth.a_max = 'fast': must be a number"]),
+    'group': (['leo_pass', '--param', 'acu.azimuth=1'], ["unknown parameter 'azimuth'"]),
+    'list for a number': (['leo_pass', '--param', 'acu.azimuth.a_max=[1.0]'], ['azimuth.a_max = ']),
+    'mapping for a text': (['leo_pass', '--param', 'recorder.scenario={a: 1}'], ['scenario = ']),
+    'duration': (['leo_pass', '--duration', 'nan'], ['duration = nan s: must be 0.1 to 86400']),
+    'seed': (['leo_pass', '--seed', '-1'], ['seed = -1']),
+    'no file': (['/nowhere/run.yaml'], ['/nowhere/run.yaml: No such file']),
+}
+
+
+@pytest.mark.parametrize('case', COMMAND_LINES)
+def test_command_line(case, capsys, one_line, tmp_path):
+    arguments, texts = COMMAND_LINES[case]
+    line = refused(capsys, one_line, 'run', *arguments, '--bag', tmp_path / 'bag')
+    assert line.startswith('pedestal: error: ')
+    for text in texts:
+        assert text in line
+    assert list(tmp_path.iterdir()) == []
+
+
+SCENARIO_FILES = {
+    'misspelt key': ('acu:\n  ros__parameters:\n    azimuth:\n      a_mx: 1.0\n', "did you mean 'azimuth.a_max'?"),
+    'misspelt header': ('acu: {ros__parameters: {}}\n', 'the section `scenario` is missing'),
+    'section': ('scenario: {ros__parameters: {}}\nantenna: {ros__parameters: {}}\n', "section 'antenna' is no node"),
+    'no ros__parameters': ('scenario: {duration: 2.0}\n', "section 'scenario' must hold ros__parameters"),
+    'ros__parameters no mapping': ('scenario: {ros__parameters: 3}\n', "section 'scenario' must hold ros__parameters"),
+    'no YAML': ('scenario: {ros__parameters: [}\n', 'no valid YAML'),
+    'empty': ('', 'the section `scenario` is missing'),
+    'number as key': ('scenario: {ros__parameters: {1: 2}}\n', "unknown parameter '1'"),
+    'no text': (b'\xff\xfe\x00scenario', 'no valid'),
+}
+
+
+@pytest.mark.parametrize('case', SCENARIO_FILES)
+def test_scenario_file(case, capsys, one_line, tmp_path):
+    content, text = SCENARIO_FILES[case]
+    if 'a_mx' in str(content):
+        content = 'scenario: {ros__parameters: {}}\n' + content
+    file = tmp_path / 'mine.yaml'
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    line = refused(capsys, one_line, 'run', file, '--bag', tmp_path / 'bag')
+    assert 'mine' in line and text in line
+
+
+TRACKS = {
+    'gap': ([*ROWS[:5], *ROWS[16:]], ['line 7', 'max_gap = 10 s']),
+    'unordered': ([*ROWS[:5], ROWS[7], ROWS[6], *ROWS[8:]], ['line 8', 'must be above 0']),
+    'text': ([*ROWS[:5], '5,north,8.52,1500', *ROWS[6:]], ['line 7', 'north']),
+    'NaN': ([*ROWS[:5], '5,nan,8.52,1500', *ROWS[6:]], ['line 7', 'nan']),
+    'short row': ([*ROWS[:5], '5,47.4', *ROWS[6:]], ['line 7']),
+    'no rows': ([], ['0 rows']),
+}
+
+
+@pytest.mark.parametrize('case', TRACKS)
+def test_track_file(case, capsys, one_line, tmp_path):
+    rows, texts = TRACKS[case]
+    file = tmp_path / 'flight.csv'
+    file.write_text(TRACK + '\n'.join(rows) + '\n')
+    line = refused(capsys, one_line, 'run', 'track_file', '--param', f'{TRACK_PATH}={file}', '--duration', '5',
+                   '--bag', tmp_path / 'bag')
+    assert str(file) in line
+    for text in texts:
+        assert text in line, line
+
+
+def test_track_file_that_is_not_there(capsys, one_line, tmp_path):
+    line = refused(capsys, one_line, 'run', 'track_file', '--param', f'{TRACK_PATH}={tmp_path}/no.csv', '--bag',
+                   tmp_path / 'bag')
+    assert f'{tmp_path}/no.csv' in line
+    assert 'path' in refused(capsys, one_line, 'run', 'track_file', '--bag', tmp_path / 'bag2')
+
+
+def test_tle_with_a_bad_checksum(capsys, one_line, tmp_path):
+    line_1 = '1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9992'
+    line = refused(capsys, one_line, 'run', 'leo_pass', '--bag', tmp_path / 'bag', '--param',
+                   f'tracking_receiver.target.leo_pass.line_1={line_1}')
+    assert 'TLE line 1: checksum' in line
+
+
+@pytest.mark.parametrize('place', ['exists', 'under a file', 'under /proc'])
+def test_place_of_the_bag(place, capsys, one_line, tmp_path, domain_id, monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain_id))
+    (tmp_path / 'file').write_text('')
+    (tmp_path / 'there').mkdir()
+    bag = {'exists': tmp_path / 'there', 'under a file': tmp_path / 'file' / 'bag',
+           'under /proc': '/proc/1/bag'}[place]
+    line = refused(capsys, one_line, 'run', 'leo_pass', '--bag', bag)
+    assert str(bag) in line
+
+
+@pytest.mark.parametrize('place', ['missing/result.json', 'there'])
+def test_place_of_the_rows_is_judged_before_the_run(place, capsys, one_line, tmp_path):
+    (tmp_path / 'there').mkdir()
+    line = refused(capsys, one_line, 'run', 'leo_pass', '--bag', tmp_path / 'bag', '--json', tmp_path / place)
+    assert str(tmp_path / place) in line
+    assert not (tmp_path / 'bag.log').exists()
+
+
+@pytest.mark.parametrize('verb', ['verify', 'report'])
+@pytest.mark.parametrize('what', ['nothing', 'empty folder', 'text'])
+def test_a_bag_that_is_none(verb, what, capsys, one_line, tmp_path):
+    bag = tmp_path / 'bag'
+    if what == 'empty folder':
+        bag.mkdir()
+    elif what == 'text':
+        bag = tmp_path / 'bag.mcap'
+        bag.write_text('hello')
+    assert str(bag) in refused(capsys, one_line, verb, bag)
+
+
+@pytest.fixture(scope='module')
+def graphs(start_run):
+    """(run, result) of three runs side by side: one on a disk that is full, where no file grows beyond 700 kB; the
+    first and the second on one domain."""
+    limit = (sys.executable, '-c', 'import os, resource, sys; '
+             'resource.setrlimit(resource.RLIMIT_FSIZE, (700_000, 700_000)); os.execv(sys.argv[1], sys.argv[1:])')
+    first = start_run('leo_pass', '--pacing', 'realtime', '--duration', '6')
+    full = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '30', prefix=limit)
+    deadline = time.monotonic() + 60.0
+    while not first.recorded(10):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    second = start_run('uav_flyby', '--duration', '1', domain_id=first.domain_id)
+    return {name: (run, run.finish()) for name, run in (('second', second), ('full', full), ('first', first))}
+
+
+def test_full_disk(graphs):
+    """The run ends, names the file, and the rest is readable."""
+    run, result = graphs['full']
+    assert result.returncode == 1
+    assert 'Traceback' not in result.stderr
+    assert result.stderr.startswith('pedestal: error: recorder ended before the run did')
+    assert 'File too large' in result.stderr and str(run.bag) in result.stderr
+    assert len(bags.read(run.bag).table('joint_states')['t']) > 50
+
+
+def test_a_second_graph_on_the_domain_is_refused(graphs, one_line):
+    run, result = graphs['second']
+    assert result.returncode == 1
+    assert f'another graph runs on ROS_DOMAIN_ID {run.domain_id}; set a free one' in one_line(result.stderr)
+    assert not run.bag.exists()
+
+
+def test_the_first_graph_goes_on_to_its_end(graphs):
+    run, result = graphs['first']
+    assert result.returncode == 0, result.stderr
+    assert verify(run.bag).complete
+    modes = bags.read(run.bag).table('acu/mode')['data']
+    assert modes[-1] == 'autotrack'
+
+
+def joints(stamp_ms, position=(0.1, 0.5)):
+    message = messages.joint_state(messages.AXES)
+    messages.put_stamp(message.header.stamp, stamp_ms * 1_000_000)
+    message.position[:] = position
+    return message
+
+
+STAMPS = {
+    'acu back': ('acu', 'joint_states', [5, 0], 'joint_states stamp went back from 0.005000 to 0.000000 s'),
+    'receiver back': ('tracking_receiver', 'joint_states', [10, 5], 'joint_states stamp went back from 0.010000 to '),
+    'receiver jump': ('tracking_receiver', 'joint_states', [0, 5, 25],
+                      'joint_states stamp jumped from 0.005000 to 0.025000 s; the period is 0.005000 s'),
+    'drive': ('adu', 'acu/rate_command', [10], 'acu/rate_command is stamped 0.010000 s where 0.000000 s is due'),
+}
+
+
+@pytest.fixture(scope='module')
+def misled(start_node, connect):
+    """Results of lockstep nodes that got stamps in a wrong order."""
+    started = {case: start_node(node, '-p', 'graph.pacing:=lockstep', '-p', 'graph.deadline:=5.0', *(
+        ('-p', 'graph.nodes:=acu,adu') if node == 'adu' else ())) for case, (node, *_) in STAMPS.items()}
+    results = {}
+    for case, (_, topic, stamps, _) in STAMPS.items():
+        client = connect(started[case].domain_id)
+        client.write(topic)
+        if topic != 'joint_states':
+            client.read('joint_states')
+            client.until(lambda client=client: client.heard['joint_states'])
+        for stamp in stamps:
+            client.publish(topic, joints(stamp))
+        results[case] = started[case].finish(30.0)
+        client.close()
+    return results
+
+
+@pytest.mark.parametrize('case', STAMPS)
+def test_lockstep_ends_on_a_wrong_stamp(misled, case, one_line):
+    assert misled[case].returncode == 1
+    assert STAMPS[case][3] in one_line(misled[case].stderr)
+
+
+def test_receiver_names_bad_input_in_realtime(start_node, connect):
+    node = start_node('tracking_receiver')
+    client = connect(node.domain_id)
+    client.write('joint_states')
+    client.read('tracking_receiver/angle_error')
+    client.read('diagnostics')
+    errors = client.heard['tracking_receiver/angle_error']
+
+    def seen(stamp, position):
+        client.publish('joint_states', joints(stamp, position))
+        client.until(lambda: errors and messages.nanoseconds(errors[-1].header.stamp) == stamp * 1_000_000)
+        return errors[-1].vector
+
+    seen(5, (0.1, 0.5))
+    for stamp, bad in ((10, math.nan), (15, math.inf)):
+        assert math.isnan(seen(stamp, (bad, 0.5)).x)
+    seen(20, (0.1, 0.5))
+    assert client.diagnosed('joint states not valid').level == 2
+    client.publish('joint_states', joints(1))
+    assert client.diagnosed('joint_states stamp went back from 0.020000 to 0.001000 s').level == 1
+    node.process.send_signal(signal.SIGINT)
+    result = node.finish(15.0)
+    assert (result.returncode, result.stderr) == (0, '')

@@ -1,0 +1,87 @@
+"""A node dies, falls silent, or the user stops the run: an error that names the node, and a bag that can be read."""
+import re
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup.verify import verify
+
+NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
+DEADLINE = 3
+
+
+@pytest.fixture(scope='module')
+def hurt(start_run):
+    """hurt({target: signal}) -> {target: (run, result)} of runs side by side; as soon as one is well under way its
+    target, a node or the command `pedestal` itself, gets the signal."""
+    def hurt(targets):
+        runs = {target: start_run('leo_pass', '--pacing', 'lockstep', '--param', f'scenario.deadline={DEADLINE}')
+                for target in targets}
+        waiting = set(targets)
+        deadline = time.monotonic() + 90.0
+        while waiting:
+            assert time.monotonic() < deadline, f'{waiting} did not start'
+            for target in sorted(waiting):
+                run = runs[target]
+                if run.recorded():
+                    waiting.remove(target)
+                    if target == 'pedestal':
+                        run.process.send_signal(targets[target])
+                    else:
+                        run.signal(target, targets[target])
+            time.sleep(0.02)
+        return {target: (run, run.finish()) for target, run in runs.items()}
+    return hurt
+
+
+@pytest.fixture(scope='module')
+def killed(hurt):
+    return hurt({**dict.fromkeys(NODES, signal.SIGKILL), 'pedestal': signal.SIGINT})
+
+
+@pytest.fixture(scope='module')
+def stopped(hurt):
+    return hurt(dict.fromkeys(NODES, signal.SIGSTOP))
+
+
+def assert_readable(run, damaged=False):
+    bag = bags.load(run.bag)
+    assert bool(bag.damage) == damaged
+    stamps = bag.table('joint_states')['t']
+    assert len(stamps) > 50
+    assert np.array_equal(np.round(stamps / 0.005), np.arange(len(stamps)))
+
+
+@pytest.mark.parametrize('node', NODES)
+def test_a_killed_node_is_named(killed, node):
+    run, result = killed[node]
+    assert result.returncode == 1
+    assert 'Traceback' not in result.stderr
+    first = result.stderr.splitlines()[0]
+    assert first.startswith(f'pedestal: error: {node} died by signal SIGKILL; its last log lines')
+    assert str(run.log / f'{node}.log') in first
+    assert '\n  | ' in result.stderr
+    assert run.pids() == {}
+    assert_readable(run, damaged=node == 'recorder')
+
+
+@pytest.mark.parametrize('node', NODES)
+def test_a_silent_node_is_named(stopped, node):
+    run, result = stopped[node]
+    assert result.returncode == 1
+    assert 'Traceback' not in result.stderr
+    assert re.match(rf'pedestal: error: {node} has fallen silent; its last log lines', result.stderr)
+    assert run.pids() == {}
+    assert_readable(run)
+
+
+def test_ctrl_c_ends_in_order(killed):
+    run, result = killed['pedestal']
+    assert result.returncode == 130
+    assert result.stderr == f'pedestal: stopped; what was recorded is in {run.bag}\n'
+    assert run.pids() == {}
+    assert_readable(run)
+    assert verify(run.bag).problems == []

@@ -1,0 +1,145 @@
+"""Lockstep runs as a user starts them: the same every time, complete, equal to the composed cores, open to readers."""
+import hashlib
+import json
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup import closed_loop, scenario
+from pedestal_bringup.verify import verify
+
+PARAM = 'acu.tracker.lock_count=20'
+LENGTH = {'leo_pass': 4.0, 'ship_pass': 3.0}
+METRICS = {'pointing_rms_deg', 'pointing_max_deg', 'lost_steps', 'realtime_factor', 'single_sample_noise_deg',
+           'lock_time_s', 'noise_reduction'}
+
+
+def digest(run):
+    [file] = run.bag.glob('*.mcap')
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@pytest.fixture(scope='module')
+def runs(start_run):
+    """Finished runs by name: three leo_pass of one seed, one of them beside busy processes, one of another seed, and
+    two ship_pass."""
+    def start(name, *more):
+        return start_run(name, '--pacing', 'lockstep', '--duration', LENGTH[name], '--param', PARAM, *more)
+
+    done = {}
+
+    def finish(**started):
+        for name, run in started.items():
+            result = run.finish()
+            assert result.returncode == 0, result.stderr
+            run.output = result.stdout
+            done[name] = run
+
+    finish(first=start('leo_pass'), other_seed=start('leo_pass', '--seed', '2'))
+    finish(again=start('leo_pass'), ship=start('ship_pass'))
+    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(2)]
+    try:
+        finish(under_load=start('leo_pass'), ship_again=start('ship_pass'))
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    return done
+
+
+@pytest.mark.parametrize('first, second', [('first', 'again'), ('first', 'under_load'), ('ship', 'ship_again')])
+def test_same_seed_gives_the_same_file(runs, first, second):
+    assert digest(runs[first]) == digest(runs[second])
+
+
+def test_another_seed_gives_another_file(runs):
+    assert digest(runs['first']) != digest(runs['other_seed'])
+
+
+@pytest.mark.parametrize('name', ['first', 'ship'])
+def test_rows_and_hash(runs, name):
+    content = json.loads(runs[name].json.read_text())
+    assert {row['case'] for row in content['rows']} == {content['name']}
+    values = {row['metric']: row['value'] for row in content['rows']}
+    assert METRICS <= set(values)
+    assert values['lost_steps'] == 0
+    assert content['mcap_sha256'] == digest(runs[name])
+    assert content['mcap_sha256'] in runs[name].output.replace('\n', '')
+
+
+def test_a_run_that_tracks_has_all_numbers(runs):
+    rows = json.loads(runs['first'].json.read_text())['rows']
+    assert [row['metric'] for row in rows if row['value'] is None] == []
+
+
+@pytest.mark.parametrize('name, topics', [('first', 11), ('ship', 14)])
+def test_recording_is_complete(runs, name, topics, run_process):
+    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'verify', runs[name].bag], 60.0)
+    assert done.returncode == 0, done.stdout
+    assert ': complete: ' in done.stdout
+    report = verify(runs[name].bag)
+    assert report.steps == round(LENGTH['leo_pass' if name == 'first' else 'ship_pass'] / 0.005) + 1
+    assert len(report.topics) == topics and all(check.count for check in report.topics)
+
+
+COLUMNS = {
+    'joint_states': [('azimuth.position', 'position', 0), ('elevation.position', 'position', 1),
+                     ('azimuth.effort', 'torque', 0), ('elevation.effort', 'torque', 1)],
+    'adu/motor_states': [('azimuth_motor_1.effort', 'motor_torque', (0, 0)),
+                         ('azimuth_motor_2.effort', 'motor_torque', (0, 1)),
+                         ('elevation_motor_1.effort', 'motor_torque', (1, 0)),
+                         ('elevation_motor_2.effort', 'motor_torque', (1, 1))],
+    'acu/rate_command': [('azimuth.velocity', 'rate', 0), ('elevation.velocity', 'rate', 1),
+                         ('azimuth.effort', 'feedforward', 0), ('elevation.effort', 'feedforward', 1)],
+    'acu/estimate': [('azimuth.position', 'estimate', (0, 0)), ('elevation.velocity', 'estimate', (1, 1)),
+                     ('azimuth.acceleration', 'estimate', (0, 2))],
+    'acu/reference': [('azimuth.position', 'reference', (0, 0)), ('elevation.position', 'reference', (1, 0))],
+    'tracking_receiver/angle_error': [('x', 'measured', 0), ('y', 'measured', 1)],
+}
+
+
+@pytest.mark.parametrize('name, scenario_name', [('first', 'leo_pass'), ('ship', 'ship_pass')])
+def test_composed_cores_equal_the_run_to_the_last_bit(runs, name, scenario_name):
+    chosen = scenario.load(scenario_name, [PARAM], duration=LENGTH[scenario_name])
+    composed = closed_loop.run(closed_loop.cores(chosen))
+    recorded = bags.read(runs[name].bag)
+    differences = {}
+    for topic, columns in COLUMNS.items():
+        table = recorded.table(topic)
+        assert np.array_equal(np.round(table['t'] * 1e9), np.round(composed['t'][:len(table['t'])] * 1e9))
+        for column, field, index in columns:
+            there = composed[field][(slice(len(table['t'])), *np.atleast_1d(index))]
+            if not np.array_equal(table[column], there, equal_nan=True):
+                differences[f'{topic} {column}'] = float(np.nanmax(np.abs(table[column] - there)))
+    assert differences == {}
+
+
+def test_readers_of_others_see_the_same(runs):
+    """rosbags and mcap with mcap-ros2-support open the bag of a real run: equal counts and numbers."""
+    ours = bags.read(runs['ship'].bag)
+    counts = {name: sum(1 for _ in ours.raw(name)) for name in ours.topics}
+    with AnyReader([runs['ship'].bag]) as reader:
+        assert {connection.topic.lstrip('/'): connection.msgcount for connection in reader.connections} == counts
+        joints = [connection for connection in reader.connections if connection.topic == '/joint_states']
+        theirs = np.array([reader.deserialize(data, connection.msgtype).position
+                           for connection, _, data in reader.messages(joints)])
+    [file] = pathlib.Path(runs['ship'].bag).glob('*.mcap')
+    seen = dict.fromkeys(counts, 0)
+    decoded = []
+    with open(file, 'rb') as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        for _, channel, _, message in reader.iter_decoded_messages():
+            seen[channel.topic.lstrip('/')] += 1
+            if channel.topic == '/joint_states':
+                decoded.append(list(message.position))
+    assert seen == counts
+    table = ours.table('joint_states')
+    assert np.array_equal(theirs, np.column_stack((table['azimuth.position'], table['elevation.position'])))
+    assert np.array_equal(theirs, decoded)

@@ -1,0 +1,66 @@
+"""Each executable alone: it starts, and ends without a word when told to; the parameter doors of a node."""
+import importlib.resources
+import signal
+
+import pytest
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder')
+
+
+@pytest.fixture(scope='module')
+def scenario_file():
+    return importlib.resources.files('pedestal_bringup') / 'scenarios' / 'ship_pass.yaml'
+
+
+@pytest.fixture(scope='module')
+def ended(start_node, connect, scenario_file):
+    """{(node, signal): result} of nodes that loaded a scenario file as it is, each told to stop once it was there."""
+    def end(number):
+        started = {node: start_node(node, '--params-file', scenario_file) for node in NODES}
+        for node, alone in started.items():
+            client = connect(alone.domain_id)
+            client.until(lambda client=client, node=node: node in client.node.get_node_names())
+            # A node's services come when its parameters and laws are ready.
+            client.until(lambda client=client, node=node: client.node.count_publishers('diagnostics'))
+            client.close()
+            alone.process.send_signal(number)
+        return {(node, number): alone.finish(15.0) for node, alone in started.items()}
+    return {**end(signal.SIGINT), **end(signal.SIGTERM)}
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('node', NODES)
+def test_a_node_ends_in_silence_when_told_to(ended, node, number):
+    result = ended[node, number]
+    assert (result.returncode, result.stderr) == (0, '')
+
+
+REFUSED = {
+    'unknown key': ('acu', ['-p', 'azimuth.position_loop.kpp:=20.0'],
+                    "unknown parameter 'azimuth.position_loop.kpp'; did you mean 'azimuth.position_loop.kp'?"),
+    'range': ('adu', ['-p', 'period:=0.5'], 'period'),
+    'NaN': ('tracking_receiver', ['-p', 'receiver.cn0_dbhz:=.nan'], 'receiver.cn0_dbhz'),
+    'type': ('ins', ['-p', 'latency:=soon'], 'latency'),
+    'choice': ('ship_motion', ['-p', 'ship.kind:=jump'], 'ship.kind'),
+    'cross-check': ('acu', ['-p', 'azimuth.limits.low:=3.0', '-p', 'azimuth.limits.high:=2.0'], 'azimuth.limits'),
+    'pacing': ('adu', ['-p', 'graph.pacing:=sometimes'], 'must be one of lockstep, realtime'),
+}
+
+
+@pytest.fixture(scope='module')
+def refused(start_node, tmp_path_factory):
+    file = tmp_path_factory.mktemp('parameters') / 'wrong.yaml'
+    file.write_text('recorder:\n  ros__parameters:\n    bagg: here\n')
+    started = {case: start_node(node, *arguments) for case, (node, arguments, _) in REFUSED.items()}
+    started['file'] = start_node('recorder', '--params-file', file)
+    return {case: node.finish() for case, node in started.items()}
+
+
+@pytest.mark.parametrize('case', [*REFUSED, 'file'])
+def test_a_node_refuses_a_parameter_in_one_line(refused, case, one_line):
+    result = refused[case]
+    node, _, text = REFUSED.get(case, ('recorder', (), "unknown parameter 'bagg'; did you mean 'bag'?"))
+    assert result.returncode == 1
+    line = one_line(result.stderr)
+    assert 'error: ' in line and text in line

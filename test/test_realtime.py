@@ -1,0 +1,167 @@
+"""Realtime: the steady timer, the latest command, and what a drive does when its commands stop or are nonsense."""
+import json
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup.verify import verify
+from pedestal_common import messages
+
+PAUSE = 1.6
+"""Drive time [s] for which the ACU of the run stands still: longer than a second, so a diagnostic falls in it."""
+
+
+@pytest.fixture(scope='module')
+def run(start_run, connect):
+    """A realtime run whose ACU is stopped for a while on the way to the target: run.stopped, run.resumed [s]."""
+    run = start_run('leo_pass', '--pacing', 'realtime', '--duration', '4.5')
+    client = connect(run.domain_id)
+    client.read('joint_states')
+    heard = client.heard['joint_states']
+
+    def stamp():
+        return messages.nanoseconds(heard[-1].header.stamp) * 1e-9
+    client.until(lambda: heard and abs(heard[-1].velocity[0]) > 0.2)
+    run.signal('acu', signal.SIGSTOP)
+    run.stopped = stamp()
+    client.until(lambda: stamp() >= run.stopped + PAUSE)
+    run.resumed = stamp()
+    run.signal('acu', signal.SIGCONT)
+    client.close()
+    run.result = run.finish()
+    return run
+
+
+def test_a_run_goes_at_the_pace_of_the_clock(run):
+    assert run.result.returncode == 0, run.result.stderr
+    rows = {row['metric']: row['value'] for row in json.loads(run.json.read_text())['rows']}
+    assert 0.7 < rows['realtime_factor'] < 1.02
+    assert rows['lost_steps'] > 200
+    assert verify(run.bag).complete
+
+
+def test_stale_commands_stop_the_axes(run):
+    table = bags.read(run.bag).table('joint_states')
+    rate = np.hypot(table['azimuth.velocity'], table['elevation.velocity'])
+    t = table['t']
+    assert rate[t <= run.stopped].max() > 0.2
+    assert rate[(t > run.stopped + 0.8) & (t < run.resumed)].max() < 2e-3
+    assert rate[t > run.resumed + 0.1].max() > 0.1
+
+
+def test_the_drive_says_that_commands_are_stale(run):
+    bag = bags.read(run.bag)
+    said = [status for _, _, _, data in bag.raw('diagnostics')
+            for status in messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticArray').status
+            if status.name == 'adu' and 'no new acu/rate_command for 0.05 s: stopping' in status.message]
+    assert said and {status.level for status in said} == {2}
+
+
+class Commander:
+    """Answers every joint state with a rate command, as an ACU would."""
+
+    def __init__(self, client):
+        self.client = client
+        self.rates = 0.0, 0.0
+        client.write('acu/rate_command')
+        client.read('diagnostics')
+        client.read('joint_states', self.answer)
+        client.until(lambda: client.heard['joint_states'])
+
+    def answer(self, joints):
+        if self.rates is not None:
+            self.send(messages.nanoseconds(joints.header.stamp), self.rates)
+
+    def send(self, stamp, rates):
+        command = messages.joint_state(messages.AXES)
+        messages.put_stamp(command.header.stamp, stamp)
+        command.velocity[:] = rates
+        self.client.publish('acu/rate_command', command)
+
+    @property
+    def last(self):
+        return self.client.heard['joint_states'][-1]
+
+    @property
+    def stamp(self):
+        return messages.nanoseconds(self.last.header.stamp)
+
+    def moves_at(self, azimuth, elevation):
+        self.client.until(lambda: np.allclose(self.last.velocity, (azimuth, elevation), atol=5e-3), 10.0)
+
+
+@pytest.fixture(scope='module')
+def drive(start_node, connect):
+    """A drive alone, with brakes so weak that a stop takes a second, under a commander."""
+    node = start_node('adu', '-p', 'initial_elevation:=0.8', '-p', 'azimuth.limits.deceleration:=0.2')
+    commander = Commander(connect(node.domain_id))
+    yield commander
+    node.process.send_signal(signal.SIGINT)
+    assert node.finish(15.0).stderr == ''
+
+
+def test_the_latest_command_wins(drive):
+    drive.rates = 0.1, 0.05
+    drive.moves_at(0.1, 0.05)
+    stamp = drive.stamp
+    drive.rates = None
+    drive.send(stamp - 1, (0.3, 0.0))
+    drive.rates = -0.1, 0.0
+    drive.moves_at(-0.1, 0.0)
+
+
+def test_a_command_from_the_past_is_refused(drive):
+    drive.rates = 0.1, 0.0
+    drive.moves_at(0.1, 0.0)
+    drive.send(0, (2.0, 1.0))
+    status = drive.client.diagnosed('acu/rate_command refused: stamp went back from ')
+    assert status.level == 1
+    drive.moves_at(0.1, 0.0)
+
+
+def test_a_command_from_the_future_is_refused(drive):
+    drive.rates = 0.1, 0.0
+    drive.send(drive.stamp + 100_000_000_000, (2.0, 1.0))
+    drive.client.diagnosed('s lies ahead of the drive (')
+    drive.moves_at(0.1, 0.0)
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf])
+def test_a_command_that_is_no_number_is_named(drive, value):
+    drive.rates = 0.1, 0.0
+    drive.moves_at(0.1, 0.0)
+    drive.rates = value, 0.0
+    seen = len(drive.client.heard['joint_states'])
+    drive.client.until(lambda: len(drive.client.heard['joint_states']) > seen + 5)
+    drive.rates = 0.1, 0.0
+    assert drive.client.diagnosed('acu/rate_command holds NaN or infinity').level == 2
+    drive.moves_at(0.1, 0.0)
+
+
+def test_silence_stops_the_axes_with_a_diagnostic(drive):
+    drive.rates = 0.2, 0.0
+    drive.moves_at(0.2, 0.0)
+    start = drive.last.position[0]
+    drive.rates = None
+    assert drive.client.diagnosed('no new acu/rate_command for 0.05 s: stopping').level == 2
+    drive.moves_at(0.0, 0.0)
+    # Controlled: the way of a stop at 0.2 rad/s2 from 0.2 rad/s, and of the 10 periods before it.
+    assert drive.last.position[0] - start == pytest.approx(0.1 + 0.2 * 0.05, rel=0.3)
+
+
+def test_emergency_stop_and_reset(drive):
+    drive.rates = 0.2, 0.0
+    drive.moves_at(0.2, 0.0)
+    assert drive.client.trigger('adu/emergency_stop') == (
+        True, 'axes are stopping and stay stopped until adu/reset_faults')
+    assert drive.client.trigger('adu/reset_faults') == (False, 'refused: azimuth still moves')
+    drive.client.diagnosed('emergency stop')
+    drive.moves_at(0.0, 0.0)
+    still = time.monotonic() + 0.3
+    drive.client.until(lambda: time.monotonic() > still)
+    drive.moves_at(0.0, 0.0)
+    assert drive.client.trigger('adu/reset_faults') == (True, 'drive enabled')
+    drive.moves_at(0.2, 0.0)

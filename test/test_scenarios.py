@@ -1,0 +1,26 @@
+"""Every scenario that comes with the product loads, and its closed loop ends in autotrack."""
+import numpy as np
+import pytest
+
+from acu_tracker import modes
+from pedestal_bringup import closed_loop, scenario
+
+DURATION = 6.0
+
+
+@pytest.mark.parametrize('name', scenario.available())
+def test_a_scenario_tracks(name, tmp_path):
+    overrides = []
+    if name == 'track_file':
+        file = tmp_path / 'flight.csv'
+        rows = [f'{t},{47.41 + 4e-4 * t:.6f},8.51,1500' for t in range(12)]
+        file.write_text('time_s,latitude_deg,longitude_deg,altitude_m\n' + '\n'.join(rows) + '\n')
+        overrides = [f'tracking_receiver.target.track_file.path={file}']
+    chosen = scenario.load(name, overrides, duration=DURATION)
+    result = closed_loop.run(closed_loop.cores(chosen))
+    assert len(result) == round(DURATION / 0.005) + 1
+    assert result['mode'][-1] == modes.AUTOTRACK
+    error = result['true_error'][result['t'] > DURATION - 0.5]
+    assert np.isfinite(error).all()
+    half_beam = 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
+    assert np.abs(error).max() < 0.5 * half_beam

@@ -1,0 +1,202 @@
+"""The ACU's modes by service, and what it says to bad input: one node alone under a client that plays the rest."""
+import math
+import signal
+
+import numpy as np
+import pytest
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+
+from pedestal_bringup.program import program_message
+from pedestal_common import messages
+
+PERIOD = 5_000_000
+JOINTS, ERROR = 'joint_states', 'tracking_receiver/angle_error'
+
+
+class Plant:
+    """Encoders at rest and a receiver that sees the target in the beam; each step waits for the ACU's command."""
+
+    def __init__(self, client):
+        self.client = client
+        self.stamp = 0
+        client.write(JOINTS, ERROR, 'acu/program_track')
+        for name in ('acu/rate_command', 'acu/mode', 'diagnostics'):
+            client.read(name)
+
+    def step(self, count=1, position=(0.1, 0.5), error=(0.0, 0.0, 60.0), jump=0):
+        """Publish count steps and wait for the answer to the last."""
+        self.stamp += jump
+        for _ in range(count):
+            self.stamp += PERIOD
+            joints = messages.joint_state(messages.AXES)
+            messages.put_stamp(joints.header.stamp, self.stamp)
+            joints.position[:] = position
+            self.client.publish(JOINTS, joints)
+            measured = messages.Vector3Stamped(header=messages.header('beam'), vector=messages.vector3(*error))
+            messages.put_stamp(measured.header.stamp, self.stamp)
+            self.client.publish(ERROR, measured)
+        self.answered()
+
+    def answered(self):
+        commands = self.client.heard['acu/rate_command']
+        self.client.until(lambda: commands and messages.nanoseconds(commands[-1].header.stamp) >= self.stamp)
+
+    @property
+    def mode(self):
+        """The latched mode as heard last."""
+        return self.client.heard['acu/mode'][-1].data
+
+    def enters(self, mode):
+        self.step()
+        self.client.until(lambda: self.mode == mode, 10.0)
+
+    def program(self, rows, start=0.0):
+        """A program track of (time, azimuth, elevation) rows."""
+        table = np.array(rows, float).reshape(-1, 3)
+        message = program_message(table[:, 0], table[:, 1:])
+        messages.put_stamp(message.header.stamp, round(start * 1e9))
+        return message
+
+
+@pytest.fixture(scope='module')
+def plant(start_node, connect):
+    node = start_node('acu')
+    yield Plant(connect(node.domain_id))
+    node.process.send_signal(signal.SIGINT)
+    result = node.finish(15.0)
+    assert result.returncode == 0 and 'Traceback' not in result.stderr
+
+
+def test_no_mode_before_the_encoders_speak(plant):
+    for mode in ('stow', 'preset', 'program', 'autotrack'):
+        assert plant.client.trigger(f'acu/{mode}') == (False, 'refused: encoder invalid; mode is standby')
+
+
+def test_refused_with_the_reason(plant):
+    plant.step(error=(math.nan, math.nan, 10.0))
+    assert plant.client.trigger('acu/program') == (False, 'refused: no program track; mode is standby')
+    assert plant.client.trigger('acu/autotrack') == (False, 'refused: receiver not locked; mode is standby')
+
+
+@pytest.mark.parametrize('mode', ['stow', 'preset', 'standby'])
+def test_accepted_after_read_back(plant, mode):
+    plant.step()
+    assert plant.client.trigger(f'acu/{mode}') == (True, f'mode is {mode}')
+    plant.enters(mode)
+
+
+def test_program_and_autotrack(plant):
+    now = plant.stamp * 1e-9
+    plant.client.publish('acu/program_track', plant.program([(0.0, 0.1, 0.5), (100.0, 0.1, 0.5)], now))
+    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/program')[0], 10.0)
+    plant.enters('program')
+    plant.step(150)
+    assert plant.client.trigger('acu/autotrack') == (True, 'mode is autotrack')
+    plant.enters('autotrack')
+    assert plant.client.trigger('acu/standby') == (True, 'mode is standby')
+    plant.enters('standby')
+
+
+def test_a_program_that_is_over_is_refused(plant):
+    now = plant.stamp * 1e-9
+    plant.client.publish('acu/program_track', plant.program([(0.0, 0.1, 0.5), (0.1, 0.1, 0.5)], now))
+    plant.step(60)
+    assert plant.client.trigger('acu/program') == (False, 'refused: after program track; mode is standby')
+
+
+@pytest.mark.parametrize('change, text', [
+    (lambda m: m.points[1].positions.__setitem__(0, math.nan), 'program track row 1: '),
+    (lambda m: m.points[1].positions.__setitem__(1, math.inf), 'program track row 1: '),
+    (lambda m: setattr(m.points[1], 'time_from_start', messages.Duration(sec=0, nanosec=0)), 'must be after 0 s'),
+    (lambda m: setattr(m, 'joint_names', ['azimuth', 'polarisation']), "joint_names ['azimuth', 'polarisation']"),
+    (lambda m: setattr(m.points[1], 'positions', np.zeros(1)), 'row 1: 1 positions'),
+    (lambda m: setattr(m, 'points', []), 'program track has 0 rows'),
+], ids=['NaN', 'inf', 'unordered', 'names', 'short row', 'empty'])
+def test_a_bad_program_track_is_named(plant, change, text):
+    message = plant.program([(0.0, 0.1, 0.5), (1.0, 0.2, 0.5)])
+    change(message)
+    plant.client.publish('acu/program_track', message)
+    status = plant.client.diagnosed('acu/program_track refused: ')
+    assert text in status.message and '\n' not in status.message
+    assert plant.client.trigger('acu/reset_faults') == (True, 'cleared')
+
+
+def test_one_row_is_a_preset(plant):
+    plant.client.publish('acu/program_track', plant.program([(0.0, math.nan, 0.7)]))
+    plant.step()
+    assert plant.client.diagnosed('invalid input: preset').level == 2
+    plant.client.publish('acu/program_track', plant.program([(0.0, 0.3, 0.7)]))
+    plant.step()
+    assert plant.client.trigger('acu/preset')[0]
+    plant.step(3)
+    command = plant.client.heard['acu/rate_command'][-1]
+    assert (command.velocity > 0.0).all(), 'it moves from (0.1, 0.5) to (0.3, 0.7)'
+    assert plant.client.trigger('acu/standby')[0]
+    plant.client.publish('acu/program_track', plant.program([(0.0, 0.3, 3.0)]))
+    plant.step()
+    assert plant.client.trigger('acu/preset') == (False, 'refused: outside limits; mode is standby')
+
+
+@pytest.mark.parametrize('bad', [
+    {'encoder': {'position': (math.nan, 0.5)}, 'error': {'error': (0.0, math.nan, 60.0)}},
+    {'encoder': {'position': (0.1, math.inf)}, 'error': {'error': (math.inf, 0.0, 60.0)}},
+    {'step_gap': {'jump': 3_000_000_000}, 'error': {'error': (0.0, 0.0, math.nan)}},
+], ids=['NaN', 'inf', 'stamp jump and C/N0 NaN'])
+def test_a_bad_message_among_good_ones_is_named(plant, bad):
+    plant.client.diagnosed('')
+    for changes in bad.values():
+        plant.step(3)
+        plant.step(1, **changes)
+    plant.step(3)
+    status = plant.client.diagnosed('invalid input: ')
+    assert status.level == 2
+    assert set(bad) <= set(status.message.partition(': ')[2].split())
+    assert np.isfinite(plant.client.heard['acu/rate_command'][-1].velocity).all()
+
+
+def test_an_invalid_encoder_ends_a_mode(plant):
+    plant.step()
+    assert plant.client.trigger('acu/stow')[0]
+    plant.enters('stow')
+    plant.step(position=(math.nan, 0.5))
+    plant.client.until(lambda: plant.mode == 'standby', 10.0)
+    assert (plant.client.heard['acu/rate_command'][-1].velocity == 0.0).all()
+
+
+def test_parameters_while_it_runs(plant):
+    def put(name, value):
+        request = SetParameters.Request(parameters=[Parameter(name=name, value=ParameterValue(
+            type=ParameterType.PARAMETER_DOUBLE, double_value=value))])
+        return plant.client.call('acu/set_parameters', SetParameters, request).results[0]
+
+    def moved_by():
+        """The rate commanded soon after preset is asked for, 0.5 rad away in azimuth."""
+        plant.client.publish('acu/program_track', plant.program([(0.0, 0.6, 0.5)]))
+        plant.step()
+        assert plant.client.trigger('acu/preset')[0]
+        plant.step(20)
+        rate = plant.client.heard['acu/rate_command'][-1].velocity[0]
+        assert plant.client.trigger('acu/standby')[0]
+        plant.step(20)
+        return rate
+
+    before = moved_by()
+    assert put('azimuth.shaper.rate', 0.01).successful
+    assert put('azimuth.position_loop.kp', 0.0).successful
+    assert put('azimuth.position_loop.ki', 0.0).successful
+    assert moved_by() < 0.1 * before
+    for name, value, text in (('azimuth.shaper.rate', 1e9, 'azimuth.shaper.rate'),
+                              ('azimuth.position_loop.kp', math.nan, 'azimuth.position_loop.kp'),
+                              ('azimuth.limits.rate', 1e-3, 'shaper.rate'),
+                              ('period', 0.01, 'period')):
+        result = put(name, value)
+        assert not result.successful and text in result.reason, (name, result.reason)
+
+
+def test_stamps_that_go_back_are_named(plant):
+    plant.step()
+    joints = messages.joint_state(messages.AXES)
+    plant.client.publish(JOINTS, joints)
+    status = plant.client.diagnosed('joint_states stamp went back from ')
+    assert status.level == 1
