@@ -158,6 +158,8 @@ class AcuNode(shell.Shell):
             return shell.WARN, self.refused, values
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
+        if invalid == ['error_gated']:
+            return shell.WARN, 'an error of the receiver was too far off to be believed', values
         if invalid:
             return shell.ERROR, f'invalid input: {" ".join(invalid)}', values
         return (shell.WARN if outputs['coasting'] else shell.OK), f'{mode} ({reason})', values

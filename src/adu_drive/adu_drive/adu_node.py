@@ -42,6 +42,8 @@ class AduNode(shell.Shell):
         self.emergency = False
         self.refused = ''
         self.invalid = ''
+        self.tick_timer = None
+        self.ticking = False
         self.truth = None
         self.truth_stamp = None
         self.deck_rate = np.zeros(3)
@@ -67,13 +69,22 @@ class AduNode(shell.Shell):
         self.start_timer = self.every(0.001, self.start)
 
     def start(self):
-        """Step 0, once the graph is complete; in realtime the steady timer begins here."""
+        """Step 0, once the graph is complete. In realtime the steady timer begins with the first command, when the
+        others have found each other; without an ACU at once, and with a mute one after the deadline."""
         self.start_timer.cancel()
         self.await_graph()
-        self.begun = self.heard = time.monotonic()
+        self.heard = time.monotonic()
         self.publish_step()
         if not self.graph.lockstep:
-            self.every(self.parameters.period, self.tick)
+            mute = self.graph.deadline if 'acu' in self.graph.nodes else self.parameters.period
+            self.tick_timer = self.every(mute, self.begin_ticking)
+
+    def begin_ticking(self):
+        """Realtime: from now on a step every period."""
+        self.tick_timer.cancel()
+        self.tick_timer = self.every(self.parameters.period, self.tick)
+        self.begun = self.heard = time.monotonic()
+        self.ticking = True
 
     def publish_step(self):
         """joint_states, clock and motor_states of step k; what the others wait for goes first."""
@@ -113,6 +124,8 @@ class AduNode(shell.Shell):
             self.refused = f'stamp {stamp / 1e9:.3f} s lies ahead of the drive ({self.k * self.period_ns / 1e9:.3f} s)'
         else:
             self.command, self.command_stamp = message, stamp
+            if self.tick_timer is not None and not self.ticking:
+                self.begin_ticking()
 
     def on_truth(self, message):
         self.truth = message
@@ -148,6 +161,8 @@ class AduNode(shell.Shell):
         if self.outputs[0]['invalid_command']:
             self.invalid = 'acu/rate_command' if np.isfinite(inputs['base_acceleration']).all() else 'ship/truth'
         self.k += 1
+        if self.k == 1:
+            self.begun = time.monotonic()
         self.publish_step()
 
     def take_truth(self, truth, inputs):
@@ -161,10 +176,12 @@ class AduNode(shell.Shell):
             self.deck_rate, self.truth_stamp = rate, stamp
 
     def end(self):
-        """The last step has been answered: say how it went and finish."""
+        """The last step has been answered: say how it went and finish. The clock ran from the first answer on, when
+        everyone had found everyone."""
         wall = time.monotonic() - self.begun
         self.await_acknowledged()
-        print(json.dumps({'steps': self.k, 'wall_s': wall, 'realtime_factor': self.k * self.parameters.period / wall,
+        factor = (self.k - 1) * self.parameters.period / wall
+        print(json.dumps({'steps': self.k, 'wall_s': wall, 'realtime_factor': factor,
                           'lost_steps': int(self.lost_steps), 'late_ticks': int(self.late_ticks)}), flush=True)
         self.finished = True
 

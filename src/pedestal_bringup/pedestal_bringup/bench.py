@@ -50,9 +50,8 @@ def bare_lap():
         raise RuntimeError('the bare ring did not close within 120 s') from None
     finally:
         for process in processes.values():
-            process.terminate()
-        for process in processes.values():
-            process.wait(timeout=20.0)
+            process.kill()
+            process.wait()
     if not said:
         raise RuntimeError(f'the bare ring failed: {complaint.strip()}')
     return json.loads(said.splitlines()[-1])['lap_us']
