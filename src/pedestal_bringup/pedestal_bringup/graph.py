@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -64,7 +65,7 @@ class Operator(Shell):
         while time.monotonic() < deadline:
             names = self.get_node_names()
             if names.count(self.name) > 1 or any(node in names for node in NODE_KINDS):
-                raise RunError(f'another graph runs on ROS_DOMAIN_ID {self.context.get_domain_id()}; set a free one')
+                raise another_graph(self.context.get_domain_id())
             time.sleep(0.02)
 
     def _take(self, array):
@@ -127,27 +128,48 @@ def uninterrupted():
         signal.signal(signal.SIGINT, before)
 
 
+@contextlib.contextmanager
+def sole_run(domain_id):
+    """Hold a ROS domain for one run on this machine: an abstract socket, gone with its process however that ends.
+
+    Raises RunError when another run holds it; discovery alone is too slow to tell on a busy machine.
+    """
+    with socket.socket(socket.AF_UNIX) as holder:
+        try:
+            holder.bind(f'\0pedestal-domain-{domain_id}')
+        except OSError:
+            raise another_graph(domain_id) from None
+        yield
+
+
+def another_graph(domain_id):
+    return RunError(f'another graph runs on ROS_DOMAIN_ID {domain_id}; set a free one')
+
+
 class Graph:
-    """The processes of one run. Use as a context: leaving it stops whatever still runs."""
+    """The processes of one run and their logs, beside the bag. Use as a context: leaving it stops whatever still runs.
+
+    Raises RunError when there is no writing beside the bag.
+    """
 
     def __init__(self, scenario, bag):
         self.scenario = scenario
         self.bag = pathlib.Path(bag)
         self.log = self.bag.with_name(self.bag.name + '.log')
+        self.file = self.log / 'parameters.yaml'
         self.processes = {}
-
-    def __enter__(self):
-        file = self.log / 'parameters.yaml'
         try:
             self.log.mkdir(parents=True, exist_ok=True)
-            file.write_text(parameter_file(self.scenario, self.scenario.header.pacing, self.bag))
+            self.file.write_text(parameter_file(scenario, scenario.header.pacing, self.bag))
         except OSError as error:
             raise RunError(f'cannot record to {self.bag}: {error.filename}: {error.strerror}') from None
+
+    def __enter__(self):
         for node in self.scenario.nodes:
             if node in NODE_KINDS:
                 with open(self.log / f'{node}.log', 'wb') as output:
                     self.processes[node] = subprocess.Popen(
-                        [sys.executable, '-m', NODE_KINDS[node].module, '--ros-args', '--params-file', str(file)],
+                        [sys.executable, '-m', NODE_KINDS[node].module, '--ros-args', '--params-file', str(self.file)],
                         stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
                         env={**os.environ, 'ROS_LOG_DIR': str(self.log)}, start_new_session=True,
                         preexec_fn=_end_with_parent)
@@ -224,39 +246,45 @@ def run(scenario, bag, progress):
     a clean stop. The recording up to then stays readable.
     """
     table = program_table(scenario) if scenario.header.program.source != 'none' else None
+    graph = Graph(scenario, bag)
     set_middleware_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         operator = Operator()
-        operator.refuse_company()
-        with Graph(scenario, bag) as graph:
-            if table is not None:
-                operator.send(table)
-            executor = SingleThreadedExecutor()
-            executor.add_node(operator)
-
-            def stuck(nodes):
-                return operator.stuck(nodes, executor)
-
-            deadline = scenario.header.deadline
-            patience = min(deadline, REALTIME_SILENCE) if scenario.header.pacing == 'realtime' else 2.0 * deadline
-            while graph.ended().get('adu') != 0:
-                executor.spin_once(timeout_sec=0.1)
-                progress(operator.time)
-                if any(code != 0 or node not in ('adu', 'recorder') for node, code in graph.ended().items()):
-                    raise graph.failure(stuck, operator.silent(deadline))
-                if operator.silent(patience):
-                    raise graph.failure(stuck, operator.silent(patience))
-            progress(scenario.header.duration)
-            for node in graph.processes:
-                if node not in ('adu', 'recorder') and graph.stop(node) != 0:
-                    raise graph.failure(stuck)
-            if graph.stop('recorder') != 0:
-                raise graph.failure(stuck)
-            operator.destroy_node()
-            return Outcome(graph.result('adu'), graph.result('recorder'))
+        with sole_run(operator.context.get_domain_id()):
+            operator.refuse_company()
+            return _run(graph, operator, table, progress)
     finally:
         rclpy.try_shutdown()
+
+
+def _run(graph, operator, table, progress):
+    """Start the nodes, watch them to the end of the run, stop them in order."""
+    header = graph.scenario.header
+    patience = min(header.deadline, REALTIME_SILENCE) if header.pacing == 'realtime' else 2.0 * header.deadline
+    with graph:
+        if table is not None:
+            operator.send(table)
+        executor = SingleThreadedExecutor()
+        executor.add_node(operator)
+
+        def stuck(nodes):
+            return operator.stuck(nodes, executor)
+
+        while graph.ended().get('adu') != 0:
+            executor.spin_once(timeout_sec=0.1)
+            progress(operator.time)
+            if any(code != 0 or node not in ('adu', 'recorder') for node, code in graph.ended().items()):
+                raise graph.failure(stuck, operator.silent(header.deadline))
+            if operator.silent(patience):
+                raise graph.failure(stuck, operator.silent(patience))
+        progress(header.duration)
+        for node in graph.processes:
+            if node not in ('adu', 'recorder') and graph.stop(node) != 0:
+                raise graph.failure(stuck)
+        if graph.stop('recorder') != 0:
+            raise graph.failure(stuck)
+        return Outcome(graph.result('adu'), graph.result('recorder'))
 
 
 def send_program(scenario) -> int:
