@@ -62,11 +62,6 @@ TOPICS = (
 BY_NAME = {topic.name: topic for topic in TOPICS}
 
 
-def written_by(node, graph):
-    """The topics `node` writes in a graph of these nodes, in table order."""
-    return [topic for topic in TOPICS if node in topic.writers and node in graph]
-
-
 def read_by(node, graph):
     """The topics `node` reads for which the graph has a writer; the recorder reads every one."""
     return [topic for topic in TOPICS

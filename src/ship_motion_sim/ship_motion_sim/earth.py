@@ -1,9 +1,8 @@
-"""Gravity, rotation and radii of the earth: WGS-84 (NIMA TR8350.2, tables 3.1 to 3.4), nowhere else."""
+"""Gravity and rotation of the earth: WGS-84 (NIMA TR8350.2, tables 3.1 to 3.4)."""
 import math
 
 from pedestal_common.compiled import compiled
 
-SEMI_MAJOR = 6378137.0          # a [m]
 FLATTENING = 1.0 / 298.257223563
 RATE = 7.292115e-5              # [rad/s]
 GRAVITY_EQUATOR = 9.7803253359  # [m/s2]
@@ -23,11 +22,3 @@ def gravity(latitude):
 def rate(latitude):
     """Rotation of the earth in ENU [rad/s]: (east, north, up)."""
     return 0.0, RATE * math.cos(latitude), RATE * math.sin(latitude)
-
-
-@compiled
-def radii(latitude):
-    """Radii of curvature [m] at a geodetic latitude [rad]: (along the meridian, across it)."""
-    w2 = 1.0 - ECCENTRICITY2 * math.sin(latitude) ** 2
-    across = SEMI_MAJOR / math.sqrt(w2)
-    return across * (1.0 - ECCENTRICITY2) / w2, across

@@ -68,6 +68,8 @@ class TrackingReceiverNode(shell.Shell):
         fault, self.fault = self.fault, receiver.LOCKED
         values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
                   ('target', self.parameters.target.kind)]
+        sigma = receiver.angle_noise(self.parameters, float(outputs['cn0_dbhz']), self.parameters.period)
+        values.append(('angle_noise_deg', f'{np.degrees(sigma):.4g}'))
         if self.target.start_time:
             values.append(('stamp_0_utc', self.target.start_time))
         if self.steps.refused:
