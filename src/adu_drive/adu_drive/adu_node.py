@@ -83,7 +83,7 @@ class AduNode(shell.Shell):
         """Realtime: from now on a step every period."""
         self.tick_timer.cancel()
         self.tick_timer = self.every(self.parameters.period, self.tick)
-        self.begun = self.heard = time.monotonic()
+        self.heard = time.monotonic()
         self.ticking = True
 
     def publish_step(self):

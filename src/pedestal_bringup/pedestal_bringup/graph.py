@@ -276,8 +276,9 @@ def _run(graph, operator, table, progress):
             progress(operator.time)
             if any(code != 0 or node not in ('adu', 'recorder') for node, code in graph.ended().items()):
                 raise graph.failure(stuck, operator.silent(header.deadline))
-            if operator.silent(patience):
-                raise graph.failure(stuck, operator.silent(patience))
+            mute = operator.silent(patience)
+            if mute:
+                raise graph.failure(stuck, mute)
         progress(header.duration)
         for node in graph.processes:
             if node not in ('adu', 'recorder') and graph.stop(node) != 0:

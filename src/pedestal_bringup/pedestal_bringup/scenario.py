@@ -101,9 +101,7 @@ class Scenario:
     def as_yaml(self):
         """The scenario as a ROS 2 parameter file."""
         sections = {'scenario': parameters.as_dict(self.header), **self.values}
-        return yaml.safe_dump({node: {'ros__parameters': {key: list(value) if isinstance(value, tuple) else value
-                                                          for key, value in values.items()}}
-                               for node, values in sections.items()}, sort_keys=True)
+        return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()}, sort_keys=True)
 
 
 def _folder():

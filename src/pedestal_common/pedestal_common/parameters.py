@@ -29,7 +29,7 @@ def flag(default, doc):
 
 
 def text(default, doc):
-    """A string, or a tuple of strings, that only its reader can judge (a file, a TLE line, a list of names)."""
+    """A string that only its reader can judge (a file, a TLE line)."""
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
@@ -130,7 +130,7 @@ def _replace(instance, values, prefix):
             value = values[name]
             if field.type is float and not isinstance(value, bool):
                 value = _number(value)
-            changes[field.name] = tuple(value) if isinstance(value, list) else value
+            changes[field.name] = value
     try:
         return dataclasses.replace(instance, **changes)
     except ParameterError as error:

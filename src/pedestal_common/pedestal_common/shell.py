@@ -18,7 +18,6 @@ from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
     ParameterDescriptor,
-    ParameterType,
     SetParametersResult,
 )
 from rclpy.clock import Clock, ClockType
@@ -221,22 +220,15 @@ class Shell(Node):
             floating_point_range=[FloatingPointRange(from_value=0.1, to_value=3600.0, step=0.0)]))
         names = []
         values = {}
+        defaults = parameters.defaults(self._parameters_type)
         for name, field in parameters.flatten(self._parameters_type):
             names.append(name)
             read_only = not any(name.startswith(prefix) for prefix in live)
-            value = self._defaults()[name]
-            if isinstance(value, tuple):
-                value = list(value)
-                descriptor = _descriptor(field, read_only)
-                descriptor.type = ParameterType.PARAMETER_STRING_ARRAY
-            else:
-                descriptor = _descriptor(field, read_only)
-            values[name] = self.declare_parameter(name, value, descriptor).value
+            values[name] = self.declare_parameter(name, defaults[name], _descriptor(field, read_only)).value
         known.update(names, ('graph.pacing', 'graph.nodes', 'graph.deadline'))
         unknown = [name for name in self._parameter_overrides
                    if name not in known and not name.startswith('qos_overrides')]
-        parameters.build(self._parameters_type, {**values, **dict.fromkeys(unknown)} if unknown else values)
-        self.parameters = parameters.build(self._parameters_type, values)
+        self.parameters = parameters.build(self._parameters_type, {**values, **dict.fromkeys(unknown)})
         pacing = self.get_parameter('graph.pacing').value
         if pacing not in ('lockstep', 'realtime'):
             raise parameters.ParameterError(f"graph.pacing = '{pacing}': must be one of lockstep, realtime")
@@ -248,9 +240,6 @@ class Shell(Node):
         if live:
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)
-
-    def _defaults(self):
-        return parameters.defaults(self._parameters_type)
 
     def _changed(self, changes):
         values = parameters.as_dict(self.parameters)
