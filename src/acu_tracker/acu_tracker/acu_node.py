@@ -29,7 +29,7 @@ class AcuNode(shell.Shell):
         self.announced = None
         self.refused = ''
         self.invalid = 0
-        self.waiting = 'operator' in self.graph.nodes and self.graph.lockstep
+        self.waiting = 'operator' in self.graph.members and self.graph.lockstep
         self.held = None
 
         self.command = messages.joint_state(messages.AXES)
@@ -45,7 +45,7 @@ class AcuNode(shell.Shell):
         self.create_service(Trigger, 'acu/reset_faults', self.on_reset_faults)
         self.diagnose_with(self.diagnose)
 
-        self.on_ship = 'ins' in self.graph.nodes
+        self.on_ship = 'ins' in self.graph.members
         self.inputs[0]['stabilised'] = self.on_ship
         followers = {ERROR: p.receiver_latency, **({ATTITUDE: p.attitude_latency} if self.on_ship else {})}
         self.follow('joint_states', followers, self.step)

@@ -33,7 +33,7 @@ class AduNode(shell.Shell):
         self.period_ns = round(p.period * shell.SECOND)
         self.timeout_ns = round(p.command_timeout * p.period * shell.SECOND)
         self.steps_to_go = round(p.duration / p.period) if p.duration > 0.0 else None
-        self.on_ship = 'ship_motion' in self.graph.nodes
+        self.on_ship = 'ship_motion' in self.graph.members
         self.k = 0
         self.lost_steps = self.late_ticks = 0
         self.command = None
@@ -76,7 +76,7 @@ class AduNode(shell.Shell):
         self.heard = time.monotonic()
         self.publish_step()
         if not self.graph.lockstep:
-            mute = self.graph.deadline if 'acu' in self.graph.nodes else self.parameters.period
+            mute = self.graph.deadline if 'acu' in self.graph.members else self.parameters.period
             self.tick_timer = self.every(mute, self.begin_ticking)
 
     def begin_ticking(self):

@@ -31,7 +31,7 @@ class TrackingReceiverNode(shell.Shell):
         self.send_error = self.writer('tracking_receiver/angle_error')
         self.send_truth = self.writer('target/truth')
         self.diagnose_with(self.diagnose)
-        self.on_ship = 'ship_motion' in self.graph.nodes
+        self.on_ship = 'ship_motion' in self.graph.members
         self.follow('joint_states', {'ship/truth': 0.0} if self.on_ship else {}, self.step)
 
     def step(self, stamp, joints, followers):
