@@ -1,4 +1,4 @@
-"""The command line `pedestal`: thin verbs over graph, bag, report and bench."""
+"""The command line `pedestal`: thin verbs over graph, bag, report, studies and bench."""
 import argparse
 import contextlib
 import json
@@ -14,6 +14,7 @@ from rich.table import Table
 from pedestal_common.parameters import ParameterError
 
 EXIT_STOPPED = 130
+EXIT_WRONG_COMMAND = 2
 
 
 def main(args=None) -> int:
@@ -45,7 +46,7 @@ def _parser():
     run.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='default: bags/runs/SCENARIO-N')
     run.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     run.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                     help='change a parameter, as acu.azimuth.position_loop.kp=20; may be repeated')
+                     help='change a parameter, as acu.azimuth.feedforward.bandwidth=20; may be repeated')
     run.set_defaults(verb=_run)
 
     scenarios = verbs.add_parser('scenarios', help='list the scenarios')
@@ -71,6 +72,12 @@ def _parser():
     report.add_argument('--png', type=pathlib.Path, metavar='DIR', help='also write each figure as PNG')
     report.set_defaults(verb=_report)
 
+    study = verbs.add_parser('study', help='measure the compiled closed loop against the papers: rows and figures')
+    study.add_argument('name', nargs='?', metavar='NAME', help='without one: list the studies')
+    study.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
+    study.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
+    study.set_defaults(verb=_study)
+
     bench = verbs.add_parser('bench', help='measure this machine: the lockstep ring, or the compiled core')
     bench.add_argument('what', nargs='?', choices=('graph', 'core'), help='default: both')
     bench.add_argument('--json', type=pathlib.Path, metavar='FILE')
@@ -94,6 +101,11 @@ def _progress(duration):
         yield advance
 
 
+def _check_json(path):
+    if path and (path.is_dir() or not path.parent.is_dir()):
+        raise ValueError(f'--json {path}: must be a file in a directory that exists')
+
+
 def _run(options):
     from pedestal_bringup import graph, results, scenario
     from pedestal_bringup.bag import read
@@ -102,8 +114,7 @@ def _run(options):
     bag = options.bag or graph.free_bag(chosen.name)
     if bag.exists():
         raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
-    if options.json and (options.json.is_dir() or not options.json.parent.is_dir()):
-        raise ValueError(f'--json {options.json}: must be a file in a directory that exists')
+    _check_json(options.json)
     with _progress(chosen.header.duration) as progress:
         try:
             outcome = graph.run(chosen, bag, progress)
@@ -176,6 +187,64 @@ def _report(options):
     from pedestal_bringup import report
     print(report.write(options.bag, options.output, options.png))
     return 0
+
+
+def _study(options):
+    from pedestal_bringup import studies
+    if options.name not in studies.NAMES:
+        problem = f'unknown study {options.name!r}' if options.name else 'no study named'
+        print(f'pedestal: error: {problem}, there are', file=sys.stderr)
+        for name, line in studies.descriptions().items():
+            print(f'  {name:10} {line}', file=sys.stderr)
+        return EXIT_WRONG_COMMAND
+    from pedestal_bringup.studies import experiment
+    output = options.output or pathlib.Path('studies', options.name)
+    _check_json(options.json)
+    output.mkdir(parents=True, exist_ok=True)
+    with _share() as progress:
+        result = studies.study(options.name).run(progress)
+        for name, draw in result.figures.items():
+            progress(None, f'drawing {name}')
+            experiment.save(draw, output / f'{name}.png')
+    _show_study(f'study {options.name}', result.rows)
+    for remark in result.remarks:
+        print(remark)
+    print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')
+    if options.json:
+        _write_json(options.json, {'name': options.name, 'rows': result.rows})
+    return 0
+
+
+@contextlib.contextmanager
+def _share():
+    """A function progress(share done, what comes next): a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda share, text: None
+        return
+    with Progress(BarColumn(), TextColumn('{task.description}'), TimeElapsedColumn(),
+                  console=Console(stderr=True)) as bar:
+        task = bar.add_task('compiling the laws (the first time)', total=1.0)
+        yield lambda share, text: bar.update(task, completed=share, description=text)
+
+
+PIPE_WIDTH = 160
+"""Columns of a table that nobody reads on a terminal: one line a row."""
+
+
+def _show_study(title, rows):
+    from pedestal_bringup.studies import experiment
+
+    def number(value):
+        return '-' if value is None else f'{value:.4g}'
+
+    table = Table(title=title, title_justify='left')
+    for name, justify in (('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'),
+                          ('target', 'left'), ('unit', 'left'), ('', 'left')):
+        table.add_column(name, justify=justify)
+    for row in rows:
+        table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), row['target'] or '',
+                      row['unit'], 'MISSED' if experiment.missed(row) else '')
+    Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(table)
 
 
 def _bench(options):

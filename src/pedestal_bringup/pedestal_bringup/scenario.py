@@ -22,7 +22,7 @@ from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 class ProgramParameters(parameters.Parameters):
     """The program track the operator sends the ACU before the run: the target as predicted, with its error."""
     source: str = parameters.choice('target', ('target', 'none'), 'what the table is made of')
-    interval: float = parameters.parameter(1.0, 0.05, 60.0, 's', 'time between two points')
+    interval: float = parameters.parameter(1.0, 0.002, 60.0, 's', 'time between two points')
     time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
     azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
     elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
@@ -180,7 +180,7 @@ def parse_override(text):
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
-        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.position_loop.kp=20')
+        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.feedforward.bandwidth=20')
     parameters_of(node)
     try:
         return node, key, yaml.load(right, Loader=_Loader)
