@@ -55,15 +55,17 @@ class Writer:
 
     directory: must not exist. topics: rows of topics.TOPICS; a message names its topic by the index in them.
     metadata: {text: text} of the run, kept as the MCAP metadata record `pedestal` and custom_data of metadata.yaml.
+    more: {name: {text: text}} of further metadata records.
     Raises BagError, naming the file, when the disk does not take a chunk. What was written by then stays readable;
     nothing is written after it but the summary, so that a bag has no hole.
     """
 
-    def __init__(self, directory, topics, metadata):
+    def __init__(self, directory, topics, metadata, more=()):
         self.path = pathlib.Path(directory).absolute()
         self.file = self.path / f'{self.path.name}_0.mcap'
         self.topics = tuple(topics)
         self.metadata = {str(key): str(value) for key, value in metadata.items()}
+        self._more = dict(more)
         self._compress = zstandard.ZstdCompressor(level=1).compress
         self._channels = []
         self._schemas = []
@@ -102,9 +104,11 @@ class Writer:
                           'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)}))
         for record in (*self._schemas, *self._channels):
             record.write(builder)
-        self._metadata_at = builder.count
-        records.Metadata(name='pedestal', metadata=self.metadata).write(builder)
-        self._metadata_length = builder.count - self._metadata_at
+        self._metadata_indexes = []
+        for name, metadata in (('pedestal', self.metadata), *self._more.items()):
+            at = builder.count
+            records.Metadata(name=name, metadata=metadata).write(builder)
+            self._metadata_indexes.append(records.MetadataIndex(offset=at, length=builder.count - at, name=name))
         return builder.end()
 
     def _put(self, data):
@@ -198,10 +202,9 @@ class Writer:
                 attachment_count=0, channel_count=len(self._channels), chunk_count=len(self._chunk_indexes),
                 channel_message_counts={number: count for number, count in enumerate(self.counts, 1) if count},
                 message_count=sum(self.counts), message_start_time=self._first or 0, message_end_time=self._last,
-                metadata_count=1, schema_count=len(self._schemas))]),
+                metadata_count=len(self._metadata_indexes), schema_count=len(self._schemas))]),
             (Opcode.CHUNK_INDEX, self._chunk_indexes),
-            (Opcode.METADATA_INDEX, [records.MetadataIndex(offset=self._metadata_at, length=self._metadata_length,
-                                                           name='pedestal')]))
+            (Opcode.METADATA_INDEX, self._metadata_indexes))
         offsets = []
         for opcode, group in groups:
             start = builder.count
@@ -267,14 +270,14 @@ def load(path):
 class Bag:
     """A recording.
 
-    topics: {name without the leading '/': type}; metadata: {text: text} of the run (the record `pedestal`);
+    topics: {name without the leading '/': type}; metadata_records: {name: {text: text}};
     index: record array in the order of the file, one row per message: channel, sequence, log, publish [ns], chunk,
     start, stop (where its bytes are); statistics: {name: count} as the file's summary says, None without one.
     """
 
     def __init__(self, path, file, data):
         self.path, self.file = path, file
-        self.topics, self.metadata, self.statistics, self.damage = {}, {}, None, ''
+        self.topics, self.metadata_records, self.statistics, self.damage = {}, {}, None, ''
         self._data = data
         self._schemas, self._channels, self._chunks = {}, {}, []
         self._chunk = functools.lru_cache(maxsize=256)(self._decompress)
@@ -348,8 +351,7 @@ class Bag:
             self.topics[channel.topic.lstrip('/')] = self._schemas[channel.schema_id]
         elif opcode == Opcode.METADATA:
             record = records.Metadata.read(stream)
-            if record.name == 'pedestal':
-                self.metadata = record.metadata
+            self.metadata_records[record.name] = record.metadata
         elif opcode == Opcode.STATISTICS:
             counts = records.Statistics.read(stream).channel_message_counts
             self.statistics = {name: counts.get(channel, 0) for channel, name in self._channels.items()}
@@ -359,6 +361,23 @@ class Bag:
         chunk = records.Chunk.read(ReadDataStream(io.BytesIO(self._data[at:at + length])))
         stream, size = get_chunk_data_stream(chunk, validate_crc=True)
         return stream.read(size)
+
+    @property
+    def metadata(self):
+        """{text: text} of the run (the record `pedestal`); empty in a foreign bag."""
+        return self.metadata_records.get('pedestal', {})
+
+    @functools.cached_property
+    def configuration(self):
+        """How the run was made: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}; '' and {} in a bag
+        that does not say."""
+        try:
+            return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''),
+                    'parameters': {node: yaml.safe_load(text)
+                                   for node, text in self.metadata_records.get('parameters', {}).items()}}
+        except yaml.YAMLError as error:
+            reason = ' '.join(str(error).split())
+            raise BagError(f'{self.file}: its record `parameters` is no YAML: {reason}') from None
 
     def rows(self, topic):
         """The rows of `index` of one topic."""

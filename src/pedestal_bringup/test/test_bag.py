@@ -152,6 +152,28 @@ def test_mcap_and_mcap_ros2_support_read_what_was_written(recording, rows):
         assert numbers == list(range(1, len(numbers) + 1))
 
 
+def test_configuration_comes_back_and_is_indexed(tmp_path):
+    more = {'scenario': {'yaml': 'scenario: {}\n'}, 'parameters': {'acu': yaml.safe_dump({'a.b': 1e-7, 'c': '12:30'})}}
+    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA, more)
+    writer.close()
+    content = bag.read(tmp_path / 'b')
+    assert content.metadata == {key: str(value) for key, value in METADATA.items()}
+    assert content.configuration == {'scenario': 'scenario: {}\n', 'parameters': {'acu': {'a.b': 1e-7, 'c': '12:30'}}}
+    with open(content.file, 'rb') as stream:
+        reader = make_reader(stream)
+        assert {record.name: record.metadata for record in reader.iter_metadata()} == {
+            'pedestal': content.metadata, **more}
+        assert reader.get_summary().statistics.metadata_count == 3
+
+
+def test_a_bag_that_does_not_say_how_it_was_made_is_no_gap(recording):
+    content = bag.read(recording)
+    assert content.configuration == {'scenario': '', 'parameters': {}}
+    report = verify(recording)
+    assert report.complete and report.made == 'made by: not said in the bag, it holds no configuration'
+    assert report.made in report.lines()
+
+
 def test_file_without_its_summary_reads_from_the_front(recording, rows):
     with open(recording / 'whole_0.mcap', 'rb') as stream:
         assert len(list(NonSeekingReader(stream).iter_messages(log_time_order=False))) == len(rows)
