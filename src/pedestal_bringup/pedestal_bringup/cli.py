@@ -71,6 +71,14 @@ def _parser():
     report.add_argument('--png', type=pathlib.Path, metavar='DIR', help='also write each figure as PNG')
     report.set_defaults(verb=_report)
 
+    export = verbs.add_parser('export', help='write a recording as one table per topic, CSV or Parquet')
+    export.add_argument('bag', type=pathlib.Path)
+    export.add_argument('--format', choices=('csv', 'parquet'), default='csv', help='default: csv')
+    export.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: export in the bag')
+    export.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='default: all')
+    export.add_argument('--overwrite', action='store_true', help='replace tables that are there')
+    export.set_defaults(verb=_export)
+
     bench = verbs.add_parser('bench', help='measure this machine: the lockstep ring, or the compiled core')
     bench.add_argument('what', nargs='?', choices=('graph', 'core'), help='default: both')
     bench.add_argument('--json', type=pathlib.Path, metavar='FILE')
@@ -175,6 +183,16 @@ def _verify(options):
 def _report(options):
     from pedestal_bringup import report
     print(report.write(options.bag, options.output, options.png))
+    return 0
+
+
+def _export(options):
+    from pedestal_bringup.export import export
+    for file, rows, columns in export(options.bag, options.format, options.output, options.topics, options.overwrite):
+        if file is None:
+            print(f'pedestal: left out: {rows}', file=sys.stderr)
+        else:
+            print(f'{file}  {rows} rows, {columns} columns')
     return 0
 
 
