@@ -6,6 +6,7 @@ recorder shares two cores with the loop it records.
 
 Nothing in the MCAP file depends on its path, the host or the wall clock: equal messages give equal bytes.
 """
+import difflib
 import functools
 import io
 import pathlib
@@ -252,6 +253,17 @@ def read(path):
     if bag.damage:
         raise BagError(f'{bag.file}: {bag.damage}')
     return bag
+
+
+def chosen_topics(bag, names):
+    """The topics of these names, without the leading '/', each once; BagError with the nearest for one it has not."""
+    chosen = list(dict.fromkeys(name.lstrip('/') for name in names))
+    for name in chosen:
+        if name not in bag.topics:
+            near = difflib.get_close_matches(name, bag.topics, n=1)
+            hint = f'did you mean {near[0]}? ' if near else ''
+            raise BagError(f'{bag.path}: no topic {name} in it; {hint}there are {", ".join(bag.topics)}')
+    return chosen
 
 
 def load(path):

@@ -78,6 +78,14 @@ def _parser():
     study.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
     study.set_defaults(verb=_study)
 
+    export = verbs.add_parser('export', help='write a recording as one table per topic, CSV or Parquet')
+    export.add_argument('bag', type=pathlib.Path)
+    export.add_argument('--format', choices=('csv', 'parquet'), default='csv', help='default: csv')
+    export.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: export in the bag')
+    export.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='default: all')
+    export.add_argument('--overwrite', action='store_true', help='replace tables that are there')
+    export.set_defaults(verb=_export)
+
     bench = verbs.add_parser('bench', help='measure this machine: the lockstep ring, or the compiled core')
     bench.add_argument('what', nargs='?', choices=('graph', 'core'), help='default: both')
     bench.add_argument('--json', type=pathlib.Path, metavar='FILE')
@@ -245,6 +253,16 @@ def _show_study(title, rows):
         table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), row['target'] or '',
                       row['unit'], 'MISSED' if experiment.missed(row) else '')
     Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(table)
+
+
+def _export(options):
+    from pedestal_bringup.export import export
+    for file, rows, columns in export(options.bag, options.format, options.output, options.topics, options.overwrite):
+        if file is None:
+            print(f'pedestal: left out: {rows}', file=sys.stderr)
+        else:
+            print(f'{file}  {rows} rows, {columns} columns')
+    return 0
 
 
 def _bench(options):
