@@ -16,12 +16,12 @@ from ship_motion_sim import imu, ins, motion
 from tracking_receiver_sim import receiver, target
 
 RESULT = np.dtype([('t', 'f8'), ('position', 'f8', 2), ('load_position', 'f8', 2), ('torque', 'f8', 2),
-                   ('motor_torque', 'f8', (2, 2)), ('motor_velocity', 'f8', (2, 2)), ('rate', 'f8', 2),
-                   ('feedforward', 'f8', 2), ('measured', 'f8', 2), ('true_error', 'f8', 2),
+                   ('motor_torque', 'f8', (2, 2)), ('motor_velocity', 'f8', (2, 2)), ('bias', 'f8', 2),
+                   ('rate', 'f8', 2), ('feedforward', 'f8', 2), ('measured', 'f8', 2), ('true_error', 'f8', 2),
                    ('estimate', 'f8', (2, 3)), ('reference', 'f8', (2, 3)), ('mode', 'i8')], align=True)
 """One step t_k: encoders and true load angle [rad], torque on the load and of the motors [Nm], motor speeds [rad/s],
-the ACU's rate command [rad/s] and feed-forward torque [Nm], the receiver's error and the true one (cross-elevation,
-elevation) [rad]."""
+bias torque [Nm], the ACU's rate command [rad/s] and feed-forward torque [Nm], the receiver's error and the true one
+(cross-elevation, elevation) [rad]."""
 
 
 @dataclasses.dataclass
@@ -157,6 +157,7 @@ def _record(row, t, azimuth, elevation, acu, error):
     row.position[0], row.position[1] = azimuth.position, elevation.position
     row.load_position[0], row.load_position[1] = azimuth.load_position, elevation.load_position
     row.torque[0], row.torque[1] = azimuth.torque, elevation.torque
+    row.bias[0], row.bias[1] = azimuth.bias, elevation.bias
     row.measured[0], row.measured[1] = error.cross_elevation, error.elevation
     row.true_error[0], row.true_error[1] = error.true_cross_elevation, error.true_elevation
     for i in range(2):
