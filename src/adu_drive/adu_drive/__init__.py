@@ -2,8 +2,8 @@
 
     drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
     axis          one axis: sensors, speed loop, two current loops, plant
-    speed_loop, bias, current_loop, pi, travel, encoder         the controller's laws
-    motor, gear_train, friction                                 the plant's laws
+    speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder    the controller's laws
+    motor, gear_train, friction                                                  the plant's laws
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
@@ -19,6 +19,7 @@ Symbols
     R, L, psi, p      phase resistance [ohm], inductance [H], flux linkage [Wb], pole pairs
     K_t               torque constant 1.5 p psi [Nm/A]
     K_p, K_i          gains of a PI controller
+    w_o, d            bandwidth of the disturbance observer [rad/s]; torque it sees on a motor shaft [Nm]
     k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis
     z                 LuGre bristle deflection [rad]; sigma_0, sigma_1 its stiffness and damping
     T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]

@@ -5,7 +5,18 @@ the records `s` (state) and `c` (constants) of the axis, built here as nested di
 """
 import math
 
-from adu_drive import bias, current_loop, encoder, friction, gear_train, motor, pi, speed_loop, travel
+from adu_drive import (
+    bias,
+    current_loop,
+    disturbance_observer,
+    encoder,
+    friction,
+    gear_train,
+    motor,
+    pi,
+    speed_loop,
+    travel,
+)
 from adu_drive.params import SPEED_PERIOD
 from pedestal_common.compiled import compiled
 
@@ -30,12 +41,15 @@ def constants(p, h):
     per_rad = 2.0 ** p.encoder.load_bits / (2.0 * math.pi)
     motor_per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     N = p.gear_train.ratio
+    J_shaft = 0.5 * (p.motor_1.inertia + p.motor_2.inertia + p.speed_loop.load_inertia / N ** 2)
+    l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_PERIOD)
     return {
         'motor_1': _motor_constants(p.motor_1, p.current_loop, motor_per_rad, h),
         'motor_2': _motor_constants(p.motor_2, p.current_loop, motor_per_rad, h),
         'N': N, 'per_N': 1.0 / N, 'per_2N': 0.5 / N, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
         'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * SPEED_PERIOD,
         'K_d': p.speed_loop.differential_damping,
+        'l_1': l_1, 'l_2': l_2, 'h_J_shaft': SPEED_PERIOD / J_shaft,
         'T_b': p.bias.torque, 'out': p.bias.out, 'per_fade': 1.0 / (p.bias.out - p.bias.hold),
         'bias_gain': 1.0 - math.exp(-SPEED_PERIOD / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
         'k': p.gear_train.stiffness, 'c': p.gear_train.damping, 'half_lash': 0.5 * p.gear_train.lash,
@@ -64,11 +78,13 @@ def initial_state(p, theta, external):
     """State of one axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary."""
     per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     T = -0.5 * external / p.gear_train.ratio
+    observed = p.speed_loop.disturbance_observer > 0.0
     T_b = bias.scheduled.py_func(T, p.bias.torque, p.bias.out, 1.0 / (p.bias.out - p.bias.hold))
     return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, theta, per_rad),
             'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, theta, per_rad),
             'theta': theta, 'omega': 0.0, 'z': 0.0,
-            'sum': T, 'bias': T_b, 'rate': 0.0,
+            'sum': 0.0 if observed else T, 'bias': T_b, 'rate': 0.0,
+            'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0}
 
 
@@ -96,6 +112,9 @@ def speed_control(s, c, rate, torque, enable):
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     _sense(m1, k1)
     _sense(m2, k2)
+    omega = 0.5 * (m1.measured + m2.measured)
+    s.omega_hat, s.d_hat = disturbance_observer.update(
+        s.omega_hat, s.d_hat, omega, 0.5 * (_realised(m1, k1) + _realised(m2, k2)), c.l_1, c.l_2, c.h_J_shaft)
 
     if enable:
         wanted = min(max(rate, -c.rate_max), c.rate_max)
@@ -111,8 +130,8 @@ def speed_control(s, c, rate, torque, enable):
         feed_forward = 0.0
         s.end_stop = 1
 
-    error = c.N * s.rate - 0.5 * (m1.measured + m2.measured)
-    T = speed_loop.torque(error, s.sum, c.K_p, feed_forward)
+    error = c.N * s.rate - omega
+    T = speed_loop.torque(error, s.sum, c.K_p, feed_forward - s.d_hat)
     s.bias += c.bias_gain * (bias.scheduled(T, c.T_b, c.out, c.per_fade) - s.bias)
     m1.torque_ref, m2.torque_ref, limited = speed_loop.shared(
         T, s.bias, m1.measured, m2.measured, c.K_d, k1.limit, k2.limit)

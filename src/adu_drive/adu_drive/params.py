@@ -48,6 +48,8 @@ class SpeedLoopParameters(Parameters):
     proportional: float = parameter(6.0, 0.0, 1000.0, 'Nms/rad', 'per motor, on its shaft')
     integral: float = parameter(200.0, 0.0, 1e5, 'Nm/rad', 'per motor, on its shaft')
     differential_damping: float = parameter(0.0, 0.0, 10.0, 'Nms/rad', 'on the speed difference of the motors')
+    disturbance_observer: float = parameter(0.0, 0.0, 2000.0, 'rad/s', 'bandwidth; 0: off')
+    load_inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'of the load as the disturbance observer believes')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,7 +158,7 @@ class AduParameters(Parameters):
     azimuth: AxisParameters = group(AxisParameters)
     elevation: AxisParameters = group(
         AxisParameters,
-        speed_loop=SpeedLoopParameters(proportional=3.2, integral=105.0),
+        speed_loop=SpeedLoopParameters(proportional=3.2, integral=105.0, load_inertia=150.0),
         gear_train=GearTrainParameters(reducer_ratio=10.0, pinion_ratio=9.0, lash=0.8e-3, stiffness=4e6, damping=4e3),
         load=LoadParameters(inertia=150.0, viscous=15.0, unbalance=40.0),
         friction=FrictionParameters(coulomb=45.0, breakaway=60.0),

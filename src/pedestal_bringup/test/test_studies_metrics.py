@@ -41,12 +41,12 @@ def test_crossings():
     assert experiment.crossings(np.array([0.0, 1.1, 0.999, 1.001, 1.0]), 1.0) == 1
 
 
-def test_last_periods_are_whole_and_after_the_skip():
-    mask = experiment.last_periods(T, 0.7, 0.5)
-    assert np.ptp(T[mask]) == pytest.approx(3 * 0.7, abs=2e-4)
-    assert T[mask][-1] == T[-1] and T[mask][0] > 0.5
+def test_whole_periods_begin_at_the_skip():
+    mask = experiment.whole_periods(T, 0.7, 0.5)
+    assert np.sum(mask) == 3 * 7000
+    assert T[mask][0] == pytest.approx(0.5)
     with pytest.raises(ValueError, match='no whole period'):
-        experiment.last_periods(T, 2.9, 0.5)
+        experiment.whole_periods(T, 2.9, 0.5)
 
 
 def test_amplitude_and_period_are_found_beside_an_offset():

@@ -8,17 +8,18 @@ import math
 
 import numpy as np
 
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.figures import FILTERED, INK, RAW, TRUTH
 from pedestal_bringup.studies import experiment, servo
 from pedestal_bringup.studies.experiment import Case, Result, row
 
 SETTLED = 2.0
 """Standstill is what is left so long after a step [s]."""
 
-REVERSAL_AMPLITUDE, REVERSAL_RATE = 0.05, 0.2
-"""Sine of the reversal: amplitude [rad], peak rate [rad/s]."""
+REVERSAL_AMPLITUDE = 0.05
+"""Sine of the reversals [rad]."""
 
-REVERSAL_PERIOD = 2.0 * math.pi * REVERSAL_AMPLITUDE / REVERSAL_RATE
+REVERSALS = {'reversal': 0.2, 'fast_reversal': 4.0}
+"""Its angular frequency [rad/s]: slow, so that only lash is left; 0.2 rad/s at its peak, where friction joins in."""
 
 
 def bias(schedule, torque=12.0, hold=14.0, out=45.0):
@@ -40,6 +41,7 @@ STRUCTURES = {
 TARGETS = {
     ('bias-off', 'standstill_peak_to_peak_rad'): '> 5e-4', ('bias-on', 'standstill_peak_to_peak_rad'): '< 2e-6',
     ('hold-fade', 'standstill_peak_to_peak_rad'): '< 2e-6', ('bias-on', 'reversal_ratio_off_to_on'): '> 30',
+    ('hold-fade', 'reversal_ratio_off_to_on'): '> 30',
     ('hold-fade', 'sine_residual_rad'): '<= 1e-4', ('hold-fade', 'step_overshoot_percent'): '<= 2.5'}
 
 
@@ -48,10 +50,11 @@ def standstill_case(name):
     return Case(name, 'servo_step', PAPER_CASES[name], SETTLED + 1.0)
 
 
-def reversal_case(name):
-    return Case(name, 'servo_sine', {**PAPER_CASES[name],
-                                     'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE,
-                                     'tracking_receiver.target.angle.frequency': 1.0 / REVERSAL_PERIOD}, 6.4)
+def reversal_case(kind, name):
+    """Three periods of a sine of REVERSALS."""
+    return experiment.sine_case(Case(name, 'servo_sine', {
+        **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE}),
+        REVERSALS[kind], 3)
 
 
 def fast_case(name):
@@ -75,11 +78,11 @@ def standstill(record):
     return record['t'][late], record['load_position'][late, 0]
 
 
-def steady_residual(record, amplitude, period):
-    """Time [s] and error [rad] without its fundamental, over the whole periods after the first."""
-    t = record['t']
-    error = amplitude * np.sin(2.0 * math.pi / period * t) - record['load_position'][:, 0]
-    steady = experiment.last_periods(t, period, period)
+def steady_residual(record, amplitude, w):
+    """Time [s] and error [rad] without its fundamental w [rad/s], over the whole periods after the first."""
+    t, period = record['t'], 2.0 * math.pi / w
+    error = amplitude * np.sin(w * t) - record['load_position'][:, 0]
+    steady = experiment.whole_periods(t, period, period)
     return t[steady], experiment.residual(t[steady], error[steady], period)
 
 
@@ -95,39 +98,41 @@ def synchronism_error(record):
 
 
 CASES = {('standstill', name): standstill_case(name) for name in PAPER_CASES}
-CASES |= {('reversal', name): reversal_case(name) for name in PAPER_CASES}
+CASES |= {(kind, name): reversal_case(kind, name) for kind in REVERSALS for name in PAPER_CASES}
 CASES |= {('sine', name): sine_case(name) for name in SCHEDULES}
 CASES |= {('step', name): fast_case(name) for name in SCHEDULES}
 CASES |= {('structure', name): structure_case(name) for name in STRUCTURES}
 
 
+def measured(kind, name, record):
+    """{metric: (value, unit)} of one record."""
+    if kind == 'standstill':
+        return {'standstill_peak_to_peak_rad': (np.ptp(standstill(record)[1]), 'rad')}
+    if kind in REVERSALS:
+        left = steady_residual(record, REVERSAL_AMPLITUDE, REVERSALS[kind])[1]
+        return {f'{kind}_error_rad': (experiment.peak(left), 'rad')}
+    if kind == 'sine':
+        left = steady_residual(record, servo.AMPLITUDE, servo.FREQUENCIES['0p4hz'])[1]
+        return {'sine_residual_rad': (experiment.peak(left), 'rad')}
+    if kind == 'step':
+        overshoot = experiment.overshoot_percent(record['load_position'][:, 0], servo.STEP)
+        return {'step_overshoot_percent': (overshoot, '%')}
+    return {'fight_torque_rms_nm': (experiment.rms(fight(record)), 'Nm'),
+            'synchronism_error_rms_rad_s': (experiment.rms(synchronism_error(record)), 'rad/s')}
+
+
 def rows(done):
     """The rows of the records {(kind, case): record} that there are."""
-    def found(name, metric, value, unit, case=None):
-        return row(case or name, metric, value, unit, target=TARGETS.get((name, metric)))
-
-    out, reversal = [], {}
+    found = []
     for (kind, name), record in done.items():
-        schedule = name if name == 'hold-fade' else f'schedule-{name}'
-        if kind == 'standstill':
-            out.append(found(name, 'standstill_peak_to_peak_rad', np.ptp(standstill(record)[1]), 'rad'))
-        elif kind == 'reversal':
-            reversal[name] = experiment.peak(steady_residual(record, REVERSAL_AMPLITUDE, REVERSAL_PERIOD)[1])
-            out.append(found(name, 'reversal_error_rad', reversal[name], 'rad'))
-            if name != 'bias-off':
-                out.append(found(name, 'reversal_ratio_off_to_on', reversal['bias-off'] / reversal[name], ''))
-        elif kind == 'sine':
-            period = 2.0 * math.pi / servo.FREQUENCIES['0p4hz']
-            left = experiment.peak(steady_residual(record, servo.AMPLITUDE, period)[1])
-            out.append(found(name, 'sine_residual_rad', left, 'rad', schedule))
-        elif kind == 'step':
-            y = record['load_position'][:, 0]
-            out.append(found(name, 'step_overshoot_percent', experiment.overshoot_percent(y, servo.STEP), '%',
-                             schedule))
-        else:
-            out.append(found(name, 'fight_torque_rms_nm', experiment.rms(fight(record)), 'Nm'))
-            out.append(found(name, 'synchronism_error_rms_rad_s', experiment.rms(synchronism_error(record)), 'rad/s'))
-    return out
+        values = measured(kind, name, record)
+        if kind in REVERSALS and name != 'bias-off' and (kind, 'bias-off') in done:
+            without = measured(kind, 'bias-off', done[kind, 'bias-off'])[f'{kind}_error_rad'][0]
+            values[f'{kind}_ratio_off_to_on'] = without / values[f'{kind}_error_rad'][0], ''
+        case = f'schedule-{name}' if kind in ('sine', 'step') and name != 'hold-fade' else name
+        found += [row(case, metric, value, unit, target=TARGETS.get((name, metric)))
+                  for metric, (value, unit) in values.items()]
+    return found
 
 
 def run(progress) -> Result:
@@ -152,10 +157,8 @@ def standstill_figure(done):
         record = done['standstill', name]
         t, y = standstill(record)
         axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH, FILTERED)[column])
-        axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.3g} \N{MICRO SIGN}rad peak to peak')
-        for i, colour in enumerate((MOTOR_1, MOTOR_2)):
-            axes[1, column].plot(t, record['motor_torque'][record['t'] >= SETTLED, 0, i], color=colour,
-                                 label=f'motor {i + 1}')
+        axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
+        experiment.draw_torques(axes[1, column], record)
         axes[1, column].set_xlabel('time [s]')
     axes[0, 0].set_xlim(SETTLED, SETTLED + 0.5)
     axes[0, 0].set_ylabel('azimuth [\N{MICRO SIGN}rad]')
@@ -168,16 +171,23 @@ def reversal_figure(done):
     """What lash leaves of a slow sine: reference and load, then the error without its fundamental."""
     figure, axes = experiment.panels(3, size=(7.4, 5.6), sharex=True, height_ratios=(1, 1.2, 1.2))
     t = done['reversal', 'bias-off']['t']
-    axes[0, 0].plot(t, REVERSAL_AMPLITUDE * np.sin(2.0 * math.pi / REVERSAL_PERIOD * t), color=INK)
+    w = REVERSALS['reversal']
+    axes[0, 0].plot(t, REVERSAL_AMPLITUDE * np.sin(w * t), color=INK)
     axes[0, 0].set_ylabel('reference [rad]')
     for panel, name in zip(axes[1:, 0], ('bias-off', 'bias-on')):
-        t, left = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE, REVERSAL_PERIOD)
+        t, left = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE, w)
         panel.plot(t, 1e6 * left, color=TRUTH if name == 'bias-off' else FILTERED)
         panel.set_ylabel('error [\N{MICRO SIGN}rad]')
         panel.set_title(f'{name}: error without its fundamental')
-    axes[2, 0].set_xlim(t[0], t[-1])
+    axes[2, 0].set_xlim(*turning())
     axes[2, 0].set_xlabel('time [s]')
     return figure
+
+
+def turning():
+    """The 3 s about the first reversal of the second period of the slow sine."""
+    at = 1.25 * 2.0 * math.pi / REVERSALS['reversal']
+    return at - 1.0, at + 2.0
 
 
 def torques_figure(done):
@@ -185,12 +195,11 @@ def torques_figure(done):
     figure, axes = experiment.panels(3, size=(7.4, 5.6), sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
-        for i, colour in enumerate((MOTOR_1, MOTOR_2)):
-            panel.plot(record['t'], record['motor_torque'][:, 0, i], color=colour, label=f'motor {i + 1}')
+        experiment.draw_torques(panel, record)
         panel.set_title(name)
         panel.set_ylabel('torque [Nm]')
-    axes[2, 0].set_xlim(REVERSAL_PERIOD, 2.0 * REVERSAL_PERIOD)
-    axes[2, 0].set_xlabel('time [s], one period of the reversal')
+    axes[2, 0].set_xlim(*turning())
+    axes[2, 0].set_xlabel('time [s]')
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside upper right', ncols=2)
     return figure
 
@@ -198,14 +207,14 @@ def torques_figure(done):
 def schedules_figure(done):
     """Every schedule twice: what it leaves of the sine, and what it costs the fast step."""
     names = list(SCHEDULES)
-    period = 2.0 * math.pi / servo.FREQUENCIES['0p4hz']
-    sine = [1e6 * experiment.peak(steady_residual(done['sine', name], servo.AMPLITUDE, period)[1]) for name in names]
-    step = [experiment.overshoot_percent(done['step', name]['load_position'][:, 0], servo.STEP) for name in names]
+    sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
+    step = [measured('step', name, done['step', name])['step_overshoot_percent'][0] for name in names]
     figure, axes = experiment.panels(1, 2, size=(7.4, 3.2), sharey=True)
     for panel, values, bound, label in ((axes[0, 0], sine, 100.0, 'left of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
                                         (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
         bars = panel.barh(names, values, color=[FILTERED if name == 'hold-fade' else RAW for name in names])
-        panel.bar_label(bars, [f'{value:.3g}' for value in values], padding=3)
+        panel.bar_label(bars, [f'{value:.3g}' for value in values], padding=3,
+                        bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.0})
         panel.axvline(bound, color=INK, linewidth=0.8, linestyle='--')
         panel.set_xlim(0.0, 1.2 * max(*values, bound))
         panel.grid(axis='y', visible=False)
@@ -219,8 +228,7 @@ def structures_figure(done):
     figure, axes = experiment.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
     for column, name in enumerate(STRUCTURES):
         record = done['structure', name]
-        for i, colour in enumerate((MOTOR_1, MOTOR_2)):
-            axes[0, column].plot(record['t'], record['motor_torque'][:, 0, i], color=colour, label=f'motor {i + 1}')
+        experiment.draw_torques(axes[0, column], record)
         axes[1, column].plot(record['t'], fight(record), color=INK)
         axes[0, column].set_title(name)
         axes[1, column].set_xlabel('time [s]')

@@ -39,6 +39,14 @@ class Case:
         return shlex.join(['pedestal', 'run', self.scenario, *duration, *parameters])
 
 
+def sine_case(case, w, periods):
+    """A case of servo_sine with a sine of w [rad/s], for `periods` and a little more, so that the last is whole."""
+    step = 0.002
+    duration = math.ceil((2.0 * math.pi * periods / w + 0.01) / step) * step
+    parameters = {**case.parameters, 'tracking_receiver.target.angle.frequency': w / (2.0 * math.pi)}
+    return dataclasses.replace(case, parameters=parameters, duration=round(duration, 3))
+
+
 @dataclasses.dataclass
 class Result:
     """What a study found: rows as of `row`, figures {name: function that draws a Figure}, remarks in sentences."""
@@ -94,12 +102,13 @@ def crossings(y, size, band=0.005):
     return int(np.sum(side[1:] != side[:-1]))
 
 
-def last_periods(t, period, skip):
-    """The last whole periods of a record as a mask, at least `skip` [s] after its start."""
-    whole = math.floor((t[-1] - t[0] - skip) / period + 1e-6)
+def whole_periods(t, period, skip):
+    """The whole periods of a record from `skip` [s] after its start on, as a mask."""
+    t = t - t[0]
+    whole = math.floor((t[-1] - skip) / period + 1e-6)
     if whole < 1:
-        raise ValueError(f'a record of {t[-1] - t[0]:g} s has no whole period of {period:g} s after {skip:g} s')
-    return t > t[-1] - whole * period + 1e-9
+        raise ValueError(f'a record of {t[-1]:g} s has no whole period of {period:g} s after {skip:g} s')
+    return (t >= skip - 1e-9) & (t < skip + whole * period - 1e-9)
 
 
 def harmonic_fit(t, y, w):
@@ -146,6 +155,12 @@ def panels(rows, columns=1, size=SIZE, **options):
     """(figure, axes (rows, columns)) on one sheet."""
     figure = Figure(figsize=size, layout='constrained')
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def draw_torques(axes, record):
+    """Torque of both azimuth motors over time."""
+    for i, (colour, style) in enumerate(((figures.MOTOR_1, '-'), (figures.MOTOR_2, '--'))):
+        axes.plot(record['t'], record['motor_torque'][:, 0, i], style, color=colour, label=f'motor {i + 1}')
 
 
 def save(draw, path):

@@ -4,6 +4,7 @@ Cases: paper-r1 and paper-r2, the two readings of the paper's sine, with gains f
 controller; best-inertia-plus and -minus, the same with 20 % more and less load; best-full-torque, without a reserve
 for such a load; adrc. Every case is `pedestal run servo_step|servo_sine --param ...` too (Case.command).
 """
+import functools
 import math
 
 import numpy as np
@@ -87,11 +88,8 @@ def step_case(name):
 
 
 def sine_case(name, reading):
-    """PERIODS of one reading of the paper's sine and a little more, so that the last is whole."""
-    w = FREQUENCIES[reading]
-    duration = math.ceil((2.0 * math.pi * PERIODS / w + 0.01) / 0.002) * 0.002
-    return Case(name, 'servo_sine', {**CASES[name], 'tracking_receiver.target.angle.frequency': w / (2.0 * math.pi)},
-                duration)
+    """PERIODS of one reading of the paper's sine."""
+    return experiment.sine_case(Case(name, 'servo_sine', CASES[name]), FREQUENCIES[reading], PERIODS)
 
 
 def gust_case(name, **more):
@@ -115,7 +113,7 @@ def sine_error(record, w):
 def sine_metrics(record, reading):
     w = FREQUENCIES[reading]
     t, error, period = record['t'], sine_error(record, w), 2.0 * math.pi / w
-    steady = experiment.last_periods(t, period, period)
+    steady = experiment.whole_periods(t, period, period)
     amplitude, fitted = experiment.amplitude_and_period(t[steady], record['load_position'][steady, 0], period)
     return {f'sine_{reading}_max_error_rad': experiment.peak(error[steady]),
             f'sine_{reading}_rms_error_rad': experiment.rms(error[steady]),
@@ -130,8 +128,8 @@ def gust_metrics(record):
 
 RUNS = {
     'paper-r1': ('step', '0p4hz', '0p4rads', 'gust'), 'paper-r2': ('step', '0p4rads'),
-    'best': ('step', '0p4rads', '0p4hz', 'gust'), 'best-inertia-plus': ('step', '0p4hz'),
-    'best-inertia-minus': ('step', '0p4hz'), 'best-full-torque': ('step',),
+    'best': ('step', '0p4rads', '0p4hz', 'gust'), 'best-inertia-plus': ('step',),
+    'best-inertia-minus': ('step',), 'best-full-torque': ('step',),
     'adrc': ('step', '0p4rads', '0p4hz', 'gust'),
 }
 """What is done with each case."""
@@ -148,18 +146,15 @@ def records(cases, progress):
     return done
 
 
+METRICS = {'step': step_metrics, 'gust': gust_metrics,
+           **{reading: functools.partial(sine_metrics, reading=reading) for reading in FREQUENCIES}}
+
+
 def rows(done):
     """The rows of some records."""
-    found = []
-    for (name, kind), record in done.items():
-        values = (step_metrics(record) if kind == 'step' else gust_metrics(record) if kind == 'gust'
-                  else sine_metrics(record, kind))
-        for metric, value in values.items():
-            short = metric.removeprefix(f'sine_{kind}_')
-            paper = PAPER.get(short)
-            found.append(row(name, metric, value, UNITS[metric.rpartition('_')[2]], paper,
-                             TARGETS.get(name, {}).get(metric)))
-    return found
+    return [row(name, metric, value, UNITS[metric.rpartition('_')[2]], PAPER.get(metric.removeprefix(f'sine_{kind}_')),
+                TARGETS.get(name, {}).get(metric))
+            for (name, kind), record in done.items() for metric, value in METRICS[kind](record).items()]
 
 
 def bang_bang(step, adu):
@@ -177,18 +172,14 @@ def bang_bang(step, adu):
 
 def remarks(done):
     """What the rows do not say by themselves, with the limits of the plant."""
-    def value(name, kind, metric):
-        metrics = {'step': step_metrics, 'gust': gust_metrics}.get(kind, lambda record: sine_metrics(record, kind))
-        return metrics(done[name, kind])[metric]
-
+    slow = step_metrics(done['paper-r2', 'step'])['step_settling_2percent_s']
     adu = step_case('best').loaded().node_parameters('adu')
     whole, settled = bang_bang(STEP, adu)
     gear, bits = adu.azimuth.gear_train, adu.azimuth.encoder.load_bits
     return [
-        "One controller cannot do both of the paper's figures if its sine is 0.4 rad/s: an error of 0.04 rad is that of "
-        f'a gain of {AMPLITUDE * 0.4 / 0.04:.2g} 1/s (paper-r2), whose step takes '
-        f'{value("paper-r2", "step", "step_settling_2percent_s"):.3f} s, not 0.2 s. If it is 0.4 Hz, paper-r1 does '
-        'both.',
+        "One controller cannot do both of the paper's figures if its sine is 0.4 rad/s: an error of 0.04 rad is that "
+        f'of a gain of {AMPLITUDE * 0.4 / 0.04:.2g} 1/s (paper-r2), whose step takes '
+        f'{slow:.3f} s, not 0.2 s. If it is 0.4 Hz, paper-r1 does both.',
         f'The 0.4 Hz sine starts from rest with {AMPLITUDE * FREQUENCIES["0p4hz"]:.2f} rad/s: the error of its start '
         'is v2/(2 a), set by the torque, and no controller removes it.',
         f'Limit of the step: torque. Full torque forwards and back takes {whole:.3f} s, {settled:.3f} s to the 2 % '
@@ -220,8 +211,7 @@ def step_figure(done):
         record = done[name, 'step']
         t = record['t']
         top.plot(t, record['load_position'][:, 0], color=COLOURS[name], linewidth=1.4, label=name)
-        for i, colour in enumerate((MOTOR_1, MOTOR_2)):
-            below.plot(t, record['motor_torque'][:, 0, i], color=colour, label=f'motor {i + 1}')
+        experiment.draw_torques(below, record)
         below.set_title(f'{name}: torque of the motors')
         below.set_ylabel('torque [Nm]')
         below.set_ylim(-100.0, 100.0)
@@ -246,13 +236,14 @@ def sine_figure(done):
                     label='paper-r1, 0.4 Hz')
     axes[0, 0].set_title('sine of 0.87 rad (figure 6 of the paper)')
     axes[0, 0].set_ylabel('azimuth [rad]')
-    for name, reading, colour, scale, panel in (
-            ('paper-r1', '0p4hz', TRUTH, 1e3, 1), ('paper-r2', '0p4rads', RAW, 1e3, 1),
-            ('best', '0p4hz', FILTERED, 1e6, 2), ('best', '0p4rads', MOTOR_1, 1e6, 2)):
+    for name, reading, colour, style, scale, panel in (
+            ('paper-r1', '0p4hz', TRUTH, '-', 1e3, 1), ('paper-r2', '0p4rads', INK, '--', 1e3, 1),
+            ('best', '0p4hz', FILTERED, '-', 1e6, 2), ('best', '0p4rads', MOTOR_1, '-', 1e6, 2)):
         record, w = done[name, reading], FREQUENCIES[reading]
-        axes[panel, 0].plot(record['t'] * w / (2.0 * math.pi), scale * sine_error(record, w), color=colour,
+        axes[panel, 0].plot(record['t'] * w / (2.0 * math.pi), scale * sine_error(record, w), style, color=colour,
                             label=f'{name}, {READINGS[reading]}')
     axes[1, 0].set_ylabel('error [mrad]')
+    axes[2, 0].set_title('best, its start beyond the scale')
     axes[2, 0].set_ylabel('error [\N{MICRO SIGN}rad]')
     axes[2, 0].set_ylim(-100.0, 100.0)
     axes[2, 0].set_xlim(0.0, PERIODS)
@@ -285,7 +276,8 @@ def gust_figure(done):
 def inertia_figure(done):
     """The step of best with 20 % more and less load, around its end, and the torque it takes."""
     figure, axes = experiment.panels(2, size=(7.4, 5.2), sharex=True)
-    for name, label in (('best-inertia-minus', '-20 %'), ('best', 'as known'), ('best-inertia-plus', '+20 %')):
+    for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as known'),
+                        ('best-inertia-plus', 'load 20 % heavier')):
         record = done[name, 'step']
         axes[0, 0].plot(record['t'], 1e3 * (record['load_position'][:, 0] - STEP), color=COLOURS[name], label=label)
         axes[1, 0].plot(record['t'], record['motor_torque'][:, 0].mean(axis=1), color=COLOURS[name], label=label)
@@ -298,7 +290,7 @@ def inertia_figure(done):
     axes[1, 0].set_ylabel('torque [Nm]')
     axes[1, 0].set_title('mean torque of the two motors')
     axes[1, 0].set_xlabel('time [s]')
-    axes[0, 0].legend(loc='lower right', title='load inertia')
+    axes[1, 0].legend(loc='lower right')
     return figure
 
 
