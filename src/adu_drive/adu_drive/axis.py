@@ -7,14 +7,17 @@ import math
 
 from adu_drive import (
     bias,
+    brake,
     current_loop,
     disturbance_observer,
     encoder,
+    faults,
     friction,
     gear_train,
     motor,
     pi,
     speed_loop,
+    thermal,
     travel,
 )
 from adu_drive.params import SPEED_PERIOD
@@ -26,11 +29,13 @@ CURRENT_TICKS = 5
 CURRENT_PERIOD = SPEED_PERIOD / CURRENT_TICKS
 
 
-def _motor_constants(m, loop, per_rad, h):
+def _motor_constants(m, loop, heat, per_rad, h):
     w = 2.0 * math.pi * loop.bandwidth
     return {'p': float(m.pole_pairs), 'psi': m.flux_linkage, 'L': m.inductance, 'K_t': m.torque_constant,
             'per_K_t': 1.0 / m.torque_constant, 'h_L': h / m.inductance,
-            'q_R': 1.0 / (1.0 + h * m.resistance / m.inductance), 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
+            'h_R_L': h * m.resistance / m.inductance, 'rise': thermal.COPPER * heat.rise,
+            'per_rated': 1.0 / heat.rated_torque, 'heat_gain': 1.0 - math.exp(-SPEED_PERIOD / heat.time_constant),
+            'h_brake_J': h * m.brake / m.inertia, 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
             'h_J': h / m.inertia, 'q_B': 1.0 / (1.0 + h * m.viscous / m.inertia),
             'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_PERIOD, 'v_max': m.voltage,
             'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad, 'speed': 1.0 / per_rad / SPEED_PERIOD}
@@ -44,8 +49,8 @@ def constants(p, h):
     J_shaft = 0.5 * (p.motor_1.inertia + p.motor_2.inertia + p.speed_loop.load_inertia / N ** 2)
     l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_PERIOD)
     return {
-        'motor_1': _motor_constants(p.motor_1, p.current_loop, motor_per_rad, h),
-        'motor_2': _motor_constants(p.motor_2, p.current_loop, motor_per_rad, h),
+        'motor_1': _motor_constants(p.motor_1, p.current_loop, p.thermal, motor_per_rad, h),
+        'motor_2': _motor_constants(p.motor_2, p.current_loop, p.thermal, motor_per_rad, h),
         'N': N, 'per_N': 1.0 / N, 'per_2N': 0.5 / N, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
         'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * SPEED_PERIOD,
         'K_d': p.speed_loop.differential_damping,
@@ -61,7 +66,11 @@ def constants(p, h):
         'rate_max': p.limits.rate, 'a': p.limits.deceleration, 'ramp': p.limits.deceleration * SPEED_PERIOD,
         'lower': p.limits.lower, 'upper': p.limits.upper, 'K': p.limits.approach,
         'stop_lower': p.limits.lower - p.limits.buffer, 'stop_upper': p.limits.upper + p.limits.buffer,
-        'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping}
+        'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping,
+        'faults': {'current_2': p.faults.overcurrent ** 2, 'omega': N * p.faults.overspeed,
+                   'disagreement': p.faults.encoder_disagreement, 'error': N * p.faults.following_error,
+                   'late_periods': math.ceil(p.faults.following_time / SPEED_PERIOD - 1e-6),
+                   'heat': p.faults.overtemperature}}
 
 
 def _motor_at_rest(m, g, T, theta, per_rad):
@@ -71,7 +80,8 @@ def _motor_at_rest(m, g, T, theta, per_rad):
     angle = g.ratio * (theta + flank + T * g.ratio / g.stiffness)
     return {'i_d': 0.0, 'i_q': i_q, 'i_ref': i_q, 'v_d': 0.0, 'v_q': m.resistance * i_q,
             'sum_d': 0.0, 'sum_q': m.resistance * i_q, 'omega': 0.0, 'theta': angle,
-            'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0, 'torque_ref': T, 'limited': 0}
+            'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0, 'torque_ref': T, 'limited': 0,
+            'heat': 0.0, 'q_R': 1.0, 'h_brake_J': 0.0}
 
 
 def initial_state(p, theta, external):
@@ -85,7 +95,8 @@ def initial_state(p, theta, external):
             'theta': theta, 'omega': 0.0, 'z': 0.0,
             'sum': 0.0 if observed else T, 'bias': T_b, 'rate': 0.0,
             'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
-            'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0}
+            'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0,
+            'faults': 0, 'present': 0, 'late': 0, 'slewing': 0}
 
 
 @compiled
@@ -97,6 +108,7 @@ def _measured_speed(m, k):
 @compiled
 def _sense(m, k):
     m.measured = _measured_speed(m, k)
+    m.heat = thermal.load(m.heat, k.K_t * m.i_q, k.per_rated, k.heat_gain)
     m.count = encoder.counts(m.theta, k.per_rad)
 
 
@@ -107,21 +119,55 @@ def _realised(m, k):
 
 
 @compiled
-def speed_control(s, c, rate, torque, enable):
-    """One speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references."""
+def _supervise(s, c, omega, free):
+    """Trip on what the drive measures; `free`: the motors may turn, so they must follow."""
+    m1, m2, k = s.motor_1, s.motor_2, c.faults
+    s.late = faults.late(s.late, c.N * s.rate - omega, k.error) if free else 0
+    s.present |= faults.detected(
+        max(m1.i_d * m1.i_d + m1.i_q * m1.i_q, m2.i_d * m2.i_d + m2.i_q * m2.i_q),
+        max(abs(m1.measured), abs(m2.measured)),
+        c.rad * encoder.counts(s.theta, c.per_rad) - c.per_2N * (c.motor_1.rad * m1.count + c.motor_2.rad * m2.count),
+        s.late, max(m1.heat, m2.heat), k)
+    s.faults |= s.present
+
+
+@compiled
+def _let_go(s, omega):
+    """No torque; whoever takes hold again starts from what is then."""
+    s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
+    s.sum = s.rate = s.d_hat = 0.0
+    s.omega_hat = omega
+    s.stopping = 1
+
+
+@compiled
+def speed_control(s, c, rate, torque, enable, powered, free):
+    """One speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references.
+
+    enable: follow, else stop and hold; powered: the motors may make torque; free: no brake holds them.
+    """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     _sense(m1, k1)
     _sense(m2, k2)
     omega = 0.5 * (m1.measured + m2.measured)
+    _supervise(s, c, omega, powered and free)
+    if not powered or s.faults & faults.OVERCURRENT:
+        _let_go(s, omega)
+        return
     s.omega_hat, s.d_hat = disturbance_observer.update(
         s.omega_hat, s.d_hat, omega, 0.5 * (_realised(m1, k1) + _realised(m2, k2)), c.l_1, c.l_2, c.h_J_shaft)
 
+    feed_forward = 0.0
     if enable:
         wanted = min(max(rate, -c.rate_max), c.rate_max)
-        feed_forward = torque * c.per_2N
+        if s.slewing:       # whoever commands did not stop with the drive: meet the command within the ramp
+            slewed = s.rate + min(max(wanted - s.rate, -c.ramp), c.ramp)
+            s.slewing = slewed != wanted
+            wanted = slewed
+        else:
+            feed_forward = torque * c.per_2N
     else:
         wanted = s.rate - min(max(s.rate, -c.ramp), c.ramp)
-        feed_forward = 0.0
         s.stopping = 1
     position = c.rad * encoder.counts(s.theta, c.per_rad)
     s.rate = min(max(wanted, -travel.approach_rate(position - c.lower, c.K, c.a)),
@@ -147,6 +193,21 @@ def speed_control(s, c, rate, torque, enable):
 
 
 @compiled
+def _begin_motor(m, k, grip):
+    m.h_brake_J = k.h_brake_J if grip else 0.0
+    m.q_R = thermal.damping(k.h_R_L, k.rise, m.heat)
+
+
+@compiled
+def begin_period(s, c, grip, following):
+    """Once per control period: brakes, winding temperature, and the marks of what happens within it."""
+    _begin_motor(s.motor_1, c.motor_1, grip)
+    _begin_motor(s.motor_2, c.motor_2, grip)
+    s.slewing |= not following
+    s.torque_limited = s.voltage_limited = s.end_stop = s.stopping = s.present = 0
+
+
+@compiled
 def current_control(m, k):
     """One current-loop period of one motor: current reference to phase voltages."""
     m.v_d, m.v_q, m.sum_d, m.sum_q, limited = current_loop.voltages(
@@ -159,16 +220,18 @@ def plant_step(s, c, external):
     """One plant sub-step h under an external load torque [Nm]: semi-implicit Euler, new currents into the
     speeds, new speeds into the angles; implicit in R, viscous friction and bristle."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, k1.q_R)
-    m2.i_d, m2.i_q = motor.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, k2.q_R)
+    m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, m1.q_R)
+    m2.i_d, m2.i_q = motor.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, m2.q_R)
 
     mesh_1 = gear_train.mesh_torque(m1.theta * c.per_N - s.theta, m1.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
     mesh_2 = gear_train.mesh_torque(m2.theta * c.per_N - s.theta, m2.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
     bearing, s.z = friction.lugre(s.z, s.omega, c.T_c, c.T_sc, c.per_v2, c.sigma_0, c.h_sigma_0, c.sigma_1_h, c.h)
     stop = travel.buffer_torque(s.theta, s.omega, c.stop_lower, c.stop_upper, c.k_stop, c.c_stop)
 
-    m1.omega = motor.speed(m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
-    m2.omega = motor.speed(m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
+    m1.omega = brake.braked(motor.speed(
+        m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B), m1.h_brake_J)
+    m2.omega = brake.braked(motor.speed(
+        m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B), m2.h_brake_J)
     s.omega = (s.omega + c.h_J * (mesh_1 + mesh_2 + external + stop - bearing)) * c.q_B
 
     m1.theta += c.h * m1.omega
@@ -194,5 +257,7 @@ def read(s, c, y):
     y.voltage_limited = s.voltage_limited
     y.end_stop = s.end_stop
     y.stopping = s.stopping
+    y.faults = s.faults
+    y.thermal_load[0], y.thermal_load[1] = m1.heat, m2.heat
     y.load_position = s.theta
     y.load_velocity = s.omega

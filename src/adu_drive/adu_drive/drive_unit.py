@@ -6,12 +6,15 @@ import math
 
 import numpy as np
 
-from adu_drive import axis, wind
+from adu_drive import axis, drive_state, wind
 from adu_drive.params import AduParameters, whole_speed_periods
 from pedestal_common.compiled import compiled
 
 RING = 128
 """Commands kept for the transport delay: more than MAX_DELAY over the shortest period."""
+
+LONG_AGO = 1 << 40
+"""Periods since the brakes were last moved, at the start."""
 
 LARGEST = 1e6
 """Inputs beyond this (rad/s, Nm, rad/s2), infinite or NaN are not believed."""
@@ -28,9 +31,11 @@ _AXIS_OUTPUTS = np.dtype([
     ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
     ('motor_position', 'f8', (2,)), ('motor_velocity', 'f8', (2,)), ('motor_torque', 'f8', (2,)), ('bias', 'f8'),
     ('torque_limited', 'i8'), ('voltage_limited', 'i8'), ('end_stop', 'i8'), ('stopping', 'i8'),
+    ('faults', 'i8'), ('thermal_load', 'f8', (2,)),
     ('load_position', 'f8'), ('load_velocity', 'f8')], align=True)
 
-OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8')], align=True)
+OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8'),
+                    ('phase', 'i8'), ('following', 'i8'), ('emergency', 'i8'), ('braked', 'i8')], align=True)
 """At t_k+1, per axis:
 
 position          load encoder [rad]
@@ -41,10 +46,15 @@ bias              T_b [Nm]
 torque_limited, voltage_limited                 1 when it happened within the period
 end_stop          1 when the end of travel cut the rate command within the period
 stopping          1 when not enabled within the period: ramped to standstill, then held there
+faults            latched fault word, see faults.KINDS
+thermal_load      of motor 1 and 2; 1 after rated torque for ever
 load_position, load_velocity                    the truth, for tests and studies; never published
 
 invalid_command   1 when an input of this call was not finite (or beyond LARGEST): the command counts as enable 0,
                   a disturbance as 0
+phase             of drive_state.PHASES; following: 1 when enabled and nothing stands against it at t_k+1
+emergency         1 when an emergency stop is latched
+braked            1 when the brakes grip
 """
 
 
@@ -65,17 +75,22 @@ def _constants(params, substeps):
                     'wind': wind.constants(params.wind), 'period': params.period,
                     'speed_ticks': whole_speed_periods('period', params.period),
                     'delay_ticks': whole_speed_periods('transport_delay', params.transport_delay),
+                    **{f'{name}_periods': math.ceil(getattr(params.brakes, f'{name}_time') / params.period - 1e-6)
+                       for name in ('engage', 'release', 'stop')},
                     'substeps': substeps})
 
 
 def _initial_state(params):
-    axes = {}
+    axes, enabled = {}, params.initially_enabled
     for name, torque in zip(('azimuth', 'elevation'), wind.initial_torques(params.wind)):
         p, theta = getattr(params, name), getattr(params, f'initial_{name}')
         external = torque - p.load.unbalance * math.cos(theta)
         axes[name] = axis.initial_state(p, theta, external)
     return _record({**axes, 'rate': np.zeros((RING, 2)), 'torque': np.zeros((RING, 2)),
-                    'enable': np.zeros(RING, np.int64), 'k': 0})
+                    'enable': np.zeros(RING, np.int64), 'k': 0,
+                    'phase': drive_state.ENABLED if enabled else drive_state.DISABLED, 'age': 0,
+                    'wanted': int(enabled), 'emergency': 0,
+                    'applied': int(not enabled), 'brake_age': LONG_AGO, 'braked': int(not enabled)})
 
 
 CONSTANTS = _constants(AduParameters(), 2).dtype
@@ -140,19 +155,13 @@ def _receive(s, u, disturbance_believed):
 
 
 @compiled
-def _clear(s):
-    s.torque_limited = 0
-    s.voltage_limited = 0
-    s.end_stop = 0
-    s.stopping = 0
-
-
-@compiled
 def read(state, constants, outputs):
     """Outputs as they are now, nothing integrated: at t_0, before the first step."""
     s, c, y = state[0], constants[0], outputs[0]
     axis.read(s.azimuth, c.azimuth, y.azimuth)
     axis.read(s.elevation, c.elevation, y.elevation)
+    y.phase, y.emergency, y.braked = s.phase, s.emergency, s.braked
+    y.following = s.phase == drive_state.ENABLED and drive_state.permitted(s)
 
 
 @compiled
@@ -162,14 +171,17 @@ def step(state, constants, inputs, outputs):
     az, el, c_az, c_el = s.azimuth, s.elevation, c.azimuth, c.elevation
     T_az, T_el, believed = _external(s, c, u)
     outputs[0].invalid_command = 0 if _receive(s, u, believed) else 1
-    _clear(az)
-    _clear(el)
+    s.braked = drive_state.advance(s, c)
+    enabled = s.phase == drive_state.ENABLED and u.enable == 1
+    powered, free = s.phase != drive_state.DISABLED, not s.braked
+    axis.begin_period(az, c_az, s.braked, enabled)
+    axis.begin_period(el, c_el, s.braked, enabled)
     for j in range(c.speed_ticks):
         tick = s.k * c.speed_ticks + j - c.delay_ticks
         slot = (tick // c.speed_ticks) % RING     # before the first command: a slot still empty, enable 0
-        enable = s.enable[slot] if u.enable == 1 else 0
-        axis.speed_control(az, c_az, s.rate[slot, 0], s.torque[slot, 0], enable)
-        axis.speed_control(el, c_el, s.rate[slot, 1], s.torque[slot, 1], enable)
+        enable = s.enable[slot] if enabled else 0
+        axis.speed_control(az, c_az, s.rate[slot, 0], s.torque[slot, 0], enable, powered, free)
+        axis.speed_control(el, c_el, s.rate[slot, 1], s.torque[slot, 1], enable, powered, free)
         for _ in range(axis.CURRENT_TICKS):
             axis.current_control(az.motor_1, c_az.motor_1)
             axis.current_control(az.motor_2, c_az.motor_2)

@@ -3,7 +3,7 @@ what the paper leaves open: reference/servo.md section 1."""
 import dataclasses
 import math
 
-from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter
+from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter
 
 SPEED_PERIOD = 0.5e-3
 """Period of the speed loop [s]; five current-loop periods."""
@@ -32,6 +32,7 @@ class MotorParameters(Parameters):
     friction: float = parameter(0.4, 0.0, 100.0, 'Nm', 'Coulomb friction')
     friction_speed: float = parameter(0.5, 0.1, 100.0, 'rad/s', 'rate over which friction changes its sign')
     viscous: float = parameter(0.003, 0.0, 10.0, 'Nms/rad', 'viscous friction')
+    brake: float = parameter(45.0, 0.0, 1e4, 'Nm', 'holding torque of the brake on the motor shaft')
 
     @property
     def torque_constant(self):
@@ -116,6 +117,34 @@ class LimitParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class ThermalParameters(Parameters):
+    """I2t of each motor: load = 1 after rated torque for ever."""
+    rated_torque: float = parameter(30.0, 0.1, 10000.0, 'Nm', 'torque a motor bears for ever')
+    time_constant: float = parameter(60.0, 0.1, 1e5, 's', 'of the winding')
+    rise: float = parameter(80.0, 0.0, 300.0, 'K', 'of the winding over its cold state at load 1; it adds resistance')
+
+
+@dataclasses.dataclass(frozen=True)
+class FaultParameters(Parameters):
+    """Where an axis trips."""
+    overcurrent: float = parameter(46.0, 0.01, 10000.0, 'A', 'phase current, peak; 1.3 times that of the torque limit')
+    overspeed: float = parameter(3.0, 1e-4, 50.0, 'rad/s', 'motor speed over the ratio')
+    encoder_disagreement: float = parameter(5e-3, 1e-6, 1.0, 'rad', 'load encoder less motor encoders; lash, wind-up '
+                                            'and bending of the gears must fit in')
+    following_error: float = parameter(0.05, 1e-4, 50.0, 'rad/s', 'rate wanted less rate measured ...')
+    following_time: float = parameter(0.5, 1e-3, 100.0, 's', '... beyond it for this long')
+    overtemperature: float = parameter(1.1, 0.01, 100.0, '', 'thermal load of a motor')
+
+
+@dataclasses.dataclass(frozen=True)
+class BrakeParameters(Parameters):
+    """The brakes of all motors; their torque is the motors' own parameter."""
+    engage_time: float = parameter(0.05, 0.0, 10.0, 's', 'from the order until they grip')
+    release_time: float = parameter(0.1, 0.0, 10.0, 's', 'from the order until they are free')
+    stop_time: float = parameter(1.0, 1e-3, 100.0, 's', 'a controlled stop that takes longer ends in the brakes')
+
+
+@dataclasses.dataclass(frozen=True)
 class EncoderParameters(Parameters):
     load_bits: int = parameter(22, 8, 32, 'bit', 'load encoder, per turn')
     motor_bits: int = parameter(20, 8, 32, 'bit', 'motor encoders, per turn')
@@ -133,6 +162,8 @@ class AxisParameters(Parameters):
     friction: FrictionParameters = group(FrictionParameters)
     limits: LimitParameters = group(LimitParameters)
     encoder: EncoderParameters = group(EncoderParameters)
+    thermal: ThermalParameters = group(ThermalParameters)
+    faults: FaultParameters = group(FaultParameters)
 
     def check(self):
         for motor in (self.motor_1, self.motor_2):
@@ -174,6 +205,8 @@ class AduParameters(Parameters):
     transport_delay: float = parameter(0.0, 0.0, MAX_DELAY, 's', 'a command takes effect this much later')
     initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'at t = 0')
     initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'at t = 0')
+    initially_enabled: bool = flag(True, 'false: brakes on until adu/enable')
+    brakes: BrakeParameters = group(BrakeParameters)
     wind: WindParameters = group(WindParameters)
     azimuth: AxisParameters = group(AxisParameters)
     elevation: AxisParameters = group(
@@ -182,7 +215,8 @@ class AduParameters(Parameters):
         gear_train=GearTrainParameters(reducer_ratio=10.0, pinion_ratio=9.0, lash=0.8e-3, stiffness=4e6, damping=4e3),
         load=LoadParameters(inertia=150.0, viscous=15.0, unbalance=40.0),
         friction=FrictionParameters(coulomb=45.0, breakaway=60.0),
-        limits=LimitParameters(rate=1.7, lower=math.radians(-2.0), upper=math.radians(92.0)))
+        limits=LimitParameters(rate=1.7, lower=math.radians(-2.0), upper=math.radians(92.0)),
+        faults=FaultParameters(overspeed=2.1))
 
     def check(self):
         whole_speed_periods('period', self.period)

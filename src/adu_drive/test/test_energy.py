@@ -82,10 +82,11 @@ def account(state, constants, external, motors, gear, load, log):
     state_of(s, x1)
     before = stored(x1, motors, gear, load)
     electrical = work = rate = 0.0
+    axis.begin_period(s, c, False, True)        # brakes off, windings cold
     for n in range(len(external)):
         if n % 4 == 0:
             rate = K_p * (STEP - s.theta)
-        axis.speed_control(s, c, rate, 0.0, 1)
+        axis.speed_control(s, c, rate, 0.0, 1, True, True)
         for _ in range(axis.CURRENT_TICKS):
             axis.current_control(s.motor_1, c.motor_1)
             axis.current_control(s.motor_2, c.motor_2)
@@ -104,7 +105,8 @@ def account(state, constants, external, motors, gear, load, log):
 def run(bias, substeps):
     """0.174 rad at full torque, then a gust of -1500 Nm, then the release: 0.6 s."""
     p = build(AduParameters, {'initial_elevation': 0.7, 'azimuth.bias.torque': bias,
-                              'azimuth.speed_loop.proportional': 3.57, 'azimuth.speed_loop.integral': 244.0})
+                              'azimuth.speed_loop.proportional': 3.57, 'azimuth.speed_loop.integral': 244.0,
+                              'azimuth.faults.overcurrent': 1000.0})   # 93 A where the voltage is used up
     external = np.zeros(1200)
     external[500:900] = -1500.0
     log = np.zeros((1200, 2))

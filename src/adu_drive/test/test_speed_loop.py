@@ -62,7 +62,8 @@ def test_voltage_limit_recovers_without_windup(drive):
     long after 2 s in the limit as after 0.6 s (an integral that had run on would overshoot for longer)."""
     def back(volts, seconds):
         p = build(AduParameters, {'initial_elevation': 0.7, 'initial_azimuth': -4.5, 'azimuth.motor_1.voltage': volts,
-                                  'azimuth.motor_2.voltage': volts, 'wind.azimuth': -3000.0})
+                                  'azimuth.motor_2.voltage': volts, 'wind.azimuth': -3000.0,
+                                  'azimuth.faults.following_time': 100.0})
         d = drive(p).run(seconds, azimuth=2.45)
         y, total = d.log['azimuth'][-1], d.state['azimuth']['sum'][0]
         assert total < 1.1 * y['motor_torque'].mean()
