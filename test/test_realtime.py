@@ -156,12 +156,15 @@ def test_emergency_stop_and_reset(drive):
     drive.rates = 0.2, 0.0
     drive.moves_at(0.2, 0.0)
     assert drive.client.trigger('adu/emergency_stop') == (
-        True, 'axes are stopping and stay stopped until adu/reset_faults')
-    assert drive.client.trigger('adu/reset_faults') == (False, 'refused: azimuth still moves')
+        True, 'drive is emergency stop')
+    assert drive.client.trigger('adu/reset_faults') == (
+        False, 'refused: the axes still move; drive is emergency stop')
+    assert drive.client.trigger('adu/enable') == (
+        False, 'refused: an emergency stop is latched (adu/reset_faults); drive is emergency stop')
     drive.client.diagnosed('emergency stop')
     drive.moves_at(0.0, 0.0)
     still = time.monotonic() + 0.3
     drive.client.until(lambda: time.monotonic() > still)
     drive.moves_at(0.0, 0.0)
-    assert drive.client.trigger('adu/reset_faults') == (True, 'drive enabled')
+    assert drive.client.trigger('adu/reset_faults') == (True, 'drive is disabled')
     drive.moves_at(0.2, 0.0)

@@ -6,12 +6,19 @@ import time
 import numpy as np
 from std_srvs.srv import Trigger
 
-from adu_drive import drive_unit
+from adu_drive import drive_state, drive_unit, faults, thermal
 from adu_drive.params import AduNodeParameters
 from pedestal_common import messages, shell
 
 STEP = 'step'
 """The drive's own trigger among its inputs."""
+
+REFUSALS = {
+    drive_state.FAULT_LATCHED: 'a fault is latched (adu/reset_faults)',
+    drive_state.EMERGENCY_LATCHED: 'an emergency stop is latched (adu/reset_faults)',
+    drive_state.MOVING: 'the axes still move',
+    drive_state.CAUSE_PERSISTS: 'the cause is still there'}
+"""Why a request is not granted."""
 
 ACKNOWLEDGED_STEPS = 1000
 """Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so
@@ -39,7 +46,7 @@ class AduNode(shell.Shell):
         self.command = None
         self.command_stamp = None
         self.stale = False
-        self.emergency = False
+        self.announced = None
         self.refused = ''
         self.invalid = ''
         self.tick_timer = None
@@ -55,8 +62,9 @@ class AduNode(shell.Shell):
         self.send_joints = self.writer('joint_states')
         self.send_motors = self.writer('adu/motor_states')
         self.send_clock = self.writer('clock')
-        self.create_service(Trigger, 'adu/emergency_stop', self.on_emergency_stop)
-        self.create_service(Trigger, 'adu/reset_faults', self.on_reset_faults)
+        self.send_state = self.writer('adu/state')
+        for what, name in enumerate(drive_state.REQUESTS):
+            self.create_service(Trigger, f'adu/{name}', self.service(what))
         self.diagnose_with(self.diagnose)
 
         followers = {'acu/rate_command': 0.0, **({'ship/truth': 0.0} if self.on_ship else {})}
@@ -93,6 +101,9 @@ class AduNode(shell.Shell):
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
         outputs = self.outputs[0]
+        if outputs['condition'] != self.announced:
+            self.announced = int(outputs['condition'])
+            self.announce(self.send_state, messages.String(data=state_text(outputs)))
         azimuth, elevation = outputs['azimuth'], outputs['elevation']
         joints, motors = self.joints, self.motors
         messages.put_stamp(joints.header.stamp, stamp)
@@ -154,7 +165,7 @@ class AduNode(shell.Shell):
             torques = messages.by_name(names, self.command.effort, messages.AXES)
             for axis, rate, torque in zip(messages.AXES, rates, torques):
                 inputs[axis]['rate'], inputs[axis]['torque'] = rate, torque
-        inputs['enable'] = follow and not self.emergency
+        inputs['enable'] = follow
         if truth is not None:
             self.take_truth(truth, inputs)
         drive_unit.step(self.state, self.constants, self.inputs, self.outputs)
@@ -185,23 +196,18 @@ class AduNode(shell.Shell):
                           'lost_steps': int(self.lost_steps), 'late_ticks': int(self.late_ticks)}), flush=True)
         self.finished = True
 
-    def on_emergency_stop(self, _request, response):
-        self.emergency = True
-        self.inputs[0]['enable'] = 0
-        response.success = True
-        response.message = 'axes are stopping and stay stopped until adu/reset_faults'
-        return response
-
-    def on_reset_faults(self, _request, response):
-        moving = [axis for axis in messages.AXES if abs(self.outputs[0][axis]['velocity']) > 1e-3]
-        response.success = not (self.emergency and moving)
-        if response.success:
-            self.emergency = False
-            self.refused = ''
-            response.message = 'drive enabled'
-        else:
-            response.message = f'refused: {" and ".join(moving)} still moves'
-        return response
+    def service(self, what):
+        """The callback of a request: asks the drive at once and answers with what it reads back."""
+        def ask(_request, response):
+            answer = drive_state.request(self.state, self.constants, what)
+            drive_unit.read(self.state, self.constants, self.outputs)
+            if answer == drive_state.GRANTED and what == drive_state.RESET_FAULTS:
+                self.refused = ''
+            response.success = answer == drive_state.GRANTED
+            refusal = f'refused: {REFUSALS[answer]}; ' if answer in REFUSALS else ''
+            response.message = f'{refusal}drive is {state_text(self.outputs[0])}'
+            return response
+        return ask
 
     def diagnose(self):
         """What is now, and the topic that held no number since the last diagnosis."""
@@ -209,10 +215,14 @@ class AduNode(shell.Shell):
         invalid, self.invalid = self.invalid, ''
         values = [(f'{axis} {name}', '1' if outputs[axis][name] else '0') for axis in messages.AXES
                   for name in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
-        values += [('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
-                   ('late_ticks', str(int(self.late_ticks)))]
-        if self.emergency:
-            return shell.ERROR, 'emergency stop', values
+        values += [(f'{axis} faults', ', '.join(faults.names(outputs[axis]['faults']))) for axis in messages.AXES]
+        values += [(f'{axis}_motor_{i + 1} thermal_load', f'{load:.3f}') for axis in messages.AXES
+                   for i, load in enumerate(outputs[axis]['thermal_load'])]
+        values += [('state', state_text(outputs)), ('phase', drive_state.PHASES[outputs['phase']]),
+                   ('brakes', 'on' if outputs['braked'] else 'off'), ('step', str(self.k)),
+                   ('lost_steps', str(int(self.lost_steps))), ('late_ticks', str(int(self.late_ticks)))]
+        if outputs['emergency'] or outputs['azimuth']['faults'] | outputs['elevation']['faults']:
+            return shell.ERROR, state_text(outputs), values
         if invalid:
             return shell.ERROR, f'{invalid} holds NaN or infinity: stopping', values
         if self.stale:
@@ -221,7 +231,20 @@ class AduNode(shell.Shell):
             return shell.WARN, f'acu/rate_command refused: {self.refused}', values
         if any(outputs[axis]['end_stop'] for axis in messages.AXES):
             return shell.WARN, 'at an end stop', values
-        return shell.OK, 'following', values
+        hottest = max(outputs[axis]['thermal_load'].max() for axis in messages.AXES)
+        if hottest > thermal.WARM:
+            return shell.WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values
+        return shell.OK, 'following' if outputs['following'] else state_text(outputs), values
+
+
+def state_text(outputs):
+    """'enabled' when the drive follows commands, otherwise why it does not."""
+    tripped = [f'{axis} {kind}' for axis in messages.AXES for kind in faults.names(outputs[axis]['faults'])]
+    if outputs['following']:
+        return 'enabled'
+    if tripped:
+        return 'fault: ' + ', '.join(tripped)
+    return 'emergency stop' if outputs['emergency'] else drive_state.PHASES[outputs['phase']]
 
 
 def main(args=None):

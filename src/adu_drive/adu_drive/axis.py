@@ -171,17 +171,17 @@ def _supervise(s, c, omega, free):
         max(_current_2(m1, c.motor_1), _current_2(m2, c.motor_2)),
         max(abs(m1.measured), abs(m2.measured)),
         c.rad * encoder.counts(s.theta, c.per_rad) - c.per_2N * (c.motor_1.rad * m1.count + c.motor_2.rad * m2.count),
-        s.late, max(m1.heat, m2.heat), k)
+        s.late, max(m1.heat, m2.heat), s.faults, k)
     s.faults |= s.present
 
 
 @compiled
-def _let_go(s, omega):
-    """No torque; whoever takes hold again starts from what is then."""
+def _let_go(s, omega, free):
+    """No torque. Once the brakes hold, what the motors held before is kept: they need it when the brakes open."""
     s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
-    s.motor_1.sum = s.motor_2.sum = s.rate = s.d_hat = 0.0
-    s.omega_hat = omega
-    s.stopping = 1
+    s.rate, s.omega_hat, s.stopping = 0.0, omega, 1
+    if free:
+        s.motor_1.sum = s.motor_2.sum = s.d_hat = 0.0
 
 
 @compiled
@@ -196,7 +196,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     omega = 0.5 * (m1.measured + m2.measured)
     _supervise(s, c, omega, powered and free)
     if not powered or s.faults & faults.OVERCURRENT:
-        _let_go(s, omega)
+        _let_go(s, omega, free)
         return
     s.omega_hat, s.d_hat = disturbance_observer.update(
         s.omega_hat, s.d_hat, omega, 0.5 * (_realised(m1, k1) + _realised(m2, k2)), c.l_1, c.l_2, c.h_J_shaft)

@@ -35,7 +35,8 @@ _AXIS_OUTPUTS = np.dtype([
     ('load_position', 'f8'), ('load_velocity', 'f8'), ('true_torque', 'f8', (2,))], align=True)
 
 OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8'),
-                    ('phase', 'i8'), ('following', 'i8'), ('emergency', 'i8'), ('braked', 'i8')], align=True)
+                    ('phase', 'i8'), ('following', 'i8'), ('emergency', 'i8'), ('braked', 'i8'),
+                    ('condition', 'i8')], align=True)
 """At t_k+1, per axis:
 
 position          load encoder [rad]
@@ -57,6 +58,7 @@ invalid_command   1 when an input of this call was not finite (or beyond LARGEST
 phase             of drive_state.PHASES; following: 1 when enabled and nothing stands against it at t_k+1
 emergency         1 when an emergency stop is latched
 braked            1 when the brakes grip
+condition         phase, emergency, following and both fault words in one number: it changes when one of them does
 """
 
 
@@ -164,6 +166,7 @@ def read(state, constants, outputs):
     axis.read(s.elevation, c.elevation, y.elevation)
     y.phase, y.emergency, y.braked = s.phase, s.emergency, s.braked
     y.following = s.phase == drive_state.ENABLED and drive_state.permitted(s)
+    y.condition = s.phase | s.emergency << 3 | y.following << 4 | s.azimuth.faults << 8 | s.elevation.faults << 16
 
 
 @compiled

@@ -1,4 +1,5 @@
 """What a drive trips on, from what it measures itself. A fault stays until it is reset (drive_state.request)."""
+from adu_drive import thermal
 from pedestal_common.compiled import compiled
 
 KINDS = ('overcurrent', 'overspeed', 'encoder disagreement', 'following error', 'overtemperature')
@@ -18,11 +19,12 @@ def late(periods, error, limit):
 
 
 @compiled
-def detected(current_2, omega, disagreement, late_periods, heat, c):
+def detected(current_2, omega, disagreement, late_periods, heat, latched, c):
     """Fault word of one period of one axis; c its trip levels (see params.FaultParameters).
 
     current_2: larger square of a motor's current [A2]; omega: larger motor speed [rad/s]; disagreement: load encoder
-    less mean motor encoder over the ratio [rad]; heat: larger thermal load of a motor.
+    less mean motor encoder over the ratio [rad]; heat: larger thermal load of a motor, which must fall below
+    thermal.WARM to be gone once it is latched.
     """
     bits = 0
     if current_2 > c.current_2:
@@ -33,6 +35,6 @@ def detected(current_2, omega, disagreement, late_periods, heat, c):
         bits |= DISAGREEMENT
     if late_periods >= c.late_periods:
         bits |= FOLLOWING
-    if heat > c.heat:
+    if heat > (min(thermal.WARM, c.heat) if latched & OVERTEMPERATURE else c.heat):
         bits |= OVERTEMPERATURE
     return bits

@@ -8,6 +8,9 @@ from pedestal_common.compiled import compiled
 COPPER = 0.00393
 """Temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)."""
 
+WARM = 0.8
+"""Thermal load of a motor that is worth a warning."""
+
 
 @compiled
 def load(x, torque, per_rated, gain):

@@ -54,7 +54,7 @@ def cores(scenario) -> Cores:
         program = program_track.checked(*program_table(scenario))
     acu_inputs = np.zeros(1, control_unit.INPUTS)
     acu_inputs['stabilised'] = scenario.header.ship
-    acu_inputs['encoder_valid'] = acu_inputs['drive_ready'] = 1
+    acu_inputs['encoder_valid'] = 1
     acu_inputs['program_count'] = len(program[0])
     receiver_inputs = np.zeros(1, receiver.INPUTS)
     receiver_inputs['mat_ed'] = line_of_sight.ashore_matrix()
@@ -141,6 +141,7 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
         receiver.step(receiver_state, receiver_constants, seen, error, breaks, coefficients, receiver_normals[k])
         _hand_over_error(acu_inputs, error)
         acu_inputs[0].stamp = stamp_ns * 1e-9
+        acu_inputs[0].drive_ready = axes[0].following
         acu_inputs[0].position[0], acu_inputs[0].position[1] = azimuth.position, elevation.position
         acu_inputs[0].velocity[0], acu_inputs[0].velocity[1] = azimuth.velocity, elevation.velocity
         control_unit.step(acu_state, acu_constants, acu_inputs, acu_outputs, times, angles)
