@@ -40,7 +40,7 @@ R2 = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}
 
 DRIVE = {
     'adu.azimuth.speed_loop.proportional': 8.0, 'adu.azimuth.speed_loop.integral': 50.0,
-    'adu.azimuth.bias.torque': 12.0, 'adu.azimuth.bias.hold': 14.0,
+    'adu.azimuth.bias.schedule': 'hold_fade', 'adu.azimuth.bias.torque': 12.0, 'adu.azimuth.bias.hold': 14.0,
     'adu.azimuth.bias.out': 45.0}
 """Speed loop and bias of the cases that are ours."""
 
