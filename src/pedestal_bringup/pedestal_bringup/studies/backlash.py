@@ -185,6 +185,7 @@ def standstill_figure(done):
         axes[1, column].set_xlabel('time [s]')
     axes[0, 0].set_xlim(SETTLED, SETTLED + 0.5)
     axes[0, 0].set_ylabel('azimuth [\N{MICRO SIGN}rad]')
+    axes[1, 0].set_ylim(-20.0, 20.0)
     axes[1, 0].set_ylabel('torque [Nm]')
     figure.legend(*axes[1, 0].get_legend_handles_labels(), loc='outside lower right', ncols=2)
     return figure
@@ -236,7 +237,7 @@ def schedules_figure(done):
     for panel, values, bound, label in ((axes[0, 0], sine, 100.0, 'left of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
                                         (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
         bars = panel.barh(names, values, color=[FILTERED if name == 'hold-fade' else RAW for name in names])
-        panel.bar_label(bars, [f'{value:.3g}' for value in values], padding=3,
+        panel.bar_label(bars, [f'{value:.0f}' if value >= 100.0 else f'{value:.3g}' for value in values], padding=3,
                         bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.0})
         panel.axvline(bound, color=INK, linewidth=0.8, linestyle='--')
         panel.set_xlim(0.0, 1.2 * max(*values, bound))
