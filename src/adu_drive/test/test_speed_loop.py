@@ -139,9 +139,9 @@ def test_only_the_mean_loop_keeps_the_bias(drive):
 
 def test_drift_shows_in_the_true_torque_alone(drive):
     """The controller makes the current it measures what it asked for; the shaft gets that of the true motor."""
-    d = drive(build(AduParameters, {
-        'initial_elevation': 0.7, 'azimuth.motor_2.drift.flux_linkage': -0.1,
-        'azimuth.motor_2.drift.current_gain': 0.06, 'azimuth.motor_2.drift.current_offset': 0.8, 'azimuth.motor_2.drift.resistance': 0.4}))
+    drift = {'flux_linkage': -0.1, 'resistance': 0.4, 'current_gain': 0.06, 'current_offset': 0.8}
+    d = drive(build(AduParameters, {'initial_elevation': 0.7,
+                                    **{f'azimuth.motor_2.drift.{name}': value for name, value in drift.items()}}))
     y = d.run(1.0, azimuth=0.1).log['azimuth'][-1]
     asked = [d.state['azimuth'][m]['torque_ref'][0] for m in ('motor_1', 'motor_2')]
     K_t = 1.5 * 4 * 0.4219
