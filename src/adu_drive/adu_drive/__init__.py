@@ -3,7 +3,7 @@
     drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
     axis          one axis: sensors, speed loop, two current loops, plant
     speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder    the controller's laws
-    motor, gear_train, friction                                                  the plant's laws
+    motor, gear_train, friction, wind                                            the plant's laws
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
@@ -23,5 +23,6 @@ Symbols
     k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis
     z                 LuGre bristle deflection [rad]; sigma_0, sigma_1 its stiffness and damping
     T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]
+    v, V              turbulence along the mean wind, and the mean wind [m/s]
     h                 plant sub-step 50 us; current loops 100 us, speed loop 0.5 ms
 """

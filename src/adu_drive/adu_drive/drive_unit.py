@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from adu_drive import axis
+from adu_drive import axis, wind
 from adu_drive.params import AduParameters, whole_speed_periods
 from pedestal_common.compiled import compiled
 
@@ -16,12 +16,12 @@ RING = 128
 LARGEST = 1e6
 """Inputs beyond this (rad/s, Nm, rad/s2), infinite or NaN are not believed."""
 
-_AXIS_INPUTS = np.dtype([('rate', 'f8'), ('torque', 'f8'), ('wind', 'f8')], align=True)
+_AXIS_INPUTS = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
 
 INPUTS = np.dtype([('azimuth', _AXIS_INPUTS), ('elevation', _AXIS_INPUTS),
                    ('base_acceleration', 'f8', (3,)), ('enable', 'i8')], align=True)
-"""Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm], wind torque on
-the load [Nm]. base_acceleration: angular acceleration of the deck, FLU [rad/s2].
+"""Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm].
+base_acceleration: angular acceleration of the deck, FLU [rad/s2].
 enable 1: follow, 0: controlled stop, at once whatever the delay."""
 
 _AXIS_OUTPUTS = np.dtype([
@@ -62,7 +62,7 @@ def _record(values):
 def _constants(params, substeps):
     h = axis.CURRENT_PERIOD / substeps
     return _record({'azimuth': axis.constants(params.azimuth, h), 'elevation': axis.constants(params.elevation, h),
-                    'wind_azimuth': params.wind.azimuth, 'wind_elevation': params.wind.elevation,
+                    'wind': wind.constants(params.wind), 'period': params.period,
                     'speed_ticks': whole_speed_periods('period', params.period),
                     'delay_ticks': whole_speed_periods('transport_delay', params.transport_delay),
                     'substeps': substeps})
@@ -70,9 +70,9 @@ def _constants(params, substeps):
 
 def _initial_state(params):
     axes = {}
-    for name in ('azimuth', 'elevation'):
+    for name, torque in zip(('azimuth', 'elevation'), wind.initial_torques(params.wind)):
         p, theta = getattr(params, name), getattr(params, f'initial_{name}')
-        external = getattr(params.wind, name) - p.load.unbalance * math.cos(theta)
+        external = torque - p.load.unbalance * math.cos(theta)
         axes[name] = axis.initial_state(p, theta, external)
     return _record({**axes, 'rate': np.zeros((RING, 2)), 'torque': np.zeros((RING, 2)),
                     'enable': np.zeros(RING, np.int64), 'k': 0})
@@ -89,7 +89,7 @@ def constants(params: AduParameters, substeps: int = 2) -> np.ndarray:
 
 
 def initial_state(params: AduParameters) -> np.ndarray:
-    """At rest at the initial angles, in balance with constant wind and unbalance, bias in place: (1,) record."""
+    """At rest at the initial angles, in balance with wind (t = 0) and unbalance, bias in place: (1,) record."""
     return _initial_state(params).view(STATE)
 
 
@@ -113,18 +113,14 @@ def _external(s, c, u):
     """External torques [Nm] on the two loads, constant over the period, and whether every input was believable."""
     x, y, z = u.base_acceleration[0], u.base_acceleration[1], u.base_acceleration[2]
     azimuth, elevation = s.azimuth.theta, s.elevation.theta
-    T_azimuth = c.wind_azimuth - c.azimuth.unbalance * math.cos(azimuth)
-    T_elevation = c.wind_elevation - c.elevation.unbalance * math.cos(elevation)
+    T_azimuth, T_elevation = wind.torques(c.wind, s.k * c.period)
+    T_azimuth -= c.azimuth.unbalance * math.cos(azimuth)
+    T_elevation -= c.elevation.unbalance * math.cos(elevation)
     believed = True
     if _believed(x) and _believed(y) and _believed(z):
         inertial_azimuth, inertial_elevation = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
         T_azimuth += inertial_azimuth
         T_elevation += inertial_elevation
-    else:
-        believed = False
-    if _believed(u.azimuth.wind) and _believed(u.elevation.wind):
-        T_azimuth += u.azimuth.wind
-        T_elevation += u.elevation.wind
     else:
         believed = False
     return T_azimuth, T_elevation, believed

@@ -3,7 +3,7 @@ what the paper leaves open: reference/servo.md section 1."""
 import dataclasses
 import math
 
-from pedestal_common.parameters import ParameterError, Parameters, group, parameter
+from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter
 
 SPEED_PERIOD = 0.5e-3
 """Period of the speed loop [s]; five current-loop periods."""
@@ -143,9 +143,29 @@ class AxisParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class GustParameters(Parameters):
+    """step and sine add a torque to the mean; davenport and von_karman scale the mean with (1 + v / V)^2."""
+    kind: str = choice('none', ('none', 'step', 'sine', 'davenport', 'von_karman'), 'on top of the mean torque')
+    azimuth: float = parameter(0.0, -1e5, 1e5, 'Nm', 'step, sine: amplitude')
+    elevation: float = parameter(0.0, -1e5, 1e5, 'Nm', 'step, sine: amplitude')
+    start: float = parameter(1.0, 0.0, 86400.0, 's', 'step, sine: begins at this time of the drive')
+    frequency: float = parameter(1.0, 1e-3, 50.0, 'Hz', 'sine')
+    speed: float = parameter(10.0, 1.0, 60.0, 'm/s', 'spectra: mean wind V')
+    intensity: float = parameter(0.2, 0.0, 0.5, '', 'spectra: sigma_v / V')
+    length: float = parameter(100.0, 10.0, 2000.0, 'm', 'von_karman: length of the turbulence')
+    seed: int = parameter(1, 0, 2 ** 31 - 1, '', 'spectra: of the phases')
+
+
+@dataclasses.dataclass(frozen=True)
 class WindParameters(Parameters):
-    azimuth: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'constant torque on the axis')
-    elevation: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'constant torque on the axis')
+    azimuth: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'mean torque on the axis')
+    elevation: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'mean torque on the axis')
+    gust: GustParameters = group(GustParameters)
+
+    def check(self):
+        if self.gust.kind in ('davenport', 'von_karman') and self.azimuth == self.elevation == 0.0:
+            raise ParameterError(f'gust.kind = {self.gust.kind}: the spectra scale the mean torque, '
+                                 f'and azimuth = elevation = 0 Nm')
 
 
 @dataclasses.dataclass(frozen=True)

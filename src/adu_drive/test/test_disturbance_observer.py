@@ -69,10 +69,11 @@ def test_no_windup_at_the_torque_limit(drive):
 
 def gust_peak(drive, w_o, **values):
     """Largest true angle [rad] after 1000 Nm stepped on a position loop of 40 1/s that holds still, and the last."""
-    d = drive(observed(w_o, **{'azimuth.speed_loop.proportional': 8.0, **values}))
+    d = drive(observed(w_o, **{'azimuth.speed_loop.proportional': 8.0, 'wind.gust.kind': 'step',
+                               'wind.gust.azimuth': 1000.0, 'wind.gust.start': 0.2, **values}))
     position, path = 0.0, []
-    for k in range(300):
-        y = d.step(azimuth=-40.0 * position, wind=1000.0 if k >= 100 else 0.0)
+    for _ in range(300):
+        y = d.step(azimuth=-40.0 * position)
         position = y['azimuth']['position']
         path.append(y['azimuth']['load_position'])
     return np.abs(path).max(), np.abs(path[-50:]).max()

@@ -62,8 +62,8 @@ def test_voltage_limit_recovers_without_windup(drive):
     long after 2 s in the limit as after 0.6 s (an integral that had run on would overshoot for longer)."""
     def back(volts, seconds):
         p = build(AduParameters, {'initial_elevation': 0.7, 'initial_azimuth': -4.5, 'azimuth.motor_1.voltage': volts,
-                                  'azimuth.motor_2.voltage': volts})
-        d = drive(p).run(seconds, azimuth=2.45, wind=-3000.0)
+                                  'azimuth.motor_2.voltage': volts, 'wind.azimuth': -3000.0})
+        d = drive(p).run(seconds, azimuth=2.45)
         y, total = d.log['azimuth'][-1], d.state['azimuth']['sum'][0]
         assert total < 1.1 * y['motor_torque'].mean()
         v = d.run(0.4, azimuth=2.2).log['azimuth']['load_velocity'][-80:]
@@ -78,7 +78,8 @@ def test_voltage_limit_recovers_without_windup(drive):
 
 def test_mean_speed_feedback_shares_the_load(drive):
     """Against 1000 Nm each motor carries half of what the load needs, plus and minus the bias."""
-    d = drive().run(1.0, azimuth=0.1, wind=-1000.0)
+    p = build(AduParameters, {'initial_elevation': 0.7, 'wind.azimuth': -1000.0})
+    d = drive(p).run(1.0, azimuth=0.1)
     y = d.log['azimuth'][-1]
     friction = 60.0 + 20.0 * 0.1 + 2.0 * 64.0 * (0.4 + 0.003 * 6.4)
     assert y['torque'] == pytest.approx(1000.0 + friction, rel=0.01)

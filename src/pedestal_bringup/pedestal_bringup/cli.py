@@ -7,6 +7,7 @@ import pathlib
 import signal
 import sys
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -227,8 +228,8 @@ def _share():
         yield lambda share, text: bar.update(task, completed=share, description=text)
 
 
-PIPE_WIDTH = 160
-"""Columns of a table that nobody reads on a terminal: one line a row."""
+TABLE_WIDTH = 120
+"""Columns that the table of a study may take, also where the terminal has fewer: one line a row."""
 
 
 def _show_study(title, rows):
@@ -237,14 +238,14 @@ def _show_study(title, rows):
     def number(value):
         return '-' if value is None else f'{value:.4g}'
 
-    table = Table(title=title, title_justify='left')
+    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     for name, justify in (('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'),
                           ('target', 'left'), ('unit', 'left'), ('', 'left')):
-        table.add_column(name, justify=justify)
+        table.add_column(name, justify=justify, no_wrap=True)
     for row in rows:
         table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), row['target'] or '',
                       row['unit'], 'MISSED' if experiment.missed(row) else '')
-    Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(table)
+    Console(width=max(Console().width, TABLE_WIDTH)).print(table)
 
 
 def _bench(options):

@@ -24,7 +24,9 @@ REVERSALS = {'reversal': 0.2, 'fast_reversal': 4.0}
 
 def bias(schedule, torque=12.0, hold=14.0, out=45.0):
     """Parameters of a bias schedule, torques per motor [Nm]."""
-    return {'adu.azimuth.bias.schedule': schedule, 'adu.azimuth.bias.torque': torque,
+    torque, hold, out = {'off': (0.0, hold, out),
+                         'constant': (torque, 1000.0, 2000.0)}.get(schedule, (torque, hold, out))
+    return {'adu.azimuth.bias.torque': torque,
             'adu.azimuth.bias.hold': hold, 'adu.azimuth.bias.out': out}
 
 
@@ -35,8 +37,8 @@ SCHEDULES = {
     'fade-5': bias('fade', 5.0, 0.0, 30.0), 'fade-12': bias('fade', 12.0, 0.0, 30.0), 'hold-fade': bias('hold_fade')}
 
 STRUCTURES = {
-    'mean-speed': {'adu.azimuth.speed_loop.structure': 'mean'},
-    'independent-loops': {'adu.azimuth.speed_loop.structure': 'independent'}}
+    'mean-speed': {},
+    'independent-loops': {}}
 
 TARGETS = {
     ('bias-off', 'standstill_peak_to_peak_rad'): '> 5e-4', ('bias-on', 'standstill_peak_to_peak_rad'): '< 2e-6',
@@ -58,8 +60,8 @@ def reversal_case(kind, name):
 
 
 def fast_case(name):
-    """The step that needs all torque."""
-    return Case(name, 'servo_step', {**servo.FULL_TORQUE, **SCHEDULES[name]})
+    """The step that needs all torque: 40 rad/s2."""
+    return Case(name, 'servo_step', {**servo.FULL_TORQUE, 'acu.azimuth.shaper.acceleration': 40.0, **SCHEDULES[name]})
 
 
 def sine_case(name):
