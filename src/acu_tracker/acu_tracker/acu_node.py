@@ -21,6 +21,7 @@ class AcuNode(shell.Shell):
         self.state = control_unit.initial_state(p)
         self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
         self.times, self.angles = np.zeros(0), np.zeros((0, 2))
+        self.inputs['drive_ready'] = 1
         self.outputs[0]['mode'] = modes.STANDBY
         self.outputs['innovation'] = self.outputs['nis'] = math.nan
         control_unit.step(self.state.copy(), self.constants, self.inputs, self.outputs.copy(), self.times, self.angles)
@@ -28,6 +29,7 @@ class AcuNode(shell.Shell):
                              self.times, self.angles)
         self.announced = None
         self.refused = ''
+        self.drive_state = 'unknown'
         self.invalid = 0
         self.waiting = 'operator' in self.graph.nodes and self.graph.lockstep
         self.held = None
@@ -40,6 +42,7 @@ class AcuNode(shell.Shell):
         self.send_reference = self.writer('acu/reference')
         self.send_mode = self.writer('acu/mode')
         self.reader('acu/program_track', self.on_program)
+        self.reader('adu/state', self.on_drive_state)
         for mode in range(len(modes.MODES)):
             self.create_service(Trigger, f'acu/{modes.MODES[mode]}', self.service(mode))
         self.create_service(Trigger, 'acu/reset_faults', self.on_reset_faults)
@@ -71,6 +74,11 @@ class AcuNode(shell.Shell):
         if self.held is not None:
             step, self.held = self.held, None
             self.step(*step)
+
+    def on_drive_state(self, message):
+        """A drive that never says how it is counts as ready."""
+        self.drive_state = message.data
+        self.inputs['drive_ready'] = message.data == 'enabled'
 
     def step(self, stamp, joints, followers):
         """Answer step t_k; in lockstep the first one waits for the operator's program track."""
@@ -147,7 +155,8 @@ class AcuNode(shell.Shell):
         invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.invalid >> i & 1]
         self.invalid = 0
         values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
-                  ('coasting', str(int(outputs['coasting']))), ('invalid_input', ' '.join(invalid))]
+                  ('coasting', str(int(outputs['coasting']))), ('drive', self.drive_state),
+                  ('invalid_input', ' '.join(invalid))]
         for axis, limited in zip(messages.AXES, np.transpose([outputs[f'{kind}_limited'] for kind in
                                                               ('angle', 'rate', 'acceleration')])):
             values.append((f'{axis} limited', ' '.join(kind for kind, on in zip(('angle', 'rate', 'acceleration'),
