@@ -142,7 +142,22 @@ def run(progress) -> Result:
     for i, (key, case) in enumerate(CASES.items()):
         progress(i / len(CASES), f'{key[0]}: {key[1]}')
         done[key] = case.run()
-    return Result(rows(done), figures(done), [])
+    return Result(rows(done), figures(done), remarks(rows(done)))
+
+
+def remarks(found):
+    """What the rows do not say by themselves."""
+    values = {(row['case'], row['metric']): row['value'] for row in found}
+    return [
+        f'reversal is the sine {REVERSAL_AMPLITUDE:g} rad sin({REVERSALS["reversal"]:g} t); fast_reversal goes '
+        f'through it at up to {REVERSAL_AMPLITUDE * REVERSALS["fast_reversal"]:g} rad/s. What bias leaves of the fast '
+        'one is the friction that changes its sign, no lash: its ratio is '
+        f'{values["bias-on", "fast_reversal_ratio_off_to_on"]:.0f}, not '
+        f'{values["bias-on", "reversal_ratio_off_to_on"]:.0f}.',
+        'The overshoot of the fast step hardly depends on the schedule here: the shaper brings the move to its end '
+        'gently. With a sharper move (reference/servo.md: 0.8 to 5.1 %) a constant bias costs what it takes from the '
+        'peak torque.',
+    ]
 
 
 def figures(done):
