@@ -145,9 +145,9 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
         acu_inputs[0].velocity[0], acu_inputs[0].velocity[1] = azimuth.velocity, elevation.velocity
         control_unit.step(acu_state, acu_constants, acu_inputs, acu_outputs, times, angles)
         _record(result[k], stamp_ns * 1e-9, azimuth, elevation, acu_outputs[0], error[0])
-        adu_inputs[0].azimuth.rate = acu_outputs[0].rate[0] + injected[k, 0]
-        adu_inputs[0].elevation.rate = acu_outputs[0].rate[1] + injected[k, 1]
-        adu_inputs[0].azimuth.torque, adu_inputs[0].elevation.torque = acu_outputs[0].torque[0], acu_outputs[0].torque[1]
+        rate, torque = acu_outputs[0].rate, acu_outputs[0].torque
+        adu_inputs[0].azimuth.rate, adu_inputs[0].azimuth.torque = rate[0] + injected[k, 0], torque[0]
+        adu_inputs[0].elevation.rate, adu_inputs[0].elevation.torque = rate[1] + injected[k, 1], torque[1]
         adu_inputs[0].enable = 1
         drive_unit.step(adu_state, adu_constants, adu_inputs, axes)
 

@@ -5,17 +5,18 @@ constant and the bias keeps the teeth closed. What goes on from there is E, what
 frequencies the open loop is L = Y / E, the closed loop T = L / (1 + L). No controller is known to the study:
 
     current     added to i_ref, every 100 us        E = i_ref - i_q            Y = i_q
-    speed       added to the rate command, 0.5 ms   E = rate - mean speed / N  Y = mean speed / N, as its encoders see it
+    speed       added to the rate command, 0.5 ms   E = rate - mean speed / N  Y = mean speed / N from the encoders
     position    added between ACU and drive, T      E = rate the drive gets    Y = -(rate the ACU commands)
 
 The grey line of a figure is what the gains were chosen by: w_c / s for the current, (K_p + K_i / s) / (J s) for the
-speed with everything rigid, K_p / s + K_i / s^2 for the position. The distance to it is sampling, delay and elasticity.
+speed with everything rigid, K_p / s + K_i / s^2 for the position. What lies between is sampling, delay, elasticity.
 """
 import dataclasses
 import math
 
 import numpy as np
 
+from acu_tracker.params import AcuParameters
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup import closed_loop
@@ -97,8 +98,8 @@ def response(sweep, sent, returned):
 
 @compiled
 def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
-    """One axis from rest over len(rate) speed periods: its speed (n,) at each, and i_ref and i_q of both motors (5 n, 2)
-    at each current period; rate (n,) [rad/s] is commanded, current (5 n,) [A] added to both i_ref."""
+    """One axis from rest: rate (n,) [rad/s] commanded each speed period, current (5 n,) [A] added to both i_ref each
+    current period, to the speed (n,) [rad/s] of the axis and i_ref, i_q of both motors (5 n, 2) [A]."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     for n in range(len(rate)):
         axis.speed_control(s, c, rate[n], 0.0, 1)
@@ -128,7 +129,8 @@ def _run_inner(drive, index, rate, current):
     drive = dataclasses.replace(drive, initial_azimuth=START[0], initial_elevation=START[1])
     speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
     steps = (_azimuth, _elevation)[index]
-    steps(drive_unit.initial_state(drive), drive_unit.constants(drive), RATE[index] + rate, current, speed, wanted, made)
+    steps(drive_unit.initial_state(drive), drive_unit.constants(drive), RATE[index] + rate, current, speed, wanted,
+          made)
     return speed, wanted, made
 
 
@@ -216,6 +218,7 @@ def controller(name):
 
 CASES = {
     'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
+    'adrc': (controller('adrc'), AXES),
     'paper-r1': (case('paper-r1', 'servo_sine', servo.R1), AXES[:1]),
     'best': (case('best', 'servo_sine', servo.BEST), AXES[:1])}
 """Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's."""
@@ -262,22 +265,22 @@ def run(progress) -> Result:
 
 def drawings(responses, drive):
     """{name: function that draws a Figure}."""
-    p, K_p = drive.azimuth, 20.0
-    w_c, J = 2.0 * math.pi * p.current_loop.bandwidth, p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
+    p, c = drive.azimuth, AcuParameters().azimuth.feedforward
+    w_c = 2.0 * math.pi * p.current_loop.bandwidth
+    J = p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
 
-    def chosen(curves, design=None, **limits):
-        return lambda: drawn({label: (responses[name], colour) for label, (name, colour) in curves.items()},
-                             design, **limits)
+    def chosen(curves, design=None):
+        return lambda: drawn({label: (responses[name], colour) for label, (name, colour) in curves.items()}, design)
 
     return {
         'current': chosen({'motor 1': ('current/motor_1', MOTOR_1), 'motor 2': ('current/motor_2', MOTOR_2)},
                           lambda s: w_c / s),
         'speed': chosen({'azimuth': ('speed/azimuth', FILTERED), 'elevation': ('speed/elevation', TRUTH)},
                         lambda s: (p.speed_loop.proportional + p.speed_loop.integral / s) / (J * s)),
-        'position': chosen({'pid': ('position/azimuth/pid', MOTOR_2),
-                            'feed-forward': ('position/azimuth/feedforward', FILTERED),
-                            'feed-forward, elevation': ('position/elevation/feedforward', TRUTH)},
-                           lambda s: K_p / s + 0.05 * K_p ** 2 / s ** 2),
+        'position': chosen({'feed-forward (and pid)': ('position/azimuth/feedforward', FILTERED),
+                            'the same, elevation': ('position/elevation/feedforward', TRUTH),
+                            'adrc': ('position/azimuth/adrc', MOTOR_2)},
+                           lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
         'paper': chosen({'paper': ('position/azimuth/paper-r1', RAW), 'best': ('position/azimuth/best', FILTERED)})}
 
 
@@ -313,7 +316,7 @@ def drawn(curves, design):
         gain.set_ylim(bottom=-40.0)
         if not column:
             phase.axhline(-180.0, color=INK, lw=0.6, ls=':')
-        phase.set_ylim(-360.0, 0.0 if not column else 30.0)
+        phase.set_ylim(-360.0, 60.0)
         phase.set_yticks(np.arange(-360.0, 1.0, 90.0))
         phase.set_xlabel('frequency [Hz]')
     axes[0, 0].set_ylabel('gain [dB]')
