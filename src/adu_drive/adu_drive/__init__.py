@@ -17,7 +17,7 @@ Symbols
     i_d, i_q          phase currents in rotor coordinates, amplitude invariant [A]
     v_d, v_q          phase voltages likewise [V]
     R, L, psi, p      phase resistance [ohm], inductance [H], flux linkage [Wb], pole pairs
-    K_t               torque constant 1.5 p psi [Nm/A]
+    K_t               torque constant 1.5 p psi [Nm/A]; psi_hat, K_t_hat: as the controller believes
     K_p, K_i          gains of a PI controller
     w_o, d            bandwidth of the disturbance observer [rad/s]; torque it sees on a motor shaft [Nm]
     k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis

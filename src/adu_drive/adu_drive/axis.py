@@ -27,11 +27,15 @@ CURRENT_PERIOD = SPEED_PERIOD / CURRENT_TICKS
 
 
 def _motor_constants(m, loop, per_rad, h):
+    """psi, K_t, R are the motor's own; psi_hat, K_t_hat what the controller believes."""
     w = 2.0 * math.pi * loop.bandwidth
-    return {'p': float(m.pole_pairs), 'psi': m.flux_linkage, 'L': m.inductance, 'K_t': m.torque_constant,
-            'per_K_t': 1.0 / m.torque_constant, 'h_L': h / m.inductance,
-            'q_R': 1.0 / (1.0 + h * m.resistance / m.inductance), 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
+    R, psi = m.resistance * (1.0 + m.drift.resistance), m.flux_linkage * (1.0 + m.drift.flux_linkage)
+    return {'p': float(m.pole_pairs), 'psi': psi, 'L': m.inductance, 'R': R, 'K_t': 1.5 * m.pole_pairs * psi,
+            'h_L': h / m.inductance, 'q_R': 1.0 / (1.0 + h * R / m.inductance),
+            'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
             'h_J': h / m.inertia, 'q_B': 1.0 / (1.0 + h * m.viscous / m.inertia),
+            'psi_hat': m.flux_linkage, 'K_t_hat': m.torque_constant, 'per_K_t_hat': 1.0 / m.torque_constant,
+            'gain': 1.0 + m.drift.current_gain, 'offset': m.drift.current_offset,
             'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_PERIOD, 'v_max': m.voltage,
             'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad, 'speed': 1.0 / per_rad / SPEED_PERIOD}
 
@@ -42,15 +46,16 @@ def constants(p, h):
     motor_per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     N = p.gear_train.ratio
     J_shaft = 0.5 * (p.motor_1.inertia + p.motor_2.inertia + p.speed_loop.load_inertia / N ** 2)
+    T_b, out, per_fade = bias.line(p.bias)
     l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_PERIOD)
     return {
         'motor_1': _motor_constants(p.motor_1, p.current_loop, motor_per_rad, h),
         'motor_2': _motor_constants(p.motor_2, p.current_loop, motor_per_rad, h),
         'N': N, 'per_N': 1.0 / N, 'per_2N': 0.5 / N, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
         'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * SPEED_PERIOD,
-        'K_d': p.speed_loop.differential_damping,
+        'K_d': p.speed_loop.differential_damping, 'independent': int(p.speed_loop.structure == 'independent'),
         'l_1': l_1, 'l_2': l_2, 'h_J_shaft': SPEED_PERIOD / J_shaft,
-        'T_b': p.bias.torque, 'out': p.bias.out, 'per_fade': 1.0 / (p.bias.out - p.bias.hold),
+        'T_b': T_b, 'out': out, 'per_fade': per_fade,
         'bias_gain': 1.0 - math.exp(-SPEED_PERIOD / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
         'k': p.gear_train.stiffness, 'c': p.gear_train.damping, 'half_lash': 0.5 * p.gear_train.lash,
         'h': h, 'J': p.load.inertia, 'h_J': h / p.load.inertia,
@@ -64,14 +69,18 @@ def constants(p, h):
         'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping}
 
 
-def _motor_at_rest(m, g, T, theta, per_rad):
-    """A motor that holds T [Nm] at standstill, its pinion pressed on the flank, load at theta."""
-    i_q = T / m.torque_constant
-    flank = math.copysign(0.5 * g.lash, T) if T != 0.0 else 0.0
-    angle = g.ratio * (theta + flank + T * g.ratio / g.stiffness)
-    return {'i_d': 0.0, 'i_q': i_q, 'i_ref': i_q, 'v_d': 0.0, 'v_q': m.resistance * i_q,
-            'sum_d': 0.0, 'sum_q': m.resistance * i_q, 'omega': 0.0, 'theta': angle,
-            'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0, 'torque_ref': T, 'limited': 0}
+def _motor_at_rest(m, g, T, total, theta, per_rad):
+    """A motor asked for T [Nm] at standstill, `total` of it by the integral of its speed loop, its pinion pressed on
+    the flank, load at theta."""
+    i_ref = T / m.torque_constant
+    i_q = (i_ref - m.drift.current_offset) / (1.0 + m.drift.current_gain)
+    v_q = m.resistance * (1.0 + m.drift.resistance) * i_q
+    made = m.torque_constant * (1.0 + m.drift.flux_linkage) * i_q
+    flank = math.copysign(0.5 * g.lash, made) if made != 0.0 else 0.0
+    angle = g.ratio * (theta + flank + made * g.ratio / g.stiffness)
+    return {'i_d': 0.0, 'i_q': i_q, 'i_ref': i_ref, 'v_d': 0.0, 'v_q': v_q, 'sum_d': 0.0, 'sum_q': v_q,
+            'omega': 0.0, 'theta': angle, 'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0,
+            'sum': total, 'torque_ref': T, 'limited': 0}
 
 
 def initial_state(p, theta, external):
@@ -79,12 +88,12 @@ def initial_state(p, theta, external):
     per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     T = -0.5 * external / p.gear_train.ratio
     observed = p.speed_loop.disturbance_observer > 0.0
-    T_b = bias.scheduled.py_func(T, p.bias.torque, p.bias.out, 1.0 / (p.bias.out - p.bias.hold))
-    return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, theta, per_rad),
-            'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, theta, per_rad),
+    total = 0.0 if observed else T
+    T_b = bias.scheduled.py_func(T, *bias.line(p.bias))
+    return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, total, theta, per_rad),
+            'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, total, theta, per_rad),
             'theta': theta, 'omega': 0.0, 'z': 0.0,
-            'sum': 0.0 if observed else T, 'bias': T_b, 'rate': 0.0,
-            'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
+            'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0}
 
 
@@ -101,9 +110,39 @@ def _sense(m, k):
 
 
 @compiled
+def _measured_torque(m, k):
+    """Torque [Nm] as the current sensor and the believed torque constant have it."""
+    return k.K_t_hat * (k.gain * m.i_q + k.offset)
+
+
+@compiled
 def _realised(m, k):
     """Torque [Nm] the motor made of what was asked: the current's own once the voltage circle has cut it."""
-    return k.K_t * m.i_q if m.limited else m.torque_ref
+    return _measured_torque(m, k) if m.limited else m.torque_ref
+
+
+@compiled
+def _torque_control(s, c, omega, feed_forward):
+    """Torque references of both motors from the rate s.rate, the mean speed and a torque [Nm] added to each; whether
+    one is at its limit."""
+    m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
+    omega_1, omega_2 = (m1.measured, m2.measured) if c.independent else (omega, omega)
+    error_1, error_2 = c.N * s.rate - omega_1, c.N * s.rate - omega_2
+    T_1 = speed_loop.torque(error_1, m1.sum, c.K_p, feed_forward)
+    T_2 = speed_loop.torque(error_2, m2.sum, c.K_p, feed_forward)
+    s.bias += c.bias_gain * (bias.scheduled(0.5 * (T_1 + T_2), c.T_b, c.out, c.per_fade) - s.bias)
+    T_1, T_2 = speed_loop.shared(T_1, T_2, s.bias, m1.measured, m2.measured, c.K_d)
+    m1.torque_ref, m2.torque_ref = speed_loop.limited(T_1, k1.limit), speed_loop.limited(T_2, k2.limit)
+
+    limited = m1.torque_ref != T_1 or m2.torque_ref != T_2
+    excess_1 = excess_2 = 0.0
+    if limited or m1.limited or m2.limited:
+        excess_1, excess_2 = T_1 - _realised(m1, k1), T_2 - _realised(m2, k2)
+        if not c.independent:
+            excess_1 = excess_2 = 0.5 * (excess_1 + excess_2)
+    m1.sum = pi.integral(m1.sum, error_1, c.K_iT, excess_1)
+    m2.sum = pi.integral(m2.sum, error_2, c.K_iT, excess_2)
+    return limited
 
 
 @compiled
@@ -130,15 +169,9 @@ def speed_control(s, c, rate, torque, enable):
         feed_forward = 0.0
         s.end_stop = 1
 
-    error = c.N * s.rate - omega
-    T = speed_loop.torque(error, s.sum, c.K_p, feed_forward - s.d_hat)
-    s.bias += c.bias_gain * (bias.scheduled(T, c.T_b, c.out, c.per_fade) - s.bias)
-    m1.torque_ref, m2.torque_ref, limited = speed_loop.shared(
-        T, s.bias, m1.measured, m2.measured, c.K_d, k1.limit, k2.limit)
-    excess = T - 0.5 * (_realised(m1, k1) + _realised(m2, k2))
-    s.sum = pi.integral(s.sum, error, c.K_iT, excess if limited or m1.limited or m2.limited else 0.0)
-    m1.i_ref = m1.torque_ref * k1.per_K_t
-    m2.i_ref = m2.torque_ref * k2.per_K_t
+    limited = _torque_control(s, c, omega, feed_forward - s.d_hat)
+    m1.i_ref = m1.torque_ref * k1.per_K_t_hat
+    m2.i_ref = m2.torque_ref * k2.per_K_t_hat
 
     s.torque_limited |= limited
     s.voltage_limited |= m1.limited | m2.limited
@@ -150,7 +183,8 @@ def speed_control(s, c, rate, torque, enable):
 def current_control(m, k):
     """One current-loop period of one motor: current reference to phase voltages."""
     m.v_d, m.v_q, m.sum_d, m.sum_q, limited = current_loop.voltages(
-        m.i_d, m.i_q, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L, k.psi, k.v_max)
+        k.gain * m.i_d, k.gain * m.i_q + k.offset, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L,
+        k.psi_hat, k.v_max)
     m.limited |= limited
 
 
@@ -186,8 +220,8 @@ def read(s, c, y):
     y.motor_velocity[0] = _measured_speed(m1, k1)
     y.motor_velocity[1] = _measured_speed(m2, k2)
     y.velocity = c.per_2N * (y.motor_velocity[0] + y.motor_velocity[1])
-    y.motor_torque[0] = k1.K_t * m1.i_q
-    y.motor_torque[1] = k2.K_t * m2.i_q
+    y.motor_torque[0] = _measured_torque(m1, k1)
+    y.motor_torque[1] = _measured_torque(m2, k2)
     y.torque = c.N * (y.motor_torque[0] + y.motor_torque[1])
     y.bias = s.bias
     y.torque_limited = s.torque_limited
@@ -196,3 +230,5 @@ def read(s, c, y):
     y.stopping = s.stopping
     y.load_position = s.theta
     y.load_velocity = s.omega
+    y.true_torque[0] = k1.K_t * m1.i_q
+    y.true_torque[1] = k2.K_t * m2.i_q

@@ -28,7 +28,7 @@ _AXIS_OUTPUTS = np.dtype([
     ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
     ('motor_position', 'f8', (2,)), ('motor_velocity', 'f8', (2,)), ('motor_torque', 'f8', (2,)), ('bias', 'f8'),
     ('torque_limited', 'i8'), ('voltage_limited', 'i8'), ('end_stop', 'i8'), ('stopping', 'i8'),
-    ('load_position', 'f8'), ('load_velocity', 'f8')], align=True)
+    ('load_position', 'f8'), ('load_velocity', 'f8'), ('true_torque', 'f8', (2,))], align=True)
 
 OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8')], align=True)
 """At t_k+1, per axis:
@@ -36,12 +36,14 @@ OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('
 position          load encoder [rad]
 velocity          mean motor speed / N [rad/s], from the motor encoders over the last 0.5 ms
 torque            of both motors on the load axis, from their currents [Nm]
-motor_position, motor_velocity, motor_torque    of motor 1 and 2 on the shaft: encoder, its difference, K_t i_q
+motor_position, motor_velocity, motor_torque    of motor 1 and 2 on the shaft: encoder, its difference, K_t times
+                  the current as measured
 bias              T_b [Nm]
 torque_limited, voltage_limited                 1 when it happened within the period
 end_stop          1 when the end of travel cut the rate command within the period
 stopping          1 when not enabled within the period: ramped to standstill, then held there
-load_position, load_velocity                    the truth, for tests and studies; never published
+load_position, load_velocity, true_torque       the truth, for tests and studies; never published. true_torque: of
+                  motor 1 and 2 on the shaft
 
 invalid_command   1 when an input of this call was not finite (or beyond LARGEST): the command counts as enable 0,
                   a disturbance as 0

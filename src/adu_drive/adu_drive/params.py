@@ -21,6 +21,15 @@ def whole_speed_periods(name, value):
 
 
 @dataclasses.dataclass(frozen=True)
+class DriftParameters(Parameters):
+    """The motor and its current sensor as they are, against what the controller believes."""
+    resistance: float = parameter(0.0, -0.9, 5.0, '', 'relative')
+    flux_linkage: float = parameter(0.0, -0.5, 0.5, '', 'relative')
+    current_gain: float = parameter(0.0, -0.5, 0.5, '', 'relative, of the current sensor')
+    current_offset: float = parameter(0.0, -50.0, 50.0, 'A', 'of the torque-making current as measured')
+
+
+@dataclasses.dataclass(frozen=True)
 class MotorParameters(Parameters):
     resistance: float = parameter(0.868, 0.01, 100.0, 'ohm', 'phase resistance')
     inductance: float = parameter(10.0995e-3, 1e-4, 1.0, 'H', 'phase inductance, d = q')
@@ -32,6 +41,7 @@ class MotorParameters(Parameters):
     friction: float = parameter(0.4, 0.0, 100.0, 'Nm', 'Coulomb friction')
     friction_speed: float = parameter(0.5, 0.1, 100.0, 'rad/s', 'rate over which friction changes its sign')
     viscous: float = parameter(0.003, 0.0, 10.0, 'Nms/rad', 'viscous friction')
+    drift: DriftParameters = group(DriftParameters)
 
     @property
     def torque_constant(self):
@@ -45,23 +55,24 @@ class CurrentLoopParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class SpeedLoopParameters(Parameters):
+    structure: str = choice('mean', ('mean', 'independent'), 'one loop on the mean speed, or one for each motor')
     proportional: float = parameter(6.0, 0.0, 1000.0, 'Nms/rad', 'per motor, on its shaft')
     integral: float = parameter(200.0, 0.0, 1e5, 'Nm/rad', 'per motor, on its shaft')
     differential_damping: float = parameter(0.0, 0.0, 10.0, 'Nms/rad', 'on the speed difference of the motors')
-    disturbance_observer: float = parameter(0.0, 0.0, 2000.0, 'rad/s', 'bandwidth; 0: off')
+    disturbance_observer: float = parameter(0.0, 0.0, 2000.0, 'rad/s', 'bandwidth, in place of the integral; 0: off')
     load_inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'of the load as the disturbance observer believes')
 
 
 @dataclasses.dataclass(frozen=True)
 class BiasParameters(Parameters):
-    """torque 0 = off, hold 0 = linear fade, hold beyond the torque limit = constant."""
+    schedule: str = choice('hold_fade', ('off', 'constant', 'fade', 'hold_fade'), 'fade: from zero torque demand on')
     torque: float = parameter(12.0, 0.0, 1000.0, 'Nm', 'bias per motor')
-    hold: float = parameter(14.0, 0.0, 10000.0, 'Nm', 'held up to this torque demand per motor')
-    out: float = parameter(45.0, 0.1, 20000.0, 'Nm', 'gone at this torque demand per motor')
+    hold: float = parameter(14.0, 0.0, 10000.0, 'Nm', 'hold_fade: held up to this torque demand per motor')
+    out: float = parameter(45.0, 0.1, 20000.0, 'Nm', 'fade, hold_fade: gone at this torque demand per motor')
     lag: float = parameter(0.010, 0.0, 1.0, 's', 'time constant')
 
     def check(self):
-        if self.out <= self.hold:
+        if self.schedule == 'hold_fade' and self.out <= self.hold:
             raise ParameterError(f'out = {self.out:g} Nm: must be above hold = {self.hold:g}')
 
 

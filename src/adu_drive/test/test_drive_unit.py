@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from adu_drive import drive_unit
-from adu_drive.params import AduParameters, GustParameters, LimitParameters, WindParameters
+from adu_drive.params import (
+    AduParameters,
+    AxisParameters,
+    BiasParameters,
+    GustParameters,
+    LimitParameters,
+    WindParameters,
+)
 from pedestal_common.line_of_sight import direction
 from pedestal_common.parameters import build
 
@@ -25,17 +32,18 @@ def hold_position(d, reference, seconds, K_p):
     return np.array(path)
 
 
-@pytest.mark.parametrize('bias, low, high', [(0.0, 5e-4, 5e-3), (5.0, 0.0, 2e-6), (12.0, 0.0, 2e-6)])
+@pytest.mark.parametrize('bias, low, high', [({'schedule': 'off'}, 5e-4, 5e-3), ({'torque': 5.0}, 0.0, 2e-6),
+                                             ({'schedule': 'fade'}, 0.0, 2e-6), ({}, 0.0, 2e-6)])
 def test_bias_ends_the_standstill_limit_cycle(drive, bias, low, high):
-    p = build(AduParameters, {'period': 2e-3, 'initial_elevation': 0.7, 'azimuth.bias.torque': bias})
+    p = AduParameters(period=2e-3, initial_elevation=0.7, azimuth=AxisParameters(bias=BiasParameters(**bias)))
     path = hold_position(drive(p), lambda t: 1e-3 if t < 0.5 else 0.0, 4.0, 40.0)
     assert low <= np.ptp(path[1000:]) < high
 
 
 def test_bias_keeps_the_teeth_closed_in_a_reversal(drive):
     """Slow reversals: lost motion between motor and load with the bias off, elastic deflection with it."""
-    def lost_motion(bias):
-        p = build(AduParameters, {'initial_elevation': 0.7, 'azimuth.bias.torque': bias,
+    def lost_motion(schedule):
+        p = build(AduParameters, {'initial_elevation': 0.7, 'azimuth.bias.schedule': schedule,
                                   'azimuth.speed_loop.differential_damping': 1.0})
         d = drive(p)
         for k in range(600):
@@ -43,8 +51,8 @@ def test_bias_keeps_the_teeth_closed_in_a_reversal(drive):
         a = d.log['azimuth'][200:]
         return np.ptp(a['motor_position'].mean(axis=1) / 64.0 - a['load_position'])
 
-    assert lost_motion(0.0) > 0.9e-3
-    assert lost_motion(12.0) < 0.1e-3
+    assert lost_motion('off') > 0.9e-3
+    assert lost_motion('hold_fade') < 0.1e-3
 
 
 def test_starts_at_rest_in_balance(drive):
