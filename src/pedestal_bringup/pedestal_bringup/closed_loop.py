@@ -116,7 +116,7 @@ def _hand_over_error(acu_inputs, error):
 
 @compiled
 def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, adu, breaks, coefficients, times, angles,
-           imu_normals, ins_normals, receiver_normals, deck_rate, result):
+           imu_normals, ins_normals, receiver_normals, deck_rate, injected, result):
     """Steps first ... first + count - 1 into result[:count]."""
     receiver_state, receiver_constants, seen, error = tracking
     acu_state, acu_constants, acu_inputs, acu_outputs = acu
@@ -146,8 +146,9 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
         acu_inputs[0].velocity[0], acu_inputs[0].velocity[1] = azimuth.velocity, elevation.velocity
         control_unit.step(acu_state, acu_constants, acu_inputs, acu_outputs, times, angles)
         _record(result[k], stamp_ns * 1e-9, azimuth, elevation, acu_outputs[0], error[0])
-        adu_inputs[0].azimuth.rate, adu_inputs[0].azimuth.torque = acu_outputs[0].rate[0], acu_outputs[0].torque[0]
-        adu_inputs[0].elevation.rate, adu_inputs[0].elevation.torque = acu_outputs[0].rate[1], acu_outputs[0].torque[1]
+        rate, torque = acu_outputs[0].rate, acu_outputs[0].torque
+        adu_inputs[0].azimuth.rate, adu_inputs[0].azimuth.torque = rate[0] + injected[k, 0], torque[0]
+        adu_inputs[0].elevation.rate, adu_inputs[0].elevation.torque = rate[1] + injected[k, 1], torque[1]
         adu_inputs[0].enable = 1
         drive_unit.step(adu_state, adu_constants, adu_inputs, axes)
 
@@ -173,8 +174,13 @@ BLOCK = 2000
 """Steps whose noise is drawn at once."""
 
 
-def run(loop: Cores) -> np.ndarray:
-    """Every step 0 ... steps of a scenario's closed loop as RESULT records (steps + 1,)."""
+def run(loop: Cores, injected=None) -> np.ndarray:
+    """Every step 0 ... steps of a scenario's closed loop as RESULT records (steps + 1,).
+
+    injected (steps + 1, 2): rate [rad/s] of azimuth and elevation added to the command on its way to the drive.
+    """
+    if injected is None:
+        injected = np.zeros((loop.steps + 1, 2))
     result = np.zeros(loop.steps + 1, RESULT)
     deck_rate = np.zeros(3)
     for first in range(0, len(result), BLOCK):
@@ -183,5 +189,5 @@ def run(loop: Cores) -> np.ndarray:
                    for i, (stream, width) in enumerate(loop.streams)]
         _steps(first, count, loop.period_ns, loop.on_ship, loop.ship, loop.ins, loop.receiver, loop.acu, loop.adu,
                loop.target.breaks, loop.target.coefficients, *loop.program, *normals, deck_rate,
-               result[first:first + count])
+               injected[first:first + count], result[first:first + count])
     return result

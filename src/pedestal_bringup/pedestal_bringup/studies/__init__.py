@@ -7,7 +7,7 @@ same through the graph of nodes.
 """
 import importlib
 
-NAMES = ('servo', 'backlash')
+NAMES = ('servo', 'backlash', 'bode')
 
 
 def study(name):
