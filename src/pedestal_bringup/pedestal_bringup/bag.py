@@ -151,6 +151,10 @@ def locate(path):
     raise BagError(f'{file}: not an MCAP file')
 
 
+def foreign_encoding(file, channel):
+    return BagError(f'{file}: {channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
+
+
 def _only_file(path):
     files = sorted(path.glob('*.mcap')) or sorted(path.glob('*.db3'))
     if len(files) != 1:
@@ -193,7 +197,7 @@ class Bag:
                 raise EOFError(f'the file ends at byte {len(data)} inside a record that goes on to {at + length}')
             try:
                 closed = self._take(opcode, at, length, rows)
-            except EOFError:
+            except (BagError, EOFError):
                 raise
             except Exception as error:
                 raise EOFError(f'broken record at byte {at - 9}: {error}') from None
@@ -233,7 +237,7 @@ class Bag:
         elif opcode == Opcode.CHANNEL:
             channel = records.Channel.read(stream)
             if channel.message_encoding != 'cdr':
-                raise EOFError(f'{channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
+                raise foreign_encoding(self.file, channel)
             self._channels[channel.id] = channel.topic.lstrip('/')
             self.topics[channel.topic.lstrip('/')] = self._schemas[channel.schema_id]
         elif opcode == Opcode.METADATA:

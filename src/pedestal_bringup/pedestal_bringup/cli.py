@@ -70,6 +70,11 @@ def _parser():
     recover.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: beside it, BAG-recovered')
     recover.set_defaults(verb=_recover)
 
+    rerun = verbs.add_parser('rerun', help='make a recorded run again and compare; exit code 1 when a message differs')
+    rerun.add_argument('recording', type=pathlib.Path)
+    rerun.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='of the new run; default: bags/runs/SCENARIO-N')
+    rerun.set_defaults(verb=_rerun)
+
     report = verbs.add_parser('report', help='write a recording as one HTML file with its figures')
     report.add_argument('bag', type=pathlib.Path)
     report.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
@@ -104,9 +109,7 @@ def _run(options):
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
     chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
-    bag = options.bag or graph.free_bag(chosen.name)
-    if bag.exists():
-        raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
+    bag = _new_bag(options.bag, chosen.name)
     if options.json and (options.json.is_dir() or not options.json.parent.is_dir()):
         raise ValueError(f'--json {options.json}: must be a file in a directory that exists')
     with _progress(chosen.header.duration) as progress:
@@ -128,6 +131,15 @@ def _run(options):
     if not check.complete:
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     return 0
+
+
+def _new_bag(given, scenario):
+    """Where to record: as given, or bags/runs/SCENARIO-N."""
+    from pedestal_bringup import graph
+    bag = given or graph.free_bag(scenario)
+    if bag.exists():
+        raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
+    return bag
 
 
 def _show(title, values):
@@ -181,6 +193,18 @@ def _recover(options):
     from pedestal_bringup.recover import recover
     print('\n'.join(recover(options.bag, options.output).lines()))
     return 0
+
+
+def _rerun(options):
+    from pedestal_bringup import bag, graph, rerun
+    recording = bag.read(options.recording)
+    chosen = rerun.configured(recording)
+    path = _new_bag(options.bag, chosen.name)
+    with _progress(chosen.header.duration) as progress:
+        graph.run(chosen, path, progress)
+    comparison = rerun.compare(recording, bag.read(path))
+    print('\n'.join(comparison.lines()))
+    return 0 if comparison.equal else 1
 
 
 def _report(options):
