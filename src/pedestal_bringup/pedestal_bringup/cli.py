@@ -67,6 +67,16 @@ def _parser():
     verify.add_argument('bag', type=pathlib.Path)
     verify.set_defaults(verb=_verify)
 
+    recover = verbs.add_parser('recover', help='make a readable bag of what is left in a damaged one')
+    recover.add_argument('bag', type=pathlib.Path)
+    recover.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: beside it, BAG-recovered')
+    recover.set_defaults(verb=_recover)
+
+    rerun = verbs.add_parser('rerun', help='make a recorded run again and compare; exit code 1 when a message differs')
+    rerun.add_argument('recording', type=pathlib.Path)
+    rerun.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='of the new run; default: bags/runs/SCENARIO-N')
+    rerun.set_defaults(verb=_rerun)
+
     report = verbs.add_parser('report', help='write a recording as one HTML file with its figures')
     report.add_argument('bag', type=pathlib.Path)
     report.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
@@ -120,9 +130,7 @@ def _run(options):
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
     chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
-    bag = options.bag or graph.free_bag(chosen.name)
-    if bag.exists():
-        raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
+    bag = _new_bag(options.bag, chosen.name)
     _check_json(options.json)
     with _progress(chosen.header.duration) as progress:
         try:
@@ -143,6 +151,15 @@ def _run(options):
     if not check.complete:
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     return 0
+
+
+def _new_bag(given, scenario):
+    """Where to record: as given, or bags/runs/SCENARIO-N."""
+    from pedestal_bringup import graph
+    bag = given or graph.free_bag(scenario)
+    if bag.exists():
+        raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
+    return bag
 
 
 def _show(title, values):
@@ -190,6 +207,24 @@ def _verify(options):
     check = verify(options.bag)
     print('\n'.join(check.lines()))
     return 0 if check.complete else 1
+
+
+def _recover(options):
+    from pedestal_bringup.recover import recover
+    print('\n'.join(recover(options.bag, options.output).lines()))
+    return 0
+
+
+def _rerun(options):
+    from pedestal_bringup import bag, graph, rerun
+    recording = bag.read(options.recording)
+    chosen = rerun.configured(recording)
+    path = _new_bag(options.bag, chosen.name)
+    with _progress(chosen.header.duration) as progress:
+        graph.run(chosen, path, progress)
+    comparison = rerun.compare(recording, bag.read(path))
+    print('\n'.join(comparison.lines()))
+    return 0 if comparison.equal else 1
 
 
 def _report(options):

@@ -232,7 +232,7 @@ class RecorderNode(Shell):
             while block := file.read(1 << 20):
                 digest.update(block)
             size = file.tell()
-        print(json.dumps({'bag': str(self._bag.path), 'messages': sum(self._bag.counts), 'lost': self._lost.total(),
+        print(json.dumps({'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),
                           'sha256': digest.hexdigest(), 'bytes': size}), flush=True)
         if self._error is None and self._lost:
             self._error = self._losses()

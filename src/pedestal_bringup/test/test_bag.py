@@ -328,11 +328,25 @@ def test_flush_leaves_every_message_so_far_in_the_file(tmp_path, rows):
     writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
     for name, stamp, data in rows[:100]:
         writer.write(NAMES.index(name), stamp, stamp, data)
-    assert bag.load(tmp_path / 'b').index.size == 0
+    assert copied(writer).index.size == 0
     writer.flush()
-    content = bag.load(tmp_path / 'b')
+    content = copied(writer)
     assert [(name, log, data) for name, log, _, data in content.raw()] == rows[:100]
     assert 'without a summary' in content.damage
+
+
+def copied(writer):
+    copy = writer.path.with_suffix('.mcap')
+    copy.write_bytes(writer.file.read_bytes())
+    return bag.load(copy)
+
+
+def test_a_bag_that_is_being_written_is_refused(tmp_path):
+    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
+    with pytest.raises(bag.BagError, match='b_0.mcap: is being written; wait until its recorder has ended'):
+        bag.load(tmp_path / 'b')
+    writer.close()
+    bag.read(tmp_path / 'b')
 
 
 def test_verify_accepts_a_whole_run_with_a_delayed_topic(recording, rows):
@@ -431,7 +445,7 @@ def test_a_disk_that_takes_a_chunk_partly_leaves_a_whole_bag_without_a_hole(tmp_
             return getattr(self.stream, name)
 
     writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
-    writer._stream = Disk(writer._stream, 250_000)
+    writer._container._stream = Disk(writer._container._stream, 250_000)
     errors = []
     for name, stamp, data in rows:
         try:
