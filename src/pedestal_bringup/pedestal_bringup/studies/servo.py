@@ -53,7 +53,7 @@ BEST = {
     **DRIVE, **SHAPER, 'adu.azimuth.speed_loop.disturbance_observer': 400.0,
     'acu.azimuth.controller': 'feedforward', 'acu.azimuth.feedforward.bandwidth': 30.0,
     'acu.azimuth.feedforward.integral': 0.2}
-"""Each gain bears 1.3 times its value when a knock opens the lash. Beyond that (a bandwidth of 40 rad/s) closing the
+"""Each gain bears 1.3 times its value when a knock opens the lash. Beyond that (a bandwidth of 45 rad/s) closing the
 lash takes so much torque that the bias stays faded, and the lash opens again: a limit cycle of some mrad. A faster
 observer (600 rad/s) takes 6 % off the gust and lets the load ring on the gear for 0.2 s."""
 
