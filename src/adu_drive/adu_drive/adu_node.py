@@ -46,6 +46,7 @@ class AduNode(shell.Shell):
         self.command = None
         self.command_stamp = None
         self.stale = False
+        self.condition = None
         self.announced = None
         self.refused = ''
         self.invalid = ''
@@ -101,9 +102,9 @@ class AduNode(shell.Shell):
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
         outputs = self.outputs[0]
-        if outputs['condition'] != self.announced:
-            self.announced = int(outputs['condition'])
-            self.announce(self.send_state, messages.String(data=state_text(outputs)))
+        if outputs['condition'] != self.condition:
+            self.condition = int(outputs['condition'])
+            self.announce_state(state_text(outputs))
         azimuth, elevation = outputs['azimuth'], outputs['elevation']
         joints, motors = self.joints, self.motors
         messages.put_stamp(joints.header.stamp, stamp)
@@ -120,6 +121,11 @@ class AduNode(shell.Shell):
         self.send_motors(motors)
         if self.graph.lockstep:
             self.steps.take(STEP, stamp, None)
+
+    def announce_state(self, text):
+        if text != self.announced:
+            self.announced = text
+            self.announce(self.send_state, messages.String(data=text))
 
     def answered(self, _stamp, _trigger, inputs):
         """Lockstep: the command stamped t_k (and the ship's truth) has come."""
@@ -239,12 +245,17 @@ class AduNode(shell.Shell):
 
 def state_text(outputs):
     """'enabled' when the drive follows commands, otherwise why it does not."""
-    tripped = [f'{axis} {kind}' for axis in messages.AXES for kind in faults.names(outputs[axis]['faults'])]
     if outputs['following']:
         return 'enabled'
+    tripped = [f'{axis} {kind}' for axis in messages.AXES for kind in faults.names(outputs[axis]['faults'])]
     if tripped:
         return 'fault: ' + ', '.join(tripped)
-    return 'emergency stop' if outputs['emergency'] else drive_state.PHASES[outputs['phase']]
+    if outputs['emergency']:
+        return 'emergency stop'
+    phase = outputs['phase']
+    if phase == drive_state.DISABLED and outputs['permitted']:
+        phase = drive_state.RELEASING
+    return drive_state.PHASES[drive_state.STOPPING if phase == drive_state.ENABLED else phase]
 
 
 def main(args=None):
