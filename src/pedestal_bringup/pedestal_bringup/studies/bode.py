@@ -30,7 +30,7 @@ MOTORS = ('motor_1', 'motor_2')
 START = (-2.0, 0.15)
 """Where the axes start [rad]."""
 
-RATE = (0.2, 0.06)
+RATE = (0.1, 0.03)
 """Rates of the axes [rad/s]: far above the excitation and the Stribeck rate, inside the travel for a whole record."""
 
 
@@ -70,8 +70,8 @@ CURRENT = Sweep(0.1, 10.0, 4000.0, 60, 5, 5, 1.5)
 SPEED = Sweep(1.0, 1.0, 900.0, 120, 2, 4, 0.02)
 """Peak in rad/s of the load: 8 Nm of a motor, less than the bias."""
 
-POSITION = Sweep(4.0, 0.25, 95.0, 200, 2, 3, 0.02)
-"""Peak in rad/s; up to nearly half the control rate of 5 ms."""
+POSITION = Sweep(8.0, 0.25, 95.0, 150, 2, 3, 0.012)
+"""Peak in rad/s, half of what would open the teeth at the paper's 5 Nm of bias; up to nearly half the control rate of 5 ms."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -216,12 +216,22 @@ def controller(name):
     return case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
+FAST = {'acu.azimuth.feedforward.bandwidth': 40.0}
+STRUCTURE = {**FAST, 'adu.azimuth.structure.inertia_share': 0.5, 'adu.azimuth.structure.frequency': 8.0}
+NOTCH = {**STRUCTURE, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
+         'acu.azimuth.notch.depth': 0.3}
+"""Half of the load swings on the other half; the notch lies where the loop without it has its resonance."""
+
 CASES = {
     'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
     'adrc': (controller('adrc'), AXES),
     'paper-r1': (case('paper-r1', 'servo_sine', servo.R1), AXES[:1]),
-    'best': (case('best', 'servo_sine', servo.BEST), AXES[:1])}
-"""Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's."""
+    'best': (case('best', 'servo_sine', servo.BEST), AXES[:1]),
+    'rigid': (case('rigid', 'leo_pass', FAST), AXES[:1]),
+    'structure': (case('structure', 'leo_pass', STRUCTURE), AXES[:1]),
+    'structure-notch': (case('structure-notch', 'leo_pass', NOTCH), AXES[:1])}
+"""Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's; a
+faster one with a rigid load, with a flexible one, and with a notch against that."""
 
 LINEAR = 0.1
 """The loops are compared at half the excitation where |L| is above this."""
@@ -281,6 +291,9 @@ def drawings(responses, drive):
                             'the same, elevation': ('position/elevation/feedforward', TRUTH),
                             'adrc': ('position/azimuth/adrc', MOTOR_2)},
                            lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
+        'structure': chosen({'rigid': ('position/azimuth/rigid', RAW),
+                             'flexible': ('position/azimuth/structure', TRUTH),
+                             'flexible, notch': ('position/azimuth/structure-notch', FILTERED)}),
         'paper': chosen({'paper': ('position/azimuth/paper-r1', RAW), 'best': ('position/azimuth/best', FILTERED)})}
 
 
