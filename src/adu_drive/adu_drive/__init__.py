@@ -3,7 +3,7 @@
     drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
     axis          one axis: sensors, speed loop, two current loops, plant
     speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder    the controller's laws
-    motor, gear_train, friction, wind                                            the plant's laws
+    motor, gear_train, friction, structure, wind                                 the plant's laws
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.

@@ -15,6 +15,7 @@ from adu_drive import (
     motor,
     pi,
     speed_loop,
+    structure,
     travel,
 )
 from adu_drive.params import SPEED_PERIOD
@@ -40,6 +41,12 @@ def _motor_constants(m, loop, per_rad, h):
             'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad, 'speed': 1.0 / per_rad / SPEED_PERIOD}
 
 
+def _dish(p):
+    """Inertia, stiffness and damping of the flexible part of the load."""
+    J_dish = p.structure.inertia_share * p.load.inertia
+    return J_dish, *structure.spring_and_damper(J_dish, p.structure.frequency, p.structure.damping)
+
+
 def constants(p, h):
     """Hoisted constants of one axis (AxisParameters) for a plant sub-step h [s]: nested dictionary."""
     per_rad = 2.0 ** p.encoder.load_bits / (2.0 * math.pi)
@@ -47,6 +54,8 @@ def constants(p, h):
     N = p.gear_train.ratio
     J_shaft = 0.5 * (p.motor_1.inertia + p.motor_2.inertia + p.speed_loop.load_inertia / N ** 2)
     T_b, out, per_fade = bias.line(p.bias)
+    J_dish, k_dish, c_dish = _dish(p)
+    J_base = p.load.inertia - J_dish
     l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_PERIOD)
     return {
         'motor_1': _motor_constants(p.motor_1, p.current_loop, motor_per_rad, h),
@@ -58,8 +67,10 @@ def constants(p, h):
         'T_b': T_b, 'out': out, 'per_fade': per_fade,
         'bias_gain': 1.0 - math.exp(-SPEED_PERIOD / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
         'k': p.gear_train.stiffness, 'c': p.gear_train.damping, 'half_lash': 0.5 * p.gear_train.lash,
-        'h': h, 'J': p.load.inertia, 'h_J': h / p.load.inertia,
-        'q_B': 1.0 / (1.0 + h * p.load.viscous / p.load.inertia), 'unbalance': p.load.unbalance,
+        'flexible': int(J_dish > 0.0), 'k_dish': k_dish, 'c_dish': c_dish, 'h_J_dish': h / J_dish if J_dish else 0.0,
+        'base_share': 1.0 - p.structure.inertia_share,
+        'h': h, 'J': p.load.inertia, 'h_J': h / J_base,
+        'q_B': 1.0 / (1.0 + h * p.load.viscous / J_base), 'unbalance': p.load.unbalance,
         'T_c': p.friction.coulomb, 'T_sc': p.friction.breakaway - p.friction.coulomb,
         'per_v2': p.friction.stribeck_rate ** -2, 'sigma_0': p.friction.stiffness,
         'h_sigma_0': h * p.friction.stiffness, 'sigma_1_h': p.friction.damping / h,
@@ -86,6 +97,7 @@ def _motor_at_rest(m, g, T, total, theta, per_rad):
 def initial_state(p, theta, external):
     """State of one axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary."""
     per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
+    _, k_dish, _ = _dish(p)
     T = -0.5 * external / p.gear_train.ratio
     observed = p.speed_loop.disturbance_observer > 0.0
     total = 0.0 if observed else T
@@ -93,6 +105,7 @@ def initial_state(p, theta, external):
     return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, total, theta, per_rad),
             'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, total, theta, per_rad),
             'theta': theta, 'omega': 0.0, 'z': 0.0,
+            'dish': theta + external / k_dish if k_dish else theta, 'omega_dish': 0.0, 'deck': 0.0,
             'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0}
 
@@ -190,8 +203,11 @@ def current_control(m, k):
 
 @compiled
 def plant_step(s, c, external):
-    """One plant sub-step h under an external load torque [Nm]: semi-implicit Euler, new currents into the
-    speeds, new speeds into the angles; implicit in R, viscous friction and bristle."""
+    """One plant sub-step h under an external load torque [Nm], which holds s.deck from the deck's acceleration.
+
+    Semi-implicit Euler, new currents into the speeds, new speeds into the angles; implicit in R, viscous friction and
+    bristle.
+    """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, k1.q_R)
     m2.i_d, m2.i_q = motor.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, k2.q_R)
@@ -200,6 +216,12 @@ def plant_step(s, c, external):
     mesh_2 = gear_train.mesh_torque(m2.theta * c.per_N - s.theta, m2.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
     bearing, s.z = friction.lugre(s.z, s.omega, c.T_c, c.T_sc, c.per_v2, c.sigma_0, c.h_sigma_0, c.sigma_1_h, c.h)
     stop = travel.buffer_torque(s.theta, s.omega, c.stop_lower, c.stop_upper, c.k_stop, c.c_stop)
+
+    if c.flexible:
+        on_base = c.base_share * s.deck
+        s.dish, s.omega_dish, twist = structure.swing(
+            s.dish, s.omega_dish, s.theta, s.omega, external - on_base, c.k_dish, c.c_dish, c.h, c.h_J_dish)
+        external = on_base + twist
 
     m1.omega = motor.speed(m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
     m2.omega = motor.speed(m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
@@ -228,7 +250,7 @@ def read(s, c, y):
     y.voltage_limited = s.voltage_limited
     y.end_stop = s.end_stop
     y.stopping = s.stopping
-    y.load_position = s.theta
-    y.load_velocity = s.omega
+    y.load_position = s.dish if c.flexible else s.theta
+    y.load_velocity = s.omega_dish if c.flexible else s.omega
     y.true_torque[0] = k1.K_t * m1.i_q
     y.true_torque[1] = k2.K_t * m2.i_q

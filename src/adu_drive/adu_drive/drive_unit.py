@@ -42,8 +42,8 @@ bias              T_b [Nm]
 torque_limited, voltage_limited                 1 when it happened within the period
 end_stop          1 when the end of travel cut the rate command within the period
 stopping          1 when not enabled within the period: ramped to standstill, then held there
-load_position, load_velocity, true_torque       the truth, for tests and studies; never published. true_torque: of
-                  motor 1 and 2 on the shaft
+load_position, load_velocity, true_torque       the truth, for tests and studies; never published: where the beam
+                  points (the dish, where the structure is flexible), and K_t i_q of motor 1 and 2
 
 invalid_command   1 when an input of this call was not finite (or beyond LARGEST): the command counts as enable 0,
                   a disturbance as 0
@@ -118,14 +118,11 @@ def _external(s, c, u):
     T_azimuth, T_elevation = wind.torques(c.wind, s.k * c.period)
     T_azimuth -= c.azimuth.unbalance * math.cos(azimuth)
     T_elevation -= c.elevation.unbalance * math.cos(elevation)
-    believed = True
-    if _believed(x) and _believed(y) and _believed(z):
-        inertial_azimuth, inertial_elevation = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
-        T_azimuth += inertial_azimuth
-        T_elevation += inertial_elevation
-    else:
-        believed = False
-    return T_azimuth, T_elevation, believed
+    believed = _believed(x) and _believed(y) and _believed(z)
+    if not believed:
+        x = y = z = 0.0
+    s.azimuth.deck, s.elevation.deck = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
+    return T_azimuth + s.azimuth.deck, T_elevation + s.elevation.deck, believed
 
 
 @compiled

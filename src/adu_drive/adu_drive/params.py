@@ -97,6 +97,14 @@ class LoadParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class StructureParameters(Parameters):
+    """A part of the load, the dish, swings on the rest of it, which the gear and the encoder see."""
+    inertia_share: float = parameter(0.0, 0.0, 0.9, '', "of the load's inertia; 0: rigid")
+    frequency: float = parameter(12.0, 1.0, 200.0, 'Hz', 'of the dish on a locked base')
+    damping: float = parameter(0.01, 0.0, 1.0, '', 'damping ratio of that')
+
+
+@dataclasses.dataclass(frozen=True)
 class FrictionParameters(Parameters):
     """LuGre friction of the load bearing."""
     coulomb: float = parameter(60.0, 0.01, 1e5, 'Nm', 'sliding')
@@ -141,6 +149,7 @@ class AxisParameters(Parameters):
     bias: BiasParameters = group(BiasParameters)
     gear_train: GearTrainParameters = group(GearTrainParameters)
     load: LoadParameters = group(LoadParameters)
+    structure: StructureParameters = group(StructureParameters)
     friction: FrictionParameters = group(FrictionParameters)
     limits: LimitParameters = group(LimitParameters)
     encoder: EncoderParameters = group(EncoderParameters)
