@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import importlib.resources
 import pathlib
+import re
 import typing
 
 import yaml
@@ -41,12 +42,15 @@ class ScenarioParameters(parameters.Parameters):
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML's plain values, but a date stays the text it was written as."""
+    """YAML's plain values, but a date and `on`, `off`, `yes`, `no` stay the texts they were written as."""
 
 
 _Loader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if tag != 'tag:yaml.org,2002:timestamp']
+    first: [(tag, pattern) for tag, pattern in resolvers
+            if tag not in ('tag:yaml.org,2002:timestamp', 'tag:yaml.org,2002:bool')]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+_Loader.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^(?:true|True|TRUE|false|False|FALSE)$'),
+                              list('tTfF'))
 
 
 class NodeKind(typing.NamedTuple):

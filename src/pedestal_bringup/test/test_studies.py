@@ -69,12 +69,11 @@ def test_rows_are_within_their_bounds(studied, name, case, metric):
     assert low <= value <= high
 
 
-def test_two_loops_fight_where_one_does_not(studied):
+def test_two_loops_fight_at_rest_where_one_does_not(studied):
     content = json.loads((studied('backlash')[0] / 'rows.json').read_text())
     values = {(row['case'], row['metric']): row['value'] for row in content['rows']}
     for metric in ('fight_torque_rms_nm', 'synchronism_error_rms_rad_s'):
-        assert values['independent-loops', metric] > 0.0 and values['mean-speed', metric] > 0.0
-    assert values['independent-loops', 'fight_torque_rms_nm'] > 2.0 * values['mean-speed', 'fight_torque_rms_nm']
+        assert values['independent-loops', metric] > 20.0 * values['mean-speed', metric] > 0.0
 
 
 def test_what_misses_its_target_is_marked(done):

@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+import yaml
 
 from pedestal_bringup.studies import experiment
 
@@ -82,3 +83,10 @@ def test_a_case_says_how_to_run_it_through_the_nodes():
     case = experiment.Case('fast', 'servo_step', {'adu.azimuth.bias.torque': 3.0}, 2.0)
     assert case.command() == 'pedestal run servo_step --duration 2 --param adu.azimuth.bias.torque=3.0'
     assert case.loaded().node_parameters('adu').azimuth.bias.torque == 3.0
+
+
+def test_off_is_a_word():
+    """YAML 1.1 takes off for false; a schedule of that name must survive, also in the file the nodes read."""
+    loaded = experiment.Case('off', 'servo_step', {'adu.azimuth.bias.schedule': 'off'}).loaded()
+    assert loaded.node_parameters('adu').azimuth.bias.schedule == 'off'
+    assert yaml.safe_load(loaded.as_yaml())['adu']['ros__parameters']['azimuth.bias.schedule'] == 'off'
