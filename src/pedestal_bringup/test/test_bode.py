@@ -282,4 +282,4 @@ def test_study_through_the_command_line(tmp_path):
         assert values[case, 'crossover_hz'] > 1.0 and values[case, 'phase_margin_deg'] > 10.0
     figures = {path.stem: path.stat().st_size for path in (tmp_path / 'studies' / 'bode').glob('*.png')}
     assert {'current', 'speed', 'position', 'paper', 'structure'} <= set(figures) and min(figures.values()) > 10000
-    assert 'Half the excitation' in result.stdout
+    assert 'Linear: half the excitation' in result.stdout
