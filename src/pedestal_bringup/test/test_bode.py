@@ -30,15 +30,18 @@ def held(system, times, dt):
 
 
 def mechanics(p):
-    """Windings, rotors, meshes and load of one axis: voltages v1, v2 to currents, motor angles, load angle."""
-    g, J, B = p.gear_train, p.load.inertia, p.load.viscous
+    """Windings, rotors, meshes, load and dish of one axis: voltages v1, v2 to currents, motor angles, load angle."""
+    g, share = p.gear_train, p.structure.inertia_share
     N, k, c = g.ratio, g.stiffness, g.damping
-    A, B_v = np.zeros((8, 8)), np.zeros((8, 2))                       # i w th, i w th, w th
-    A[7, 6] = 1.0
-    A[6, 6] = -B / J
+    J, w_d = (1.0 - share) * p.load.inertia, 2.0 * math.pi * p.structure.frequency
+    A, B_v = np.zeros((10, 10)), np.zeros((10, 2))                  # i w th, i w th, w th, w th
+    A[7, 6] = A[9, 8] = 1.0
+    A[6, 6] = -p.load.viscous / J
+    A[8, 6:] = 2.0 * p.structure.damping * w_d, w_d ** 2, -2.0 * p.structure.damping * w_d, -w_d ** 2
+    A[6] -= share / (1.0 - share) * A[8]
     for j, m in enumerate((p.motor_1, p.motor_2)):
         i, w, th = 3 * j, 3 * j + 1, 3 * j + 2
-        mesh = np.zeros(8)
+        mesh = np.zeros(10)
         mesh[[w, th, 6, 7]] = c / N, k / N, -c, -k
         A[i, i], A[i, w] = -m.resistance / m.inductance, -m.pole_pairs * m.flux_linkage / m.inductance
         B_v[i, j] = 1.0 / m.inductance
@@ -47,7 +50,7 @@ def mechanics(p):
         A[w, w] -= m.viscous / m.inertia
         A[th, w] = 1.0
         A[6] += mesh / J
-    C = np.eye(8)[[0, 3, 2, 5, 7]]
+    C = np.eye(10)[[0, 3, 2, 5, 7]]
     return control.ss(A, B_v, C, np.zeros((5, 2)), inputs=['v1', 'v2'], outputs=['i1', 'i2', 'th1', 'th2', 'th'],
                       name='mechanics')
 
@@ -114,6 +117,13 @@ def pd_controller(K_p, K_d, lag, T):
     return control.tf([K_p * (lag + T) + K_d, -K_p * lag - K_d], [lag + T, -lag], T)
 
 
+def notch_filter(c, T):
+    """(s^2 + 2 depth width w s + w^2) / (s^2 + 2 width w s + w^2), sampled with w where it is."""
+    w = 2.0 * math.pi * c.frequency
+    notch = control.tf([1.0, 2.0 * c.depth * c.width * w, w * w], [1.0, 2.0 * c.width * w, w * w])
+    return control.sample_system(notch, T, 'bilinear', prewarp_frequency=w)
+
+
 def model_at(loop, frequency):
     return loop(np.exp(2j * math.pi * frequency * loop.dt))
 
@@ -127,9 +137,9 @@ def turning(p, f):
     over a speed period held for five current periods.
     """
     s, m = 2j * np.pi * f, p.motor_1
-    turned = [1, 2, 4, 5, 6, 7]
+    turned = [1, 2, 4, 5, 6, 7, 8, 9]
     A = mechanics(p).A
-    M = control.ss(A[np.ix_(turned, turned)], A[np.ix_(turned, [0])] + A[np.ix_(turned, [3])], np.eye(6)[:1], [[0.0]])
+    M = control.ss(A[np.ix_(turned, turned)], A[np.ix_(turned, [0])] + A[np.ix_(turned, [3])], np.eye(8)[:1], [[0.0]])
     D = (1.0 - np.exp(-s * SPEED_PERIOD)) / (s * SPEED_PERIOD) \
         * np.mean(np.exp(np.outer(-s, CURRENT_PERIOD * np.arange(5))), axis=1)
     return 1.0 / (1.0 + m.pole_pairs * m.flux_linkage / (m.inductance * s + m.resistance) * M(s) * (1.0 - D))
@@ -203,6 +213,24 @@ def test_position_loop_of_the_paper():
     assert margins_agree(found, loop, 0.25)
 
 
+def test_flexible_structure_and_the_notch_against_it():
+    """The resonance takes the margins away, the notch brings them back."""
+    ours = {}
+    for name in ('structure', 'structure-notch'):
+        case, axes = bode.CASES[name]
+        loaded = case.loaded()
+        acu, T = loaded.node_parameters('acu').azimuth, 5e-3
+        loop = open_position_loop(loaded.node_parameters('adu').azimuth, pi_controller(acu.feedforward, T), T)
+        if acu.notch.frequency > 0.0:
+            loop = loop * notch_filter(acu.notch, T)
+        found = bode.position(case, axes)[f'position/azimuth/{name}']
+        assert agrees(found, loop, 0.25, 40.0, 0.04, 2.0)
+        assert margins_agree(found, loop, 0.25)
+        ours[name] = {metric: value for metric, (value, _) in bode.margins(found).items()}
+    assert ours['structure']['phase_margin_deg'] < 20.0 and ours['structure']['gain_margin_db'] < 5.0
+    assert ours['structure-notch']['phase_margin_deg'] > 40.0 and ours['structure-notch']['gain_margin_db'] > 10.0
+
+
 def known(loop):
     """A Response that is exact."""
     f = np.geomspace(0.1, 40.0, 200)
@@ -253,5 +281,5 @@ def test_study_through_the_command_line(tmp_path):
     for case in cases:
         assert values[case, 'crossover_hz'] > 1.0 and values[case, 'phase_margin_deg'] > 10.0
     figures = {path.stem: path.stat().st_size for path in (tmp_path / 'studies' / 'bode').glob('*.png')}
-    assert {'current', 'speed', 'position', 'paper'} <= set(figures) and min(figures.values()) > 10000
-    assert 'Half the excitation' in result.stdout
+    assert {'current', 'speed', 'position', 'paper', 'structure'} <= set(figures) and min(figures.values()) > 10000
+    assert 'Linear: half the excitation' in result.stdout

@@ -12,6 +12,7 @@ The grey line of a figure is what the gains were chosen by: w_c / s for the curr
 speed with everything rigid, K_p / s + K_i / s^2 for the position. What lies between is sampling, delay, elasticity.
 """
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -30,7 +31,7 @@ MOTORS = ('motor_1', 'motor_2')
 START = (-2.0, 0.15)
 """Where the axes start [rad]."""
 
-RATE = (0.2, 0.06)
+RATE = (0.1, 0.03)
 """Rates of the axes [rad/s]: far above the excitation and the Stribeck rate, inside the travel for a whole record."""
 
 
@@ -67,11 +68,11 @@ class Sweep:
 CURRENT = Sweep(0.1, 10.0, 4000.0, 60, 5, 5, 1.5)
 """Peak in A."""
 
-SPEED = Sweep(1.0, 1.0, 900.0, 120, 2, 4, 0.02)
-"""Peak in rad/s of the load: 8 Nm of a motor, less than the bias."""
+SPEED = Sweep(1.0, 1.0, 900.0, 120, 2, 4, 0.015)
+"""Peak in rad/s of the load: 6 Nm of a motor, less than the bias."""
 
-POSITION = Sweep(4.0, 0.25, 95.0, 200, 2, 3, 0.02)
-"""Peak in rad/s; up to nearly half the control rate of 5 ms."""
+POSITION = Sweep(8.0, 0.25, 95.0, 300, 2, 3, 0.012)
+"""Peak in rad/s: half of what would open the teeth at the paper's 5 Nm of bias. Up to nearly half of 1 / 5 ms."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -216,25 +217,31 @@ def controller(name):
     return case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
+FAST = {'acu.azimuth.feedforward.bandwidth': 40.0}
+STRUCTURE = {**FAST, 'adu.azimuth.structure.inertia_share': 0.5, 'adu.azimuth.structure.frequency': 8.0}
+NOTCH = {**STRUCTURE, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
+         'acu.azimuth.notch.depth': 0.3}
+"""Half of the load swings on the other half; the notch lies where the loop without it has its resonance."""
+
 CASES = {
     'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
     'adrc': (controller('adrc'), AXES),
     'paper-r1': (case('paper-r1', 'servo_sine', servo.R1), AXES[:1]),
-    'best': (case('best', 'servo_sine', servo.BEST), AXES[:1])}
-"""Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's."""
+    'best': (case('best', 'servo_sine', servo.BEST), AXES[:1]),
+    'rigid': (case('rigid', 'leo_pass', FAST), AXES[:1]),
+    'structure': (case('structure', 'leo_pass', STRUCTURE), AXES[:1]),
+    'structure-notch': (case('structure-notch', 'leo_pass', NOTCH), AXES[:1])}
+"""Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's; a
+faster one with a rigid load, with a flexible one, and with a notch against that."""
 
-LINEAR = 0.1
-"""The loops are compared at half the excitation where |L| is above this."""
-
-
-def halved(sweep):
-    return dataclasses.replace(sweep, peak=0.5 * sweep.peak)
+MARGIN_BAND = math.sqrt(10.0)
+"""Around crossover, where the margins are read: |L| within this of 1, 10 dB either way."""
 
 
 def nonlinearity(found, smaller):
-    """Largest relative change of L between two excitations, where |L| > LINEAR."""
+    """Largest relative change of L between two excitations, within MARGIN_BAND."""
     change = np.abs(smaller.open_loop / found.open_loop - 1.0)
-    return float(change[np.abs(found.open_loop) > LINEAR].max())
+    return float(change[np.abs(np.log(np.abs(found.open_loop))) < math.log(MARGIN_BAND)].max())
 
 
 def rows(responses):
@@ -245,19 +252,19 @@ def rows(responses):
 
 def run(progress) -> Result:
     drive = AduParameters()
-    parts = [('current loops', lambda half: current(drive, halved(CURRENT) if half else CURRENT)),
-             ('speed loops', lambda half: speed(drive, halved(SPEED) if half else SPEED))]
-    parts += [(f'position loop {name}', lambda half, case=case, axes=axes: position(
-        case, axes, halved(POSITION) if half else POSITION)) for name, (case, axes) in CASES.items()]
+    parts = {'current loops': (functools.partial(current, drive), CURRENT),
+             'speed loops': (functools.partial(speed, drive), SPEED)}
+    parts |= {f'position loop {name}': (functools.partial(position, case, axes), POSITION)
+              for name, (case, axes) in CASES.items()}
     responses, change = {}, {}
-    for i, (text, measure) in enumerate(parts):
+    for i, (text, (measure, sweep)) in enumerate(parts.items()):
         progress(i / len(parts), text)
-        found, smaller = measure(False), measure(True)
+        found, smaller = measure(sweep), measure(dataclasses.replace(sweep, peak=0.5 * sweep.peak))
         change |= {name: nonlinearity(found[name], smaller[name]) for name in found}
         responses |= found
     worst = max(change, key=change.get)
-    remarks = [f'Half the excitation changes no open loop by more than {100.0 * change[worst]:.1f} % where |L| > '
-               f'{LINEAR:g} ({worst}).']
+    remarks = [f'Linear: half the excitation changes no open loop by more than {100.0 * change[worst]:.1f} % within '
+               f'10 dB of |L| = 1 ({worst}).']
     return Result(rows(responses), drawings(responses, drive), remarks)
 
 
@@ -281,6 +288,9 @@ def drawings(responses, drive):
                             'the same, elevation': ('position/elevation/feedforward', TRUTH),
                             'adrc': ('position/azimuth/adrc', MOTOR_2)},
                            lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
+        'structure': chosen({'rigid': ('position/azimuth/rigid', RAW),
+                             'flexible': ('position/azimuth/structure', TRUTH),
+                             'flexible, notch': ('position/azimuth/structure-notch', FILTERED)}),
         'paper': chosen({'paper': ('position/azimuth/paper-r1', RAW), 'best': ('position/azimuth/best', FILTERED)})}
 
 
