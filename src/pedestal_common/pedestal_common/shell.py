@@ -375,11 +375,9 @@ class Shell(Node):
         deadline = time.monotonic() + START_DEADLINE
         for topic, publisher in self._publishers_by_topic.items():
             wanted = topics.readers(topic, self.graph.members)
-            while publisher.get_subscription_count() < wanted:
+            while missing := self._missing(topic, publisher, wanted):
                 if time.monotonic() > deadline:
-                    present = sorted(info.node_name for info in self.get_subscriptions_info_by_topic(topic.name))
-                    raise GraphError(f'{topic.name} has {publisher.get_subscription_count()} of {wanted} readers '
-                                     f'after {START_DEADLINE:g} s; present: {", ".join(present) or "none"}')
+                    raise GraphError(f'{topic.name} is not read by {", ".join(missing)} after {START_DEADLINE:g} s')
                 if _stop:
                     raise Stopped
                 time.sleep(0.01)
@@ -387,6 +385,15 @@ class Shell(Node):
             if len(topic.writers) == 1 and self.count_publishers(topic.name) > 1:
                 raise GraphError(f'{topic.name} already has a writer: another graph runs on ROS_DOMAIN_ID '
                                  f'{self.context.get_domain_id()}; set a free one')
+
+    def _missing(self, topic, publisher, wanted):
+        """Which of the wanted readers a topic has not got yet. By name: a stranger who listens is no substitute."""
+        if not wanted:
+            return []
+        there = self.get_subscriptions_info_by_topic(publisher.topic_name)
+        names = {info.node_name for info in there}
+        missing = [name for name in wanted if name not in names]
+        return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
     def draining(self):
         """Asked after the end: True while a node must go on receiving before `close`; overridden by the recorder."""
