@@ -189,12 +189,16 @@ def parse_override(text):
 
 
 def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
-    """A Scenario from a name or a YAML path.
+    """A Scenario from a name or a YAML path; see parse."""
+    return parse(*_text(name_or_path), overrides, seed, duration, pacing)
+
+
+def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
+    """A Scenario from its YAML text; parse(name, Scenario.as_yaml()) gives the same again.
 
     overrides: texts 'node.key=value'. seed, duration and pacing replace the header's where given.
     Raises ScenarioError for anything unknown or out of range.
     """
-    name, content = _text(name_or_path)
     sections = _sections(name, content)
     for override in overrides:
         node, key, value = parse_override(override)
