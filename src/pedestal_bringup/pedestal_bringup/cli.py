@@ -45,7 +45,7 @@ def _parser():
     run.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='default: bags/runs/SCENARIO-N')
     run.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     run.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                     help='change a parameter, as acu.azimuth.position_loop.kp=20; may be repeated')
+                     help='change a parameter, as acu.azimuth.feedforward.bandwidth=20; may be repeated')
     run.set_defaults(verb=_run)
 
     scenarios = verbs.add_parser('scenarios', help='list the scenarios')

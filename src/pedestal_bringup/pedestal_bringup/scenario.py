@@ -180,7 +180,7 @@ def parse_override(text):
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
-        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.position_loop.kp=20')
+        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.feedforward.bandwidth=20')
     parameters_of(node)
     try:
         return node, key, yaml.load(right, Loader=_Loader)
