@@ -15,7 +15,7 @@ JOINTS, ERROR, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship
 COMMAND, ESTIMATE, REFERENCE, MODE, PROGRAM = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode',
                                                'acu/program_track')
 HEARD = records.of(JOINTS, ERROR, ATTITUDE)
-SAID = np.dtype([*records.of(COMMAND, ESTIMATE, REFERENCE).descr, (MODE, 'i8')], align=True)
+SAID = records.of(COMMAND, ESTIMATE, REFERENCE, more=(MODE,))
 
 
 class Acu:

@@ -7,15 +7,18 @@ its messages exists once.
 HEARD, SAID = of('joint_states', 'ship/truth'), of('acu/rate_command')
     one field per topic: stamp [ns], then the numbers; a message that did not come, or is not to be sent, has stamp NEVER
 """
+import typing
+
 import numpy as np
 
 from pedestal_common import messages, topics
 
 NEVER = -2**63
+_AXES = list(messages.AXES)
 
 
 def _type(*fields):
-    return np.dtype([('stamp', 'i8'), *((name, 'f8', (size,)) for name, size in fields)], align=True)
+    return np.dtype([('stamp', 'i8'), *((name, 'f8', (size,)) for name, size in fields)])
 
 
 def _joints(names):
@@ -40,16 +43,15 @@ _KINDS = {
     'Imu': _spatial(('orientation', 4), ('angular_velocity', 3), ('linear_acceleration', 3)),
 }
 _MOTORS = _joints(messages.MOTORS)
-_AXES = list(messages.AXES)
 
 
 def _kind(topic):
     return _MOTORS if topic == 'adu/motor_states' else _KINDS[topics.BY_NAME[topic].type.rpartition('/')[2]]
 
 
-def of(*names) -> np.dtype:
-    """The record of these topics."""
-    return np.dtype([(name, _kind(name)[0]) for name in names], align=True)
+def of(*names, more=()) -> np.dtype:
+    """The record of these topics, `more` whole numbers behind them."""
+    return np.dtype([*((name, _kind(name)[0]) for name in names), *((name, 'i8') for name in more)])
 
 
 def columns(topic) -> tuple:
@@ -57,100 +59,91 @@ def columns(topic) -> tuple:
     return _kind(topic)[1]
 
 
-def numbers(record, topic) -> np.ndarray:
-    """The numbers of a topic's records (n,) without the stamp, as (n, len(columns(topic)))."""
-    return np.column_stack([record[name] for name in _kind(topic)[0].names[1:]]) if columns(topic) else \
-        np.zeros((len(record), 0))
+class Slot(typing.NamedTuple):
+    """Where the numbers of a topic are in a record: views of its stamps (n,) [ns] and numbers (n, columns)."""
+    stamp: np.ndarray
+    numbers: np.ndarray
 
 
-def put_numbers(record, topic, values):
-    """Write numbers (n, len(columns(topic))) into a topic's records (n,)."""
-    at = 0
-    for name in _kind(topic)[0].names[1:]:
-        size = record[name].shape[1]
-        record[name] = values[:, at:at + size]
-        at += size
+def slot(record, topic) -> Slot:
+    """The Slot of a topic in records (n,)."""
+    start = record.dtype.fields[topic][1] // 8
+    return Slot(record[topic]['stamp'],
+                record.view('f8').reshape(len(record), -1)[:, start + 1:start + 1 + len(columns(topic))])
 
 
-def take(record, message):
-    """Take the numbers of a message into a record (np.void); None leaves them as they are and says NEVER."""
+def only(record, topic) -> Slot:
+    """The Slot of a topic in one record (1,), as `take` and `put` want it: stamp (1,), numbers (columns,)."""
+    stamp, numbers = slot(record, topic)
+    return Slot(stamp, numbers[0])
+
+
+def take(place, message):
+    """Take the numbers of a message into its Slot; None leaves them as they are and says NEVER."""
     if message is None:
-        record['stamp'] = NEVER
+        place.stamp[0] = NEVER
     else:
-        record['stamp'] = messages.nanoseconds(message.header.stamp)
-        _TAKE[type(message)](record, message)
+        place.stamp[0] = messages.nanoseconds(message.header.stamp)
+        place.numbers[:] = _TAKE[type(message)](message)
 
 
-def _take_joints(record, message):
-    names = message.name
-    for field, values in (('position', message.position), ('velocity', message.velocity), ('effort', message.effort)):
-        # The usual case costs a tenth of looking for each name.
-        usual = names == _AXES and len(values) == len(_AXES)
-        record[field] = values if usual else messages.by_name(names, values, messages.AXES)
+def _joint_numbers(message):
+    names, fields = message.name, (message.position, message.velocity, message.effort)
+    # The usual case costs a tenth of looking for each name.
+    if names == _AXES and len(fields[0]) == len(fields[1]) == len(fields[2]) == len(_AXES):
+        return [value for values in fields for value in values.tolist()]
+    return [value for values in fields for value in messages.by_name(names, values, messages.AXES)]
 
 
-def _take_vector(record, message):
+def _vector_numbers(message):
     v = message.vector
-    record['vector'] = v.x, v.y, v.z
+    return v.x, v.y, v.z
 
 
-def _take_odometry(record, message):
+def _odometry_numbers(message):
     pose, twist = message.pose.pose, message.twist.twist
     p, q, v, w = pose.position, pose.orientation, twist.linear, twist.angular
-    record['position'], record['orientation'] = (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)
-    record['twist_linear'], record['twist_angular'] = (v.x, v.y, v.z), (w.x, w.y, w.z)
+    return p.x, p.y, p.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z
 
 
-def _take_imu(record, message):
+def _imu_numbers(message):
     q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
-    record['orientation'] = q.x, q.y, q.z, q.w
-    record['angular_velocity'], record['linear_acceleration'] = (w.x, w.y, w.z), (f.x, f.y, f.z)
+    return q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z
 
 
-def put(message, record):
-    """Put a record (np.void) into a message of its topic."""
-    messages.put_stamp(message.header.stamp, int(record['stamp']))
-    _PUT[type(message)](message, record)
+def put(message, place):
+    """Put the numbers of a Slot into its message."""
+    messages.put_stamp(message.header.stamp, place.stamp.item())
+    _PUT[type(message)](message, place.numbers)
 
 
-def _put_joints(message, record):
-    message.position[:], message.velocity[:], message.effort[:] = (
-        record['position'], record['velocity'], record['effort'])
+def _put_joints(message, numbers):
+    n = len(message.name)
+    message.position[:], message.velocity[:], message.effort[:] = numbers[:n], numbers[n:2 * n], numbers[2 * n:]
 
 
-def _put_trajectory(message, record):
+def _put_trajectory(message, numbers):
     point = message.points[0]
-    point.positions[:], point.velocities[:], point.accelerations[:] = (
-        record['position'], record['velocity'], record['acceleration'])
+    point.positions[:], point.velocities[:], point.accelerations[:] = numbers[:2], numbers[2:4], numbers[4:]
 
 
-def _put_xyz(target, values):
-    target.x, target.y, target.z = values.tolist()
+def _put_vector(message, numbers):
+    v = message.vector
+    v.x, v.y, v.z = numbers.tolist()
 
 
-def _put_xyzw(target, values):
-    target.x, target.y, target.z, target.w = values.tolist()
-
-
-def _put_vector(message, record):
-    _put_xyz(message.vector, record['vector'])
-
-
-def _put_odometry(message, record):
+def _put_odometry(message, numbers):
     pose, twist = message.pose.pose, message.twist.twist
-    _put_xyz(pose.position, record['position'])
-    _put_xyzw(pose.orientation, record['orientation'])
-    _put_xyz(twist.linear, record['twist_linear'])
-    _put_xyz(twist.angular, record['twist_angular'])
+    p, q, v, w = pose.position, pose.orientation, twist.linear, twist.angular
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z = numbers.tolist()
 
 
-def _put_imu(message, record):
-    _put_xyzw(message.orientation, record['orientation'])
-    _put_xyz(message.angular_velocity, record['angular_velocity'])
-    _put_xyz(message.linear_acceleration, record['linear_acceleration'])
+def _put_imu(message, numbers):
+    q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
+    q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z = numbers.tolist()
 
 
-_TAKE = {messages.JointState: _take_joints, messages.Vector3Stamped: _take_vector,
-         messages.Odometry: _take_odometry, messages.Imu: _take_imu}
+_TAKE = {messages.JointState: _joint_numbers, messages.Vector3Stamped: _vector_numbers,
+         messages.Odometry: _odometry_numbers, messages.Imu: _imu_numbers}
 _PUT = {messages.JointState: _put_joints, messages.JointTrajectory: _put_trajectory,
         messages.Vector3Stamped: _put_vector, messages.Odometry: _put_odometry, messages.Imu: _put_imu}

@@ -14,7 +14,7 @@ class InsNode(shell.Shell):
         self.unit = Ins(self.parameters)
         self.unit.prepare()
         self.worst = 0
-        self.raw, self.data = self.unit.heard[0][RAW], self.unit.said[0][DATA]
+        self.raw, self.data = records.only(self.unit.heard, RAW), records.only(self.unit.said, DATA)
         self.send = self.writer(DATA)
         self.diagnose_with(self.diagnose)
         self.follow(RAW, self.unit.followers, self.step)

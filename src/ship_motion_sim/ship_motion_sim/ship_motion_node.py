@@ -15,18 +15,19 @@ class ShipMotionNode(shell.Shell):
         super().__init__('ship_motion', ShipMotionParameters)
         self.unit = ShipMotion(self.parameters)
         self.unit.prepare()
-        self.clock = self.unit.heard[0][CLOCK]
-        self.send = {name: self.writer(name) for name in (TRUTH, RAW)}
+        self.clock = records.only(self.unit.heard, CLOCK)
+        self.says = [(self.unit.messages[name], records.only(self.unit.said, name), self.writer(name))
+                     for name in (TRUTH, RAW)]
         self.diagnose_with(self.diagnose)
         self.follow(CLOCK, self.unit.followers, self.step)
 
     def step(self, stamp, _clock, _followers):
-        self.clock['stamp'] = stamp
+        self.clock.stamp[0] = stamp
         self.unit.answer()
         self.begin_step(stamp)
-        for name, send in self.send.items():
-            records.put(self.unit.messages[name], self.unit.said[0][name])
-            send(self.unit.messages[name])
+        for message, place, send in self.says:
+            records.put(message, place)
+            send(message)
 
     def diagnose(self):
         truth = self.unit.truth[0]

@@ -20,8 +20,8 @@ class TrackingReceiverNode(shell.Shell):
         self.unit.prepare()
         self.outputs = self.unit.outputs
         self.fault = receiver.LOCKED
-        self.joints, self.ship = (self.unit.heard[0][name] for name in (JOINTS, SHIP))
-        self.error, self.truth = (self.unit.said[0][name] for name in (ERROR, TARGET))
+        self.joints, self.ship = (records.only(self.unit.heard, name) for name in (JOINTS, SHIP))
+        self.error, self.truth = (records.only(self.unit.said, name) for name in (ERROR, TARGET))
         self.send_error = self.writer(ERROR)
         self.send_truth = self.writer(TARGET)
         self.diagnose_with(self.diagnose)
