@@ -5,7 +5,7 @@ into the messages it says; a recomputation fills the same records from the colum
 its messages exists once.
 
 HEARD, SAID = of('joint_states', 'ship/truth'), of('acu/rate_command')
-    one field per topic: stamp [ns], then the numbers; a message that did not come, or is not to be sent, has stamp NEVER
+    one field per topic: stamp [ns], then the numbers; one that did not come, or is not to be sent, has stamp NEVER
 """
 import typing
 
@@ -113,8 +113,11 @@ def _imu_numbers(message):
 
 def put(message, place):
     """Put the numbers of a Slot into its message."""
-    messages.put_stamp(message.header.stamp, place.stamp.item())
-    _PUT[type(message)](message, place.numbers)
+    if type(message) is messages.Clock:
+        messages.put_stamp(message.clock, place.stamp.item())
+    else:
+        messages.put_stamp(message.header.stamp, place.stamp.item())
+        _PUT[type(message)](message, place.numbers)
 
 
 def _put_joints(message, numbers):

@@ -1,4 +1,4 @@
-"""Step matching: which messages belong to step t_k. No ROS here, so that a recorded run is matched as its nodes were."""
+"""Step matching: which messages belong to step t_k. No ROS here: a recorded run is matched as its nodes were."""
 import collections
 
 SECOND = 1_000_000_000
