@@ -6,19 +6,13 @@ import time
 import numpy as np
 from std_srvs.srv import Trigger
 
-from adu_drive import drive_state, drive_unit, faults, thermal
+from adu_drive import drive_state, faults, thermal
 from adu_drive.params import AduNodeParameters
-from pedestal_common import messages, shell
+from adu_drive.wire import CLOCK, COMMAND, JOINTS, MOTORS, SHIP, STATE, Adu
+from pedestal_common import messages, records, shell
 
 STEP = 'step'
 """The drive's own trigger among its inputs."""
-
-REFUSALS = {
-    drive_state.FAULT_LATCHED: 'a fault is latched (adu/reset_faults)',
-    drive_state.EMERGENCY_LATCHED: 'an emergency stop is latched (adu/reset_faults)',
-    drive_state.MOVING: 'the axes still move',
-    drive_state.CAUSE_PERSISTS: 'the cause is still there'}
-"""Why a request is not granted."""
 
 ACKNOWLEDGED_STEPS = 1000
 """Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so
@@ -30,51 +24,41 @@ class AduNode(shell.Shell):
     def __init__(self):
         super().__init__('adu', AduNodeParameters)
         p = self.parameters
-        self.constants = drive_unit.constants(p)
-        self.state = drive_unit.initial_state(p)
-        self.inputs = np.zeros(1, drive_unit.INPUTS)
-        self.outputs = np.zeros(1, drive_unit.OUTPUTS)
-        drive_unit.step(self.state.copy(), self.constants, self.inputs, self.outputs.copy())
-        drive_unit.read(self.state, self.constants, self.outputs)
-
+        self.unit = Adu(p, 'ship_motion' in self.graph.members)
+        self.unit.prepare()
+        self.outputs = self.unit.outputs
+        self.now, self.heard_command, self.heard_ship = (records.only(self.unit.heard, name)
+                                                         for name in (JOINTS, COMMAND, SHIP))
         self.period_ns = round(p.period * shell.SECOND)
-        self.timeout_ns = round(p.command_timeout * p.period * shell.SECOND)
         self.steps_to_go = round(p.duration / p.period) if p.duration > 0.0 else None
-        self.on_ship = 'ship_motion' in self.graph.members
         self.k = 0
         self.lost_steps = self.late_ticks = 0
         self.command = None
         self.command_stamp = None
         self.stale = False
-        self.condition = None
-        self.announced = None
+        self.code = None
+        self.announced = ''
         self.refused = ''
         self.invalid = ''
         self.tick_timer = None
         self.ticking = False
         self.truth = None
-        self.truth_stamp = None
-        self.deck_rate = np.zeros(3)
         self.begun = self.heard = time.monotonic()
 
-        self.clock_message = messages.Clock(clock=messages.Time(sec=0, nanosec=0))
-        self.joints = messages.joint_state(messages.AXES)
-        self.motors = messages.joint_state(messages.MOTORS)
-        self.send_joints = self.writer('joint_states')
-        self.send_motors = self.writer('adu/motor_states')
-        self.send_clock = self.writer('clock')
-        self.send_state = self.writer('adu/state')
-        for what, name in enumerate(drive_state.REQUESTS):
-            self.create_service(Trigger, f'adu/{name}', self.service(what))
+        # What the others wait for goes first.
+        self.says = [(self.unit.messages[name], records.only(self.unit.said, name), self.writer(name))
+                     for name in (JOINTS, CLOCK, MOTORS)]
+        self.send_state = self.writer(STATE)
+        for name, what in drive_state.REQUESTS.items():
+            self.create_service(Trigger, name, self.service(what))
         self.diagnose_with(self.diagnose)
 
-        followers = {'acu/rate_command': 0.0, **({'ship/truth': 0.0} if self.on_ship else {})}
         if self.graph.lockstep:
-            self.follow(STEP, followers, self.answered)
+            self.follow(STEP, self.unit.followers, self.answered)
         else:
-            self.reader('acu/rate_command', self.on_command)
-            if self.on_ship:
-                self.reader('ship/truth', self.on_truth)
+            self.reader(COMMAND, self.on_command)
+            if SHIP in self.unit.followers:
+                self.reader(SHIP, self.on_truth)
         self.start_timer = self.every(0.001, self.start)
 
     def start(self):
@@ -96,41 +80,33 @@ class AduNode(shell.Shell):
         self.ticking = True
 
     def publish_step(self):
-        """joint_states, clock and motor_states of step k; what the others wait for goes first."""
+        """The state when it has changed, then joint_states, clock and motor_states of step k."""
         stamp = self.k * self.period_ns
         self.begin_step(stamp)
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
-        outputs = self.outputs[0]
-        if outputs['condition'] != self.condition:
-            self.condition = int(outputs['condition'])
-            self.announce_state(state_text(outputs))
-        azimuth, elevation = outputs['azimuth'], outputs['elevation']
-        joints, motors = self.joints, self.motors
-        messages.put_stamp(joints.header.stamp, stamp)
-        joints.position[:] = azimuth['position'], elevation['position']
-        joints.velocity[:] = azimuth['velocity'], elevation['velocity']
-        joints.effort[:] = azimuth['torque'], elevation['torque']
-        self.send_joints(joints)
-        messages.put_stamp(self.clock_message.clock, stamp)
-        self.send_clock(self.clock_message)
-        messages.put_stamp(motors.header.stamp, stamp)
-        for field, values in (('motor_position', motors.position), ('motor_velocity', motors.velocity),
-                              ('motor_torque', motors.effort)):
-            values[:2], values[2:] = azimuth[field], elevation[field]
-        self.send_motors(motors)
+        self.now.stamp[0] = stamp
+        self.unit.say()
+        self.announce_state()
+        for message, place, send in self.says:
+            records.put(message, place)
+            send(message)
         if self.graph.lockstep:
             self.steps.take(STEP, stamp, None)
 
-    def announce_state(self, text):
-        if text != self.announced:
-            self.announced = text
-            self.announce(self.send_state, messages.String(data=text))
+    def announce_state(self):
+        code = self.unit.said[0][STATE]
+        if code != self.code:
+            self.code = code
+            now = drive_state.described(int(code))
+            if now != self.announced:
+                self.announced = now
+                self.announce(self.send_state, messages.String(data=now))
 
     def answered(self, _stamp, _trigger, inputs):
         """Lockstep: the command stamped t_k (and the ship's truth) has come."""
-        self.command = inputs['acu/rate_command']
-        self.advance(True, inputs.get('ship/truth'))
+        self.command, self.truth = inputs[COMMAND], inputs.get(SHIP)
+        self.advance()
 
     def on_command(self, message):
         """Realtime: the latest command wins; one that is not newer, or from the future, is refused."""
@@ -154,43 +130,24 @@ class AduNode(shell.Shell):
         stamp = self.k * self.period_ns
         age = stamp - self.command_stamp if self.command_stamp is not None else stamp
         self.lost_steps += age > 0
-        self.stale = age > self.timeout_ns or self.command is None
         self.late_ticks += time.monotonic() - self.heard > 1.5 * self.parameters.period
         self.heard = time.monotonic()
-        self.advance(not self.stale, self.truth)
+        self.advance()
 
-    def advance(self, follow, truth):
+    def advance(self):
         """Integrate from t_k to t_k+1 and publish, or end after the last step."""
         if self.k == self.steps_to_go:
             self.end()
             return
-        inputs = self.inputs[0]
-        if self.command is not None:
-            names = self.command.name
-            rates = messages.by_name(names, self.command.velocity, messages.AXES)
-            torques = messages.by_name(names, self.command.effort, messages.AXES)
-            for axis, rate, torque in zip(messages.AXES, rates, torques):
-                inputs[axis]['rate'], inputs[axis]['torque'] = rate, torque
-        inputs['enable'] = follow
-        if truth is not None:
-            self.take_truth(truth, inputs)
-        drive_unit.step(self.state, self.constants, self.inputs, self.outputs)
+        records.take(self.heard_command, self.command)
+        records.take(self.heard_ship, self.truth)
+        self.stale = self.unit.advance()
         if self.outputs[0]['invalid_command']:
-            self.invalid = 'acu/rate_command' if np.isfinite(inputs['base_acceleration']).all() else 'ship/truth'
+            self.invalid = COMMAND if np.isfinite(self.unit.inputs[0]['base_acceleration']).all() else SHIP
         self.k += 1
         if self.k == 1:
             self.begun = time.monotonic()
         self.publish_step()
-
-    def take_truth(self, truth, inputs):
-        """The deck's angular acceleration from two successive truths and their stamps."""
-        stamp = messages.nanoseconds(truth.header.stamp)
-        w = truth.twist.twist.angular
-        rate = np.array((w.x, w.y, w.z))
-        if self.truth_stamp is not None and stamp > self.truth_stamp:
-            inputs['base_acceleration'] = (rate - self.deck_rate) / ((stamp - self.truth_stamp) * 1e-9)
-        if np.isfinite(rate).all() and stamp != self.truth_stamp:
-            self.deck_rate, self.truth_stamp = rate, stamp
 
     def end(self):
         """The last step has been answered: say how it went and finish. The clock ran from the first answer on, when
@@ -203,59 +160,49 @@ class AduNode(shell.Shell):
         self.finished = True
 
     def service(self, what):
-        """The callback of a request: asks the drive at once and answers with what it reads back."""
-        def ask(_request, response):
-            answer = drive_state.request(self.state, self.constants, what)
-            drive_unit.read(self.state, self.constants, self.outputs)
-            if answer == drive_state.GRANTED and what == drive_state.RESET_FAULTS:
+        """The callback of a service: asks the drive between two steps and answers with what it reads back."""
+        def change(_request, response):
+            answer = self.unit.ask(what)
+            if what == drive_state.RESET_FAULTS and answer == drive_state.GRANTED:
                 self.refused = ''
+            now = drive_state.described(int(self.outputs[0]['condition']))
             response.success = answer == drive_state.GRANTED
-            refusal = f'refused: {REFUSALS[answer]}; ' if answer in REFUSALS else ''
-            response.message = f'{refusal}drive is {state_text(self.outputs[0])}'
+            refusal = '' if response.success else f'refused: {drive_state.REFUSALS[answer]}; '
+            response.message = f'{refusal}drive is {now}'
             return response
-        return ask
+        return change
 
     def diagnose(self):
         """What is now, and the topic that held no number since the last diagnosis."""
         outputs = self.outputs[0]
+        now = drive_state.described(int(outputs['condition']))
         invalid, self.invalid = self.invalid, ''
         values = [(f'{axis} {name}', '1' if outputs[axis][name] else '0') for axis in messages.AXES
                   for name in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
         values += [(f'{axis} faults', ', '.join(faults.names(outputs[axis]['faults']))) for axis in messages.AXES]
-        values += [(f'{axis}_motor_{i + 1} thermal_load', f'{load:.3f}') for axis in messages.AXES
-                   for i, load in enumerate(outputs[axis]['thermal_load'])]
-        values += [('state', state_text(outputs)), ('phase', drive_state.PHASES[outputs['phase']]),
-                   ('brakes', 'on' if outputs['braked'] else 'off'), ('step', str(self.k)),
-                   ('lost_steps', str(int(self.lost_steps))), ('late_ticks', str(int(self.late_ticks)))]
-        if outputs['emergency'] or outputs['azimuth']['faults'] | outputs['elevation']['faults']:
-            return shell.ERROR, state_text(outputs), values
+        values += [(f'{axis}_motor_{i} thermal_load', f'{load:.3f}') for axis in messages.AXES
+                   for i, load in enumerate(outputs[axis]['thermal_load'], 1)]
+        values += [('state', now), ('phase', drive_state.PHASES[outputs['phase']]),
+                   ('brakes', 'on' if outputs['braked'] else 'off')]
+        values += [('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
+                   ('late_ticks', str(int(self.late_ticks)))]
+        if outputs['emergency'] or any(outputs[axis]['faults'] for axis in messages.AXES):
+            return shell.ERROR, now, values
         if invalid:
             return shell.ERROR, f'{invalid} holds NaN or infinity: stopping', values
         if self.stale:
-            return shell.ERROR, f'no new acu/rate_command for {self.timeout_ns / 1e9:g} s: stopping', values
+            limit = self.unit.memory['timeout'][0] / 1e9
+            return shell.ERROR, f'no new acu/rate_command for {limit:g} s: stopping', values
         if self.refused:
             return shell.WARN, f'acu/rate_command refused: {self.refused}', values
+        if now != 'enabled':
+            return shell.WARN, now, values
         if any(outputs[axis]['end_stop'] for axis in messages.AXES):
             return shell.WARN, 'at an end stop', values
         hottest = max(outputs[axis]['thermal_load'].max() for axis in messages.AXES)
         if hottest > thermal.WARM:
             return shell.WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values
-        return shell.OK, 'following' if outputs['following'] else state_text(outputs), values
-
-
-def state_text(outputs):
-    """'enabled' when the drive follows commands, otherwise why it does not."""
-    if outputs['following']:
-        return 'enabled'
-    tripped = [f'{axis} {kind}' for axis in messages.AXES for kind in faults.names(outputs[axis]['faults'])]
-    if tripped:
-        return 'fault: ' + ', '.join(tripped)
-    if outputs['emergency']:
-        return 'emergency stop'
-    phase = outputs['phase']
-    if phase == drive_state.DISABLED and outputs['permitted']:
-        phase = drive_state.RELEASING
-    return drive_state.PHASES[drive_state.STOPPING if phase == drive_state.ENABLED else phase]
+        return shell.OK, 'following', values
 
 
 def main(args=None):

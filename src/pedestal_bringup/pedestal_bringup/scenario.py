@@ -141,11 +141,11 @@ def _text(name_or_path):
     return name_or_path, entry.read_text()
 
 
-def _dotted(tree, prefix=''):
+def dotted(tree, prefix=''):
     flat = {}
     for key, value in tree.items():
         if isinstance(value, dict):
-            flat.update(_dotted(value, f'{prefix}{key}.'))
+            flat.update(dotted(value, f'{prefix}{key}.'))
         else:
             flat[f'{prefix}{key}'] = value
     return flat
@@ -166,7 +166,7 @@ def _sections(name, content):
         values = body['ros__parameters'] or {} if whole else None
         if not isinstance(values, dict):
             raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
-        sections[section] = _dotted(values)
+        sections[section] = dotted(values)
     return sections
 
 
