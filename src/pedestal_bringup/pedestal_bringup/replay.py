@@ -38,6 +38,9 @@ WINDOW = 1000
 SETTLING = 0.5
 """Seconds from the last reader's coming to the first message: others are still finding each other."""
 
+UNKNOWN = '_NODE_NAME_UNKNOWN_'
+"""What rmw calls the node of a writer it has found before it has found the node."""
+
 LOOK, READERS_LOOK, KEY_LOOK = 0.1, 0.5, 0.05
 """Seconds between two looks at the position shown, at who still reads, at the keyboard while waiting."""
 
@@ -248,11 +251,13 @@ class Player(Node):
         """
         begun = settled = time.monotonic()
         while not self._ended():
+            unread, now = self._unread(), time.monotonic()
             for name in self.channels:
                 live = self._writers(name) if name != self.companion else []
-                if live:
+                if UNKNOWN in live and now - begun < self.deadline:
+                    settled = now
+                elif live:
                     raise GraphError(f'{name} already has a writer, {", ".join(live)}: its messages would come twice')
-            unread, now = self._unread(), time.monotonic()
             if unread:
                 settled = now
                 name, who = unread
