@@ -95,8 +95,8 @@ def _parser():
                         help='wall-clock time a reader or an answer is waited for; default: 60')
     replay.set_defaults(verb=_replay)
 
-    bench = verbs.add_parser('bench', help='measure this machine: the lockstep ring, or the compiled core')
-    bench.add_argument('what', nargs='?', choices=('graph', 'core'), help='default: both')
+    bench = verbs.add_parser('bench', help='measure this machine: the lockstep ring, the compiled core, bags')
+    bench.add_argument('what', nargs='?', choices=('graph', 'core', 'bag'), help='default: all')
     bench.add_argument('--json', type=pathlib.Path, metavar='FILE')
     bench.set_defaults(verb=_bench)
     return parser

@@ -414,6 +414,13 @@ class Player(Node):
             self._spin(KEY_LOOK)
 
 
+    def close(self):
+        self.status.clear()
+        self.spinner.remove_node(self)
+        self.spinner.shutdown()
+        self.destroy_node()
+
+
 @contextlib.contextmanager
 def _stop_by_signal():
     """stopped() -> whether SIGINT has come: rclpy must not be left in the middle of a call."""
@@ -425,11 +432,13 @@ def _stop_by_signal():
         signal.signal(signal.SIGINT, before)
 
 
-def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, deadline=60.0) -> Outcome:
+def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, deadline=60.0,
+           ready=lambda: None) -> Outcome:
     """Publish a bag into the live graph of this ROS domain.
 
     nodes: what these read, or names: these topics, or neither: all. rate: times real time; None: lockstep with nodes.
-    start, duration, deadline [s]. Raises BagError, ValueError for an option, GraphError for what the graph is not.
+    start, duration, deadline [s]. ready() is called before the first message.
+    Raises BagError, ValueError for an option, GraphError for what the graph is not.
     """
     for option, value, low in (('rate', rate, 0.0), ('duration', duration, 0.0), ('deadline', deadline, 0.0)):
         if value is not None and not (low < value < math.inf):
@@ -455,12 +464,13 @@ def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, dea
             try:
                 begun = time.monotonic()
                 if player.connect():
+                    ready()
                     begun = time.monotonic()
                     player.play()
                 wall = time.monotonic() - begun
                 player.finish()
             finally:
-                player.status.clear()
+                player.close()
             return Outcome(
                 str(path), {name: channel.sent for name, channel in player.channels.items()},
                 playlist.first / SECOND, player.position / SECOND, wall,
