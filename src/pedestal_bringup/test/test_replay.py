@@ -4,7 +4,7 @@ import io
 import pytest
 
 pytest.importorskip('rclpy')
-from pedestal_bringup import bag, cli, replay  # noqa: E402
+from pedestal_bringup import bag, cli, playlist  # noqa: E402
 from pedestal_common import messages, topics  # noqa: E402
 
 T = 5_000_000
@@ -37,7 +37,7 @@ def write(path, rows):
 
 def played(recording, names, start=0.0, duration=None):
     """[(stamp / T, [(topic, bytes)])] of a playlist."""
-    steps = replay.Playlist(recording, names, start, duration).steps()
+    steps = playlist.Playlist(recording, names, start, duration).steps()
     return [(stamp / T, list(group)) for stamp, group in steps]
 
 
@@ -83,7 +83,7 @@ def test_start_and_duration_count_from_the_first_step_and_keep_what_holds(tmp_pa
     (['recorder'], {topic.name for topic in topics.TOPICS} | {OTHER.name}),
     ([], {topic.name for topic in topics.TOPICS} | {OTHER.name})])
 def test_a_node_gets_what_it_reads_and_no_node_under_test_writes(tmp_path, nodes, expected):
-    assert set(replay.select(write(tmp_path / 'bag', ROWS), nodes, [])) == expected
+    assert set(playlist.select(write(tmp_path / 'bag', ROWS), nodes, [])) == expected
 
 
 REFUSED = {
