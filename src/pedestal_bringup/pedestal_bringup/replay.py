@@ -187,7 +187,7 @@ class Player(Node):
 
     def play(self):
         """Publish to the end of the list, or until `quit` or stopped. Raises GraphError when a reader goes, or when
-        an answer of lockstep stays away for the deadline."""
+        an answer of lockstep stays away for the deadline; shell.Stopped when stopped while a reader takes nothing."""
         for stamp, group in self.playlist.steps():
             if not self._await_turn(stamp):
                 return
@@ -220,7 +220,10 @@ class Player(Node):
         channel = self.channels[name]
         since, readers = time.monotonic(), channel.publisher.get_subscription_count()
         while not channel.publisher.wait_for_all_acked(Duration(seconds=0)):
-            if time.monotonic() > since + limit:
+            waited = time.monotonic() - since
+            if waited > PARTING and self.stopped():
+                raise shell.Stopped
+            if waited > limit:
                 raise GraphError(f'a reader of {name} took nothing for {limit:g} s')
             self._spin(0.002)
         if time.monotonic() > since + LEAVE and channel.publisher.get_subscription_count() < readers:
@@ -309,7 +312,7 @@ class Player(Node):
         """Wait until everything sent has arrived and the nodes under test have answered. Raises GraphError after the
         deadline; a stopped replay waits for what it sent only, and only a little."""
         if self._ended():
-            with contextlib.suppress(GraphError):
+            with contextlib.suppress(GraphError, shell.Stopped):
                 for name in self.channels:
                     self._await_arrival(name, PARTING)
             return
@@ -380,7 +383,8 @@ def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, dea
                 if player.connect():
                     ready()
                     begun = time.monotonic()
-                    player.play()
+                    with contextlib.suppress(shell.Stopped):
+                        player.play()
                 wall = time.monotonic() - begun
                 player.finish()
             finally:
