@@ -24,8 +24,9 @@ def refused(capsys, one_line, *arguments):
 
 COMMAND_LINES = {
     'unknown scenario': (['leo_pas'], ["unknown scenario 'leo_pas'; did you mean 'leo_pass'?", 'uav_flyby']),
-    'misspelt key': (['leo_pass', '--param', 'acu.azimuth.position_loop.kpp=20'],
-                     ["unknown parameter 'azimuth.position_loop.kpp'", "did you mean 'azimuth.position_loop.kp'?"]),
+    'misspelt key': (['leo_pass', '--param', 'acu.azimuth.feedforward.bandwith=20'],
+                     ["unknown parameter 'azimuth.feedforward.bandwith'",
+                      "did you mean 'azimuth.feedforward.bandwidth'?"]),
     'misspelt node': (['leo_pass', '--param', 'acuu.period=0.005'], ["'acuu' is no node"]),
     'no value': (['leo_pass', '--param', 'acu.period'], ['must be node.key=value']),
     'broken value': (['leo_pass', '--param', 'acu.period=[1'], ['acu.period=[1']),

@@ -14,6 +14,7 @@ from rosbags.highlevel import AnyReader
 from pedestal_bringup import bag as bags
 from pedestal_bringup import closed_loop, scenario
 from pedestal_bringup.verify import verify
+from pedestal_common import parameters
 
 PARAM = 'acu.tracker.lock_count=20'
 LENGTH = {'leo_pass': 4.0, 'ship_pass': 3.0}
@@ -57,6 +58,23 @@ def runs(start_run):
 @pytest.mark.parametrize('first, second', [('first', 'again'), ('first', 'under_load'), ('ship', 'ship_again')])
 def test_same_seed_gives_the_same_file(runs, first, second):
     assert digest(runs[first]) == digest(runs[second])
+
+
+@pytest.mark.parametrize('name', ['first', 'ship'])
+def test_the_recording_says_how_it_was_made(runs, name):
+    """The scenario in the bag is the scenario that ran; its parameters are all of them, as the nodes had them."""
+    bag = bags.read(runs[name].bag)
+    case = bag.metadata['scenario']
+    chosen = scenario.load(case, [PARAM], duration=LENGTH[case], pacing='lockstep')
+    assert scenario.parse(case, bag.configuration['scenario']) == chosen
+    said = bag.configuration['parameters']
+    assert set(said) == set(chosen.nodes) - {'operator'}
+    for node in set(said) - {'recorder'}:
+        assert parameters.build(scenario.parameters_of(node), said[node]) == chosen.node_parameters(node)
+        assert set(said[node]) == set(parameters.defaults(scenario.parameters_of(node)))
+    assert {'git', 'version.python', 'version.numpy', 'version.numba', 'version.rclpy'} <= set(bag.metadata)
+    made = f'made by: scenario {case}, lockstep, seed 1, git '
+    assert any(line.startswith(made) for line in verify(runs[name].bag).lines())
 
 
 def test_another_seed_gives_another_file(runs):

@@ -37,8 +37,8 @@ def test_a_node_ends_in_silence_when_told_to(ended, node, number):
 
 
 REFUSED = {
-    'unknown key': ('acu', ['-p', 'azimuth.position_loop.kpp:=20.0'],
-                    "unknown parameter 'azimuth.position_loop.kpp'; did you mean 'azimuth.position_loop.kp'?"),
+    'unknown key': ('acu', ['-p', 'azimuth.feedforward.bandwith:=20.0'],
+                    "unknown parameter 'azimuth.feedforward.bandwith'; did you mean 'azimuth.feedforward.bandwidth'?"),
     'range': ('adu', ['-p', 'period:=0.5'], 'period'),
     'NaN': ('tracking_receiver', ['-p', 'receiver.cn0_dbhz:=.nan'], 'receiver.cn0_dbhz'),
     'type': ('ins', ['-p', 'latency:=soon'], 'latency'),

@@ -183,11 +183,10 @@ def test_parameters_while_it_runs(plant):
 
     before = moved_by()
     assert put('azimuth.shaper.rate', 0.01).successful
-    assert put('azimuth.position_loop.kp', 0.0).successful
-    assert put('azimuth.position_loop.ki', 0.0).successful
+    assert put('azimuth.feedforward.bandwidth', 0.0).successful
     assert moved_by() < 0.1 * before
     for name, value, text in (('azimuth.shaper.rate', 1e9, 'azimuth.shaper.rate'),
-                              ('azimuth.position_loop.kp', math.nan, 'azimuth.position_loop.kp'),
+                              ('azimuth.feedforward.bandwidth', math.nan, 'azimuth.feedforward.bandwidth'),
                               ('azimuth.limits.rate', 1e-3, 'shaper.rate'),
                               ('period', 0.01, 'period')):
         result = put(name, value)

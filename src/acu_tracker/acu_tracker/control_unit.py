@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from acu_tracker import deck_reference, modes, position_loop, program_track, shaper, tracker
-from acu_tracker.history import LENGTH, bracket, history_type, push
+from acu_tracker import deck_reference, modes, position_loop, program_track, tracker
+from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import displaced, earth_angles, earth_direction, rotation, to_earth
@@ -41,14 +41,11 @@ OUTPUTS = np.dtype([
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)
 
-_AXIS = np.dtype([('position', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'),    # shaped reference at its stamp
-                  ('integral', 'f8'), ('command', 'f8')], align=True)
 STATE = np.dtype([
     ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'), ('stabilised', 'i8'),
     ('encoder', history_type(2)),                                               # azimuth, elevation
     ('attitude', history_type(10)),                                             # quaternion, w, dw
-    ('reference', history_type(6)),                                             # shaped: angle, rate, acceleration x 2
-    ('tracker', tracker.TRACKER), ('azimuth', _AXIS), ('elevation', _AXIS),
+    ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
     ('turn', 'f8'),                                                            # raw azimuth last followed
     ('preset', 'f8', (2,)),
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
@@ -253,42 +250,16 @@ def request(state, constants, inputs, outputs, mode, program_times, program_angl
 
 
 @compiled
-def seat(s, u):
-    """Targets := actual. The shaped reference starts at the encoders' angle and rate."""
-    s.reference.count = 0
-    row = push(s.reference, u.stamp)
-    s.azimuth.position, s.azimuth.rate, s.azimuth.acceleration = u.position[0], u.velocity[0], 0.0
-    s.elevation.position, s.elevation.rate, s.elevation.acceleration = u.position[1], u.velocity[1], 0.0
-    s.azimuth.integral = s.elevation.integral = 0.0
+def seat(s, p, u):
+    """Targets := actual."""
+    position_loop.seat(s.azimuth, p.azimuth, u.stamp, u.position[0], u.velocity[0])
+    position_loop.seat(s.elevation, p.elevation, u.stamp, u.position[1], u.velocity[1])
     s.turn = u.position[0]
-    remember(s, row)
 
 
 @compiled
-def remember(s, row):
-    """Keep the shaped reference of both axes for the instant when the encoders meet it."""
-    r = s.reference.sample[row]
-    r[0], r[1], r[2] = s.azimuth.position, s.azimuth.rate, s.azimuth.acceleration
-    r[3], r[4], r[5] = s.elevation.position, s.elevation.rate, s.elevation.acceleration
-
-
-@compiled
-def planned(history, first, t, out):
-    """The reference that was planned for t into out (3,): angle (cubic Hermite), rate, acceleration."""
-    i, j, f = bracket(history, t)
-    if i < 0:
-        i = j = (history.newest + 1 - history.count) % LENGTH
-    a, b = history.sample[i], history.sample[j]
-    T = history.stamp[j] - history.stamp[i]
-    d, m0, m1 = b[first] - a[first], T * a[first + 1], T * b[first + 1]
-    out[0] = a[first] + f * (m0 + f * (3.0 * d - 2.0 * m0 - m1 + f * (m0 + m1 - 2.0 * d)))
-    out[1] = a[first + 1] + f * (b[first + 1] - a[first + 1])
-    out[2] = a[first + 2] + f * (b[first + 2] - a[first + 2])
-
-
-@compiled
-def raw_target(s, p, times, angles, t_m):
-    """Deck (A, dA, ddA, E, dE, ddE) at t_m of what the mode follows, the azimuth on the turn that fits."""
+def raw_target(s, p, times, angles, t):
+    """Deck (A, dA, ddA, E, dE, ddE) at t of what the mode follows, the azimuth on the turn that fits."""
     if s.mode == modes.STOW:
         s.turn = s.azimuth.position
         return p.azimuth.stow, 0.0, 0.0, p.elevation.stow, 0.0, 0.0
@@ -297,48 +268,16 @@ def raw_target(s, p, times, angles, t_m):
         return s.preset[0], 0.0, 0.0, s.preset[1], 0.0, 0.0
     below = above = 0.0
     if s.mode == modes.PROGRAM:
-        A, dA, ddA, E, dE, ddE = program_target(s, p, times, angles, t_m)
+        A, dA, ddA, E, dE, ddE = program_target(s, p, times, angles, t)
         if s.entered:
-            below, above = program_track.azimuth_travel(times, angles, t_m)
+            below, above = program_track.azimuth_travel(times, angles, t)
     else:
-        T = t_m - s.tracker.stamp
+        T = t - s.tracker.stamp
         A, dA, ddA = tracker.outlook(s.tracker.azimuth, T, p.tracker.alpha)
         E, dE, ddE = tracker.outlook(s.tracker.elevation, T, p.tracker.alpha)
-        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t_m, A, dA, ddA, E, dE, ddE)
+        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
     s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
     return s.turn, dA, ddA, E, dE, ddE
-
-
-@compiled
-def follow(axis, p, raw, raw_rate, raw_acceleration, dt, o, index):
-    """Shape the raw reference of one axis to dt after the last."""
-    r = p.shaper
-    raw, raw_rate, raw_acceleration, o.angle_limited[index] = shaper.held_inside(
-        raw, raw_rate, raw_acceleration, p.limits.low, p.limits.high, r.acceleration,
-        r.h0 + r.acceleration / r.jerk)
-    axis.position, axis.rate, axis.acceleration, o.rate_limited[index], o.acceleration_limited[index] = shaper.shape(
-        axis.position, axis.rate, axis.acceleration, raw, raw_rate, raw_acceleration, dt, r.rate, r.acceleration,
-        r.jerk, r.h0)
-
-
-@compiled
-def command(axis, p, u, dt, o, index):
-    """Close the position loop of one axis on the reference planned for t_k."""
-    planned_angle, planned_rate = o.reference[index, 0], o.reference[index, 1]
-    axis.command, axis.integral, rate_limited, acceleration_limited = position_loop.rate_command(
-        planned_angle - u.position[index], planned_rate - u.velocity[index], axis.integral, axis.command, axis.rate,
-        dt, p.position_loop, p.limits)
-    o.rate_limited[index] |= rate_limited
-    o.acceleration_limited[index] |= acceleration_limited
-    o.torque[index] = position_loop.torque_feedforward(axis.rate, axis.acceleration, p.position_loop)
-
-
-@compiled
-def rest(axis, limits, dt, o, index):
-    """Bring the rate command of one axis to zero within its acceleration."""
-    axis.command, _, o.acceleration_limited[index] = position_loop.limited(
-        0.0, axis.command, dt, limits.rate, limits.acceleration)
-    axis.integral = 0.0
 
 
 @compiled
@@ -395,21 +334,18 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     rested = s.mode == modes.STANDBY
     _, program_flags = change_mode(s, p, o, times, angles, t_m, s.pending if rested else modes.NO_REQUEST)
     if encoder_ok and (rested or jumped):
-        seat(s, u)
+        seat(s, p, u)
     if s.mode == modes.STANDBY:
-        rest(s.azimuth, p.azimuth.limits, dt, o, 0)
-        rest(s.elevation, p.elevation.limits, dt, o, 1)
-        o.reference[0, 0], o.reference[1, 0] = s.azimuth.position, s.elevation.position
+        position_loop.rest(s.azimuth, p.azimuth, dt, o, 0)
+        position_loop.rest(s.elevation, p.elevation, dt, o, 1)
     else:
-        A, dA, ddA, E, dE, ddE = raw_target(s, p, times, angles, t_m)
-        ahead = t_m - s.reference.stamp[s.reference.newest]
-        follow(s.azimuth, p.azimuth, A, dA, ddA, ahead, o, 0)
-        follow(s.elevation, p.elevation, E, dE, ddE, ahead, o, 1)
-        remember(s, push(s.reference, t_m))
-        planned(s.reference, 0, u.stamp, o.reference[0])
-        planned(s.reference, 3, u.stamp, o.reference[1])
-        command(s.azimuth, p.azimuth, u, dt, o, 0)
-        command(s.elevation, p.elevation, u, dt, o, 1)
+        t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
+        t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
+        A, dA, ddA, E, dE, ddE = raw_target(s, p, times, angles, t_azimuth)
+        if t_elevation != t_azimuth:
+            _, _, _, E, dE, ddE = raw_target(s, p, times, angles, t_elevation)
+        position_loop.step(s.azimuth, p.azimuth, A, dA, ddA, u.stamp, t_m, u.position[0], u.velocity[0], dt, o, 0)
+        position_loop.step(s.elevation, p.elevation, E, dE, ddE, u.stamp, t_m, u.position[1], u.velocity[1], dt, o, 1)
         s.entered = 0
         o.coasting = s.mode == modes.AUTOTRACK and overdue(s, p) > p.tracker.coast_after
 

@@ -4,6 +4,7 @@ import math
 
 from acu_tracker.history import LENGTH
 from acu_tracker.modes import MODES
+from acu_tracker.position_loop import CONTROLLERS
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter
 
 
@@ -41,12 +42,21 @@ class TrackerParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
-class PositionLoop(Parameters):
-    """PID on the position error, rate and torque feed-forward."""
+class Pid(Parameters):
+    """PID on the raw target, as in paper 000. K_p = bandwidth, K_i = integral K_p^2, K_d = derivative."""
 
-    kp: float = parameter(20.0, 0.0, 500.0, '1/s', 'proportional gain')
-    ki: float = parameter(20.0, 0.0, 1e4, '1/s2', 'integral gain')
-    kd: float = parameter(0.0, 0.0, 1.0, '', 'derivative gain')
+    bandwidth: float = parameter(20.0, 0.0, 500.0, 'rad/s', 'of the position loop: K_p')
+    integral: float = parameter(0.05, 0.0, 10.0, '', 'K_i / K_p^2; 0.25: both poles of the loop at K_p / 2')
+    derivative: float = parameter(0.0, 0.0, 1.0, '', 'K_d on the rate of the error')
+    derivative_time: float = parameter(0.003, 0.0, 1.0, 's', 'lag of the derivative')
+
+
+@dataclasses.dataclass(frozen=True)
+class Feedforward(Parameters):
+    """Rate, torque and friction of the shaped reference fed forward, PI on the rest."""
+
+    bandwidth: float = parameter(20.0, 0.0, 500.0, 'rad/s', 'of the position loop: K_p')
+    integral: float = parameter(0.05, 0.0, 10.0, '', 'K_i / K_p^2; 0.25: both poles of the loop at K_p / 2')
     rate_feedforward: float = parameter(1.0, 0.0, 2.0, '', 'share of the reference rate fed forward')
     inertia: float = parameter(280.0, 0.0, 1e9, 'kg m2', 'load and motors, seen at the load')
     friction: float = parameter(60.0, 0.0, 1e7, 'Nm', 'Coulomb friction Tc fed forward')
@@ -75,7 +85,7 @@ class Limits(Parameters):
     low: float = parameter(-1.5 * math.pi, -20.0, 20.0, 'rad', 'lowest deck angle')
     high: float = parameter(1.5 * math.pi, -20.0, 20.0, 'rad', 'highest deck angle')
     rate: float = parameter(2.45, 1e-4, 100.0, 'rad/s', 'largest rate command')
-    acceleration: float = parameter(40.0, 1e-4, 1000.0, 'rad/s2', 'largest change of the rate command over time')
+    acceleration: float = parameter(40.0, 1e-4, 1e5, 'rad/s2', 'largest change of the rate command over time')
 
     def check(self):
         if self.low >= self.high:
@@ -89,7 +99,9 @@ class AxisParameters(Parameters):
     a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
     stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode stow')
     preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
-    position_loop: PositionLoop = group(PositionLoop)
+    controller: str = choice('feedforward', CONTROLLERS, 'of the position loop; may be changed while it runs')
+    pid: Pid = group(Pid)
+    feedforward: Feedforward = group(Feedforward)
     shaper: Shaper = group(Shaper)
     limits: Limits = group(Limits)
 
@@ -111,7 +123,7 @@ class Elevation(AxisParameters):
     a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
     stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'deck angle of mode stow')
     preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
-    position_loop: PositionLoop = group(PositionLoop, inertia=288.0, friction=45.0)
+    feedforward: Feedforward = group(Feedforward, inertia=288.0, friction=45.0)
     shaper: Shaper = group(Shaper, rate=1.4, acceleration=20.0)
     limits: Limits = group(Limits, low=-0.09, high=1.66, rate=1.57)
 

@@ -6,9 +6,9 @@ import time
 import numpy as np
 from std_srvs.srv import Trigger
 
-from adu_drive import drive_unit
 from adu_drive.params import AduNodeParameters
-from pedestal_common import messages, shell
+from adu_drive.wire import CLOCK, COMMAND, JOINTS, MOTORS, SHIP, Adu
+from pedestal_common import messages, records, shell
 
 STEP = 'step'
 """The drive's own trigger among its inputs."""
@@ -23,49 +23,38 @@ class AduNode(shell.Shell):
     def __init__(self):
         super().__init__('adu', AduNodeParameters)
         p = self.parameters
-        self.constants = drive_unit.constants(p)
-        self.state = drive_unit.initial_state(p)
-        self.inputs = np.zeros(1, drive_unit.INPUTS)
-        self.outputs = np.zeros(1, drive_unit.OUTPUTS)
-        drive_unit.step(self.state.copy(), self.constants, self.inputs, self.outputs.copy())
-        drive_unit.read(self.state, self.constants, self.outputs)
-
+        self.unit = Adu(p, 'ship_motion' in self.graph.nodes)
+        self.unit.prepare()
+        self.outputs = self.unit.outputs
+        self.clock, self.heard_command, self.heard_ship = (records.only(self.unit.heard, name)
+                                                           for name in (CLOCK, COMMAND, SHIP))
         self.period_ns = round(p.period * shell.SECOND)
-        self.timeout_ns = round(p.command_timeout * p.period * shell.SECOND)
         self.steps_to_go = round(p.duration / p.period) if p.duration > 0.0 else None
-        self.on_ship = 'ship_motion' in self.graph.nodes
         self.k = 0
         self.lost_steps = self.late_ticks = 0
         self.command = None
         self.command_stamp = None
         self.stale = False
-        self.emergency = False
         self.refused = ''
         self.invalid = ''
         self.tick_timer = None
         self.ticking = False
         self.truth = None
-        self.truth_stamp = None
-        self.deck_rate = np.zeros(3)
         self.begun = self.heard = time.monotonic()
 
-        self.clock_message = messages.Clock(clock=messages.Time(sec=0, nanosec=0))
-        self.joints = messages.joint_state(messages.AXES)
-        self.motors = messages.joint_state(messages.MOTORS)
-        self.send_joints = self.writer('joint_states')
-        self.send_motors = self.writer('adu/motor_states')
-        self.send_clock = self.writer('clock')
+        # What the others wait for goes first.
+        self.says = [(self.unit.messages[name], records.only(self.unit.said, name), self.writer(name))
+                     for name in (JOINTS, CLOCK, MOTORS)]
         self.create_service(Trigger, 'adu/emergency_stop', self.on_emergency_stop)
         self.create_service(Trigger, 'adu/reset_faults', self.on_reset_faults)
         self.diagnose_with(self.diagnose)
 
-        followers = {'acu/rate_command': 0.0, **({'ship/truth': 0.0} if self.on_ship else {})}
         if self.graph.lockstep:
-            self.follow(STEP, followers, self.answered)
+            self.follow(STEP, self.unit.followers, self.answered)
         else:
-            self.reader('acu/rate_command', self.on_command)
-            if self.on_ship:
-                self.reader('ship/truth', self.on_truth)
+            self.reader(COMMAND, self.on_command)
+            if SHIP in self.unit.followers:
+                self.reader(SHIP, self.on_truth)
         self.start_timer = self.every(0.001, self.start)
 
     def start(self):
@@ -87,33 +76,23 @@ class AduNode(shell.Shell):
         self.ticking = True
 
     def publish_step(self):
-        """joint_states, clock and motor_states of step k; what the others wait for goes first."""
+        """joint_states, clock and motor_states of step k."""
         stamp = self.k * self.period_ns
         self.begin_step(stamp)
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
-        outputs = self.outputs[0]
-        azimuth, elevation = outputs['azimuth'], outputs['elevation']
-        joints, motors = self.joints, self.motors
-        messages.put_stamp(joints.header.stamp, stamp)
-        joints.position[:] = azimuth['position'], elevation['position']
-        joints.velocity[:] = azimuth['velocity'], elevation['velocity']
-        joints.effort[:] = azimuth['torque'], elevation['torque']
-        self.send_joints(joints)
-        messages.put_stamp(self.clock_message.clock, stamp)
-        self.send_clock(self.clock_message)
-        messages.put_stamp(motors.header.stamp, stamp)
-        for field, values in (('motor_position', motors.position), ('motor_velocity', motors.velocity),
-                              ('motor_torque', motors.effort)):
-            values[:2], values[2:] = azimuth[field], elevation[field]
-        self.send_motors(motors)
+        self.clock.stamp[0] = stamp
+        self.unit.say()
+        for message, place, send in self.says:
+            records.put(message, place)
+            send(message)
         if self.graph.lockstep:
             self.steps.take(STEP, stamp, None)
 
     def answered(self, _stamp, _trigger, inputs):
         """Lockstep: the command stamped t_k (and the ship's truth) has come."""
-        self.command = inputs['acu/rate_command']
-        self.advance(True, inputs.get('ship/truth'))
+        self.command, self.truth = inputs[COMMAND], inputs.get(SHIP)
+        self.advance()
 
     def on_command(self, message):
         """Realtime: the latest command wins; one that is not newer, or from the future, is refused."""
@@ -137,43 +116,24 @@ class AduNode(shell.Shell):
         stamp = self.k * self.period_ns
         age = stamp - self.command_stamp if self.command_stamp is not None else stamp
         self.lost_steps += age > 0
-        self.stale = age > self.timeout_ns or self.command is None
         self.late_ticks += time.monotonic() - self.heard > 1.5 * self.parameters.period
         self.heard = time.monotonic()
-        self.advance(not self.stale, self.truth)
+        self.advance()
 
-    def advance(self, follow, truth):
+    def advance(self):
         """Integrate from t_k to t_k+1 and publish, or end after the last step."""
         if self.k == self.steps_to_go:
             self.end()
             return
-        inputs = self.inputs[0]
-        if self.command is not None:
-            names = self.command.name
-            rates = messages.by_name(names, self.command.velocity, messages.AXES)
-            torques = messages.by_name(names, self.command.effort, messages.AXES)
-            for axis, rate, torque in zip(messages.AXES, rates, torques):
-                inputs[axis]['rate'], inputs[axis]['torque'] = rate, torque
-        inputs['enable'] = follow and not self.emergency
-        if truth is not None:
-            self.take_truth(truth, inputs)
-        drive_unit.step(self.state, self.constants, self.inputs, self.outputs)
+        records.take(self.heard_command, self.command)
+        records.take(self.heard_ship, self.truth)
+        self.stale = self.unit.advance()
         if self.outputs[0]['invalid_command']:
-            self.invalid = 'acu/rate_command' if np.isfinite(inputs['base_acceleration']).all() else 'ship/truth'
+            self.invalid = COMMAND if np.isfinite(self.unit.inputs[0]['base_acceleration']).all() else SHIP
         self.k += 1
         if self.k == 1:
             self.begun = time.monotonic()
         self.publish_step()
-
-    def take_truth(self, truth, inputs):
-        """The deck's angular acceleration from two successive truths and their stamps."""
-        stamp = messages.nanoseconds(truth.header.stamp)
-        w = truth.twist.twist.angular
-        rate = np.array((w.x, w.y, w.z))
-        if self.truth_stamp is not None and stamp > self.truth_stamp:
-            inputs['base_acceleration'] = (rate - self.deck_rate) / ((stamp - self.truth_stamp) * 1e-9)
-        if np.isfinite(rate).all() and stamp != self.truth_stamp:
-            self.deck_rate, self.truth_stamp = rate, stamp
 
     def end(self):
         """The last step has been answered: say how it went and finish. The clock ran from the first answer on, when
@@ -186,17 +146,16 @@ class AduNode(shell.Shell):
         self.finished = True
 
     def on_emergency_stop(self, _request, response):
-        self.emergency = True
-        self.inputs[0]['enable'] = 0
+        self.unit.memory['emergency'] = 1
         response.success = True
         response.message = 'axes are stopping and stay stopped until adu/reset_faults'
         return response
 
     def on_reset_faults(self, _request, response):
         moving = [axis for axis in messages.AXES if abs(self.outputs[0][axis]['velocity']) > 1e-3]
-        response.success = not (self.emergency and moving)
+        response.success = not (self.unit.memory['emergency'][0] and moving)
         if response.success:
-            self.emergency = False
+            self.unit.memory['emergency'] = 0
             self.refused = ''
             response.message = 'drive enabled'
         else:
@@ -211,12 +170,13 @@ class AduNode(shell.Shell):
                   for name in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
         values += [('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
                    ('late_ticks', str(int(self.late_ticks)))]
-        if self.emergency:
+        if self.unit.memory['emergency'][0]:
             return shell.ERROR, 'emergency stop', values
         if invalid:
             return shell.ERROR, f'{invalid} holds NaN or infinity: stopping', values
         if self.stale:
-            return shell.ERROR, f'no new acu/rate_command for {self.timeout_ns / 1e9:g} s: stopping', values
+            limit = self.unit.memory['timeout'][0] / 1e9
+            return shell.ERROR, f'no new acu/rate_command for {limit:g} s: stopping', values
         if self.refused:
             return shell.WARN, f'acu/rate_command refused: {self.refused}', values
         if any(outputs[axis]['end_stop'] for axis in messages.AXES):

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
-from pedestal_bringup import bag, bare_ring, closed_loop, graph, replay, scenario, solve_ivp_axis
+from pedestal_bringup import bag, bare_ring, closed_loop, graph, recompute, replay, scenario, solve_ivp_axis
 from pedestal_bringup.verify import verify
 from pedestal_common import messages
 from pedestal_common.compiled import compiled
@@ -204,6 +204,7 @@ def bench_bag():
         scanned = count / best_of(lambda: bag.read(path), 3)
         read = count / best_of(lambda: [messages.deserialize(data, kind) for kind, data in raw], 3)
         disk = disk_rate(folder)
+        factor = statistics.median(recompute.measure(path) for _ in range(ROUNDS))
     rows = [row('record', 'messages_per_s', rate, '1/s'), row('record', 'lost', lost, '', '0'),
             row('record', 'cpu_percent', 100.0 * load, '%'),
             row('record', 'bytes_per_message', size / count, 'B'),
@@ -212,7 +213,8 @@ def bench_bag():
             row('record', 'disk_messages_per_s', disk / (size / count), '1/s'),
             row('verify', 'messages_per_s', checked, '1/s'),
             row('verify', 'scan_messages_per_s', scanned, '1/s'),
-            row('verify', 'deserialise_messages_per_s', read, '1/s')]
+            row('verify', 'deserialise_messages_per_s', read, '1/s'),
+            row('recompute', 'realtime_factor', factor, '', '>= 100')]
     show(f'bags: {count} messages of the demo, {BAG_SECONDS:g} s, recorded again at {TRAFFIC:g} x real time', rows)
     print(f'record: given all at once, the recorder and whoever feeds it reach {limit:.0f} messages/s, '
           f'{limit * BAG_SECONDS / count:.0f} x the demo; the disk ({disk / 1e6:.0f} MB/s) would take '

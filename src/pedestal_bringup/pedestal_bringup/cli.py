@@ -45,7 +45,7 @@ def _parser():
     run.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='default: bags/runs/SCENARIO-N')
     run.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     run.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                     help='change a parameter, as acu.azimuth.position_loop.kp=20; may be repeated')
+                     help='change a parameter, as acu.azimuth.feedforward.bandwidth=20; may be repeated')
     run.set_defaults(verb=_run)
 
     scenarios = verbs.add_parser('scenarios', help='list the scenarios')
@@ -64,6 +64,11 @@ def _parser():
     verify = verbs.add_parser('verify', help='prove that a recording is complete; exit code 1 with the gaps if not')
     verify.add_argument('bag', type=pathlib.Path)
     verify.set_defaults(verb=_verify)
+
+    recover = verbs.add_parser('recover', help='make a readable bag of what is left in a damaged one')
+    recover.add_argument('bag', type=pathlib.Path)
+    recover.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: beside it, BAG-recovered')
+    recover.set_defaults(verb=_recover)
 
     report = verbs.add_parser('report', help='write a recording as one HTML file with its figures')
     report.add_argument('bag', type=pathlib.Path)
@@ -194,6 +199,12 @@ def _verify(options):
     check = verify(options.bag)
     print('\n'.join(check.lines()))
     return 0 if check.complete else 1
+
+
+def _recover(options):
+    from pedestal_bringup.recover import recover
+    print('\n'.join(recover(options.bag, options.output).lines()))
+    return 0
 
 
 def _report(options):

@@ -18,6 +18,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from pedestal_bringup import configuration
 from pedestal_bringup.program import program_message, program_table
 from pedestal_bringup.scenario import NODE_KINDS
 from pedestal_common import messages, parameters
@@ -109,7 +110,7 @@ def parameter_file(scenario, pacing, bag):
         sections.setdefault(node, {'ros__parameters': {}})['ros__parameters'].update({
             'graph.pacing': pacing, 'graph.nodes': ','.join(scenario.nodes),
             'graph.deadline': scenario.header.deadline})
-    sections['recorder']['ros__parameters']['bag'] = str(bag)
+    sections['recorder']['ros__parameters'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
     return yaml.safe_dump(sections)
 
 

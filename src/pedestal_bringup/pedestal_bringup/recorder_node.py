@@ -1,7 +1,6 @@
 """The recorder: every topic of the graph into a bag, raw, nothing lost unsaid."""
 import collections
 import hashlib
-import importlib.metadata
 import inspect
 import json
 import struct
@@ -10,6 +9,7 @@ import time
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from pedestal_bringup import configuration
 from pedestal_bringup.bag import BagError, Writer
 from pedestal_bringup.columns import STAMPED
 from pedestal_bringup.params import RecorderParameters
@@ -24,18 +24,7 @@ DRAIN = 4.0
 when others were heard but a topic of every step was not: Fast DDS repeats what a reader missed while it was being
 discovered with the next heartbeat of the writer, by default every 3 s."""
 
-PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
-            'pedestal_bringup')
-
 _stamp_of = struct.Struct('<iI').unpack_from
-
-
-def _versions():
-    for package in PACKAGES:
-        try:
-            yield f'version.{package}', importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            pass
 
 
 class RecorderNode(Shell):
@@ -49,8 +38,8 @@ class RecorderNode(Shell):
         recorded = topics.read_by('recorder', nodes) if nodes else topics.TOPICS
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
-            'beamwidth': self.parameters.beamwidth,
-            **dict(_versions())})
+            'beamwidth': self.parameters.beamwidth, 'git': configuration.git_revision(), **configuration.versions()},
+            configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
         self._order = StepOrder(recorded, nodes, self._bag.write)
         self._end = round(self.parameters.duration * SECOND) or None
         self._lost = collections.Counter()
@@ -241,7 +230,7 @@ class RecorderNode(Shell):
             while block := file.read(1 << 20):
                 digest.update(block)
             size = file.tell()
-        print(json.dumps({'bag': str(self._bag.path), 'messages': sum(self._bag.counts), 'lost': self._lost.total(),
+        print(json.dumps({'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),
                           'sha256': digest.hexdigest(), 'bytes': size}), flush=True)
         if self._error is None and self._lost:
             self._error = self._losses()

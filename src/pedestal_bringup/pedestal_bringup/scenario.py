@@ -137,11 +137,11 @@ def _text(name_or_path):
     return name_or_path, entry.read_text()
 
 
-def _dotted(tree, prefix=''):
+def dotted(tree, prefix=''):
     flat = {}
     for key, value in tree.items():
         if isinstance(value, dict):
-            flat.update(_dotted(value, f'{prefix}{key}.'))
+            flat.update(dotted(value, f'{prefix}{key}.'))
         else:
             flat[f'{prefix}{key}'] = value
     return flat
@@ -162,7 +162,7 @@ def _sections(name, content):
         values = body['ros__parameters'] or {} if whole else None
         if not isinstance(values, dict):
             raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
-        sections[section] = _dotted(values)
+        sections[section] = dotted(values)
     return sections
 
 
@@ -180,7 +180,7 @@ def parse_override(text):
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
-        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.position_loop.kp=20')
+        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.feedforward.bandwidth=20')
     parameters_of(node)
     try:
         return node, key, yaml.load(right, Loader=_Loader)
@@ -189,12 +189,16 @@ def parse_override(text):
 
 
 def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
-    """A Scenario from a name or a YAML path.
+    """A Scenario from a name or a YAML path; see parse."""
+    return parse(*_text(name_or_path), overrides, seed, duration, pacing)
+
+
+def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
+    """A Scenario from its YAML text; parse(name, Scenario.as_yaml()) gives the same again.
 
     overrides: texts 'node.key=value'. seed, duration and pacing replace the header's where given.
     Raises ScenarioError for anything unknown or out of range.
     """
-    name, content = _text(name_or_path)
     sections = _sections(name, content)
     for override in overrides:
         node, key, value = parse_override(override)

@@ -5,7 +5,7 @@ import numpy as np
 import yaml
 
 from pedestal_bringup import bag as bags
-from pedestal_bringup import columns
+from pedestal_bringup import columns, configuration
 from pedestal_common import messages, topics
 
 MAX_LATENCY = 1_000_000_000
@@ -26,12 +26,14 @@ class TopicCheck:
 
 @dataclasses.dataclass
 class Report:
-    """What verify found. steps: how many the run has; period [s], NaN when there are fewer than two."""
+    """What verify found. steps: how many the run has; period [s], NaN when there are fewer than two; made: how the bag
+    was made, a line."""
     path: str
     topics: list
     problems: list
     steps: int
     period: float
+    made: str
 
     @property
     def complete(self):
@@ -44,7 +46,7 @@ class Report:
         for check in self.topics:
             lines.append(f'{check.name:{width}} {check.count:9} {check.first:14.6f} {check.last:14.6f}')
             lines += [f'  {problem}' for problem in check.problems]
-        lines += self.problems
+        lines += [*self.problems, self.made]
         total = sum(check.count for check in self.topics)
         count = len(self.problems) + sum(len(check.problems) for check in self.topics)
         steps = f'{self.steps} steps of {self.period * 1e3:g} ms'
@@ -88,7 +90,7 @@ def verify(path) -> Report:
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
     return Report(str(path), checks, problems, (last - first) // period + 1 if period else 0,
-                  period / 1e9 if period else np.nan)
+                  period / 1e9 if period else np.nan, configuration.line(bag))
 
 
 def _differences(said, counts):

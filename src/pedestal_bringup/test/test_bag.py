@@ -152,6 +152,28 @@ def test_mcap_and_mcap_ros2_support_read_what_was_written(recording, rows):
         assert numbers == list(range(1, len(numbers) + 1))
 
 
+def test_configuration_comes_back_and_is_indexed(tmp_path):
+    more = {'scenario': {'yaml': 'scenario: {}\n'}, 'parameters': {'acu': yaml.safe_dump({'a.b': 1e-7, 'c': '12:30'})}}
+    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA, more)
+    writer.close()
+    content = bag.read(tmp_path / 'b')
+    assert content.metadata == {key: str(value) for key, value in METADATA.items()}
+    assert content.configuration == {'scenario': 'scenario: {}\n', 'parameters': {'acu': {'a.b': 1e-7, 'c': '12:30'}}}
+    with open(content.file, 'rb') as stream:
+        reader = make_reader(stream)
+        assert {record.name: record.metadata for record in reader.iter_metadata()} == {
+            'pedestal': content.metadata, **more}
+        assert reader.get_summary().statistics.metadata_count == 3
+
+
+def test_a_bag_that_does_not_say_how_it_was_made_is_no_gap(recording):
+    content = bag.read(recording)
+    assert content.configuration == {'scenario': '', 'parameters': {}}
+    report = verify(recording)
+    assert report.complete and report.made == 'made by: not said in the bag, it holds no configuration'
+    assert report.made in report.lines()
+
+
 def test_file_without_its_summary_reads_from_the_front(recording, rows):
     with open(recording / 'whole_0.mcap', 'rb') as stream:
         assert len(list(NonSeekingReader(stream).iter_messages(log_time_order=False))) == len(rows)
@@ -306,11 +328,25 @@ def test_flush_leaves_every_message_so_far_in_the_file(tmp_path, rows):
     writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
     for name, stamp, data in rows[:100]:
         writer.write(NAMES.index(name), stamp, stamp, data)
-    assert bag.load(tmp_path / 'b').index.size == 0
+    assert copied(writer).index.size == 0
     writer.flush()
-    content = bag.load(tmp_path / 'b')
+    content = copied(writer)
     assert [(name, log, data) for name, log, _, data in content.raw()] == rows[:100]
     assert 'without a summary' in content.damage
+
+
+def copied(writer):
+    copy = writer.path.with_suffix('.mcap')
+    copy.write_bytes(writer.file.read_bytes())
+    return bag.load(copy)
+
+
+def test_a_bag_that_is_being_written_is_refused(tmp_path):
+    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
+    with pytest.raises(bag.BagError, match='b_0.mcap: is being written; wait until its recorder has ended'):
+        bag.load(tmp_path / 'b')
+    writer.close()
+    bag.read(tmp_path / 'b')
 
 
 def test_verify_accepts_a_whole_run_with_a_delayed_topic(recording, rows):
@@ -409,7 +445,7 @@ def test_a_disk_that_takes_a_chunk_partly_leaves_a_whole_bag_without_a_hole(tmp_
             return getattr(self.stream, name)
 
     writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
-    writer._stream = Disk(writer._stream, 250_000)
+    writer._container._stream = Disk(writer._container._stream, 250_000)
     errors = []
     for name, stamp, data in rows:
         try:

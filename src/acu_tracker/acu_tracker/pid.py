@@ -1,0 +1,29 @@
+"""PID on the raw target at t_k (paper 000): no shaper, no feed-forward.
+
+u = K_p e + I + K_d D,    dI/dt = K_i e,    D = e' through a lag of derivative_time.
+"""
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def gains(c):
+    """(K_p, K_i) of a bandwidth: K_i = integral K_p^2, so that `integral` alone sets the damping."""
+    return c.bandwidth, c.integral * (c.bandwidth * c.bandwidth)
+
+
+@compiled
+def integrated(integral, e, dt, K_p, K_i):
+    """The integral dt later. Without a K_i what a handover left in it fades with the bandwidth."""
+    return integral + dt * K_i * e if K_i > 0.0 else integral / (1.0 + dt * K_p)
+
+
+@compiled
+def derivative(D, e, e_before, dt, derivative_time):
+    """Rate of the error [rad/s] through a first-order lag (backward Euler)."""
+    return (derivative_time * D + e - e_before) / (derivative_time + dt)
+
+
+@compiled
+def rate(e, integral, D, K_p, K_d):
+    """Rate command [rad/s] of an error e [rad]."""
+    return K_p * e + integral + K_d * D

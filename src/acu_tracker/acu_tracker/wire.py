@@ -1,0 +1,137 @@
+"""The control unit between its messages: what it makes of those it hears, and what it puts into those it says.
+
+The node answers one step at a time, a recomputed bag all of them at once, through the same `answer`.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker import control_unit, modes, program_track
+from pedestal_common import messages, records
+from pedestal_common.compiled import compiled
+from pedestal_common.records import NEVER
+
+JOINTS, ERROR, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
+COMMAND, ESTIMATE, REFERENCE, MODE, PROGRAM = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode',
+                                               'acu/program_track')
+HEARD = records.of(JOINTS, ERROR, ATTITUDE)
+SAID = records.of(COMMAND, ESTIMATE, REFERENCE, more=(MODE,))
+
+
+class Acu:
+    """The control unit of an AcuParameters; on_ship: its deck moves, and an attitude is heard.
+
+    heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
+    a step waits for; events: {topic: function(message)} it hears besides.
+    """
+    HEARD, SAID, CODES = HEARD, SAID, {MODE: modes.MODES}
+
+    def __init__(self, params, on_ship):
+        self.state = control_unit.initial_state(params)
+        self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
+        self.inputs[0]['stabilised'] = on_ship
+        self.outputs[0]['mode'] = modes.STANDBY
+        self.outputs['innovation'] = self.outputs['nis'] = math.nan
+        self.times, self.angles = np.zeros(0), np.zeros((0, 2))
+        self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
+        self.messages = {COMMAND: messages.joint_state(messages.AXES),
+                         ESTIMATE: messages.joint_trajectory('earth', [messages.trajectory_point()]),
+                         REFERENCE: messages.joint_trajectory('base_link', [messages.trajectory_point()])}
+        self.followers = {ERROR: params.receiver_latency, **({ATTITUDE: params.attitude_latency} if on_ship else {})}
+        self.events = {PROGRAM: self.take_program}
+        self.configure(params)
+
+    def configure(self, params):
+        self.constants = control_unit.constants(params)
+
+    def take_program(self, message):
+        """Two or more points are a program track in earth angles, one a preset in deck angles. Raises ValueError."""
+        times, angles = rows(message)
+        if len(angles) == 1:
+            self.inputs[0]['preset'], self.inputs[0]['preset_valid'] = angles[0], 1
+        else:
+            start = messages.nanoseconds(message.header.stamp) * 1e-9
+            self.times, self.angles = program_track.checked(times + start, angles)
+            self.inputs[0]['program_count'] = len(self.times)
+
+    def prepare(self):
+        """Compile `answer` and `request`."""
+        state, inputs, outputs = self.state.copy(), self.inputs.copy(), self.outputs.copy()
+        answer(state, self.constants, inputs, outputs, self.times, self.angles, self.heard, self.said.copy())
+        control_unit.request(state, self.constants, inputs, outputs, modes.STANDBY, self.times, self.angles)
+
+    def request(self, mode):
+        """Ask for a mode (its code) between two steps; True when granted."""
+        return bool(control_unit.request(self.state, self.constants, self.inputs, self.outputs, mode, self.times,
+                                         self.angles))
+
+    def answer(self):
+        """Answer `heard` with `said`."""
+        answer(self.state, self.constants, self.inputs, self.outputs, self.times, self.angles, self.heard, self.said)
+
+    def answers(self, heard, said):
+        """The same for many steps, records (n,)."""
+        answers(self.state, self.constants, self.inputs, self.outputs, self.times, self.angles, heard, said)
+
+
+@compiled
+def hear(u, joints, error, attitude):
+    """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next."""
+    u.stamp = joints.stamp * 1e-9
+    for i in range(2):
+        u.position[i], u.velocity[i] = joints.position[i], joints.velocity[i]
+    u.encoder_valid = 1
+    u.error_valid = 0
+    if error.stamp != NEVER:
+        x, y, cn0_dbhz = error.vector[0], error.vector[1], error.vector[2]
+        u.error_valid = 1 if x == x else 0
+        u.error_stamp = error.stamp * 1e-9
+        u.cross_elevation, u.elevation, u.cn0_dbhz = x, y, cn0_dbhz
+    if attitude.stamp != NEVER:
+        u.attitude_stamp = attitude.stamp * 1e-9
+        u.attitude_valid = 1
+        for i in range(4):
+            u.quaternion[i] = attitude.orientation[i]
+        for i in range(3):
+            u.deck_rate[i] = attitude.angular_velocity[i]
+
+
+@compiled
+def say(o, stamp, command, estimate, reference):
+    """Outputs of the control unit -> records of its messages."""
+    command.stamp = estimate.stamp = reference.stamp = stamp
+    for i in range(2):
+        command.velocity[i], command.effort[i] = o.rate[i], o.torque[i]
+        estimate.position[i], reference.position[i] = o.estimate[i, 0], o.reference[i, 0]
+        estimate.velocity[i], reference.velocity[i] = o.estimate[i, 1], o.reference[i, 1]
+        estimate.acceleration[i], reference.acceleration[i] = o.estimate[i, 2], o.reference[i, 2]
+
+
+@compiled
+def answer(state, constants, inputs, outputs, times, angles, heard, said):
+    """One step: `said` answers `heard`, records (1,)."""
+    h, y = heard[0], said[0]
+    hear(inputs[0], h[JOINTS], h[ERROR], h[ATTITUDE])
+    control_unit.step(state, constants, inputs, outputs, times, angles)
+    inputs[0].preset_valid = 0
+    say(outputs[0], h[JOINTS].stamp, y[COMMAND], y[ESTIMATE], y[REFERENCE])
+    y[MODE] = outputs[0].mode
+
+
+@compiled
+def answers(state, constants, inputs, outputs, times, angles, heard, said):
+    for k in range(len(heard)):
+        answer(state, constants, inputs, outputs, times, angles, heard[k:k + 1], said[k:k + 1])
+
+
+def rows(message):
+    """(times after the stamp (n,) [s], angles (n, 2) [rad]) of a JointTrajectory; ValueError when not there."""
+    if not set(messages.AXES) <= set(message.joint_names):
+        raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(messages.AXES)}')
+    columns = [message.joint_names.index(axis) for axis in messages.AXES]
+    for row, point in enumerate(message.points):
+        if len(point.positions) != len(message.joint_names):
+            raise ValueError(f'row {row}: {len(point.positions)} positions; must be {len(message.joint_names)}')
+    times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 for point in message.points]
+    angles = [[point.positions[column] for column in columns] for point in message.points]
+    return np.array(times), np.reshape(angles, (-1, len(columns)))

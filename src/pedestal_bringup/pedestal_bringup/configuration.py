@@ -1,0 +1,82 @@
+"""How a bag was made: scenario, parameters of all nodes, versions and git revision, as text for its metadata.
+
+Nothing here depends on the path, the host or the wall clock, so that equal runs still give equal bytes.
+"""
+import importlib.metadata
+import pathlib
+import platform
+import subprocess
+
+import yaml
+
+from pedestal_bringup.scenario import NODE_KINDS
+from pedestal_common import parameters
+
+PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
+            'pedestal_bringup', 'numpy', 'numba', 'rclpy')
+GIT_TIME = 5.0
+OWN = ('bag', 'scenario_yaml', 'parameters_yaml')
+"""Parameters of the recorder that are no part of how a run was made: where to, and the configuration itself."""
+
+
+def _git(*arguments):
+    """What a git command on this source tree prints; '' when it fails, or there is no git."""
+    try:
+        done = subprocess.run(['git', '--no-optional-locks', *arguments], cwd=pathlib.Path(__file__).parent,
+                              capture_output=True, text=True, timeout=GIT_TIME, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ''
+    return done.stdout.strip()
+
+
+def git_revision():
+    """Revision of the source tree this file is kept in, '-dirty' when a file of it is changed; '' when it is in none
+    (installed, also into an environment that lies in somebody's repository)."""
+    if not _git('ls-files', '--error-unmatch', pathlib.Path(__file__).name):
+        return ''
+    return _git('describe', '--always', '--dirty', '--abbrev=40', '--exclude=*')
+
+
+def versions():
+    """{'version.NAME': version} of Python, of our packages and of those that make the numbers."""
+    found = {'version.python': platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[f'version.{package}'] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            pass
+    return found
+
+
+def recorder_parameters(scenario):
+    """What the recorder is told of the run it records: {name of its parameter: text}."""
+    values = {node: parameters.as_dict(scenario.node_parameters(node))
+              for node in scenario.nodes if node in NODE_KINDS}
+    values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OWN}
+    return {'scenario_yaml': scenario.as_yaml(), 'parameters_yaml': yaml.safe_dump(values)}
+
+
+def records(scenario_yaml, parameters_yaml):
+    """The metadata records {name: {text: text}} of what recorder_parameters made; none of an empty text."""
+    made = {}
+    if scenario_yaml:
+        made['scenario'] = {'yaml': scenario_yaml}
+    if parameters_yaml:
+        made['parameters'] = {node: yaml.safe_dump(values)
+                              for node, values in yaml.safe_load(parameters_yaml).items()}
+    return made
+
+
+def line(bag):
+    """One line on how a bag was made."""
+    said = bag.metadata
+    made = ['not said in the bag, it holds no configuration']
+    if bag.configuration['scenario']:
+        made = [f'scenario {said.get("scenario", "")}', said.get('pacing', ''), f'seed {said.get("seed", "")}',
+                f'git {said.get("git") or "unknown"}']
+        made += [f'{key.removeprefix("version.")} {value}' for key, value in said.items()
+                 if key.startswith('version.')]
+    recovered = bag.metadata_records.get('recovered')
+    if recovered:
+        made.append(f'recovered ({recovered.get("messages_lost")} messages lost in the middle)')
+    return 'made by: ' + ', '.join(made)

@@ -1,0 +1,361 @@
+"""`pedestal recompute`: recorded inputs of a node through its step function, its outputs against the recorded ones.
+
+Inputs are matched to steps by the code the nodes use (pedestal_common.steps), turned into numbers and back by theirs
+(each column's wire module). What is exact, and what is not:
+
+lockstep   inputs belong to steps by their stamps, so the same version on the same machine gives the same bits
+realtime   a step gets what had been recorded when the next one began. That is what the node had where nothing was
+           late; a message that came to the node and to the recorder in another order gives another step
+both       services are not recorded: a change of acu/mode that the ACU would not make by itself is asked for at that
+           step; a parameter changed while running, a mode asked for again and an emergency stop leave no trace.
+           A recording that begins in the middle of a run starts from the initial state: it differs until the filter
+           has converged
+"""
+import dataclasses
+import time
+import typing
+
+import numpy as np
+import yaml
+
+from acu_tracker.wire import Acu
+from adu_drive.wire import Adu
+from pedestal_bringup import bag as bags
+from pedestal_bringup import comparison, scenario
+from pedestal_common import messages, parameters, records, topics
+from pedestal_common.records import NEVER
+from pedestal_common.steps import SECOND, GraphError, Steps
+from ship_motion_sim.ins_wire import Ins
+from ship_motion_sim.ship_wire import ShipMotion
+from tracking_receiver_sim.wire import TrackingReceiver
+
+MODE, COMMAND, ERROR = 'acu/mode', 'acu/rate_command', 'tracking_receiver/angle_error'
+
+
+def _never_tracked(outputs, inputs):
+    if not np.isfinite(inputs[ERROR].numbers[:, 0]).any():
+        return 'the receiver never locked'
+    return '' if 'autotrack' in outputs[MODE].texts else 'the ACU was never in autotrack'
+
+
+def _never_locked(outputs, _inputs):
+    return '' if np.isfinite(outputs[ERROR].values[:, 0]).any() else 'the receiver never locked'
+
+
+def _never_moved(_outputs, inputs):
+    command = inputs[COMMAND]
+    return '' if (command.numbers[command.stamp != NEVER, 2:4] != 0.0).any() else 'the drive was never told to move'
+
+
+def _never_sailed(outputs, _inputs):
+    return '' if any(np.ptp(output.values, axis=0).any() for output in outputs.values() if len(output.stamps)) else \
+        'the ship never moved'
+
+
+class Kind(typing.NamedTuple):
+    """How a node is recomputed: its unit(parameters, on_ship), the topic that begins its steps, the topic whose
+    presence says that it is on a ship, idle(outputs, inputs) -> why the recording does not exercise it, or ''."""
+    unit: type
+    trigger: str
+    ship: str
+    idle: typing.Callable
+
+
+KINDS = {
+    'ship_motion': Kind(ShipMotion, 'clock', 'clock', _never_sailed),
+    'ins': Kind(Ins, 'ship/imu/data_raw', 'ship/imu/data_raw', _never_sailed),
+    'tracking_receiver': Kind(TrackingReceiver, 'joint_states', 'ship/truth', _never_locked),
+    'acu': Kind(Acu, 'joint_states', 'ship/imu/data', _never_tracked),
+    'adu': Kind(Adu, 'clock', 'ship/truth', _never_moved),
+}
+"""The drive's steps begin with its own clock."""
+
+
+class RecomputeError(ValueError):
+    """A bag does not hold what a recomputation needs, or an option fits nothing in it; one line."""
+
+
+class Recording:
+    """The messages of a bag by topic, read once. lockstep: how they are matched; None: as the bag says."""
+
+    def __init__(self, path, lockstep=None):
+        self.bag = bags.read(path)
+        self.lockstep = self.bag.metadata.get('pacing') == 'lockstep' if lockstep is None else lockstep
+        self._rows, self._data, self._outputs = {}, {}, {}
+
+    def has(self, topic):
+        return topic in self.bag.topics and len(self.rows(topic)) > 0
+
+    def rows(self, topic):
+        if topic not in self._rows:
+            self._rows[topic] = self.bag.rows(topic)
+        return self._rows[topic]
+
+    def data(self, topic):
+        """The CDR bytes of its messages."""
+        if topic not in self._data:
+            wanted = topics.BY_NAME[topic].type
+            if self.bag.topics[topic] != wanted:
+                raise RecomputeError(f'{self.bag.path}: {topic} is {self.bag.topics[topic]}; must be {wanted}')
+            self._data[topic] = [data for _, _, _, data in self.bag.raw(topic)]
+        return self._data[topic]
+
+    def output(self, topic) -> comparison.Output:
+        """Its messages as numbers."""
+        if topic not in self._outputs:
+            try:
+                self._outputs[topic] = comparison.recorded(self.data(topic), self.rows(topic).log, topic)
+            except ValueError as error:
+                raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
+        return self._outputs[topic]
+
+    def modes(self, stamps):
+        """{step: text} of the recorded acu/mode; steps are rows of stamps [ns], the modes' own are in the bag's log
+        (lockstep) or that of the next rate command in the file."""
+        if not (self.has(MODE) and self.has(COMMAND)):
+            return {}
+        output = self.output(MODE)
+        at = output.stamps
+        if not self.lockstep:
+            after = np.searchsorted(_place(self.rows(COMMAND)), _place(self.rows(MODE)))
+            at = np.append(self.output(COMMAND).stamps, NEVER)[after]
+        steps = np.searchsorted(stamps, at)
+        return {int(step): text for step, stamp, text in zip(steps, at, output.texts)
+                if step < len(stamps) and stamps[step] == stamp}
+
+
+def _place(rows):
+    """Where messages are in the file, as numbers that grow."""
+    return (rows.chunk << 40) + rows.start
+
+
+@dataclasses.dataclass
+class Feed:
+    """The inputs of a node by step: heard (n,) of its HEARD; rows: {topic: row of its message at each step, -1 none};
+    stamps (n,) [ns]; events: [(step before which, topic, row)]; problem: why it ends early, or ''; refused: messages
+    that no step took."""
+    heard: np.ndarray
+    rows: dict
+    stamps: np.ndarray
+    events: list
+    problem: str
+    refused: int
+
+
+def feed(recording, unit, trigger) -> Feed:
+    """Match the recorded inputs of a unit to its steps."""
+    names = [trigger, *unit.followers]
+    events = [name for name in unit.events if recording.has(name)]
+    for name in names:
+        if not recording.has(name):
+            raise RecomputeError(f'{recording.bag.path}: no {name} in it, which the node hears')
+    heard = names + events
+    stamps = [recording.output(name).stamps if name in names else recording.rows(name).log for name in heard]
+    sources = np.concatenate([np.full(len(part), number) for number, part in enumerate(stamps)])
+    rows = np.concatenate([np.arange(len(part)) for part in stamps])
+    stamps = np.concatenate(stamps)
+    if recording.lockstep:
+        order = np.lexsort((np.where(sources < len(names), sources, -1), stamps))
+    else:
+        order = np.argsort(np.concatenate([_place(recording.rows(name)) for name in heard]), kind='stable')
+
+    steps = []
+    steps_taken = Steps(trigger, {name: round(latency * SECOND) for name, latency in unit.followers.items()},
+                        recording.lockstep, lambda *step: steps.append(step))
+    found, problem = [], ''
+    try:
+        take = steps_taken.take
+        for source, row, stamp in zip(sources[order].tolist(), rows[order].tolist(), stamps[order].tolist()):
+            if source < len(names):
+                take(heard[source], stamp, row)
+            else:
+                found.append((len(steps), heard[source], row))
+    except GraphError as error:
+        problem = f'inputs: {error}'
+    return Feed(*_gathered(recording, unit, trigger, steps), found, problem, steps_taken.refused)
+
+
+def _gathered(recording, unit, trigger, steps):
+    """(records of HEARD (n,), rows, stamps) of matched steps."""
+    taken = {trigger: np.array([row for _, row, _ in steps], np.int64)}
+    for name in unit.followers:
+        taken[name] = np.array([-1 if row[name] is None else row[name] for _, _, row in steps], np.int64)
+    heard = np.zeros(len(steps), unit.HEARD)
+    for name in unit.HEARD.names:
+        place = records.slot(heard, name)
+        rows = taken.get(name)
+        came = rows >= 0 if rows is not None else np.zeros(len(steps), bool)
+        place.stamp[:] = NEVER
+        if came.any():
+            output = recording.output(name)
+            place.stamp[came] = output.stamps[rows[came]]
+            place.numbers[came] = output.values[rows[came]]
+    return heard, taken, np.array([stamp for stamp, _, _ in steps], np.int64)
+
+
+def compute(recording, unit, fed, modes=None, requests=()):
+    """(said (n,), requests made {step: (mode, granted)}) of a unit on a Feed.
+
+    modes: {step: mode} as recorded; where the unit does not go there by itself, it is asked to. requests: {step: mode}
+    that are asked for whatever happens.
+    """
+    codes = dict(enumerate(unit.CODES.get(MODE, ())))
+    code_of = {text: code for code, text in codes.items()}
+    modes, made = modes or {}, {}
+    events = {}
+    for step, topic, row in fed.events:
+        events.setdefault(step, []).append((topic, row))
+    said = np.zeros(len(fed.heard), unit.SAID)
+    last = 0
+    for step in sorted({*events, *modes, *requests, len(said)}):
+        unit.answers(fed.heard[last:step], said[last:step])
+        last = step
+        if step == len(said):
+            break
+        for topic, row in events.get(step, ()):
+            try:
+                unit.events[topic](messages.deserialize(recording.data(topic)[row], topics.BY_NAME[topic].type))
+            except ValueError:
+                pass  # refused, as the node does
+        if step in requests:
+            made[step] = requests[step], unit.request(code_of[requests[step]])
+        elif modes.get(step) in code_of:
+            arrays = unit.state, unit.inputs, unit.outputs
+            before = [array.copy() for array in arrays]
+            unit.answers(fed.heard[step:step + 1], said[step:step + 1])
+            last = step + 1
+            if codes[int(said[step][MODE])] != modes[step]:
+                for array, values in zip(arrays, before):
+                    array[...] = values
+                made[step] = modes[step], unit.request(code_of[modes[step]])
+                last = step
+    return said, made
+
+
+def outputs_of(unit, fed, said):
+    """{topic: Output} of what a unit said."""
+    found = {}
+    for name in unit.SAID.names:
+        if name in unit.CODES:
+            change = np.flatnonzero(np.diff(said[name], prepend=-1))
+            found[name] = comparison.Output(fed.stamps[change], np.zeros((change.size, 0)),
+                                            [unit.CODES[name][code] for code in said[name][change]])
+        else:
+            place = records.slot(said, name)
+            sent = place.stamp != NEVER
+            found[name] = comparison.Output(place.stamp[sent], place.numbers[sent])
+    return found
+
+
+@dataclasses.dataclass
+class Recomputed:
+    """One node on one recording."""
+    node: str
+    unit: object
+    feed: Feed
+    said: np.ndarray
+    outputs: dict
+    requests: dict
+
+
+def recompute(recording, node, params, requests=None) -> Recomputed:
+    """Recompute a node with parameters of its dataclass. requests {step: mode}: what was asked of it; None: what the
+    recorded modes tell."""
+    kind = KINDS[node]
+    unit = kind.unit(params, recording.has(kind.ship))
+    fed = feed(recording, unit, kind.trigger)
+    if requests is None:
+        said, made = compute(recording, unit, fed, modes=recording.modes(fed.stamps) if MODE in unit.CODES else {})
+    else:
+        said, made = compute(recording, unit, fed, requests=requests)
+    return Recomputed(node, unit, fed, said, outputs_of(unit, fed, said), made)
+
+
+def idle(recording, done) -> str:
+    """Why the recording does not exercise a node; '' if it does. Recorded outputs are asked where there are any."""
+    outputs = {name: recording.output(name) if recording.has(name) else output
+               for name, output in done.outputs.items()}
+    inputs = {name: records.slot(done.feed.heard, name) for name in done.unit.HEARD.names}
+    return KINDS[done.node].idle(outputs, inputs)
+
+
+def compare(recording, outputs, unit, tolerance) -> list:
+    """TopicComparison of every output that was recorded."""
+    found = []
+    for name, output in outputs.items():
+        if recording.has(name) and not tolerance.ignores(name):
+            template = unit.messages.get(name)
+            found.append(comparison.compare(name, recording.output(name), output, tolerance,
+                                            recording.data(name) if template else None, template))
+    return found
+
+
+def chosen(recording, nodes, file_values):
+    """The nodes to recompute: those named, else those whose parameters are known and whose inputs are there; of a
+    recording that does not say how it was made, the ACU."""
+    for node in nodes:
+        if node not in KINDS:
+            raise RecomputeError(f'--node {node}: must be one of {", ".join(KINDS)}')
+    known = file_values if file_values is not None else recording.bag.configuration['parameters']
+    able = [node for node, kind in KINDS.items() if recording.has(kind.trigger) and node in (known or ('acu',))]
+    found = [node for node in KINDS if node in nodes] if nodes else able
+    if not found:
+        raise RecomputeError(f'{recording.bag.path}: no node whose inputs are in it; there are '
+                             f'{", ".join(recording.bag.topics)}')
+    return found
+
+
+def file_parameters(path):
+    """{node: {dotted name: value}} of a ROS 2 parameter file or a scenario. Raises ScenarioError."""
+    try:
+        tree = yaml.safe_load(path.read_text())
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise RecomputeError(f'--params-file {path}: {" ".join(str(error).split())}') from None
+    if not isinstance(tree, dict):
+        raise RecomputeError(f'--params-file {path}: must hold a section for a node')
+    if 'scenario' in tree and 'recorder' not in tree:
+        return scenario.load(str(path)).values
+    found = {}
+    for node, body in tree.items():
+        if node in KINDS:
+            if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
+                raise RecomputeError(f'--params-file {path}: section {node} must hold ros__parameters')
+            values = scenario.dotted(body['ros__parameters'])
+            found[node] = {key: value for key, value in values.items() if not key.startswith('graph.')}
+    return found
+
+
+def overrides(texts, nodes):
+    """{node: {key: value}} of texts [node.]key=value; the node may be left out where there is only one."""
+    found = {}
+    for text in texts:
+        if text.partition('=')[0].partition('.')[0] not in scenario.NODE_KINDS and len(nodes) == 1:
+            text = f'{nodes[0]}.{text}'
+        node, key, value = scenario.parse_override(text)
+        if node not in nodes:
+            raise RecomputeError(f'--param {text}: {node} is not recomputed; that is {", ".join(nodes)}')
+        found.setdefault(node, {})[key] = value
+    return found
+
+
+def parameters_of(recording, node, file_values=None, changes=()):
+    """The parameter dataclass of a node: of the file, else as recorded, else the defaults; then changed."""
+    values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
+    try:
+        return parameters.build(scenario.NODE_KINDS[node].parameters, {**values, **dict(changes)})
+    except parameters.ParameterError as error:
+        raise RecomputeError(f'{node}: {error}') from None
+
+
+def measure(path, node='acu'):
+    """Seconds recorded over seconds taken to read a bag, recompute a node and compare; the laws compiled before."""
+    def run():
+        recording = Recording(path)
+        done = recompute(recording, node, parameters_of(recording, node))
+        compare(recording, done.outputs, done.unit, comparison.Tolerance())
+        return (done.feed.stamps[-1] - done.feed.stamps[0]) / SECOND
+
+    run()
+    begun = time.perf_counter()
+    span = run()
+    return span / (time.perf_counter() - begun)

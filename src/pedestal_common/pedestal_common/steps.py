@@ -1,0 +1,102 @@
+"""Step matching: which messages belong to step t_k. No ROS here: a recorded run is matched as its nodes were."""
+import collections
+
+SECOND = 1_000_000_000
+
+
+class GraphError(RuntimeError):
+    """The graph around a node is not what it must be; one line that names topic, stamp or node."""
+
+
+class Steps:
+    """Brings a node's inputs together: the trigger stamped t_k and, of each follower, the message due at t_k.
+
+    followers: {topic: latency in ns}; due is the newest trigger stamp <= t_k - latency (none at the start).
+    Lockstep waits for exactly that message. Realtime answers t_k at the latest when the trigger of the next
+    step arrives, with whatever newest message is there and None for a follower that sent nothing new.
+    `answer(stamp_ns, trigger_message, {topic: message or None})` is called once per step, in order.
+    """
+
+    def __init__(self, trigger, followers, lockstep, answer):
+        self._trigger, self._lockstep, self._answer = trigger, lockstep, answer
+        self._latency = dict(followers)
+        self._awaited = {topic: collections.deque() for topic in followers}
+        self._due = dict.fromkeys(followers)
+        self._arrived = {topic: collections.deque() for topic in followers}
+        self._last = dict.fromkeys((trigger, *followers))
+        self._pending = None
+        self._period = None
+        self.refused = 0
+        self.refusal = ''
+
+    def take(self, topic, stamp, message):
+        """One input has come; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
+        last = self._last[topic]
+        if last is not None and stamp <= last:
+            self._refuse(f'{topic} stamp went back from {last / SECOND:.6f} to {stamp / SECOND:.6f} s')
+            return
+        self._last[topic] = stamp
+        if topic == self._trigger:
+            if self._lockstep and last is not None:
+                if self._period is not None and stamp - last != self._period:
+                    raise GraphError(f'{topic} stamp jumped from {last / SECOND:.6f} to {stamp / SECOND:.6f} s; '
+                                     f'the period is {self._period / SECOND:.6f} s')
+                self._period = stamp - last
+            if self._pending is not None:
+                if self._lockstep:
+                    raise GraphError(f'{topic} stamped {stamp / SECOND:.6f} s came before step '
+                                     f'{self._pending[0] / SECOND:.6f} s was answered')
+                self._close()
+            self._pending = (stamp, message)
+            for name, awaited in self._awaited.items():
+                awaited.append(stamp)
+                self._due[name] = None
+                while awaited and awaited[0] <= stamp - self._latency[name]:
+                    self._due[name] = awaited.popleft()
+        else:
+            self._arrived[topic].append((stamp, message))
+        if self._pending is not None and all(map(self._ready, self._due)):
+            self._close()
+
+    def _refuse(self, reason):
+        if self._lockstep:
+            raise GraphError(reason)
+        self.refused += 1
+        self.refusal = reason
+
+    def _ready(self, topic):
+        due, arrived = self._due[topic], self._arrived[topic]
+        if due is None:
+            return True
+        while arrived and arrived[0][0] < due and len(arrived) > 1:
+            arrived.popleft()
+        if not arrived:
+            return False
+        if self._lockstep and arrived[0][0] != due:
+            raise GraphError(f'{topic} is stamped {arrived[0][0] / SECOND:.6f} s where {due / SECOND:.6f} s is due; '
+                             f'is its latency what this node was told ({self._latency[topic] / SECOND:.6f} s)?')
+        return arrived[0][0] >= due
+
+    def _close(self):
+        stamp, message = self._pending
+        self._pending = None
+        inputs = {}
+        for topic, arrived in self._arrived.items():
+            inputs[topic] = None
+            if self._lockstep:
+                if self._due[topic] is not None:
+                    inputs[topic] = arrived.popleft()[1]
+            else:
+                while arrived and arrived[0][0] <= stamp:
+                    inputs[topic] = arrived.popleft()[1]
+        self._answer(stamp, message, inputs)
+
+    @property
+    def pending_stamp(self):
+        """Stamp of the step that waits for its inputs [ns], or None."""
+        return None if self._pending is None else self._pending[0]
+
+    @property
+    def waiting_for(self):
+        """Topics the pending step still waits for."""
+        return [topic for topic in self._due if self._pending is not None and not self._ready(topic)]
