@@ -315,7 +315,8 @@ def set_middleware_defaults():
         os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(profiles))
 
 
-def _executor():
+def make_executor():
+    """The executor every node runs in."""
     try:
         from rclpy.experimental.events_executor import EventsExecutor
         return EventsExecutor()
@@ -335,7 +336,7 @@ def main(node_class, args=None) -> int:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
         name = node.get_name()
-        executor = _executor()
+        executor = make_executor()
         executor.add_node(node)
         gc.freeze()
         while not (_stop or node.finished) or node.draining():
