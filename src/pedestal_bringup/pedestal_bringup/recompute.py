@@ -348,8 +348,7 @@ def file_parameters(path):
         if node in KINDS:
             if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
                 raise RecomputeError(f'--params-file {path}: section {node} must hold ros__parameters')
-            values = scenario.dotted(body['ros__parameters'])
-            found[node] = {key: value for key, value in values.items() if not key.startswith('graph.')}
+            found[node] = scenario.dotted(body['ros__parameters'])
     return found
 
 
@@ -369,6 +368,7 @@ def overrides(texts, nodes):
 def parameters_of(recording, node, file_values=None, changes=()):
     """The parameter dataclass of a node: of the file, else as recorded, else the defaults; then changed."""
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
+    values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
         return parameters.build(scenario.NODE_KINDS[node].parameters, {**values, **dict(changes)})
     except parameters.ParameterError as error:

@@ -88,7 +88,7 @@ class Player(Node):
     """
 
     def __init__(self, playlist, companion, nodes, rate, paused, deadline, keyboard, stopped):
-        super().__init__('replay')
+        super().__init__(topics.STAND_IN)
         self.playlist, self.nodes, self.rate, self.paused = playlist, nodes, rate, paused
         self.deadline, self.keyboard, self.stopped = deadline, keyboard, stopped
         self.companion = companion
