@@ -26,6 +26,8 @@ Symbols
     v1, v2, v3      adrc: shaped angle, rate, acceleration                              [rad, rad/s, rad/s2]
     z1, z2, z3      adrc: observed angle, rate, disturbance                             [rad, rad/s, rad/s2]
     w_c, w_o, w_s   adrc: poles of feedback, of observer, of the drive's rate loop      [rad/s]
+    l1, l2, l3      adrc: gains of the observer over a step h; b0 = w_s, u0 the wanted y'' [-], [1/s], [1/s2]
+    w, width, depth notch: centre, damping of its poles, what is left at the centre     [rad/s], [-], [-]
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
 
 References: paper 000 (Ma Jijun et al. 2023, 'current' statistical model filter of an antenna; PID position loop);

@@ -20,12 +20,15 @@ Symbols
     v_d, v_q          phase voltages likewise [V]
     R, L, psi, p      phase resistance [ohm], inductance [H], flux linkage [Wb], pole pairs
     K_t               torque constant 1.5 p psi [Nm/A]; psi_hat, K_t_hat: as the controller believes
-    K_p, K_i          gains of a PI controller
-    w_o, d            bandwidth of the disturbance observer [rad/s]; torque it sees on a motor shaft [Nm]
+    K_p, K_i, K_d     gains of a PI controller; of the damping between the motors
+    w_o, d            bandwidth of the disturbance observer [rad/s]; torque it sees on a motor shaft [Nm];
+                      omega_hat, d_hat its estimates, l_1, l_2 its gains
+    J_dish            share of J that swings on k_dish [Nm/rad], c_dish [Nms/rad]
     k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis
     z                 LuGre bristle deflection [rad]; sigma_0, sigma_1 its stiffness and damping
     T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]
-    x, tau            thermal load of a motor (1: rated torque for ever), time constant of its winding [s]
+    x, tau            thermal load of a motor (1: T_rated for ever), time constant of its winding [s]
+    alpha, dT         temperature coefficient of copper [1/K], rise of the winding at x = 1 [K]
     v, V              turbulence along the mean wind, and the mean wind [m/s]
     h                 plant sub-step 50 us; current loops 100 us, speed loop 0.5 ms
 """

@@ -6,7 +6,7 @@ import time
 import numpy as np
 from std_srvs.srv import Trigger
 
-from adu_drive import drive_state, faults, thermal
+from adu_drive import drive_state, drive_unit, faults, thermal
 from adu_drive.params import AduNodeParameters
 from adu_drive.wire import CLOCK, COMMAND, JOINTS, MOTORS, SHIP, STATE, Adu
 from pedestal_common import messages, records, shell
@@ -143,7 +143,8 @@ class AduNode(shell.Shell):
         records.take(self.heard_ship, self.truth)
         self.stale = self.unit.advance()
         if self.outputs[0]['invalid_command']:
-            self.invalid = COMMAND if np.isfinite(self.unit.inputs[0]['base_acceleration']).all() else SHIP
+            deck = self.unit.inputs[0]['base_acceleration']
+            self.invalid = COMMAND if (np.abs(deck) <= drive_unit.LARGEST).all() else SHIP
         self.k += 1
         if self.k == 1:
             self.begun = time.monotonic()
@@ -189,7 +190,8 @@ class AduNode(shell.Shell):
         if outputs['emergency'] or any(outputs[axis]['faults'] for axis in messages.AXES):
             return shell.ERROR, now, values
         if invalid:
-            return shell.ERROR, f'{invalid} holds NaN or infinity: stopping', values
+            largest = f'{drive_unit.LARGEST:g}'
+            return shell.ERROR, f'{invalid} holds NaN or infinity, or goes beyond {largest}: stopping', values
         if self.stale:
             limit = self.unit.memory['timeout'][0] / 1e9
             return shell.ERROR, f'no new acu/rate_command for {limit:g} s: stopping', values

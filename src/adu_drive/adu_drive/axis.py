@@ -99,7 +99,7 @@ def _motor_at_rest(m, g, T, total, theta, per_rad):
     angle = g.ratio * (theta + flank + made * g.ratio / g.stiffness)
     return {'i_d': 0.0, 'i_q': i_q, 'i_ref': i_ref, 'v_d': 0.0, 'v_q': v_q, 'sum_d': 0.0, 'sum_q': v_q,
             'omega': 0.0, 'theta': angle, 'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0,
-            'sum': total, 'torque_ref': T, 'limited': 0, 'heat': 0.0, 'q_R': 1.0, 'h_brake_J': 0.0}
+            'sum': total, 'torque_ref': T, 'limited': 0, 'inhibited': 0, 'heat': 0.0, 'q_R': 1.0, 'h_brake_J': 0.0}
 
 
 def initial_state(p, theta, external):
@@ -192,7 +192,8 @@ def _supervise(s, c, omega, free):
 def _let_go(s, omega, free):
     """No torque. Once the brakes hold, what the motors held before is kept: they need it when the brakes open."""
     s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
-    s.rate, s.omega_hat, s.stopping = 0.0, omega, 1
+    s.motor_1.inhibited = s.motor_2.inhibited = s.stopping = s.slewing = 1
+    s.rate, s.bias, s.omega_hat = 0.0, 0.0, omega
     if free:
         s.motor_1.sum = s.motor_2.sum = s.d_hat = 0.0
 
@@ -211,6 +212,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     if not powered or s.faults & faults.OVERCURRENT:
         _let_go(s, omega, free)
         return
+    m1.inhibited = m2.inhibited = 0
     s.omega_hat, s.d_hat = disturbance_observer.update(
         s.omega_hat, s.d_hat, omega, 0.5 * (_realised(m1, k1) + _realised(m2, k2)), c.l_1, c.l_2, c.h_J_shaft)
 
@@ -225,7 +227,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
             feed_forward = torque * c.per_2N
     else:
         wanted = s.rate - min(max(s.rate, -c.ramp), c.ramp)
-        s.stopping = 1
+        s.stopping = s.slewing = 1
     position = c.rad * encoder.counts(s.theta, c.per_rad)
     s.rate = min(max(wanted, -travel.approach_rate(position - c.lower, c.K, c.a)),
                  travel.approach_rate(c.upper - position, c.K, c.a))
@@ -250,17 +252,24 @@ def _begin_motor(m, k, grip):
 
 
 @compiled
-def begin_period(s, c, grip, following):
+def begin_period(s, c, grip):
     """Once per control period: brakes, winding temperature, and the marks of what happens within it."""
     _begin_motor(s.motor_1, c.motor_1, grip)
     _begin_motor(s.motor_2, c.motor_2, grip)
-    s.slewing |= not following
     s.torque_limited = s.voltage_limited = s.end_stop = s.stopping = s.present = 0
 
 
 @compiled
 def current_control(m, k):
-    """One current-loop period of one motor: current reference to phase voltages."""
+    """One current-loop period of one motor: current reference to phase voltages.
+
+    Without torque the inverter is off, whatever a current sensor says: no current, the open terminals show the
+    back-EMF. The diodes that empty the inductance within a millisecond are not modelled.
+    """
+    if m.inhibited:
+        m.i_d = m.i_q = m.sum_d = m.sum_q = m.v_d = 0.0
+        m.v_q = k.p * m.omega * k.psi
+        return
     m.v_d, m.v_q, m.sum_d, m.sum_q, limited = current_loop.voltages(
         k.gain * m.i_d, k.gain * m.i_q + k.offset, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L,
         k.psi_hat, k.v_max)

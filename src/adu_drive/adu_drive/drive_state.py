@@ -51,10 +51,11 @@ def described(condition):
         return PHASES[phase]
     tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', 8), ('elevation', 16))
                for kind in names(condition >> shift & 0xff)]
+    why = ['emergency stop'] if condition >> 3 & 1 else []
     if tripped:
-        return 'fault: ' + ', '.join(tripped)
-    if condition >> 3 & 1:
-        return 'emergency stop'
+        why.append('fault: ' + ', '.join(tripped))
+    if why:
+        return '; '.join(why)
     return PHASES[STOPPING if phase == ENABLED else phase]
 
 

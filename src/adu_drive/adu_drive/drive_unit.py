@@ -92,7 +92,7 @@ def _initial_state(params):
         external = torque - p.load.unbalance * math.cos(theta)
         axes[name] = axis.initial_state(p, theta, external)
     return _record({**axes, 'rate': np.zeros((RING, 2)), 'torque': np.zeros((RING, 2)),
-                    'enable': np.zeros(RING, np.int64), 'k': 0,
+                    'enable': np.ones(RING, np.int64), 'k': 0,
                     'phase': drive_state.ENABLED if enabled else drive_state.DISABLED, 'age': 0,
                     'wanted': int(enabled), 'emergency': 0,
                     'applied': int(not enabled), 'brake_age': LONG_AGO, 'braked': int(not enabled)})
@@ -149,7 +149,7 @@ def _receive(s, u, disturbance_believed):
     slot = s.k % RING
     believed = (disturbance_believed and _believed(u.azimuth.rate) and _believed(u.azimuth.torque)
                 and _believed(u.elevation.rate) and _believed(u.elevation.torque))
-    s.enable[slot] = 1 if believed else 0
+    s.enable[slot] = 1 if believed and u.enable == 1 else 0
     if believed:
         s.rate[slot, 0], s.rate[slot, 1] = u.azimuth.rate, u.elevation.rate
         s.torque[slot, 0], s.torque[slot, 1] = u.azimuth.torque, u.elevation.torque
@@ -185,11 +185,11 @@ def step(state, constants, inputs, outputs):
     s.braked = drive_state.advance(s, c)
     enabled = s.phase == drive_state.ENABLED and u.enable == 1
     powered, free = s.phase != drive_state.DISABLED, not s.braked
-    axis.begin_period(az, c_az, s.braked, enabled)
-    axis.begin_period(el, c_el, s.braked, enabled)
+    axis.begin_period(az, c_az, s.braked)
+    axis.begin_period(el, c_el, s.braked)
     for j in range(c.speed_ticks):
         tick = s.k * c.speed_ticks + j - c.delay_ticks
-        slot = (tick // c.speed_ticks) % RING     # before the first command: a slot still empty, enable 0
+        slot = (tick // c.speed_ticks) % RING     # before the first command: a slot still empty, rate 0
         enable = s.enable[slot] if enabled else 0
         axis.speed_control(az, c_az, s.rate[slot, 0], s.torque[slot, 0], enable, powered, free)
         axis.speed_control(el, c_el, s.rate[slot, 1], s.torque[slot, 1], enable, powered, free)

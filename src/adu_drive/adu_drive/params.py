@@ -60,7 +60,7 @@ class SpeedLoopParameters(Parameters):
     proportional: float = parameter(6.0, 0.0, 1000.0, 'Nms/rad', 'per motor, on its shaft')
     integral: float = parameter(200.0, 0.0, 1e5, 'Nm/rad', 'per motor, on its shaft')
     differential_damping: float = parameter(0.0, 0.0, 10.0, 'Nms/rad', 'on the speed difference of the motors')
-    disturbance_observer: float = parameter(0.0, 0.0, 2000.0, 'rad/s', 'bandwidth, in place of the integral; 0: off')
+    disturbance_observer: float = parameter(0.0, 0.0, 2000.0, 'rad/s', 'bandwidth, beside the integral; 0: off')
     load_inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'of the load as the disturbance observer believes')
 
 

@@ -2,6 +2,8 @@
 
     tau dx/dt = (T / T_rated)^2 - x        x = 1: rated torque for ever; torque and current are proportional
     R = R_20 (1 + alpha dT x)              copper: alpha = 0.00393 / K, dT the rise at rated torque
+
+x follows the torque the motor truly makes, so what trips on it stands for a sensor in the winding.
 """
 from pedestal_common.compiled import compiled
 

@@ -77,7 +77,7 @@ class Adu:
     def services_to(self, text):
         """The services that bring adu/state to a text."""
         o = self.outputs[0]
-        tripped, stopped = text.startswith('fault'), text == 'emergency stop'
+        tripped, stopped = 'fault' in text, 'emergency stop' in text
         latched = o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults']
         wanted = {'adu/emergency_stop': stopped and not o['emergency'],
                   'adu/reset_faults': latched and not tripped and not stopped,

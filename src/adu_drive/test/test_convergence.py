@@ -48,7 +48,7 @@ def move(state, constants, volts, path):
     """The step of paper 000: phase voltages (n, 4) every 100 us and the load angle (n,) after them."""
     s, c = state[0].azimuth, constants[0].azimuth
     m1, m2, rate = s.motor_1, s.motor_2, 0.0
-    axis.begin_period(s, c, False, True)        # brakes off, windings cold
+    axis.begin_period(s, c, False)        # brakes off, windings cold
     for n in range(len(path)):
         if n % (4 * axis.CURRENT_TICKS) == 0:
             rate = K_p * (STEP - s.theta)
@@ -67,7 +67,7 @@ def replay(state, constants, volts, path):
     """The plant alone under given voltages (n, 4), one row per 100 us; load angle (n,) after each."""
     s, c = state[0].azimuth, constants[0].azimuth
     m1, m2 = s.motor_1, s.motor_2
-    axis.begin_period(s, c, False, True)
+    axis.begin_period(s, c, False)
     for n in range(len(volts)):
         m1.v_d, m1.v_q, m2.v_d, m2.v_q = volts[n]
         for _ in range(constants[0].substeps):

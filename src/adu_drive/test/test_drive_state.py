@@ -199,3 +199,31 @@ def test_a_drive_that_starts_disabled_can_be_enabled(drive):
     d.run(0.5)
     assert phases(d) == ['disabled', 'releasing brakes', 'enabled']
     assert d.log['azimuth']['load_velocity'][-1] == pytest.approx(0.3, abs=2e-3)
+
+
+@pytest.mark.parametrize('offset', [10.0, 20.0])
+def test_without_torque_the_inverter_is_off_whatever_a_current_sensor_says(drive, offset):
+    """With the loops on, an offset of the sensors would be a torque that nobody asked for."""
+    d = made(drive, azimuth__motor_1__drift__current_offset=offset, azimuth__motor_2__drift__current_offset=offset,
+             azimuth__bias__schedule='off').run(0.2, azimuth=0.0)
+    assert request(d, 'DISABLE') == drive_state.GRANTED
+    d.run(2.0)
+    a = d.log['azimuth'][-300:]
+    assert d.log['phase'][-1] == drive_state.DISABLED
+    assert np.abs(a['true_torque']).max() == 0.0 and (a['bias'] == 0.0).all()
+    assert np.ptp(a['load_position']) < 2e-4 and np.ptp(a['motor_position']) < 0.2      # it swings inside its lash
+
+
+@pytest.mark.parametrize('gap', [{'enable': 0}, {'azimuth': math.nan}])
+@pytest.mark.parametrize('delay', [0.0, 0.05])
+def test_after_a_gap_the_command_is_met_within_the_ramp(drive, gap, delay):
+    """Stale or unbelievable commands stop the axis; nothing of before the gap comes back, and the next is no step."""
+    d = drive(AduParameters(initial_elevation=0.7, transport_delay=delay)).run(0.5, azimuth=1.0)
+    assert d.log['azimuth']['load_velocity'][-1] == pytest.approx(1.0, abs=5e-3)
+    d.run(0.3, **gap)
+    assert abs(d.log['azimuth']['load_velocity'][-1]) < 2e-3
+    d.run(0.3, azimuth=-0.5, enable=1)
+    v = d.log['azimuth']['load_velocity'][-60:]
+    assert v.max() < 0.02 and v[-1] == pytest.approx(-0.5, abs=2e-3)
+    reached = np.flatnonzero(v < -0.475)[0] - round(delay / 5e-3)
+    assert reached * 5e-3 >= 0.9 * 0.475 / 20.0

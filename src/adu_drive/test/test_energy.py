@@ -82,7 +82,7 @@ def account(state, constants, external, motors, gear, load, log):
     state_of(s, x1)
     before = stored(x1, motors, gear, load)
     electrical = work = rate = 0.0
-    axis.begin_period(s, c, False, True)        # brakes off, windings cold
+    axis.begin_period(s, c, False)        # brakes off, windings cold
     for n in range(len(external)):
         if n % 4 == 0:
             rate = K_p * (STEP - s.theta)

@@ -77,7 +77,7 @@ def test_start_and_duration_count_from_the_first_step_and_keep_what_holds(tmp_pa
 
 
 @pytest.mark.parametrize('nodes, expected', [
-    (['acu'], {'joint_states', ERROR, 'ship/imu/data', 'acu/program_track'}),
+    (['acu'], {'joint_states', ERROR, 'ship/imu/data', 'acu/program_track', 'adu/state'}),
     (['adu'], {'acu/rate_command', 'ship/truth'}),
     (['acu', 'adu'], {ERROR, 'ship/imu/data', 'acu/program_track', 'ship/truth'}),
     (['recorder'], {topic.name for topic in topics.TOPICS} | {OTHER.name}),
