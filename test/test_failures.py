@@ -1,6 +1,7 @@
 """A node dies, falls silent, or the user stops the run: an error that names the node, and a bag that can be read."""
 import re
 import signal
+import sys
 import time
 
 import numpy as np
@@ -30,6 +31,8 @@ def hurt(start_run):
                     waiting.remove(target)
                     if target == 'pedestal':
                         run.process.send_signal(targets[target])
+                    elif target == 'everything':
+                        run.kill()
                     else:
                         run.signal(target, targets[target])
             time.sleep(0.02)
@@ -39,7 +42,7 @@ def hurt(start_run):
 
 @pytest.fixture(scope='module')
 def killed(hurt):
-    return hurt({**dict.fromkeys(NODES, signal.SIGKILL), 'pedestal': signal.SIGINT})
+    return hurt({**dict.fromkeys((*NODES, 'everything'), signal.SIGKILL), 'pedestal': signal.SIGINT})
 
 
 @pytest.fixture(scope='module')
@@ -76,6 +79,21 @@ def test_a_silent_node_is_named(stopped, node):
     assert re.match(rf'pedestal: error: {node} has fallen silent; its last log lines', result.stderr)
     assert run.pids() == {}
     assert_readable(run)
+
+
+@pytest.mark.parametrize('target', ['recorder', 'everything'])
+def test_what_a_kill_left_is_recovered(killed, target, run_process):
+    run, _ = killed[target]
+    if target == 'everything':
+        assert not (run.bag / 'metadata.yaml').exists()
+    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recover', run.bag], 60.0)
+    assert (done.returncode, done.stderr) == (0, '')
+    assert 'the recording breaks off after' in done.stdout
+    recovered = run.bag.with_name('bag-recovered')
+    report = verify(recovered)
+    assert report.complete and report.steps >= 200, report.lines()
+    assert list(bags.read(recovered).raw()) == list(bags.load(run.bag).raw())
+    assert bags.read(recovered).configuration == bags.load(run.bag).configuration
 
 
 def test_ctrl_c_ends_in_order(killed):

@@ -111,7 +111,7 @@ def read(path):
     """The Bag in a directory or an .mcap file. Raises BagError when it is missing, empty, damaged or foreign."""
     bag = load(path)
     if bag.damage:
-        raise BagError(f'{bag.file}: {bag.damage}')
+        raise BagError(f'{bag.file}: {bag.damage}; `pedestal recover` makes a bag of what is there')
     return bag
 
 

@@ -65,6 +65,11 @@ def _parser():
     verify.add_argument('bag', type=pathlib.Path)
     verify.set_defaults(verb=_verify)
 
+    recover = verbs.add_parser('recover', help='make a readable bag of what is left in a damaged one')
+    recover.add_argument('bag', type=pathlib.Path)
+    recover.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: beside it, BAG-recovered')
+    recover.set_defaults(verb=_recover)
+
     report = verbs.add_parser('report', help='write a recording as one HTML file with its figures')
     report.add_argument('bag', type=pathlib.Path)
     report.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
@@ -170,6 +175,12 @@ def _verify(options):
     check = verify(options.bag)
     print('\n'.join(check.lines()))
     return 0 if check.complete else 1
+
+
+def _recover(options):
+    from pedestal_bringup.recover import recover
+    print('\n'.join(recover(options.bag, options.output).lines()))
+    return 0
 
 
 def _report(options):

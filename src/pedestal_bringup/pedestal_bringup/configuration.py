@@ -70,9 +70,13 @@ def records(scenario_yaml, parameters_yaml):
 def line(bag):
     """One line on how a bag was made."""
     said = bag.metadata
-    if not bag.configuration['scenario']:
-        return 'made by: not said in the bag, it holds no configuration'
-    made = [f'scenario {said.get("scenario", "")}', said.get('pacing', ''), f'seed {said.get("seed", "")}',
-            f'git {said.get("git") or "unknown"}']
-    made += [f'{key.removeprefix("version.")} {value}' for key, value in said.items() if key.startswith('version.')]
+    made = ['not said in the bag, it holds no configuration']
+    if bag.configuration['scenario']:
+        made = [f'scenario {said.get("scenario", "")}', said.get('pacing', ''), f'seed {said.get("seed", "")}',
+                f'git {said.get("git") or "unknown"}']
+        made += [f'{key.removeprefix("version.")} {value}' for key, value in said.items()
+                 if key.startswith('version.')]
+    recovered = bag.metadata_records.get('recovered')
+    if recovered:
+        made.append(f'recovered ({recovered.get("messages_lost")} messages lost in the middle)')
     return 'made by: ' + ', '.join(made)

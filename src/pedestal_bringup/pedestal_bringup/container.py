@@ -1,8 +1,8 @@
 """A bag in the making: one MCAP file, record by record, its summary and metadata.yaml (version 9). No ROS here.
 
-Built from the records of the `mcap` library. Its Writer class is not used: it costs 4 to 6 us a message where bag.Writer,
-on top of this, costs 1 (a dataclass, eight packs and three seeks per message against one pack), and at 11 topics the
-recorder shares two cores with the loop it records.
+Built from the records of the `mcap` library. Its Writer class is not used: it costs 4 to 6 us a message where
+bag.Writer, on top of this, costs 1 (a dataclass, eight packs and three seeks per message against one pack), and at 11
+topics the recorder shares two cores with the loop it records.
 
 Nothing in the MCAP file depends on its path, the host or the wall clock: equal records give equal bytes.
 """
