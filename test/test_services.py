@@ -164,12 +164,63 @@ def test_an_invalid_encoder_ends_a_mode(plant):
     assert (plant.client.heard['acu/rate_command'][-1].velocity == 0.0).all()
 
 
-def test_parameters_while_it_runs(plant):
-    def put(name, value):
-        request = SetParameters.Request(parameters=[Parameter(name=name, value=ParameterValue(
-            type=ParameterType.PARAMETER_DOUBLE, double_value=value))])
-        return plant.client.call('acu/set_parameters', SetParameters, request).results[0]
+def put(plant, name, value):
+    """The answer to `ros2 param set /acu name value`."""
+    typed = (ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value) if isinstance(value, str) else
+             ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value))
+    request = SetParameters.Request(parameters=[Parameter(name=name, value=typed)])
+    return plant.client.call('acu/set_parameters', SetParameters, request).results[0]
 
+
+def test_controllers_while_it_tracks(plant):
+    """The antenna obeys and follows 0.05 rad/s; every change of the azimuth's controller leaves the command alone."""
+    plant.step()
+    start = plant.stamp * 1e-9
+    plant.client.publish('acu/program_track', plant.program([(0.0, 0.1, 0.5), (40.0, 2.1, 0.5)], start))
+    plant.client.until(lambda: plant.step(error=(math.nan, math.nan, 10.0)) or plant.client.trigger('acu/program')[0],
+                       10.0)
+    azimuth, rates = 0.1, []
+
+    def track(steps):
+        nonlocal azimuth
+        for _ in range(steps):
+            plant.step(position=(azimuth, 0.5), error=(math.nan, math.nan, 10.0))
+            rates.append(plant.client.heard['acu/rate_command'][-1].velocity[0])
+            azimuth += PERIOD * 1e-9 * rates[-1]
+
+    track(200)
+    for controller in ('pid', 'adrc', 'feedforward', 'adrc', 'pid', 'feedforward'):
+        before = len(rates)
+        assert put(plant, 'azimuth.controller', controller).successful
+        track(200)
+        assert abs(rates[before] - rates[before - 1]) < 1e-4, controller
+        assert rates[-1] == pytest.approx(0.05, abs=2e-3)
+        lag = 0.1 + 0.05 * (plant.stamp * 1e-9 - start) - (azimuth - PERIOD * 1e-9 * rates[-1])
+        assert abs(lag) < 0.05 / 20.0
+    result = put(plant, 'azimuth.controller', 'lqr')
+    assert not result.successful and 'must be one of pid, feedforward, adrc' in result.reason
+    assert plant.client.trigger('acu/standby')[0]
+
+
+def test_a_drive_that_does_not_follow(plant):
+    plant.client.write('adu/state')
+    plant.client.publish('adu/state', messages.String(data='emergency stop'))
+    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow') == (
+        False, 'refused: drive not ready; mode is standby'), 10.0)
+    values = {value.key: value.value for value in plant.client.diagnosed('').values}
+    assert values['drive'] == 'emergency stop'
+    plant.client.publish('adu/state', messages.String(data='enabled'))
+    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow')[0], 10.0)
+    plant.enters('stow')
+    plant.client.publish('adu/state', messages.String(data='fault: azimuth overspeed'))
+    plant.client.until(lambda: plant.step() or plant.mode == 'standby', 10.0)
+    assert (plant.client.heard['acu/rate_command'][-1].velocity == 0.0).all()
+    plant.client.publish('adu/state', messages.String(data='enabled'))
+    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow')[0], 10.0)
+    assert plant.client.trigger('acu/standby')[0]
+
+
+def test_parameters_while_it_runs(plant):
     def moved_by():
         """The rate commanded soon after preset is asked for, 0.5 rad away in azimuth."""
         plant.client.publish('acu/program_track', plant.program([(0.0, 0.6, 0.5)]))
@@ -182,14 +233,14 @@ def test_parameters_while_it_runs(plant):
         return rate
 
     before = moved_by()
-    assert put('azimuth.shaper.rate', 0.01).successful
-    assert put('azimuth.feedforward.bandwidth', 0.0).successful
+    assert put(plant, 'azimuth.shaper.rate', 0.01).successful
+    assert put(plant, 'azimuth.feedforward.bandwidth', 0.0).successful
     assert moved_by() < 0.1 * before
     for name, value, text in (('azimuth.shaper.rate', 1e9, 'azimuth.shaper.rate'),
                               ('azimuth.feedforward.bandwidth', math.nan, 'azimuth.feedforward.bandwidth'),
                               ('azimuth.limits.rate', 1e-3, 'shaper.rate'),
                               ('period', 0.01, 'period')):
-        result = put(name, value)
+        result = put(plant, name, value)
         assert not result.successful and text in result.reason, (name, result.reason)
 
 

@@ -2,7 +2,8 @@
 
 `control_unit.step` runs once per drive step:
     error + encoder -> y -> `tracker` (Kalman filter per axis) -> prediction to the instant of the command
-    -> `deck_reference` (earth -> deck) -> `shaper` -> `position_loop` -> rate and torque.
+    -> `deck_reference` (earth -> deck) -> `position_loop` (`shaper`; `pid`, `feedforward` or `adrc`; `notch`)
+    -> rate and torque.
 `modes` decides which target is followed. Frames and angles as in `pedestal_common`.
 
 Symbols
@@ -19,9 +20,14 @@ Symbols
     t_m             middle of the interval in which the command is in force             [s]
     v, a, j         rate, acceleration, jerk of the shaped reference                    [rad/s, ...]
     h0, r           filter step and acceleration of Han's fhan                          [s], [rad/s2]
-    Kp, Ki, Kd      gains of the position loop                                          [1/s], [1/s2], [-]
-    J, Tc           inertia and Coulomb friction seen at the load                       [kg m2], [Nm]
+    e, u, y         error of the axis, rate command, encoder angle                      [rad], [rad/s], [rad]
+    K_p, K_i, K_d   gains of the position loop; D, the filtered derivative of e         [1/s], [1/s2], [-]
+    k_v, J, Tc      share of v fed forward; inertia and Coulomb friction at the load    [-], [kg m2], [Nm]
+    v1, v2, v3      adrc: shaped angle, rate, acceleration                              [rad, rad/s, rad/s2]
+    z1, z2, z3      adrc: observed angle, rate, disturbance                             [rad, rad/s, rad/s2]
+    w_c, w_o, w_s   adrc: poles of feedback, of observer, of the drive's rate loop      [rad/s]
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
 
-References: paper 000 (Ma Jijun et al. 2023, 'current' statistical model filter of an antenna); Han 2009 (fhan).
+References: paper 000 (Ma Jijun et al. 2023, 'current' statistical model filter of an antenna; PID position loop);
+paper 001 (TD, ESO and NLC of a gyrocompass); Han 2009 (fhan).
 """

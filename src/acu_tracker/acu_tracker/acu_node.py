@@ -7,7 +7,7 @@ from std_srvs.srv import Trigger
 
 from acu_tracker import control_unit, modes
 from acu_tracker.params import AcuParameters
-from acu_tracker.wire import ATTITUDE, COMMAND, ERROR, ESTIMATE, JOINTS, MODE, PROGRAM, REFERENCE, Acu
+from acu_tracker.wire import ATTITUDE, COMMAND, DRIVE, ERROR, ESTIMATE, JOINTS, MODE, PROGRAM, REFERENCE, Acu
 from pedestal_common import messages, records, shell
 
 
@@ -22,6 +22,7 @@ class AcuNode(shell.Shell):
                                                   for name in (JOINTS, ERROR, ATTITUDE))
         self.announced = None
         self.refused = ''
+        self.drive_state = 'unknown'
         self.invalid = 0
         self.waiting = 'operator' in self.graph.nodes and self.graph.lockstep
         self.held = None
@@ -31,6 +32,7 @@ class AcuNode(shell.Shell):
                      for name in (COMMAND, ESTIMATE, REFERENCE)]
         self.send_mode = self.writer(MODE)
         self.reader(PROGRAM, self.on_program)
+        self.reader(DRIVE, self.on_drive_state)
         for mode in range(len(modes.MODES)):
             self.create_service(Trigger, f'acu/{modes.MODES[mode]}', self.service(mode))
         self.create_service(Trigger, 'acu/reset_faults', self.on_reset_faults)
@@ -52,6 +54,10 @@ class AcuNode(shell.Shell):
         if self.held is not None:
             step, self.held = self.held, None
             self.step(*step)
+
+    def on_drive_state(self, message):
+        self.drive_state = message.data
+        self.unit.take_drive_state(message)
 
     def step(self, stamp, joints, followers):
         """Answer step t_k; in lockstep the first one waits for the operator's program track."""
@@ -99,7 +105,8 @@ class AcuNode(shell.Shell):
         invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.invalid >> i & 1]
         self.invalid = 0
         values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
-                  ('coasting', str(int(outputs['coasting']))), ('invalid_input', ' '.join(invalid))]
+                  ('coasting', str(int(outputs['coasting']))), ('drive', self.drive_state),
+                  ('invalid_input', ' '.join(invalid))]
         for axis, limited in zip(messages.AXES, np.transpose([outputs[f'{kind}_limited'] for kind in
                                                               ('angle', 'rate', 'acceleration')])):
             values.append((f'{axis} limited', ' '.join(kind for kind, on in zip(('angle', 'rate', 'acceleration'),

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from acu_tracker import deck_reference, modes, position_loop, program_track, tracker
+from acu_tracker import deck_reference, modes, notch, position_loop, program_track, tracker
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common.compiled import compiled
@@ -27,6 +27,7 @@ INPUTS = np.dtype([
     ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
+    ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
     ('program_count', 'i8'),                                                    # rows of the table in use
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
 ], align=True)
@@ -51,14 +52,16 @@ STATE = np.dtype([
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
 ], align=True)
 
-CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('ahead', 'f8')], align=True)
+CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('ahead', 'f8'), ('notch', 'f8', (2, 5))], align=True)
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of an AcuParameters: the parameters and `ahead` = t_m - t_k [s]."""
+    """Constants (1,) of an AcuParameters: the parameters, `ahead` = t_m - t_k [s], the notches' coefficients."""
     c = np.zeros(1, CONSTANTS)
     c['p'] = record(params, AcuParameters)
     c['ahead'] = params.command_delay + 0.5 * params.period
+    for i, axis in enumerate((params.azimuth, params.elevation)):
+        c['notch'][0, i] = notch.coefficients(axis.notch.frequency, axis.notch.width, axis.notch.depth, params.period)
     return c
 
 
@@ -203,7 +206,7 @@ def overdue(s, p):
 
 
 @compiled
-def change_mode(s, p, o, times, angles, t_m, request):
+def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
     """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
     flags = 0
     encoder_ok = s.encoder.count > 0 and s.encoder.stamp[s.encoder.newest] == s.stamp
@@ -220,7 +223,7 @@ def change_mode(s, p, o, times, angles, t_m, request):
             program = outside(deck_reference.nearest_turn(A, s.turn, low, high, 0.0, 0.0), E, p)
     o.locked = tracker.locked(s.tracker, p.tracker, overdue(s, p))
     mode, reason, result = modes.next_mode(
-        s.mode, request, encoder_ok, attitude_ok, program, outside(p.azimuth.stow, p.elevation.stow, p),
+        s.mode, request, encoder_ok, drive_ready, attitude_ok, program, outside(p.azimuth.stow, p.elevation.stow, p),
         outside(s.preset[0], s.preset[1], p), o.locked, lost, p.tracker.handover)
     if result == modes.ACCEPTED:
         s.pending = modes.NO_REQUEST
@@ -243,7 +246,7 @@ def request(state, constants, inputs, outputs, mode, program_times, program_angl
     """
     s, o = state[0], outputs[0]
     rows = max(inputs[0].program_count, 0)
-    result, _ = change_mode(s, constants[0].p, o, program_times[:rows], program_angles[:rows],
+    result, _ = change_mode(s, constants[0].p, o, inputs[0].drive_ready, program_times[:rows], program_angles[:rows],
                             s.stamp + constants[0].ahead, mode)
     o.mode, o.reason = s.mode, s.reason
     return result == modes.ACCEPTED
@@ -332,7 +335,8 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
 
     t_m = u.stamp + constants[0].ahead
     rested = s.mode == modes.STANDBY
-    _, program_flags = change_mode(s, p, o, times, angles, t_m, s.pending if rested else modes.NO_REQUEST)
+    _, program_flags = change_mode(s, p, o, u.drive_ready, times, angles, t_m,
+                                   s.pending if rested else modes.NO_REQUEST)
     if encoder_ok and (rested or jumped):
         seat(s, p, u)
     if s.mode == modes.STANDBY:
@@ -344,8 +348,10 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         A, dA, ddA, E, dE, ddE = raw_target(s, p, times, angles, t_azimuth)
         if t_elevation != t_azimuth:
             _, _, _, E, dE, ddE = raw_target(s, p, times, angles, t_elevation)
-        position_loop.step(s.azimuth, p.azimuth, A, dA, ddA, u.stamp, t_m, u.position[0], u.velocity[0], dt, o, 0)
-        position_loop.step(s.elevation, p.elevation, E, dE, ddE, u.stamp, t_m, u.position[1], u.velocity[1], dt, o, 1)
+        position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
+                           u.velocity[0], dt, o, 0)
+        position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
+                           u.velocity[1], dt, o, 1)
         s.entered = 0
         o.coasting = s.mode == modes.AUTOTRACK and overdue(s, p) > p.tracker.coast_after
 

@@ -6,15 +6,15 @@ STANDBY, STOW, PRESET, PROGRAM, AUTOTRACK = range(len(MODES))
 
 REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'attitude invalid', 'no program track',
            'before program track', 'after program track', 'receiver not locked', 'outside limits', 'unknown mode',
-           'stamp does not advance')
-(NONE, REQUESTED, LOCKED, SIGNAL_LOST, ENCODER_INVALID, ATTITUDE_INVALID, NO_PROGRAM,
- BEFORE_PROGRAM, AFTER_PROGRAM, NOT_LOCKED, OUTSIDE_LIMITS, UNKNOWN_MODE, BAD_STAMP) = range(len(REASONS))
+           'stamp does not advance', 'drive not ready')
+(NONE, REQUESTED, LOCKED, SIGNAL_LOST, ENCODER_INVALID, ATTITUDE_INVALID, NO_PROGRAM, BEFORE_PROGRAM,
+ AFTER_PROGRAM, NOT_LOCKED, OUTSIDE_LIMITS, UNKNOWN_MODE, BAD_STAMP, DRIVE_NOT_READY) = range(len(REASONS))
 
 NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 
 
 @compiled
-def obstacle(request, encoder_ok, attitude_ok, program, stow, preset, locked):
+def obstacle(request, encoder_ok, drive_ready, attitude_ok, program, stow, preset, locked):
     """Why a mode cannot be entered now, NONE if it can. `program`, `stow`, `preset`: NONE or their own obstacle."""
     if request == STANDBY:
         return NONE
@@ -22,6 +22,8 @@ def obstacle(request, encoder_ok, attitude_ok, program, stow, preset, locked):
         return UNKNOWN_MODE
     if not encoder_ok:
         return ENCODER_INVALID
+    if not drive_ready:
+        return DRIVE_NOT_READY
     if request == STOW:
         return stow
     if request == PRESET:
@@ -34,10 +36,11 @@ def obstacle(request, encoder_ok, attitude_ok, program, stow, preset, locked):
 
 
 @compiled
-def next_mode(mode, request, encoder_ok, attitude_ok, program, stow, preset, locked, lost, handover):
+def next_mode(mode, request, encoder_ok, drive_ready, attitude_ok, program, stow, preset, locked, lost, handover):
     """(mode, reason, result) of one step.
 
     request     mode asked for, NO_REQUEST for none
+    drive_ready the drive follows commands; a mode that runs ends with it, and none begins without it
     locked      the receiver has delivered long enough and the filter has converged
     lost        the coast time is over
     handover    program -> autotrack by itself once locked
@@ -45,7 +48,7 @@ def next_mode(mode, request, encoder_ok, attitude_ok, program, stow, preset, loc
     """
     result = NO_REQUEST
     if request != NO_REQUEST:
-        why = obstacle(request, encoder_ok, attitude_ok, program, stow, preset, locked)
+        why = obstacle(request, encoder_ok, drive_ready, attitude_ok, program, stow, preset, locked)
         if why == NONE:
             return request, REQUESTED, ACCEPTED
         result = REFUSED
@@ -55,6 +58,8 @@ def next_mode(mode, request, encoder_ok, attitude_ok, program, stow, preset, loc
         return mode, why, result
     if not encoder_ok:
         return STANDBY, ENCODER_INVALID, result
+    if not drive_ready:
+        return STANDBY, DRIVE_NOT_READY, result
     if mode == PROGRAM or mode == AUTOTRACK:
         if not attitude_ok:
             return STANDBY, ATTITUDE_INVALID, result

@@ -64,6 +64,25 @@ class Feedforward(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class Adrc(Parameters):
+    """State feedback and disturbance observer (paper 001); torque and friction fed forward as in `feedforward`."""
+
+    bandwidth: float = parameter(60.0, 0.1, 500.0, 'rad/s', 'w_c: poles of the state feedback')
+    observer_bandwidth: float = parameter(100.0, 0.1, 1000.0, 'rad/s', 'w_o: poles of the observer; below w_s / 3 it '
+                                          'needs an exact rate_bandwidth')
+    rate_bandwidth: float = parameter(176.0, 0.1, 1000.0, 'rad/s', "w_s of the drive's rate loop: K_p / J of a motor")
+
+
+@dataclasses.dataclass(frozen=True)
+class Notch(Parameters):
+    """Takes a structural resonance out of the feedback."""
+
+    frequency: float = parameter(0.0, 0.0, 5000.0, 'Hz', 'centre; 0: off')
+    width: float = parameter(0.5, 0.01, 2.0, '', 'damping ratio of the denominator')
+    depth: float = parameter(0.1, 0.0, 1.0, '', 'gain that is left at the centre')
+
+
+@dataclasses.dataclass(frozen=True)
 class Shaper(Parameters):
     """What the shaped reference may ask of the axis."""
 
@@ -102,6 +121,8 @@ class AxisParameters(Parameters):
     controller: str = choice('feedforward', CONTROLLERS, 'of the position loop; may be changed while it runs')
     pid: Pid = group(Pid)
     feedforward: Feedforward = group(Feedforward)
+    adrc: Adrc = group(Adrc)
+    notch: Notch = group(Notch)
     shaper: Shaper = group(Shaper)
     limits: Limits = group(Limits)
 
@@ -149,6 +170,10 @@ class AcuParameters(Parameters):
             if getattr(self, name) > (LENGTH - 4) * self.period:
                 raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {LENGTH - 4} periods, '
                                      f'{(LENGTH - 4) * self.period:g} s')
+        for name in ('azimuth', 'elevation'):
+            if getattr(self, name).notch.frequency * self.period >= 0.5:
+                raise ParameterError(f'{name}.notch.frequency = {getattr(self, name).notch.frequency:g} Hz: must be '
+                                     f'below half the step rate, {0.5 / self.period:g} Hz')
         longest = self.attitude_timeout - self.command_delay - 0.5 * self.period
         if self.attitude_latency >= longest:
             raise ParameterError(f'attitude_latency = {self.attitude_latency:g} s: must be below attitude_timeout - '

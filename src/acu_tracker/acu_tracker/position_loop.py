@@ -1,22 +1,24 @@
 """The position loop of one axis: selects the controller, hands over without a bump, keeps the limits.
 
-`pid` acts on the raw target at t_k. `feedforward` acts on the shaped reference planned for t_k and feeds the one of
-t_m forward. A shaped reference that nobody follows rests on the antenna's own angle and rate.
+`pid` acts on the raw target at t_k. `feedforward` and `adrc` act on the shaped reference as it was planned for t_k and
+feed the one of t_m forward. A shaped reference that nobody follows rests on the antenna's own angle and rate.
 """
 import numpy as np
 
-from acu_tracker import feedforward, pid, shaper
+from acu_tracker import adrc, feedforward, notch, pid, shaper
 from acu_tracker.history import LENGTH, bracket, history_type, push
 from pedestal_common.compiled import compiled
 
-CONTROLLERS = ('pid', 'feedforward')
-PID, FEEDFORWARD = range(len(CONTROLLERS))
+CONTROLLERS = ('pid', 'feedforward', 'adrc')
+PID, FEEDFORWARD, ADRC = range(len(CONTROLLERS))
 
 AXIS = np.dtype([
     ('controller', 'i8'), ('command', 'f8'),                                  # of the last step; [rad/s]
     ('position', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'),               # shaped reference at its newest stamp
-    ('reference', history_type(3)),                                           # shaped: angle, rate, acceleration
-    ('integral', 'f8'), ('error', 'f8'), ('derivative', 'f8'),                # I [rad/s], e [rad] and D [rad/s]
+    ('reference', history_type(4)),                                           # the same and the command, at t_m
+    ('integral', 'f8'), ('error', 'f8'), ('derivative', 'f8'),                # [rad/s], e [rad], D [rad/s]
+    ('z', 'f8', (3,)), ('observed', 'f8'),                                    # adrc: z1 z2 z3 at this instant [s]
+    ('notch', 'f8', (4,)),
 ], align=True)
 
 
@@ -33,9 +35,11 @@ def limited(wanted, before, dt, rate, acceleration):
 @compiled
 def seat(axis, p, t_k, y, dy):
     """Targets := actual: the controller starts from the encoder's angle y [rad] and rate dy [rad/s]."""
-    seat_reference(axis, t_k, y, dy)
     axis.controller = p.controller
-    axis.integral = axis.error = axis.derivative = 0.0
+    seat_reference(axis, t_k, y, dy)
+    seat_feedback(axis, t_k, y, dy)
+    axis.error = axis.derivative = 0.0
+    axis.notch[:] = 0.0
 
 
 @compiled
@@ -47,18 +51,33 @@ def seat_reference(axis, t_k, y, dy):
 
 
 @compiled
+def seat_feedback(axis, t_k, y, dy):
+    """Integral and observer know of no disturbance."""
+    axis.integral = 0.0
+    axis.z[0], axis.z[1], axis.z[2] = y, dy, 0.0
+    axis.observed = t_k
+
+
+@compiled
 def remember(axis, stamp):
     """Keep the shaped reference for the instant when the encoder meets it."""
     r = axis.reference.sample[push(axis.reference, stamp)]
-    r[0], r[1], r[2] = axis.position, axis.rate, axis.acceleration
+    r[0], r[1], r[2], r[3] = axis.position, axis.rate, axis.acceleration, axis.command
+
+
+@compiled
+def around(history, t):
+    """(older row, newer row, fraction between them) at t; the oldest where t lies before it."""
+    i, j, f = bracket(history, t)
+    if i < 0:
+        i = j = (history.newest + 1 - history.count) % LENGTH
+    return i, j, f
 
 
 @compiled
 def planned(history, t, out):
     """The reference that was planned for t into out (3,): angle (cubic Hermite), rate, acceleration."""
-    i, j, f = bracket(history, t)
-    if i < 0:
-        i = j = (history.newest + 1 - history.count) % LENGTH
+    i, j, f = around(history, t)
     a, b = history.sample[i], history.sample[j]
     T = history.stamp[j] - history.stamp[i]
     d, m0, m1 = b[0] - a[0], T * a[1], T * b[1]
@@ -77,13 +96,20 @@ def rest(axis, p, dt, o, index):
 
 
 @compiled
+def instant(p, t_k, t_m):
+    """When the controller wants to know the raw target."""
+    return t_k if p.controller == PID else t_m
+
+
+@compiled
 def take_raw(axis, p, A, dA, ddA, t_k, y, dy, o, index):
     """The raw target at t_k is the reference, held at the ends of travel; the shaped one rests."""
     seat_reference(axis, t_k, y, dy)
-    raw = min(max(A, p.limits.low), p.limits.high)
-    o.angle_limited[index] = raw != A
-    inside = 1.0 - o.angle_limited[index]
-    o.reference[index, 0], o.reference[index, 1], o.reference[index, 2] = raw, inside * dA, inside * ddA
+    inside = p.limits.low <= A <= p.limits.high
+    o.angle_limited[index] = not inside
+    r = o.reference[index]
+    r[0] = min(max(A, p.limits.low), p.limits.high)
+    r[1], r[2] = (dA, ddA) if inside else (0.0, 0.0)
 
 
 @compiled
@@ -97,52 +123,89 @@ def take_shaped(axis, p, A, dA, ddA, t_k, t_m, o, index):
         axis.position, axis.rate, axis.acceleration, A, dA, ddA, dt, r.rate, r.acceleration, r.jerk, r.h0)
     remember(axis, t_m)
     planned(axis.reference, t_k, o.reference[index])
+    o.torque[index] = feedforward.torque(axis.rate, axis.acceleration, p.feedforward)
 
 
 @compiled
-def instant(p, t_k, t_m):
-    """When the controller wants to know the raw target."""
-    return t_k if p.controller == PID else t_m
+def observe(axis, c, t_k, y):
+    """Bring the observer to t_k, with the command and the acceleration that were in force since it was last there."""
+    h = t_k - axis.observed
+    if h > 0.0:
+        i, j, f = around(axis.reference, t_k - 0.5 * h)
+        a, b = axis.reference.sample[i], axis.reference.sample[j]
+        axis.z[0], axis.z[1], axis.z[2] = adrc.observed(
+            axis.z[0], axis.z[1], axis.z[2], y, a[3] + f * (b[3] - a[3]), a[2] + f * (b[2] - a[2]),
+            c.observer_bandwidth, c.rate_bandwidth, h)
+        axis.observed = t_k
 
 
 @compiled
-def wanted(axis, p, e, integral):
-    """Rate command [rad/s] before the limits; e [rad], integral [rad/s]."""
+def wanted(axis, p, e, v1, v2):
+    """(rate command before notch and limits, what of it is fed forward) [rad/s]; e = v1 - encoder, v1, v2 at t_k."""
     if p.controller == PID:
-        return pid.rate(e, integral, axis.derivative, p.pid.bandwidth, p.pid.derivative)
-    return feedforward.rate(e, integral, axis.rate, p.feedforward.bandwidth, p.feedforward.rate_feedforward)
+        return pid.rate(e, axis.integral, axis.derivative, p.pid.bandwidth, p.pid.derivative), 0.0
+    if p.controller == FEEDFORWARD:
+        c = p.feedforward
+        return (feedforward.rate(e, axis.integral, axis.rate, c.bandwidth, c.rate_feedforward),
+                c.rate_feedforward * axis.rate)
+    c = p.adrc
+    return (adrc.rate(axis.z[0], axis.z[1], axis.z[2], v1, v2, axis.rate, c.bandwidth, c.rate_bandwidth), axis.rate)
 
 
 @compiled
-def step(axis, p, A, dA, ddA, t_k, t_m, y, dy, dt, o, index):
+def take_over(axis, p, e, v1, v2, t_k, y, dy):
+    """Start the controller so that its first command equals the last one."""
+    axis.controller = p.controller
+    axis.error, axis.derivative = e, v2 - dy
+    seat_feedback(axis, t_k, y, dy)
+    u, ahead = wanted(axis, p, e, v1, v2)
+    if p.controller == ADRC:
+        axis.z[2] = p.adrc.rate_bandwidth * (u - axis.command)
+    else:
+        axis.integral = axis.command - u
+    axis.notch[:] = axis.command - ahead
+
+
+@compiled
+def advance(axis, p, e, t_k, y, dt):
+    """Bring the states of the running controller to t_k."""
+    if p.controller == ADRC:
+        observe(axis, p.adrc, t_k, y)
+    else:
+        if p.controller == PID:
+            axis.derivative = pid.derivative(axis.derivative, e, axis.error, dt, p.pid.derivative_time)
+            axis.error = e
+        K_p, K_i = pid.gains(p.pid) if p.controller == PID else pid.gains(p.feedforward)
+        axis.integral = pid.integrated(axis.integral, e, dt, K_p, K_i)
+
+
+@compiled
+def step(axis, p, notch_constants, A, dA, ddA, t_k, t_m, y, dy, dt, o, index):
     """One step of an axis: raw target (A, dA, ddA) at `instant` and encoder y, dy at t_k to command and torque.
 
-    Handover: the integral takes what makes the first command equal the last.
-    Anti-windup: where the realised command differs from the wanted one, the integral only moves towards it.
+    Anti-windup: where the realised command differs from the wanted one, the integral only moves towards it; the
+    observer of adrc is fed with the realised command.
     """
     handover = axis.controller != p.controller
     if handover and axis.controller == PID:
         seat_reference(axis, t_k, y, dy)
     if p.controller == PID:
         take_raw(axis, p, A, dA, ddA, t_k, y, dy, o, index)
-        K_p, K_i = pid.gains(p.pid)
     else:
         take_shaped(axis, p, A, dA, ddA, t_k, t_m, o, index)
-        K_p, K_i = pid.gains(p.feedforward)
-        o.torque[index] = feedforward.torque(axis.rate, axis.acceleration, p.feedforward)
-    e, de = o.reference[index, 0] - y, o.reference[index, 1] - dy
+    v1, v2 = o.reference[index, 0], o.reference[index, 1]
+    e = v1 - y
     if handover:
-        axis.controller, axis.derivative = p.controller, de
-        integral = axis.integral = axis.command - wanted(axis, p, e, 0.0)
-    else:
-        if p.controller == PID:
-            axis.derivative = pid.derivative(axis.derivative, e, axis.error, dt, p.pid.derivative_time)
-        integral = pid.integrated(axis.integral, e, dt, K_p, K_i)
-    axis.error = e
-    u = wanted(axis, p, e, integral)
+        take_over(axis, p, e, v1, v2, t_k, y, dy)
+    integral = axis.integral
+    if not handover:
+        advance(axis, p, e, t_k, y, dt)
+    u, ahead = wanted(axis, p, e, v1, v2)
+    u -= notch.removed(u - ahead, axis.notch, notch_constants)
     axis.command, rate_limited, acceleration_limited = limited(u, axis.command, dt, p.limits.rate,
                                                                p.limits.acceleration)
-    if (axis.command - u) * e >= 0.0:
+    axis.reference.sample[axis.reference.newest, 3] = axis.command
+    if (axis.command - u) * e < 0.0:
         axis.integral = integral
     o.rate_limited[index] |= rate_limited
     o.acceleration_limited[index] |= acceleration_limited

@@ -12,8 +12,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
 
 JOINTS, ERROR, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
-COMMAND, ESTIMATE, REFERENCE, MODE, PROGRAM = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode',
-                                               'acu/program_track')
+COMMAND, ESTIMATE, REFERENCE, MODE = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode'
+PROGRAM, DRIVE = 'acu/program_track', 'adu/state'
 HEARD = records.of(JOINTS, ERROR, ATTITUDE)
 SAID = records.of(COMMAND, ESTIMATE, REFERENCE, more=(MODE,))
 
@@ -29,7 +29,7 @@ class Acu:
     def __init__(self, params, on_ship):
         self.state = control_unit.initial_state(params)
         self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
-        self.inputs[0]['stabilised'] = on_ship
+        self.inputs[0]['stabilised'], self.inputs[0]['drive_ready'] = on_ship, 1
         self.outputs[0]['mode'] = modes.STANDBY
         self.outputs['innovation'] = self.outputs['nis'] = math.nan
         self.times, self.angles = np.zeros(0), np.zeros((0, 2))
@@ -38,7 +38,7 @@ class Acu:
                          ESTIMATE: messages.joint_trajectory('earth', [messages.trajectory_point()]),
                          REFERENCE: messages.joint_trajectory('base_link', [messages.trajectory_point()])}
         self.followers = {ERROR: params.receiver_latency, **({ATTITUDE: params.attitude_latency} if on_ship else {})}
-        self.events = {PROGRAM: self.take_program}
+        self.events = {PROGRAM: self.take_program, DRIVE: self.take_drive_state}
         self.configure(params)
 
     def configure(self, params):
@@ -53,6 +53,10 @@ class Acu:
             start = messages.nanoseconds(message.header.stamp) * 1e-9
             self.times, self.angles = program_track.checked(times + start, angles)
             self.inputs[0]['program_count'] = len(self.times)
+
+    def take_drive_state(self, message):
+        """A drive that never says how it is counts as ready."""
+        self.inputs[0]['drive_ready'] = message.data == 'enabled'
 
     def prepare(self):
         """Compile `answer` and `request`."""

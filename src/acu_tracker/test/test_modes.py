@@ -7,6 +7,7 @@ from acu_tracker.modes import (
     ATTITUDE_INVALID,
     AUTOTRACK,
     BEFORE_PROGRAM,
+    DRIVE_NOT_READY,
     ENCODER_INVALID,
     LOCKED,
     NO_PROGRAM,
@@ -24,8 +25,8 @@ from acu_tracker.modes import (
     UNKNOWN_MODE,
 )
 
-GOOD = dict(encoder_ok=True, attitude_ok=True, program=NONE, stow=NONE, preset=NONE, locked=True, lost=False,
-            handover=False)
+GOOD = dict(encoder_ok=True, drive_ready=True, attitude_ok=True, program=NONE, stow=NONE, preset=NONE, locked=True,
+            lost=False, handover=False)
 ARGUMENTS = tuple(GOOD)
 
 
@@ -51,17 +52,22 @@ def test_every_mode_is_reached_from_every_mode(mode, request_):
     (AUTOTRACK, dict(attitude_ok=False), ATTITUDE_INVALID),
     (AUTOTRACK, dict(locked=False), NOT_LOCKED),
     (STOW, dict(encoder_ok=False), ENCODER_INVALID),
+    (STOW, dict(drive_ready=False), DRIVE_NOT_READY),
+    (PRESET, dict(drive_ready=False), DRIVE_NOT_READY),
+    (PROGRAM, dict(drive_ready=False), DRIVE_NOT_READY),
+    (AUTOTRACK, dict(drive_ready=False), DRIVE_NOT_READY),
     (5, {}, UNKNOWN_MODE),
     (-2, {}, UNKNOWN_MODE),
 ])
 def test_refusals_name_the_reason_and_change_nothing(request_, changes, reason):
     for mode in (STANDBY, STOW):
-        if changes.get('encoder_ok', True) or mode == STANDBY:
+        if mode == STANDBY or changes.get('encoder_ok', True) and changes.get('drive_ready', True):
             assert next_mode(mode, request_, **changes) == (mode, reason, REFUSED)
 
 
 def test_standby_is_never_refused():
-    assert next_mode(AUTOTRACK, STANDBY, encoder_ok=False, attitude_ok=False) == (STANDBY, REQUESTED, ACCEPTED)
+    everything = dict(encoder_ok=False, drive_ready=False, attitude_ok=False)
+    assert next_mode(AUTOTRACK, STANDBY, **everything) == (STANDBY, REQUESTED, ACCEPTED)
 
 
 @pytest.mark.parametrize('mode, changes, expected', [
@@ -79,7 +85,9 @@ def test_standby_is_never_refused():
     (PRESET, dict(attitude_ok=False), (PRESET, NONE)),
     (STOW, dict(attitude_ok=False, lost=True), (STOW, NONE)),
     (STANDBY, dict(encoder_ok=False, handover=True), (STANDBY, NONE)),
-] + [(mode, dict(encoder_ok=False), (STANDBY, ENCODER_INVALID)) for mode in (STOW, PRESET, PROGRAM, AUTOTRACK)])
+    (STANDBY, dict(drive_ready=False, handover=True), (STANDBY, NONE)),
+] + [(mode, dict(encoder_ok=False), (STANDBY, ENCODER_INVALID)) for mode in (STOW, PRESET, PROGRAM, AUTOTRACK)]
+  + [(mode, dict(drive_ready=False), (STANDBY, DRIVE_NOT_READY)) for mode in (STOW, PRESET, PROGRAM, AUTOTRACK)])
 def test_what_happens_by_itself(mode, changes, expected):
     assert next_mode(mode, **changes) == (*expected, NO_REQUEST)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker import control_unit, feedforward, position_loop
+from acu_tracker import control_unit, feedforward, notch, position_loop
 from acu_tracker.params import AxisParameters, Feedforward
 from pedestal_common.parameters import build, record
 
@@ -13,30 +13,47 @@ WIDE = {'limits.rate': 100.0, 'limits.acceleration': 1e5}
 
 
 class Axis:
-    """One axis that obeys the rate command exactly; `target(t)` gives its raw angle, rate and acceleration."""
+    """One axis: its rate obeys the command exactly, or (lag > 0) as y'' = lag (u - y') + acceleration fed forward + d.
 
-    def __init__(self, target, **parameters):
-        self.target, self.angle, self.velocity, self.k = target, 0.0, 0.0, 0
+    `target(t)` gives the raw angle, rate and acceleration.
+    """
+
+    def __init__(self, target, lag=0.0, **parameters):
+        self.target, self.lag, self.disturbance = target, lag, 0.0
+        self.angle, self.velocity, self.k = 0.0, 0.0, 0
         self.state, self.outputs = np.zeros(1, position_loop.AXIS), np.zeros(1, control_unit.OUTPUTS)
+        self.values = {}
         self.put(**parameters)
-        position_loop.seat(self.state[0], self.p, -T, 0.0, 0.0)
+        position_loop.seat(self.state[0], self.p, 0.0, 0.0, 0.0)
 
     def put(self, **parameters):
         """Change live parameters."""
-        self.values = {**getattr(self, 'values', {}), **parameters}
-        self.p = record(build(AxisParameters, self.values))[0]
+        self.values.update(parameters)
+        params = build(AxisParameters, self.values)
+        self.p = record(params)[0]
+        self.notch = np.array(notch.coefficients(params.notch.frequency, params.notch.width, params.notch.depth, T))
+
+    def move(self, command, acceleration):
+        if not self.lag:
+            self.velocity = command
+            self.angle += T * command
+            return
+        settled = command + (acceleration + self.disturbance) / self.lag
+        gone = -math.expm1(-self.lag * T) / self.lag
+        self.angle += T * settled + gone * (self.velocity - settled)
+        self.velocity += self.lag * gone * (settled - self.velocity)
 
     def run(self, steps):
-        """Rows of angle, command, integral before the command takes effect."""
+        """Rows of angle, command, integral, disturbance as observed, before the command takes effect."""
         rows = []
         for _ in range(steps):
             t_k, t_m = self.k * T, (self.k + 0.5) * T
             raw = self.target(position_loop.instant(self.p, t_k, t_m))
-            position_loop.step(self.state[0], self.p, *raw, t_k, t_m, self.angle, self.velocity, T, self.outputs[0],
-                               0)
-            rows.append((self.angle, self.state['command'][0], self.state['integral'][0]))
-            self.velocity = rows[-1][1]
-            self.angle += T * self.velocity
+            position_loop.step(self.state[0], self.p, self.notch, *raw, t_k, t_m, self.angle, self.velocity, T,
+                               self.outputs[0], 0)
+            s = self.state[0]
+            rows.append((self.angle, s['command'], s['integral'], s['z'][2]))
+            self.move(s['command'], s['acceleration'])
             self.k += 1
         return np.array(rows).T
 
@@ -61,33 +78,33 @@ def test_pid_step_response_is_that_of_the_discrete_transfer_function(K_p, K_i, K
     denominator = np.polymul(np.polymul(integrator, lag), integrator)
     closed = signal.dlti(numerator, np.polyadd(denominator, numerator), dt=T)
     _, (expected,) = signal.dstep(closed, n=400)
-    angles, _, _ = Axis(still(0.01), **pid(K_p, K_i / K_p**2, K_d, tau), **WIDE).run(400)
+    angles, *_ = Axis(still(0.01), **pid(K_p, K_i / K_p**2, K_d, tau), **WIDE).run(400)
     np.testing.assert_allclose(angles, 0.01 * expected[:, 0], atol=1e-14)
 
 
 def test_pid_lags_a_ramp_by_the_rate_over_its_gain():
     """The error is that of t_k: no step of delay, no feed-forward in it."""
     axis = Axis(lambda t: (0.1 * t, 0.1, 0.0), **pid(20.0))
-    angles, _, _ = axis.run(400)
+    angles, *_ = axis.run(400)
     assert 0.1 * 399 * T - angles[-1] == pytest.approx(0.1 / 20.0, rel=1e-9)
 
 
-@pytest.mark.parametrize('controller', ['pid', 'feedforward'])
+@pytest.mark.parametrize('controller', position_loop.CONTROLLERS)
 def test_command_keeps_rate_and_acceleration(controller):
-    _, commands, _ = Axis(still(1.0), controller=controller,
+    _, commands, *_ = Axis(still(1.0), lag=176.0, controller=controller,
                           **{'limits.rate': 0.5, 'limits.acceleration': 4.0, 'shaper.rate': 0.5,
                              'shaper.acceleration': 4.0}).run(2000)
-    assert commands.max() == pytest.approx(0.5, rel=1e-9) and commands.max() <= 0.5
+    assert commands.max() == pytest.approx(0.5, rel=1e-3) and commands.max() <= 0.5
     assert np.abs(np.diff(commands, prepend=0.0)).max() <= 4.0 * T * (1 + 1e-12)
 
 
 def test_integral_does_not_wind_up_while_the_command_is_limited():
     values = pid(20.0, 0.25)
-    angles, commands, integrals = Axis(still(1.0), **values, **{**WIDE, 'limits.rate': 0.5, 'shaper.rate': 0.5}
+    angles, commands, integrals, _ = Axis(still(1.0), **values, **{**WIDE, 'limits.rate': 0.5, 'shaper.rate': 0.5}
                                        ).run(2000)
     saturated = commands == 0.5
     assert saturated.sum() > 300 and integrals[saturated].max() <= 1e-12
-    linear, _, _ = Axis(still(0.02), **values, **WIDE).run(2000)
+    linear, *_ = Axis(still(0.02), **values, **WIDE).run(2000)
     # The overshoot is no more than that of the same loop that was never limited, from where it left the limit.
     assert angles.max() - 1.0 <= 1.5 * (linear.max() - 0.02) + 1e-3
     assert angles[-1] == pytest.approx(1.0, abs=1e-6)
@@ -96,13 +113,13 @@ def test_integral_does_not_wind_up_while_the_command_is_limited():
 def test_integral_leaves_the_limit():
     axis = Axis(still(-0.01), **pid(20.0, 0.25), **{'limits.rate': 0.5, 'shaper.rate': 0.5})
     axis.state['integral'], axis.state['command'] = 2.0, 0.5
-    _, (command,), (integral,) = axis.run(1)
+    _, (command,), (integral,), _ = axis.run(1)
     assert command == 0.5 and integral == 2.0 - 0.01 * 100.0 * T and axis.outputs['rate_limited'][0, 0]
 
 
 def test_raw_target_beyond_the_travel_is_held_at_its_end():
     axis = Axis(lambda t: (1.0 + t, 1.0, 0.0), **pid(20.0), **{'limits.high': 0.3})
-    angles, _, _ = axis.run(400)
+    angles, *_ = axis.run(400)
     assert angles[-1] == pytest.approx(0.3, abs=1e-6) and axis.outputs['angle_limited'][0, 0]
 
 
@@ -122,14 +139,61 @@ def tracking(t):
 @pytest.mark.parametrize('old, new', [(a, b) for a in position_loop.CONTROLLERS for b in position_loop.CONTROLLERS
                                       if a != b])
 def test_switching_while_tracking_does_not_move_the_command(old, new, integral):
-    axis = Axis(tracking, controller=old, **WIDE, **{f'{name}.integral': integral for name in ('pid', 'feedforward')})
-    _, before, _ = axis.run(400)
+    """Also with the drive's lag, and a disturbance that the running controller has learnt."""
+    axis = Axis(tracking, lag=176.0, controller=old, **WIDE,
+                **{f'{name}.integral': integral for name in ('pid', 'feedforward')},
+                **{'notch.frequency': 40.0, 'shaper.rate': 50.0})
+    axis.disturbance = 3.0
+    _, before, *_ = axis.run(400)
     normal = np.abs(np.diff(before[-100:])).max()
     axis.put(controller=new)
-    _, after, _ = axis.run(800)
-    assert abs(after[0] - before[-1]) <= normal
-    # Then it settles as the new controller does by itself: the fading integral, or the shaper, sets the pace.
-    assert np.abs(np.diff(after)).max() < (20.0 * T * before[-1] if new == 'pid' else 30.0 * T)
-    fresh = Axis(tracking, **axis.values)
+    _, after, *_ = axis.run(800)
+    assert abs(after[0] - before[-1]) <= normal + 1e-12
+    # Then it settles as the new controller does by itself.
+    fresh = Axis(tracking, lag=176.0, **axis.values)
+    fresh.disturbance = 3.0
     fresh.run(1200)
     assert axis.angle == pytest.approx(fresh.angle, abs=1e-7)
+
+
+def test_notch_takes_its_frequency_out_of_the_feedback_only():
+    """What an oscillating encoder puts on the command falls to `depth`; the rate that is fed forward is untouched."""
+    def shaken(**parameters):
+        axis = Axis(lambda t: (0.2 * t, 0.2, 0.0), **parameters, **{'feedforward.integral': 0.0})
+        axis.move = lambda command, acceleration: setattr(
+            axis, 'angle', 0.2 * (axis.k + 1) * T + 1e-4 * math.sin(2.0 * math.pi * 25.0 * (axis.k + 1) * T))
+        _, commands, *_ = axis.run(800)
+        return commands[400:]
+
+    plain, notched = shaken(), shaken(**{'notch.frequency': 25.0, 'notch.depth': 0.2})
+    assert np.mean(notched) == pytest.approx(0.2, abs=1e-6)
+    assert np.ptp(plain) == pytest.approx(2.0 * 20.0 * 1e-4, rel=1e-2)
+    assert np.ptp(notched) == pytest.approx(0.2 * np.ptp(plain), rel=1e-3)
+
+
+def test_adrc_follows_without_taking_the_reference_for_a_disturbance():
+    """On the plant it is told of: an observer that fights the feed-forward would see up to 176 x 0.5 rad/s2."""
+    axis = Axis(lambda t: (0.2 * (1 - math.cos(2.5 * t)), 0.5 * math.sin(2.5 * t), 1.25 * math.cos(2.5 * t)),
+                lag=176.0, controller='adrc')
+    angles, _, _, disturbance = axis.run(2000)
+    errors = angles - 0.2 * (1 - np.cos(2.5 * T * np.arange(2000)))
+    assert np.abs(disturbance).max() < 0.05 and np.abs(errors[400:]).max() < 1e-5
+
+
+def test_adrc_finds_a_disturbance_and_cancels_it():
+    axis = Axis(still(0.0), lag=176.0, controller='adrc')
+    axis.disturbance = 5.0
+    angles, commands, _, disturbance = axis.run(400)
+    assert disturbance[-1] == pytest.approx(5.0, rel=1e-6) and abs(angles[-1]) < 1e-9
+    assert commands[-1] == pytest.approx(-5.0 / 176.0, rel=1e-6)
+
+
+def test_adrc_knows_of_its_limited_command():
+    """A rate limit that the reference exceeds for two seconds leaves no false disturbance behind."""
+    limited = {'limits.rate': 0.5, 'shaper.rate': 0.5}
+    axis = Axis(still(1.0), lag=176.0, controller='adrc', **limited)
+    axis.run(20)
+    axis.p['limits']['rate'] = 0.3
+    angles, commands, _, disturbance = axis.run(1200)
+    assert (commands == 0.3).sum() > 300 and np.abs(disturbance).max() < 0.5
+    assert angles[-1] == pytest.approx(1.0, abs=1e-6)

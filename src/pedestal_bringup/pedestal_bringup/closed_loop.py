@@ -53,7 +53,7 @@ def cores(scenario) -> Cores:
         program = program_track.checked(*program_table(scenario))
     acu_inputs = np.zeros(1, control_unit.INPUTS)
     acu_inputs['stabilised'] = scenario.header.ship
-    acu_inputs['encoder_valid'] = 1
+    acu_inputs['encoder_valid'] = acu_inputs['drive_ready'] = 1
     acu_inputs['program_count'] = len(program[0])
     receiver_inputs = np.zeros(1, receiver.INPUTS)
     receiver_inputs['mat_ed'] = line_of_sight.ashore_matrix()

@@ -35,6 +35,8 @@ TOPICS = (
           'azimuth, elevation: encoder angle [rad], rate [rad/s], torque on the load [Nm]'),
     Topic('adu/motor_states', 'sensor_msgs/msg/JointState', ('adu',), (), 'step', 'step',
           'azimuth_motor_1 ... elevation_motor_2: shaft angle [rad], rate [rad/s], torque [Nm]'),
+    Topic('adu/state', 'std_msgs/msg/String', ('adu',), ('acu',), 'state', 'change',
+          "'enabled' when the drive follows commands, otherwise why not"),
     Topic('ship/truth', 'nav_msgs/msg/Odometry', ('ship_motion',), ('tracking_receiver', 'adu'), 'step', 'step',
           'pose of base_link (FLU) in earth (ENU), twist in base_link'),
     Topic('ship/imu/data_raw', 'sensor_msgs/msg/Imu', ('ship_motion',), ('ins',), 'step', 'step',

@@ -1,0 +1,50 @@
+"""Active disturbance rejection: TD, ESO and NLC of paper 001, equations (7) to (11), for a drive that obeys a rate.
+
+Seen from here the drive is of second order: its rate loop is a lag of bandwidth w_s (b0 = w_s), and the torque that is
+fed forward gives it the acceleration v3 of the reference:
+    y'' = w_s (u - y') + v3 + z3.
+What is known of y'' stands in the observer's model, so z3 holds the disturbance alone. The paper's y'' = z3 + b0 u
+leaves -w_s y' and v3 to z3 as well: they change as the target moves, and the observer comes late to all of it.
+
+TD (7)(8)   the shaper: fhan with the target's own rate and acceleration fed forward; v1, v2, v3 are its result
+ESO (9)     linear instead of fal, all poles at exp(-w_o h), fed with the command as it was limited
+NLC (11)    u0 = v3 + w_c^2 (v1 - z1) + 2 w_c (v2 - z2): fhan (h1 = 1/w_c) in its linear zone, which the paper's never
+            leaves; u = (u0 - known part - z3) / b0, where the paper prints u0 - z3 / b0
+"""
+import math
+
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def observer_gains(w_o, w_s, h):
+    """(l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles of the observer at p = exp(-w_o h).
+
+    For w_s -> 0 they are 1 - p^3, 1.5 (1 - p)^2 (1 + p) / h, (1 - p)^3 / h^2.
+    """
+    p, a = math.exp(-w_o * h), math.exp(-w_s * h)
+    g = -math.expm1(-w_s * h) / w_s
+    k1 = 2.0 + a - 3.0 * p
+    l3 = (1.0 - p)**3 / (g * h)
+    k2 = (l3 * g * g - (a - p)**3) / (g * (1.0 - a))
+    l2 = (k2 - g * l3) / a
+    return k1 - g * l2 - (h - g) / w_s * l3, l2, l3
+
+
+@compiled
+def observed(z1, z2, z3, y, u, v3, w_o, w_s, h):
+    """(z1, z2, z3) at the encoder angle y [rad], h after the last; u [rad/s] and v3 [rad/s2] were in force since."""
+    g = -math.expm1(-w_s * h) / w_s
+    settled = u + (v3 + z3) / w_s
+    z1 += h * settled + g * (z2 - settled)
+    z2 += w_s * g * (settled - z2)
+    l1, l2, l3 = observer_gains(w_o, w_s, h)
+    e = y - z1
+    return z1 + l1 * e, z2 + l2 * e, z3 + l3 * e
+
+
+@compiled
+def rate(z1, z2, z3, v1, v2, v2_m, w_c, w_s):
+    """Rate command [rad/s]: v1, v2 at t_k are to be met, v2_m at t_m is fed forward."""
+    u0 = w_c * w_c * (v1 - z1) + 2.0 * w_c * (v2 - z2)
+    return v2_m + (z2 - v2) + (u0 - z3) / w_s
