@@ -1,6 +1,6 @@
 """The control unit between its messages: what it makes of those it hears, and what it puts into those it says.
 
-The node answers one step at a time, a recomputed bag all of them at once, through the same `answer`.
+The node answers one step at a time, a recomputed bag all of them at once, through the same `answers`.
 """
 import math
 
@@ -59,9 +59,9 @@ class Acu:
         self.inputs[0]['drive_ready'] = message.data == 'enabled'
 
     def prepare(self):
-        """Compile `answer` and `request`."""
+        """Compile `answers` and `request`."""
         state, inputs, outputs = self.state.copy(), self.inputs.copy(), self.outputs.copy()
-        answer(state, self.constants, inputs, outputs, self.times, self.angles, self.heard, self.said.copy())
+        answers(state, self.constants, inputs, outputs, self.times, self.angles, self.heard, self.said.copy())
         control_unit.request(state, self.constants, inputs, outputs, modes.STANDBY, self.times, self.angles)
 
     def request(self, mode):
@@ -71,7 +71,7 @@ class Acu:
 
     def answer(self):
         """Answer `heard` with `said`."""
-        answer(self.state, self.constants, self.inputs, self.outputs, self.times, self.angles, self.heard, self.said)
+        self.answers(self.heard, self.said)
 
     def answers(self, heard, said):
         """The same for many steps, records (n,)."""
@@ -112,20 +112,15 @@ def say(o, stamp, command, estimate, reference):
 
 
 @compiled
-def answer(state, constants, inputs, outputs, times, angles, heard, said):
-    """One step: `said` answers `heard`, records (1,)."""
-    h, y = heard[0], said[0]
-    hear(inputs[0], h[JOINTS], h[ERROR], h[ATTITUDE])
-    control_unit.step(state, constants, inputs, outputs, times, angles)
-    inputs[0].preset_valid = 0
-    say(outputs[0], h[JOINTS].stamp, y[COMMAND], y[ESTIMATE], y[REFERENCE])
-    y[MODE] = outputs[0].mode
-
-
-@compiled
 def answers(state, constants, inputs, outputs, times, angles, heard, said):
+    """Step by step: said[k] answers heard[k]."""
     for k in range(len(heard)):
-        answer(state, constants, inputs, outputs, times, angles, heard[k:k + 1], said[k:k + 1])
+        h, y = heard[k], said[k]
+        hear(inputs[0], h[JOINTS], h[ERROR], h[ATTITUDE])
+        control_unit.step(state, constants, inputs, outputs, times, angles)
+        inputs[0].preset_valid = 0
+        say(outputs[0], h[JOINTS].stamp, y[COMMAND], y[ESTIMATE], y[REFERENCE])
+        y[MODE] = outputs[0].mode
 
 
 def rows(message):

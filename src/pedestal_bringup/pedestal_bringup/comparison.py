@@ -74,8 +74,12 @@ class TopicComparison:
         return lines
 
 
-HEADINGS = (f'{"topic":34} {"computed":>9} {"recorded":>9}',
-            f'  {"field":32} {"differ":>9} {"beyond":>9} {"largest":>11} {"first s":>14}')
+def lines(compared) -> list:
+    """TopicComparisons as text: a line per topic, one per field that differs."""
+    text = [f'{"topic":34} {"computed":>9} {"recorded":>9}']
+    if any(topic.fields for topic in compared):
+        text.append(f'  {"field":32} {"differ":>9} {"beyond":>9} {"largest":>11} {"first s":>14}')
+    return text + [line for topic in compared for line in topic.lines()]
 
 
 @dataclasses.dataclass

@@ -1,6 +1,6 @@
 """The INS between its messages: what it makes of those it hears, and what it puts into those it says.
 
-The node answers one message at a time, a recomputed bag all of them at once, through the same `answer`.
+The node answers one message at a time, a recomputed bag all of them at once, through the same `answers`.
 """
 import numpy as np
 
@@ -33,14 +33,13 @@ class Ins:
         self.followers, self.events = {}, {}
 
     def prepare(self):
-        """Compile `answer`."""
-        answer(self.state.copy(), self.constants, self.inputs.copy(), self.outputs.copy(), np.zeros(ins.NORMALS),
-               self.heard, self.said.copy())
+        """Compile `answers`."""
+        answers(self.state.copy(), self.constants, self.inputs.copy(), self.outputs.copy(), np.zeros((1, ins.NORMALS)),
+                self.heard, self.said.copy())
 
     def answer(self):
         """Answer `heard` with `said`."""
-        answer(self.state, self.constants, self.inputs, self.outputs, self.rng.standard_normal(ins.NORMALS),
-               self.heard, self.said)
+        self.answers(self.heard, self.said)
 
     def answers(self, heard, said):
         """The same for many steps, records (n,)."""
@@ -55,21 +54,17 @@ def attitude_variance(p):
 
 
 @compiled
-def answer(state, constants, inputs, outputs, normals, heard, said):
-    """One step: `said` answers `heard`, records (1,)."""
-    u, o, raw, data = inputs[0], outputs[0], heard[0][RAW], said[0][DATA]
-    u.stamp_ns = raw.stamp
-    for i in range(3):
-        u.angular_velocity[i], u.linear_acceleration[i] = raw.angular_velocity[i], raw.linear_acceleration[i]
-    ins.step(state, constants, inputs, outputs, normals)
-    data.stamp = o.stamp_ns if o.due == 1 else NEVER
-    for i in range(4):
-        data.orientation[i] = o.quaternion[i]
-    for i in range(3):
-        data.angular_velocity[i], data.linear_acceleration[i] = o.angular_velocity[i], o.linear_acceleration[i]
-
-
-@compiled
 def answers(state, constants, inputs, outputs, normals, heard, said):
+    """Step by step: said[k] answers heard[k]."""
+    u, o = inputs[0], outputs[0]
     for k in range(len(heard)):
-        answer(state, constants, inputs, outputs, normals[k], heard[k:k + 1], said[k:k + 1])
+        raw, data = heard[k][RAW], said[k][DATA]
+        u.stamp_ns = raw.stamp
+        for i in range(3):
+            u.angular_velocity[i], u.linear_acceleration[i] = raw.angular_velocity[i], raw.linear_acceleration[i]
+        ins.step(state, constants, inputs, outputs, normals[k])
+        data.stamp = o.stamp_ns if o.due == 1 else NEVER
+        for i in range(4):
+            data.orientation[i] = o.quaternion[i]
+        for i in range(3):
+            data.angular_velocity[i], data.linear_acceleration[i] = o.angular_velocity[i], o.linear_acceleration[i]

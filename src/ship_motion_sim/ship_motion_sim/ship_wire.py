@@ -1,6 +1,6 @@
 """The ship between its messages: what it makes of the clock, and what it puts into the messages it says.
 
-The node answers one tick at a time, a recomputed bag all of them at once, through the same `answer`.
+The node answers one tick at a time, a recomputed bag all of them at once, through the same `answers`.
 """
 import numpy as np
 
@@ -34,14 +34,13 @@ class ShipMotion:
         self.followers, self.events = {}, {}
 
     def prepare(self):
-        """Compile `answer`; until the first tick, the truth is that of stamp 0."""
-        answer(self.last.copy(), self.ship, self.inputs, self.truth, self.imu, self.imu_inputs, self.felt,
-               np.zeros(imu.NORMALS), self.heard, self.said.copy())
+        """Compile `answers`; until the first tick, the truth is that of stamp 0."""
+        answers(self.last.copy(), self.ship, self.inputs, self.truth, self.imu, self.imu_inputs, self.felt,
+                np.zeros((1, imu.NORMALS)), self.heard, self.said.copy())
 
     def answer(self):
         """Answer `heard` with `said`."""
-        answer(self.last, self.ship, self.inputs, self.truth, self.imu, self.imu_inputs, self.felt,
-               self.rng.standard_normal(imu.NORMALS), self.heard, self.said)
+        self.answers(self.heard, self.said)
 
     def answers(self, heard, said):
         """The same for many steps, records (n,)."""
@@ -50,26 +49,22 @@ class ShipMotion:
 
 
 @compiled
-def answer(last, ship, inputs, truth, imu_constants, imu_inputs, felt, normals, heard, said):
-    """One step: `said` answers `heard`, records (1,); last (1,): stamp of the step before [ns]."""
-    stamp = heard[0][CLOCK].stamp
-    inputs[0].t = stamp * 1e-9
-    imu_inputs[0].dt = (stamp - last[0]) * 1e-9 if last[0] != NEVER else NOMINAL_PERIOD
-    last[0] = stamp
-    motion.step(ship, inputs, truth)
-    imu.step(imu_constants, imu_inputs, truth, felt, normals)
-    o, f, pose, raw = truth[0], felt[0], said[0][TRUTH], said[0][RAW]
-    pose.stamp = raw.stamp = stamp
-    raw.orientation[3] = 1.0
-    for i in range(4):
-        pose.orientation[i] = o.quaternion[i]
-    for i in range(3):
-        pose.position[i], pose.twist_linear[i], pose.twist_angular[i] = (
-            o.position[i], o.velocity_deck[i], o.angular_velocity[i])
-        raw.angular_velocity[i], raw.linear_acceleration[i] = f.angular_velocity[i], f.linear_acceleration[i]
-
-
-@compiled
 def answers(last, ship, inputs, truth, imu_constants, imu_inputs, felt, normals, heard, said):
+    """Tick by tick: said[k] answers heard[k]; last (1,): stamp of the tick before [ns]."""
+    o, f = truth[0], felt[0]
     for k in range(len(heard)):
-        answer(last, ship, inputs, truth, imu_constants, imu_inputs, felt, normals[k], heard[k:k + 1], said[k:k + 1])
+        stamp = heard[k][CLOCK].stamp
+        inputs[0].t = stamp * 1e-9
+        imu_inputs[0].dt = (stamp - last[0]) * 1e-9 if last[0] != NEVER else NOMINAL_PERIOD
+        last[0] = stamp
+        motion.step(ship, inputs, truth)
+        imu.step(imu_constants, imu_inputs, truth, felt, normals[k])
+        pose, raw = said[k][TRUTH], said[k][RAW]
+        pose.stamp = raw.stamp = stamp
+        raw.orientation[3] = 1.0
+        for i in range(4):
+            pose.orientation[i] = o.quaternion[i]
+        for i in range(3):
+            pose.position[i], pose.twist_linear[i], pose.twist_angular[i] = (
+                o.position[i], o.velocity_deck[i], o.angular_velocity[i])
+            raw.angular_velocity[i], raw.linear_acceleration[i] = f.angular_velocity[i], f.linear_acceleration[i]

@@ -1,6 +1,6 @@
 """The tracking receiver between its messages: what it makes of those it hears, and what it puts into those it says.
 
-The node answers one step at a time, a recomputed bag all of them at once, through the same `answer`.
+The node answers one step at a time, a recomputed bag all of them at once, through the same `answers`.
 """
 import numpy as np
 
@@ -39,14 +39,13 @@ class TrackingReceiver:
         self.events = {}
 
     def prepare(self):
-        """Compile `answer`."""
-        answer(self.state.copy(), self.constants, self.inputs.copy(), self.outputs.copy(), self.target.breaks,
-               self.target.coefficients, np.zeros(self.normals), self.heard, self.said.copy())
+        """Compile `answers`."""
+        answers(self.state.copy(), self.constants, self.inputs.copy(), self.outputs.copy(), self.target.breaks,
+                self.target.coefficients, np.zeros((1, self.normals)), self.heard, self.said.copy())
 
     def answer(self):
         """Answer `heard` with `said`."""
-        answer(self.state, self.constants, self.inputs, self.outputs, self.target.breaks, self.target.coefficients,
-               self.rng.standard_normal(self.normals), self.heard, self.said)
+        self.answers(self.heard, self.said)
 
     def answers(self, heard, said):
         """The same for many steps, records (n,)."""
@@ -82,15 +81,10 @@ def say(o, stamp, error, target_truth):
 
 
 @compiled
-def answer(state, constants, inputs, outputs, breaks, coefficients, normals, heard, said):
-    """One step: `said` answers `heard`, records (1,)."""
-    h, y = heard[0], said[0]
-    hear(inputs[0], h[JOINTS], h[SHIP])
-    receiver.step(state, constants, inputs, outputs, breaks, coefficients, normals)
-    say(outputs[0], h[JOINTS].stamp, y[ERROR], y[TARGET])
-
-
-@compiled
 def answers(state, constants, inputs, outputs, breaks, coefficients, normals, heard, said):
+    """Step by step: said[k] answers heard[k]."""
     for k in range(len(heard)):
-        answer(state, constants, inputs, outputs, breaks, coefficients, normals[k], heard[k:k + 1], said[k:k + 1])
+        h, y = heard[k], said[k]
+        hear(inputs[0], h[JOINTS], h[SHIP])
+        receiver.step(state, constants, inputs, outputs, breaks, coefficients, normals[k])
+        say(outputs[0], h[JOINTS].stamp, y[ERROR], y[TARGET])
