@@ -1,5 +1,6 @@
 # make demo    set up, run the main scenario as separate nodes, record it, check the recording, write the report
 # make test    set up, lint, run every test
+# make update-references  record bags/reference anew and print the difference that is accepted with it
 # make bench   set up, measure the graph and the core
 # make colcon  build src/ as a ROS 2 workspace and start a node from it
 # make clean   remove everything made here
@@ -22,6 +23,9 @@ demo: install
 test: install
 	.venv/bin/ruff check .
 	.venv/bin/python -m pytest
+
+update-references: install
+	.venv/bin/python bags/reference/update.py
 
 bench: install
 	.venv/bin/pedestal bench graph
@@ -63,4 +67,4 @@ APT := apt-get -qq -o APT::Sandbox::User=root
 	    rm -r usr python3-pip-whl_*.deb ); fi || \
 	    { rm -rf $*; echo 'This Python cannot make an environment with pip: sudo apt-get install python3-venv'; exit 1; }
 
-.PHONY: install demo test bench colcon clean
+.PHONY: install demo test update-references bench colcon clean

@@ -26,8 +26,8 @@ class AduNode(shell.Shell):
         self.unit = Adu(p, 'ship_motion' in self.graph.nodes)
         self.unit.prepare()
         self.outputs = self.unit.outputs
-        self.clock, self.heard_command, self.heard_ship = (records.only(self.unit.heard, name)
-                                                           for name in (CLOCK, COMMAND, SHIP))
+        self.now, self.heard_command, self.heard_ship = (records.only(self.unit.heard, name)
+                                                         for name in (JOINTS, COMMAND, SHIP))
         self.period_ns = round(p.period * shell.SECOND)
         self.steps_to_go = round(p.duration / p.period) if p.duration > 0.0 else None
         self.k = 0
@@ -81,7 +81,7 @@ class AduNode(shell.Shell):
         self.begin_step(stamp)
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
-        self.clock.stamp[0] = stamp
+        self.now.stamp[0] = stamp
         self.unit.say()
         for message, place, send in self.says:
             records.put(message, place)

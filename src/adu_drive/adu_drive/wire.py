@@ -12,8 +12,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
 
 CLOCK, COMMAND, SHIP, JOINTS, MOTORS = 'clock', 'acu/rate_command', 'ship/truth', 'joint_states', 'adu/motor_states'
-HEARD, SAID = records.of(CLOCK, COMMAND, SHIP), records.of(JOINTS, CLOCK, MOTORS)
-"""The clock it hears is its own: the stamp t_k of the step it takes next."""
+HEARD, SAID = records.of(JOINTS, COMMAND, SHIP), records.of(JOINTS, CLOCK, MOTORS)
+"""The joint states it hears are its own, of which it takes the stamp: t_k of the step that follows."""
 
 MEMORY = np.dtype([('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)), ('timeout', 'i8'),
                    ('emergency', 'i8')])
@@ -65,7 +65,7 @@ class Adu:
 def say(outputs, heard, said):
     """Outputs of the drive -> records of its messages."""
     y, joints, motors = outputs[0], said[0][JOINTS], said[0][MOTORS]
-    joints.stamp = motors.stamp = said[0][CLOCK].stamp = heard[0][CLOCK].stamp
+    joints.stamp = motors.stamp = said[0][CLOCK].stamp = heard[0][JOINTS].stamp
     for i in range(2):
         axis = y.azimuth if i == 0 else y.elevation
         joints.position[i], joints.velocity[i], joints.effort[i] = axis.position, axis.velocity, axis.torque
@@ -101,7 +101,7 @@ def hear(u, m, stamp, command, ship):
 def advance(state, constants, inputs, outputs, memory, heard):
     """From t_k to t_k+1; whether the command in force is stale."""
     h = heard[0]
-    stale = hear(inputs[0], memory[0], h[CLOCK].stamp, h[COMMAND], h[SHIP])
+    stale = hear(inputs[0], memory[0], h[JOINTS].stamp, h[COMMAND], h[SHIP])
     drive_unit.step(state, constants, inputs, outputs)
     return stale
 

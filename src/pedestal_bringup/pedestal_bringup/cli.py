@@ -15,14 +15,15 @@ from pedestal_common.parameters import ParameterError
 
 EXIT_STOPPED = 130
 
-RECOMPUTE = """Feeds the recorded inputs of a node to its step function and compares what it answers with what was recorded:
-count and order of the messages first, then every field. Exit code 1 when something differs beyond its tolerance, or when
-the recording never exercised the node (never locked, never in autotrack, never moved).
+RECOMPUTE = """\
+Feeds the recorded inputs of a node to its step function and compares what it answers with what was recorded: count and
+order of the messages first, then every field. Exit code 1 when something differs beyond its tolerance, or when the
+recording never exercised the node (never locked, never in autotrack, never moved).
 
-Exact for a lockstep recording: the same version on the same machine gives the same bits. In a realtime recording a step
-gets what had been recorded when the next one began, which is what the node had unless a message was late. Services are
-not recorded: a change of acu/mode that the ACU would not make by itself is asked for at that step, and counted. Nor are
-parameters that were changed while running.
+Exact for a lockstep recording: the same version on the same machine gives the same bits. In a realtime recording a
+step gets what had been sent when the next one began: that is what the node had, but for messages that were on their
+way to it just then. Services are not recorded: a change of acu/mode that the ACU would not make by itself is asked for
+at that step, and counted. Nor are parameters that were changed while running. Diagnostics are not recomputed.
 
 With --param it does not fail but reports old against new. The recorded antenna does not move with the recomputed
 command: compared are the estimate against the recorded truth (error, noise, lag) and the noise of the command; what a

@@ -149,7 +149,8 @@ def column(type_name, path, texts):
 
 
 def alike(data, type_name, template, names):
-    """Which of the messages (n,) equal a template (CDR bytes) in all but the stamp and the columns of these names."""
+    """Which of the messages (n,) equal a template (CDR bytes) in all but the stamp and the columns of these names; the
+    padding that DDS adds at their end does not count."""
     walk = _Walk(template, type_name)
     fixed = [np.arange(start, stop) for start, stop in walk.fixed]
     for path, start, dtype in walk.numbers:
@@ -157,7 +158,8 @@ def alike(data, type_name, template, names):
             fixed.append(np.arange(start, start + int(dtype[2:])))
     fixed = np.concatenate(fixed)
     wanted = np.frombuffer(template, np.uint8)[fixed]
-    same = np.array([len(message) == len(template) for message in data], bool)
-    block = np.frombuffer(b''.join([message for message, fits in zip(data, same) if fits]), np.uint8)
-    same[same] = (block.reshape(-1, len(template))[:, fixed] == wanted).all(axis=1)
+    size = len(template)
+    same = np.array([0 <= len(message) - size < 4 for message in data], bool)
+    block = np.frombuffer(b''.join([message[:size] for message, fits in zip(data, same) if fits]), np.uint8)
+    same[same] = (block.reshape(-1, size)[:, fixed] == wanted).all(axis=1)
     return same

@@ -84,7 +84,7 @@ def outputs(recording, done, params):
     """{topic: Output} of the process of a node fed with the inputs of a Recomputed, whose answers say how many
     messages are due at each step. Raises RunError when they do not come."""
     if not recording.lockstep:
-        raise recompute.RecomputeError('--live feeds in lockstep: a recording in realtime, whose steps may lack inputs, '
+        raise recompute.RecomputeError('--live feeds in lockstep: a realtime recording, whose steps may lack inputs, '
                                        'is recomputed without it')
     nodes = _graph(recording, done)
     set_middleware_defaults()

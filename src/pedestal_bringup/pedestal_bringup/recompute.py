@@ -4,8 +4,8 @@ Inputs are matched to steps by the code the nodes use (pedestal_common.steps), t
 (each column's wire module). What is exact, and what is not:
 
 lockstep   inputs belong to steps by their stamps, so the same version on the same machine gives the same bits
-realtime   a step gets what had been recorded when the next one began. That is what the node had where nothing was
-           late; a message that came to the node and to the recorder in another order gives another step
+realtime   a step gets what had been sent (in a foreign recording: recorded) when the next one began. That is what the
+           node had, but for messages that were on their way to it just then
 both       services are not recorded: a change of acu/mode that the ACU would not make by itself is asked for at that
            step; a parameter changed while running, a mode asked for again and an emergency stop leave no trace.
            A recording that begins in the middle of a run starts from the initial state: it differs until the filter
@@ -30,6 +30,7 @@ from ship_motion_sim.ship_wire import ShipMotion
 from tracking_receiver_sim.wire import TrackingReceiver
 
 MODE, COMMAND, ERROR = 'acu/mode', 'acu/rate_command', 'tracking_receiver/angle_error'
+AFTER_ALL = 2**63 - 1
 
 
 def _never_tracked(outputs, inputs):
@@ -66,9 +67,9 @@ KINDS = {
     'ins': Kind(Ins, 'ship/imu/data_raw', 'ship/imu/data_raw', _never_sailed),
     'tracking_receiver': Kind(TrackingReceiver, 'joint_states', 'ship/truth', _never_locked),
     'acu': Kind(Acu, 'joint_states', 'ship/imu/data', _never_tracked),
-    'adu': Kind(Adu, 'clock', 'ship/truth', _never_moved),
+    'adu': Kind(Adu, 'joint_states', 'ship/truth', _never_moved),
 }
-"""The drive's steps begin with its own clock."""
+"""The drive's steps begin with its own joint states."""
 
 
 class RecomputeError(ValueError):
@@ -91,6 +92,12 @@ class Recording:
             self._rows[topic] = self.bag.rows(topic)
         return self._rows[topic]
 
+    def arrival(self, topic):
+        """Numbers in whose order messages came: when they were sent, by the machine's clock, in our own recordings; in
+        others, where they are in the file."""
+        rows = self.rows(topic)
+        return rows.publish if 'pacing' in self.bag.metadata else (rows.chunk << 40) + rows.start
+
     def data(self, topic):
         """The CDR bytes of its messages."""
         if topic not in self._data:
@@ -104,29 +111,31 @@ class Recording:
         """Its messages as numbers."""
         if topic not in self._outputs:
             try:
-                self._outputs[topic] = comparison.recorded(self.data(topic), self.rows(topic).log, topic)
+                output = comparison.recorded(self.data(topic), self.rows(topic).log, topic)
+                self._outputs[topic] = output if output.texts is None else dataclasses.replace(
+                    output, stamps=self.steps(topic))
             except ValueError as error:
                 raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
         return self._outputs[topic]
 
+    def steps(self, topic):
+        """Stamps [ns] of the steps that messages without one belong to: in our lockstep recordings their log says, in
+        others they came before the answer to that step; AFTER_ALL where none came any more, their log where no answer
+        was recorded."""
+        log = self.rows(topic).log
+        if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(COMMAND):
+            return log
+        after = np.searchsorted(self.arrival(COMMAND), self.arrival(topic))
+        return np.append(self.output(COMMAND).stamps, AFTER_ALL)[after]
+
     def modes(self, stamps):
-        """{step: text} of the recorded acu/mode; steps are rows of stamps [ns], the modes' own are in the bag's log
-        (lockstep) or that of the next rate command in the file."""
-        if not (self.has(MODE) and self.has(COMMAND)):
+        """{step: text} of the recorded acu/mode; steps are rows of stamps (n,) [ns]."""
+        if not self.has(MODE):
             return {}
         output = self.output(MODE)
-        at = output.stamps
-        if not self.lockstep:
-            after = np.searchsorted(_place(self.rows(COMMAND)), _place(self.rows(MODE)))
-            at = np.append(self.output(COMMAND).stamps, NEVER)[after]
-        steps = np.searchsorted(stamps, at)
-        return {int(step): text for step, stamp, text in zip(steps, at, output.texts)
+        steps = np.searchsorted(stamps, output.stamps)
+        return {int(step): text for step, stamp, text in zip(steps, output.stamps, output.texts)
                 if step < len(stamps) and stamps[step] == stamp}
-
-
-def _place(rows):
-    """Where messages are in the file, as numbers that grow."""
-    return (rows.chunk << 40) + rows.start
 
 
 @dataclasses.dataclass
@@ -145,34 +154,44 @@ class Feed:
 def feed(recording, unit, trigger) -> Feed:
     """Match the recorded inputs of a unit to its steps."""
     names = [trigger, *unit.followers]
-    events = [name for name in unit.events if recording.has(name)]
     for name in names:
         if not recording.has(name):
             raise RecomputeError(f'{recording.bag.path}: no {name} in it, which the node hears')
-    heard = names + events
-    stamps = [recording.output(name).stamps if name in names else recording.rows(name).log for name in heard]
+    stamps = [recording.output(name).stamps for name in names]
     sources = np.concatenate([np.full(len(part), number) for number, part in enumerate(stamps)])
     rows = np.concatenate([np.arange(len(part)) for part in stamps])
     stamps = np.concatenate(stamps)
-    if recording.lockstep:
-        order = np.lexsort((np.where(sources < len(names), sources, -1), stamps))
-    else:
-        order = np.argsort(np.concatenate([_place(recording.rows(name)) for name in heard]), kind='stable')
+    arrival = np.concatenate([recording.arrival(name) for name in names])
+    order = np.lexsort((sources, stamps)) if recording.lockstep else np.argsort(arrival, kind='stable')
 
-    steps = []
-    steps_taken = Steps(trigger, {name: round(latency * SECOND) for name, latency in unit.followers.items()},
-                        recording.lockstep, lambda *step: steps.append(step))
-    found, problem = [], ''
+    steps, taken = [], []
+    matched = Steps(trigger, {name: round(latency * SECOND) for name, latency in unit.followers.items()},
+                    recording.lockstep, lambda *step: steps.append(step))
+    problem = ''
     try:
-        take = steps_taken.take
-        for source, row, stamp in zip(sources[order].tolist(), rows[order].tolist(), stamps[order].tolist()):
-            if source < len(names):
-                take(heard[source], stamp, row)
-            else:
-                found.append((len(steps), heard[source], row))
+        take = matched.take
+        for source, row, stamp, at in zip(*(values[order].tolist() for values in (sources, rows, stamps, arrival))):
+            take(names[source], stamp, row)
+            if len(steps) > len(taken):
+                taken.append(at)
     except GraphError as error:
         problem = f'inputs: {error}'
-    return Feed(*_gathered(recording, unit, trigger, steps), found, problem, steps_taken.refused)
+    heard, rows, stamps = _gathered(recording, unit, trigger, steps)
+    return Feed(heard, rows, stamps, _events(recording, unit, stamps, taken), problem, matched.refused)
+
+
+def _events(recording, unit, stamps, taken):
+    """[(step before which it came, topic, row)] of the messages that no step waits for, in order; taken (n,): when the
+    last input of each step came."""
+    found = []
+    for name in unit.events:
+        if recording.has(name):
+            if recording.has(COMMAND) or recording.bag.metadata.get('pacing') == 'lockstep':
+                steps = np.searchsorted(stamps, recording.steps(name))
+            else:
+                steps = np.searchsorted(taken, recording.arrival(name))
+            found += [(step, name, row) for row, step in enumerate(steps.tolist())]
+    return sorted(found, key=lambda event: event[0])
 
 
 def _gathered(recording, unit, trigger, steps):
@@ -291,13 +310,14 @@ def compare(recording, outputs, unit, tolerance) -> list:
 
 
 def chosen(recording, nodes, file_values):
-    """The nodes to recompute: those named, else those whose parameters are known and whose inputs are there; of a
-    recording that does not say how it was made, the ACU."""
+    """The nodes to recompute: those named, else those whose parameters are known and whose inputs and outputs are
+    there, and the ACU also without outputs; of a recording that does not say how it was made, the ACU."""
     for node in nodes:
         if node not in KINDS:
             raise RecomputeError(f'--node {node}: must be one of {", ".join(KINDS)}')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
-    able = [node for node, kind in KINDS.items() if recording.has(kind.trigger) and node in (known or ('acu',))]
+    able = [node for node, kind in KINDS.items() if recording.has(kind.trigger) and node in (known or ('acu',))
+            and (node == 'acu' or any(map(recording.has, kind.unit.SAID.names)))]
     found = [node for node in KINDS if node in nodes] if nodes else able
     if not found:
         raise RecomputeError(f'{recording.bag.path}: no node whose inputs are in it; there are '

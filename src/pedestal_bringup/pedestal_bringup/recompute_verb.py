@@ -8,6 +8,7 @@ from pedestal_bringup.bag import Writer
 from pedestal_common import messages, records, topics
 from pedestal_common.steps import SECOND
 
+
 def main(options):
     """(lines to print, rows, whether all is well) of the verb's options. Raises ValueError for what fits nothing."""
     given = recompute.file_parameters(options.params_file) if options.params_file else None

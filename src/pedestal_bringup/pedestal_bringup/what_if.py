@@ -12,8 +12,8 @@ from pedestal_bringup import results
 RIPPLE = 0.25
 """What is faster than a moving mean of this length [s] counts as noise of a command."""
 
-NOTE = ('the recorded antenna does not move with the recomputed command: compared are the estimate against the recorded '
-        'truth and the noise of estimate and command; for the pointing, run the scenario with these parameters')
+NOTE = ('the recorded antenna does not move with the recomputed command: compared are the estimate against the '
+        'recorded truth and the noise of estimate and command; for the pointing, run the scenario anew')
 
 
 class Overlay:

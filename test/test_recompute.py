@@ -1,0 +1,399 @@
+"""`pedestal recompute`: recorded inputs through the nodes' step functions and, once, through a node's process."""
+import json
+import math
+import pathlib
+import signal
+import sys
+
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup import cli, comparison, recompute, recompute_verb, results
+from pedestal_common import messages, topics
+
+REFERENCES = pathlib.Path(__file__).parent.parent / 'bags' / 'reference'
+SHORT = ('--pacing', 'lockstep', '--param', 'acu.tracker.lock_count=20')
+EXACT = ('--absolute', '0', '--relative', '0')
+ESTIMATE, REFERENCE, MODE, ERROR = 'acu/estimate', 'acu/reference', 'acu/mode', 'tracking_receiver/angle_error'
+OUTPUTS = ('acu/rate_command', ESTIMATE, REFERENCE, MODE)
+
+
+@pytest.fixture(scope='module')
+def runs(start_run):
+    """A run ashore and one on a ship."""
+    started = {'leo': start_run('leo_pass', *SHORT, '--duration', '5'),
+               'ship': start_run('ship_pass', *SHORT, '--duration', '3')}
+    for run in started.values():
+        result = run.finish()
+        assert result.returncode == 0, result.stderr
+    return started
+
+
+@pytest.fixture
+def pedestal(capsys, monkeypatch):
+    """pedestal(*arguments) -> (exit code, what it printed, what it complained) of `pedestal recompute` in this
+    process."""
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+
+    def call(*arguments):
+        code = cli.main(['recompute', *map(str, arguments)])
+        said = capsys.readouterr()
+        return code, said.out, said.err
+    return call
+
+
+@pytest.fixture
+def rewrite(tmp_path):
+    """rewrite(bag, change, pacing=None) -> path of a copy; change([(topic, log, publish, data)]) -> the rows of it."""
+    def make(source, change, pacing=None):
+        bag = bags.read(source)
+        named = [topic for topic in topics.TOPICS if topic.name in bag.topics]
+        index = {topic.name: number for number, topic in enumerate(named)}
+        path = tmp_path / f'changed-{len(list(tmp_path.iterdir()))}'
+        writer = bags.Writer(path, named, {**bag.metadata, **({'pacing': pacing} if pacing else {})},
+                             {name: content for name, content in bag.metadata_records.items() if name != 'pedestal'})
+        for topic, log, publish, data in change(list(bag.raw())):
+            writer.write(index[topic], log, publish, data)
+        writer.close()
+        return path
+    return make
+
+
+def where(rows, topic, number):
+    """The place of the number-th message of a topic."""
+    return [place for place, row in enumerate(rows) if row[0] == topic][number]
+
+
+def changed(topic, number, change):
+    """A change of rewrite: change(message) of one message."""
+    def make(rows):
+        place = where(rows, topic, number)
+        name, log, publish, data = rows[place]
+        message = messages.deserialize(data, topics.BY_NAME[topic].type)
+        change(message)
+        rows[place] = name, log, publish, messages.serialize(message)
+        return rows
+    return make
+
+
+def lines_of(output, topic):
+    """The line of a topic and those indented below it."""
+    lines = output.splitlines()
+    start = next(number for number, line in enumerate(lines) if line.startswith(topic + ' '))
+    stop = next((number for number in range(start + 1, len(lines)) if not lines[number].startswith('  ')), None)
+    return lines[start:stop]
+
+
+@pytest.mark.parametrize('name, nodes', [
+    ('leo', ('tracking_receiver', 'acu', 'adu')),
+    ('ship', ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu'))])
+def test_a_lockstep_recording_comes_out_the_same_to_the_last_bit(runs, name, nodes, run_process, tmp_path):
+    rows = tmp_path / 'rows.json'
+    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recompute', runs[name].bag, *EXACT, '--json',
+                        rows], 120.0)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert [line for line in done.stdout.splitlines() if line.endswith(': identical')] == [
+        f'{node}: identical' for node in nodes]
+    values = {(row['case'], row['metric']): row['value'] for row in json.loads(rows.read_text())['rows']}
+    assert {case for case, _ in values} == set(nodes)
+    recording = recompute.Recording(runs[name].bag)
+    written = {topic.name for topic in topics.TOPICS
+               if set(topic.writers) & set(nodes) and topic.rate != 'second' and recording.has(topic.name)}
+    assert {metric.split()[0] for _, metric in values} == written
+    assert all(value == 0 for (_, metric), value in values.items() if metric.endswith(('differences', 'problems')))
+    steps = round({'leo': 5.0, 'ship': 3.0}[name] / 0.005) + 1
+    assert values['acu', 'acu/estimate recomputed'] == values['acu', 'acu/estimate recorded'] == steps
+
+
+def test_a_wrong_number_is_named(runs, rewrite, pedestal):
+    def change(message):
+        message.points[0].velocities = message.points[0].velocities + (0.0, 0.25)
+    code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(ESTIMATE, 600, change)), '--node', 'acu')
+    assert code == 1
+    assert said.splitlines()[-1] == 'acu: DIFFERS'
+    [_, line] = lines_of(said, ESTIMATE)
+    assert line.split() == ['elevation.velocity', '1', '1', '0.25', '3.000000']
+    assert lines_of(said, REFERENCE)[0].endswith('identical')
+
+
+def test_tolerances_and_the_ignore_list(runs, rewrite, pedestal):
+    def change(message):
+        message.points[0].positions = message.points[0].positions + (1e-7, 0.0)
+    path = rewrite(runs['leo'].bag, changed(ESTIMATE, 600, change))
+    assert pedestal(path, '--node', 'acu')[0] == 1
+    code, said, _ = pedestal(path, '--node', 'acu', '--absolute', '2e-7')
+    assert code == 0 and said.splitlines()[-1] == 'acu: equal within tolerance'
+    assert lines_of(said, ESTIMATE)[1].split()[:3] == ['azimuth.position', '1', '0']
+    code, said, _ = pedestal(path, '--node', 'acu', '--ignore', 'acu/estimate.azimuth*')
+    assert code == 0 and said.splitlines()[-1] == 'acu: identical'
+    assert pedestal(path, '--node', 'acu', '--ignore', ESTIMATE)[0] == 0
+
+
+def test_a_number_against_none_differs(runs, rewrite, pedestal):
+    def change(message):
+        message.points[0].positions = message.points[0].positions + (math.nan, 0.0)
+    code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(ESTIMATE, 600, change)), '--node', 'acu', '--absolute',
+                             '1e9')
+    assert code == 1
+    assert lines_of(said, ESTIMATE)[1].split() == ['azimuth.position', '1', '1', 'other', '3.000000']
+
+
+def test_a_wrong_frame_is_named(runs, rewrite, pedestal):
+    def change(message):
+        message.header.frame_id = 'mars'
+    code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(ESTIMATE, 7, change)), '--node', 'acu')
+    assert code == 1
+    assert lines_of(said, ESTIMATE)[1].split() == [*comparison.REST.split(), '1', '1', 'other', '0.035000']
+
+
+def test_a_wrong_mode_is_named(runs, rewrite, pedestal):
+    def change(message):
+        message.data = 'stow'
+    code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(MODE, 0, change)), '--node', 'acu', '--ignore',
+                             'acu/r*', '--ignore', 'acu/e*')
+    assert code == 1
+    assert any('stow asked for at 0.000000 s' in line for line in said.splitlines())
+    assert 'DIFFERS' in said
+
+
+def test_a_dropped_and_a_doubled_message_are_named(runs, rewrite, pedestal):
+    def change(rows):
+        del rows[where(rows, ESTIMATE, 500)]
+        place = where(rows, REFERENCE, 300)
+        return rows[:place] + [rows[place]] + rows[place:]
+    code, said, _ = pedestal(rewrite(runs['leo'].bag, change), '--node', 'acu')
+    assert code == 1
+    assert lines_of(said, ESTIMATE)[1:] == ['  1000 messages recorded, 1001 recomputed',
+                                            '  1 not recorded, the first at 2.500000 s']
+    assert lines_of(said, REFERENCE)[1:] == ['  1002 messages recorded, 1001 recomputed',
+                                             '  1 recorded more than once, the first at 1.500000 s']
+
+
+def test_messages_in_the_wrong_order_are_named(runs, rewrite, pedestal):
+    def change(rows):
+        a, b = where(rows, ESTIMATE, 500), where(rows, ESTIMATE, 501)
+        rows[a], rows[b] = rows[b], rows[a]
+        return rows
+    code, said, _ = pedestal(rewrite(runs['leo'].bag, change), '--node', 'acu')
+    assert code == 1
+    assert lines_of(said, ESTIMATE)[1:] == ['  order: 1 recorded stamps go back, the first from 2.505000 to '
+                                            '2.500000 s']
+
+
+def test_a_missing_input_is_named(runs, rewrite, pedestal):
+    def change(rows):
+        del rows[where(rows, ERROR, 500)]
+        return rows
+    code, said, _ = pedestal(rewrite(runs['leo'].bag, change), '--node', 'acu')
+    assert code == 1
+    assert 'NOT recomputed to the end: inputs: joint_states stamped 2.505000 s came before step 2.500000 s' in said
+    assert '501 not recomputed, the first at 2.500000 s' in said
+
+
+def test_a_changed_parameter_is_reported_old_against_new(runs, pedestal, tmp_path):
+    """A wilder target model follows faster and filters less."""
+    path, rows = runs['leo'].bag, tmp_path / 'rows.json'
+    code, said, _ = pedestal(path, '--param', 'acu.azimuth.a_max=0.4', '--param', 'acu.elevation.a_max=0.4', '--json',
+                             rows)
+    assert code == 0
+    assert 'the recorded antenna does not move with the recomputed command' in said
+    values = {row['metric']: row['value'] for row in json.loads(rows.read_text())['rows']}
+    assert values['recorded_pointing_rms_deg old'] == values['recorded_pointing_rms_deg new']
+    assert values['noise_reduction new'] < 0.7 * values['noise_reduction old']
+    for name in ('estimate_rate_noise_deg_s', 'command_noise_deg_s', 'estimate_rate_error_rms_deg_s'):
+        assert values[f'{name} new'] > 2.0 * values[f'{name} old']
+    assert values['evaluated_time_s old'] == values['evaluated_time_s new'] > 1.0
+
+
+def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
+    """Those of the recording are what its run said; the recorded estimate, delayed by 20 ms, lags 20 ms more."""
+    from pedestal_bringup import what_if
+    recording = recompute.Recording(runs['leo'].bag)
+    old = {name: recording.output(name) for name in OUTPUTS}
+    late = comparison.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
+    numbers = what_if.numbers(recording.bag, [old, {**old, ESTIMATE: late}])
+    summary = results.summary(results.tracking(recording.bag))
+    for name, theirs in (('noise_reduction', 'noise_reduction'), ('recorded_pointing_rms_deg', 'pointing_rms_deg')):
+        assert numbers[name][0][0] == pytest.approx(summary[theirs][0], rel=1e-9)
+    (before, after), unit = numbers['estimate_lag_s']
+    assert unit == 's'
+    assert after - before == pytest.approx(0.02, abs=1e-3)
+
+
+@pytest.fixture
+def inputs_only(runs, rewrite):
+    return rewrite(runs['leo'].bag, lambda rows: [row for row in rows if row[0] in (
+        'joint_states', ERROR, 'acu/program_track', 'target/truth')])
+
+
+def test_a_bag_with_inputs_only_gets_its_outputs(inputs_only, runs, pedestal, tmp_path):
+    output = tmp_path / 'with_outputs'
+    code, said, _ = pedestal(inputs_only, '--node', 'acu', '--output', output)
+    assert code == 0
+    assert 'none of its outputs is in the recording: nothing to compare' in said
+    assert any(line.startswith('noise_reduction ') for line in said.splitlines())
+    whole, made = bags.read(runs['leo'].bag), bags.read(output)
+    for topic in OUTPUTS[:3]:
+        assert [data for *_, data in made.raw(topic)] == [data for *_, data in whole.raw(topic)]
+    assert [(log, message) for _, log, _, message in made.messages(MODE)] == [
+        (log, message) for _, log, _, message in whole.messages(MODE)]
+    assert made.configuration == whole.configuration
+    assert pedestal(output, '--node', 'acu', *EXACT)[0] == 0
+
+
+def test_a_bag_with_inputs_only_and_a_changed_parameter(inputs_only, pedestal):
+    code, said, _ = pedestal(inputs_only, '--node', 'acu', '--param', 'tracker.alpha=2')
+    assert code == 0
+    assert 'old is recomputed with the parameters unchanged' in said
+    assert lines_of(said, ESTIMATE)[1].split()[0] == 'azimuth.position'
+
+
+def as_it_came(rows):
+    """Rows of a lockstep recording in the order of arrival: the program track at once, a mode before its command."""
+    def rank(row):
+        return {'acu/program_track': (-1, 0), MODE: (row[1], 0)}.get(row[0], (row[1], row[0].startswith('acu/')))
+    return sorted(rows, key=rank)
+
+
+@pytest.fixture
+def foreign(runs, tmp_path):
+    """The run ashore as another program records it: one file of ours turned into one of rosbags', arrival times."""
+    bag, path = bags.read(runs['leo'].bag), tmp_path / 'foreign'
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {name: writer.add_connection('/' + name, kind, typestore=messages.TYPESTORE)
+                       for name, kind in bag.topics.items()}
+        for number, (topic, log, _, data) in enumerate(as_it_came(bag.raw())):
+            writer.write(connections[topic], 1_700_000_000_000_000_000 + log + number, data)
+    return path
+
+
+def test_a_foreign_bag_with_the_parameters_of_its_run(foreign, runs, pedestal):
+    code, said, _ = pedestal(foreign, '--params-file', runs['leo'].log / 'parameters.yaml', *EXACT)
+    assert code == 0, said
+    assert [line for line in said.splitlines() if line.endswith(': identical')] == [
+        'tracking_receiver: identical', 'acu: identical', 'adu: identical']
+
+
+def test_a_foreign_bag_without_parameters_says_so(foreign, pedestal):
+    code, said, _ = pedestal(foreign)
+    assert code == 1
+    assert 'acu: 1001 steps, 0 to 5 s, realtime; DEFAULT parameters' in said
+    assert 'adu:' not in said
+
+
+def test_a_recording_in_realtime_order(runs, rewrite, pedestal):
+    """The same messages, matched by when they came."""
+    path = rewrite(runs['leo'].bag, lambda rows: [(topic, log, number, data) for number, (topic, log, _, data)
+                                                  in enumerate(as_it_came(rows))], pacing='realtime')
+    code, said, _ = pedestal(path, *EXACT)
+    assert code == 0, said
+    assert ', realtime; ' in said
+
+
+@pytest.fixture
+def requested(runs, tmp_path):
+    """The run ashore as it would have been recorded had someone asked for standby at 2 s and for program at 2.5 s."""
+    recording = recompute.Recording(runs['leo'].bag)
+    done = recompute.recompute(recording, 'acu', recompute.parameters_of(recording, 'acu'),
+                               {400: 'standby', 500: 'program'})
+    assert done.requests == {400: ('standby', True), 500: ('program', True)}
+    recompute_verb.write(tmp_path / 'requested', recording, done.outputs, done.unit.messages, {})
+    return tmp_path / 'requested'
+
+
+def test_modes_asked_for_are_found_and_asked_for_again(requested, pedestal):
+    code, said, _ = pedestal(requested, '--node', 'acu', *EXACT)
+    assert code == 0, said
+    assert 'mode standby asked for at 2.000000 s' in said and 'mode program asked for at 2.500000 s' in said
+    assert '2 mode requests fed' in said
+    table = bags.read(requested).table(MODE)
+    assert [mode for mode, t in zip(table['data'], table['t']) if t > 1.9][:3] == ['standby', 'program', 'autotrack']
+
+
+def test_the_process_of_the_node_says_the_same(requested, run_process, reserve_domain):
+    """Inputs, program track and modes asked for by service, over DDS."""
+    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recompute', requested, '--node', 'acu',
+                        '--live', *EXACT], 120.0, ROS_DOMAIN_ID=str(reserve_domain()))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert 'compared is what the process of acu published' in done.stdout
+    assert done.stdout.splitlines()[-1] == 'acu: identical'
+
+
+def test_what_was_never_exercised_fails(runs, rewrite, pedestal):
+    """The first 0.2 s: everything equal, nothing locked."""
+    path = rewrite(runs['leo'].bag, lambda rows: [row for row in rows if row[1] <= 200_000_000])
+    code, said, _ = pedestal(path)
+    assert code == 1
+    assert [line for line in said.splitlines() if 'NOT exercised' in line] == [
+        'tracking_receiver: NOT exercised: the receiver never locked (--allow-idle lets it pass)',
+        'acu: NOT exercised: the receiver never locked (--allow-idle lets it pass)']
+    assert pedestal(path, '--allow-idle')[0] == 0
+
+
+def test_locked_but_never_tracked_fails(runs, rewrite, pedestal):
+    modes = bags.read(runs['leo'].bag).table(MODE)
+    before = (modes['t'][modes['data'].index('autotrack')] - 0.01) * 1e9
+    path = rewrite(runs['leo'].bag, lambda rows: [row for row in rows if row[1] <= before])
+    code, said, _ = pedestal(path, '--node', 'acu')
+    assert code == 1
+    assert 'acu: NOT exercised: the ACU was never in autotrack' in said
+
+
+def test_a_drive_that_was_never_told_to_move_fails(runs, rewrite, pedestal):
+    def change(rows):
+        still = messages.joint_state(messages.AXES)
+        for place, (topic, log, publish, _) in enumerate(rows):
+            if topic == 'acu/rate_command':
+                messages.put_stamp(still.header.stamp, log)
+                rows[place] = topic, log, publish, messages.serialize(still)
+        return rows
+    code, said, _ = pedestal(rewrite(runs['leo'].bag, change), '--node', 'adu')
+    assert code == 1
+    assert 'adu: NOT exercised: the drive was never told to move' in said
+
+
+def test_speed_is_measured(runs):
+    assert math.isfinite(recompute.measure(runs['leo'].bag))
+
+
+BAD = {
+    'no bag': ((), 'nowhere: No such file or directory'),
+    'node': (('--node', 'radio'), '--node radio: must be one of ship_motion, ins, tracking_receiver, acu, adu'),
+    'parameter': (('--node', 'acu', '--param', 'tracker.alfa=1'), "did you mean 'tracker.alpha'?"),
+    'value': (('--node', 'acu', '--param', 'tracker.alpha=-1'), 'tracker.alpha = -1'),
+    'no node of the parameter': (('--param', 'alpha=1'), "--param 'alpha=1': must be node.key=value"),
+    'another node': (('--node', 'acu', '--param', 'adu.period=0.01'), 'adu is not recomputed; that is acu'),
+    'file': (('--params-file', 'nowhere.yaml'), '--params-file nowhere.yaml: '),
+    'node not there': (('--node', 'ins'), 'no ship/imu/data_raw in it, which the node hears'),
+    'live and changed': (('--live', '--param', 'acu.tracker.alpha=1'), '--param does not go with it'),
+    'live in realtime': (('--live', '--pacing', 'realtime', '--node', 'acu'), '--live feeds in lockstep'),
+    'output': (('--output', '.'), '--output . exists already'),
+}
+
+
+@pytest.mark.parametrize('case', BAD)
+def test_bad_input_is_one_line(case, runs, pedestal, one_line):
+    arguments, text = BAD[case]
+    code, _, errors = pedestal('nowhere' if case == 'no bag' else runs['leo'].bag, *arguments)
+    assert code == 1
+    assert text in one_line(errors)
+
+
+def test_a_topic_of_another_type_is_refused(runs, pedestal, tmp_path, one_line):
+    with Writer(tmp_path / 'other', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = [writer.add_connection(name, 'std_msgs/msg/String', typestore=messages.TYPESTORE)
+                       for name in ('/joint_states', f'/{ERROR}')]
+        for connection in connections:
+            writer.write(connection, 0, messages.serialize(messages.String(data='well')))
+    code, _, errors = pedestal(tmp_path / 'other')
+    assert code == 1
+    assert 'joint_states is std_msgs/msg/String; must be sensor_msgs/msg/JointState' in one_line(errors)
+
+
+@pytest.mark.parametrize('name', sorted(path.name for path in REFERENCES.iterdir() if path.is_dir()))
+def test_references_still_hold(name, pedestal):
+    """A change that means to change them: make update-references."""
+    code, said, errors = pedestal(REFERENCES / name)
+    assert code == 0, said + errors
+    assert sum(file.stat().st_size for file in (REFERENCES / name).iterdir()) < 1_000_000
