@@ -97,7 +97,7 @@ def test_a_run_that_tracks_has_all_numbers(runs):
     assert [row['metric'] for row in rows if row['value'] is None] == []
 
 
-@pytest.mark.parametrize('name, topics', [('first', 11), ('ship', 14)])
+@pytest.mark.parametrize('name, topics', [('first', 12), ('ship', 15)])
 def test_recording_is_complete(runs, name, topics, run_process):
     done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'verify', runs[name].bag], 60.0)
     assert done.returncode == 0, done.stdout

@@ -140,8 +140,8 @@ class RecorderNode(Shell):
         def put_clock(data, info):
             self._tick(put(data, info))
 
-        def put_mode(data, _):
-            order.take_mode(index, data)
+        def put_change(data, _):
+            order.take_change(index, data)
 
         def put_diagnostics(data, _):
             sender, stamp = self._sender(data), stamp_in(data)
@@ -152,7 +152,9 @@ class RecorderNode(Shell):
                 else:
                     order.take(sender_slot, stamp, data)
 
-        return {'clock': put_clock, 'acu/mode': put_mode, 'diagnostics': put_diagnostics}.get(topic.name, put)
+        if topic.rate == 'change':
+            return put_change
+        return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
     def _as_it_comes(self, index, topic):
         write, stamp_in = self._bag.write, self._stamp_in

@@ -37,11 +37,15 @@ class StepOrder:
         self._needed = {rate: [slot for slot, (_, topic, _) in enumerate(self._slots, 1) if topic.rate == rate]
                         for rate in ('step', 'once', 'second')}
         self._steps = len(self._needed['step'])
-        self._command = self._slot_of.get(('acu/rate_command', None))
-        self._commanded = -1
+        self._answered, self._answer = {}, {}
+        for index, topic in enumerate(topics):
+            if topic.rate == 'change':
+                answers = [slot for slot in self._needed['step'] if self._slots[slot - 1][1].writers == topic.writers]
+                self._answer[index] = answers[0] if answers else None
+                self._answered[self._answer[index]] = -1
         self._buckets = {}
         self._stamps = []
-        self._modes = []
+        self._changes = {index: [] for index in self._answer}
         self._odd = []
         self.written = -1
         self.odd = 0
@@ -67,16 +71,16 @@ class StepOrder:
             self.take_odd(self._slots[slot - 1][0], data)
             return
         bucket[slot] = data
-        if slot == self._command:
-            self._commanded = stamp
+        if slot in self._answered:
+            self._answered[slot] = stamp
         if self._slots[slot - 1][1].rate == 'step':
             bucket[0] -= 1
         if not bucket[0] and stamp == self._stamps[0]:
             self._advance()
 
-    def take_mode(self, index, data):
-        """A message without stamp: it belongs to the step after the last command that has come."""
-        self._modes.append((self._commanded, index, data))
+    def take_change(self, index, data):
+        """A message of a `change` topic: it belongs to the step after the last that its writer has answered."""
+        self._changes[index].append((self._answered[self._answer[index]], data))
 
     def take_odd(self, index, data):
         """A message that belongs to no step."""
@@ -120,9 +124,9 @@ class StepOrder:
             if data is not None:
                 write(index, stamp, stamp, data)
             elif topic.rate == 'change':
-                while self._modes and self._modes[0][0] < stamp:
-                    _, mode_index, mode = self._modes.pop(0)
-                    write(mode_index, stamp, stamp, mode)
+                changes = self._changes[index]
+                while changes and changes[0][0] < stamp:
+                    write(index, stamp, stamp, changes.pop(0)[1])
         self._put_odd()
 
     def _put_odd(self):
@@ -135,7 +139,8 @@ class StepOrder:
         while self._stamps:
             self._put()
         stamp = max(self.written, 0)
-        for _, index, mode in self._modes:
-            self._write(index, stamp, stamp, mode)
-        self._modes = []
+        for index, changes in self._changes.items():
+            for _, data in changes:
+                self._write(index, stamp, stamp, data)
+            changes.clear()
         self._put_odd()

@@ -100,12 +100,12 @@ class Graph:
         time.sleep(0.3)  # the recorder's side of the discovery
 
     def publish(self, rows):
-        """As nodes do: the mode between two commands, and all that was sent has arrived in the end."""
+        """As nodes do: a change between two answers, and all that was sent has arrived in the end."""
         for name, _, data in rows:
-            if name == 'acu/mode':
+            if name in ANSWERS:
                 self.acknowledged()
             self.publishers[name].publish(data)
-            if name == 'acu/mode':
+            if name in ANSWERS:
                 self.acknowledged()
         self.acknowledged()
 
@@ -132,14 +132,17 @@ def rows():
     return [(name, stamp, data + bytes(-len(data) % 4)) for name, stamp, data in made]
 
 
+ANSWERS = {'acu/mode': 'acu/rate_command', 'adu/state': 'clock'}
+
+
 def shuffled(rows, seed):
-    """An arrival that keeps each topic's own order and the mode between two commands."""
+    """An arrival that keeps each topic's own order and a change between two answers of its writer."""
     rng = random.Random(seed)
     groups = {}
     for row in rows:
-        groups.setdefault('acu/rate_command' if row[0] == 'acu/mode' else row[0], []).append(row)
+        groups.setdefault(ANSWERS.get(row[0], row[0]), []).append(row)
     for group in groups.values():
-        group.sort(key=lambda row: (row[1], row[0] != 'acu/mode'))
+        group.sort(key=lambda row: (row[1], row[0] not in ANSWERS))
     out = []
     while groups:
         oldest = min(group[0][1] for group in groups.values())

@@ -10,6 +10,8 @@ T = 5_000_000
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
 RECORDED = topics.read_by('recorder', NODES)
 NAMES = [topic.name for topic in RECORDED]
+ANSWERS = {'acu/mode': 'acu/rate_command', 'adu/state': 'clock'}
+"""The first step topic of whoever writes a `change` topic."""
 SPEAKERS = [node for node in topics.NODES if node in topics.BY_NAME['diagnostics'].writers and node in NODES]
 
 
@@ -20,8 +22,8 @@ class Collected:
             (NAMES[index], log, data)))
 
     def put(self, name, k, data, node=None):
-        if name == 'acu/mode':
-            self.order.take_mode(NAMES.index(name), data)
+        if name in ANSWERS:
+            self.order.take_change(NAMES.index(name), data)
         else:
             self.order.take(self.order.slot(name, node), k * T, data)
 
@@ -40,15 +42,15 @@ def canonical(steps, latency=3):
 
 
 def shuffled(rows, seed, spread=4):
-    """The same rows in an order that keeps each topic's own and the mode between the commands before and after it."""
+    """The same rows in an order that keeps each topic's own and a change between two answers of its writer."""
     rng = random.Random(seed)
     groups = {}
     for row in rows:
-        name = ('acu/rate_command', None) if row[0] == 'acu/mode' else (row[0], row[3])
+        name = (ANSWERS.get(row[0], row[0]), row[3])
         groups.setdefault(name, []).append(row)
     out = []
     for group in groups.values():
-        group.sort(key=lambda row: (row[1], row[0] != 'acu/mode'))
+        group.sort(key=lambda row: (row[1], row[0] not in ANSWERS))
     while groups:
         oldest = min(group[0][1] for group in groups.values())
         name = rng.choice([name for name, group in groups.items() if group[0][1] <= oldest + spread])
@@ -79,8 +81,8 @@ def test_a_step_waits_for_every_topic_and_at_a_second_for_every_node():
         for row in rows:
             if row is not absent:
                 collected.put(*row)
-        if absent[0] == 'acu/mode':
-            assert len(collected.rows) == len(rows) - 1
+        if absent[0] in ANSWERS:
+            assert len(collected.rows) == sum(row[0] not in ANSWERS for row in rows)
         else:
             assert collected.rows == []
             expected = f'diagnostics of {absent[3]}' if absent[3] else absent[0]
