@@ -81,6 +81,13 @@ def test_another_seed_gives_another_file(runs):
     assert digest(runs['first']) != digest(runs['other_seed'])
 
 
+def test_rerun_makes_the_same_file_again(runs, run_process, tmp_path):
+    pedestal = [sys.executable, '-m', 'pedestal_bringup.cli']
+    done = run_process([*pedestal, 'rerun', runs['first'].bag, '--bag', tmp_path / 'again'], 90.0)
+    assert (done.returncode, done.stderr) == (0, '')
+    assert done.stdout == f'{tmp_path}/again: equal to the last byte, sha256 {digest(runs["first"])}\n'
+
+
 @pytest.mark.parametrize('name', ['first', 'ship'])
 def test_rows_and_hash(runs, name):
     content = json.loads(runs[name].json.read_text())

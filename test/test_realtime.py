@@ -17,7 +17,7 @@ PAUSE = 1.6
 @pytest.fixture(scope='module')
 def run(start_run, connect):
     """A realtime run whose ACU is stopped for a while on the way to the target: run.stopped, run.resumed [s]."""
-    run = start_run('leo_pass', '--pacing', 'realtime', '--duration', '4.5')
+    run = start_run('leo_pass', '--pacing', 'realtime', '--duration', '6', '--param', 'acu.azimuth.shaper.rate=0.3')
     client = connect(run.domain_id)
     client.read('joint_states')
     heard = client.heard['joint_states']
@@ -69,6 +69,7 @@ class Commander:
         client.write('acu/rate_command')
         client.read('diagnostics')
         client.read('joint_states', self.answer)
+        client.read('adu/state')
         client.until(lambda: client.heard['joint_states'])
 
     def answer(self, joints):
@@ -86,6 +87,10 @@ class Commander:
         return self.client.heard['joint_states'][-1]
 
     @property
+    def state(self):
+        return self.client.heard['adu/state'][-1].data
+
+    @property
     def stamp(self):
         return messages.nanoseconds(self.last.header.stamp)
 
@@ -96,7 +101,8 @@ class Commander:
 @pytest.fixture(scope='module')
 def drive(start_node, connect):
     """A drive alone, with brakes so weak that a stop takes a second, under a commander."""
-    node = start_node('adu', '-p', 'initial_elevation:=0.8', '-p', 'azimuth.limits.deceleration:=0.2')
+    node = start_node('adu', '-p', 'initial_elevation:=0.8', '-p', 'azimuth.limits.deceleration:=0.2',
+                      '-p', 'azimuth.faults.overspeed:=0.4', '-p', 'brakes.stop_time:=10.0')
     commander = Commander(connect(node.domain_id))
     yield commander
     node.process.send_signal(signal.SIGINT)
@@ -156,12 +162,44 @@ def test_emergency_stop_and_reset(drive):
     drive.rates = 0.2, 0.0
     drive.moves_at(0.2, 0.0)
     assert drive.client.trigger('adu/emergency_stop') == (
-        True, 'axes are stopping and stay stopped until adu/reset_faults')
-    assert drive.client.trigger('adu/reset_faults') == (False, 'refused: azimuth still moves')
+        True, 'drive is emergency stop')
+    assert drive.client.trigger('adu/reset_faults') == (
+        False, 'refused: the axes still move; drive is emergency stop')
+    assert drive.client.trigger('adu/enable') == (
+        False, 'refused: an emergency stop is latched (adu/reset_faults); drive is emergency stop')
     drive.client.diagnosed('emergency stop')
     drive.moves_at(0.0, 0.0)
     still = time.monotonic() + 0.3
     drive.client.until(lambda: time.monotonic() > still)
     drive.moves_at(0.0, 0.0)
-    assert drive.client.trigger('adu/reset_faults') == (True, 'drive enabled')
+    assert drive.client.trigger('adu/reset_faults') == (True, 'drive is releasing brakes')
     drive.moves_at(0.2, 0.0)
+
+
+def test_a_fault_is_latched_told_and_reset_by_service(drive):
+    drive.rates = 0.5, 0.0
+    assert drive.client.diagnosed('fault: azimuth overspeed').level == 2
+    assert drive.state == 'fault: azimuth overspeed'
+    drive.rates = 0.1, 0.0
+    assert drive.client.trigger('adu/enable') == (
+        False, 'refused: a fault is latched (adu/reset_faults); drive is fault: azimuth overspeed')
+    assert drive.client.trigger('adu/reset_faults') == (
+        False, 'refused: the axes still move; drive is fault: azimuth overspeed')
+    drive.moves_at(0.0, 0.0)
+    still = time.monotonic() + 0.5
+    drive.client.until(lambda: time.monotonic() > still)
+    drive.moves_at(0.0, 0.0)
+    assert drive.client.trigger('adu/reset_faults') == (True, 'drive is releasing brakes')
+    drive.moves_at(0.1, 0.0)
+    assert drive.state == 'enabled'
+
+
+def test_disable_and_enable(drive):
+    drive.rates = 0.1, 0.0
+    drive.moves_at(0.1, 0.0)
+    assert drive.client.trigger('adu/disable') == (True, 'drive is stopping')
+    drive.moves_at(0.0, 0.0)
+    drive.client.until(lambda: drive.state == 'disabled', 10.0)
+    assert drive.client.trigger('adu/enable') == (True, 'drive is releasing brakes')
+    drive.moves_at(0.1, 0.0)
+    assert drive.state == 'enabled'

@@ -153,7 +153,7 @@ def test_a_wrong_mode_is_named(runs, rewrite, pedestal):
     code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(MODE, 0, change)), '--node', 'acu', '--ignore',
                              'acu/r*', '--ignore', 'acu/e*')
     assert code == 1
-    assert any('stow asked for at 0.000000 s' in line for line in said.splitlines())
+    assert any('acu/stow asked for at 0.000000 s' in line for line in said.splitlines())
     assert 'DIFFERS' in said
 
 
@@ -250,9 +250,13 @@ def test_a_bag_with_inputs_only_and_a_changed_parameter(inputs_only, pedestal):
 
 
 def as_it_came(rows):
-    """Rows of a lockstep recording in the order of arrival: the program track at once, a mode before its command."""
+    """Rows of a lockstep recording in the order of arrival: the program track at once, a state before what its writer
+    says in that step."""
+    ranks = {'acu/program_track': -1e9, 'adu/state': -1.0, MODE: 1.0, 'acu/rate_command': 2.0, ESTIMATE: 2.0,
+             REFERENCE: 2.0}
+
     def rank(row):
-        return {'acu/program_track': (-1, 0), MODE: (row[1], 0)}.get(row[0], (row[1], row[0].startswith('acu/')))
+        return row[1] + ranks.get(row[0], 0.0)
     return sorted(rows, key=rank)
 
 
@@ -291,33 +295,45 @@ def test_a_recording_in_realtime_order(runs, rewrite, pedestal):
     assert ', realtime; ' in said
 
 
-@pytest.fixture
-def requested(runs, tmp_path):
-    """The run ashore as it would have been recorded had someone asked for standby at 2 s and for program at 2.5 s."""
-    recording = recompute.Recording(runs['leo'].bag)
-    done = recompute.recompute(recording, 'acu', recompute.parameters_of(recording, 'acu'),
-                               {400: 'standby', 500: 'program'})
-    assert done.requests == {400: ('standby', True), 500: ('program', True)}
+REQUESTS = {'acu': (MODE, {400: 'acu/standby', 500: 'acu/program'}, ['standby', 'program', 'autotrack']),
+            'adu': ('adu/state', {400: 'adu/emergency_stop', 600: 'adu/reset_faults', 800: 'adu/disable',
+                                  900: 'adu/enable'},
+                    ['emergency stop', 'releasing brakes', 'enabled', 'stopping', 'engaging brakes', 'disabled',
+                     'releasing brakes', 'enabled'])}
+
+
+@pytest.fixture(params=REQUESTS)
+def requested(runs, tmp_path, request):
+    """(node, path) of the run ashore as it would have been recorded had someone asked something of a node."""
+    recording, node = recompute.Recording(runs['leo'].bag), request.param
+    requests = REQUESTS[node][1]
+    done = recompute.recompute(recording, node, recompute.parameters_of(recording, node),
+                               {step: [service] for step, service in requests.items()})
+    assert done.requests == {step: [(service, True)] for step, service in requests.items()}
     recompute_verb.write(tmp_path / 'requested', recording, done.outputs, done.unit.messages, {})
-    return tmp_path / 'requested'
+    return node, tmp_path / 'requested'
 
 
-def test_modes_asked_for_are_found_and_asked_for_again(requested, pedestal):
-    code, said, _ = pedestal(requested, '--node', 'acu', *EXACT)
+def test_what_was_asked_for_is_found_and_asked_for_again(requested, pedestal):
+    node, path = requested
+    topic, requests, states = REQUESTS[node]
+    code, said, _ = pedestal(path, '--node', node, *EXACT)
     assert code == 0, said
-    assert 'mode standby asked for at 2.000000 s' in said and 'mode program asked for at 2.500000 s' in said
-    assert '2 mode requests fed' in said
-    table = bags.read(requested).table(MODE)
-    assert [mode for mode, t in zip(table['data'], table['t']) if t > 1.9][:3] == ['standby', 'program', 'autotrack']
+    for step, service in requests.items():
+        assert f'{service} asked for at {step * 0.005:.6f} s' in said
+    assert f'{len(requests)} requests fed' in said
+    table = bags.read(path).table(topic)
+    assert [text for text, t in zip(table['data'], table['t']) if t > 1.9][:len(states)] == states
 
 
 def test_the_process_of_the_node_says_the_same(requested, run_process, reserve_domain):
-    """Inputs, program track and modes asked for by service, over DDS."""
-    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recompute', requested, '--node', 'acu',
-                        '--live', *EXACT], 120.0, ROS_DOMAIN_ID=str(reserve_domain()))
+    """Inputs, program track and services, over DDS."""
+    node, path = requested
+    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recompute', path, '--node', node, '--live',
+                        *EXACT], 120.0, ROS_DOMAIN_ID=str(reserve_domain()))
     assert done.returncode == 0, done.stdout + done.stderr
-    assert 'compared is what the process of acu published' in done.stdout
-    assert done.stdout.splitlines()[-1] == 'acu: identical'
+    assert f'compared is what the process of {node} published' in done.stdout
+    assert done.stdout.splitlines()[-1] == f'{node}: identical'
 
 
 def test_what_was_never_exercised_fails(runs, rewrite, pedestal):

@@ -16,7 +16,7 @@ setup(
         ('share/' + package_name + '/launch', glob('launch/*.launch.py')),
     ],
     install_requires=['numpy', 'numba', 'mcap', 'zstandard', 'rosbags', 'matplotlib', 'rich', 'PyYAML', 'scipy'],
-    extras_require={'test': ['pytest', 'mcap-ros2-support']},
+    extras_require={'parquet': ['pyarrow'], 'test': ['pytest', 'mcap-ros2-support', 'pyarrow', 'control']},
     python_requires='>=3.10',
     zip_safe=False,
     maintainer='pedestal maintainers',

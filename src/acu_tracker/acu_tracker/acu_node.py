@@ -15,7 +15,7 @@ class AcuNode(shell.Shell):
 
     def __init__(self):
         super().__init__('acu', AcuParameters, live=('tracker', 'azimuth', 'elevation'))
-        self.unit = Acu(self.parameters, 'ins' in self.graph.nodes)
+        self.unit = Acu(self.parameters, 'ins' in self.graph.members)
         self.unit.prepare()
         self.outputs = self.unit.outputs
         self.joints, self.error, self.attitude = (records.only(self.unit.heard, name)
@@ -24,7 +24,7 @@ class AcuNode(shell.Shell):
         self.refused = ''
         self.drive_state = 'unknown'
         self.invalid = 0
-        self.waiting = 'operator' in self.graph.nodes and self.graph.lockstep
+        self.waiting = 'operator' in self.graph.members and self.graph.lockstep
         self.held = None
 
         # The rate command, which the drive waits for, then what is only looked at.
@@ -84,7 +84,7 @@ class AcuNode(shell.Shell):
     def service(self, mode):
         """The callback of a mode's service: asks the mode machine at once and answers with what it reads back."""
         def change(_request, response):
-            response.success = accepted = self.unit.request(mode)
+            response.success = accepted = self.unit.ask(mode)
             outputs = self.outputs[0]
             now = modes.MODES[outputs['mode']]
             response.message = (f'mode is {now}' if accepted else

@@ -34,6 +34,7 @@ class Acu:
         self.outputs['innovation'] = self.outputs['nis'] = math.nan
         self.times, self.angles = np.zeros(0), np.zeros((0, 2))
         self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
+        self.remembers = self.state, self.inputs, self.outputs
         self.messages = {COMMAND: messages.joint_state(messages.AXES),
                          ESTIMATE: messages.joint_trajectory('earth', [messages.trajectory_point()]),
                          REFERENCE: messages.joint_trajectory('base_link', [messages.trajectory_point()])}
@@ -64,7 +65,15 @@ class Acu:
         answers(state, self.constants, inputs, outputs, self.times, self.angles, self.heard, self.said.copy())
         control_unit.request(state, self.constants, inputs, outputs, modes.STANDBY, self.times, self.angles)
 
-    def request(self, mode):
+    def request(self, service):
+        """Ask for a mode by the name of its service between two steps; True when granted."""
+        return self.ask(modes.MODES.index(service.removeprefix('acu/')))
+
+    def services_to(self, mode):
+        """The services that bring acu/mode to a mode."""
+        return [f'acu/{mode}'] if mode in modes.MODES else []
+
+    def ask(self, mode):
         """Ask for a mode (its code) between two steps; True when granted."""
         return bool(control_unit.request(self.state, self.constants, self.inputs, self.outputs, mode, self.times,
                                          self.angles))

@@ -2,8 +2,8 @@
 
     drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
     axis          one axis: sensors, speed loop, two current loops, plant
-    speed_loop, bias, current_loop, pi, travel, encoder         the controller's laws
-    motor, gear_train, friction                                 the plant's laws
+    speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder    the controller's laws
+    motor, gear_train, friction, structure, wind                                 the plant's laws
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
@@ -17,10 +17,12 @@ Symbols
     i_d, i_q          phase currents in rotor coordinates, amplitude invariant [A]
     v_d, v_q          phase voltages likewise [V]
     R, L, psi, p      phase resistance [ohm], inductance [H], flux linkage [Wb], pole pairs
-    K_t               torque constant 1.5 p psi [Nm/A]
+    K_t               torque constant 1.5 p psi [Nm/A]; psi_hat, K_t_hat: as the controller believes
     K_p, K_i          gains of a PI controller
+    w_o, d            bandwidth of the disturbance observer [rad/s]; torque it sees on a motor shaft [Nm]
     k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis
     z                 LuGre bristle deflection [rad]; sigma_0, sigma_1 its stiffness and damping
     T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]
+    v, V              turbulence along the mean wind, and the mean wind [m/s]
     h                 plant sub-step 50 us; current loops 100 us, speed loop 0.5 ms
 """

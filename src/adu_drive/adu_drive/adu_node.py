@@ -6,12 +6,20 @@ import time
 import numpy as np
 from std_srvs.srv import Trigger
 
+from adu_drive import drive_state, faults, thermal
 from adu_drive.params import AduNodeParameters
-from adu_drive.wire import CLOCK, COMMAND, JOINTS, MOTORS, SHIP, Adu
+from adu_drive.wire import CLOCK, COMMAND, JOINTS, MOTORS, SHIP, STATE, Adu, state_text
 from pedestal_common import messages, records, shell
 
 STEP = 'step'
 """The drive's own trigger among its inputs."""
+
+REFUSALS = {
+    drive_state.FAULT_LATCHED: 'a fault is latched (adu/reset_faults)',
+    drive_state.EMERGENCY_LATCHED: 'an emergency stop is latched (adu/reset_faults)',
+    drive_state.MOVING: 'the axes still move',
+    drive_state.CAUSE_PERSISTS: 'the cause is still there'}
+"""Why a request is not granted."""
 
 ACKNOWLEDGED_STEPS = 1000
 """Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so
@@ -23,7 +31,7 @@ class AduNode(shell.Shell):
     def __init__(self):
         super().__init__('adu', AduNodeParameters)
         p = self.parameters
-        self.unit = Adu(p, 'ship_motion' in self.graph.nodes)
+        self.unit = Adu(p, 'ship_motion' in self.graph.members)
         self.unit.prepare()
         self.outputs = self.unit.outputs
         self.now, self.heard_command, self.heard_ship = (records.only(self.unit.heard, name)
@@ -35,6 +43,8 @@ class AduNode(shell.Shell):
         self.command = None
         self.command_stamp = None
         self.stale = False
+        self.condition = None
+        self.announced = None
         self.refused = ''
         self.invalid = ''
         self.tick_timer = None
@@ -45,8 +55,9 @@ class AduNode(shell.Shell):
         # What the others wait for goes first.
         self.says = [(self.unit.messages[name], records.only(self.unit.said, name), self.writer(name))
                      for name in (JOINTS, CLOCK, MOTORS)]
-        self.create_service(Trigger, 'adu/emergency_stop', self.on_emergency_stop)
-        self.create_service(Trigger, 'adu/reset_faults', self.on_reset_faults)
+        self.send_state = self.writer(STATE)
+        for what, name in enumerate(drive_state.REQUESTS):
+            self.create_service(Trigger, f'adu/{name}', self.service(what))
         self.diagnose_with(self.diagnose)
 
         if self.graph.lockstep:
@@ -65,7 +76,7 @@ class AduNode(shell.Shell):
         self.heard = time.monotonic()
         self.publish_step()
         if not self.graph.lockstep:
-            mute = self.graph.deadline if 'acu' in self.graph.nodes else self.parameters.period
+            mute = self.graph.deadline if 'acu' in self.graph.members else self.parameters.period
             self.tick_timer = self.every(mute, self.begin_ticking)
 
     def begin_ticking(self):
@@ -81,6 +92,10 @@ class AduNode(shell.Shell):
         self.begin_step(stamp)
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
+        outputs = self.outputs[0]
+        if outputs['condition'] != self.condition:
+            self.condition = int(outputs['condition'])
+            self.announce_state(state_text(outputs))
         self.now.stamp[0] = stamp
         self.unit.say()
         for message, place, send in self.says:
@@ -88,6 +103,11 @@ class AduNode(shell.Shell):
             send(message)
         if self.graph.lockstep:
             self.steps.take(STEP, stamp, None)
+
+    def announce_state(self, text):
+        if text != self.announced:
+            self.announced = text
+            self.announce(self.send_state, messages.String(data=text))
 
     def answered(self, _stamp, _trigger, inputs):
         """Lockstep: the command stamped t_k (and the ship's truth) has come."""
@@ -145,22 +165,17 @@ class AduNode(shell.Shell):
                           'lost_steps': int(self.lost_steps), 'late_ticks': int(self.late_ticks)}), flush=True)
         self.finished = True
 
-    def on_emergency_stop(self, _request, response):
-        self.unit.memory['emergency'] = 1
-        response.success = True
-        response.message = 'axes are stopping and stay stopped until adu/reset_faults'
-        return response
-
-    def on_reset_faults(self, _request, response):
-        moving = [axis for axis in messages.AXES if abs(self.outputs[0][axis]['velocity']) > 1e-3]
-        response.success = not (self.unit.memory['emergency'][0] and moving)
-        if response.success:
-            self.unit.memory['emergency'] = 0
-            self.refused = ''
-            response.message = 'drive enabled'
-        else:
-            response.message = f'refused: {" and ".join(moving)} still moves'
-        return response
+    def service(self, what):
+        """The callback of a request: asks the drive at once and answers with what it reads back."""
+        def ask(_request, response):
+            answer = self.unit.ask(what)
+            if answer == drive_state.GRANTED and what == drive_state.RESET_FAULTS:
+                self.refused = ''
+            response.success = answer == drive_state.GRANTED
+            refusal = f'refused: {REFUSALS[answer]}; ' if answer in REFUSALS else ''
+            response.message = f'{refusal}drive is {state_text(self.outputs[0])}'
+            return response
+        return ask
 
     def diagnose(self):
         """What is now, and the topic that held no number since the last diagnosis."""
@@ -168,10 +183,14 @@ class AduNode(shell.Shell):
         invalid, self.invalid = self.invalid, ''
         values = [(f'{axis} {name}', '1' if outputs[axis][name] else '0') for axis in messages.AXES
                   for name in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
-        values += [('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
-                   ('late_ticks', str(int(self.late_ticks)))]
-        if self.unit.memory['emergency'][0]:
-            return shell.ERROR, 'emergency stop', values
+        values += [(f'{axis} faults', ', '.join(faults.names(outputs[axis]['faults']))) for axis in messages.AXES]
+        values += [(f'{axis}_motor_{i + 1} thermal_load', f'{load:.3f}') for axis in messages.AXES
+                   for i, load in enumerate(outputs[axis]['thermal_load'])]
+        values += [('state', state_text(outputs)), ('phase', drive_state.PHASES[outputs['phase']]),
+                   ('brakes', 'on' if outputs['braked'] else 'off'), ('step', str(self.k)),
+                   ('lost_steps', str(int(self.lost_steps))), ('late_ticks', str(int(self.late_ticks)))]
+        if outputs['emergency'] or outputs['azimuth']['faults'] | outputs['elevation']['faults']:
+            return shell.ERROR, state_text(outputs), values
         if invalid:
             return shell.ERROR, f'{invalid} holds NaN or infinity: stopping', values
         if self.stale:
@@ -181,7 +200,10 @@ class AduNode(shell.Shell):
             return shell.WARN, f'acu/rate_command refused: {self.refused}', values
         if any(outputs[axis]['end_stop'] for axis in messages.AXES):
             return shell.WARN, 'at an end stop', values
-        return shell.OK, 'following', values
+        hottest = max(outputs[axis]['thermal_load'].max() for axis in messages.AXES)
+        if hottest > thermal.WARM:
+            return shell.WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values
+        return shell.OK, 'following' if outputs['following'] else state_text(outputs), values
 
 
 def main(args=None):

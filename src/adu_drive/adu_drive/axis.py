@@ -5,7 +5,22 @@ the records `s` (state) and `c` (constants) of the axis, built here as nested di
 """
 import math
 
-from adu_drive import bias, current_loop, encoder, friction, gear_train, motor, pi, speed_loop, travel
+from adu_drive import (
+    bias,
+    brake,
+    current_loop,
+    disturbance_observer,
+    encoder,
+    faults,
+    friction,
+    gear_train,
+    motor,
+    pi,
+    speed_loop,
+    structure,
+    thermal,
+    travel,
+)
 from adu_drive.params import SPEED_PERIOD
 from pedestal_common.compiled import compiled
 
@@ -15,14 +30,25 @@ CURRENT_TICKS = 5
 CURRENT_PERIOD = SPEED_PERIOD / CURRENT_TICKS
 
 
-def _motor_constants(m, loop, per_rad, h):
+def _motor_constants(m, loop, heat, per_rad, h):
+    """psi, K_t, R are the motor's own; psi_hat, K_t_hat what the controller believes."""
     w = 2.0 * math.pi * loop.bandwidth
-    return {'p': float(m.pole_pairs), 'psi': m.flux_linkage, 'L': m.inductance, 'K_t': m.torque_constant,
-            'per_K_t': 1.0 / m.torque_constant, 'h_L': h / m.inductance,
-            'q_R': 1.0 / (1.0 + h * m.resistance / m.inductance), 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
+    R, psi = m.resistance * (1.0 + m.drift.resistance), m.flux_linkage * (1.0 + m.drift.flux_linkage)
+    return {'p': float(m.pole_pairs), 'psi': psi, 'L': m.inductance, 'K_t': 1.5 * m.pole_pairs * psi,
+            'h_L': h / m.inductance, 'h_R_L': h * R / m.inductance, 'rise': thermal.COPPER * heat.rise,
+            'per_rated': 1.0 / heat.rated_torque, 'heat_gain': 1.0 - math.exp(-SPEED_PERIOD / heat.time_constant),
+            'h_brake_J': h * m.brake / m.inertia, 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
             'h_J': h / m.inertia, 'q_B': 1.0 / (1.0 + h * m.viscous / m.inertia),
+            'psi_hat': m.flux_linkage, 'K_t_hat': m.torque_constant, 'per_K_t_hat': 1.0 / m.torque_constant,
+            'gain': 1.0 + m.drift.current_gain, 'offset': m.drift.current_offset,
             'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_PERIOD, 'v_max': m.voltage,
             'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad, 'speed': 1.0 / per_rad / SPEED_PERIOD}
+
+
+def _dish(p):
+    """Inertia, stiffness and damping of the flexible part of the load."""
+    J_dish = p.structure.inertia_share * p.load.inertia
+    return J_dish, *structure.spring_and_damper(J_dish, p.structure.frequency, p.structure.damping)
 
 
 def constants(p, h):
@@ -30,46 +56,67 @@ def constants(p, h):
     per_rad = 2.0 ** p.encoder.load_bits / (2.0 * math.pi)
     motor_per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     N = p.gear_train.ratio
+    J_shaft = 0.5 * (p.motor_1.inertia + p.motor_2.inertia + p.speed_loop.load_inertia / N ** 2)
+    T_b, out, per_fade = bias.line(p.bias)
+    J_dish, k_dish, c_dish = _dish(p)
+    J_base = p.load.inertia - J_dish
+    l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_PERIOD)
     return {
-        'motor_1': _motor_constants(p.motor_1, p.current_loop, motor_per_rad, h),
-        'motor_2': _motor_constants(p.motor_2, p.current_loop, motor_per_rad, h),
+        'motor_1': _motor_constants(p.motor_1, p.current_loop, p.thermal, motor_per_rad, h),
+        'motor_2': _motor_constants(p.motor_2, p.current_loop, p.thermal, motor_per_rad, h),
         'N': N, 'per_N': 1.0 / N, 'per_2N': 0.5 / N, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
         'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * SPEED_PERIOD,
-        'K_d': p.speed_loop.differential_damping,
-        'T_b': p.bias.torque, 'out': p.bias.out, 'per_fade': 1.0 / (p.bias.out - p.bias.hold),
+        'K_d': p.speed_loop.differential_damping, 'independent': int(p.speed_loop.structure == 'independent'),
+        'l_1': l_1, 'l_2': l_2, 'h_J_shaft': SPEED_PERIOD / J_shaft,
+        'T_b': T_b, 'out': out, 'per_fade': per_fade,
         'bias_gain': 1.0 - math.exp(-SPEED_PERIOD / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
         'k': p.gear_train.stiffness, 'c': p.gear_train.damping, 'half_lash': 0.5 * p.gear_train.lash,
-        'h': h, 'J': p.load.inertia, 'h_J': h / p.load.inertia,
-        'q_B': 1.0 / (1.0 + h * p.load.viscous / p.load.inertia), 'unbalance': p.load.unbalance,
+        'flexible': int(J_dish > 0.0), 'k_dish': k_dish, 'c_dish': c_dish, 'h_J_dish': h / J_dish if J_dish else 0.0,
+        'base_share': 1.0 - p.structure.inertia_share,
+        'h': h, 'J': p.load.inertia, 'h_J': h / J_base,
+        'q_B': 1.0 / (1.0 + h * p.load.viscous / J_base), 'unbalance': p.load.unbalance,
         'T_c': p.friction.coulomb, 'T_sc': p.friction.breakaway - p.friction.coulomb,
         'per_v2': p.friction.stribeck_rate ** -2, 'sigma_0': p.friction.stiffness,
         'h_sigma_0': h * p.friction.stiffness, 'sigma_1_h': p.friction.damping / h,
         'rate_max': p.limits.rate, 'a': p.limits.deceleration, 'ramp': p.limits.deceleration * SPEED_PERIOD,
         'lower': p.limits.lower, 'upper': p.limits.upper, 'K': p.limits.approach,
         'stop_lower': p.limits.lower - p.limits.buffer, 'stop_upper': p.limits.upper + p.limits.buffer,
-        'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping}
+        'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping,
+        'faults': {'current_2': p.faults.overcurrent ** 2, 'omega': N * p.faults.overspeed,
+                   'disagreement': p.faults.encoder_disagreement, 'error': N * p.faults.following_error,
+                   'late_periods': math.ceil(p.faults.following_time / SPEED_PERIOD - 1e-6),
+                   'heat': p.faults.overtemperature}}
 
 
-def _motor_at_rest(m, g, T, theta, per_rad):
-    """A motor that holds T [Nm] at standstill, its pinion pressed on the flank, load at theta."""
-    i_q = T / m.torque_constant
-    flank = math.copysign(0.5 * g.lash, T) if T != 0.0 else 0.0
-    angle = g.ratio * (theta + flank + T * g.ratio / g.stiffness)
-    return {'i_d': 0.0, 'i_q': i_q, 'i_ref': i_q, 'v_d': 0.0, 'v_q': m.resistance * i_q,
-            'sum_d': 0.0, 'sum_q': m.resistance * i_q, 'omega': 0.0, 'theta': angle,
-            'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0, 'torque_ref': T, 'limited': 0}
+def _motor_at_rest(m, g, T, total, theta, per_rad):
+    """A motor asked for T [Nm] at standstill, `total` of it by the integral of its speed loop, its pinion pressed on
+    the flank, load at theta."""
+    i_ref = T / m.torque_constant
+    i_q = (i_ref - m.drift.current_offset) / (1.0 + m.drift.current_gain)
+    v_q = m.resistance * (1.0 + m.drift.resistance) * i_q
+    made = m.torque_constant * (1.0 + m.drift.flux_linkage) * i_q
+    flank = math.copysign(0.5 * g.lash, made) if made != 0.0 else 0.0
+    angle = g.ratio * (theta + flank + made * g.ratio / g.stiffness)
+    return {'i_d': 0.0, 'i_q': i_q, 'i_ref': i_ref, 'v_d': 0.0, 'v_q': v_q, 'sum_d': 0.0, 'sum_q': v_q,
+            'omega': 0.0, 'theta': angle, 'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0,
+            'sum': total, 'torque_ref': T, 'limited': 0, 'heat': 0.0, 'q_R': 1.0, 'h_brake_J': 0.0}
 
 
 def initial_state(p, theta, external):
     """State of one axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary."""
     per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
+    _, k_dish, _ = _dish(p)
     T = -0.5 * external / p.gear_train.ratio
-    T_b = bias.scheduled.py_func(T, p.bias.torque, p.bias.out, 1.0 / (p.bias.out - p.bias.hold))
-    return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, theta, per_rad),
-            'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, theta, per_rad),
+    observed = p.speed_loop.disturbance_observer > 0.0
+    total = 0.0 if observed else T
+    T_b = bias.scheduled.py_func(T, *bias.line(p.bias))
+    return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, total, theta, per_rad),
+            'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, total, theta, per_rad),
             'theta': theta, 'omega': 0.0, 'z': 0.0,
-            'sum': T, 'bias': T_b, 'rate': 0.0,
-            'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0}
+            'dish': theta + external / k_dish if k_dish else theta, 'omega_dish': 0.0, 'deck': 0.0,
+            'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
+            'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0,
+            'faults': 0, 'present': 0, 'late': 0, 'slewing': 0}
 
 
 @compiled
@@ -81,28 +128,103 @@ def _measured_speed(m, k):
 @compiled
 def _sense(m, k):
     m.measured = _measured_speed(m, k)
+    m.heat = thermal.load(m.heat, k.K_t * m.i_q, k.per_rated, k.heat_gain)
     m.count = encoder.counts(m.theta, k.per_rad)
+
+
+@compiled
+def _measured_torque(m, k):
+    """Torque [Nm] as the current sensor and the believed torque constant have it."""
+    return k.K_t_hat * (k.gain * m.i_q + k.offset)
 
 
 @compiled
 def _realised(m, k):
     """Torque [Nm] the motor made of what was asked: the current's own once the voltage circle has cut it."""
-    return k.K_t * m.i_q if m.limited else m.torque_ref
+    return _measured_torque(m, k) if m.limited else m.torque_ref
 
 
 @compiled
-def speed_control(s, c, rate, torque, enable):
-    """One speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references."""
+def _torque_control(s, c, omega, feed_forward):
+    """Torque references of both motors from the rate s.rate, the mean speed and a torque [Nm] added to each; whether
+    one is at its limit."""
+    m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
+    omega_1, omega_2 = (m1.measured, m2.measured) if c.independent else (omega, omega)
+    error_1, error_2 = c.N * s.rate - omega_1, c.N * s.rate - omega_2
+    T_1 = speed_loop.torque(error_1, m1.sum, c.K_p, feed_forward)
+    T_2 = speed_loop.torque(error_2, m2.sum, c.K_p, feed_forward)
+    s.bias += c.bias_gain * (bias.scheduled(0.5 * (T_1 + T_2), c.T_b, c.out, c.per_fade) - s.bias)
+    T_1, T_2 = speed_loop.shared(T_1, T_2, s.bias, m1.measured, m2.measured, c.K_d)
+    m1.torque_ref, m2.torque_ref = speed_loop.limited(T_1, k1.limit), speed_loop.limited(T_2, k2.limit)
+
+    limited = m1.torque_ref != T_1 or m2.torque_ref != T_2
+    excess_1 = excess_2 = 0.0
+    if limited or m1.limited or m2.limited:
+        excess_1, excess_2 = T_1 - _realised(m1, k1), T_2 - _realised(m2, k2)
+        if not c.independent:
+            excess_1 = excess_2 = 0.5 * (excess_1 + excess_2)
+    m1.sum = pi.integral(m1.sum, error_1, c.K_iT, excess_1)
+    m2.sum = pi.integral(m2.sum, error_2, c.K_iT, excess_2)
+    return limited
+
+
+@compiled
+def _current_2(m, k):
+    """Square of the measured current [A2]."""
+    i_d, i_q = k.gain * m.i_d, k.gain * m.i_q + k.offset
+    return i_d * i_d + i_q * i_q
+
+
+@compiled
+def _supervise(s, c, omega, free):
+    """Trip on what the drive measures; `free`: the motors may turn, so they must follow."""
+    m1, m2, k = s.motor_1, s.motor_2, c.faults
+    s.late = faults.late(s.late, c.N * s.rate - omega, k.error) if free else 0
+    s.present |= faults.detected(
+        max(_current_2(m1, c.motor_1), _current_2(m2, c.motor_2)),
+        max(abs(m1.measured), abs(m2.measured)),
+        c.rad * encoder.counts(s.theta, c.per_rad) - c.per_2N * (c.motor_1.rad * m1.count + c.motor_2.rad * m2.count),
+        s.late, max(m1.heat, m2.heat), s.faults, k)
+    s.faults |= s.present
+
+
+@compiled
+def _let_go(s, omega, free):
+    """No torque. Once the brakes hold, what the motors held before is kept: they need it when the brakes open."""
+    s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
+    s.rate, s.omega_hat, s.stopping = 0.0, omega, 1
+    if free:
+        s.motor_1.sum = s.motor_2.sum = s.d_hat = 0.0
+
+
+@compiled
+def speed_control(s, c, rate, torque, enable, powered, free):
+    """One speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references.
+
+    enable: follow, else stop and hold; powered: the motors may make torque; free: no brake holds them.
+    """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     _sense(m1, k1)
     _sense(m2, k2)
+    omega = 0.5 * (m1.measured + m2.measured)
+    _supervise(s, c, omega, powered and free)
+    if not powered or s.faults & faults.OVERCURRENT:
+        _let_go(s, omega, free)
+        return
+    s.omega_hat, s.d_hat = disturbance_observer.update(
+        s.omega_hat, s.d_hat, omega, 0.5 * (_realised(m1, k1) + _realised(m2, k2)), c.l_1, c.l_2, c.h_J_shaft)
 
+    feed_forward = 0.0
     if enable:
         wanted = min(max(rate, -c.rate_max), c.rate_max)
-        feed_forward = torque * c.per_2N
+        if s.slewing:       # whoever commands did not stop with the drive: meet the command within the ramp
+            slewed = s.rate + min(max(wanted - s.rate, -c.ramp), c.ramp)
+            s.slewing = slewed != wanted
+            wanted = slewed
+        else:
+            feed_forward = torque * c.per_2N
     else:
         wanted = s.rate - min(max(s.rate, -c.ramp), c.ramp)
-        feed_forward = 0.0
         s.stopping = 1
     position = c.rad * encoder.counts(s.theta, c.per_rad)
     s.rate = min(max(wanted, -travel.approach_rate(position - c.lower, c.K, c.a)),
@@ -111,15 +233,9 @@ def speed_control(s, c, rate, torque, enable):
         feed_forward = 0.0
         s.end_stop = 1
 
-    error = c.N * s.rate - 0.5 * (m1.measured + m2.measured)
-    T = speed_loop.torque(error, s.sum, c.K_p, feed_forward)
-    s.bias += c.bias_gain * (bias.scheduled(T, c.T_b, c.out, c.per_fade) - s.bias)
-    m1.torque_ref, m2.torque_ref, limited = speed_loop.shared(
-        T, s.bias, m1.measured, m2.measured, c.K_d, k1.limit, k2.limit)
-    excess = T - 0.5 * (_realised(m1, k1) + _realised(m2, k2))
-    s.sum = pi.integral(s.sum, error, c.K_iT, excess if limited or m1.limited or m2.limited else 0.0)
-    m1.i_ref = m1.torque_ref * k1.per_K_t
-    m2.i_ref = m2.torque_ref * k2.per_K_t
+    limited = _torque_control(s, c, omega, feed_forward - s.d_hat)
+    m1.i_ref = m1.torque_ref * k1.per_K_t_hat
+    m2.i_ref = m2.torque_ref * k2.per_K_t_hat
 
     s.torque_limited |= limited
     s.voltage_limited |= m1.limited | m2.limited
@@ -128,28 +244,55 @@ def speed_control(s, c, rate, torque, enable):
 
 
 @compiled
+def _begin_motor(m, k, grip):
+    m.h_brake_J = k.h_brake_J if grip else 0.0
+    m.q_R = thermal.damping(k.h_R_L, k.rise, m.heat)
+
+
+@compiled
+def begin_period(s, c, grip, following):
+    """Once per control period: brakes, winding temperature, and the marks of what happens within it."""
+    _begin_motor(s.motor_1, c.motor_1, grip)
+    _begin_motor(s.motor_2, c.motor_2, grip)
+    s.slewing |= not following
+    s.torque_limited = s.voltage_limited = s.end_stop = s.stopping = s.present = 0
+
+
+@compiled
 def current_control(m, k):
     """One current-loop period of one motor: current reference to phase voltages."""
     m.v_d, m.v_q, m.sum_d, m.sum_q, limited = current_loop.voltages(
-        m.i_d, m.i_q, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L, k.psi, k.v_max)
+        k.gain * m.i_d, k.gain * m.i_q + k.offset, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L,
+        k.psi_hat, k.v_max)
     m.limited |= limited
 
 
 @compiled
 def plant_step(s, c, external):
-    """One plant sub-step h under an external load torque [Nm]: semi-implicit Euler, new currents into the
-    speeds, new speeds into the angles; implicit in R, viscous friction and bristle."""
+    """One plant sub-step h under an external load torque [Nm], which holds s.deck from the deck's acceleration.
+
+    Semi-implicit Euler, new currents into the speeds, new speeds into the angles; implicit in R, viscous friction and
+    bristle.
+    """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, k1.q_R)
-    m2.i_d, m2.i_q = motor.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, k2.q_R)
+    m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, m1.q_R)
+    m2.i_d, m2.i_q = motor.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, m2.q_R)
 
     mesh_1 = gear_train.mesh_torque(m1.theta * c.per_N - s.theta, m1.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
     mesh_2 = gear_train.mesh_torque(m2.theta * c.per_N - s.theta, m2.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
     bearing, s.z = friction.lugre(s.z, s.omega, c.T_c, c.T_sc, c.per_v2, c.sigma_0, c.h_sigma_0, c.sigma_1_h, c.h)
     stop = travel.buffer_torque(s.theta, s.omega, c.stop_lower, c.stop_upper, c.k_stop, c.c_stop)
 
-    m1.omega = motor.speed(m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
-    m2.omega = motor.speed(m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
+    if c.flexible:
+        on_base = c.base_share * s.deck
+        s.dish, s.omega_dish, twist = structure.swing(
+            s.dish, s.omega_dish, s.theta, s.omega, external - on_base, c.k_dish, c.c_dish, c.h, c.h_J_dish)
+        external = on_base + twist
+
+    m1.omega = brake.braked(motor.speed(
+        m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B), m1.h_brake_J)
+    m2.omega = brake.braked(motor.speed(
+        m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B), m2.h_brake_J)
     s.omega = (s.omega + c.h_J * (mesh_1 + mesh_2 + external + stop - bearing)) * c.q_B
 
     m1.theta += c.h * m1.omega
@@ -167,13 +310,17 @@ def read(s, c, y):
     y.motor_velocity[0] = _measured_speed(m1, k1)
     y.motor_velocity[1] = _measured_speed(m2, k2)
     y.velocity = c.per_2N * (y.motor_velocity[0] + y.motor_velocity[1])
-    y.motor_torque[0] = k1.K_t * m1.i_q
-    y.motor_torque[1] = k2.K_t * m2.i_q
+    y.motor_torque[0] = _measured_torque(m1, k1)
+    y.motor_torque[1] = _measured_torque(m2, k2)
     y.torque = c.N * (y.motor_torque[0] + y.motor_torque[1])
     y.bias = s.bias
     y.torque_limited = s.torque_limited
     y.voltage_limited = s.voltage_limited
     y.end_stop = s.end_stop
     y.stopping = s.stopping
-    y.load_position = s.theta
-    y.load_velocity = s.omega
+    y.faults = s.faults
+    y.thermal_load[0], y.thermal_load[1] = m1.heat, m2.heat
+    y.load_position = s.dish if c.flexible else s.theta
+    y.load_velocity = s.omega_dish if c.flexible else s.omega
+    y.true_torque[0] = k1.K_t * m1.i_q
+    y.true_torque[1] = k2.K_t * m2.i_q

@@ -1,9 +1,21 @@
 """Bias torque against backlash: opposite on the two motors, faded out where both must pull together.
 
-Paper 000 section 1.3 leaves the schedule open; hold-fade is reference/servo.md section 3: full bias up to
+Paper 000 section 1.3 leaves the schedule open; hold_fade is reference/servo.md section 3: full bias up to
 a torque demand `hold` (one pinion would let go without it), none from `out` on (peak torque for acceleration).
 """
+import math
+
 from pedestal_common.compiled import compiled
+
+
+def line(p):
+    """T_b, out, per_fade of BiasParameters for `scheduled`."""
+    if p.schedule == 'off':
+        return 0.0, p.out, 1.0
+    if p.schedule == 'constant':
+        return p.torque, math.inf, 1.0
+    hold = p.hold if p.schedule == 'hold_fade' else 0.0
+    return p.torque, p.out, 1.0 / (p.out - hold)
 
 
 @compiled

@@ -6,45 +6,59 @@ import math
 
 import numpy as np
 
-from adu_drive import axis
+from adu_drive import axis, drive_state, wind
 from adu_drive.params import AduParameters, whole_speed_periods
 from pedestal_common.compiled import compiled
 
 RING = 128
 """Commands kept for the transport delay: more than MAX_DELAY over the shortest period."""
 
+LONG_AGO = 1 << 40
+"""Periods since the brakes were last moved, at the start."""
+
 LARGEST = 1e6
 """Inputs beyond this (rad/s, Nm, rad/s2), infinite or NaN are not believed."""
 
-_AXIS_INPUTS = np.dtype([('rate', 'f8'), ('torque', 'f8'), ('wind', 'f8')], align=True)
+_AXIS_INPUTS = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
 
 INPUTS = np.dtype([('azimuth', _AXIS_INPUTS), ('elevation', _AXIS_INPUTS),
                    ('base_acceleration', 'f8', (3,)), ('enable', 'i8')], align=True)
-"""Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm], wind torque on
-the load [Nm]. base_acceleration: angular acceleration of the deck, FLU [rad/s2].
+"""Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm].
+base_acceleration: angular acceleration of the deck, FLU [rad/s2].
 enable 1: follow, 0: controlled stop, at once whatever the delay."""
 
 _AXIS_OUTPUTS = np.dtype([
     ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
     ('motor_position', 'f8', (2,)), ('motor_velocity', 'f8', (2,)), ('motor_torque', 'f8', (2,)), ('bias', 'f8'),
     ('torque_limited', 'i8'), ('voltage_limited', 'i8'), ('end_stop', 'i8'), ('stopping', 'i8'),
-    ('load_position', 'f8'), ('load_velocity', 'f8')], align=True)
+    ('faults', 'i8'), ('thermal_load', 'f8', (2,)),
+    ('load_position', 'f8'), ('load_velocity', 'f8'), ('true_torque', 'f8', (2,))], align=True)
 
-OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8')], align=True)
+OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8'),
+                    ('phase', 'i8'), ('permitted', 'i8'), ('following', 'i8'), ('emergency', 'i8'), ('braked', 'i8'),
+                    ('condition', 'i8')], align=True)
 """At t_k+1, per axis:
 
 position          load encoder [rad]
 velocity          mean motor speed / N [rad/s], from the motor encoders over the last 0.5 ms
 torque            of both motors on the load axis, from their currents [Nm]
-motor_position, motor_velocity, motor_torque    of motor 1 and 2 on the shaft: encoder, its difference, K_t i_q
+motor_position, motor_velocity, motor_torque    of motor 1 and 2 on the shaft: encoder, its difference, K_t times
+                  the current as measured
 bias              T_b [Nm]
 torque_limited, voltage_limited                 1 when it happened within the period
 end_stop          1 when the end of travel cut the rate command within the period
 stopping          1 when not enabled within the period: ramped to standstill, then held there
-load_position, load_velocity                    the truth, for tests and studies; never published
+faults            latched fault word, see faults.KINDS
+thermal_load      of motor 1 and 2; 1 after rated torque for ever
+load_position, load_velocity, true_torque       the truth, for tests and studies; never published: where the beam
+                  points (the dish, where the structure is flexible), and K_t i_q of motor 1 and 2
 
 invalid_command   1 when an input of this call was not finite (or beyond LARGEST): the command counts as enable 0,
                   a disturbance as 0
+phase             of drive_state.PHASES; permitted: 1 when nothing stands against being enabled; following: both
+emergency         1 when an emergency stop is latched
+braked            1 when the brakes grip
+condition         all of these and both fault words in one number: it changes when one of them does
 """
 
 
@@ -62,20 +76,25 @@ def _record(values):
 def _constants(params, substeps):
     h = axis.CURRENT_PERIOD / substeps
     return _record({'azimuth': axis.constants(params.azimuth, h), 'elevation': axis.constants(params.elevation, h),
-                    'wind_azimuth': params.wind.azimuth, 'wind_elevation': params.wind.elevation,
+                    'wind': wind.constants(params.wind), 'period': params.period,
                     'speed_ticks': whole_speed_periods('period', params.period),
                     'delay_ticks': whole_speed_periods('transport_delay', params.transport_delay),
+                    **{f'{name}_periods': math.ceil(getattr(params.brakes, f'{name}_time') / params.period - 1e-6)
+                       for name in ('engage', 'release', 'stop')},
                     'substeps': substeps})
 
 
 def _initial_state(params):
-    axes = {}
-    for name in ('azimuth', 'elevation'):
+    axes, enabled = {}, params.initially_enabled
+    for name, torque in zip(('azimuth', 'elevation'), wind.initial_torques(params.wind)):
         p, theta = getattr(params, name), getattr(params, f'initial_{name}')
-        external = getattr(params.wind, name) - p.load.unbalance * math.cos(theta)
+        external = torque - p.load.unbalance * math.cos(theta)
         axes[name] = axis.initial_state(p, theta, external)
     return _record({**axes, 'rate': np.zeros((RING, 2)), 'torque': np.zeros((RING, 2)),
-                    'enable': np.zeros(RING, np.int64), 'k': 0})
+                    'enable': np.zeros(RING, np.int64), 'k': 0,
+                    'phase': drive_state.ENABLED if enabled else drive_state.DISABLED, 'age': 0,
+                    'wanted': int(enabled), 'emergency': 0,
+                    'applied': int(not enabled), 'brake_age': LONG_AGO, 'braked': int(not enabled)})
 
 
 CONSTANTS = _constants(AduParameters(), 2).dtype
@@ -89,7 +108,7 @@ def constants(params: AduParameters, substeps: int = 2) -> np.ndarray:
 
 
 def initial_state(params: AduParameters) -> np.ndarray:
-    """At rest at the initial angles, in balance with constant wind and unbalance, bias in place: (1,) record."""
+    """At rest at the initial angles, in balance with wind (t = 0) and unbalance, bias in place: (1,) record."""
     return _initial_state(params).view(STATE)
 
 
@@ -113,21 +132,14 @@ def _external(s, c, u):
     """External torques [Nm] on the two loads, constant over the period, and whether every input was believable."""
     x, y, z = u.base_acceleration[0], u.base_acceleration[1], u.base_acceleration[2]
     azimuth, elevation = s.azimuth.theta, s.elevation.theta
-    T_azimuth = c.wind_azimuth - c.azimuth.unbalance * math.cos(azimuth)
-    T_elevation = c.wind_elevation - c.elevation.unbalance * math.cos(elevation)
-    believed = True
-    if _believed(x) and _believed(y) and _believed(z):
-        inertial_azimuth, inertial_elevation = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
-        T_azimuth += inertial_azimuth
-        T_elevation += inertial_elevation
-    else:
-        believed = False
-    if _believed(u.azimuth.wind) and _believed(u.elevation.wind):
-        T_azimuth += u.azimuth.wind
-        T_elevation += u.elevation.wind
-    else:
-        believed = False
-    return T_azimuth, T_elevation, believed
+    T_azimuth, T_elevation = wind.torques(c.wind, s.k * c.period)
+    T_azimuth -= c.azimuth.unbalance * math.cos(azimuth)
+    T_elevation -= c.elevation.unbalance * math.cos(elevation)
+    believed = _believed(x) and _believed(y) and _believed(z)
+    if not believed:
+        x = y = z = 0.0
+    s.azimuth.deck, s.elevation.deck = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
+    return T_azimuth + s.azimuth.deck, T_elevation + s.elevation.deck, believed
 
 
 @compiled
@@ -144,19 +156,15 @@ def _receive(s, u, disturbance_believed):
 
 
 @compiled
-def _clear(s):
-    s.torque_limited = 0
-    s.voltage_limited = 0
-    s.end_stop = 0
-    s.stopping = 0
-
-
-@compiled
 def read(state, constants, outputs):
     """Outputs as they are now, nothing integrated: at t_0, before the first step."""
     s, c, y = state[0], constants[0], outputs[0]
     axis.read(s.azimuth, c.azimuth, y.azimuth)
     axis.read(s.elevation, c.elevation, y.elevation)
+    y.phase, y.emergency, y.braked = s.phase, s.emergency, s.braked
+    y.permitted = drive_state.permitted(s)
+    y.following = y.permitted and s.phase == drive_state.ENABLED
+    y.condition = s.phase | s.emergency << 3 | y.permitted << 4 | s.azimuth.faults << 8 | s.elevation.faults << 16
 
 
 @compiled
@@ -166,14 +174,17 @@ def step(state, constants, inputs, outputs):
     az, el, c_az, c_el = s.azimuth, s.elevation, c.azimuth, c.elevation
     T_az, T_el, believed = _external(s, c, u)
     outputs[0].invalid_command = 0 if _receive(s, u, believed) else 1
-    _clear(az)
-    _clear(el)
+    s.braked = drive_state.advance(s, c)
+    enabled = s.phase == drive_state.ENABLED and u.enable == 1
+    powered, free = s.phase != drive_state.DISABLED, not s.braked
+    axis.begin_period(az, c_az, s.braked, enabled)
+    axis.begin_period(el, c_el, s.braked, enabled)
     for j in range(c.speed_ticks):
         tick = s.k * c.speed_ticks + j - c.delay_ticks
         slot = (tick // c.speed_ticks) % RING     # before the first command: a slot still empty, enable 0
-        enable = s.enable[slot] if u.enable == 1 else 0
-        axis.speed_control(az, c_az, s.rate[slot, 0], s.torque[slot, 0], enable)
-        axis.speed_control(el, c_el, s.rate[slot, 1], s.torque[slot, 1], enable)
+        enable = s.enable[slot] if enabled else 0
+        axis.speed_control(az, c_az, s.rate[slot, 0], s.torque[slot, 0], enable, powered, free)
+        axis.speed_control(el, c_el, s.rate[slot, 1], s.torque[slot, 1], enable, powered, free)
         for _ in range(axis.CURRENT_TICKS):
             axis.current_control(az.motor_1, c_az.motor_1)
             axis.current_control(az.motor_2, c_az.motor_2)

@@ -3,7 +3,7 @@ what the paper leaves open: reference/servo.md section 1."""
 import dataclasses
 import math
 
-from pedestal_common.parameters import ParameterError, Parameters, group, parameter
+from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter
 
 SPEED_PERIOD = 0.5e-3
 """Period of the speed loop [s]; five current-loop periods."""
@@ -21,6 +21,15 @@ def whole_speed_periods(name, value):
 
 
 @dataclasses.dataclass(frozen=True)
+class DriftParameters(Parameters):
+    """The motor and its current sensor as they are, against what the controller believes."""
+    resistance: float = parameter(0.0, -0.9, 5.0, '', 'relative')
+    flux_linkage: float = parameter(0.0, -0.5, 0.5, '', 'relative')
+    current_gain: float = parameter(0.0, -0.5, 0.5, '', 'relative, of the current sensor')
+    current_offset: float = parameter(0.0, -50.0, 50.0, 'A', 'of the torque-making current as measured')
+
+
+@dataclasses.dataclass(frozen=True)
 class MotorParameters(Parameters):
     resistance: float = parameter(0.868, 0.01, 100.0, 'ohm', 'phase resistance')
     inductance: float = parameter(10.0995e-3, 1e-4, 1.0, 'H', 'phase inductance, d = q')
@@ -32,6 +41,8 @@ class MotorParameters(Parameters):
     friction: float = parameter(0.4, 0.0, 100.0, 'Nm', 'Coulomb friction')
     friction_speed: float = parameter(0.5, 0.1, 100.0, 'rad/s', 'rate over which friction changes its sign')
     viscous: float = parameter(0.003, 0.0, 10.0, 'Nms/rad', 'viscous friction')
+    brake: float = parameter(45.0, 0.0, 1e4, 'Nm', 'holding torque of the brake on the motor shaft')
+    drift: DriftParameters = group(DriftParameters)
 
     @property
     def torque_constant(self):
@@ -45,21 +56,24 @@ class CurrentLoopParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class SpeedLoopParameters(Parameters):
+    structure: str = choice('mean', ('mean', 'independent'), 'one loop on the mean speed, or one for each motor')
     proportional: float = parameter(6.0, 0.0, 1000.0, 'Nms/rad', 'per motor, on its shaft')
     integral: float = parameter(200.0, 0.0, 1e5, 'Nm/rad', 'per motor, on its shaft')
     differential_damping: float = parameter(0.0, 0.0, 10.0, 'Nms/rad', 'on the speed difference of the motors')
+    disturbance_observer: float = parameter(0.0, 0.0, 2000.0, 'rad/s', 'bandwidth, in place of the integral; 0: off')
+    load_inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'of the load as the disturbance observer believes')
 
 
 @dataclasses.dataclass(frozen=True)
 class BiasParameters(Parameters):
-    """torque 0 = off, hold 0 = linear fade, hold beyond the torque limit = constant."""
+    schedule: str = choice('hold_fade', ('off', 'constant', 'fade', 'hold_fade'), 'fade: from zero torque demand on')
     torque: float = parameter(12.0, 0.0, 1000.0, 'Nm', 'bias per motor')
-    hold: float = parameter(14.0, 0.0, 10000.0, 'Nm', 'held up to this torque demand per motor')
-    out: float = parameter(45.0, 0.1, 20000.0, 'Nm', 'gone at this torque demand per motor')
+    hold: float = parameter(14.0, 0.0, 10000.0, 'Nm', 'hold_fade: held up to this torque demand per motor')
+    out: float = parameter(45.0, 0.1, 20000.0, 'Nm', 'fade, hold_fade: gone at this torque demand per motor')
     lag: float = parameter(0.010, 0.0, 1.0, 's', 'time constant')
 
     def check(self):
-        if self.out <= self.hold:
+        if self.schedule == 'hold_fade' and self.out <= self.hold:
             raise ParameterError(f'out = {self.out:g} Nm: must be above hold = {self.hold:g}')
 
 
@@ -81,6 +95,14 @@ class LoadParameters(Parameters):
     inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'about the axis')
     viscous: float = parameter(20.0, 0.0, 1e6, 'Nms/rad', 'viscous friction')
     unbalance: float = parameter(0.0, -1e5, 1e5, 'Nm', 'gravity torque at angle 0, pulls the angle down')
+
+
+@dataclasses.dataclass(frozen=True)
+class StructureParameters(Parameters):
+    """A part of the load, the dish, swings on the rest of it, which the gear and the encoder see."""
+    inertia_share: float = parameter(0.0, 0.0, 0.9, '', "of the load's inertia; 0: rigid")
+    frequency: float = parameter(12.0, 1.0, 200.0, 'Hz', 'of the dish on a locked base')
+    damping: float = parameter(0.01, 0.0, 1.0, '', 'damping ratio of that')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,6 +136,34 @@ class LimitParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class ThermalParameters(Parameters):
+    """I2t of each motor: load = 1 after rated torque for ever."""
+    rated_torque: float = parameter(30.0, 0.1, 10000.0, 'Nm', 'torque a motor bears for ever')
+    time_constant: float = parameter(60.0, 0.1, 1e5, 's', 'of the winding')
+    rise: float = parameter(80.0, 0.0, 300.0, 'K', 'of the winding over its cold state at load 1; it adds resistance')
+
+
+@dataclasses.dataclass(frozen=True)
+class FaultParameters(Parameters):
+    """Where an axis trips."""
+    overcurrent: float = parameter(46.0, 0.01, 10000.0, 'A', 'phase current, peak; 1.3 times that of the torque limit')
+    overspeed: float = parameter(3.0, 1e-4, 50.0, 'rad/s', 'motor speed over the ratio')
+    encoder_disagreement: float = parameter(5e-3, 1e-6, 1.0, 'rad', 'load encoder less motor encoders; lash, wind-up '
+                                            'and bending of the gears must fit in')
+    following_error: float = parameter(0.05, 1e-4, 50.0, 'rad/s', 'rate wanted less rate measured ...')
+    following_time: float = parameter(0.5, 1e-3, 100.0, 's', '... beyond it for this long')
+    overtemperature: float = parameter(1.1, 0.01, 100.0, '', 'thermal load of a motor')
+
+
+@dataclasses.dataclass(frozen=True)
+class BrakeParameters(Parameters):
+    """The brakes of all motors; their torque is the motors' own parameter."""
+    engage_time: float = parameter(0.05, 0.0, 10.0, 's', 'from the order until they grip')
+    release_time: float = parameter(0.1, 0.0, 10.0, 's', 'from the order until they are free')
+    stop_time: float = parameter(1.0, 1e-3, 100.0, 's', 'a controlled stop that takes longer ends in the brakes')
+
+
+@dataclasses.dataclass(frozen=True)
 class EncoderParameters(Parameters):
     load_bits: int = parameter(22, 8, 32, 'bit', 'load encoder, per turn')
     motor_bits: int = parameter(20, 8, 32, 'bit', 'motor encoders, per turn')
@@ -128,9 +178,12 @@ class AxisParameters(Parameters):
     bias: BiasParameters = group(BiasParameters)
     gear_train: GearTrainParameters = group(GearTrainParameters)
     load: LoadParameters = group(LoadParameters)
+    structure: StructureParameters = group(StructureParameters)
     friction: FrictionParameters = group(FrictionParameters)
     limits: LimitParameters = group(LimitParameters)
     encoder: EncoderParameters = group(EncoderParameters)
+    thermal: ThermalParameters = group(ThermalParameters)
+    faults: FaultParameters = group(FaultParameters)
 
     def check(self):
         for motor in (self.motor_1, self.motor_2):
@@ -141,9 +194,29 @@ class AxisParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class GustParameters(Parameters):
+    """step and sine add a torque to the mean; davenport and von_karman scale the mean with (1 + v / V)^2."""
+    kind: str = choice('none', ('none', 'step', 'sine', 'davenport', 'von_karman'), 'on top of the mean torque')
+    azimuth: float = parameter(0.0, -1e5, 1e5, 'Nm', 'step, sine: amplitude')
+    elevation: float = parameter(0.0, -1e5, 1e5, 'Nm', 'step, sine: amplitude')
+    start: float = parameter(1.0, 0.0, 86400.0, 's', 'step, sine: begins at this time of the drive')
+    frequency: float = parameter(1.0, 1e-3, 50.0, 'Hz', 'sine')
+    speed: float = parameter(10.0, 1.0, 60.0, 'm/s', 'spectra: mean wind V')
+    intensity: float = parameter(0.2, 0.0, 0.5, '', 'spectra: sigma_v / V')
+    length: float = parameter(100.0, 10.0, 2000.0, 'm', 'von_karman: length of the turbulence')
+    seed: int = parameter(1, 0, 2 ** 31 - 1, '', 'spectra: of the phases')
+
+
+@dataclasses.dataclass(frozen=True)
 class WindParameters(Parameters):
-    azimuth: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'constant torque on the axis')
-    elevation: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'constant torque on the axis')
+    azimuth: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'mean torque on the axis')
+    elevation: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'mean torque on the axis')
+    gust: GustParameters = group(GustParameters)
+
+    def check(self):
+        if self.gust.kind in ('davenport', 'von_karman') and self.azimuth == self.elevation == 0.0:
+            raise ParameterError(f'gust.kind = {self.gust.kind}: the spectra scale the mean torque, '
+                                 f'and azimuth = elevation = 0 Nm')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,15 +225,18 @@ class AduParameters(Parameters):
     transport_delay: float = parameter(0.0, 0.0, MAX_DELAY, 's', 'a command takes effect this much later')
     initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'at t = 0')
     initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'at t = 0')
+    initially_enabled: bool = flag(True, 'false: brakes on until adu/enable')
+    brakes: BrakeParameters = group(BrakeParameters)
     wind: WindParameters = group(WindParameters)
     azimuth: AxisParameters = group(AxisParameters)
     elevation: AxisParameters = group(
         AxisParameters,
-        speed_loop=SpeedLoopParameters(proportional=3.2, integral=105.0),
+        speed_loop=SpeedLoopParameters(proportional=3.2, integral=105.0, load_inertia=150.0),
         gear_train=GearTrainParameters(reducer_ratio=10.0, pinion_ratio=9.0, lash=0.8e-3, stiffness=4e6, damping=4e3),
         load=LoadParameters(inertia=150.0, viscous=15.0, unbalance=40.0),
         friction=FrictionParameters(coulomb=45.0, breakaway=60.0),
-        limits=LimitParameters(rate=1.7, lower=math.radians(-2.0), upper=math.radians(92.0)))
+        limits=LimitParameters(rate=1.7, lower=math.radians(-2.0), upper=math.radians(92.0)),
+        faults=FaultParameters(overspeed=2.1))
 
     def check(self):
         whole_speed_periods('period', self.period)

@@ -6,19 +6,46 @@ import math
 
 import numpy as np
 
-from adu_drive import drive_unit
+from adu_drive import drive_state, drive_unit, faults
 from pedestal_common import messages, records
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
 
 CLOCK, COMMAND, SHIP, JOINTS, MOTORS = 'clock', 'acu/rate_command', 'ship/truth', 'joint_states', 'adu/motor_states'
-HEARD, SAID = records.of(JOINTS, COMMAND, SHIP), records.of(JOINTS, CLOCK, MOTORS)
+STATE = 'adu/state'
+HEARD, SAID = records.of(JOINTS, COMMAND, SHIP), records.of(JOINTS, CLOCK, MOTORS, more=(STATE,))
 """The joint states it hears are its own, of which it takes the stamp: t_k of the step that follows."""
 
 MEMORY = np.dtype([('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)), ('timeout', 'i8'),
-                   ('emergency', 'i8')])
+                   ('begun', 'i8')])
 """Stamps of the last command and of the last truth with a finite rate (FLU, rad/s); age at which a command is stale
-[ns]; 1 from an emergency stop on."""
+[ns]; answers: 1 once the first step was said."""
+
+
+def state_text(outputs):
+    """'enabled' when the drive follows commands, otherwise why it does not."""
+    if outputs['following']:
+        return 'enabled'
+    tripped = [f'{axis} {kind}' for axis in messages.AXES for kind in faults.names(outputs[axis]['faults'])]
+    if tripped:
+        return 'fault: ' + ', '.join(tripped)
+    if outputs['emergency']:
+        return 'emergency stop'
+    phase = outputs['phase']
+    if phase == drive_state.DISABLED and outputs['permitted']:
+        phase = drive_state.RELEASING
+    return drive_state.PHASES[drive_state.STOPPING if phase == drive_state.ENABLED else phase]
+
+
+class _Words:
+    """The text of adu/state by its code, the condition of drive_unit.OUTPUTS."""
+
+    def __getitem__(self, condition):
+        phase, permitted = condition & 7, condition >> 4 & 1
+        azimuth, elevation = {'faults': condition >> 8 & 0xff}, {'faults': condition >> 16 & 0xff}
+        return state_text({'phase': phase, 'permitted': permitted, 'emergency': condition >> 3 & 1,
+                           'following': permitted and phase == drive_state.ENABLED, 'azimuth': azimuth,
+                           'elevation': elevation})
 
 
 class Adu:
@@ -27,7 +54,7 @@ class Adu:
     heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
     a step waits for.
     """
-    HEARD, SAID, CODES = HEARD, SAID, {}
+    HEARD, SAID, CODES = HEARD, SAID, {STATE: _Words()}
 
     def __init__(self, params, on_ship):
         self.constants, self.state = drive_unit.constants(params), drive_unit.initial_state(params)
@@ -36,17 +63,19 @@ class Adu:
         self.memory = np.zeros(1, MEMORY)
         self.memory['command_stamp'] = self.memory['truth_stamp'] = NEVER
         self.memory['timeout'] = round(params.command_timeout * params.period * 1e9)
-        self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
+        self.heard, self.said, self.last = np.zeros(1, HEARD), np.zeros(1, SAID), np.zeros(1, HEARD)
+        self.remembers = self.state, self.inputs, self.outputs, self.memory, self.last
         self.messages = {JOINTS: messages.joint_state(messages.AXES), MOTORS: messages.joint_state(messages.MOTORS),
                          CLOCK: messages.Clock(clock=messages.Time(sec=0, nanosec=0))}
         self.followers = {COMMAND: 0.0, **({SHIP: 0.0} if on_ship else {})}
         self.events = {}
 
     def prepare(self):
-        """Compile `say` and `advance`."""
-        say(self.outputs, self.heard, self.said.copy())
-        advance(self.state.copy(), self.constants, self.inputs.copy(), self.outputs.copy(), self.memory.copy(),
-                self.heard)
+        """Compile `say`, `advance` and `ask`."""
+        state, outputs = self.state.copy(), self.outputs.copy()
+        say(outputs, self.heard, self.said.copy())
+        advance(state, self.constants, self.inputs.copy(), outputs, self.memory.copy(), self.heard)
+        drive_state.request(state, self.constants, drive_state.DISABLE)
 
     def say(self):
         """Put what is at the stamp of `heard` into `said`."""
@@ -56,9 +85,32 @@ class Adu:
         """One period on from the stamp of `heard`, obeying it; whether the command in force is stale."""
         return advance(self.state, self.constants, self.inputs, self.outputs, self.memory, self.heard)
 
+    def ask(self, what):
+        """Ask for one of drive_state.REQUESTS (its index) between two steps; drive_state.GRANTED, or why not."""
+        answer = drive_state.request(self.state, self.constants, what)
+        drive_unit.read(self.state, self.constants, self.outputs)
+        return answer
+
+    def request(self, service):
+        """The same by the name of its service; True when granted."""
+        return self.ask(drive_state.REQUESTS.index(service.removeprefix('adu/'))) == drive_state.GRANTED
+
+    def services_to(self, text):
+        """The services that bring adu/state to a text. What a latched fault or emergency stop hides (that the drive
+        was disabled meanwhile) shows when it is reset."""
+        o, wanted = self.outputs[0], self.state[0]['wanted']
+        if text.startswith('fault'):
+            return []
+        if text == 'emergency stop':
+            return [] if o['emergency'] else ['adu/emergency_stop']
+        services = ['adu/reset_faults'] if o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults'] else []
+        if text in ('enabled', 'releasing brakes'):
+            return services if wanted else [*services, 'adu/enable']
+        return [*services, 'adu/disable'] if wanted else services
+
     def answers(self, heard, said):
-        """Both for many steps, records (n,)."""
-        answers(self.state, self.constants, self.inputs, self.outputs, self.memory, heard, said)
+        """Many steps, records (n,): `advance` by what was heard last, then `say`."""
+        answers(self.state, self.constants, self.inputs, self.outputs, self.memory, self.last, heard, said)
 
 
 @compiled
@@ -73,6 +125,7 @@ def say(outputs, heard, said):
             motors.position[2 * i + j] = axis.motor_position[j]
             motors.velocity[2 * i + j] = axis.motor_velocity[j]
             motors.effort[2 * i + j] = axis.motor_torque[j]
+    said[0][STATE] = y.condition
 
 
 @compiled
@@ -83,7 +136,7 @@ def hear(u, m, stamp, command, ship):
         u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
         u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
     stale = m.command_stamp == NEVER or stamp - m.command_stamp > m.timeout
-    u.enable = 0 if stale or m.emergency == 1 else 1
+    u.enable = 0 if stale else 1
     if ship.stamp != NEVER:
         w, last = ship.twist_angular, m.truth_stamp
         # The deck's angular acceleration, from two successive truths and their stamps.
@@ -107,7 +160,11 @@ def advance(state, constants, inputs, outputs, memory, heard):
 
 
 @compiled
-def answers(state, constants, inputs, outputs, memory, heard, said):
+def answers(state, constants, inputs, outputs, memory, last, heard, said):
+    """Step by step; what is asked for before heard[k] comes between the answer to heard[k - 1] and the next."""
     for k in range(len(heard)):
+        if memory[0].begun:
+            advance(state, constants, inputs, outputs, memory, last)
         say(outputs, heard[k:k + 1], said[k:k + 1])
-        advance(state, constants, inputs, outputs, memory, heard[k:k + 1])
+        last[0] = heard[k]
+        memory[0].begun = 1

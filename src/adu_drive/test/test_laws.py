@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from adu_drive import bias, encoder, friction, gear_train, pi, speed_loop, travel
+from adu_drive.params import BiasParameters
 
 
 def test_own_exp_and_tanh_keep_their_stated_errors():
@@ -15,10 +16,13 @@ def test_own_exp_and_tanh_keep_their_stated_errors():
     assert math.isnan(friction.tanh(math.nan))
 
 
-@pytest.mark.parametrize('demand, expected', [(0.0, 12.0), (14.0, 12.0), (-14.0, 12.0), (29.5, 6.0), (-29.5, 6.0),
-                                              (45.0, 0.0), (90.0, 0.0)])
-def test_bias_is_held_then_faded(demand, expected):
-    assert bias.scheduled(demand, 12.0, 45.0, 1.0 / (45.0 - 14.0)) == pytest.approx(expected, abs=1e-12)
+@pytest.mark.parametrize('schedule, expected', [
+    ('off', [0.0, 0.0, 0.0, 0.0, 0.0]), ('constant', [12.0, 12.0, 12.0, 12.0, 12.0]),
+    ('fade', [12.0, 12.0 * 31.0 / 45.0, 12.0 * 15.5 / 45.0, 0.0, 0.0]), ('hold_fade', [12.0, 12.0, 6.0, 0.0, 0.0])])
+def test_bias_schedules(schedule, expected):
+    line = bias.line(BiasParameters(schedule=schedule))
+    for sign in (1.0, -1.0):
+        assert [bias.scheduled(sign * T, *line) for T in (0.0, 14.0, 29.5, 45.0, 90.0)] == pytest.approx(expected)
 
 
 def test_mesh_has_a_dead_zone_and_never_pulls():
@@ -43,9 +47,8 @@ def test_lugre_settles_on_the_stribeck_curve_and_sticks_like_a_spring():
 
 
 def test_differential_damping_and_limits_share_the_torque():
-    assert speed_loop.shared(10.0, 5.0, 1.0, 0.0, 2.0, 90.0, 90.0) == (13.0, 7.0, False)
-    assert speed_loop.shared(88.0, 5.0, 0.0, 0.0, 0.0, 90.0, 90.0) == (90.0, 83.0, True)
-    assert speed_loop.shared(-100.0, 0.0, 0.0, 0.0, 0.0, 90.0, 80.0) == (-90.0, -80.0, True)
+    assert speed_loop.shared(10.0, 10.0, 5.0, 1.0, 0.0, 2.0) == (13.0, 7.0)
+    assert [speed_loop.limited(T, 90.0) for T in (-100.0, 12.0, 93.0)] == [-90.0, 12.0, 90.0]
 
 
 def test_integral_is_held_only_into_the_limit():

@@ -34,6 +34,7 @@ def test_table_1_of_paper_000():
     (lambda: FrictionParameters(breakaway=50.0), 'breakaway = 50'),
     (lambda: AxisParameters(motor_1=MotorParameters(voltage=200.0)), 'limits.rate = 2.45'),
     (lambda: EncoderParameters(load_bits=math.nan), 'load_bits'),
+    (lambda: build(AduParameters, {'wind.gust.kind': 'davenport'}), 'gust.kind = davenport'),
     (lambda: build(AduParameters, {'azimuth.gear_train.lsh': 0.0}), "did you mean 'azimuth.gear_train.lash'"),
 ])
 def test_bad_parameters_are_named(make, words):

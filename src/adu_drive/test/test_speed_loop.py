@@ -62,9 +62,10 @@ def test_voltage_limit_recovers_without_windup(drive):
     long after 2 s in the limit as after 0.6 s (an integral that had run on would overshoot for longer)."""
     def back(volts, seconds):
         p = build(AduParameters, {'initial_elevation': 0.7, 'initial_azimuth': -4.5, 'azimuth.motor_1.voltage': volts,
-                                  'azimuth.motor_2.voltage': volts})
-        d = drive(p).run(seconds, azimuth=2.45, wind=-3000.0)
-        y, total = d.log['azimuth'][-1], d.state['azimuth']['sum'][0]
+                                  'azimuth.motor_2.voltage': volts, 'wind.azimuth': -3000.0,
+                                  'azimuth.faults.following_time': 100.0})
+        d = drive(p).run(seconds, azimuth=2.45)
+        y, total = d.log['azimuth'][-1], d.state['azimuth']['motor_1']['sum'][0]
         assert total < 1.1 * y['motor_torque'].mean()
         v = d.run(0.4, azimuth=2.2).log['azimuth']['load_velocity'][-80:]
         assert v[-1] == pytest.approx(2.2, abs=2e-3)
@@ -78,7 +79,8 @@ def test_voltage_limit_recovers_without_windup(drive):
 
 def test_mean_speed_feedback_shares_the_load(drive):
     """Against 1000 Nm each motor carries half of what the load needs, plus and minus the bias."""
-    d = drive().run(1.0, azimuth=0.1, wind=-1000.0)
+    p = build(AduParameters, {'initial_elevation': 0.7, 'wind.azimuth': -1000.0})
+    d = drive(p).run(1.0, azimuth=0.1)
     y = d.log['azimuth'][-1]
     friction = 60.0 + 20.0 * 0.1 + 2.0 * 64.0 * (0.4 + 0.003 * 6.4)
     assert y['torque'] == pytest.approx(1000.0 + friction, rel=0.01)
@@ -101,3 +103,51 @@ def test_differential_damping_calms_the_pinions(drive):
         return np.std(difference)
 
     assert ringing(1.0) < 0.3 * ringing(0.0)
+
+
+HARD_MOVES = [(2.1, 0.1), (0.0, 0.4), (-2.1, 0.1), (0.0, 0.4)]
+
+
+def moved(drive, **values):
+    """The azimuth of the outputs of hard moves there and back, parked after each; rates that fade the bias out."""
+    d = drive(build(AduParameters, {'initial_elevation': 0.7, **values}))
+    for rate, seconds in HARD_MOVES:
+        d.run(seconds, azimuth=rate)
+    return d.log['azimuth']
+
+
+def test_two_loops_are_one_on_the_mean_and_one_on_the_difference(drive):
+    """Without integrals, two loops are the mean loop with a differential damping of K_p / 2."""
+    values = {'azimuth.speed_loop.integral': 0.0, 'azimuth.motor_2.drift.flux_linkage': -0.05,
+              'azimuth.motor_1.torque_limit': 1000.0, 'azimuth.motor_2.torque_limit': 1000.0}
+    two = moved(drive, **values, **{'azimuth.speed_loop.structure': 'independent'})
+    one = moved(drive, **values, **{'azimuth.speed_loop.differential_damping': 3.0})
+    for field in ('load_position', 'motor_torque'):
+        assert two[field] == pytest.approx(one[field], abs=1e-6)
+
+
+def test_only_the_mean_loop_keeps_the_bias(drive):
+    """The bias that comes back after a move turns the pinions against each other; the integrals of two loops take
+    that for an error and push back, until nothing of the bias is left."""
+    preload = {}
+    for structure in ('mean', 'independent'):
+        a = moved(drive, **{'azimuth.speed_loop.structure': structure})
+        assert a['bias'][-1] == pytest.approx(12.0, abs=1e-3)
+        preload[structure] = 0.5 * (a['motor_torque'][-1, 0] - a['motor_torque'][-1, 1])
+    assert preload['mean'] == pytest.approx(12.0, abs=0.1)
+    assert preload['independent'] < 4.0
+
+
+def test_drift_shows_in_the_true_torque_alone(drive):
+    """The controller makes the current it measures what it asked for; the shaft gets that of the true motor."""
+    drift = {'flux_linkage': -0.1, 'resistance': 0.4, 'current_gain': 0.06, 'current_offset': 0.8}
+    d = drive(build(AduParameters, {'initial_elevation': 0.7,
+                                    **{f'azimuth.motor_2.drift.{name}': value for name, value in drift.items()}}))
+    y = d.run(1.0, azimuth=0.1).log['azimuth'][-1]
+    asked = [d.state['azimuth'][m]['torque_ref'][0] for m in ('motor_1', 'motor_2')]
+    K_t = 1.5 * 4 * 0.4219
+    assert y['motor_torque'] == pytest.approx(asked, abs=0.1)
+    assert y['true_torque'][0] == pytest.approx(asked[0], abs=0.1)
+    assert y['true_torque'][1] == pytest.approx(0.9 * (asked[1] - 0.8 * K_t) / 1.06, abs=0.1)
+    friction = 60.0 + 20.0 * 0.1 + 2.0 * 64.0 * (0.4 + 0.003 * 6.4)
+    assert 64.0 * y['true_torque'].sum() == pytest.approx(friction, rel=0.02)

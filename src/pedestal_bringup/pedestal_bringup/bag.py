@@ -1,4 +1,5 @@
 """Bags: a rosbag2 directory (metadata.yaml version 9) with one MCAP file, written and read. No ROS here."""
+import difflib
 import fcntl
 import functools
 import io
@@ -115,6 +116,17 @@ def read(path):
     return bag
 
 
+def chosen_topics(bag, names):
+    """The topics of these names, without the leading '/', each once; BagError with the nearest for one it has not."""
+    chosen = list(dict.fromkeys(name.lstrip('/') for name in names))
+    for name in chosen:
+        if name not in bag.topics:
+            near = difflib.get_close_matches(name, bag.topics, n=1)
+            hint = f'did you mean {near[0]}? ' if near else ''
+            raise BagError(f'{bag.path}: no topic {name} in it; {hint}there are {", ".join(bag.topics)}')
+    return chosen
+
+
 def load(path):
     """The Bag as far as it can be read; its `damage` says in one line where and why it ends, '' if it is whole."""
     file = locate(path)
@@ -149,6 +161,10 @@ def locate(path):
     if head == SQLITE:
         raise BagError(f'{file}: an SQLite bag, not an MCAP file; `ros2 bag convert` makes one of it')
     raise BagError(f'{file}: not an MCAP file')
+
+
+def foreign_encoding(file, channel):
+    return BagError(f'{file}: {channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
 
 
 def _only_file(path):
@@ -193,7 +209,7 @@ class Bag:
                 raise EOFError(f'the file ends at byte {len(data)} inside a record that goes on to {at + length}')
             try:
                 closed = self._take(opcode, at, length, rows)
-            except EOFError:
+            except (BagError, EOFError):
                 raise
             except Exception as error:
                 raise EOFError(f'broken record at byte {at - 9}: {error}') from None
@@ -233,7 +249,7 @@ class Bag:
         elif opcode == Opcode.CHANNEL:
             channel = records.Channel.read(stream)
             if channel.message_encoding != 'cdr':
-                raise EOFError(f'{channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
+                raise foreign_encoding(self.file, channel)
             self._channels[channel.id] = channel.topic.lstrip('/')
             self.topics[channel.topic.lstrip('/')] = self._schemas[channel.schema_id]
         elif opcode == Opcode.METADATA:

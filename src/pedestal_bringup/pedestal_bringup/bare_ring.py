@@ -37,7 +37,7 @@ class Ring(Node):
         self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
         step_topics = [topic for topic in topics.TOPICS if topic.rate == 'step']
         self.writers = [(self.create_publisher(shell.message_class(topic.type), topic.name, shell.QOS['step']),
-                         _filled(topic.type), topics.readers(topic, ROLES))
+                         _filled(topic.type), len(topics.readers(topic, ROLES)))
                         for topic in step_topics if role in topic.writers]
         for topic in step_topics:
             if role == 'recorder' and topic.writers[0] in ROLES:

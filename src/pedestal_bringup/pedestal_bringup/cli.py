@@ -1,4 +1,4 @@
-"""The command line `pedestal`: thin verbs over graph, bag, report and bench."""
+"""The command line `pedestal`: thin verbs over graph, bag, report, studies and bench."""
 import argparse
 import contextlib
 import json
@@ -7,6 +7,7 @@ import pathlib
 import signal
 import sys
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -14,6 +15,7 @@ from rich.table import Table
 from pedestal_common.parameters import ParameterError
 
 EXIT_STOPPED = 130
+EXIT_WRONG_COMMAND = 2
 
 RECOMPUTE = """\
 Feeds the recorded inputs of a node to its step function and compares what it answers with what was recorded: count and
@@ -22,8 +24,9 @@ recording never exercised the node (never locked, never in autotrack, never move
 
 Exact for a lockstep recording: the same version on the same machine gives the same bits. In a realtime recording a
 step gets what had been sent when the next one began: that is what the node had, but for messages that were on their
-way to it just then. Services are not recorded: a change of acu/mode that the ACU would not make by itself is asked for
-at that step, and counted. Nor are parameters that were changed while running. Diagnostics are not recomputed.
+way to it just then. Services are not recorded: a change of acu/mode or adu/state that the node would not make by
+itself is asked for at that step, and counted. Nor are parameters that were changed while running. Diagnostics are not
+recomputed.
 
 With --param it does not fail but reports old against new. The recorded antenna does not move with the recomputed
 command: compared are the estimate against the recorded truth (error, noise, lag) and the noise of the command; what a
@@ -84,11 +87,30 @@ def _parser():
     recover.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: beside it, BAG-recovered')
     recover.set_defaults(verb=_recover)
 
+    rerun = verbs.add_parser('rerun', help='make a recorded run again and compare; exit code 1 when a message differs')
+    rerun.add_argument('recording', type=pathlib.Path)
+    rerun.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='of the new run; default: bags/runs/SCENARIO-N')
+    rerun.set_defaults(verb=_rerun)
+
     report = verbs.add_parser('report', help='write a recording as one HTML file with its figures')
     report.add_argument('bag', type=pathlib.Path)
     report.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
     report.add_argument('--png', type=pathlib.Path, metavar='DIR', help='also write each figure as PNG')
     report.set_defaults(verb=_report)
+
+    study = verbs.add_parser('study', help='measure the compiled closed loop against the papers: rows and figures')
+    study.add_argument('name', nargs='?', metavar='NAME', help='without one: list the studies')
+    study.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
+    study.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
+    study.set_defaults(verb=_study)
+
+    export = verbs.add_parser('export', help='write a recording as one table per topic, CSV or Parquet')
+    export.add_argument('bag', type=pathlib.Path)
+    export.add_argument('--format', choices=('csv', 'parquet'), default='csv', help='default: csv')
+    export.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: export in the bag')
+    export.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='default: all')
+    export.add_argument('--overwrite', action='store_true', help='replace tables that are there')
+    export.set_defaults(verb=_export)
 
     _add_recompute(verbs)
 
@@ -140,16 +162,18 @@ def _progress(duration):
         yield advance
 
 
+def _check_json(path):
+    if path and (path.is_dir() or not path.parent.is_dir()):
+        raise ValueError(f'--json {path}: must be a file in a directory that exists')
+
+
 def _run(options):
     from pedestal_bringup import graph, results, scenario
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
     chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
-    bag = options.bag or graph.free_bag(chosen.name)
-    if bag.exists():
-        raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
-    if options.json and (options.json.is_dir() or not options.json.parent.is_dir()):
-        raise ValueError(f'--json {options.json}: must be a file in a directory that exists')
+    bag = _new_bag(options.bag, chosen.name)
+    _check_json(options.json)
     with _progress(chosen.header.duration) as progress:
         try:
             outcome = graph.run(chosen, bag, progress)
@@ -169,6 +193,15 @@ def _run(options):
     if not check.complete:
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     return 0
+
+
+def _new_bag(given, scenario):
+    """Where to record: as given, or bags/runs/SCENARIO-N."""
+    from pedestal_bringup import graph
+    bag = given or graph.free_bag(scenario)
+    if bag.exists():
+        raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
+    return bag
 
 
 def _show(title, values):
@@ -224,9 +257,89 @@ def _recover(options):
     return 0
 
 
+def _rerun(options):
+    from pedestal_bringup import bag, graph, rerun
+    recording = bag.read(options.recording)
+    chosen = rerun.configured(recording)
+    path = _new_bag(options.bag, chosen.name)
+    with _progress(chosen.header.duration) as progress:
+        graph.run(chosen, path, progress)
+    comparison = rerun.compare(recording, bag.read(path))
+    print('\n'.join(comparison.lines()))
+    return 0 if comparison.equal else 1
+
+
 def _report(options):
     from pedestal_bringup import report
     print(report.write(options.bag, options.output, options.png))
+    return 0
+
+
+def _study(options):
+    from pedestal_bringup import studies
+    if options.name not in studies.NAMES:
+        problem = f'unknown study {options.name!r}' if options.name else 'no study named'
+        print(f'pedestal: error: {problem}, there are', file=sys.stderr)
+        for name, line in studies.descriptions().items():
+            print(f'  {name:10} {line}', file=sys.stderr)
+        return EXIT_WRONG_COMMAND
+    from pedestal_bringup.studies import experiment
+    output = options.output or pathlib.Path('studies', options.name)
+    _check_json(options.json)
+    output.mkdir(parents=True, exist_ok=True)
+    with _share() as progress:
+        result = studies.study(options.name).run(progress)
+        for name, draw in result.figures.items():
+            progress(None, f'drawing {name}')
+            experiment.save(draw, output / f'{name}.png')
+    _show_study(f'study {options.name}', result.rows)
+    for remark in result.remarks:
+        print(remark)
+    print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')
+    if options.json:
+        _write_json(options.json, {'name': options.name, 'rows': result.rows})
+    return 0
+
+
+@contextlib.contextmanager
+def _share():
+    """A function progress(share done, what comes next): a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda share, text: None
+        return
+    with Progress(BarColumn(), TextColumn('{task.description}'), TimeElapsedColumn(),
+                  console=Console(stderr=True)) as bar:
+        task = bar.add_task('compiling the laws (the first time)', total=1.0)
+        yield lambda share, text: bar.update(task, completed=share, description=text)
+
+
+TABLE_WIDTH = 120
+"""Columns that the table of a study may take, also where the terminal has fewer: one line a row."""
+
+
+def _show_study(title, rows):
+    from pedestal_bringup.studies import experiment
+
+    def number(value):
+        return '-' if value is None else f'{value:.4g}'
+
+    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    for name, justify in (('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'),
+                          ('target', 'left'), ('unit', 'left'), ('', 'left')):
+        table.add_column(name, justify=justify, no_wrap=True)
+    for row in rows:
+        table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), row['target'] or '',
+                      row['unit'], 'MISSED' if experiment.missed(row) else '')
+    Console(width=max(Console().width, TABLE_WIDTH)).print(table)
+
+
+def _export(options):
+    from pedestal_bringup.export import export
+    for file, rows, columns in export(options.bag, options.format, options.output, options.topics, options.overwrite):
+        if file is None:
+            print(f'pedestal: left out: {rows}', file=sys.stderr)
+        else:
+            print(f'{file}  {rows} rows, {columns} columns')
     return 0
 
 

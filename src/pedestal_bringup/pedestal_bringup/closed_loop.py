@@ -16,11 +16,12 @@ from ship_motion_sim import imu, ins, motion
 from tracking_receiver_sim import receiver, target
 
 RESULT = np.dtype([('t', 'f8'), ('position', 'f8', 2), ('load_position', 'f8', 2), ('torque', 'f8', 2),
-                   ('motor_torque', 'f8', (2, 2)), ('rate', 'f8', 2), ('feedforward', 'f8', 2), ('measured', 'f8', 2),
-                   ('true_error', 'f8', 2), ('estimate', 'f8', (2, 3)), ('reference', 'f8', (2, 3)), ('mode', 'i8')],
-                  align=True)
-"""One step t_k: encoders and true load angle [rad], torque on the load and of the motors [Nm], the ACU's rate command
-[rad/s] and feed-forward torque [Nm], the receiver's error and the true one (cross-elevation, elevation) [rad]."""
+                   ('motor_torque', 'f8', (2, 2)), ('motor_velocity', 'f8', (2, 2)), ('bias', 'f8', 2),
+                   ('rate', 'f8', 2), ('feedforward', 'f8', 2), ('measured', 'f8', 2), ('true_error', 'f8', 2),
+                   ('estimate', 'f8', (2, 3)), ('reference', 'f8', (2, 3)), ('mode', 'i8')], align=True)
+"""One step t_k: encoders and true load angle [rad], torque on the load and of the motors [Nm], motor speeds [rad/s],
+bias torque [Nm], the ACU's rate command [rad/s] and feed-forward torque [Nm], the receiver's error and the true one
+(cross-elevation, elevation) [rad]."""
 
 
 @dataclasses.dataclass
@@ -53,7 +54,7 @@ def cores(scenario) -> Cores:
         program = program_track.checked(*program_table(scenario))
     acu_inputs = np.zeros(1, control_unit.INPUTS)
     acu_inputs['stabilised'] = scenario.header.ship
-    acu_inputs['encoder_valid'] = acu_inputs['drive_ready'] = 1
+    acu_inputs['encoder_valid'] = 1
     acu_inputs['program_count'] = len(program[0])
     receiver_inputs = np.zeros(1, receiver.INPUTS)
     receiver_inputs['mat_ed'] = line_of_sight.ashore_matrix()
@@ -115,7 +116,7 @@ def _hand_over_error(acu_inputs, error):
 
 @compiled
 def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, adu, breaks, coefficients, times, angles,
-           imu_normals, ins_normals, receiver_normals, deck_rate, result):
+           imu_normals, ins_normals, receiver_normals, deck_rate, injected, result):
     """Steps first ... first + count - 1 into result[:count]."""
     receiver_state, receiver_constants, seen, error = tracking
     acu_state, acu_constants, acu_inputs, acu_outputs = acu
@@ -140,12 +141,14 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
         receiver.step(receiver_state, receiver_constants, seen, error, breaks, coefficients, receiver_normals[k])
         _hand_over_error(acu_inputs, error)
         acu_inputs[0].stamp = stamp_ns * 1e-9
+        acu_inputs[0].drive_ready = axes[0].following
         acu_inputs[0].position[0], acu_inputs[0].position[1] = azimuth.position, elevation.position
         acu_inputs[0].velocity[0], acu_inputs[0].velocity[1] = azimuth.velocity, elevation.velocity
         control_unit.step(acu_state, acu_constants, acu_inputs, acu_outputs, times, angles)
         _record(result[k], stamp_ns * 1e-9, azimuth, elevation, acu_outputs[0], error[0])
-        adu_inputs[0].azimuth.rate, adu_inputs[0].azimuth.torque = acu_outputs[0].rate[0], acu_outputs[0].torque[0]
-        adu_inputs[0].elevation.rate, adu_inputs[0].elevation.torque = acu_outputs[0].rate[1], acu_outputs[0].torque[1]
+        rate, torque = acu_outputs[0].rate, acu_outputs[0].torque
+        adu_inputs[0].azimuth.rate, adu_inputs[0].azimuth.torque = rate[0] + injected[k, 0], torque[0]
+        adu_inputs[0].elevation.rate, adu_inputs[0].elevation.torque = rate[1] + injected[k, 1], torque[1]
         adu_inputs[0].enable = 1
         drive_unit.step(adu_state, adu_constants, adu_inputs, axes)
 
@@ -156,10 +159,12 @@ def _record(row, t, azimuth, elevation, acu, error):
     row.position[0], row.position[1] = azimuth.position, elevation.position
     row.load_position[0], row.load_position[1] = azimuth.load_position, elevation.load_position
     row.torque[0], row.torque[1] = azimuth.torque, elevation.torque
+    row.bias[0], row.bias[1] = azimuth.bias, elevation.bias
     row.measured[0], row.measured[1] = error.cross_elevation, error.elevation
     row.true_error[0], row.true_error[1] = error.true_cross_elevation, error.true_elevation
     for i in range(2):
         row.motor_torque[0, i], row.motor_torque[1, i] = azimuth.motor_torque[i], elevation.motor_torque[i]
+        row.motor_velocity[0, i], row.motor_velocity[1, i] = azimuth.motor_velocity[i], elevation.motor_velocity[i]
         row.rate[i], row.feedforward[i] = acu.rate[i], acu.torque[i]
         for j in range(3):
             row.estimate[i, j], row.reference[i, j] = acu.estimate[i, j], acu.reference[i, j]
@@ -169,8 +174,13 @@ BLOCK = 2000
 """Steps whose noise is drawn at once."""
 
 
-def run(loop: Cores) -> np.ndarray:
-    """Every step 0 ... steps of a scenario's closed loop as RESULT records (steps + 1,)."""
+def run(loop: Cores, injected=None) -> np.ndarray:
+    """Every step 0 ... steps of a scenario's closed loop as RESULT records (steps + 1,).
+
+    injected (steps + 1, 2): rate [rad/s] of azimuth and elevation added to the command on its way to the drive.
+    """
+    if injected is None:
+        injected = np.zeros((loop.steps + 1, 2))
     result = np.zeros(loop.steps + 1, RESULT)
     deck_rate = np.zeros(3)
     for first in range(0, len(result), BLOCK):
@@ -179,5 +189,5 @@ def run(loop: Cores) -> np.ndarray:
                    for i, (stream, width) in enumerate(loop.streams)]
         _steps(first, count, loop.period_ns, loop.on_ship, loop.ship, loop.ins, loop.receiver, loop.acu, loop.adu,
                loop.target.breaks, loop.target.coefficients, *loop.program, *normals, deck_rate,
-               result[first:first + count])
+               injected[first:first + count], result[first:first + count])
     return result

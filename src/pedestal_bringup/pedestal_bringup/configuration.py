@@ -9,7 +9,6 @@ import subprocess
 
 import yaml
 
-from pedestal_bringup.scenario import NODE_KINDS
 from pedestal_common import parameters
 
 PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
@@ -51,7 +50,7 @@ def versions():
 def recorder_parameters(scenario):
     """What the recorder is told of the run it records: {name of its parameter: text}."""
     values = {node: parameters.as_dict(scenario.node_parameters(node))
-              for node in scenario.nodes if node in NODE_KINDS}
+              for node in scenario.nodes if node != 'operator'}
     values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OWN}
     return {'scenario_yaml': scenario.as_yaml(), 'parameters_yaml': yaml.safe_dump(values)}
 

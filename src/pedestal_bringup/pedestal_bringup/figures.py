@@ -269,7 +269,7 @@ def pointing(recording):
         _draw_pointing(panels[i, 0], recording, i)
     axes = panels[2, 0]
     _line(axes, run.t, np.where(off > 0.0, off, np.nan), color=TRUTH, linewidth=0.8)
-    axes.set_yscale('log')
+    axes.set_yscale('log' if np.any(off > 0.0) else 'linear')
     axes.set_title('angle between beam and target, whole run')
     axes.set_ylabel('off axis [deg]')
     axes.set_xlabel('time [s]')

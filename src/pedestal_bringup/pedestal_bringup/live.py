@@ -33,18 +33,27 @@ STOP = 10.0
 class Feeder(Operator):
     """Stands for everything around the node: writes what it hears, reads what it says."""
 
-    def __init__(self, node, heard, said, nodes):
+    def __init__(self, node, heard):
         super().__init__()
         self.node = node
         self.publishers_of = {name: self.create_publisher(message_class(topics.BY_NAME[name].type), name,
                                                           QOS[topics.BY_NAME[name].qos]) for name in heard}
+        self.answers = {}
+
+    def readers(self, said, nodes):
+        """The nodes the process waits for, which read what it says; the recorder keeps it in `answers`."""
         self.answers = {name: [] for name in said}
-        for name in (*said, 'diagnostics'):
-            topic = topics.BY_NAME[name]
-            # The node waits for as many readers as its graph names.
-            for number in range(topics.readers(topic, nodes)):
-                take = self.answers[name].append if name in said and number == 0 else lambda data: None
-                self.create_subscription(message_class(topic.type), name, take, QOS[topic.qos], raw=True)
+        made = []
+        for reader in nodes:
+            if reader not in (self.node, self.name):
+                made.append(rclpy.create_node(reader))
+                for topic in map(topics.BY_NAME.get, (*said, 'diagnostics')):
+                    if reader in topics.readers(topic, nodes):
+                        kept = reader == 'recorder' and topic.name in said
+                        made[-1].create_subscription(
+                            message_class(topic.type), topic.name,
+                            self.answers[topic.name].append if kept else lambda data: None, QOS[topic.qos], raw=True)
+        return made
 
     def announce_now(self, name, data):
         """Publish a message that no step waits for, and wait until it has arrived."""
@@ -57,10 +66,11 @@ class Feeder(Operator):
 class Live:
     """The node's process and the feeder, spun until what is waited for has come."""
 
-    def __init__(self, feeder, process, log):
+    def __init__(self, feeder, readers, process, log):
         self.feeder, self.process, self.log = feeder, process, log
         self.executor = SingleThreadedExecutor()
-        self.executor.add_node(feeder)
+        for node in (feeder, *readers):
+            self.executor.add_node(node)
 
     def until(self, condition, limit, what):
         deadline = time.monotonic() + limit
@@ -109,14 +119,15 @@ def _run(recording, done, params, nodes, folder):
     file.write_text(yaml.safe_dump({done.node: {'ros__parameters': values}}))
     heard = [name for name in (*done.feed.rows, *{name for _, name, _ in done.feed.events})
              if done.node not in topics.BY_NAME[name].writers]
-    feeder = Feeder(done.node, heard, list(done.outputs), nodes)
+    feeder = Feeder(done.node, heard)
     with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:
         feeder.refuse_company()
+        readers = feeder.readers(list(done.outputs), nodes)
         process = subprocess.Popen([sys.executable, '-m', NODE_KINDS[done.node].module, '--ros-args', '--params-file',
                                     str(file)], stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                                    env={**os.environ, 'ROS_LOG_DIR': str(folder)})
         try:
-            live = Live(feeder, process, log)
+            live = Live(feeder, readers, process, log)
             live.until(lambda: all(publisher.get_subscription_count() for publisher in feeder.publishers_of.values())
                        and feeder.count_publishers('diagnostics'), START, lambda: 'reader of its inputs')
             time.sleep(0.5)  # the other side of the discovery
@@ -153,11 +164,12 @@ def _feed(recording, done, live):
     for step in range(len(feed.stamps)):
         for name, row in events[step]:
             feeder.announce_now(name, recording.data(name)[row])
-        if step in done.requests:
-            live.ask(f'acu/{done.requests[step][0]}')
         if own:
             live.until(lambda step=step: answered(step), START if step == 0 else PATIENCE,
                        lambda step=step: missing(step))
+        # What is asked for before the answer to a step: the drive answers before it is fed.
+        for service, _ in done.requests.get(step + own, ()):
+            live.ask(service)
         for name, rows in feed.rows.items():
             if rows[step] >= 0 and name in feeder.publishers_of:
                 feeder.publishers_of[name].publish(recording.data(name)[rows[step]])
@@ -170,7 +182,7 @@ def _feed(recording, done, live):
 def _due(done, name):
     """How many messages of a topic must have come by each step (n,)."""
     if name in done.unit.CODES:
-        return np.cumsum(np.diff(done.said[name], prepend=-1) != 0)
+        return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
     return np.cumsum(records.slot(done.said, name).stamp != records.NEVER)
 
 

@@ -9,11 +9,12 @@ def program_table(scenario):
     """(times (n,) s, angles (n, 2) earth azimuth (unwrapped), elevation [rad]) of a scenario's prediction.
 
     From stamp 0 until two intervals past the end, so that the end of the run lies inside; where the target is not
-    known, it stands at its first or last known place.
+    known, it stands at its first or last known place. Times to the last bit as the ACU reads them from the message.
     """
     program, duration = scenario.header.program, scenario.header.duration
     built = target.build(scenario.node_parameters('tracking_receiver').target, duration)
-    times = np.arange(0.0, duration + 2.0 * program.interval, program.interval)
+    nanoseconds = np.round(np.arange(0.0, duration + 2.0 * program.interval, program.interval) * 1e9)
+    times = nanoseconds // 1e9 + nanoseconds % 1e9 * 1e-9
     known = np.clip(times - program.time_offset, built.breaks[0], built.breaks[-1])
     azimuth, elevation, _ = target.look_angles(built, known)
     return times, np.column_stack((np.unwrap(azimuth) + program.azimuth_offset, elevation + program.elevation_offset))

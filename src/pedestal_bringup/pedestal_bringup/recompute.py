@@ -6,8 +6,8 @@ Inputs are matched to steps by the code the nodes use (pedestal_common.steps), t
 lockstep   inputs belong to steps by their stamps, so the same version on the same machine gives the same bits
 realtime   a step gets what had been sent (in a foreign recording: recorded) when the next one began. That is what the
            node had, but for messages that were on their way to it just then
-both       services are not recorded: a change of acu/mode that the ACU would not make by itself is asked for at that
-           step; a parameter changed while running, a mode asked for again and an emergency stop leave no trace.
+both       services are not recorded: a change of acu/mode or adu/state that the node would not make by itself is asked
+           for at that step; a parameter changed while running and a mode asked for again leave no trace.
            A recording that begins in the middle of a run starts from the initial state: it differs until the filter
            has converged
 """
@@ -123,16 +123,17 @@ class Recording:
         others they came before the answer to that step; AFTER_ALL where none came any more, their log where no answer
         was recorded."""
         log = self.rows(topic).log
-        if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(COMMAND):
+        answer = 'joint_states' if topics.BY_NAME[topic].writers == ('adu',) else COMMAND
+        if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(answer):
             return log
-        after = np.searchsorted(self.arrival(COMMAND), self.arrival(topic))
-        return np.append(self.output(COMMAND).stamps, AFTER_ALL)[after]
+        after = np.searchsorted(self.arrival(answer), self.arrival(topic))
+        return np.append(self.output(answer).stamps, AFTER_ALL)[after]
 
-    def modes(self, stamps):
-        """{step: text} of the recorded acu/mode; steps are rows of stamps (n,) [ns]."""
-        if not self.has(MODE):
+    def states(self, topic, stamps):
+        """{step: text} of a recorded acu/mode or adu/state; steps are rows of stamps (n,) [ns]."""
+        if not self.has(topic):
             return {}
-        output = self.output(MODE)
+        output = self.output(topic)
         steps = np.searchsorted(stamps, output.stamps)
         return {int(step): text for step, stamp, text in zip(steps, output.stamps, output.texts)
                 if step < len(stamps) and stamps[step] == stamp}
@@ -212,21 +213,18 @@ def _gathered(recording, unit, trigger, steps):
     return heard, taken, np.array([stamp for stamp, _, _ in steps], np.int64)
 
 
-def compute(recording, unit, fed, modes=None, requests=()):
-    """(said (n,), requests made {step: (mode, granted)}) of a unit on a Feed.
+def compute(recording, unit, fed, states=None, requests=()):
+    """(said (n,), requests made {step: [(service, granted)]}) of a unit on a Feed.
 
-    modes: {step: mode} as recorded; where the unit does not go there by itself, it is asked to. requests: {step: mode}
-    that are asked for whatever happens.
+    states: {step: text} of the unit's state as recorded; where it does not come to it by itself, it is asked to.
+    requests: {step: [service]} that are asked for whatever happens.
     """
-    codes = dict(enumerate(unit.CODES.get(MODE, ())))
-    code_of = {text: code for code, text in codes.items()}
-    modes, made = modes or {}, {}
-    events = {}
+    states, made, events = states or {}, {}, {}
     for step, topic, row in fed.events:
         events.setdefault(step, []).append((topic, row))
     said = np.zeros(len(fed.heard), unit.SAID)
     last = 0
-    for step in sorted({*events, *modes, *requests, len(said)}):
+    for step in sorted({*events, *states, *requests, len(said)}):
         unit.answers(fed.heard[last:step], said[last:step])
         last = step
         if step == len(said):
@@ -237,18 +235,18 @@ def compute(recording, unit, fed, modes=None, requests=()):
             except ValueError:
                 pass  # refused, as the node does
         if step in requests:
-            made[step] = requests[step], unit.request(code_of[requests[step]])
-        elif modes.get(step) in code_of:
-            arrays = unit.state, unit.inputs, unit.outputs
-            before = [array.copy() for array in arrays]
+            made[step] = [(service, unit.request(service)) for service in requests[step]]
+        elif step in states:
+            [(name, words)] = unit.CODES.items()
+            before = [array.copy() for array in unit.remembers]
             unit.answers(fed.heard[step:step + 1], said[step:step + 1])
             last = step + 1
-            if codes[int(said[step][MODE])] != modes[step]:
-                for array, values in zip(arrays, before):
+            if words[int(said[step][name])] != states[step]:
+                for array, values in zip(unit.remembers, before):
                     array[...] = values
-                made[step] = modes[step], unit.request(code_of[modes[step]])
+                made[step] = [(service, unit.request(service)) for service in unit.services_to(states[step])]
                 last = step
-    return said, made
+    return said, {step: done for step, done in made.items() if done}
 
 
 def outputs_of(unit, fed, said):
@@ -256,14 +254,23 @@ def outputs_of(unit, fed, said):
     found = {}
     for name in unit.SAID.names:
         if name in unit.CODES:
-            change = np.flatnonzero(np.diff(said[name], prepend=-1))
-            found[name] = comparison.Output(fed.stamps[change], np.zeros((change.size, 0)),
-                                            [unit.CODES[name][code] for code in said[name][change]])
+            found[name] = _announced(fed.stamps, said[name], unit.CODES[name])
         else:
             place = records.slot(said, name)
             sent = place.stamp != NEVER
             found[name] = comparison.Output(place.stamp[sent], place.numbers[sent])
     return found
+
+
+def _announced(stamps, codes, words):
+    """The Output of a topic that tells the words of a code when they change."""
+    change, texts = [], []
+    for step in np.flatnonzero(np.diff(codes, prepend=-1)).tolist():
+        text = words[int(codes[step])]
+        if not texts or text != texts[-1]:
+            change.append(step)
+            texts.append(text)
+    return comparison.Output(stamps[np.array(change, np.int64)], np.zeros((len(change), 0)), texts)
 
 
 @dataclasses.dataclass
@@ -278,13 +285,14 @@ class Recomputed:
 
 
 def recompute(recording, node, params, requests=None) -> Recomputed:
-    """Recompute a node with parameters of its dataclass. requests {step: mode}: what was asked of it; None: what the
-    recorded modes tell."""
+    """Recompute a node with parameters of its dataclass. requests {step: [service]}: what was asked of it; None: what
+    its recorded states tell."""
     kind = KINDS[node]
     unit = kind.unit(params, recording.has(kind.ship))
     fed = feed(recording, unit, kind.trigger)
     if requests is None:
-        said, made = compute(recording, unit, fed, modes=recording.modes(fed.stamps) if MODE in unit.CODES else {})
+        states = {step: text for name in unit.CODES for step, text in recording.states(name, fed.stamps).items()}
+        said, made = compute(recording, unit, fed, states)
     else:
         said, made = compute(recording, unit, fed, requests=requests)
     return Recomputed(node, unit, fed, said, outputs_of(unit, fed, said), made)
@@ -340,8 +348,7 @@ def file_parameters(path):
         if node in KINDS:
             if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
                 raise RecomputeError(f'--params-file {path}: section {node} must hold ros__parameters')
-            values = scenario.dotted(body['ros__parameters'])
-            found[node] = {key: value for key, value in values.items() if not key.startswith('graph.')}
+            found[node] = scenario.dotted(body['ros__parameters'])
     return found
 
 
@@ -361,6 +368,7 @@ def overrides(texts, nodes):
 def parameters_of(recording, node, file_values=None, changes=()):
     """The parameter dataclass of a node: of the file, else as recorded, else the defaults; then changed."""
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
+    values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
         return parameters.build(scenario.NODE_KINDS[node].parameters, {**values, **dict(changes)})
     except parameters.ParameterError as error:

@@ -31,7 +31,8 @@ def main(options):
         lines += ['' if lines else None, _title(recording, done, origin), *_remarks(recording, done)]
         if changes:
             new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes[node]),
-                                      {step: mode for step, (mode, _) in done.requests.items()})
+                                      {step: [service for service, _ in made] for step, made in
+                                       done.requests.items()})
             more, found = _old_against_new(recording, done, new, tolerance, changes[node])
             outputs.update(new.outputs)
         else:
@@ -77,11 +78,11 @@ def _remarks(recording, done):
         said.append(f'NOT recomputed to the end: {done.feed.problem}')
     if done.feed.refused:
         said.append(f'{done.feed.refused} inputs refused: their stamps go back')
-    for step, (mode, granted) in done.requests.items():
-        said.append(f'mode {mode} asked for at {done.feed.stamps[step] / SECOND:.6f} s'
-                    f'{"" if granted else ", and refused"}')
+    for step, made in done.requests.items():
+        said += [f'{service} asked for at {done.feed.stamps[step] / SECOND:.6f} s{"" if granted else ", and refused"}'
+                 for service, granted in made]
     if done.requests:
-        said.append(f'{len(done.requests)} mode requests fed')
+        said.append(f'{sum(map(len, done.requests.values()))} requests fed')
     return said
 
 
@@ -135,7 +136,7 @@ def _old_against_new(recording, old, new, tolerance, changes):
     before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
     whose = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with the parameters unchanged'
     lines = [f'changed: {", ".join(f"{key} = {value}" for key, value in changes.items())}; old is {whose}']
-    lines += [line for line in _remarks(recording, new) if 'mode' in line]
+    lines += [line for line in _remarks(recording, new) if 'asked for' in line]
     rows = []
     if new.node == 'acu' and len(new.feed.stamps):
         lines += [f'note: {what_if.NOTE}', f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']

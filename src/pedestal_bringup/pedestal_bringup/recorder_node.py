@@ -32,7 +32,7 @@ class RecorderNode(Shell):
 
     def __init__(self):
         super().__init__('recorder', RecorderParameters)
-        nodes = self.graph.nodes
+        nodes = self.graph.members
         if self.graph.lockstep and not nodes:
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
         recorded = topics.read_by('recorder', nodes) if nodes else topics.TOPICS
@@ -65,7 +65,7 @@ class RecorderNode(Shell):
     def _callback(self, index, topic):
         put = self._in_step(index, topic) if self.graph.lockstep else self._as_it_comes(index, topic)
         checked = len(topic.writers) == 1
-        expected = 1 if topic.qos == 'step' and self.graph.nodes else 0
+        expected = 1 if topic.qos == 'step' and self.graph.members else 0
         taken = self._taken
 
         def take(data, info=None):

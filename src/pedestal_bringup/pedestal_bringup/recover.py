@@ -102,7 +102,7 @@ def recover(path, output=None) -> Recovered:
     container = Container(output)
     try:
         with open(file, 'rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            salvage = _Salvage(container)
+            salvage = _Salvage(file, container)
             salvage.take_all(data)
         if not container.counts:
             raise BagError(f'{file}: not one message in it can be read')
@@ -209,8 +209,8 @@ def _summary(data):
 class _Salvage:
     """What is good of a file goes into a container, what is not into `gaps`."""
 
-    def __init__(self, container):
-        self._container = container
+    def __init__(self, file, container):
+        self._file, self._container = file, container
         self._loose = bytearray()
         self._metadata = {}
         self._sequence = {}
@@ -254,6 +254,8 @@ class _Salvage:
     def _declare(self, declared, keep):
         for record in declared:
             known = self._container.schemas if isinstance(record, records.Schema) else self._container.channels
+            if isinstance(record, records.Channel) and record.message_encoding != 'cdr':
+                raise bags.foreign_encoding(self._file, record)
             if record.id not in known:
                 keep(record)
 

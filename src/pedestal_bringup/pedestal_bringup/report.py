@@ -69,10 +69,18 @@ def _missing(spec, recording):
 
 
 def _table(bag, topic):
-    """The columns of a topic; None without a message or when it is of another type than the graph's."""
+    """The columns of a topic; None without a message or when it is of another type than the graph's.
+
+    Raises bag.BagError when the stamps of a topic of the steps go back: nothing drawn over them would be true.
+    """
     if bag.topics.get(topic) != topics.BY_NAME[topic].type or not bag.rows(topic).size:
         return None
-    return bag.table(topic)
+    table = bag.table(topic)
+    back = np.flatnonzero(np.diff(table['t']) < 0.0) if topics.BY_NAME[topic].rate == 'step' else np.zeros(0, int)
+    if back.size:
+        raise bags.BagError(f'{bag.file}: the stamps of {topic} go back, the first from {table["t"][back[0]]:.6f} to '
+                            f'{table["t"][back[0] + 1]:.6f} s; `pedestal verify` says what else is wrong')
+    return table
 
 
 def _tracking(bag):

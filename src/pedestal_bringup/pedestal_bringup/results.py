@@ -38,7 +38,8 @@ def _pointing(beam, target, ship, attitude, known_attitude, estimate, error, fil
 class Tracking:
     """A run as arrays on the drive's steps; angles in rad, NaN where nothing was measured.
 
-    t (n,) s; azimuth, elevation (n,) encoders; cross_elevation, elevation_error (n,) true error;
+    t (n,) s; azimuth, elevation (n,) encoders; reference (n, 2) deck angles that the ACU follows, NaN in standby;
+    cross_elevation, elevation_error (n,) true error;
     measured (n, 2) receiver errors and cn0 (n,) at their stamp; filtered (n, 2) the estimate seen from the
     beam, as cross-elevation and elevation; beam_earth (n, 2); target_earth (n, 2) and range (n,) m; mode (n,) text;
     tracking (n,) bool: in autotrack and settled.
@@ -46,6 +47,7 @@ class Tracking:
     t: np.ndarray
     azimuth: np.ndarray
     elevation: np.ndarray
+    reference: np.ndarray
     cross_elevation: np.ndarray
     elevation_error: np.ndarray
     measured: np.ndarray
@@ -98,8 +100,11 @@ def tracking(bag) -> Tracking:
     mode = modes(bag, t)
     automatic = mode == 'autotrack'
     start = t[automatic][0] + SETTLING if automatic.any() else math.inf
-    return Tracking(t, beam[:, 0], beam[:, 1], error[:, 0], error[:, 1], measured[:, :2], measured[:, 2], filtered,
-                    beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode, automatic & (t >= start))
+    reference = on_grid('acu/reference', ('azimuth.position', 'elevation.position'))
+    reference[(mode == 'standby') | (mode == '')] = np.nan
+    return Tracking(t, beam[:, 0], beam[:, 1], reference, error[:, 0], error[:, 1], measured[:, :2], measured[:, 2],
+                    filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
+                    automatic & (t >= start))
 
 
 def modes(bag, t):
@@ -120,6 +125,7 @@ def rms(values):
 def summary(run: Tracking) -> dict:
     """{metric: (value, unit)} over the settled autotrack part of a run; NaN when it never tracked.
 
+    *_following_*_deg: reference less encoder over every step outside standby, tracking or not;
     pointing_*_deg: both axes together, per axis and sample (not the angle off the beam);
     single_sample_noise_deg: rms of the receiver's error minus the true one, per axis and sample;
     noise_reduction: that divided by the rms error of the filtered line of sight against truth.
@@ -131,7 +137,12 @@ def summary(run: Tracking) -> dict:
     filtered = (run.filtered[on] - true) * degrees
     locked = np.isfinite(run.measured[:, 0])
     noise = rms(raw)
+    following = (run.reference - np.column_stack((run.azimuth, run.elevation))) * degrees
     values = {
+        'azimuth_following_rms_deg': (rms(following[:, 0]), 'deg'),
+        'azimuth_following_max_deg': (_max(following[:, 0]), 'deg'),
+        'elevation_following_rms_deg': (rms(following[:, 1]), 'deg'),
+        'elevation_following_max_deg': (_max(following[:, 1]), 'deg'),
         'pointing_rms_deg': (rms(true) * degrees, 'deg'),
         'pointing_max_deg': (_max(true) * degrees, 'deg'),
         'cross_elevation_rms_deg': (rms(true[:, 0]) * degrees, 'deg'),
@@ -152,7 +163,8 @@ def summary(run: Tracking) -> dict:
 
 
 def _max(values):
-    return float(np.nanmax(np.abs(values))) if values.size else math.nan
+    values = values[np.isfinite(values)]
+    return float(np.max(np.abs(values))) if values.size else math.nan
 
 
 TARGETS = {'pointing_to_noise': '<= 0.4', 'lost_steps': '0', 'realtime_factor': '>= 4 in lockstep'}

@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import importlib.resources
 import pathlib
+import re
 import typing
 
 import yaml
@@ -22,7 +23,7 @@ from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 class ProgramParameters(parameters.Parameters):
     """The program track the operator sends the ACU before the run: the target as predicted, with its error."""
     source: str = parameters.choice('target', ('target', 'none'), 'what the table is made of')
-    interval: float = parameters.parameter(1.0, 0.05, 60.0, 's', 'time between two points')
+    interval: float = parameters.parameter(1.0, 0.002, 60.0, 's', 'time between two points')
     time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
     azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
     elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
@@ -41,12 +42,15 @@ class ScenarioParameters(parameters.Parameters):
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML's plain values, but a date stays the text it was written as."""
+    """YAML's plain values, but a date and `on`, `off`, `yes`, `no` stay the texts they were written as."""
 
 
 _Loader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if tag != 'tag:yaml.org,2002:timestamp']
+    first: [(tag, pattern) for tag, pattern in resolvers
+            if tag not in ('tag:yaml.org,2002:timestamp', 'tag:yaml.org,2002:bool')]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+_Loader.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^(?:true|True|TRUE|false|False|FALSE)$'),
+                              list('tTfF'))
 
 
 class NodeKind(typing.NamedTuple):

@@ -77,6 +77,8 @@ def verify(path) -> Report:
             problems.append(f'{stamp.size} messages where one is due')
         elif rates[name] == 'second' and bag.metadata.get('pacing') == 'lockstep' and period:
             problems += _seconds(bag, name, stamp, first, last, period)
+        if name in topics.BY_NAME and bag.topics[name] != topics.BY_NAME[name].type:
+            problems.append(f'of type {bag.topics[name]}, where the graph has {topics.BY_NAME[name].type}')
         if ours:
             problems += _sequence(rows[name].sequence)
         checks.append(TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,

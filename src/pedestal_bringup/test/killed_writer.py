@@ -1,4 +1,4 @@
-"""Writers that die: `python killed_writer.py FOLDER SEED` writes bags in children and kills each at a random moment.
+"""Writers that die: `python killed_writer.py FOLDER SEED` writes bags in children and kills each at a random place.
 
 Bag N is FOLDER/N; line N of the output says how many rows were written and how many of them before the last flush.
 Every fifth writer meets a disk that is full at a random size instead.
@@ -15,6 +15,8 @@ import struct
 import sys
 import time
 
+import numpy as np
+
 from pedestal_bringup import bag
 from pedestal_common import messages
 
@@ -25,8 +27,6 @@ _spec.loader.exec_module(_bag_test)
 BAGS = 50
 STEPS = 400
 ROWS = 40_000
-LONGEST = 0.2
-"""Seconds until the last kill, about what all rows take."""
 
 
 def rows():
@@ -45,21 +45,22 @@ def rows():
 
 
 def write(directory, made, counters):
-    """Write a bag, counting in shared memory the rows written and those that were written before the last flush."""
+    """Write a bag, counting in shared memory the rows written and those that were written before the last flush (in
+    whole words: struct.pack_into clears its place first, so that a kill could leave a 0)."""
     writer = bag.Writer(directory, _bag_test.RECORDED, _bag_test.METADATA)
     flush = writer.flush
     done = 0
 
     def counting():
         flush()
-        struct.pack_into('<q', counters, 8, done)
+        counters[1] = done
 
     writer.flush = counting
     try:
         for index, stamp, data in made:
             writer.write(index, stamp, stamp, data)
             done += 1
-            struct.pack_into('<q', counters, 0, done)
+            counters[0] = done
     finally:
         writer.flush = flush
         writer.close()
@@ -69,8 +70,8 @@ def main(folder, seed):
     rng = random.Random(seed)
     made = list(itertools.islice(rows(), ROWS))
     for number in range(BAGS):
-        moment, size = rng.uniform(0.0, LONGEST), rng.randrange(20_000, 2_000_000)
-        counters = mmap.mmap(-1, 16)
+        last, wait, size = rng.randrange(ROWS - 5_000), rng.uniform(0.0, 0.01), rng.randrange(20_000, 2_000_000)
+        counters = np.frombuffer(mmap.mmap(-1, 16), np.int64)
         child = os.fork()
         if not child:
             try:
@@ -80,10 +81,12 @@ def main(folder, seed):
             finally:
                 os._exit(0)
         if number % 5:
-            time.sleep(moment)
+            while counters[0] < last:
+                time.sleep(0.0005)
+            time.sleep(wait)
             os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
-        print(*struct.unpack('<2q', counters), flush=True)
+        print(*counters, flush=True)
 
 
 if __name__ == '__main__':

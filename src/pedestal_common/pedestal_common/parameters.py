@@ -98,18 +98,18 @@ def as_dict(instance, prefix=''):
     return values
 
 
-def build(cls, values):
-    """An instance from {dotted name: value}; names left out keep their default.
+def build(cls, values, prefix=''):
+    """An instance from {dotted name: value}, every name beginning with `prefix`; names left out keep their default.
 
     Raises ParameterError for an unknown name (with the nearest known one) or a refused value.
     """
-    known = [name for name, _ in flatten(cls)]
+    known = [name for name, _ in flatten(cls, prefix)]
     for name in values:
         if name not in known:
             import difflib
             near = difflib.get_close_matches(name, known, n=1)
             raise ParameterError(f'unknown parameter {name!r}' + (f'; did you mean {near[0]!r}?' if near else ''))
-    return _replace(cls(), values, '')
+    return _replace(cls(), values, prefix)
 
 
 def _number(value):

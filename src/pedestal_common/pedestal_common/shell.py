@@ -3,6 +3,7 @@
 A node is `class AcuNode(Shell)` with a parameter dataclass, the topics it reads and a `step`; everything
 it computes is in its column's compiled step.
 """
+import dataclasses
 import gc
 import importlib
 import os
@@ -10,7 +11,6 @@ import pathlib
 import signal
 import sys
 import time
-import typing
 
 import rclpy
 from rcl_interfaces.msg import (
@@ -45,11 +45,24 @@ PARTING = 1.0
 """Seconds a node that ends waits for readers to take what it published."""
 
 
-class GraphParameters(typing.NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class GraphParameters(parameters.Parameters):
     """What every node is told about the run (ROS parameters `graph.*`)."""
-    pacing: str
-    nodes: tuple
-    deadline: float
+    pacing: str = parameters.choice('realtime', ('lockstep', 'realtime'), 'who waits for whom')
+    nodes: str = parameters.text('', 'names of the nodes of this run, comma separated; each waits for its readers '
+                                 'among them')
+    deadline: float = parameters.parameter(60.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
+
+    def check(self):
+        for name in self.members:
+            if name not in topics.NODES:
+                raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}' is none of "
+                                                f'{", ".join(topics.NODES)}')
+
+    @property
+    def members(self):
+        """`nodes` as a tuple."""
+        return tuple(name for name in self.nodes.replace(' ', '').split(',') if name)
 
     @property
     def lockstep(self):
@@ -110,37 +123,23 @@ class Shell(Node):
         self._send_diagnostics = None
 
     def _declare(self, live):
-        known = {'use_sim_time', 'start_type_description_service'}
-        self.declare_parameter('graph.pacing', 'realtime', ParameterDescriptor(
-            description='lockstep or realtime', read_only=True))
-        self.declare_parameter('graph.nodes', '', ParameterDescriptor(
-            description='names of the nodes of this run, comma separated; each waits for its readers among them',
-            read_only=True))
-        self.declare_parameter('graph.deadline', 60.0, ParameterDescriptor(
-            description='wall-clock time a silent node is waited for [s]', read_only=True,
-            floating_point_range=[FloatingPointRange(from_value=0.1, to_value=3600.0, step=0.0)]))
-        names = []
-        values = {}
-        defaults = parameters.defaults(self._parameters_type)
-        for name, field in parameters.flatten(self._parameters_type):
-            names.append(name)
-            read_only = not any(name.startswith(prefix) for prefix in live)
-            values[name] = self.declare_parameter(name, defaults[name], _descriptor(field, read_only)).value
-        known.update(names, ('graph.pacing', 'graph.nodes', 'graph.deadline'))
+        graph = self._declare_all(GraphParameters, (), 'graph.')
+        own = self._declare_all(self._parameters_type, live)
+        known = {'use_sim_time', 'start_type_description_service', *graph, *own}
         unknown = [name for name in self._parameter_overrides
                    if name not in known and not name.startswith('qos_overrides')]
-        self.parameters = parameters.build(self._parameters_type, {**values, **dict.fromkeys(unknown)})
-        pacing = self.get_parameter('graph.pacing').value
-        if pacing not in ('lockstep', 'realtime'):
-            raise parameters.ParameterError(f"graph.pacing = '{pacing}': must be one of lockstep, realtime")
-        nodes = tuple(n for n in self.get_parameter('graph.nodes').value.replace(' ', '').split(',') if n)
-        for node in nodes:
-            if node not in topics.NODES:
-                raise parameters.ParameterError(f"graph.nodes names '{node}': must be of {', '.join(topics.NODES)}")
-        self.graph = GraphParameters(pacing, nodes, self.get_parameter('graph.deadline').value)
+        self.parameters = parameters.build(self._parameters_type, {**own, **dict.fromkeys(unknown)})
+        self.graph = parameters.build(GraphParameters, graph, 'graph.')
         if live:
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)
+
+    def _declare_all(self, cls, live, prefix=''):
+        """{dotted name: value} of the ROS parameters of a dataclass, those that begin with one of `live` writable."""
+        defaults = parameters.as_dict(cls(), prefix)
+        return {name: self.declare_parameter(name, defaults[name],
+                                             _descriptor(field, not name.startswith(tuple(live)))).value
+                for name, field in parameters.flatten(cls, prefix)}
 
     def _changed(self, changes):
         values = parameters.as_dict(self.parameters)
@@ -276,12 +275,10 @@ class Shell(Node):
         """
         deadline = time.monotonic() + START_DEADLINE
         for topic, publisher in self._publishers_by_topic.items():
-            wanted = topics.readers(topic, self.graph.nodes)
-            while publisher.get_subscription_count() < wanted:
+            wanted = topics.readers(topic, self.graph.members)
+            while missing := self._missing(topic, publisher, wanted):
                 if time.monotonic() > deadline:
-                    present = sorted(info.node_name for info in self.get_subscriptions_info_by_topic(topic.name))
-                    raise GraphError(f'{topic.name} has {publisher.get_subscription_count()} of {wanted} readers '
-                                     f'after {START_DEADLINE:g} s; present: {", ".join(present) or "none"}')
+                    raise GraphError(f'{topic.name} is not read by {", ".join(missing)} after {START_DEADLINE:g} s')
                 if _stop:
                     raise Stopped
                 time.sleep(0.01)
@@ -289,6 +286,15 @@ class Shell(Node):
             if len(topic.writers) == 1 and self.count_publishers(topic.name) > 1:
                 raise GraphError(f'{topic.name} already has a writer: another graph runs on ROS_DOMAIN_ID '
                                  f'{self.context.get_domain_id()}; set a free one')
+
+    def _missing(self, topic, publisher, wanted):
+        """Which of the wanted readers a topic has not got yet. By name: a stranger who listens is no substitute."""
+        if not wanted:
+            return []
+        there = self.get_subscriptions_info_by_topic(publisher.topic_name)
+        names = {info.node_name for info in there}
+        missing = [name for name in wanted if name not in names]
+        return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
     def draining(self):
         """Asked after the end: True while a node must go on receiving before `close`; overridden by the recorder."""

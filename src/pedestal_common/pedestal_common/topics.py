@@ -71,5 +71,5 @@ def read_by(node, graph):
 
 
 def readers(topic, graph):
-    """How many subscriptions a topic must have before a graph of these nodes may start."""
-    return sum(node in graph for node in topic.readers) + ('recorder' in graph)
+    """The nodes that must read a topic before a graph of these nodes may start."""
+    return [node for node in graph if node in topic.readers or node == 'recorder']

@@ -40,7 +40,7 @@ KNOT_SPACING = 1.0
 SEARCH_SPACING = 20.0
 """Between the pass finder's looks [s]; a LEO pass lasts minutes."""
 MARGIN = 5.0
-"""How far a leo_pass or flyby is laid out before and past the run [s], for a program track that looks ahead."""
+"""How far all but a track_file is laid out before and past the run [s], for a program track that looks ahead."""
 TLE_AGE = 30.0
 """Largest time between TLE epoch and start_time [days]: past it SGP4 says nothing about the satellite."""
 COLUMNS = {'time_s': (-1e12, 1e12), 'latitude_deg': (-90.0, 90.0), 'longitude_deg': (-180.0, 360.0),
@@ -149,7 +149,7 @@ def build(params, duration) -> Target:
 
 
 def _angles(params, duration):
-    return np.array([0.0, duration]), np.zeros((4, 1, 3)), ''
+    return np.array([-MARGIN, duration + MARGIN]), np.zeros((4, 1, 3)), ''
 
 
 def _flyby(params, duration):

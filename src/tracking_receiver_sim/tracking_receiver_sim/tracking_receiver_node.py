@@ -15,8 +15,7 @@ class TrackingReceiverNode(shell.Shell):
 
     def __init__(self):
         super().__init__('tracking_receiver', TrackingReceiverNodeParameters)
-        self.on_ship = 'ship_motion' in self.graph.nodes
-        self.unit = TrackingReceiver(self.parameters, self.on_ship)
+        self.unit = TrackingReceiver(self.parameters, 'ship_motion' in self.graph.members)
         self.unit.prepare()
         self.outputs = self.unit.outputs
         self.fault = receiver.LOCKED

@@ -1,0 +1,95 @@
+"""Enable, brakes and faults of the drive: one state machine for both axes, advanced once per control period.
+
+    enabled -> stopping -> engaging brakes -> disabled -> releasing brakes -> enabled
+
+The drive wants to be enabled while it is asked to be, no fault and no emergency stop is latched. It stops under
+control, lets the brakes grip while the motors still hold, and only then takes their torque away. Overcurrent, and a
+stop that takes too long, take the torque away at once and let the brakes fall in.
+"""
+from adu_drive.faults import OVERCURRENT
+from pedestal_common.compiled import compiled
+
+PHASES = ('disabled', 'releasing brakes', 'enabled', 'stopping', 'engaging brakes')
+DISABLED, RELEASING, ENABLED, STOPPING, ENGAGING = range(len(PHASES))
+
+REQUESTS = ('enable', 'disable', 'emergency_stop', 'reset_faults')
+ENABLE, DISABLE, EMERGENCY_STOP, RESET_FAULTS = range(len(REQUESTS))
+
+GRANTED, FAULT_LATCHED, EMERGENCY_LATCHED, MOVING, CAUSE_PERSISTS = range(5)
+"""Answers to a request."""
+
+STANDSTILL = 1e-3
+"""Load rate [rad/s] below which an axis stands."""
+
+
+@compiled
+def permitted(s):
+    """Whether the drive may follow commands."""
+    return s.wanted and not s.emergency and not (s.azimuth.faults | s.elevation.faults)
+
+
+@compiled
+def moves(axis, c):
+    """Whether an axis turns, by its motor encoders."""
+    return abs(axis.motor_1.measured + axis.motor_2.measured) * c.per_2N > STANDSTILL
+
+
+@compiled
+def _next(s, c):
+    allowed = permitted(s)
+    if (s.azimuth.faults | s.elevation.faults) & OVERCURRENT:
+        return DISABLED
+    if s.phase == ENABLED:
+        return ENABLED if allowed else STOPPING
+    if s.phase == STOPPING:
+        if s.age >= c.stop_periods:
+            return DISABLED
+        turning = s.azimuth.rate != 0.0 or s.elevation.rate != 0.0
+        turning |= moves(s.azimuth, c.azimuth) or moves(s.elevation, c.elevation)
+        return STOPPING if turning else ENGAGING
+    if s.phase == ENGAGING:
+        return DISABLED if s.brake_age >= c.engage_periods else ENGAGING
+    if s.phase == DISABLED:
+        return RELEASING if allowed else DISABLED
+    if not allowed:
+        return ENGAGING
+    return ENABLED if s.brake_age >= c.release_periods else RELEASING
+
+
+@compiled
+def advance(s, c):
+    """One control period: the phase, and whether the brakes grip in it."""
+    phase = _next(s, c)
+    s.age = s.age + 1 if phase == s.phase else 0
+    s.phase = phase
+    applied = phase == DISABLED or phase == ENGAGING
+    s.brake_age = s.brake_age + 1 if applied == s.applied else 0
+    s.applied = applied
+    return s.brake_age >= c.engage_periods if applied else s.brake_age < c.release_periods
+
+
+@compiled
+def request(state, constants, what):
+    """Ask something of the drive between two periods: GRANTED, or why not. It acts in the next period.
+
+    Faults and emergency stop can be reset when both axes stand and no cause is present; the drive is then enabled
+    again by itself if it was before.
+    """
+    s, c = state[0], constants[0]
+    if what == DISABLE:
+        s.wanted = 0
+    elif what == EMERGENCY_STOP:
+        s.emergency = 1
+    elif what == ENABLE:
+        if s.azimuth.faults | s.elevation.faults:
+            return FAULT_LATCHED
+        if s.emergency:
+            return EMERGENCY_LATCHED
+        s.wanted = 1
+    else:
+        if moves(s.azimuth, c.azimuth) or moves(s.elevation, c.elevation):
+            return MOVING
+        if s.azimuth.present | s.elevation.present:
+            return CAUSE_PERSISTS
+        s.azimuth.faults = s.elevation.faults = s.emergency = 0
+    return GRANTED

@@ -1,0 +1,25 @@
+"""Heating of a motor by its torque, as the I2t protection of a drive counts it, and the resistance it leads to.
+
+    tau dx/dt = (T / T_rated)^2 - x        x = 1: rated torque for ever; torque and current are proportional
+    R = R_20 (1 + alpha dT x)              copper: alpha = 0.00393 / K, dT the rise at rated torque
+"""
+from pedestal_common.compiled import compiled
+
+COPPER = 0.00393
+"""Temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)."""
+
+WARM = 0.8
+"""Thermal load of a motor that is worth a warning."""
+
+
+@compiled
+def load(x, torque, per_rated, gain):
+    """Thermal load one period later under a torque [Nm]; gain = 1 - exp(-h / tau)."""
+    relative = torque * per_rated
+    return x + gain * (relative * relative - x)
+
+
+@compiled
+def damping(h_R_L, rise, x):
+    """Factor 1 / (1 + h R / L) of the current's implicit step with the winding at load x; rise = alpha dT."""
+    return 1.0 / (1.0 + h_R_L * (1.0 + rise * x))

@@ -1,0 +1,78 @@
+"""Wind torque on both axes, a function of time alone: a mean, and a gust on top of it.
+
+A spectral gust is the sum of LINES cosines with random phases, one for each of LINES equal steps of log f, so that
+v(t) has the spectrum asked for (Shinozuka and Deodatis, Applied Mechanics Reviews 44 (1991) 191) and the same t
+gives the same torque. Drag goes with the square of the wind's speed: torque = mean (1 + v / V)^2.
+"""
+import math
+import types
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+LINES = 128
+LOWEST, HIGHEST = 1e-4, 20.0
+"""Range of the spectra [Hz]; gusts quicker than 20 Hz are far smaller than an antenna."""
+
+NONE, STEP, SINE, SPECTRUM = range(4)
+_KINDS = {'none': NONE, 'step': STEP, 'sine': SINE, 'davenport': SPECTRUM, 'von_karman': SPECTRUM}
+
+
+def davenport(f, V):
+    """Density [s] of v^2 / sigma_v^2 at f [Hz], mean speed V [m/s]: 2/3 x^2 / (f (1 + x^2)^(4/3)), x = 1200 m f / V.
+
+    Davenport, Quarterly Journal of the Royal Meteorological Society 87 (1961) 194, scaled to a variance of 1.
+    """
+    x = 1200.0 * f / V
+    return 2.0 / 3.0 * x * x / (f * (1.0 + x * x) ** (4.0 / 3.0))
+
+
+def von_karman(f, V, L):
+    """The same of the longitudinal von Karman spectrum, L [m] its length."""
+    return 4.0 * (L / V) / (1.0 + 70.8 * (f * L / V) ** 2) ** (5.0 / 6.0)
+
+
+def _lines(gust):
+    """Amplitude of v / V, angular frequency [rad/s] and phase of every cosine."""
+    if _KINDS[gust.kind] != SPECTRUM:
+        return np.zeros((3, LINES))
+    edges = np.geomspace(LOWEST, HIGHEST, LINES + 1)
+    f = np.sqrt(edges[:-1] * edges[1:])
+    density = davenport(f, gust.speed) if gust.kind == 'davenport' else von_karman(f, gust.speed, gust.length)
+    phase = np.random.default_rng(gust.seed).uniform(0.0, 2.0 * math.pi, LINES)
+    return np.array([gust.intensity * np.sqrt(2.0 * density * np.diff(edges)), 2.0 * math.pi * f, phase])
+
+
+def constants(p):
+    """Constants of WindParameters: nested dictionary."""
+    amplitude, omega, phase = _lines(p.gust)
+    return {'azimuth': p.azimuth, 'elevation': p.elevation, 'kind': _KINDS[p.gust.kind],
+            'gust_azimuth': p.gust.azimuth, 'gust_elevation': p.gust.elevation, 'start': p.gust.start,
+            'omega_sine': 2.0 * math.pi * p.gust.frequency, 'amplitude': amplitude, 'omega': omega, 'phase': phase}
+
+
+@compiled
+def turbulence(t, amplitude, omega, phase):
+    """Longitudinal turbulence v / V at the time t [s]."""
+    v = 0.0
+    for i in range(LINES):
+        v += amplitude[i] * math.cos(omega[i] * t + phase[i])
+    return v
+
+
+@compiled
+def torques(c, t):
+    """Torques [Nm] on the azimuth and elevation loads at the time t [s]."""
+    if c.kind == SPECTRUM:
+        g = 1.0 + turbulence(t, c.amplitude, c.omega, c.phase)
+        return c.azimuth * g * abs(g), c.elevation * g * abs(g)      # a wind that turns round pushes back
+    gust = 0.0
+    if t >= c.start:
+        gust = 1.0 if c.kind == STEP else math.sin(c.omega_sine * (t - c.start)) if c.kind == SINE else 0.0
+    return c.azimuth + c.gust_azimuth * gust, c.elevation + c.gust_elevation * gust
+
+
+def initial_torques(p):
+    """Torques [Nm] of WindParameters on azimuth and elevation at t = 0."""
+    return torques.py_func(types.SimpleNamespace(**constants(p)), 0.0)

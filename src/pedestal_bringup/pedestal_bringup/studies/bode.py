@@ -1,0 +1,335 @@
+"""Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
+
+A signal is added inside a loop at its break point while the axis moves at a constant rate, where friction is a
+constant and the bias keeps the teeth closed. What goes on from there is E, what comes back -Y; at the excited
+frequencies the open loop is L = Y / E, the closed loop T = L / (1 + L). No controller is known to the study:
+
+    current     added to i_ref, every 100 us        E = i_ref - i_q            Y = i_q
+    speed       added to the rate command, 0.5 ms   E = rate - mean speed / N  Y = mean speed / N from the encoders
+    position    added between ACU and drive, T      E = rate the drive gets    Y = -(rate the ACU commands)
+
+The grey line of a figure is what the gains were chosen by: w_c / s for the current, (K_p + K_i / s) / (J s) for the
+speed with everything rigid, K_p / s + K_i / s^2 for the position. What lies between is sampling, delay, elasticity.
+"""
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+from acu_tracker.params import AcuParameters
+from adu_drive import axis, drive_unit
+from adu_drive.params import AduParameters
+from pedestal_bringup import closed_loop
+from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.studies import experiment, servo
+from pedestal_bringup.studies.experiment import Case, Result, row
+from pedestal_common.compiled import compiled
+
+AXES = ('azimuth', 'elevation')
+MOTORS = ('motor_1', 'motor_2')
+START = (-2.0, 0.15)
+"""Where the axes start [rad]."""
+
+RATE = (0.1, 0.03)
+"""Rates of the axes [rad/s]: far above the excitation and the Stribeck rate, inside the travel for a whole record."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Sweep:
+    """A multisine: `points` frequencies, evenly spaced in log from `lowest` to `highest` [Hz], on whole periods of
+    `period` [s]; `dropped` periods to settle, `kept` to measure; largest value `peak`."""
+    period: float
+    lowest: float
+    highest: float
+    points: int
+    dropped: int
+    kept: int
+    peak: float
+
+    def bins(self):
+        """Frequencies as whole multiples of 1 / period."""
+        return np.unique(np.round(np.geomspace(self.lowest, self.highest, self.points) * self.period).astype(int))
+
+    def frequencies(self):
+        return self.bins() / self.period
+
+    def signal(self, step):
+        """The whole record (n,) at one value per `step` [s]: equal amplitudes, Schroeder's phases (IEEE Trans.
+        Information Theory 16 (1970) 85), which keep the peak low."""
+        n = round(self.period / step)
+        k = np.arange(len(self.bins()))
+        spectrum = np.zeros(n // 2 + 1, complex)
+        spectrum[self.bins()] = np.exp(-1j * math.pi * k * (k + 1) / len(k))
+        one = np.fft.irfft(spectrum, n)
+        return np.tile(self.peak / np.abs(one).max() * one, self.dropped + self.kept)
+
+
+CURRENT = Sweep(0.1, 10.0, 4000.0, 60, 5, 5, 1.5)
+"""Peak in A."""
+
+SPEED = Sweep(1.0, 1.0, 900.0, 120, 2, 4, 0.015)
+"""Peak in rad/s of the load: 6 Nm of a motor, less than the bias."""
+
+POSITION = Sweep(8.0, 0.25, 95.0, 300, 2, 3, 0.012)
+"""Peak in rad/s: half of what would open the teeth at the paper's 5 Nm of bias. Up to nearly half of 1 / 5 ms."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Response:
+    """Open loop (n,) complex at the frequencies (n,) [Hz]; deviation (n,): standard deviation of it, relative."""
+    frequency: np.ndarray
+    open_loop: np.ndarray
+    deviation: np.ndarray
+
+    @property
+    def closed_loop(self):
+        return self.open_loop / (1.0 + self.open_loop)
+
+
+def response(sweep, sent, returned):
+    """Response of a loop from what went on from its break point and what came back, two records (n,)."""
+    E, Y = (np.fft.rfft(x.reshape(sweep.dropped + sweep.kept, -1)[sweep.dropped:], axis=1)[:, sweep.bins()]
+            for x in (sent, returned))
+    L = Y.mean(axis=0) / E.mean(axis=0)
+    return Response(sweep.frequencies(), L, np.std(Y / E / L, axis=0) / math.sqrt(sweep.kept - 1))
+
+
+# The loops inside the drive.
+
+@compiled
+def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
+    """One axis from rest: rate (n,) [rad/s] commanded each speed period, current (5 n,) [A] added to both i_ref each
+    current period, to the speed (n,) [rad/s] of the axis and i_ref, i_q of both motors (5 n, 2) [A]."""
+    m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
+    for n in range(len(rate)):
+        axis.speed_control(s, c, rate[n], 0.0, 1)
+        speed[n] = c.per_2N * (m1.measured + m2.measured)
+        i_1, i_2 = m1.i_ref, m2.i_ref
+        for k in range(n * axis.CURRENT_TICKS, (n + 1) * axis.CURRENT_TICKS):
+            m1.i_ref, m2.i_ref = i_1 + current[k], i_2 + current[k]
+            wanted[k, 0], wanted[k, 1], made[k, 0], made[k, 1] = m1.i_ref, m2.i_ref, m1.i_q, m2.i_q
+            axis.current_control(m1, k1)
+            axis.current_control(m2, k2)
+            for _ in range(substeps):
+                axis.plant_step(s, c, 0.0)
+
+
+@compiled
+def _azimuth(state, constants, rate, current, speed, wanted, made):
+    _inner_loops(state[0].azimuth, constants[0].azimuth, constants[0].substeps, rate, current, speed, wanted, made)
+
+
+@compiled
+def _elevation(state, constants, rate, current, speed, wanted, made):
+    _inner_loops(state[0].elevation, constants[0].elevation, constants[0].substeps, rate, current, speed, wanted, made)
+
+
+def _run_inner(drive, index, rate, current):
+    """(speed (n,), i_ref, i_q (5 n, 2)) of an axis of a drive (AduParameters) under what is added to its signals."""
+    drive = dataclasses.replace(drive, initial_azimuth=START[0], initial_elevation=START[1])
+    speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
+    steps = (_azimuth, _elevation)[index]
+    steps(drive_unit.initial_state(drive), drive_unit.constants(drive), RATE[index] + rate, current, speed, wanted,
+          made)
+    return speed, wanted, made
+
+
+def current(drive, sweep=CURRENT):
+    """Responses of the current loops of the azimuth's motors: {name: Response}."""
+    added = sweep.signal(axis.CURRENT_PERIOD)
+    _, wanted, made = _run_inner(drive, 0, np.zeros(len(added) // axis.CURRENT_TICKS), added)
+    return {f'current/{motor}': response(sweep, wanted[:, j] - made[:, j], made[:, j])
+            for j, motor in enumerate(MOTORS)}
+
+
+def speed(drive, sweep=SPEED):
+    """Responses of the speed loops of both axes: {name: Response}."""
+    added, found = sweep.signal(axis.SPEED_PERIOD), {}
+    for i, name in enumerate(AXES):
+        seen, _, _ = _run_inner(drive, i, added, np.zeros(len(added) * axis.CURRENT_TICKS))
+        found[f'speed/{name}'] = response(sweep, RATE[i] + added - seen, seen)
+    return found
+
+
+# The position loop.
+
+MOVING = {
+    'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0, 'scenario.program.interval': 1.0,
+    'adu.initial_azimuth': START[0], 'adu.initial_elevation': START[1],
+    'tracking_receiver.target.kind': 'ramp',
+    'tracking_receiver.target.angle.azimuth': START[0], 'tracking_receiver.target.angle.elevation': START[1],
+    'tracking_receiver.target.angle.azimuth_rate': RATE[0], 'tracking_receiver.target.angle.elevation_rate': RATE[1]}
+"""Both axes follow a program track of constant rates."""
+
+
+def case(name, scenario, parameters):
+    """A case of the position loop: the loop of a scenario, with parameters changed, moving at constant rates."""
+    return Case(name, scenario, {**MOVING, **parameters})
+
+
+def position(case, axes=AXES, sweep=POSITION):
+    """Responses of the position loops of a case: {name: Response}."""
+    loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
+    loop = closed_loop.cores(loaded)
+    added = np.zeros((loop.steps + 1, 2))
+    added[:-1] = sweep.signal(loop.period_ns * 1e-9)[:, np.newaxis]
+    commanded = closed_loop.run(loop, added)['rate']
+    return {f'position/{name}/{case.name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
+            for i, name in enumerate(AXES) if name in axes}
+
+
+# What a response says.
+
+def _crossings(f, y, angle):
+    """Where y (n,) goes through zero, and the angle [rad] there: both linear in log f, angle taken the short way."""
+    i = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
+    share = y[i] / (y[i] - y[i + 1])
+    turn = np.angle(np.exp(1j * (angle[i + 1] - angle[i])))
+    return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * turn
+
+
+def margins(found):
+    """{metric: (value, unit)} of a Response; NaN: no such frequency in the band.
+
+    crossover: where |L| first falls below 1. phase_margin: the smallest turn, either way, that puts a point of |L| = 1
+    on -1. gain_margin: the smallest gain that does it. bandwidth: where |T| first falls below -3 dB. peak: of |T|.
+    """
+    f, L, T = found.frequency, found.open_loop, np.abs(found.closed_loop)
+    gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)
+    crossover, turn = _crossings(f, gain, from_minus_one)
+    turn = np.abs(np.angle(np.exp(1j * turn)))
+    near = np.where(np.abs(from_minus_one) < 0.5 * math.pi, from_minus_one, np.nan)
+    _, at_minus = _crossings(f, near, gain)
+    at_minus = at_minus[at_minus < 0.0]
+    below = _crossings(f, np.log(T) - 0.5 * math.log(0.5), T)[0]
+    return {'bandwidth_hz': (below[0] if below.size else math.nan, 'Hz'),
+            'crossover_hz': (crossover[0] if crossover.size else math.nan, 'Hz'),
+            'gain_margin_db': (-20.0 / math.log(10.0) * at_minus.max() if at_minus.size else math.nan, 'dB'),
+            'phase_margin_deg': (math.degrees(turn.min()) if turn.size else math.nan, 'deg'),
+            'peak_db': (20.0 * math.log10(T.max()), 'dB')}
+
+
+# The study.
+
+def controller(name):
+    """Both axes of the product's default loop with a position controller."""
+    return case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
+
+
+FAST = {'acu.azimuth.feedforward.bandwidth': 40.0}
+STRUCTURE = {**FAST, 'adu.azimuth.structure.inertia_share': 0.5, 'adu.azimuth.structure.frequency': 8.0}
+NOTCH = {**STRUCTURE, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
+         'acu.azimuth.notch.depth': 0.3}
+"""Half of the load swings on the other half; the notch lies where the loop without it has its resonance."""
+
+CASES = {
+    'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
+    'adrc': (controller('adrc'), AXES),
+    'paper-r1': (case('paper-r1', 'servo_sine', servo.R1), AXES[:1]),
+    'best': (case('best', 'servo_sine', servo.BEST), AXES[:1]),
+    'rigid': (case('rigid', 'leo_pass', FAST), AXES[:1]),
+    'structure': (case('structure', 'leo_pass', STRUCTURE), AXES[:1]),
+    'structure-notch': (case('structure-notch', 'leo_pass', NOTCH), AXES[:1])}
+"""Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's; a
+faster one with a rigid load, with a flexible one, and with a notch against that."""
+
+MARGIN_BAND = math.sqrt(10.0)
+"""Around crossover, where the margins are read: |L| within this of 1, 10 dB either way."""
+
+
+def nonlinearity(found, smaller):
+    """Largest relative change of L between two excitations, within MARGIN_BAND."""
+    change = np.abs(smaller.open_loop / found.open_loop - 1.0)
+    return float(change[np.abs(np.log(np.abs(found.open_loop))) < math.log(MARGIN_BAND)].max())
+
+
+def rows(responses):
+    """The rows of {name: Response}."""
+    return [row(name, metric, value, unit) for name, found in responses.items()
+            for metric, (value, unit) in margins(found).items()]
+
+
+def run(progress) -> Result:
+    drive = AduParameters()
+    parts = {'current loops': (functools.partial(current, drive), CURRENT),
+             'speed loops': (functools.partial(speed, drive), SPEED)}
+    parts |= {f'position loop {name}': (functools.partial(position, case, axes), POSITION)
+              for name, (case, axes) in CASES.items()}
+    responses, change = {}, {}
+    for i, (text, (measure, sweep)) in enumerate(parts.items()):
+        progress(i / len(parts), text)
+        found, smaller = measure(sweep), measure(dataclasses.replace(sweep, peak=0.5 * sweep.peak))
+        change |= {name: nonlinearity(found[name], smaller[name]) for name in found}
+        responses |= found
+    worst = max(change, key=change.get)
+    remarks = [f'Linear: half the excitation changes no open loop by more than {100.0 * change[worst]:.1f} % within '
+               f'10 dB of |L| = 1 ({worst}).']
+    return Result(rows(responses), drawings(responses, drive), remarks)
+
+
+# Figures.
+
+def drawings(responses, drive):
+    """{name: function that draws a Figure}."""
+    p, c = drive.azimuth, AcuParameters().azimuth.feedforward
+    w_c = 2.0 * math.pi * p.current_loop.bandwidth
+    J = p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
+
+    def chosen(curves, design=None):
+        return lambda: drawn({label: (responses[name], colour) for label, (name, colour) in curves.items()}, design)
+
+    return {
+        'current': chosen({'motor 1': ('current/motor_1', MOTOR_1), 'motor 2': ('current/motor_2', MOTOR_2)},
+                          lambda s: w_c / s),
+        'speed': chosen({'azimuth': ('speed/azimuth', FILTERED), 'elevation': ('speed/elevation', TRUTH)},
+                        lambda s: (p.speed_loop.proportional + p.speed_loop.integral / s) / (J * s)),
+        'position': chosen({'feed-forward (and pid)': ('position/azimuth/feedforward', FILTERED),
+                            'the same, elevation': ('position/elevation/feedforward', TRUTH),
+                            'adrc': ('position/azimuth/adrc', MOTOR_2)},
+                           lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
+        'structure': chosen({'rigid': ('position/azimuth/rigid', RAW),
+                             'flexible': ('position/azimuth/structure', TRUTH),
+                             'flexible, notch': ('position/azimuth/structure-notch', FILTERED)}),
+        'paper': chosen({'paper': ('position/azimuth/paper-r1', RAW), 'best': ('position/azimuth/best', FILTERED)})}
+
+
+def decibel(x):
+    return 20.0 * np.log10(np.abs(x))
+
+
+def degrees(x):
+    """Phase (n,) without jumps, the first in (-360, 0]."""
+    phase = np.degrees(np.unwrap(np.angle(x)))
+    return phase - 360.0 * math.ceil(phase[0] / 360.0)
+
+
+def drawn(curves, design):
+    """Bode diagrams of the open and the closed loop: {label: (Response, colour)}, design(s) the open loop or None."""
+    figure, axes = experiment.panels(2, 2, sharex=True)
+    believed = {label: found.deviation < 0.2 for label, (found, _) in curves.items()}
+    for column, title in enumerate(('open loop', 'closed loop')):
+        gain, phase = axes[:, column]
+        if design:
+            f = next(iter(curves.values()))[0].frequency
+            L = design(2j * math.pi * f)
+            x = L / (1.0 + L) if column else L
+            gain.semilogx(f, decibel(x), color=RAW, lw=0.8, label='as designed')
+            phase.semilogx(f, degrees(x), color=RAW, lw=0.8)
+        for label, (found, colour) in curves.items():
+            keep = believed[label]
+            x = (found.closed_loop if column else found.open_loop)[keep]
+            gain.semilogx(found.frequency[keep], decibel(x), '.-', color=colour, ms=3.0, lw=0.7, label=label)
+            phase.semilogx(found.frequency[keep], degrees(x), '.-', color=colour, ms=3.0, lw=0.7)
+        gain.set_title(title)
+        gain.axhline(-3.0 if column else 0.0, color=INK, lw=0.6, ls=':')
+        gain.set_ylim(bottom=-40.0)
+        if not column:
+            phase.axhline(-180.0, color=INK, lw=0.6, ls=':')
+        phase.set_ylim(-360.0, 60.0)
+        phase.set_yticks(np.arange(-360.0, 1.0, 90.0))
+        phase.set_xlabel('frequency [Hz]')
+    axes[0, 0].set_ylabel('gain [dB]')
+    axes[1, 0].set_ylabel('phase [deg]')
+    axes[0, 0].legend()
+    return figure

@@ -1,0 +1,185 @@
+"""Bags that are damaged, foreign, wrong or not finished: what each verb that reads one says. Never a traceback."""
+import os
+import random
+import sqlite3
+
+import pytest
+from mcap.writer import Writer as McapWriter
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup import cli
+from pedestal_common import messages, topics
+
+RECORDED = topics.read_by('recorder', ('tracking_receiver', 'acu', 'adu', 'recorder'))
+
+
+def message(topic, stamp):
+    if topic.name == 'clock':
+        made = messages.Clock(clock=messages.Time(sec=0, nanosec=0))
+        messages.put_stamp(made.clock, stamp)
+        return made
+    kind = topic.type.rpartition('/')[2]
+    made = {'JointState': lambda: messages.joint_state(messages.AXES),
+            'JointTrajectory': lambda: messages.joint_trajectory('earth', [messages.trajectory_point()]),
+            'Odometry': lambda: messages.odometry('earth', 'target'),
+            'Vector3Stamped': lambda: messages.Vector3Stamped(header=messages.header('beam'),
+                                                              vector=messages.vector3())}[kind]()
+    messages.put_stamp(made.header.stamp, stamp)
+    return made
+
+
+def write(path, stamps, written=RECORDED, close=True):
+    """A bag with the stamps [step of 5 ms] on every topic of the steps."""
+    writer = bags.Writer(path, written, {'scenario': 'test', 'pacing': 'lockstep'})
+    for step in stamps:
+        for index, topic in enumerate(written):
+            if topic.rate == 'step':
+                writer.write(index, step * 5_000_000, step * 5_000_000,
+                             messages.serialize(message(topic, step * 5_000_000)))
+    if close:
+        writer.close()
+    return writer
+
+
+def whole(path):
+    return write(path, range(600))
+
+
+def truncated(path):
+    file = whole(path).file
+    os.truncate(file, file.stat().st_size * 2 // 3)
+
+
+def not_one_chunk(path):
+    file = whole(path).file
+    os.truncate(file, 2_000)
+
+
+def empty(path):
+    whole(path).file.write_bytes(b'')
+
+
+def no_message(path):
+    write(path, [])
+
+
+def text(path):
+    path.mkdir()
+    (path / 'notes.mcap').write_text('time_s,azimuth\n0.0,1.0\n')
+
+
+def encrypted(path):
+    path.mkdir()
+    (path / 'x.mcap').write_bytes(random.Random(1).randbytes(50_000))
+
+
+def sqlite(path):
+    path.mkdir()
+    database = sqlite3.connect(path / 'x_0.db3')
+    database.execute('create table topics (id integer)')
+    database.commit()
+    database.close()
+
+
+def other_profile(path):
+    path.mkdir()
+    with open(path / 'x.mcap', 'wb') as stream:
+        writer = McapWriter(stream)
+        writer.start(profile='', library='other')
+        schema = writer.register_schema('pose', 'jsonschema', b'{}')
+        channel = writer.register_channel('/pose', 'json', schema)
+        for k in range(100):
+            writer.add_message(channel, k, b'{"x": 1}', k)
+        writer.finish()
+
+
+def several(path):
+    path.mkdir()
+    for name in ('a_0.mcap', 'a_1.mcap'):
+        (path / name).write_bytes(b'')
+
+
+def no_bag(path):
+    path.mkdir()
+
+
+def missing(path):
+    pass
+
+
+def wrong_type(path):
+    """joint_states and the truth are of the type of a point."""
+    point = topics.BY_NAME['tracking_receiver/angle_error'].type
+    write(path, range(600), [topic._replace(type=point) if topic.name in ('joint_states', 'target/truth') else topic
+                             for topic in RECORDED])
+
+
+def backwards(path):
+    write(path, [*range(300), *range(290, 600)])
+
+
+WRITERS = []
+
+
+def being_written(path):
+    WRITERS.append(write(path, range(600), close=False))
+
+
+VERBS = ('verify', 'report', 'recover', 'rerun')
+CASES = {
+    truncated: {'verify': 'the file ends at byte', 'recover': None,
+                '': ('the file ends at byte', 'inside a record', '`pedestal recover` makes a bag of what is there')},
+    not_one_chunk: {'verify': 'the file ends at byte', 'recover': 'not one message in it can be read',
+                    '': ('the file ends at byte',)},
+    empty: {'': ('_0.mcap: empty file',)},
+    no_message: {'verify': "no topic of the drive's steps has a message", 'report': None,
+                 'recover': 'not one message in it can be read', 'rerun': 'holds no configuration'},
+    text: {'': ('notes.mcap: not an MCAP file',)},
+    encrypted: {'': ('x.mcap: not an MCAP file',)},
+    sqlite: {'': ('x_0.db3: an SQLite bag, not an MCAP file', '`ros2 bag convert`')},
+    other_profile: {'': ("/pose is encoded as 'json': not a ROS 2 recording",)},
+    several: {'': ('2 .mcap files in it where one belongs',)},
+    no_bag: {'': ('0 .mcap files in it where one belongs',)},
+    missing: {'': ('No such file or directory',)},
+    wrong_type: {'verify': 'of type geometry_msgs/msg/Vector3Stamped, where the graph has sensor_msgs/msg/JointState',
+                 'report': None, 'recover': None, 'rerun': 'holds no configuration'},
+    backwards: {'verify': '1 stamps go back, the first from 1.495000 to 1.450000 s',
+                'report': 'the stamps of joint_states go back, the first from 1.495000 to 1.450000 s',
+                'recover': None, 'rerun': 'holds no configuration'},
+    being_written: {'': ('is being written; wait until its recorder has ended',)},
+}
+"""What each verb says, '' standing for those not named: the one line of an error. None: it does its work."""
+
+
+@pytest.mark.parametrize('make', CASES, ids=lambda make: make.__name__)
+def test_bad_bag(make, tmp_path, capsys, one_line):
+    path = tmp_path / 'bag'
+    make(path)
+    before = {file: file.read_bytes() for file in path.glob('*')}
+    for verb in VERBS:
+        expected = CASES[make].get(verb, CASES[make].get(''))
+        code = cli.main([verb, str(path)])
+        out, err = capsys.readouterr()
+        if expected is None:
+            assert (code, err) == (0, ''), verb
+        elif isinstance(expected, str) and verb == 'verify':
+            assert (code, err) == (1, '') and expected in out and 'NOT complete' in out.splitlines()[-1], out
+        else:
+            line = one_line(err)
+            assert code == 1 and line.startswith('pedestal: error: ') and str(path) in line, verb
+            for part in (expected,) if isinstance(expected, str) else expected:
+                assert part in line
+    (path / 'report.html').unlink(missing_ok=True)
+    assert {file: file.read_bytes() for file in path.glob('*')} == before
+    for writer in WRITERS:
+        writer.close()
+    WRITERS.clear()
+
+
+def test_the_report_of_numbers_that_are_strange_but_readable(tmp_path):
+    wrong_type(tmp_path / 'bag')
+    assert cli.main(['report', str(tmp_path / 'bag')]) == 0
+    whole(tmp_path / 'never off the target')
+    assert cli.main(['report', str(tmp_path / 'never off the target')]) == 0
+    said = 'joint_states: of type geometry_msgs/msg/Vector3Stamped, where the graph has sensor_msgs/msg/JointState'
+    assert said in (tmp_path / 'bag' / 'report.html').read_text()

@@ -1,0 +1,62 @@
+"""The step and the sine of paper 000 through the graph of nodes equal the study's: there is one implementation."""
+import json
+
+import numpy as np
+import pytest
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup.studies import servo
+from pedestal_bringup.studies.experiment import Case
+
+ALLOWED = 1e-6
+"""Largest difference between a run of the nodes and the study [rad, rad/s]."""
+
+CASES = {
+    'r1-step': Case('paper-r1', 'servo_step', servo.R1), 'best-step': Case('best', 'servo_step', servo.BEST),
+    'r1-sine': Case('paper-r1', 'servo_sine', servo.R1, 1.6), 'best-sine': Case('best', 'servo_sine', servo.BEST, 1.6)}
+
+
+@pytest.fixture(scope='module')
+def runs(start_run):
+    """Finished `pedestal run` of every case, two at a time."""
+    done = {}
+    names = list(CASES)
+    for pair in (names[:2], names[2:]):
+        for name in pair:
+            _, _, scenario, *arguments = CASES[name].command().split()
+            done[name] = start_run(scenario, *arguments)
+        for name in pair:
+            result = done[name].finish()
+            assert result.returncode == 0, result.stderr
+            done[name].output = result.stdout
+    return done
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_nodes_and_study_agree(runs, name, record_property):
+    composed = CASES[name].run()
+    recorded = bags.read(runs[name].bag)
+    for topic, quantity, field in (('joint_states', 'position', 'position'), ('acu/rate_command', 'velocity', 'rate'),
+                                   ('acu/reference', 'position', 'reference')):
+        table = recorded.table(topic)
+        count = len(table['t'])
+        assert count >= len(composed) - 1
+        assert np.array_equal(np.round(table['t'] * 1e9), np.round(composed['t'][:count] * 1e9))
+        for i, axis in enumerate(('azimuth', 'elevation')):
+            there = composed[field][:count, i]
+            difference = np.max(np.abs(table[f'{axis}.{quantity}'] - (there[:, 0] if there.ndim > 1 else there)))
+            record_property(f'{topic} {axis} {quantity}', difference)
+            assert difference <= ALLOWED, (topic, axis, difference)
+    moved = recorded.table('joint_states')['azimuth.position']
+    assert np.ptp(moved) > 0.17
+
+
+def test_a_run_that_never_tracks_tells_how_it_followed(runs):
+    values = {row['metric']: row['value'] for row in json.loads(runs['r1-step'].json.read_text())['rows']}
+    composed = CASES['r1-step'].run()
+    error = np.degrees(composed['reference'][:-1, 0, 0] - composed['position'][:-1, 0])
+    assert values['azimuth_following_max_deg'] == pytest.approx(np.max(np.abs(error)), rel=1e-6)
+    assert values['azimuth_following_rms_deg'] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-2)
+    assert values['elevation_following_max_deg'] < 0.01
+    assert values['pointing_rms_deg'] is None
+    assert 'not measured' in runs['r1-step'].output
