@@ -1,7 +1,7 @@
 # make demo    set up, run the main scenario as separate nodes, record it, check the recording, write the report
 # make test    set up, lint, run every test
 # make update-references  record bags/reference anew and print the difference that is accepted with it
-# make bench   set up, measure the graph and the core
+# make bench   set up, measure the graph, the core and bags
 # make colcon  build src/ as a ROS 2 workspace and start a node from it
 # make clean   remove everything made here
 
@@ -30,6 +30,7 @@ update-references: install
 bench: install
 	.venv/bin/pedestal bench graph
 	.venv/bin/pedestal bench core
+	.venv/bin/pedestal bench bag
 
 # colcon leaves build/, install/ and log/ where it is called, so that is build/colcon/.
 colcon: .venv-colcon/installed

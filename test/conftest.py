@@ -201,12 +201,12 @@ def start_node(reserve_domain, tmp_path_factory):
 class Client:
     """Talks to nodes through rclpy: publishes and hears the messages of messages.py, calls services."""
 
-    def __init__(self, domain_id):
+    def __init__(self, domain_id, name):
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
         self.context = rclpy.Context()
         rclpy.init(args=[], context=self.context, domain_id=domain_id)
-        self.node = rclpy.create_node('client', context=self.context)
+        self.node = rclpy.create_node(name, context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
         self.heard = {}
@@ -284,14 +284,14 @@ class Client:
 
 @pytest.fixture(scope='module')
 def connect():
-    """connect(domain_id) -> Client."""
+    """connect(domain_id, name='client') -> Client; by its name it can stand for a node of the graph."""
     from pedestal_common import shell
     clients = []
     before = dict(os.environ)
     shell.set_middleware_defaults()
 
-    def open_client(domain_id):
-        clients.append(Client(domain_id))
+    def open_client(domain_id, name='client'):
+        clients.append(Client(domain_id, name))
         return clients[-1]
 
     yield open_client

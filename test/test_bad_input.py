@@ -208,10 +208,11 @@ def misled(start_node, connect):
         ('-p', 'graph.nodes:=acu,adu') if node == 'adu' else ())) for case, (node, *_) in STAMPS.items()}
     results = {}
     for case, (_, topic, stamps, _) in STAMPS.items():
-        client = connect(started[case].domain_id)
+        client = connect(started[case].domain_id, 'acu')
         client.write(topic)
         if topic != 'joint_states':
             client.read('joint_states')
+            client.read('adu/state')
             client.until(lambda client=client: client.heard['joint_states'])
         for stamp in stamps:
             client.publish(topic, joints(stamp))

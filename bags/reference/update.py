@@ -17,13 +17,18 @@ LARGEST = 1_000_000
 SHORT = ('--pacing', 'lockstep', '--duration', '4', '--param', 'acu.tracker.lock_count=20')
 """Just long enough to lock, to hand over and to track for some seconds."""
 
-REFERENCES = {'leo_pass': SHORT, 'uav_flyby': SHORT, 'ship_pass': SHORT}
+REFERENCES = {'leo_pass': SHORT, 'uav_flyby': SHORT, 'ship_pass': SHORT, 'servo_step': (),
+              'servo_sine': ('--duration', '1.5')}
 """{scenario and name of its reference: how its run is shortened}."""
 
 
 def pedestal(*arguments):
     """Exit code of a `pedestal` command, its output on ours."""
     return subprocess.run([sys.executable, '-m', 'pedestal_bringup.cli', *map(str, arguments)]).returncode
+
+
+COMPARE = ('--absolute', 0, '--relative', 0, '--allow-idle')
+"""To the last bit, and also where a scenario never tracks."""
 
 
 def update(name, folder):
@@ -36,12 +41,12 @@ def update(name, folder):
     if size > LARGEST:
         print(f'{name}: {size} bytes; must be at most {LARGEST}', file=sys.stderr)
         return 1
-    if pedestal('recompute', new, '--absolute', 0, '--relative', 0):
+    if pedestal('recompute', new, *COMPARE):
         print(f'{name}: the new recording does not recompute to itself', file=sys.stderr)
         return 1
     if old.exists():
         print(f'-- accepted: what the nodes now make of the old {name}', flush=True)
-        pedestal('recompute', old, '--absolute', 0, '--relative', 0)
+        pedestal('recompute', old, *COMPARE)
         shutil.rmtree(old)
     shutil.move(new, old)
     print(f'-- {old}: {size} bytes', flush=True)

@@ -1,9 +1,11 @@
 """The antenna drive unit: two axes, each with two motors that take the lash out of one bull gear.
 
     drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
-    axis          one axis: sensors, speed loop, two current loops, plant
-    speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder    the controller's laws
-    motor, gear_train, friction, structure, wind                                 the plant's laws
+    drive_state   enable, brakes and faults: the state machine of both axes
+    axis          one axis: sensors, speed loop, two current loops, plant, what it trips on
+    wire          the column between its messages: what the node and a recomputation share
+    speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    the controller's laws
+    motor, thermal, brake, gear_train, friction, structure, wind                         the plant's laws
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
@@ -23,6 +25,7 @@ Symbols
     k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis
     z                 LuGre bristle deflection [rad]; sigma_0, sigma_1 its stiffness and damping
     T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]
+    x, tau            thermal load of a motor (1: rated torque for ever), time constant of its winding [s]
     v, V              turbulence along the mean wind, and the mean wind [m/s]
     h                 plant sub-step 50 us; current loops 100 us, speed loop 0.5 ms
 """

@@ -8,18 +8,11 @@ from std_srvs.srv import Trigger
 
 from adu_drive import drive_state, faults, thermal
 from adu_drive.params import AduNodeParameters
-from adu_drive.wire import CLOCK, COMMAND, JOINTS, MOTORS, SHIP, STATE, Adu, state_text
+from adu_drive.wire import CLOCK, COMMAND, JOINTS, MOTORS, SHIP, STATE, Adu
 from pedestal_common import messages, records, shell
 
 STEP = 'step'
 """The drive's own trigger among its inputs."""
-
-REFUSALS = {
-    drive_state.FAULT_LATCHED: 'a fault is latched (adu/reset_faults)',
-    drive_state.EMERGENCY_LATCHED: 'an emergency stop is latched (adu/reset_faults)',
-    drive_state.MOVING: 'the axes still move',
-    drive_state.CAUSE_PERSISTS: 'the cause is still there'}
-"""Why a request is not granted."""
 
 ACKNOWLEDGED_STEPS = 1000
 """Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so
@@ -43,8 +36,8 @@ class AduNode(shell.Shell):
         self.command = None
         self.command_stamp = None
         self.stale = False
-        self.condition = None
-        self.announced = None
+        self.code = None
+        self.announced = ''
         self.refused = ''
         self.invalid = ''
         self.tick_timer = None
@@ -56,8 +49,8 @@ class AduNode(shell.Shell):
         self.says = [(self.unit.messages[name], records.only(self.unit.said, name), self.writer(name))
                      for name in (JOINTS, CLOCK, MOTORS)]
         self.send_state = self.writer(STATE)
-        for what, name in enumerate(drive_state.REQUESTS):
-            self.create_service(Trigger, f'adu/{name}', self.service(what))
+        for name, what in drive_state.REQUESTS.items():
+            self.create_service(Trigger, name, self.service(what))
         self.diagnose_with(self.diagnose)
 
         if self.graph.lockstep:
@@ -87,27 +80,28 @@ class AduNode(shell.Shell):
         self.ticking = True
 
     def publish_step(self):
-        """joint_states, clock and motor_states of step k."""
+        """The state when it has changed, then joint_states, clock and motor_states of step k."""
         stamp = self.k * self.period_ns
         self.begin_step(stamp)
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
-        outputs = self.outputs[0]
-        if outputs['condition'] != self.condition:
-            self.condition = int(outputs['condition'])
-            self.announce_state(state_text(outputs))
         self.now.stamp[0] = stamp
         self.unit.say()
+        self.announce_state()
         for message, place, send in self.says:
             records.put(message, place)
             send(message)
         if self.graph.lockstep:
             self.steps.take(STEP, stamp, None)
 
-    def announce_state(self, text):
-        if text != self.announced:
-            self.announced = text
-            self.announce(self.send_state, messages.String(data=text))
+    def announce_state(self):
+        code = self.unit.said[0][STATE]
+        if code != self.code:
+            self.code = code
+            now = drive_state.described(int(code))
+            if now != self.announced:
+                self.announced = now
+                self.announce(self.send_state, messages.String(data=now))
 
     def answered(self, _stamp, _trigger, inputs):
         """Lockstep: the command stamped t_k (and the ship's truth) has come."""
@@ -166,31 +160,34 @@ class AduNode(shell.Shell):
         self.finished = True
 
     def service(self, what):
-        """The callback of a request: asks the drive at once and answers with what it reads back."""
-        def ask(_request, response):
+        """The callback of a service: asks the drive between two steps and answers with what it reads back."""
+        def change(_request, response):
             answer = self.unit.ask(what)
-            if answer == drive_state.GRANTED and what == drive_state.RESET_FAULTS:
+            if what == drive_state.RESET_FAULTS and answer == drive_state.GRANTED:
                 self.refused = ''
+            now = drive_state.described(int(self.outputs[0]['condition']))
             response.success = answer == drive_state.GRANTED
-            refusal = f'refused: {REFUSALS[answer]}; ' if answer in REFUSALS else ''
-            response.message = f'{refusal}drive is {state_text(self.outputs[0])}'
+            refusal = '' if response.success else f'refused: {drive_state.REFUSALS[answer]}; '
+            response.message = f'{refusal}drive is {now}'
             return response
-        return ask
+        return change
 
     def diagnose(self):
         """What is now, and the topic that held no number since the last diagnosis."""
         outputs = self.outputs[0]
+        now = drive_state.described(int(outputs['condition']))
         invalid, self.invalid = self.invalid, ''
         values = [(f'{axis} {name}', '1' if outputs[axis][name] else '0') for axis in messages.AXES
                   for name in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
         values += [(f'{axis} faults', ', '.join(faults.names(outputs[axis]['faults']))) for axis in messages.AXES]
-        values += [(f'{axis}_motor_{i + 1} thermal_load', f'{load:.3f}') for axis in messages.AXES
-                   for i, load in enumerate(outputs[axis]['thermal_load'])]
-        values += [('state', state_text(outputs)), ('phase', drive_state.PHASES[outputs['phase']]),
-                   ('brakes', 'on' if outputs['braked'] else 'off'), ('step', str(self.k)),
-                   ('lost_steps', str(int(self.lost_steps))), ('late_ticks', str(int(self.late_ticks)))]
-        if outputs['emergency'] or outputs['azimuth']['faults'] | outputs['elevation']['faults']:
-            return shell.ERROR, state_text(outputs), values
+        values += [(f'{axis}_motor_{i} thermal_load', f'{load:.3f}') for axis in messages.AXES
+                   for i, load in enumerate(outputs[axis]['thermal_load'], 1)]
+        values += [('state', now), ('phase', drive_state.PHASES[outputs['phase']]),
+                   ('brakes', 'on' if outputs['braked'] else 'off')]
+        values += [('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
+                   ('late_ticks', str(int(self.late_ticks)))]
+        if outputs['emergency'] or any(outputs[axis]['faults'] for axis in messages.AXES):
+            return shell.ERROR, now, values
         if invalid:
             return shell.ERROR, f'{invalid} holds NaN or infinity: stopping', values
         if self.stale:
@@ -198,12 +195,14 @@ class AduNode(shell.Shell):
             return shell.ERROR, f'no new acu/rate_command for {limit:g} s: stopping', values
         if self.refused:
             return shell.WARN, f'acu/rate_command refused: {self.refused}', values
+        if now != 'enabled':
+            return shell.WARN, now, values
         if any(outputs[axis]['end_stop'] for axis in messages.AXES):
             return shell.WARN, 'at an end stop', values
         hottest = max(outputs[axis]['thermal_load'].max() for axis in messages.AXES)
         if hottest > thermal.WARM:
             return shell.WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values
-        return shell.OK, 'following' if outputs['following'] else state_text(outputs), values
+        return shell.OK, 'following', values
 
 
 def main(args=None):

@@ -6,17 +6,24 @@ The drive wants to be enabled while it is asked to be, no fault and no emergency
 control, lets the brakes grip while the motors still hold, and only then takes their torque away. Overcurrent, and a
 stop that takes too long, take the torque away at once and let the brakes fall in.
 """
-from adu_drive.faults import OVERCURRENT
+from adu_drive.faults import OVERCURRENT, names
 from pedestal_common.compiled import compiled
 
 PHASES = ('disabled', 'releasing brakes', 'enabled', 'stopping', 'engaging brakes')
 DISABLED, RELEASING, ENABLED, STOPPING, ENGAGING = range(len(PHASES))
 
-REQUESTS = ('enable', 'disable', 'emergency_stop', 'reset_faults')
-ENABLE, DISABLE, EMERGENCY_STOP, RESET_FAULTS = range(len(REQUESTS))
+ENABLE, DISABLE, EMERGENCY_STOP, RESET_FAULTS = range(4)
+REQUESTS = {'adu/enable': ENABLE, 'adu/disable': DISABLE, 'adu/emergency_stop': EMERGENCY_STOP,
+            'adu/reset_faults': RESET_FAULTS}
+"""What can be asked for, by the name of its service."""
 
 GRANTED, FAULT_LATCHED, EMERGENCY_LATCHED, MOVING, CAUSE_PERSISTS = range(5)
-"""Answers to a request."""
+REFUSALS = {
+    FAULT_LATCHED: 'a fault is latched (adu/reset_faults)',
+    EMERGENCY_LATCHED: 'an emergency stop is latched (adu/reset_faults)',
+    MOVING: 'the axes still move',
+    CAUSE_PERSISTS: 'the cause is still there'}
+"""Answers to a request, and why it is not granted."""
 
 STANDSTILL = 1e-3
 """Load rate [rad/s] below which an axis stands."""
@@ -26,6 +33,29 @@ STANDSTILL = 1e-3
 def permitted(s):
     """Whether the drive may follow commands."""
     return s.wanted and not s.emergency and not (s.azimuth.faults | s.elevation.faults)
+
+
+@compiled
+def condition(s):
+    """All that `described` tells, in one number: it changes when something of it does."""
+    return (s.phase | s.emergency << 3 | (1 if permitted(s) else 0) << 4
+            | s.azimuth.faults << 8 | s.elevation.faults << 16)
+
+
+def described(condition):
+    """'enabled' when the drive follows commands, otherwise why it does not."""
+    phase, allowed = condition & 7, condition >> 4 & 1
+    if allowed:
+        if phase == DISABLED:
+            phase = RELEASING
+        return PHASES[phase]
+    tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', 8), ('elevation', 16))
+               for kind in names(condition >> shift & 0xff)]
+    if tripped:
+        return 'fault: ' + ', '.join(tripped)
+    if condition >> 3 & 1:
+        return 'emergency stop'
+    return PHASES[STOPPING if phase == ENABLED else phase]
 
 
 @compiled

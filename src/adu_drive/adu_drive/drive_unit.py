@@ -35,7 +35,7 @@ _AXIS_OUTPUTS = np.dtype([
     ('load_position', 'f8'), ('load_velocity', 'f8'), ('true_torque', 'f8', (2,))], align=True)
 
 OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8'),
-                    ('phase', 'i8'), ('permitted', 'i8'), ('following', 'i8'), ('emergency', 'i8'), ('braked', 'i8'),
+                    ('phase', 'i8'), ('following', 'i8'), ('wanted', 'i8'), ('emergency', 'i8'), ('braked', 'i8'),
                     ('condition', 'i8')], align=True)
 """At t_k+1, per axis:
 
@@ -55,10 +55,11 @@ load_position, load_velocity, true_torque       the truth, for tests and studies
 
 invalid_command   1 when an input of this call was not finite (or beyond LARGEST): the command counts as enable 0,
                   a disturbance as 0
-phase             of drive_state.PHASES; permitted: 1 when nothing stands against being enabled; following: both
+phase             of drive_state.PHASES; following: 1 when enabled and nothing stands against it at t_k+1
+wanted            1 unless the drive was asked to be disabled
 emergency         1 when an emergency stop is latched
 braked            1 when the brakes grip
-condition         all of these and both fault words in one number: it changes when one of them does
+condition         see drive_state.condition
 """
 
 
@@ -161,10 +162,17 @@ def read(state, constants, outputs):
     s, c, y = state[0], constants[0], outputs[0]
     axis.read(s.azimuth, c.azimuth, y.azimuth)
     axis.read(s.elevation, c.elevation, y.elevation)
-    y.phase, y.emergency, y.braked = s.phase, s.emergency, s.braked
-    y.permitted = drive_state.permitted(s)
-    y.following = y.permitted and s.phase == drive_state.ENABLED
-    y.condition = s.phase | s.emergency << 3 | y.permitted << 4 | s.azimuth.faults << 8 | s.elevation.faults << 16
+    y.phase, y.wanted, y.emergency, y.braked = s.phase, s.wanted, s.emergency, s.braked
+    y.following = s.phase == drive_state.ENABLED and drive_state.permitted(s)
+    y.condition = drive_state.condition(s)
+
+
+@compiled
+def request(state, constants, outputs, what):
+    """drive_state.request between two periods; the outputs read back what is now."""
+    answer = drive_state.request(state, constants, what)
+    read(state, constants, outputs)
+    return answer
 
 
 @compiled

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from adu_drive import drive_state, drive_unit, faults
+from adu_drive import drive_state, drive_unit
 from pedestal_common import messages, records
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
@@ -22,30 +22,11 @@ MEMORY = np.dtype([('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate',
 [ns]; answers: 1 once the first step was said."""
 
 
-def state_text(outputs):
-    """'enabled' when the drive follows commands, otherwise why it does not."""
-    if outputs['following']:
-        return 'enabled'
-    tripped = [f'{axis} {kind}' for axis in messages.AXES for kind in faults.names(outputs[axis]['faults'])]
-    if tripped:
-        return 'fault: ' + ', '.join(tripped)
-    if outputs['emergency']:
-        return 'emergency stop'
-    phase = outputs['phase']
-    if phase == drive_state.DISABLED and outputs['permitted']:
-        phase = drive_state.RELEASING
-    return drive_state.PHASES[drive_state.STOPPING if phase == drive_state.ENABLED else phase]
-
-
 class _Words:
-    """The text of adu/state by its code, the condition of drive_unit.OUTPUTS."""
+    """The text of adu/state by its code."""
 
-    def __getitem__(self, condition):
-        phase, permitted = condition & 7, condition >> 4 & 1
-        azimuth, elevation = {'faults': condition >> 8 & 0xff}, {'faults': condition >> 16 & 0xff}
-        return state_text({'phase': phase, 'permitted': permitted, 'emergency': condition >> 3 & 1,
-                           'following': permitted and phase == drive_state.ENABLED, 'azimuth': azimuth,
-                           'elevation': elevation})
+    def __getitem__(self, code):
+        return drive_state.described(code)
 
 
 class Adu:
@@ -75,7 +56,7 @@ class Adu:
         state, outputs = self.state.copy(), self.outputs.copy()
         say(outputs, self.heard, self.said.copy())
         advance(state, self.constants, self.inputs.copy(), outputs, self.memory.copy(), self.heard)
-        drive_state.request(state, self.constants, drive_state.DISABLE)
+        drive_unit.request(state, self.constants, outputs, drive_state.DISABLE)
 
     def say(self):
         """Put what is at the stamp of `heard` into `said`."""
@@ -86,27 +67,23 @@ class Adu:
         return advance(self.state, self.constants, self.inputs, self.outputs, self.memory, self.heard)
 
     def ask(self, what):
-        """Ask for one of drive_state.REQUESTS (its index) between two steps; drive_state.GRANTED, or why not."""
-        answer = drive_state.request(self.state, self.constants, what)
-        drive_unit.read(self.state, self.constants, self.outputs)
-        return answer
+        """Ask for one of drive_state.REQUESTS between two steps; drive_state.GRANTED, or why not."""
+        return drive_unit.request(self.state, self.constants, self.outputs, what)
 
     def request(self, service):
         """The same by the name of its service; True when granted."""
-        return self.ask(drive_state.REQUESTS.index(service.removeprefix('adu/'))) == drive_state.GRANTED
+        return self.ask(drive_state.REQUESTS[service]) == drive_state.GRANTED
 
     def services_to(self, text):
-        """The services that bring adu/state to a text. What a latched fault or emergency stop hides (that the drive
-        was disabled meanwhile) shows when it is reset."""
-        o, wanted = self.outputs[0], self.state[0]['wanted']
-        if text.startswith('fault'):
-            return []
-        if text == 'emergency stop':
-            return [] if o['emergency'] else ['adu/emergency_stop']
-        services = ['adu/reset_faults'] if o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults'] else []
-        if text in ('enabled', 'releasing brakes'):
-            return services if wanted else [*services, 'adu/enable']
-        return [*services, 'adu/disable'] if wanted else services
+        """The services that bring adu/state to a text."""
+        o = self.outputs[0]
+        tripped, stopped = text.startswith('fault'), text == 'emergency stop'
+        latched = o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults']
+        wanted = {'adu/emergency_stop': stopped and not o['emergency'],
+                  'adu/reset_faults': latched and not tripped and not stopped,
+                  'adu/disable': text in ('stopping', 'disabled') and o['wanted'],
+                  'adu/enable': text in ('releasing brakes', 'enabled') and not o['wanted']}
+        return [service for service, due in wanted.items() if due]
 
     def answers(self, heard, said):
         """Many steps, records (n,): `advance` by what was heard last, then `say`."""

@@ -282,17 +282,24 @@ class Bag:
             reason = ' '.join(str(error).split())
             raise BagError(f'{self.file}: its record `parameters` is no YAML: {reason}') from None
 
-    def rows(self, topic):
-        """The rows of `index` of one topic."""
+    def where(self, topic):
+        """Where in `index` the rows of one topic are."""
         name = topic.lstrip('/')
         if name not in self.topics:
             raise BagError(f'{self.path}: no topic {name} in it; there are {", ".join(self.topics)}')
         channels = [channel for channel, channel_name in self._channels.items() if channel_name == name]
-        return self.index[np.isin(self.index.channel, channels)]
+        return np.flatnonzero(np.isin(self.index.channel, channels))
+
+    def rows(self, topic):
+        """The rows of `index` of one topic."""
+        return self.index[self.where(topic)]
 
     def raw(self, topic=None):
         """Iterator of (topic, log time, publish time [ns], CDR bytes) in the order of the file."""
-        rows = self.index if topic is None else self.rows(topic)
+        return self.take(self.index if topic is None else self.rows(topic))
+
+    def take(self, rows):
+        """The same of any rows of `index`, in their order."""
         names = self._channels
         for channel, _, log, publish, chunk, start, stop in rows.tolist():
             data = self._data if chunk < 0 else self._chunk(chunk)

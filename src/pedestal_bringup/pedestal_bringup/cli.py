@@ -114,8 +114,24 @@ def _parser():
 
     _add_recompute(verbs)
 
-    bench = verbs.add_parser('bench', help='measure this machine: the lockstep ring, or the compiled core')
-    bench.add_argument('what', nargs='?', choices=('graph', 'core'), help='default: both')
+    replay = verbs.add_parser('replay', help='publish a recording into a live graph')
+    replay.add_argument('bag', type=pathlib.Path)
+    into = replay.add_mutually_exclusive_group()
+    into.add_argument('--node', nargs='+', action='extend', default=[], metavar='NAME',
+                      help='what these nodes read, as acu; default: every topic')
+    into.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='these topics')
+    pace = replay.add_mutually_exclusive_group()
+    pace.add_argument('--rate', type=float, default=1.0, metavar='X', help='times real time; default: 1')
+    pace.add_argument('--lockstep', action='store_true', help='a step when the nodes have answered the one before')
+    replay.add_argument('--start', type=float, default=0.0, metavar='S', help='begin this far into the recording')
+    replay.add_argument('--duration', type=float, metavar='S', help='of the recording; default: to its end')
+    replay.add_argument('--paused', action='store_true', help='begin with a pause')
+    replay.add_argument('--deadline', type=float, default=60.0, metavar='S',
+                        help='wall-clock time a reader or an answer is waited for; default: 60')
+    replay.set_defaults(verb=_replay)
+
+    bench = verbs.add_parser('bench', help='measure this machine: the lockstep ring, the compiled core, bags')
+    bench.add_argument('what', nargs='?', choices=('graph', 'core', 'bag'), help='default: all')
     bench.add_argument('--json', type=pathlib.Path, metavar='FILE')
     bench.set_defaults(verb=_bench)
     return parser
@@ -350,6 +366,16 @@ def _recompute(options):
     if options.json:
         _write_json(options.json, {'name': 'recompute', 'rows': rows})
     return 0 if well else 1
+
+
+def _replay(options):
+    from pedestal_bringup.replay import replay
+    outcome = replay(options.bag, options.node, options.topics, None if options.lockstep else options.rate,
+                     options.start, options.duration, options.paused, options.deadline)
+    print('\n'.join(outcome.lines()))
+    if outcome.ended == 'stopped':
+        raise KeyboardInterrupt
+    return 0
 
 
 def _bench(options):

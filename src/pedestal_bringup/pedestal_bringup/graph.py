@@ -252,9 +252,12 @@ def run(scenario, bag, progress):
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         operator = Operator()
-        with sole_run(operator.context.get_domain_id()):
-            operator.refuse_company()
-            return _run(graph, operator, table, progress)
+        try:
+            with sole_run(operator.context.get_domain_id()):
+                operator.refuse_company()
+                return _run(graph, operator, table, progress)
+        finally:
+            operator.destroy_node()
     finally:
         rclpy.try_shutdown()
 

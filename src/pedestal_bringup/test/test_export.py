@@ -217,6 +217,15 @@ def test_a_bag_that_is_none(verb, what, tmp_path, capsys):
 
 
 @pytest.mark.parametrize('verb', ['export', 'replay'])
+def test_a_bag_that_is_being_written(verb, tmp_path, capsys):
+    writer = bag.Writer(tmp_path / 'bag', topics.TOPICS, {})
+    assert cli.main([verb, str(tmp_path / 'bag')]) == 1
+    error = capsys.readouterr().err
+    assert f'{writer.file}: is being written' in error and error.count('\n') == 1
+    writer.close()
+
+
+@pytest.mark.parametrize('verb', ['export', 'replay'])
 def test_an_unknown_topic_names_the_nearest(verb, recording, capsys):
     assert cli.main([verb, str(recording), '--topics', 'joint_states', 'acu/rate_comand']) == 1
     error = capsys.readouterr().err

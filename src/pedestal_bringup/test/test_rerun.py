@@ -113,14 +113,15 @@ def recorded(tmp_path):
 
 
 def test_the_scenario_comes_back_from_the_recording(recorded):
-    chosen = scenario.load('leo_pass', ['acu.azimuth.position_loop.kp=12'], seed=3, duration=4.0)
+    chosen = scenario.load('leo_pass', ['acu.azimuth.feedforward.bandwidth=12'], seed=3, duration=4.0)
     assert rerun.configured(recorded(chosen)) == chosen
 
 
 def test_a_default_that_has_changed_since_is_set_as_it_was(recorded):
     chosen = scenario.load('leo_pass')
-    again = rerun.configured(recorded(chosen, lambda values: values['acu'].update({'azimuth.position_loop.kp': 19.0})))
-    values = {**chosen.values, 'acu': {**chosen.values['acu'], 'azimuth.position_loop.kp': 19.0}}
+    changed = {'azimuth.feedforward.bandwidth': 19.0}
+    again = rerun.configured(recorded(chosen, lambda values: values['acu'].update(changed)))
+    values = {**chosen.values, 'acu': {**chosen.values['acu'], **changed}}
     assert again == dataclasses.replace(chosen, values=values)
 
 

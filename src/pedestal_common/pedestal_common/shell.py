@@ -288,12 +288,13 @@ class Shell(Node):
                                  f'{self.context.get_domain_id()}; set a free one')
 
     def _missing(self, topic, publisher, wanted):
-        """Which of the wanted readers a topic has not got yet. By name: a stranger who listens is no substitute."""
+        """Which of the wanted readers a topic has not got yet. By name: a stranger who listens is no substitute, but
+        a replay stands in for whoever is not there."""
         if not wanted:
             return []
         there = self.get_subscriptions_info_by_topic(publisher.topic_name)
         names = {info.node_name for info in there}
-        missing = [name for name in wanted if name not in names]
+        missing = [name for name in wanted if name not in names and topics.STAND_IN not in names]
         return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
     def draining(self):
@@ -315,7 +316,8 @@ def set_middleware_defaults():
         os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(profiles))
 
 
-def _executor():
+def make_executor():
+    """The executor every node runs in."""
     try:
         from rclpy.experimental.events_executor import EventsExecutor
         return EventsExecutor()
@@ -335,7 +337,7 @@ def main(node_class, args=None) -> int:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
         name = node.get_name()
-        executor = _executor()
+        executor = make_executor()
         executor.add_node(node)
         gc.freeze()
         while not (_stop or node.finished) or node.draining():

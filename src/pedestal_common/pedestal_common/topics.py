@@ -26,6 +26,9 @@ class Topic(typing.NamedTuple):
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
 """Names of the nodes; `operator` is whoever sends the ACU its program track (`pedestal run`)."""
 
+STAND_IN = 'replay'
+"""The node that replays a recording to the others."""
+
 _ALL = NODES[:-2]
 
 TOPICS = (

@@ -15,7 +15,8 @@ class TrackingReceiverNode(shell.Shell):
 
     def __init__(self):
         super().__init__('tracking_receiver', TrackingReceiverNodeParameters)
-        self.unit = TrackingReceiver(self.parameters, 'ship_motion' in self.graph.members)
+        self.on_ship = 'ship_motion' in self.graph.members
+        self.unit = TrackingReceiver(self.parameters, self.on_ship)
         self.unit.prepare()
         self.outputs = self.unit.outputs
         self.fault = receiver.LOCKED

@@ -102,8 +102,9 @@ def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
     """One axis from rest: rate (n,) [rad/s] commanded each speed period, current (5 n,) [A] added to both i_ref each
     current period, to the speed (n,) [rad/s] of the axis and i_ref, i_q of both motors (5 n, 2) [A]."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
+    axis.begin_period(s, c, False, True)        # brakes off, windings cold throughout
     for n in range(len(rate)):
-        axis.speed_control(s, c, rate[n], 0.0, 1)
+        axis.speed_control(s, c, rate[n], 0.0, 1, True, True)
         speed[n] = c.per_2N * (m1.measured + m2.measured)
         i_1, i_2 = m1.i_ref, m2.i_ref
         for k in range(n * axis.CURRENT_TICKS, (n + 1) * axis.CURRENT_TICKS):

@@ -1,0 +1,247 @@
+"""`pedestal replay` into live nodes: their answers are the recorded ones, nothing is lost or doubled, keys and signals
+do what they say."""
+import fcntl
+import hashlib
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import termios
+import time
+
+import pytest
+
+from pedestal_bringup import bag as bags
+from pedestal_common import messages, shell, topics
+
+CLI = [sys.executable, '-m', 'pedestal_bringup.cli']
+ANSWERS = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode')
+INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'tracking_receiver/angle_error', 'acu/program_track')
+STEPS = 401
+ENOUGH = {'lockstep': (STEPS,), 'realtime': (STEPS - 1, STEPS)}
+"""Steps that are answered: in realtime the last one may wait for the message of the INS that was still on its way when
+the recording ended."""
+
+
+@pytest.fixture(scope='module')
+def run(start_run):
+    """A finished lockstep run with a ship, 2 s, in which the ACU comes to autotrack."""
+    run = start_run('ship_pass', '--pacing', 'lockstep', '--duration', '2', '--param', 'acu.tracker.lock_count=20')
+    result = run.finish()
+    assert result.returncode == 0, result.stderr
+    return run
+
+
+@pytest.fixture
+def domain(reserve_domain, monkeypatch):
+    """A ROS domain of its own for the test, the default of what it starts."""
+    number = reserve_domain()
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(number))
+    return number
+
+
+def data(path, topic):
+    return [content for _, _, _, content in bags.read(path).raw(topic)]
+
+
+def sent(output):
+    """{topic: count} that replay says it has sent."""
+    return {name: int(count) for name, count in re.findall(r'^(\S+) +(\d+)$', output, re.MULTILINE)}
+
+
+@pytest.fixture
+def acu_and_recorder(run, start_process, domain, tmp_path):
+    """start(pacing) -> (acu, recorder of its answers) with the parameters of the run."""
+    def start(pacing):
+        node = [sys.executable, '-m', 'acu_tracker.acu_node', '--ros-args', '--params-file',
+                run.log / 'parameters.yaml', '-p', 'acu:graph.nodes:=acu,ins,adu,operator,recorder', '-p',
+                f'acu:graph.pacing:={pacing}']
+        recorder = [sys.executable, '-m', 'pedestal_bringup.recorder_node', '--ros-args', '-p',
+                    f'bag:={tmp_path / "again"}', '-p', 'graph.nodes:=acu,recorder', '-p', f'graph.pacing:={pacing}']
+        return [start_process(command, ROS_DOMAIN_ID=str(domain)) for command in (node, recorder)]
+    return start
+
+
+def end(process):
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=30.0)
+    assert process.returncode == 0, errors
+    return output
+
+
+@pytest.mark.parametrize('pace', [['--lockstep'], ['--rate', '1'], ['--rate', '20']], ids=' '.join)
+def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, domain, tmp_path):
+    pacing = 'lockstep' if pace == ['--lockstep'] else 'realtime'
+    acu, recorder = acu_and_recorder(pacing)
+    done = run_process([*CLI, 'replay', run.bag, '--node', 'acu', *pace], 60.0, ROS_DOMAIN_ID=str(domain))
+    assert (done.returncode, done.stderr) == (0, '')
+    assert sent(done.stdout) == {name: len(data(run.bag, name)) for name in INPUTS}
+    [answered] = re.findall(f'^acu answered (\\d+) of {STEPS} steps$', done.stdout, re.MULTILINE)
+    assert int(answered) in ENOUGH[pacing]
+    end(acu), end(recorder)
+    answers = {name: (data(run.bag, name), data(tmp_path / 'again', name)) for name in ANSWERS}
+    assert len(answers['acu/mode'][0]) >= 2 and 'autotrack' in str(answers['acu/mode'][0][-1])
+    for name, (recorded, again) in answers.items():
+        if pacing == 'lockstep':
+            assert again == recorded, name
+        elif name != 'acu/mode':
+            assert len(again) == int(answered), name
+
+
+def test_all_of_it_into_a_recorder_gives_the_same_file(run, start_process, run_process, domain, tmp_path):
+    recorder = start_process([sys.executable, '-m', 'pedestal_bringup.recorder_node', '--ros-args', '--params-file',
+                              run.log / 'parameters.yaml', '-p', f'recorder:bag:={tmp_path / "bag"}'],
+                             ROS_DOMAIN_ID=str(domain))
+    done = run_process([*CLI, 'replay', run.bag, '--rate', '5'], 60.0, ROS_DOMAIN_ID=str(domain))
+    assert (done.returncode, done.stderr) == (0, '')
+    output, errors = recorder.communicate(timeout=30.0)
+    assert (recorder.returncode, errors) == (0, '')
+    digests = {hashlib.sha256(next(path.glob('*.mcap')).read_bytes()).hexdigest()
+               for path in (run.bag, tmp_path / 'bag')}
+    assert len(digests) == 1
+
+
+def test_start_and_duration(run, connect, start_process, domain):
+    client = connect(domain)
+    replay = start_process([*CLI, 'replay', run.bag, '--topics', 'joint_states', 'acu/program_track', '--start', '0.5',
+                            '--duration', '0.25', '--rate', '5'], ROS_DOMAIN_ID=str(domain))
+    for name in ('joint_states', 'acu/program_track'):
+        client.read(name)
+    client.until(lambda: replay.poll() is not None and sum(map(len, client.heard.values())) == 52)
+    output, errors = replay.communicate()
+    assert (replay.returncode, errors) == (0, '')
+    assert len(client.heard['acu/program_track']) == 1
+    assert [messages.nanoseconds(m.header.stamp) for m in client.heard['joint_states']] == [
+        500_000_000 + k * 5_000_000 for k in range(51)]
+    assert sent(output) == {'joint_states': 51, 'acu/program_track': 1, 'clock': 51}
+
+
+class Terminal:
+    """A replay whose standard streams are a terminal of its own, which controls it."""
+
+    def __init__(self, command, environment):
+        self.master, slave = pty.openpty()
+        self.before = termios.tcgetattr(slave)
+
+        def control():
+            fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+        self.process = subprocess.Popen([str(part) for part in command], stdin=slave, stdout=slave, stderr=slave,
+                                        env=environment, start_new_session=True, preexec_fn=control)
+        self.slave = slave
+        os.set_blocking(self.master, False)
+        self.text = ''
+
+    def press(self, key):
+        os.write(self.master, key)
+
+    def said(self, text):
+        try:
+            self.text += os.read(self.master, 100_000).decode()
+        except BlockingIOError:
+            pass
+        return text in self.text
+
+    def close(self):
+        self.process.kill()
+        self.process.wait()
+        os.close(self.slave)
+        os.close(self.master)
+
+
+@pytest.fixture
+def terminal(environment, domain):
+    opened = []
+
+    def open_terminal(*arguments):
+        opened.append(Terminal([*CLI, 'replay', *arguments], {**environment, 'ROS_DOMAIN_ID': str(domain)}))
+        return opened[-1]
+
+    yield open_terminal
+    for one in opened:
+        one.close()
+
+
+def test_pause_step_and_quit_from_the_keyboard(run, connect, terminal, domain):
+    client = connect(domain)
+    replay = terminal(run.bag, '--topics', 'joint_states', '--paused')
+    client.read('joint_states')
+    heard = client.heard['joint_states']
+
+    def rests():
+        """How many have come once no more come."""
+        count, since = len(heard), time.monotonic()
+        while time.monotonic() < since + 0.4:
+            client.executor.spin_once(timeout_sec=0.05)
+            if len(heard) != count:
+                count, since = len(heard), time.monotonic()
+        return count
+
+    client.until(lambda: replay.said('paused   space: pause, go on   n or right arrow: one step   q: quit'))
+    assert rests() == 0
+    for count, key in enumerate((b'n', b'\x1b[C', b'\x1bOC', b'x', b'nn'), 1):
+        replay.press(key)
+        assert rests() == {4: 3, 5: 5}.get(count, count)
+    replay.press(b' ')
+    client.until(lambda: len(heard) > 20)
+    replay.press(b' ')
+    paused = rests()
+    assert 20 < paused < STEPS
+    client.until(lambda: replay.said(f'{(paused - 1) * 0.005:.3f} / 2.000 s  paused'))
+    replay.press(b' ')
+    client.until(lambda: len(heard) > paused + 20)
+    replay.press(b'n')
+    stepped = rests()
+    assert stepped < STEPS
+    replay.press(b'q')
+    client.until(lambda: replay.process.poll() is not None)
+    assert replay.process.returncode == 0 and replay.said('quit before the end')
+    assert [messages.nanoseconds(message.header.stamp) for message in heard] == [
+        k * 5_000_000 for k in range(stepped)]
+    assert termios.tcgetattr(replay.slave) == replay.before
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_cleanly(number, run, connect, terminal, domain):
+    client = connect(domain)
+    replay = terminal(run.bag, '--topics', 'joint_states', '--rate', '0.5')
+    client.read('joint_states')
+    client.until(lambda: len(client.heard['joint_states']) > 10)
+    replay.process.send_signal(number)
+    client.until(lambda: replay.process.poll() is not None, 10.0)
+    assert replay.process.returncode == 130 and replay.said('pedestal: stopped')
+    assert 'Traceback' not in replay.text and 'stopped before the end' in replay.text
+    count = int(re.search(r'joint_states +(\d+)', replay.text)[1])
+    client.until(lambda: len(client.heard['joint_states']) == count, 5.0)
+    assert termios.tcgetattr(replay.slave) == replay.before
+
+
+def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_line, domain):
+    client = connect(domain)
+    topic = topics.BY_NAME['joint_states']
+    client.node.create_publisher(shell.message_class(topic.type), topic.name, shell.QOS[topic.qos])
+    done = run_process([*CLI, 'replay', run.bag, '--node', 'acu'], 60.0, ROS_DOMAIN_ID=str(domain))
+    assert done.returncode == 1 and done.stdout == ''
+    assert one_line(done.stderr) == ('pedestal: error: joint_states already has a writer, client: its messages would '
+                                     'come twice')
+
+
+def test_a_topic_that_nobody_reads_is_named(run, run_process, one_line, domain):
+    for options, who in ((['--node', 'acu'], 'acu'), (['--topics', 'joint_states'], 'anyone')):
+        done = run_process([*CLI, 'replay', run.bag, *options, '--deadline', '1'], 60.0, ROS_DOMAIN_ID=str(domain))
+        assert done.returncode == 1 and done.stdout == ''
+        assert one_line(done.stderr) == (f'pedestal: error: nobody reads joint_states after 1 s; waited for {who}; '
+                                         'present: no node')
+
+
+def test_a_reader_that_goes_ends_it(run, connect, start_process, one_line, domain):
+    client = connect(domain)
+    replay = start_process([*CLI, 'replay', run.bag, '--topics', 'joint_states', '--rate', '0.2'],
+                           ROS_DOMAIN_ID=str(domain))
+    client.read('joint_states')
+    client.until(lambda: len(client.heard['joint_states']) > 10)
+    client.node.destroy_subscription(next(iter(client.node.subscriptions)))
+    output, errors = replay.communicate(timeout=10.0)
+    assert replay.returncode == 1 and output == ''
+    assert 'joint_states is no longer read by anyone, at 0.' in one_line(errors)
