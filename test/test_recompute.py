@@ -25,7 +25,7 @@ def runs(start_run):
     started = {'leo': start_run('leo_pass', *SHORT, '--duration', '5'),
                'ship': start_run('ship_pass', *SHORT, '--duration', '3')}
     for run in started.values():
-        result = run.finish()
+        result = run.finish(180.0)  # the first run compiles the laws
         assert result.returncode == 0, result.stderr
     return started
 
@@ -409,7 +409,7 @@ def test_a_topic_of_another_type_is_refused(runs, pedestal, tmp_path, one_line):
 
 @pytest.mark.parametrize('name', sorted(path.name for path in REFERENCES.iterdir() if path.is_dir()))
 def test_references_still_hold(name, pedestal):
-    """A change that means to change them: make update-references."""
-    code, said, errors = pedestal(REFERENCES / name, '--allow-idle')
+    """A change that means to change them: make update-references. A servo scenario never tracks."""
+    code, said, errors = pedestal(REFERENCES / name, *(['--allow-idle'] if name.startswith('servo_') else []))
     assert code == 0, said + errors
     assert sum(file.stat().st_size for file in (REFERENCES / name).iterdir()) < 1_000_000
