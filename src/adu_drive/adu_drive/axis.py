@@ -99,7 +99,7 @@ def _motor_at_rest(m, g, T, total, theta, per_rad):
     angle = g.ratio * (theta + flank + made * g.ratio / g.stiffness)
     return {'i_d': 0.0, 'i_q': i_q, 'i_ref': i_ref, 'v_d': 0.0, 'v_q': v_q, 'sum_d': 0.0, 'sum_q': v_q,
             'omega': 0.0, 'theta': angle, 'count': encoder.counts.py_func(angle, per_rad), 'measured': 0.0,
-            'sum': total, 'torque_ref': T, 'limited': 0, 'inhibited': 0, 'heat': 0.0, 'q_R': 1.0, 'h_brake_J': 0.0}
+            'sum': total, 'torque_ref': T, 'limited': 0, 'inhibited': 0, 'heat': 0.0, 'q_R': 1.0}
 
 
 def initial_state(p, theta, external):
@@ -116,7 +116,7 @@ def initial_state(p, theta, external):
             'dish': theta + external / k_dish if k_dish else theta, 'omega_dish': 0.0, 'deck': 0.0,
             'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0,
-            'faults': 0, 'present': 0, 'late': 0, 'slewing': 0}
+            'faults': 0, 'present': 0, 'late': 0, 'slewing': 0, 'braked': 0}
 
 
 @compiled
@@ -246,16 +246,12 @@ def speed_control(s, c, rate, torque, enable, powered, free):
 
 
 @compiled
-def _begin_motor(m, k, grip):
-    m.h_brake_J = k.h_brake_J if grip else 0.0
-    m.q_R = thermal.damping(k.h_R_L, k.rise, m.heat)
-
-
-@compiled
 def begin_period(s, c, grip):
     """Once per control period: brakes, winding temperature, and the marks of what happens within it."""
-    _begin_motor(s.motor_1, c.motor_1, grip)
-    _begin_motor(s.motor_2, c.motor_2, grip)
+    m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
+    s.braked = 1 if grip else 0
+    m1.q_R = thermal.damping(k1.h_R_L, k1.rise, m1.heat)
+    m2.q_R = thermal.damping(k2.h_R_L, k2.rise, m2.heat)
     s.torque_limited = s.voltage_limited = s.end_stop = s.stopping = s.present = 0
 
 
@@ -298,10 +294,10 @@ def plant_step(s, c, external):
             s.dish, s.omega_dish, s.theta, s.omega, external - on_base, c.k_dish, c.c_dish, c.h, c.h_J_dish)
         external = on_base + twist
 
-    m1.omega = brake.braked(motor.speed(
-        m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B), m1.h_brake_J)
-    m2.omega = brake.braked(motor.speed(
-        m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B), m2.h_brake_J)
+    m1.omega = motor.speed(m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
+    m2.omega = motor.speed(m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
+    if s.braked:
+        m1.omega, m2.omega = brake.braked(m1.omega, k1.h_brake_J), brake.braked(m2.omega, k2.h_brake_J)
     s.omega = (s.omega + c.h_J * (mesh_1 + mesh_2 + external + stop - bearing)) * c.q_B
 
     m1.theta += c.h * m1.omega

@@ -6,8 +6,5 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def braked(omega, h_T_J):
-    """Shaft speed [rad/s] after a sub-step with the brake on: less by h T / J, and at rest where it would turn round.
-
-    h_T_J = 0: brake off.
-    """
+    """Shaft speed [rad/s] after a sub-step with the brake on: less by h T / J, at rest where it would turn round."""
     return math.copysign(max(abs(omega) - h_T_J, 0.0), omega)
