@@ -94,6 +94,13 @@ class Commander:
     def stamp(self):
         return messages.nanoseconds(self.last.header.stamp)
 
+    def rests(self, seconds):
+        """Stands, and still does `seconds` later."""
+        self.moves_at(0.0, 0.0)
+        end = time.monotonic() + seconds
+        self.client.until(lambda: time.monotonic() > end)
+        self.moves_at(0.0, 0.0)
+
     def moves_at(self, azimuth, elevation):
         self.client.until(lambda: np.allclose(self.last.velocity, (azimuth, elevation), atol=5e-3), 10.0)
 
@@ -168,10 +175,7 @@ def test_emergency_stop_and_reset(drive):
     assert drive.client.trigger('adu/enable') == (
         False, 'refused: an emergency stop is latched (adu/reset_faults); drive is emergency stop')
     drive.client.diagnosed('emergency stop')
-    drive.moves_at(0.0, 0.0)
-    still = time.monotonic() + 0.3
-    drive.client.until(lambda: time.monotonic() > still)
-    drive.moves_at(0.0, 0.0)
+    drive.rests(0.3)
     assert drive.client.trigger('adu/reset_faults') == (True, 'drive is releasing brakes')
     drive.moves_at(0.2, 0.0)
 
@@ -185,10 +189,7 @@ def test_a_fault_is_latched_told_and_reset_by_service(drive):
         False, 'refused: a fault is latched (adu/reset_faults); drive is fault: azimuth overspeed')
     assert drive.client.trigger('adu/reset_faults') == (
         False, 'refused: the axes still move; drive is fault: azimuth overspeed')
-    drive.moves_at(0.0, 0.0)
-    still = time.monotonic() + 0.5
-    drive.client.until(lambda: time.monotonic() > still)
-    drive.moves_at(0.0, 0.0)
+    drive.rests(0.5)
     assert drive.client.trigger('adu/reset_faults') == (True, 'drive is releasing brakes')
     drive.moves_at(0.1, 0.0)
     assert drive.state == 'enabled'

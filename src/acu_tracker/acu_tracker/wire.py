@@ -22,9 +22,10 @@ class Acu:
     """The control unit of an AcuParameters; on_ship: its deck moves, and an attitude is heard.
 
     heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
-    a step waits for; events: {topic: function(message)} it hears besides.
+    a step waits for; events: {topic: function(message)} it hears besides; WORDS: {topic: function from its
+    code in `said` to its text}.
     """
-    HEARD, SAID, CODES = HEARD, SAID, {MODE: modes.MODES}
+    HEARD, SAID, WORDS = HEARD, SAID, {MODE: modes.MODES.__getitem__}
 
     def __init__(self, params, on_ship):
         self.state = control_unit.initial_state(params)

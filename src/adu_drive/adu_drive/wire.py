@@ -22,20 +22,13 @@ MEMORY = np.dtype([('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate',
 [ns]; answers: 1 once the first step was said."""
 
 
-class _Words:
-    """The text of adu/state by its code."""
-
-    def __getitem__(self, code):
-        return drive_state.described(code)
-
-
 class Adu:
     """The drive of an AduNodeParameters; on_ship: it hears how its deck turns.
 
     heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
-    a step waits for.
+    a step waits for; WORDS: {topic: function from its code in `said` to its text}.
     """
-    HEARD, SAID, CODES = HEARD, SAID, {STATE: _Words()}
+    HEARD, SAID, WORDS = HEARD, SAID, {STATE: drive_state.described}
 
     def __init__(self, params, on_ship):
         self.constants, self.state = drive_unit.constants(params), drive_unit.initial_state(params)

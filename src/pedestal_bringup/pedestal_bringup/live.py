@@ -181,7 +181,7 @@ def _feed(recording, done, live):
 
 def _due(done, name):
     """How many messages of a topic must have come by each step (n,)."""
-    if name in done.unit.CODES:
+    if name in done.unit.WORDS:
         return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
     return np.cumsum(records.slot(done.said, name).stamp != records.NEVER)
 

@@ -237,11 +237,11 @@ def compute(recording, unit, fed, states=None, requests=()):
         if step in requests:
             made[step] = [(service, unit.request(service)) for service in requests[step]]
         elif step in states:
-            [(name, words)] = unit.CODES.items()
+            [(name, words)] = unit.WORDS.items()
             before = [array.copy() for array in unit.remembers]
             unit.answers(fed.heard[step:step + 1], said[step:step + 1])
             last = step + 1
-            if words[int(said[step][name])] != states[step]:
+            if words(int(said[step][name])) != states[step]:
                 for array, values in zip(unit.remembers, before):
                     array[...] = values
                 made[step] = [(service, unit.request(service)) for service in unit.services_to(states[step])]
@@ -253,8 +253,8 @@ def outputs_of(unit, fed, said):
     """{topic: Output} of what a unit said."""
     found = {}
     for name in unit.SAID.names:
-        if name in unit.CODES:
-            found[name] = _announced(fed.stamps, said[name], unit.CODES[name])
+        if name in unit.WORDS:
+            found[name] = _announced(fed.stamps, said[name], unit.WORDS[name])
         else:
             place = records.slot(said, name)
             sent = place.stamp != NEVER
@@ -266,7 +266,7 @@ def _announced(stamps, codes, words):
     """The Output of a topic that tells the words of a code when they change."""
     change, texts = [], []
     for step in np.flatnonzero(np.diff(codes, prepend=-1)).tolist():
-        text = words[int(codes[step])]
+        text = words(int(codes[step]))
         if not texts or text != texts[-1]:
             change.append(step)
             texts.append(text)
@@ -291,7 +291,7 @@ def recompute(recording, node, params, requests=None) -> Recomputed:
     unit = kind.unit(params, recording.has(kind.ship))
     fed = feed(recording, unit, kind.trigger)
     if requests is None:
-        states = {step: text for name in unit.CODES for step, text in recording.states(name, fed.stamps).items()}
+        states = {step: text for name in unit.WORDS for step, text in recording.states(name, fed.stamps).items()}
         said, made = compute(recording, unit, fed, states)
     else:
         said, made = compute(recording, unit, fed, requests=requests)

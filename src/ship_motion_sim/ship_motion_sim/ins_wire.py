@@ -18,7 +18,7 @@ class Ins:
 
     heard, said: the records (1,) of one step; messages: {topic: message} it says.
     """
-    HEARD, SAID, CODES = HEARD, SAID, {}
+    HEARD, SAID, WORDS = HEARD, SAID, {}
 
     def __init__(self, params, _on_ship=True):
         self.constants = ins.constants(params)

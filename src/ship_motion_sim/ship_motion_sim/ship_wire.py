@@ -21,7 +21,7 @@ class ShipMotion:
 
     heard, said: the records (1,) of one step; messages: {topic: message} it says.
     """
-    HEARD, SAID, CODES = HEARD, SAID, {}
+    HEARD, SAID, WORDS = HEARD, SAID, {}
 
     def __init__(self, params, _on_ship=True):
         self.ship, self.imu = motion.constants(params.ship), imu.constants(params)

@@ -22,7 +22,7 @@ class TrackingReceiver:
     heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
     a step waits for.
     """
-    HEARD, SAID, CODES = HEARD, SAID, {}
+    HEARD, SAID, WORDS = HEARD, SAID, {}
 
     def __init__(self, params, on_ship):
         self.target = target.build(params.target, params.duration)

@@ -95,8 +95,6 @@ def response(sweep, sent, returned):
     return Response(sweep.frequencies(), L, np.std(Y / E / L, axis=0) / math.sqrt(sweep.kept - 1))
 
 
-# The loops inside the drive.
-
 @compiled
 def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
     """One axis from rest: rate (n,) [rad/s] commanded each speed period, current (5 n,) [A] added to both i_ref each
@@ -153,8 +151,6 @@ def speed(drive, sweep=SPEED):
     return found
 
 
-# The position loop.
-
 MOVING = {
     'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0, 'scenario.program.interval': 1.0,
     'adu.initial_azimuth': START[0], 'adu.initial_elevation': START[1],
@@ -179,8 +175,6 @@ def position(case, axes=AXES, sweep=POSITION):
     return {f'position/{name}/{case.name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
             for i, name in enumerate(AXES) if name in axes}
 
-
-# What a response says.
 
 def _crossings(f, y, angle):
     """Where y (n,) goes through zero, and the angle [rad] there: both linear in log f, angle taken the short way."""
@@ -210,8 +204,6 @@ def margins(found):
             'phase_margin_deg': (math.degrees(turn.min()) if turn.size else math.nan, 'deg'),
             'peak_db': (20.0 * math.log10(T.max()), 'dB')}
 
-
-# The study.
 
 def controller(name):
     """Both axes of the product's default loop with a position controller."""
@@ -268,8 +260,6 @@ def run(progress) -> Result:
                f'10 dB of |L| = 1 ({worst}).']
     return Result(rows(responses), drawings(responses, drive), remarks)
 
-
-# Figures.
 
 def drawings(responses, drive):
     """{name: function that draws a Figure}."""

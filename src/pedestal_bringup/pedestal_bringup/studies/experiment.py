@@ -149,8 +149,6 @@ def peak(y):
     return float(np.max(np.abs(y)))
 
 
-# Figures.
-
 def panels(rows, columns=1, size=SIZE, **options):
     """(figure, axes (rows, columns)) on one sheet."""
     figure = Figure(figsize=size, layout='constrained')
