@@ -1,6 +1,7 @@
 """The command line `pedestal`: thin verbs over graph, bag, report, studies and bench."""
 import argparse
 import contextlib
+import inspect
 import json
 import math
 import pathlib
@@ -328,7 +329,7 @@ def _study(options):
 def _many_runs(options, study, stack):
     """What a study of many runs is told beside its progress; the pool is closed with the stack."""
     asked = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
-    if not hasattr(study, 'RUNS'):
+    if 'runs' not in inspect.signature(study.run).parameters:
         for name, value in asked.items():
             if value is not None:
                 raise ValueError(f'--{name} {value}: study {options.name} has one run of each case')
