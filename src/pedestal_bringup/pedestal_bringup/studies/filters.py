@@ -58,7 +58,12 @@ PAPER = {('flyby-500m', 'current_statistical', 'reduction'): 7.0,
 """Paper 000, figures 7 to 10."""
 
 HONEST = (0.8, 1.25)
-"""Mean NIS per degree of freedom, and errors over the sigma that the filter gives them, of a filter that knows them."""
+"""Mean NIS per degree of freedom, and error over the sigma that the filter gives it, where a filter knows its errors."""
+
+
+def freedom(name):
+    """Degrees of freedom of the innovation of a filter."""
+    return 1 + (name in RATES)
 
 
 def times():
@@ -123,17 +128,18 @@ def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE
             case = profile, name, noise
             totals[case] = ensemble.added(totals[case], sums) if case in totals else sums
             over_time[case] = ensemble.added(over_time[case], thinned) if case in over_time else thinned
-    values = {case: metrics(sums, 1 + (case[1] in RATES)) for case, sums in totals.items()}
+    values = {case: metrics(sums) for case, sums in totals.items()}
     return Result(rows(values), figures(values, over_time), remarks(values, tuned, runs), shown=shown(rows(values)))
 
 
-def metrics(sums, freedom):
-    """{metric: (value, unit)}; for a filter that knows its errors nis_mean is `freedom` and both _over_sigma are 1."""
+def metrics(sums):
+    """{metric: (value, unit)}; where a filter knows its errors nis_mean is `freedom(name)` and both _over_sigma are 1."""
     angle, rate, raw = (ensemble.rms(sums, name).item() for name in ('angle', 'rate', 'raw'))
-    nis, variance, rate_variance = ((sums[name] / sums['runs']).item() for name in ('nis', 'variance', 'rate_variance'))
+    runs = sums['runs'].item()
     return {'angle_rms_deg': (math.degrees(angle), 'deg'), 'rate_rms_deg_s': (math.degrees(rate), 'deg/s'),
-            'reduction': (raw / angle, ''), 'nis_mean': (nis, ''), 'angle_over_sigma': (angle / math.sqrt(variance), ''),
-            'rate_over_sigma': (rate / math.sqrt(rate_variance), '')}
+            'reduction': (raw / angle, ''), 'nis_mean': (sums['nis'].item() / runs, ''),
+            'angle_over_sigma': (angle / math.sqrt(sums['variance'].item() / runs), ''),
+            'rate_over_sigma': (rate / math.sqrt(sums['rate_variance'].item() / runs), '')}
 
 
 def rows(values):
@@ -167,16 +173,18 @@ def remarks(values, tuned, runs):
     for colour in ('white', 'coloured'):
         doubtful = {}
         for (profile, name, noise), at in values.items():
-            worst = [metric for metric, value in (('NIS', at['nis_mean'][0] / (1 + (name in RATES))),
-                                                  ('angle', at['angle_over_sigma'][0]),
-                                                  ('rate', at['rate_over_sigma'][0]))
-                     if not HONEST[0] <= value <= HONEST[1]]
-            if worst and noise.startswith(colour):
-                doubtful.setdefault(name, {}).setdefault(', '.join(worst), []).append(profile)
-        listed = '; '.join(f'{name} ({", ".join(f"{what} on {len(cases)}" for what, cases in at.items())})'
-                           for name, at in doubtful.items())
-        found.append(f'{colour} noise: NIS per degree of freedom, or errors over their sigma, outside {HONEST[0]:g} to '
-                     f'{HONEST[1]:g}, on so many of the cases: {listed or "none"}.')
+            measures = {'NIS': at['nis_mean'][0] / freedom(name), 'angle': at['angle_over_sigma'][0],
+                        'rate': at['rate_over_sigma'][0]}
+            if noise.startswith(colour):
+                for what, value in measures.items():
+                    if not HONEST[0] <= value <= HONEST[1]:
+                        doubtful.setdefault(name, {}).setdefault(what, []).append(value)
+        listed = [f'    {name}: '
+                  + ', '.join(f'{what} {min(off):.2f} to {max(off):.2f}' for what, off in at.items())
+                  for name, at in doubtful.items()]
+        if listed:
+            found += [f'Not honest under {colour} noise, NIS per degree of freedom or error over own sigma outside '
+                      f'{HONEST[0]:g} to {HONEST[1]:g} in some case:', *listed]
     pairs = [(values[profile, name, noise]['reduction'][0],
               values[profile, name, noise.replace('white', 'coloured')]['reduction'][0])
              for profile, name, noise in values if noise == SHOWN
@@ -257,7 +265,7 @@ def rms_figure(values, on):
 def nis_figure(values, on):
     """Mean NIS per degree of freedom of every filter; 1: it knows its errors."""
     def nis(name, at):
-        return at['nis_mean'][0] / (1 + (name in RATES))
+        return at['nis_mean'][0] / freedom(name)
 
     figure, panels = bars(values, on, nis, 'NIS per degree of freedom', _colour,
                           lambda name, at: f'{nis(name, at):.2f}')

@@ -3,7 +3,8 @@
 The criterion (a number to make small: the angle rms of a study, the negative log-likelihood of a bag's innovations)
 is taken as a function of the logarithms of the kind's own parameters. First on a grid over RANGES, for one or two of
 them; then, from the best point (from the given parameters where there are more than two), downhill by the simplex of
-Nelder and Mead until the parameters stay within 2 %. Judge the result on seeds, or a part of the recording, of their own.
+Nelder and Mead until the parameters stay within 2 %. Judge the result on seeds, or a part of the recording, of its
+own.
 """
 import itertools
 import math
