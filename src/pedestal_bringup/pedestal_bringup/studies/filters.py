@@ -58,7 +58,7 @@ PAPER = {('flyby-500m', 'current_statistical', 'reduction'): 7.0,
 """Paper 000, figures 7 to 10."""
 
 HONEST = (0.8, 1.25)
-"""Mean NIS per degree of freedom, and error over the sigma that the filter gives it, where a filter knows its errors."""
+"""Mean NIS per degree of freedom, and error over the sigma that the filter gives it, where it knows its errors."""
 
 
 def freedom(name):
@@ -133,7 +133,7 @@ def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE
 
 
 def metrics(sums):
-    """{metric: (value, unit)}; where a filter knows its errors nis_mean is `freedom(name)` and both _over_sigma are 1."""
+    """{metric: (value, unit)}; where a filter knows its errors nis_mean is its freedom and both _over_sigma are 1."""
     angle, rate, raw = (ensemble.rms(sums, name).item() for name in ('angle', 'rate', 'raw'))
     runs = sums['runs'].item()
     return {'angle_rms_deg': (math.degrees(angle), 'deg'), 'rate_rms_deg_s': (math.degrees(rate), 'deg/s'),
@@ -172,7 +172,7 @@ def remarks(values, tuned, runs):
                   for name in FILTERS]
     for colour in ('white', 'coloured'):
         doubtful = {}
-        for (profile, name, noise), at in values.items():
+        for (_, name, noise), at in values.items():
             measures = {'NIS': at['nis_mean'][0] / freedom(name), 'angle': at['angle_over_sigma'][0],
                         'rate': at['rate_over_sigma'][0]}
             if noise.startswith(colour):
@@ -245,6 +245,7 @@ def bars(values, on, metric, label, colour, text):
                            color=[colour(name) for name in FILTERS])
         panel.bar_label(drawn, [text(name, at) for name, at in zip(FILTERS, found)], padding=2, fontsize=6)
         panel.margins(x=0.35)
+        panel.locator_params(axis='x', nbins=3)
         panel.grid(axis='y', visible=False)
         panel.set_title(profile)
         panel.set_xlabel(label)
@@ -297,10 +298,12 @@ def noise_figure(values, on):
     for panel, profile in zip(axes[0], on):
         for noise, colour, marker in zip(NOISES, (RAW, RAW, FILTERED, FILTERED), 'o^o^'):
             there = [name for name in FILTERS if (profile, name, noise) in values]
-            panel.semilogx([values[profile, name, noise]['reduction'][0] for name in there], there, marker,
+            panel.plot([values[profile, name, noise]['reduction'][0] for name in there], there, marker,
                            color=colour, ms=4.0, linestyle='', label=f'{noise} deg',
                            fillstyle='full' if marker == 'o' else 'none')
         panel.axvline(1.0, color=INK, linewidth=0.8)
+        panel.set_xlim(left=0.0)
+        panel.locator_params(axis='x', nbins=4)
         panel.set_title(profile)
         panel.set_xlabel('reduction')
     axes[0, 0].invert_yaxis()
