@@ -317,7 +317,7 @@ def _study(options):
         for name, draw in result.figures.items():
             progress(None, f'drawing {name}')
             experiment.save(draw, output / f'{name}.png')
-    _show_study(f'study {options.name}', result.rows)
+    _show_study(f'study {options.name}', result.rows if result.shown is None else result.shown)
     for remark in result.remarks:
         print(remark)
     print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')

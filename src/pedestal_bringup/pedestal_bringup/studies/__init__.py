@@ -8,7 +8,7 @@ others is a scenario and parameters: `pedestal run SCENARIO --param ...` takes t
 """
 import importlib
 
-NAMES = ('servo', 'backlash', 'bode', 'imm-feedforward', 'rate-measurement')
+NAMES = ('servo', 'backlash', 'bode', 'filters', 'manoeuvre', 'pareto', 'imm-feedforward', 'rate-measurement')
 
 
 def study(name):

@@ -1,7 +1,7 @@
 """Target motions of the filter studies, exact: angle [rad], rate [rad/s] and acceleration [rad/s2] over time.
 
 flyby-500m, flyby-60m: past the antenna on a straight line at 15 m/s, nearest in the middle of the record.
-s-turn-500m: 500 m away, 3 m/s2 across the line of sight, now to one side, now to the other.
+s-turn-500m: 500 m away, an S of turns at 3 m/s2 across the line of sight between two straight legs.
 s-20deg: paper 003's S motion of 20 deg at 3.5 deg/s.
 """
 import math
@@ -22,9 +22,9 @@ NEAREST = {'flyby-500m': 500.0, 'flyby-60m': 60.0}
 TURN_ACCELERATION, TURN_DISTANCE = 3.0, 500.0
 """Of the S-turn [m/s2, m]: a bank of 17 deg."""
 
-TURN_TIME, ROLL_TIME = 8.0, 1.0
-"""From one turn to the next, and the part of it in which the target rolls from one bank to the other [s].
-At 15 m/s the course swings by +-45 deg. The reference says only 3 m/s2 at 500 m: these two are ours."""
+TURNS, ROLL_TIME = {14.0: 1.0, 22.0: -1.0, 38.0: 1.0, 46.0: 0.0}, 1.0
+"""When the target rolls [s], into which turn (0: straight on), and how long that takes [s]. The reference gives only
+the acceleration and the distance; straight legs before and after give its numbers for cv and ca."""
 
 STROKE, RATE, REVERSAL = math.radians(20.0), math.radians(3.5), 1.0
 """Of paper 003's S motion, from end to end [rad], between its ends [rad/s], and the time of a reversal, ours [s]."""
@@ -44,10 +44,21 @@ def flyby(t, w):
 
 
 def s_turn(t):
-    """Acceleration across the line of sight that changes sides every TURN_TIME."""
-    a = TURN_ACCELERATION / TURN_DISTANCE
-    _, wave, integral, second = _reversing(t, TURN_TIME - ROLL_TIME, ROLL_TIME)
-    return a * second, a * integral, a * wave
+    """Straight on, a turn to one side, twice as long to the other, back, and straight on, along the old line."""
+    found, before = [0.0, 0.0, 0.0], 0.0
+    for at, side in TURNS.items():
+        jump = (side - before) * TURN_ACCELERATION / TURN_DISTANCE
+        found = [x + jump * more for x, more in zip(found, _step(t - at, ROLL_TIME))]
+        before = side
+    return tuple(found)
+
+
+def _step(t, width):
+    """(second integral, integral, s) of a step s from 0 to 1 at t = 0, half a cosine `width` [s] wide."""
+    x = np.clip(t / width + 0.5, 0.0, 1.0)
+    after = np.maximum(t - 0.5 * width, 0.0)
+    return (0.5 * width * width * (0.5 * x * x + (np.cos(np.pi * x) - 1.0) / np.pi**2) + 0.5 * after * (width + after),
+            0.5 * width * (x - np.sin(np.pi * x) / np.pi) + after, 0.5 * (1.0 - np.cos(np.pi * x)))
 
 
 def s_motion(t, stroke, rate, reversal):
@@ -60,19 +71,9 @@ def s_motion(t, stroke, rate, reversal):
     if uniform < 0.0:
         raise ValueError(f'reversal = {reversal:g} s: must be at most pi stroke / (2 rate) = '
                          f'{0.5 * math.pi * stroke / rate:g} s')
-    slope, wave, integral, _ = _reversing(t, uniform, reversal)
-    return rate * integral, rate * wave, rate * slope
-
-
-def _reversing(t, uniform, reversal):
-    """(dw/dt, w, its integral, its second integral) of a wave w that stays +1 for `uniform` [s], becomes -1 along half
-    a cosine in `reversal` [s], stays, comes back; t = 0 in the middle of a stay at +1. Both integrals have mean 0.
-    """
     half, r = np.divmod(t + 0.5 * uniform, uniform + reversal)
-    sign = 1.0 - 2.0 * (half % 2)
-    stay = np.minimum(r, uniform)
+    sign = rate * (1.0 - 2.0 * (half % 2))
+    stay = np.minimum(r, uniform) - 0.5 * uniform
     x = np.pi * np.maximum(r - uniform, 0.0) / reversal
-    T = reversal / np.pi
-    last = 0.5 * uniform * reversal + 2.0 * T * T
-    return (-sign * np.sin(x) / T, sign * np.cos(x), sign * (stay - 0.5 * uniform + T * np.sin(x)),
-            sign * (0.5 * stay * (stay - uniform) + 0.5 * uniform * T * x + T * T * (1.0 - np.cos(x)) - 0.5 * last))
+    T = reversal / math.pi
+    return sign * (stay + T * np.sin(x)), sign * np.cos(x), -sign * np.sin(x) / T
