@@ -123,7 +123,7 @@ def test_no_row_misses_its_target(result):
     for axis in study.REVERSALS:
         for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state'):
             assert {(f'{axis}/{name}', 'miss_rms_deg'), (f'{axis}/{name}', 'rate_noise_deg_s')} <= named.keys()
-    assert sum(row['target'] is not None for row in result.rows) == 11
+    assert sum(row['target'] is not None for row in result.rows) == 15
     assert [row for row in result.rows if experiment.missed(row)] == []
 
 
