@@ -10,7 +10,14 @@ from acu_tracker import deck_reference, modes, notch, position_loop, program_tra
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import displaced, earth_angles, earth_direction, rotation, to_earth
+from pedestal_common.line_of_sight import (
+    displaced,
+    displaced_motion,
+    earth_angles,
+    earth_direction,
+    rotation,
+    to_earth,
+)
 from pedestal_common.parameters import record, record_type
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
@@ -24,6 +31,8 @@ INPUTS = np.dtype([
     ('position', 'f8', (2,)), ('velocity', 'f8', (2,)), ('encoder_valid', 'i8'),  # deck azimuth, elevation
     ('error_stamp', 'f8'), ('error_valid', 'i8'),                               # 0: none came, or unlocked
     ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
+    ('error_rate', 'f8', (2,)), ('error_rate_sigma', 'f8'),                     # of that error [rad/s]; NaN: none
+    ('range', 'f8'), ('range_variance', 'f8'),                                  # to that target [m], [m2]; NaN: none
     ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
@@ -46,7 +55,7 @@ OUTPUTS = np.dtype([
 
 STATE = np.dtype([
     ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'), ('stabilised', 'i8'),
-    ('encoder', history_type(2)),                                               # azimuth, elevation
+    ('encoder', history_type(4)),                                               # azimuth, elevation, their rates
     ('attitude', history_type(10)),                                             # quaternion, w, dw
     ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
     ('turn', 'f8'),                                                            # raw azimuth last followed
@@ -85,7 +94,8 @@ def take_encoder(s, u):
     ok = u.encoder_valid and math.isfinite(u.position[0] + u.position[1] + u.velocity[0] + u.velocity[1])
     if ok:
         row = push(s.encoder, u.stamp)
-        s.encoder.sample[row, 0], s.encoder.sample[row, 1] = u.position[0], u.position[1]
+        for i in range(2):
+            s.encoder.sample[row, i], s.encoder.sample[row, 2 + i] = u.position[i], u.velocity[i]
     return ok
 
 
@@ -150,6 +160,19 @@ def attitude_at(s, p, t):
 
 
 @compiled
+def target_rates(s, u, a, b, f):
+    """Rates (azimuth, elevation) of the target: those of the antenna, a share f between two encoder samples a and b,
+    and of the error, on a ship turned into earth angles by the attitude `s` was last asked for."""
+    x, y, z, dx, dy, dz = displaced_motion(
+        a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), a[3] + f * (b[3] - a[3]),
+        u.cross_elevation, u.elevation, u.error_rate[0], u.error_rate[1])
+    if s.stabilised:
+        return deck_reference.earth_rates(s.mat_ed, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
+    _, dA, _, _, dE, _ = deck_reference.moving_angles(x, y, z, dx, dy, dz, 0.0, 0.0, 0.0)
+    return dA, dE
+
+
+@compiled
 def take_error(s, p, c, u, o):
     """Filter y = encoder at the stamp of the error, displaced by the error, in earth angles on a ship."""
     e = p.tracker.receiver
@@ -166,12 +189,16 @@ def take_error(s, p, c, u, o):
         # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
         y, x, z = earth_direction(azimuth, elevation)
         azimuth, elevation = earth_angles(*to_earth(s.mat_ed, x, -y, z))
+    azimuth_rate, elevation_rate = math.nan, math.nan
+    if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
+        azimuth_rate, elevation_rate = target_rates(s, u, a, b, f)
     R = tracker.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e.beamwidth, e.slope, e.integration,
                                e.sigma_floor)
+    R_rate = u.error_rate_sigma * u.error_rate_sigma
     cos_el = max(math.cos(elevation), 0.01)
     (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
      o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, u.error_stamp, azimuth, elevation, R / (cos_el * cos_el), R,
-                                 math.nan, math.nan, math.nan, math.nan)
+                                 azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate)
     if outcome == tracker.STALE:
         return _ERROR_STAMP
     return _ERROR_GATED if outcome == tracker.GATED else 0
