@@ -57,7 +57,9 @@ class Feedforward(Parameters):
 
     bandwidth: float = parameter(20.0, 0.0, 500.0, 'rad/s', 'of the position loop: K_p')
     integral: float = parameter(0.05, 0.0, 10.0, '', 'K_i / K_p^2; 0.25: both poles of the loop at K_p / 2')
-    rate_feedforward: float = parameter(1.0, 0.0, 2.0, '', 'share of the reference rate fed forward')
+    rate_feedforward: float = parameter(1.0, 0.0, 2.0, '', 'k_v: share of the reference rate fed forward')
+    acceleration_feedforward: float = parameter(0.0, -1.0, 1.0, 's', 'k_a: of the reference acceleration; 0 where '
+                                                'inertia does it')
     inertia: float = parameter(280.0, 0.0, 1e9, 'kg m2', 'load and motors, seen at the load')
     friction: float = parameter(60.0, 0.0, 1e7, 'Nm', 'Coulomb friction Tc fed forward')
     friction_rate: float = parameter(0.002, 1e-6, 1.0, 'rad/s', 'rate at which 76 % of the friction is fed forward')

@@ -33,8 +33,8 @@ STATE = np.dtype([
     ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('c', 'f8', (2,)),
     ('z', 'f8', (2, 3)), ('s', 'f8', (2, 3, 3)), ('g', 'f8', (2, N, 3)), ('points', 'f8', (2, 3, 3)),
     ('weights', 'f8', (2,)), ('mean', 'f8', (N,)), ('covariance', 'f8', (N, N))], align=True)
-"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, c: the same
-predicted to the next one; z, s: its measurement, as `innovation` expects it, and the covariance; g: that with X. The
+"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, c: the
+same, predicted to the next one; z, s: what `innovation` expects to be measured, its covariance; g: that with X. The
 rest is room to work in.
 """
 
@@ -156,8 +156,8 @@ def _measured(east, north, up):
 
 @compiled
 def _transformed(x, p, z, s, g, d):
-    """Unscented transform of the prediction x, p to the measurement: mean z (3,), S (3, 3) without R, and the covariance
-    with X, g (9, 3). d (2, 3, 3): how the points at +L_k and -L_k measure, against the one in the middle."""
+    """Unscented transform of the prediction x, p to the measurement: mean z (3,), covariance s (3, 3) without R, and
+    that with X, g (9, 3). d (2, 3, 3): how the points at +L_k and -L_k measure, against the one in the middle."""
     A, E, r = _measured(x[0], x[1], x[2])
     z[0] = z[1] = z[2] = 0.0
     s[:, :] = 0.0
