@@ -184,7 +184,7 @@ def _check_json(path):
 
 
 def _run(options):
-    from pedestal_bringup import graph, results, scenario
+    from pedestal_bringup import consistency, graph, results, scenario
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
     chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
@@ -196,7 +196,9 @@ def _run(options):
         except KeyboardInterrupt:
             print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
             return EXIT_STOPPED
-    values = results.summary(results.tracking(read(bag)))
+    recording = read(bag)
+    tracked = results.tracking(recording)
+    values = {**results.summary(tracked), **consistency.summary(consistency.read(recording, tracked))}
     values['lost_steps'] = (float(outcome.drive['lost_steps']), '')
     values['realtime_factor'] = (outcome.drive['realtime_factor'], '')
     values['messages'] = (float(outcome.recorder['messages']), '')
