@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from acu_tracker.filter_params import Filter
+from acu_tracker.filter_params import Filter, Ukf
 from acu_tracker.history import LENGTH
 from acu_tracker.modes import MODES
 from acu_tracker.position_loop import CONTROLLERS
@@ -33,6 +33,7 @@ class TrackerParameters(Parameters):
     coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack is left')
     handover: bool = flag(True, 'program hands over to autotrack by itself once locked')
     receiver: ReceiverLaw = group(ReceiverLaw)
+    ukf: Ukf = group(Ukf)
 
     def check(self):
         if self.coast_time < self.coast_after:
