@@ -56,10 +56,11 @@ def innovations(recording):
 
 
 def _averaged(t, nis, freedoms):
-    """(times, mean NIS, its expectation, its band) over stretches of SPAN; NaN where nothing was measured."""
+    """(times, mean NIS, its expectation, its band) over stretches of SPAN; NaN where hardly anything was measured."""
     part = np.floor((t - t[0]) / SPAN).astype(int)
     known = np.isfinite(nis)
     count = np.bincount(part, known)
+    count[count < 0.5 * count.max()] = np.nan
     with np.errstate(invalid='ignore', divide='ignore'):
         mean = np.bincount(part, np.where(known, nis, 0.0)) / count
         total = np.bincount(part, np.where(known, freedoms, 0.0))

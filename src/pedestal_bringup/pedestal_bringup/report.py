@@ -198,7 +198,10 @@ def _honesty(found):
             row('rate sigma it states', 'rate_sigma', 'deg/s', degrees)]
     said = ''.join(f'<p>{name.capitalize()}: {html.escape(axis.verdict)}.</p>'
                    for name, axis in zip(('azimuth', 'elevation'), judged))
-    return _rows(['', 'azimuth', 'elevation', ''], rows, 'n') + said
+    return _rows(['', 'azimuth', 'elevation', ''], rows, 'n') + said + (
+        '<p class="soft">Over the evaluated part. NIS: innovations in units of what the filter expects of them; NEES: '
+        'errors against the truth in units of what it states. On a ship the attitude error of the INS is among them, '
+        'which no filter of the target knows.</p>')
 
 
 def _loop(bag, check):

@@ -6,8 +6,13 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
+from acu_tracker import motion_models, tracker
+from acu_tracker.params import ReceiverLaw
 from pedestal_bringup import consistency
-from pedestal_common import messages
+from pedestal_common import line_of_sight, messages
+from pedestal_common.parameters import build
+from tracking_receiver_sim import receiver, target
+from tracking_receiver_sim.params import SMOOTHINGS, TrackingReceiverParameters
 
 
 def correlated(rng, n, size, memory):
@@ -107,6 +112,34 @@ def test_true_rates_seen_from_a_sailing_ship():
 
 
 def test_names_are_those_of_the_models_and_axes():
-    motion_models = pytest.importorskip('acu_tracker.motion_models')
     assert messages.MODELS == motion_models.MODELS
     assert len(messages.FILTER) == 2 * (len(consistency.NAMES) + len(messages.MODELS))
+
+
+@pytest.mark.parametrize('smoothing', SMOOTHINGS)
+@pytest.mark.parametrize('cn0_dbhz', [42.0, 55.0])
+def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_dbhz):
+    """A filter averages many errors: what counts is the variance of their mean. A smoothed error itself has less, and
+    its neighbours share it; unsmoothed it is that of each."""
+    params = build(TrackingReceiverParameters, {
+        'target.kind': 'step', 'target.angle.azimuth': 0.3, 'target.angle.elevation': 0.6, 'target.angle.start': 1e6,
+        'receiver.range_exponent': 0.0, 'receiver.cn0_dbhz': cn0_dbhz, 'receiver.smoothing': smoothing})
+    built = target.build(params.target, 1000.0)
+    constants, state = receiver.constants(params, 0.005, built), receiver.initial_state()
+    inputs, outputs = np.zeros(1, receiver.INPUTS), np.zeros(1, receiver.OUTPUTS)
+    inputs['mat_ed'], inputs['valid'] = line_of_sight.ashore_matrix(), 1
+    inputs['azimuth'], inputs['elevation'] = 0.3, 0.6
+    normals = np.random.default_rng(2).standard_normal((40_400, receiver.normals_per_step(params)))
+    errors, expected, law = [], [], ReceiverLaw()
+    for k, row in enumerate(normals):
+        inputs['stamp_ns'] = 5_000_000 * k
+        receiver.step(state, constants, inputs, outputs, built.breaks, built.coefficients, row)
+        if k >= 400:
+            x, e, level = (float(outputs[name][0]) for name in ('cross_elevation', 'elevation', 'cn0_dbhz'))
+            errors += [[x, e]]
+            expected += [tracker.error_variance(x, e, level, law.beamwidth, law.slope, law.integration,
+                                                law.sigma_floor)]
+    errors, variance = np.array(errors), np.mean(expected)
+    means = errors.reshape(-1, 50, 2).mean(axis=1)
+    assert 50 * means.var() == pytest.approx(variance, rel=0.15)
+    assert errors.var() == pytest.approx(variance, rel=0.07) or smoothing != 'none'
