@@ -33,8 +33,8 @@ STATE = np.dtype([
     ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('c', 'f8', (2,)),
     ('z', 'f8', (2, 3)), ('s', 'f8', (2, 3, 3)), ('g', 'f8', (2, N, 3)), ('points', 'f8', (2, 3, 3)),
     ('weights', 'f8', (2,)), ('mean', 'f8', (N,)), ('covariance', 'f8', (N, N))], align=True)
-"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, c: the same
-predicted to the next one; z, s: its measurement, as `innovation` expects it, and the covariance; g: that with X. The
+"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, c: the
+same, predicted to the next one; z, s: what `innovation` expects to be measured, its covariance; g: that with X. The
 rest is room to work in.
 """
 
@@ -156,8 +156,8 @@ def _measured(east, north, up):
 
 @compiled
 def _transformed(x, p, z, s, g, d):
-    """Unscented transform of the prediction x, p to the measurement: mean z (3,), S (3, 3) without R, and the covariance
-    with X, g (9, 3). d (2, 3, 3): how the points at +L_k and -L_k measure, against the one in the middle."""
+    """Unscented transform of the prediction x, p to the measurement: mean z (3,), covariance s (3, 3) without R, and
+    that with X, g (9, 3). d (2, 3, 3): how the points at +L_k and -L_k measure, against the one in the middle."""
     A, E, r = _measured(x[0], x[1], x[2])
     z[0] = z[1] = z[2] = 0.0
     s[:, :] = 0.0
@@ -256,17 +256,31 @@ def correct(s, azimuth, elevation, range_):
 
 
 @compiled
+def range_known(s, share_2):
+    """Whether the standard deviation of the range is at most a share (its square) of the range in both modes."""
+    for j in range(2):
+        x, p = s.x[j], s.p[j]
+        spread = 0.0
+        for a in range(3):
+            for b in range(3):
+                spread += x[a] * x[b] * p[a, b]
+        r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
+        if not spread <= share_2 * r2 * r2:
+            return False
+    return True
+
+
+@compiled
 def _moving_angles(x):
-    """(A, dA, ddA, E, dE, ddE, r, dr) of position, velocity and acceleration x (9,)."""
+    """(A, dA, ddA, E, dE, ddE) of position, velocity and acceleration x (9,)."""
     r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
     e, n, u = x[0] / r, x[1] / r, x[2] / r
     dr = e * x[3] + n * x[4] + u * x[5]
     de, dn, du = (x[3] - dr * e) / r, (x[4] - dr * n) / r, (x[5] - dr * u) / r
     ddr = r * (de * de + dn * dn + du * du) + e * x[6] + n * x[7] + u * x[8]
-    A, dA, ddA, E, dE, ddE = deck_reference.moving_angles(
+    return deck_reference.moving_angles(
         n, -e, u, dn, -de, du, (x[7] - ddr * n - 2.0 * dr * dn) / r, -(x[6] - ddr * e - 2.0 * dr * de) / r,
         (x[8] - ddr * u - 2.0 * dr * du) / r)
-    return A, dA, ddA, E, dE, ddE, r, dr
 
 
 @compiled
@@ -281,8 +295,7 @@ def outlook(s, c, T):
             x[i] += s.mu[j] * (p + T * v + f13 * a)
             x[i + 3] += s.mu[j] * (v + f23 * a)
             x[i + 6] += s.mu[j] * f33 * a
-    A, dA, ddA, E, dE, ddE, _, _ = _moving_angles(x)
-    return A, dA, ddA, E, dE, ddE
+    return _moving_angles(x)
 
 
 @compiled

@@ -1,5 +1,5 @@
-"""The Cartesian filters against filterpy 2.0's, right where it is used here: it draws the points of the measurement after
-Q, and its IMM mixes before `predict`. It weighs modes by plain likelihoods, so the noise here is not far off."""
+"""The Cartesian filters against filterpy 2.0's, right where it is used here: it draws the points of the measurement
+after Q, and its IMM mixes before `predict`. It weighs modes by plain likelihoods, so the noise here is not far off."""
 import dataclasses
 import math
 

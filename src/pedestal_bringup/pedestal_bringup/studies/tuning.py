@@ -13,7 +13,6 @@ import numpy as np
 from scipy.optimize import minimize
 
 from acu_tracker.axis_filter import named_models
-from acu_tracker.filter_params import Filter
 from acu_tracker.motion_models import MODELS
 from pedestal_common import parameters
 
@@ -40,14 +39,14 @@ def _of_kind(kind):
 
 
 def tuned(params, criterion, searched=None):
-    """(filter_params.Filter with the least criterion found, that criterion).
+    """(parameters with the least criterion found, that criterion), from a filter_params.Filter or Ukf.
 
-    criterion: function of a Filter, infinite or NaN where it does not work. searched: names, None: those of `names`.
+    criterion: function of them, infinite or NaN where it does not work. searched: names, None: those of `names`.
     Raises ValueError where it works nowhere.
     """
     searched = names(params) if searched is None else tuple(searched)
     given = parameters.as_dict(params)
-    fields = dict(parameters.flatten(Filter))
+    fields = dict(parameters.flatten(type(params)))
     bounds = [(math.log(fields[name].metadata['low'] or 1e-9), math.log(fields[name].metadata['high']))
               for name in searched]
 
@@ -55,7 +54,7 @@ def tuned(params, criterion, searched=None):
         limited = [min(max(value, low), high) for value, (low, high) in zip(x, bounds)]
         changes = {name: min(max(math.exp(value), fields[name].metadata['low']), fields[name].metadata['high'])
                    for name, value in zip(searched, limited)}
-        return parameters.build(Filter, {**given, **changes})
+        return parameters.build(type(params), {**given, **changes})
 
     def cost(x):
         value = criterion(at(x))
@@ -70,5 +69,5 @@ def tuned(params, criterion, searched=None):
     options = {'initial_simplex': corners, 'xatol': TOLERANCE, 'fatol': math.inf, 'maxfev': 100 * len(start)}
     found = minimize(cost, start, method='Nelder-Mead', bounds=bounds, options=options)
     if not math.isfinite(found.fun):
-        raise ValueError(f'{params.kind}: no {", ".join(searched)} gives a finite criterion')
+        raise ValueError(f'no {", ".join(searched)} gives a finite criterion')
     return at(found.x), float(found.fun)
