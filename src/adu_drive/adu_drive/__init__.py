@@ -6,6 +6,7 @@
     wire          the column between its messages: what the node and a recomputation share
     speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    the controller's laws
     motor, thermal, brake, gear_train, friction, structure, wind                         the plant's laws
+    electronic_beam    in the drive's place: the beam of a phased array, delay and hold
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
