@@ -36,7 +36,8 @@ OUTPUTS = np.dtype([
     ('mode', 'i8'), ('reason', 'i8'),                                            # codes of MODES and REASONS
     ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
-    ('reference', 'f8', (2, 3)),                                                # deck angle, rate, acceleration at t_k
+    ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
+                                                                                # of a beam at t_m: the command
     ('innovation', 'f8', (2,)), ('nis', 'f8', (2,)),                            # nu, nu2/S; NaN: no error this step
     ('coasting', 'i8'), ('locked', 'i8'), ('invalid_input', 'i8'),
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
@@ -49,6 +50,7 @@ STATE = np.dtype([
     ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
     ('turn', 'f8'),                                                            # raw azimuth last followed
     ('preset', 'f8', (2,)),
+    ('error', 'f8', (2,)),                                                      # of this step, azimuth, elevation
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
 ], align=True)
 
@@ -145,18 +147,29 @@ def attitude_at(s, p, t):
 
 
 @compiled
+def met(s, p, i, j, f, index):
+    """The encoder of an axis at a fraction f between two rows: in between, or the beam that stood up to the newer."""
+    a, b = s.encoder.sample[i, index], s.encoder.sample[j, index]
+    if p.controller == position_loop.BEAM:
+        return b if f > 1e-6 else a
+    return a + f * (b - a)
+
+
+@compiled
 def take_error(s, p, u, o):
-    """Filter y = encoder at the stamp of the error, displaced by the error, in earth angles on a ship."""
+    """Filter y = encoder at the instant of the error, displaced by the error, in earth angles on a ship."""
     e = p.tracker.receiver
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
         return _ERROR
-    i, j, f = bracket(s.encoder, u.error_stamp)
+    t = u.error_stamp - e.age
+    i, j, f = bracket(s.encoder, t)
     if i < 0:
         return _ERROR_STAMP
-    a, b = s.encoder.sample[i], s.encoder.sample[j]
-    azimuth, elevation = displaced(a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), u.cross_elevation, u.elevation)
+    A, E = met(s, p.azimuth, i, j, f, 0), met(s, p.elevation, i, j, f, 1)
+    azimuth, elevation = displaced(A, E, u.cross_elevation, u.elevation)
+    s.error[0], s.error[1] = azimuth - A, elevation - E
     if u.stabilised:
-        if not attitude_at(s, p, u.error_stamp):
+        if not attitude_at(s, p, t):
             return _ATTITUDE
         # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
         y, x, z = earth_direction(azimuth, elevation)
@@ -165,7 +178,7 @@ def take_error(s, p, u, o):
                                e.sigma_floor)
     cos_el = max(math.cos(elevation), 0.01)
     outcome, o.innovation[0], o.innovation[1], o.nis[0], o.nis[1] = tracker.observe(
-        s.tracker, p.tracker, p.azimuth.a_max, p.elevation.a_max, u.error_stamp, azimuth, elevation,
+        s.tracker, p.tracker, p.azimuth.a_max, p.elevation.a_max, t, azimuth, elevation,
         R / (cos_el * cos_el), R)
     if outcome == tracker.STALE:
         o.innovation[:] = math.nan
@@ -181,6 +194,16 @@ def seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
         return deck_reference.deck_angles(s.mat_ed, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2],
                                           A, dA, ddA, E, dE, ddE)
     return A, dA, ddA, E, dE, ddE
+
+
+@compiled
+def deck_rates(s, p, t):
+    """(azimuth, elevation) rate at which a fixed target where the beam is seems to move because the deck does; 0 where
+    nobody compensates for it."""
+    wanted = p.azimuth.beam.rate_compensation != 0.0 or p.elevation.beam.rate_compensation != 0.0
+    if wanted and s.stabilised and attitude_at(s, p, t):
+        return deck_reference.fixed_rates(s.w[0], s.w[1], s.w[2], s.azimuth.position, s.elevation.position)
+    return 0.0, 0.0
 
 
 @compiled
@@ -201,8 +224,8 @@ def outside(azimuth, elevation, p):
 
 @compiled
 def overdue(s, p):
-    """How long [s] no error was believed, beyond the receiver's latency."""
-    return s.stamp - s.tracker.stamp - p.receiver_latency
+    """How long [s] no error was believed, beyond the receiver's latency and the age of its errors."""
+    return s.stamp - s.tracker.stamp - p.receiver_latency - p.tracker.receiver.age
 
 
 @compiled
@@ -321,6 +344,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     encoder_ok = take_encoder(s, u)
     if not encoder_ok:
         flags |= _ENCODER
+    s.error[0] = s.error[1] = math.nan
     if u.stabilised != s.stabilised:
         s.stabilised, s.tracker.running = u.stabilised, 0
     if u.stabilised and not take_attitude(s, p, u):
@@ -348,10 +372,17 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         A, dA, ddA, E, dE, ddE = raw_target(s, p, times, angles, t_azimuth)
         if t_elevation != t_azimuth:
             _, _, _, E, dE, ddE = raw_target(s, p, times, angles, t_elevation)
-        position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
-                           u.velocity[0], dt, o, 0)
-        position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
-                           u.velocity[1], dt, o, 1)
+        autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
+        if p.azimuth.controller == position_loop.BEAM:
+            position_loop.steer(s.azimuth, p.azimuth, A, dA, ddA, s.error[0], V_A, autotrack, dt, o, 0)
+        else:
+            position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
+                               u.velocity[0], dt, o, 0)
+        if p.elevation.controller == position_loop.BEAM:
+            position_loop.steer(s.elevation, p.elevation, E, dE, ddE, s.error[1], V_E, autotrack, dt, o, 1)
+        else:
+            position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m,
+                               u.position[1], u.velocity[1], dt, o, 1)
         s.entered = 0
         o.coasting = s.mode == modes.AUTOTRACK and overdue(s, p) > p.tracker.coast_after
 

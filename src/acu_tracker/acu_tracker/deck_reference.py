@@ -6,7 +6,7 @@ Exact: the unit vector is differentiated twice, u_d = M' u, u_d' = M' u' - w x u
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import to_deck, wrap
+from pedestal_common.line_of_sight import direction, to_deck, wrap
 
 
 @compiled
@@ -53,6 +53,15 @@ def deck_angles(mat_ed, wx, wy, wz, dwx, dwy, dwz, A, dA, ddA, E, dE, ddE):
     # w x (2 M' u' - w x u_d)
     bx, by, bz = cross(wx, wy, wz, 2.0 * ex - cx, 2.0 * ey - cy, 2.0 * ez - cz)
     return moving_angles(x, y, z, ex - cx, ey - cy, ez - cz, fx - bx - ax, fy - by - ay, fz - bz - az)
+
+
+@compiled
+def fixed_rates(wx, wy, wz, A, E):
+    """(dA, dE) at which an earth-fixed direction, now at deck angles A, E, seems to move while the deck turns by w."""
+    x, y, z = direction(A, E)
+    cx, cy, cz = cross(wx, wy, wz, x, y, z)
+    _, dA, _, _, dE, _ = moving_angles(x, y, z, -cx, -cy, -cz, 0.0, 0.0, 0.0)
+    return dA, dE
 
 
 @compiled

@@ -25,7 +25,7 @@ that was believed; position: the beam in force (azimuth, elevation) [rad], since
 
 INPUTS = np.dtype([('stamp_ns', 'i8'), ('due', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))],
                   align=True)
-"""Stamp t_k of the step [ns]; due 1: a command came, with its stamp and beam (azimuth, elevation) on the deck [rad]."""
+"""Stamp t_k of the step [ns]; due 1: a command came, with its stamp and its beam (azimuth, elevation) [rad]."""
 
 OUTPUTS = np.dtype([('position', 'f8', (2,)), ('since_ns', 'i8'), ('stale', 'i8'), ('invalid_command', 'i8')],
                    align=True)
