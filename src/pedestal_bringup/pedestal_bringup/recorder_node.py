@@ -35,7 +35,8 @@ class RecorderNode(Shell):
         nodes = self.graph.members
         if self.graph.lockstep and not nodes:
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
-        recorded = topics.read_by('recorder', nodes) if nodes else topics.TOPICS
+        flags = [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
+        recorded = topics.read_by('recorder', nodes, flags) if nodes else topics.TOPICS
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
             'beamwidth': self.parameters.beamwidth, 'git': configuration.git_revision(), **configuration.versions()},

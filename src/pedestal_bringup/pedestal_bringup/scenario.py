@@ -80,6 +80,10 @@ KNOWN = (
 """(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
 
 
+MEASURED = (('receiver.rate.measured', 'receiver_rate'), ('receiver.ranging.measured', 'receiver_range'))
+"""(parameter of the receiver, what its readers are told): whether one of its topics is there at all."""
+
+
 class ScenarioError(ValueError):
     """A scenario is unknown or says something that is not allowed; one line naming file, node, key and value."""
 
@@ -245,6 +249,11 @@ def _spread(name, sections, header, seed):
             tell('ins', key, value)
     for node in ('acu', 'tracking_receiver'):
         tell(node, 'period', sections['adu'].get('period', parameters.defaults(parameters_of('adu'))['period']))
+    for key, told in MEASURED:
+        measured = sections['tracking_receiver'].get(key, False)
+        for node in ('acu', 'recorder'):
+            if measured or told in sections[node]:
+                tell(node, told, measured)
     for owner, key, node, told in KNOWN:
         if key in sections[owner]:
             sections[node].setdefault(told, sections[owner][key])

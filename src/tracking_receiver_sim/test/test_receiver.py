@@ -15,6 +15,7 @@ BEAMWIDTH = 0.0175
 FIXED = {'target.kind': 'step', 'target.angle.azimuth': 0.3, 'target.angle.elevation': 0.6,
          'target.angle.start': 1e6, 'receiver.range_exponent': 0.0}
 QUIET = FIXED | {'receiver.cn0_dbhz': 110.0}
+MEASURED = {'receiver.rate.measured': True, 'receiver.ranging.measured': True}
 
 
 class Bench:
@@ -186,8 +187,8 @@ def test_lock_has_two_levels_and_two_times():
 def test_latency_is_exact(latency):
     rng = np.random.default_rng(6)
     stamps = np.cumsum(rng.integers(1, 9_000_000, 400))
-    prompt = Bench(FIXED).run(stamps=stamps, rng=np.random.default_rng(7))
-    late = Bench(FIXED | {'receiver.latency': latency}).run(stamps=stamps, rng=np.random.default_rng(7))
+    prompt = Bench(FIXED | MEASURED).run(stamps=stamps, rng=np.random.default_rng(7))
+    late = Bench(FIXED | MEASURED | {'receiver.latency': latency}).run(stamps=stamps, rng=np.random.default_rng(7))
     assert np.array_equal(prompt['stamp_ns'], stamps) and np.all(prompt['due'] == 1)
     given = -1
     for k, now in enumerate(stamps):
@@ -197,7 +198,7 @@ def test_latency_is_exact(latency):
         if newest > given:
             given = newest
             assert late['stamp_ns'][k] == stamps[newest]
-            for name in ('cross_elevation', 'elevation', 'cn0_dbhz', 'locked'):
+            for name in ('cross_elevation', 'elevation', 'cn0_dbhz', 'locked', 'rate', 'range'):
                 assert np.array_equal(late[name][k], prompt[name][newest], equal_nan=True)
         else:
             assert math.isnan(late['elevation'][k])
@@ -303,6 +304,51 @@ def test_same_normals_give_the_same_bits():
     runs = [Bench(values, duration=60.0).run(500, np.random.default_rng(9)).tobytes() for _ in range(2)]
     assert runs[0] == runs[1]
     assert runs[0] != Bench(values, duration=60.0).run(500, np.random.default_rng(10)).tobytes()
+
+
+def test_rate_on_a_moving_deck_is_how_fast_the_error_changes():
+    """Against the difference of the true errors two steps apart; a flyby seen from a turning, sailing deck."""
+    bench = Bench(MEASURED | {'target.kind': 'flyby', 'receiver.range_exponent': 0.0, 'receiver.cn0_dbhz': 60.0},
+                  period=1e-3)
+    out, beam = [], (0.8, 0.1)
+    for k in range(400):
+        t = 1e-3 * k
+        attitude = Rotation.from_euler('ZYX', [0.1 * t + 1.8, 0.2 * math.sin(t), 0.3 * math.sin(2.0 * t)])
+        h = 1e-5
+        ahead, behind = (Rotation.from_euler('ZYX', [0.1 * s + 1.8, 0.2 * math.sin(s), 0.3 * math.sin(2.0 * s)])
+                         for s in (t + h, t - h))
+        velocity = np.array([6.0, 2.0, 0.5])
+        bench.inputs['mat_ed'], bench.inputs['position'] = attitude.as_matrix(), velocity * t
+        bench.inputs['twist_linear'] = attitude.inv().apply(velocity)
+        bench.inputs['twist_angular'] = (behind.inv() * ahead).as_rotvec() / (2.0 * h)
+        if k == 0:
+            x, y, z = attitude.inv().apply(bench.run(1)[0]['target_position'])
+            beam = math.atan2(-y, x), math.atan2(z, math.hypot(x, y))
+        bench.point(beam[0] + 0.02 * t, beam[1] - 0.01 * t)
+        bench.inputs['azimuth_rate'], bench.inputs['elevation_rate'] = 0.02, -0.01
+        out.append(bench.run(1)[0])
+    out = np.array(out)
+    true = np.stack([out['true_cross_elevation'], out['true_elevation']], axis=1)
+    locked = np.flatnonzero(out['locked'][1:-1]) + 1
+    assert len(locked) > 200
+    assert np.ptp(true[locked], axis=0).max() > 0.005
+    assert out['rate'][locked] == pytest.approx((true[locked + 1] - true[locked - 1]) / 2e-3, abs=1e-5)
+    assert np.isnan(out['rate'][out['locked'] == 0]).all() and np.isnan(out['range'][out['locked'] == 0]).all()
+
+
+def test_rate_and_range_have_the_noise_they_say_and_leave_the_errors_alone():
+    plain = Bench(FIXED | {'receiver.cn0_dbhz': 60.0}).run(100, np.random.default_rng(5))
+    assert np.isnan(plain['rate']).all() and np.isnan(plain['range']).all()
+    bench = Bench(FIXED | MEASURED | {'receiver.cn0_dbhz': 60.0, 'receiver.rate.sigma': 0.002,
+                                      'receiver.ranging.sigma': 3.0})
+    assert receiver.normals_per_step(bench.params) == 6 * 5 + 3
+    out = bench.run(4000, np.random.default_rng(5))[100:]
+    assert out['rate'].std(axis=0) == pytest.approx([0.002, 0.002], rel=0.05)
+    assert out['range'].std() == pytest.approx(3.0, rel=0.05)
+    assert out['range'].mean() == pytest.approx(10e3, abs=0.3)
+    assert np.array_equal(out['range'], out['range'].astype(np.float32))
+    every = np.column_stack([out['rate'], out['range'], errors(out)])
+    assert np.abs(np.corrcoef(every.T) - np.eye(5)).max() < 0.1
 
 
 def test_latency_that_does_not_fit_the_ring_is_refused():

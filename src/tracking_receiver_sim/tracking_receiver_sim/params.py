@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
+from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp')
 LEO_PASS, TRACK_FILE, FLYBY, SINE, STEP, RAMP = range(6)
@@ -91,6 +91,20 @@ class AntennaParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class RateParameters(Parameters):
+    """The rate of the angle error, an independent measurement: tachometer of the antenna and receiver together."""
+    measured: bool = flag(False, 'measured and published on angle_rate')
+    sigma: float = parameter(1.745e-3, 1e-9, 10.0, 'rad/s', '1-sigma of each axis, tachometer and receiver together')
+
+
+@dataclasses.dataclass(frozen=True)
+class RangingParameters(Parameters):
+    """The distance of the target."""
+    measured: bool = flag(False, 'measured and published on range')
+    sigma: float = parameter(1.0, 1e-6, 1e6, 'm', '1-sigma of the range')
+
+
+@dataclasses.dataclass(frozen=True)
 class ReceiverParameters(Parameters):
     """Level, sampling, smoothing, lock, delay."""
     cn0_dbhz: float = parameter(46.4, 0.0, 120.0, 'dB-Hz', 'C/N0 on the beam axis at the reference range')
@@ -108,6 +122,8 @@ class ReceiverParameters(Parameters):
     acquire_time: float = parameter(0.1, 0.0, 10.0, 's', 'time above the upper level before lock')
     lose_time: float = parameter(0.05, 0.0, 10.0, 's', 'time below the lower level before loss')
     latency: float = parameter(0.0, 0.0, 0.5, 's', 'from measurement to output')
+    rate: RateParameters = group(RateParameters)
+    ranging: RangingParameters = group(RangingParameters)
 
     def check(self):
         if self.lose_level_dbhz > self.acquire_level_dbhz:
