@@ -93,9 +93,9 @@ def _times(stamps):
 
 def _header(name, type_name, column):
     unit = None
-    if name == 'tracking_receiver/angle_error':
+    if topics.plain(name) == 'tracking_receiver/angle_error':
         unit = _ANGLE_ERROR.get(column)
-    elif name in topics.BY_NAME:
+    elif topics.plain(name) in topics.BY_NAME:
         units = _UNITS.get(type_name, {})
         unit = next((units[part] for part in reversed(column.split('.')) if part in units), None)
     return f'{column} [{unit}]' if unit else column
