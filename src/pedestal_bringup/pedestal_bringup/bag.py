@@ -184,11 +184,12 @@ class Bag:
 
     topics: {name without the leading '/': type}; metadata_records: {name: {text: text}};
     index: record array in the order of the file, one row per message: channel, sequence, log, publish [ns], chunk,
-    start, stop (where its bytes are); statistics: {name: count} as the file's summary says, None without one.
+    start, stop (where its bytes are); statistics: {name: count} as the file's summary says, None without one;
+    beam: the prefix of the beam of several that it is a view of, ''.
     """
 
     def __init__(self, path, file, data):
-        self.path, self.file = path, file
+        self.path, self.file, self.beam = path, file, ''
         self.topics, self.metadata_records, self.statistics, self.damage = {}, {}, None, ''
         self._data = data
         self._schemas, self._channels, self._chunks = {}, {}, []
@@ -295,9 +296,10 @@ class Bag:
         prefix = f'{beam}/' if beam else known[0]
         if prefix not in known:
             raise BagError(f'{self.path}: beam {beam!r}: must be one of {", ".join(name[:-1] for name in known)}')
-        seen = copy.copy(self)
         if not prefix:
-            return seen
+            return self
+        seen = copy.copy(self)
+        seen.beam = prefix
 
         def own(content):
             return {tables.plain(name): value for name, value in content.items()

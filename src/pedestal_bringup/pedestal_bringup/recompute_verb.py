@@ -69,7 +69,7 @@ def _title(recording, done, origin):
     stamps = done.feed.stamps / SECOND
     span = f'{stamps[0]:g} to {stamps[-1]:g} s' if len(stamps) else 'no step'
     pacing = 'lockstep' if recording.lockstep else 'realtime'
-    return f'{recording.bag.path}: {done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
+    return f'{recording.bag.path}: {recording.bag.beam}{done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
 
 
 def _remarks(recording, done):

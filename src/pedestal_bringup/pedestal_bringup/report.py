@@ -228,7 +228,7 @@ def _figure(spec, recording):
 
 def _page(bag, recording):
     check = verify(bag.path)
-    name = bag.metadata.get('scenario') or bag.file.stem
+    name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     data = bag.file.read_bytes()
