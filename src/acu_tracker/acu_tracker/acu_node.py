@@ -7,7 +7,7 @@ from std_srvs.srv import Trigger
 
 from acu_tracker import control_unit, modes
 from acu_tracker.params import AcuParameters
-from acu_tracker.wire import ATTITUDE, COMMAND, DRIVE, ERROR, ESTIMATE, JOINTS, MODE, PROGRAM, REFERENCE, Acu
+from acu_tracker.wire import DRIVE, JOINTS, MODE, PROGRAM, Acu
 from pedestal_common import messages, records, shell
 
 
@@ -18,8 +18,8 @@ class AcuNode(shell.Shell):
         self.unit = Acu(self.parameters, 'ins' in self.graph.members)
         self.unit.prepare()
         self.outputs = self.unit.outputs
-        self.joints, self.error, self.attitude = (records.only(self.unit.heard, name)
-                                                  for name in (JOINTS, ERROR, ATTITUDE))
+        self.joints = records.only(self.unit.heard, JOINTS)
+        self.follower_places = [(name, records.only(self.unit.heard, name)) for name in self.unit.followers]
         self.announced = None
         self.refused = ''
         self.drive_state = 'unknown'
@@ -28,8 +28,8 @@ class AcuNode(shell.Shell):
         self.held = None
 
         # The rate command, which the drive waits for, then what is only looked at.
-        self.says = [(self.unit.messages[name], records.only(self.unit.said, name), self.writer(name))
-                     for name in (COMMAND, ESTIMATE, REFERENCE)]
+        self.says = [(message, records.only(self.unit.said, name), self.writer(name))
+                     for name, message in self.unit.messages.items()]
         self.send_mode = self.writer(MODE)
         self.reader(PROGRAM, self.on_program)
         self.reader(DRIVE, self.on_drive_state)
@@ -65,8 +65,8 @@ class AcuNode(shell.Shell):
             self.held = (stamp, joints, followers)
             return
         records.take(self.joints, joints)
-        records.take(self.error, followers[ERROR])
-        records.take(self.attitude, followers.get(ATTITUDE))
+        for name, place in self.follower_places:
+            records.take(place, followers[name])
         self.unit.answer()
         outputs = self.outputs[0]
         self.invalid |= int(outputs['invalid_input'])

@@ -24,6 +24,8 @@ INPUTS = np.dtype([
     ('position', 'f8', (2,)), ('velocity', 'f8', (2,)), ('encoder_valid', 'i8'),  # deck azimuth, elevation
     ('error_stamp', 'f8'), ('error_valid', 'i8'),                               # 0: none came, or unlocked
     ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
+    ('error_rate', 'f8', (2,)), ('error_rate_sigma', 'f8'),                     # of that error [rad/s]; NaN: none
+    ('range', 'f8'), ('range_variance', 'f8'),                                  # to that target [m], [m2]; NaN: none
     ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
@@ -38,14 +40,17 @@ OUTPUTS = np.dtype([
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
     ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
                                                                                 # of a beam at t_m: the command
-    ('innovation', 'f8', (2,)), ('nis', 'f8', (2,)),                            # nu, nu2/S; NaN: no error this step
+    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # NaN: no error, no rate this step
+    ('nis', 'f8', (2,)),                                                        # nu' S^-1 nu of what was measured
+    ('sigma', 'f8', (2,)), ('rate_sigma', 'f8', (2,)), ('correlation', 'f8', (2,)),     # of the estimate at t_k
+    ('probability', 'f8', (2, 4)),                                              # of MODELS; NaN: not in the bank
     ('coasting', 'i8'), ('locked', 'i8'), ('invalid_input', 'i8'),
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)
 
 STATE = np.dtype([
     ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'), ('stabilised', 'i8'),
-    ('encoder', history_type(2)),                                               # azimuth, elevation
+    ('encoder', history_type(4)),                                               # azimuth, elevation, their rates
     ('attitude', history_type(10)),                                             # quaternion, w, dw
     ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
     ('turn', 'f8'),                                                            # raw azimuth last followed
@@ -82,7 +87,8 @@ def take_encoder(s, u):
     ok = u.encoder_valid and math.isfinite(u.position[0] + u.position[1] + u.velocity[0] + u.velocity[1])
     if ok:
         row = push(s.encoder, u.stamp)
-        s.encoder.sample[row, 0], s.encoder.sample[row, 1] = u.position[0], u.position[1]
+        for i in range(2):
+            s.encoder.sample[row, i], s.encoder.sample[row, 2 + i] = u.position[i], u.velocity[i]
     return ok
 
 
@@ -312,7 +318,12 @@ def clear(o):
     o.coasting, o.invalid_input = 0, 0
     o.torque[:] = 0.0
     o.innovation[:] = math.nan
+    o.rate_innovation[:] = math.nan
     o.nis[:] = math.nan
+    o.sigma[:] = math.nan
+    o.rate_sigma[:] = math.nan
+    o.correlation[:] = math.nan
+    o.probability[:] = math.nan
     o.estimate[:] = math.nan
     o.reference[:] = 0.0
     o.angle_limited[:] = 0

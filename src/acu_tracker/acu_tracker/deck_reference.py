@@ -6,7 +6,7 @@ Exact: the unit vector is differentiated twice, u_d = M' u, u_d' = M' u' - w x u
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import direction, to_deck, wrap
+from pedestal_common.line_of_sight import direction, to_deck, to_earth, wrap
 
 
 @compiled
@@ -61,6 +61,16 @@ def fixed_rates(wx, wy, wz, A, E):
     x, y, z = direction(A, E)
     cx, cy, cz = cross(wx, wy, wz, x, y, z)
     _, dA, _, _, dE, _ = moving_angles(x, y, z, -cx, -cy, -cz, 0.0, 0.0, 0.0)
+    return dA, dE
+
+
+@compiled
+def earth_rates(mat_ed, wx, wy, wz, x, y, z, dx, dy, dz):
+    """Rates (dA, dE) of the earth angles of a moving FLU unit vector on a deck that turns: u' = M (u_d' + w x u_d)."""
+    cx, cy, cz = cross(wx, wy, wz, x, y, z)
+    e, n, u = to_earth(mat_ed, x, y, z)
+    de, dn, du = to_earth(mat_ed, dx + cx, dy + cy, dz + cz)
+    _, dA, _, _, dE, _ = moving_angles(n, -e, u, dn, -de, du, 0.0, 0.0, 0.0)
     return dA, dE
 
 

@@ -172,6 +172,8 @@ class AcuParameters(Parameters):
     command_delay: float = parameter(0.0, 0.0, 1.0, 's', 'known delay from t_k until the command is in force')
     receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', "known latency of the receiver's errors")
     attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: latency of the attitude')
+    receiver_rate: bool = flag(False, 'the receiver measures the rate of its errors: tracking_receiver/angle_rate')
+    receiver_range: bool = flag(False, 'the receiver measures the range: tracking_receiver/range')
     initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
     attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')

@@ -12,10 +12,11 @@ from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
 
 JOINTS, ERROR, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
+RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 COMMAND, ESTIMATE, REFERENCE, MODE = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode'
-PROGRAM, DRIVE = 'acu/program_track', 'adu/state'
-HEARD = records.of(JOINTS, ERROR, ATTITUDE)
-SAID = records.of(COMMAND, ESTIMATE, REFERENCE, more=(MODE,))
+FILTER, PROGRAM, DRIVE = 'acu/filter', 'acu/program_track', 'adu/state'
+HEARD = records.of(JOINTS, ERROR, RATE, RANGE, ATTITUDE)
+SAID = records.of(COMMAND, ESTIMATE, REFERENCE, FILTER, more=(MODE,))
 
 
 class Acu:
@@ -32,14 +33,20 @@ class Acu:
         self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
         self.inputs[0]['stabilised'], self.inputs[0]['drive_ready'] = on_ship, 1
         self.outputs[0]['mode'] = modes.STANDBY
-        self.outputs['innovation'] = self.outputs['nis'] = math.nan
+        control_unit.clear(self.outputs[0])
         self.times, self.angles = np.zeros(0), np.zeros((0, 2))
         self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
+        for name in HEARD.names:
+            self.heard[name]['stamp'] = NEVER
         self.remembers = self.state, self.inputs, self.outputs
         self.messages = {COMMAND: messages.joint_state(messages.AXES),
                          ESTIMATE: messages.joint_trajectory('earth', [messages.trajectory_point()]),
-                         REFERENCE: messages.joint_trajectory('base_link', [messages.trajectory_point()])}
-        self.followers = {ERROR: params.receiver_latency, **({ATTITUDE: params.attitude_latency} if on_ship else {})}
+                         REFERENCE: messages.joint_trajectory('base_link', [messages.trajectory_point()]),
+                         FILTER: messages.named_numbers(messages.FILTER, 'earth')}
+        self.followers = {ERROR: params.receiver_latency,
+                          **({RATE: params.receiver_latency} if params.receiver_rate else {}),
+                          **({RANGE: params.receiver_latency} if params.receiver_range else {}),
+                          **({ATTITUDE: params.attitude_latency} if on_ship else {})}
         self.events = {PROGRAM: self.take_program, DRIVE: self.take_drive_state}
         self.configure(params)
 
@@ -89,8 +96,9 @@ class Acu:
 
 
 @compiled
-def hear(u, joints, error, attitude):
-    """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next."""
+def hear(u, joints, error, rate, distance, attitude):
+    """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next. A rate or a
+    range belongs to the error that was measured with it, or to none."""
     u.stamp = joints.stamp * 1e-9
     for i in range(2):
         u.position[i], u.velocity[i] = joints.position[i], joints.velocity[i]
@@ -101,6 +109,11 @@ def hear(u, joints, error, attitude):
         u.error_valid = 1 if x == x else 0
         u.error_stamp = error.stamp * 1e-9
         u.cross_elevation, u.elevation, u.cn0_dbhz = x, y, cn0_dbhz
+    u.error_rate[0] = u.error_rate[1] = u.range = math.nan
+    if rate.stamp != NEVER and rate.stamp == error.stamp:
+        u.error_rate[0], u.error_rate[1], u.error_rate_sigma = rate.vector[0], rate.vector[1], rate.vector[2]
+    if distance.stamp != NEVER and distance.stamp == error.stamp:
+        u.range, u.range_variance = distance.range[0], distance.variance[0]
     if attitude.stamp != NEVER:
         u.attitude_stamp = attitude.stamp * 1e-9
         u.attitude_valid = 1
@@ -111,14 +124,20 @@ def hear(u, joints, error, attitude):
 
 
 @compiled
-def say(o, stamp, command, estimate, reference):
+def say(o, stamp, command, estimate, reference, filtered):
     """Outputs of the control unit -> records of its messages."""
-    command.stamp = estimate.stamp = reference.stamp = stamp
+    command.stamp = estimate.stamp = reference.stamp = filtered.stamp = stamp
     for i in range(2):
         command.velocity[i], command.effort[i] = o.rate[i], o.torque[i]
         estimate.position[i], reference.position[i] = o.estimate[i, 0], o.reference[i, 0]
         estimate.velocity[i], reference.velocity[i] = o.estimate[i, 1], o.reference[i, 1]
         estimate.acceleration[i], reference.acceleration[i] = o.estimate[i, 2], o.reference[i, 2]
+        # In the order of messages.FILTER.
+        numbers = filtered.position[10 * i:]
+        numbers[0], numbers[1], numbers[2] = o.innovation[i], o.rate_innovation[i], o.nis[i]
+        numbers[3], numbers[4], numbers[5] = o.sigma[i], o.rate_sigma[i], o.correlation[i]
+        for model in range(4):
+            numbers[6 + model] = o.probability[i, model]
 
 
 @compiled
@@ -126,10 +145,10 @@ def answers(state, constants, inputs, outputs, times, angles, heard, said):
     """Step by step: said[k] answers heard[k]."""
     for k in range(len(heard)):
         h, y = heard[k], said[k]
-        hear(inputs[0], h[JOINTS], h[ERROR], h[ATTITUDE])
+        hear(inputs[0], h[JOINTS], h[ERROR], h[RATE], h[RANGE], h[ATTITUDE])
         control_unit.step(state, constants, inputs, outputs, times, angles)
         inputs[0].preset_valid = 0
-        say(outputs[0], h[JOINTS].stamp, y[COMMAND], y[ESTIMATE], y[REFERENCE])
+        say(outputs[0], h[JOINTS].stamp, y[COMMAND], y[ESTIMATE], y[REFERENCE], y[FILTER])
         y[MODE] = outputs[0].mode
 
 

@@ -68,3 +68,13 @@ def test_turned_is_the_rotation_by_a_vector():
 ])
 def test_nearest_turn(azimuth, near, travel, expected):
     assert deck_reference.nearest_turn(azimuth, near, LOW, HIGH, *travel) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize('t', [0.0, 1.7, 4.4, 9.1])
+def test_a_deck_rate_comes_back_to_earth(t):
+    h = 1e-4
+    before, after = (attitude(t + d).inv().apply([math.cos(E) * math.sin(A), math.cos(E) * math.cos(A), math.sin(E)])
+                     for d in (-h, h) for A, E in [earth(t + d)])
+    here = 0.5 * (before + after)
+    got = deck_reference.earth_rates(attitude(t).as_matrix(), *body_rate(t), *here, *(after - before) / (2.0 * h))
+    assert got == pytest.approx((0.03 + 0.004 * t, 0.02 - 0.002 * t), abs=1e-7)

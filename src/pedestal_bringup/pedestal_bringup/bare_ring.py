@@ -9,7 +9,7 @@ import time
 
 from rclpy.node import Node
 
-from pedestal_common import shell, topics
+from pedestal_common import messages, shell, topics
 
 ROLES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 TRIGGERS = {'tracking_receiver': 'joint_states', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
@@ -17,10 +17,13 @@ WARM_UP = 300
 """Laps before the clock starts."""
 
 
-def _filled(type_name):
+def _filled(topic):
     """An rclpy message with as many values as the graph's."""
+    type_name = topic.type
     message = shell.message_class(type_name)()
-    if type_name.endswith('JointState'):
+    if topic.name == 'acu/filter':
+        message.name, message.position = list(messages.FILTER), [0.0] * len(messages.FILTER)
+    elif type_name.endswith('JointState'):
         message.name = ['azimuth', 'elevation']
         message.position, message.velocity, message.effort = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
     elif type_name.endswith('JointTrajectory'):
@@ -35,9 +38,9 @@ class Ring(Node):
     def __init__(self, role, steps):
         super().__init__(role)
         self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
-        step_topics = [topic for topic in topics.TOPICS if topic.rate == 'step']
+        step_topics = [topic for topic in topics.TOPICS if topic.rate == 'step' and not topic.flag]
         self.writers = [(self.create_publisher(shell.message_class(topic.type), topic.name, shell.QOS['step']),
-                         _filled(topic.type), len(topics.readers(topic, ROLES)))
+                         _filled(topic), len(topics.readers(topic, ROLES)))
                         for topic in step_topics if role in topic.writers]
         for topic in step_topics:
             if role == 'recorder' and topic.writers[0] in ROLES:

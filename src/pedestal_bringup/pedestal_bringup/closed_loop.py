@@ -18,10 +18,12 @@ from tracking_receiver_sim import receiver, target
 RESULT = np.dtype([('t', 'f8'), ('position', 'f8', 2), ('load_position', 'f8', 2), ('torque', 'f8', 2),
                    ('motor_torque', 'f8', (2, 2)), ('motor_velocity', 'f8', (2, 2)), ('bias', 'f8', 2),
                    ('rate', 'f8', 2), ('feedforward', 'f8', 2), ('measured', 'f8', 2), ('true_error', 'f8', 2),
-                   ('estimate', 'f8', (2, 3)), ('reference', 'f8', (2, 3)), ('mode', 'i8')], align=True)
+                   ('estimate', 'f8', (2, 3)), ('reference', 'f8', (2, 3)), ('mode', 'i8'),
+                   ('innovation', 'f8', 2), ('rate_innovation', 'f8', 2), ('nis', 'f8', 2), ('sigma', 'f8', 2),
+                   ('rate_sigma', 'f8', 2), ('correlation', 'f8', 2), ('probability', 'f8', (2, 4))], align=True)
 """One step t_k: encoders and true load angle [rad], torque on the load and of the motors [Nm], motor speeds [rad/s],
 bias torque [Nm], the ACU's rate command [rad/s] and feed-forward torque [Nm], the receiver's error and the true one
-(cross-elevation, elevation) [rad]."""
+(cross-elevation, elevation) [rad]; from `innovation` on what acu/filter tells."""
 
 
 @dataclasses.dataclass
@@ -104,14 +106,18 @@ def _hand_over_attitude(acu_inputs, ins_outputs):
 
 
 @compiled
-def _hand_over_error(acu_inputs, error):
-    """Receiver -> control unit, when a measurement is due."""
+def _hand_over_error(acu_inputs, constants, error):
+    """Receiver -> control unit, when a measurement is due; error: outputs of the receiver."""
+    acu_inputs[0].error_rate[0] = acu_inputs[0].error_rate[1] = acu_inputs[0].range = np.nan
     acu_inputs[0].error_valid = error[0].due and error[0].cross_elevation == error[0].cross_elevation
     if error[0].due:
         acu_inputs[0].error_stamp = error[0].stamp_ns * 1e-9
         acu_inputs[0].cross_elevation = error[0].cross_elevation
         acu_inputs[0].elevation = error[0].elevation
         acu_inputs[0].cn0_dbhz = error[0].cn0_dbhz
+        acu_inputs[0].error_rate[0], acu_inputs[0].error_rate[1] = error[0].rate[0], error[0].rate[1]
+        acu_inputs[0].error_rate_sigma = constants.rate_sigma
+        acu_inputs[0].range, acu_inputs[0].range_variance = error[0].range, constants.range_variance
 
 
 @compiled
@@ -130,6 +136,8 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
             _hand_over_attitude(acu_inputs, navigation[3])
             for i in range(3):
                 seen[0].position[i] = truth[0].position[i]
+                seen[0].twist_linear[i] = truth[0].velocity_deck[i]
+                seen[0].twist_angular[i] = truth[0].angular_velocity[i]
                 rise = (truth[0].angular_velocity[i] - deck_rate[i]) / period
                 adu_inputs[0].base_acceleration[i] = rise if first + k > 0 else 0.0
                 deck_rate[i] = truth[0].angular_velocity[i]
@@ -138,8 +146,9 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
         azimuth, elevation = axes[0].azimuth, axes[0].elevation
         seen[0].stamp_ns = stamp_ns
         seen[0].azimuth, seen[0].elevation = azimuth.position, elevation.position
+        seen[0].azimuth_rate, seen[0].elevation_rate = azimuth.velocity, elevation.velocity
         receiver.step(receiver_state, receiver_constants, seen, error, breaks, coefficients, receiver_normals[k])
-        _hand_over_error(acu_inputs, error)
+        _hand_over_error(acu_inputs, receiver_constants[0], error)
         acu_inputs[0].stamp = stamp_ns * 1e-9
         acu_inputs[0].drive_ready = axes[0].following
         acu_inputs[0].position[0], acu_inputs[0].position[1] = azimuth.position, elevation.position
@@ -168,6 +177,10 @@ def _record(row, t, azimuth, elevation, acu, error):
         row.rate[i], row.feedforward[i] = acu.rate[i], acu.torque[i]
         for j in range(3):
             row.estimate[i, j], row.reference[i, j] = acu.estimate[i, j], acu.reference[i, j]
+        row.innovation[i], row.rate_innovation[i], row.nis[i] = acu.innovation[i], acu.rate_innovation[i], acu.nis[i]
+        row.sigma[i], row.rate_sigma[i], row.correlation[i] = acu.sigma[i], acu.rate_sigma[i], acu.correlation[i]
+        for j in range(4):
+            row.probability[i, j] = acu.probability[i, j]
 
 
 BLOCK = 2000

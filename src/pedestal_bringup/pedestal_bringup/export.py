@@ -26,7 +26,15 @@ _UNITS = {
     'nav_msgs/msg/Odometry': {'position': 'm', 'linear': 'm/s', 'angular': 'rad/s'},
 }
 """Units of the topics in the table of topics: {type: {part of the column's name: unit}}."""
-_ANGLE_ERROR = {'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'}
+_FILTER = {'innovation': 'rad', 'sigma': 'rad', 'rate_innovation': 'rad/s', 'rate_sigma': 'rad/s'}
+_OWN = {
+    'tracking_receiver/angle_error': {'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'},
+    'tracking_receiver/angle_rate': {'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'},
+    'tracking_receiver/range': {'range': 'm', 'variance': 'm2', 'min_range': 'm', 'max_range': 'm',
+                                'field_of_view': 'rad'},
+    'acu/filter': {f'{axis}_{name}.position': unit for axis in messages.AXES for name, unit in _FILTER.items()},
+}
+"""Units of topics whose type does not tell: {topic: {column: unit}}."""
 
 
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
@@ -93,8 +101,8 @@ def _times(stamps):
 
 def _header(name, type_name, column):
     unit = None
-    if topics.plain(name) == 'tracking_receiver/angle_error':
-        unit = _ANGLE_ERROR.get(column)
+    if topics.plain(name) in _OWN:
+        unit = _OWN[topics.plain(name)].get(column)
     elif topics.plain(name) in topics.BY_NAME:
         units = _UNITS.get(type_name, {})
         unit = next((units[part] for part in reversed(column.split('.')) if part in units), None)

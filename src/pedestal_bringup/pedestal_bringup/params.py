@@ -1,7 +1,7 @@
 """Parameters of the recorder node."""
 import dataclasses
 
-from pedestal_common.parameters import ParameterError, Parameters, parameter, text
+from pedestal_common.parameters import ParameterError, Parameters, flag, parameter, text
 
 
 @dataclasses.dataclass(frozen=True)
@@ -12,6 +12,8 @@ class RecorderParameters(Parameters):
     scenario: str = text('', 'name of the scenario of the run')
     beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', "half-power beamwidth, for the report's scale")
     seed: int = parameter(1, 0, 2**31 - 1, '', 'seed of the run')
+    receiver_rate: bool = flag(False, 'tracking_receiver/angle_rate is there')
+    receiver_range: bool = flag(False, 'tracking_receiver/range is there')
     scenario_yaml: str = text('', 'the scenario of the run as a ROS 2 parameter file')
     parameters_yaml: str = text('', 'every parameter of every node of the run as YAML, {node: {name: value}}')
 

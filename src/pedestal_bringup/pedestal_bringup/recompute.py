@@ -271,7 +271,7 @@ def outputs_of(unit, fed, said):
     for name in unit.SAID.names:
         if name in unit.WORDS:
             found[name] = _announced(fed.stamps, said[name], unit.WORDS[name])
-        else:
+        elif name in unit.messages:
             place = records.slot(said, name)
             sent = place.stamp != NEVER
             found[name] = comparison.Output(place.stamp[sent], place.numbers[sent])

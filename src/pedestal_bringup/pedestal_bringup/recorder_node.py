@@ -35,8 +35,8 @@ class RecorderNode(Shell):
         nodes = self.graph.members
         if self.graph.lockstep and not nodes:
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
-        beams = self.graph.beams
-        recorded = topics.read_by('recorder', nodes, beams) if nodes else list(self.topics.values())
+        beams, flags = self.graph.beams, [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
+        recorded = topics.read_by('recorder', nodes, flags, beams) if nodes else list(self.topics.values())
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),

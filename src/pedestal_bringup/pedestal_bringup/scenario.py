@@ -17,6 +17,7 @@ from adu_drive.params import AduNodeParameters, BeamParameters
 from pedestal_bringup.params import RecorderParameters
 from pedestal_common import parameters, topics
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
+from tracking_receiver_sim import smoothing
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 
@@ -94,6 +95,10 @@ KNOWN = (
     ('ins', 'latency', 'acu', 'attitude_latency'),
 )
 """(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
+
+
+MEASURED = (('receiver.rate.measured', 'receiver_rate'), ('receiver.ranging.measured', 'receiver_range'))
+"""(parameter of the receiver, what its readers are told): whether one of its topics is there at all."""
 
 
 class ScenarioError(ValueError):
@@ -301,21 +306,39 @@ def _spread(name, sections, header, seed):
     for node in ('acu', 'tracking_receiver'):
         tell(node, 'period', sections['adu'].get(
             'period', parameters.defaults(kind('adu', header.beam).parameters)['period']))
+    for key, told in MEASURED:
+        measured = sections['tracking_receiver'].get(key, False)
+        for node in ('acu', 'recorder'):
+            if measured or told in sections[node]:
+                tell(node, told, measured)
     for owner, key, node, told in KNOWN:
         if key in sections[owner]:
             sections[node].setdefault(told, sections[owner][key])
+    if header.beam:
+        sections['tracking_receiver'].setdefault('receiver.beam', 'held')
+        sections['acu'].setdefault('tracker.receiver.age', _error_age(sections['tracking_receiver']))
+
+
+def _error_age(values):
+    """How long [s] before its stamp an error of a beam that stands belongs: the mean delay of the receiver's samples."""
+    tracking = parameters.build(parameters_of('tracking_receiver'), values)
+    r = tracking.receiver
+    return smoothing.delay(r.smoothing, r.samples_per_step, r.smoothing_samples) * tracking.period / r.samples_per_step
 
 
 def _spread_to_beam(node, sections, header, seed):
     """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
     values, beam = sections[node], topics.beam_of(node)
-    if topics.plain(node) == 'tracking_receiver' and (seed is not None or 'seed' not in values):
+    receiver = f'{beam}/tracking_receiver'
+    if node == receiver and (seed is not None or 'seed' not in values):
         spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
         values['seed'] = int(spread.generate_state(1)[0] >> 1)
     for owner, key, other, told in KNOWN:
         own = sections.get(f'{beam}/{owner}', {})
         if topics.plain(node) == other and key in own:
             values.setdefault(told, own[key])
+    if node != receiver and any(key.startswith('receiver.s') for key in sections[receiver]):
+        values.setdefault('tracker.receiver.age', _error_age(_whole(sections, receiver)))
 
 
 def _checked(name, section, parameters_type, values):

@@ -24,6 +24,7 @@ Odometry = _TYPES['nav_msgs/msg/Odometry']
 Point = _TYPES['geometry_msgs/msg/Point']
 Pose = _TYPES['geometry_msgs/msg/Pose']
 PoseWithCovariance = _TYPES['geometry_msgs/msg/PoseWithCovariance']
+Range = _TYPES['sensor_msgs/msg/Range']
 Quaternion = _TYPES['geometry_msgs/msg/Quaternion']
 String = _TYPES['std_msgs/msg/String']
 Time = _TYPES['builtin_interfaces/msg/Time']
@@ -33,6 +34,11 @@ Vector3 = _TYPES['geometry_msgs/msg/Vector3']
 Vector3Stamped = _TYPES['geometry_msgs/msg/Vector3Stamped']
 
 AXES = ('azimuth', 'elevation')
+MODELS = ('cv', 'ca', 'singer', 'current_statistical')
+"""Motion models of the ACU's filters, in the order of their probabilities."""
+FILTER = tuple(f'{axis}_{name}' for axis in AXES for name in (
+    'innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation', *MODELS))
+"""Names of the numbers on acu/filter."""
 MOTORS = ('azimuth_motor_1', 'azimuth_motor_2', 'elevation_motor_1', 'elevation_motor_2')
 
 
@@ -70,6 +76,12 @@ def joint_state(names, frame_id='base_link') -> JointState:
                       effort=np.zeros(n))
 
 
+def named_numbers(names, frame_id='') -> JointState:
+    """A JointState as a vector of named numbers, all in `position`."""
+    return JointState(header=header(frame_id), name=list(names), position=np.zeros(len(names)), velocity=np.zeros(0),
+                      effort=np.zeros(0))
+
+
 def trajectory_point() -> JointTrajectoryPoint:
     size = len(AXES)
     return JointTrajectoryPoint(positions=np.zeros(size), velocities=np.zeros(size), accelerations=np.zeros(size),
@@ -82,6 +94,16 @@ def joint_trajectory(frame_id, points) -> JointTrajectory:
 
 def vector3(x=0.0, y=0.0, z=0.0) -> Vector3:
     return Vector3(x=x, y=y, z=z)
+
+
+def vector3_stamped(frame_id) -> Vector3Stamped:
+    return Vector3Stamped(header=header(frame_id), vector=vector3())
+
+
+def range_message(frame_id, field_of_view) -> Range:
+    """A Range of radio, which the type has no code for (its 0 is the other one that is no light); any distance."""
+    return Range(header=header(frame_id), radiation_type=0, field_of_view=field_of_view, min_range=0.0,
+                 max_range=float('inf'), range=0.0, variance=0.0)
 
 
 def odometry(frame_id, child_frame_id) -> Odometry:

@@ -39,15 +39,18 @@ _KINDS = {
     'JointTrajectory': (_type(('position', 2), ('velocity', 2), ('acceleration', 2)),
                         tuple(f'{name}.{field}' for field in ('position', 'velocity', 'acceleration')
                               for name in messages.AXES)),
+    'Range': (_type(('range', 1), ('variance', 1)), ('range', 'variance')),
     'Vector3Stamped': (_type(('vector', 3)), ('x', 'y', 'z')),
     'Odometry': _spatial(('position', 3), ('orientation', 4), ('twist_linear', 3), ('twist_angular', 3)),
     'Imu': _spatial(('orientation', 4), ('angular_velocity', 3), ('linear_acceleration', 3)),
 }
-_MOTORS = _joints(messages.MOTORS)
+_NAMED = {'adu/motor_states': _joints(messages.MOTORS),
+          'acu/filter': (_type(('position', len(messages.FILTER))),
+                         tuple(f'{name}.position' for name in messages.FILTER))}
 
 
 def _kind(topic):
-    return _MOTORS if topic == 'adu/motor_states' else _KINDS[topics.BY_NAME[topic].type.rpartition('/')[2]]
+    return _NAMED[topic] if topic in _NAMED else _KINDS[topics.BY_NAME[topic].type.rpartition('/')[2]]
 
 
 def of(*names, more=()) -> np.dtype:
@@ -112,6 +115,10 @@ def _vector_numbers(message):
     return v.x, v.y, v.z
 
 
+def _range_numbers(message):
+    return message.range, message.variance
+
+
 def _odometry_numbers(message):
     pose, twist = message.pose.pose, message.twist.twist
     p, q, v, w = pose.position, pose.orientation, twist.linear, twist.angular
@@ -147,6 +154,10 @@ def _put_vector(message, numbers):
     v.x, v.y, v.z = numbers.tolist()
 
 
+def _put_range(message, numbers):
+    message.range, message.variance = numbers.tolist()
+
+
 def _put_odometry(message, numbers):
     pose, twist = message.pose.pose, message.twist.twist
     p, q, v, w = pose.position, pose.orientation, twist.linear, twist.angular
@@ -159,7 +170,8 @@ def _put_imu(message, numbers):
 
 
 _TAKE = {messages.JointState: _joint_numbers, messages.JointTrajectory: _point_numbers,
-         messages.Vector3Stamped: _vector_numbers,
+         messages.Vector3Stamped: _vector_numbers, messages.Range: _range_numbers,
          messages.Odometry: _odometry_numbers, messages.Imu: _imu_numbers}
 _PUT = {messages.JointState: _put_joints, messages.JointTrajectory: _put_trajectory,
-        messages.Vector3Stamped: _put_vector, messages.Odometry: _put_odometry, messages.Imu: _put_imu}
+        messages.Vector3Stamped: _put_vector, messages.Range: _put_range, messages.Odometry: _put_odometry,
+        messages.Imu: _put_imu}

@@ -1,5 +1,8 @@
 """The graph as one table: every topic with its type, writer, readers, QoS and rate. No ROS here.
 
+A topic with a flag is in a graph only where something measures it; the parameter of that name tells its readers (the
+ACU, the recorder) that it is there.
+
 Qos
     step    one message per drive step: reliable, keep all (nothing may be lost)
     state   latched: reliable, transient local, depth 1
@@ -26,6 +29,7 @@ class Topic(typing.NamedTuple):
     qos: str
     rate: str
     doc: str
+    flag: str = ''
 
 
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
@@ -58,6 +62,11 @@ TOPICS = (
           'attitude deck -> earth and deck rate [rad/s] as the INS knows them'),
     Topic('tracking_receiver/angle_error', 'geometry_msgs/msg/Vector3Stamped', ('tracking_receiver',), ('acu',),
           'step', 'step', 'x cross-elevation error [rad], y elevation error [rad], z C/N0 [dB-Hz]; x, y NaN unlocked'),
+    Topic('tracking_receiver/angle_rate', 'geometry_msgs/msg/Vector3Stamped', ('tracking_receiver',), ('acu',),
+          'step', 'step', 'x cross-elevation, y elevation error rate [rad/s], NaN unlocked; z their 1-sigma',
+          'receiver_rate'),
+    Topic('tracking_receiver/range', 'sensor_msgs/msg/Range', ('tracking_receiver',), ('acu',), 'step', 'step',
+          'range of the target [m], NaN unlocked, and its variance [m2]', 'receiver_range'),
     Topic('target/truth', 'nav_msgs/msg/Odometry', ('tracking_receiver',), (), 'step', 'step',
           'target position [m] and velocity [m/s] in the ENU frame of the station'),
     Topic('acu/rate_command', 'sensor_msgs/msg/JointState', ('acu',), ('adu',), 'step', 'step',
@@ -66,6 +75,8 @@ TOPICS = (
           'target azimuth, elevation as filtered (earth angles): angle [rad], rate, acceleration; NaN without one'),
     Topic('acu/reference', 'trajectory_msgs/msg/JointTrajectory', ('acu',), (), 'step', 'step',
           'what the position loop follows, deck angles: angle [rad], rate, acceleration'),
+    Topic('acu/filter', 'sensor_msgs/msg/JointState', ('acu',), (), 'step', 'step',
+          'named numbers, all in `position`: innovations, NIS, 1-sigmas, probabilities of the models; NaN: none'),
     Topic('acu/mode', 'std_msgs/msg/String', ('acu',), (), 'state', 'change',
           'standby, stow, preset, program or autotrack'),
     Topic('acu/program_track', 'trajectory_msgs/msg/JointTrajectory', ('operator',), ('acu',), 'state', 'once',
@@ -75,6 +86,7 @@ TOPICS = (
 )
 
 BY_NAME = {topic.name: topic for topic in TOPICS}
+FLAGS = tuple(topic.flag for topic in TOPICS if topic.flag)
 
 
 def beam_of(name):
@@ -122,10 +134,12 @@ def graph(beams=0):
     return found
 
 
-def read_by(node, nodes, beams=0):
-    """The topics `node` reads for which a graph of these nodes has a writer; the recorder reads every one."""
+def read_by(node, nodes, flags=(), beams=0):
+    """The topics `node` reads for which a graph of these nodes has a writer; the recorder reads every one. flags: those
+    of FLAGS that are set."""
     return [topic for topic in graph(beams).values()
-            if (node in topic.readers or node == 'recorder') and any(w in nodes for w in topic.writers)]
+            if (node in topic.readers or node == 'recorder') and any(w in nodes for w in topic.writers)
+            and (not topic.flag or topic.flag in flags)]
 
 
 def readers(topic, nodes):

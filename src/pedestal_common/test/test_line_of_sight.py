@@ -78,3 +78,31 @@ def test_quaternion_is_fixed_axis_roll_pitch_yaw():
     angles = RNG.uniform(-1.0, 1.0, 3)
     ours = Rotation.from_quat(los.quaternion(*angles))
     assert ours.as_matrix() == pytest.approx(Rotation.from_euler('xyz', angles).as_matrix())
+
+
+def beam_at(t):
+    """Beam angles and the rates they change at."""
+    return (0.4 + 0.3 * t, 0.7 - 0.2 * t), (0.3, -0.2)
+
+
+def target_at(t):
+    """A vector of changing length and its rate."""
+    return (np.array([3.0, -1.2, 2.6]) + t * np.array([0.5, 0.8, -0.3]) + t * t * np.array([0.1, -0.2, 0.05]),
+            np.array([0.5, 0.8, -0.3]) + 2.0 * t * np.array([0.1, -0.2, 0.05]))
+
+
+@pytest.mark.parametrize('t', [0.0, -1.3, 2.5])
+def test_offset_rates_against_the_difference_of_offsets(t):
+    h = 1e-5
+    before, after = (np.array(los.offsets(*beam_at(t + d)[0], *target_at(t + d)[0])) for d in (-h, h))
+    rates = los.offset_rates(*beam_at(t)[0], *beam_at(t)[1], *target_at(t)[0], *target_at(t)[1])
+    assert rates == pytest.approx((after - before) / (2.0 * h), abs=1e-9)
+
+
+@pytest.mark.parametrize('offset', [(0.0, 0.0), (1e-9, -2e-9), (1e-4, 2e-4), (0.009, 0.001), (0.3, 0.2), (-1.0, 0.5)])
+def test_displaced_motion_inverts_offset_rates(offset):
+    (azimuth, elevation), rates = beam_at(0.0)
+    seen = los.displaced_motion(azimuth, elevation, *rates, *offset, 0.02, -0.03)
+    assert seen[:3] == pytest.approx(los.direction(*los.displaced(azimuth, elevation, *offset)), abs=1e-15)
+    assert np.dot(seen[:3], seen[3:]) == pytest.approx(0.0, abs=1e-15)
+    assert los.offset_rates(azimuth, elevation, *rates, *seen) == pytest.approx((0.02, -0.03), abs=1e-12)

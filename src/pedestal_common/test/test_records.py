@@ -5,16 +5,17 @@ import pytest
 
 from pedestal_common import messages, records
 
-TOPICS = ('joint_states', 'adu/motor_states', 'acu/estimate', 'tracking_receiver/angle_error', 'ship/truth',
-          'ship/imu/data')
+TOPICS = ('joint_states', 'adu/motor_states', 'acu/estimate', 'acu/filter', 'tracking_receiver/angle_error',
+          'tracking_receiver/range', 'ship/truth', 'ship/imu/data')
 
 
 def made(topic):
     return {'joint_states': lambda: messages.joint_state(messages.AXES),
             'adu/motor_states': lambda: messages.joint_state(messages.MOTORS),
             'acu/estimate': lambda: messages.joint_trajectory('earth', [messages.trajectory_point()]),
-            'tracking_receiver/angle_error': lambda: messages.Vector3Stamped(header=messages.header('beam'),
-                                                                             vector=messages.vector3()),
+            'acu/filter': lambda: messages.named_numbers(messages.FILTER),
+            'tracking_receiver/angle_error': lambda: messages.vector3_stamped('beam'),
+            'tracking_receiver/range': lambda: messages.range_message('beam', 0.0175),
             'ship/truth': lambda: messages.odometry('earth', 'base_link'),
             'ship/imu/data': lambda: messages.imu('base_link')}[topic]()
 
@@ -26,7 +27,7 @@ def test_what_is_put_into_a_message_has_the_names_of_a_bags_columns(topic):
     record = np.zeros(1, records.of('clock', topic))
     place = records.only(record, topic)
     place.stamp[0] = 3_000_000_007
-    place.numbers[:] = np.random.default_rng(1).normal(size=len(records.columns(topic)))
+    place.numbers[:] = np.random.default_rng(1).normal(size=len(records.columns(topic))).astype(np.float32)
     message = made(topic)
     records.put(message, place)
     table = columns.table([messages.serialize(message)], message.__msgtype__, np.zeros(1))
@@ -34,7 +35,8 @@ def test_what_is_put_into_a_message_has_the_names_of_a_bags_columns(topic):
     assert [table[name][0] for name in records.columns(topic)] == place.numbers.tolist()
 
 
-@pytest.mark.parametrize('topic', ['joint_states', 'tracking_receiver/angle_error', 'ship/truth', 'ship/imu/data'])
+@pytest.mark.parametrize('topic', ['joint_states', 'tracking_receiver/angle_error', 'tracking_receiver/range',
+                                   'ship/truth', 'ship/imu/data'])
 def test_what_was_put_is_taken(topic):
     record = np.zeros(2, records.of(topic))
     first, second = records.only(record[:1], topic), records.only(record[1:], topic)

@@ -15,6 +15,7 @@ BEAMWIDTH = 0.0175
 FIXED = {'target.kind': 'step', 'target.angle.azimuth': 0.3, 'target.angle.elevation': 0.6,
          'target.angle.start': 1e6, 'receiver.range_exponent': 0.0}
 QUIET = FIXED | {'receiver.cn0_dbhz': 110.0}
+MEASURED = {'receiver.rate.measured': True, 'receiver.ranging.measured': True}
 
 
 class Bench:
@@ -186,8 +187,8 @@ def test_lock_has_two_levels_and_two_times():
 def test_latency_is_exact(latency):
     rng = np.random.default_rng(6)
     stamps = np.cumsum(rng.integers(1, 9_000_000, 400))
-    prompt = Bench(FIXED).run(stamps=stamps, rng=np.random.default_rng(7))
-    late = Bench(FIXED | {'receiver.latency': latency}).run(stamps=stamps, rng=np.random.default_rng(7))
+    prompt = Bench(FIXED | MEASURED).run(stamps=stamps, rng=np.random.default_rng(7))
+    late = Bench(FIXED | MEASURED | {'receiver.latency': latency}).run(stamps=stamps, rng=np.random.default_rng(7))
     assert np.array_equal(prompt['stamp_ns'], stamps) and np.all(prompt['due'] == 1)
     given = -1
     for k, now in enumerate(stamps):
@@ -197,7 +198,7 @@ def test_latency_is_exact(latency):
         if newest > given:
             given = newest
             assert late['stamp_ns'][k] == stamps[newest]
-            for name in ('cross_elevation', 'elevation', 'cn0_dbhz', 'locked'):
+            for name in ('cross_elevation', 'elevation', 'cn0_dbhz', 'locked', 'rate', 'range'):
                 assert np.array_equal(late[name][k], prompt[name][newest], equal_nan=True)
         else:
             assert math.isnan(late['elevation'][k])
@@ -223,6 +224,58 @@ def test_smoothing_step_response():
                                'target.angle.elevation_amplitude': 1e-4})
     out = bench.run(1100)[1000:]
     assert out['elevation'] == pytest.approx(1e-4 * (1.0 - (1.0 - 1.0 / 20.0)**np.arange(1, 101)), abs=2e-8)
+
+
+def test_moving_average_step_response():
+    """A ramp of n samples, where the recursion is a low-pass; n - 1 over 2 of delay."""
+    bench = smoothing_bench(**{'receiver.smoothing': 'moving_average', 'target.angle.start': 1.0,
+                               'target.angle.azimuth_amplitude': 0.0, 'target.angle.elevation_amplitude': 1e-4})
+    out = bench.run(1100)[1000:]
+    assert out['elevation'] == pytest.approx(1e-4 * np.minimum(np.arange(1, 101) / 20.0, 1.0), abs=2e-8)
+
+
+def test_moving_average_over_several_steps_is_the_mean_of_their_samples():
+    """Also while it is not yet full, and once its ring has gone round."""
+    values = FIXED | {'receiver.cn0_dbhz': 60.0, 'receiver.samples_per_step': 4, 'receiver.acquire_time': 0.0}
+    steps = Bench(values).run(400, np.random.default_rng(4))
+    bench = Bench(values | {'receiver.smoothing': 'moving_average', 'receiver.smoothing_samples': 40})
+    out = bench.run(400, np.random.default_rng(4))
+    kept = out['locked'] == 1
+    expected = [errors(steps)[max(k - 9, 0):k + 1].mean(axis=0) for k in range(400)]
+    first = np.flatnonzero(kept)[0]
+    assert np.all(kept[first:]) and first < 50
+    assert errors(out)[first + 10:] == pytest.approx(np.array(expected)[first + 10:], abs=1e-15)
+    noise = Bench(values | {'receiver.smoothing': 'moving_average', 'receiver.cn0_dbhz': 55.0})
+    out = noise.run(12000, np.random.default_rng(5))[200:]
+    predicted = receiver.angle_noise(noise.params, 55.0, PERIOD)
+    assert errors(out).std(axis=0) == pytest.approx([predicted, predicted], rel=0.05)
+
+
+@pytest.mark.parametrize('samples', [1, 4])
+def test_a_held_beam_jumps_at_the_step_and_only_the_target_moves(samples):
+    """The mean of a step is the error of the target in the middle of its samples off the beam that stood."""
+    bench = Bench(QUIET | {'target.kind': 'ramp', 'target.angle.start': 1.0, 'target.angle.azimuth_rate': 0.0,
+                           'target.angle.elevation_rate': 0.02, 'receiver.beam': 'held',
+                           'receiver.samples_per_step': samples})
+    bench.run(201)
+    age = receiver.age(bench.params, PERIOD)
+    assert age == pytest.approx((samples - 1) / (2 * samples) * PERIOD)
+    for k in range(201, 207):
+        there = 0.6 + 0.02 * (k * PERIOD - 1.0)
+        beam = there + (5e-5 if k % 2 else -5e-5)
+        bench.point(0.3, beam)
+        out = bench.run(1)[0]
+        assert out['elevation'] == pytest.approx(there - 0.02 * age - beam, abs=1e-8)
+        assert out['true_elevation'] == pytest.approx(there - beam, abs=1e-9)
+
+
+@pytest.mark.parametrize('values, age', [
+    ({}, 0.0), ({'receiver.smoothing': 'recursion'}, 0.0),
+    ({'receiver.beam': 'held', 'receiver.smoothing': 'recursion'}, 0.019),
+    ({'receiver.beam': 'held', 'receiver.smoothing': 'moving_average'}, 0.0095)])
+def test_age_of_an_error(values, age):
+    params = build(TrackingReceiverParameters, {**values, 'receiver.samples_per_step': 5})
+    assert receiver.age(params, PERIOD) == pytest.approx(age)
 
 
 def test_samples_follow_the_error_between_steps():
@@ -305,6 +358,51 @@ def test_same_normals_give_the_same_bits():
     assert runs[0] != Bench(values, duration=60.0).run(500, np.random.default_rng(10)).tobytes()
 
 
+def test_rate_on_a_moving_deck_is_how_fast_the_error_changes():
+    """Against the difference of the true errors two steps apart; a flyby seen from a turning, sailing deck."""
+    bench = Bench(MEASURED | {'target.kind': 'flyby', 'receiver.range_exponent': 0.0, 'receiver.cn0_dbhz': 60.0},
+                  period=1e-3)
+    out, beam = [], (0.8, 0.1)
+    for k in range(400):
+        t = 1e-3 * k
+        attitude = Rotation.from_euler('ZYX', [0.1 * t + 1.8, 0.2 * math.sin(t), 0.3 * math.sin(2.0 * t)])
+        h = 1e-5
+        ahead, behind = (Rotation.from_euler('ZYX', [0.1 * s + 1.8, 0.2 * math.sin(s), 0.3 * math.sin(2.0 * s)])
+                         for s in (t + h, t - h))
+        velocity = np.array([6.0, 2.0, 0.5])
+        bench.inputs['mat_ed'], bench.inputs['position'] = attitude.as_matrix(), velocity * t
+        bench.inputs['twist_linear'] = attitude.inv().apply(velocity)
+        bench.inputs['twist_angular'] = (behind.inv() * ahead).as_rotvec() / (2.0 * h)
+        if k == 0:
+            x, y, z = attitude.inv().apply(bench.run(1)[0]['target_position'])
+            beam = math.atan2(-y, x), math.atan2(z, math.hypot(x, y))
+        bench.point(beam[0] + 0.02 * t, beam[1] - 0.01 * t)
+        bench.inputs['azimuth_rate'], bench.inputs['elevation_rate'] = 0.02, -0.01
+        out.append(bench.run(1)[0])
+    out = np.array(out)
+    true = np.stack([out['true_cross_elevation'], out['true_elevation']], axis=1)
+    locked = np.flatnonzero(out['locked'][1:-1]) + 1
+    assert len(locked) > 200
+    assert np.ptp(true[locked], axis=0).max() > 0.005
+    assert out['rate'][locked] == pytest.approx((true[locked + 1] - true[locked - 1]) / 2e-3, abs=1e-5)
+    assert np.isnan(out['rate'][out['locked'] == 0]).all() and np.isnan(out['range'][out['locked'] == 0]).all()
+
+
+def test_rate_and_range_have_the_noise_they_say_and_leave_the_errors_alone():
+    plain = Bench(FIXED | {'receiver.cn0_dbhz': 60.0}).run(100, np.random.default_rng(5))
+    assert np.isnan(plain['rate']).all() and np.isnan(plain['range']).all()
+    bench = Bench(FIXED | MEASURED | {'receiver.cn0_dbhz': 60.0, 'receiver.rate.sigma': 0.002,
+                                      'receiver.ranging.sigma': 3.0})
+    assert receiver.normals_per_step(bench.params) == 6 * 5 + 3
+    out = bench.run(4000, np.random.default_rng(5))[100:]
+    assert out['rate'].std(axis=0) == pytest.approx([0.002, 0.002], rel=0.05)
+    assert out['range'].std() == pytest.approx(3.0, rel=0.05)
+    assert out['range'].mean() == pytest.approx(10e3, abs=0.3)
+    assert np.array_equal(out['range'], out['range'].astype(np.float32))
+    every = np.column_stack([out['rate'], out['range'], errors(out)])
+    assert np.abs(np.corrcoef(every.T) - np.eye(5)).max() < 0.1
+
+
 def test_latency_that_does_not_fit_the_ring_is_refused():
     with pytest.raises(ParameterError, match='latency = 0.5 s: must be below 511 periods of 0.0005 s'):
         Bench(FIXED | {'receiver.latency': 0.5}, period=5e-4)
@@ -314,6 +412,7 @@ def test_latency_that_does_not_fit_the_ring_is_refused():
     ({'receiver.acquire_level_dbhz': 30.0}, 'lose_level_dbhz'),
     ({'target.leo_pass.culmination_low_deg': 80.0}, 'culmination_low_deg'),
     ({'antenna.beamwidth': math.nan}, 'beamwidth'),
+    ({'receiver.smoothing': 'moving_average', 'receiver.smoothing_samples': 257}, 'smoothing_samples = 257: .* 256'),
     ({'target.kind': 'rocket'}, 'kind')])
 def test_bad_parameters_are_refused(values, message):
     with pytest.raises(ParameterError, match=message):

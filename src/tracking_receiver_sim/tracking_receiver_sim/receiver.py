@@ -1,9 +1,12 @@
 """The monopulse tracking receiver: where the target is, what the channels see of it, what is published.
 
-One `step` per drive step. Between the previous step and this one the true error runs in a straight line;
-along it `samples_per_step` samples of sum and difference voltages are taken, the last one at the stamp. Each
-is turned into an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the detector's
-full scale, then smoothed: none is the mean of the step's samples, recursion is paper 002's eq. (1) over the samples.
+One `step` per drive step. Between the previous step and this one the true error runs in a straight line, along which
+`samples_per_step` samples of sum and difference voltages are taken, the last one at the stamp. Where the beam is held
+(an electronic beam jumps at the steps) the line begins at what the target of then would be off the beam of now. Each
+sample is turned into an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the detector's full
+scale, then smoothed.
+
+Where they are measured, the rate of the error at the stamp and the range come with each result, with white noise.
 
 Voltages are scaled so that one channel's noise has unit power in one sample: the carrier power on axis is
 C/N0 tau, and the receiver, which knows its own noise floor, takes 1 off the sum power it measures.
@@ -15,9 +18,11 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import earth_angles, offsets, to_deck
 from pedestal_common.parameters import ParameterError
-from tracking_receiver_sim import target
+from tracking_receiver_sim import smoothing, target
+from tracking_receiver_sim.error_rate import error_rate
 from tracking_receiver_sim.monopulse import channels, detect, thermal_noise
-from tracking_receiver_sim.params import RECURSION, SMOOTHINGS
+from tracking_receiver_sim.params import BEAMS, HELD
+from tracking_receiver_sim.smoothing import SMOOTHINGS
 
 STATUSES = ('locked', 'no lock', 'target below the horizon', 'target outside its track', 'joint states not valid',
             'stamp not after the one before')
@@ -31,40 +36,47 @@ POWER_FLOOR = 0.01
 """Least carrier power over noise power in one sample that the C/N0 estimate reports (-20 dB)."""
 
 STATE = np.dtype([
-    ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'),
-    ('agc_power', 'f8'), ('level_power', 'f8'), ('smooth_cross_elevation', 'f8'), ('smooth_elevation', 'f8'),
+    ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),
+    ('agc_power', 'f8'), ('level_power', 'f8'),
+    ('smooth_cross_elevation', smoothing.SMOOTHER), ('smooth_elevation', smoothing.SMOOTHER),
     ('locked', 'i8'), ('timer_ns', 'i8'),
     ('written', 'i8'), ('released', 'i8'),
     ('ring_stamp_ns', 'i8', RING), ('ring_locked', 'i8', RING),
-    ('ring_cross_elevation', 'f8', RING), ('ring_elevation', 'f8', RING), ('ring_cn0_dbhz', 'f8', RING)], align=True)
-"""error_known: cross_elevation, elevation hold the true error at stamp_ns; timer_ns: time past a lock level;
-written, released: results put into the ring and taken from it since the start."""
+    ('ring_cross_elevation', 'f8', RING), ('ring_elevation', 'f8', RING), ('ring_cn0_dbhz', 'f8', RING),
+    ('ring_rate', 'f8', (RING, 2)), ('ring_range', 'f8', RING)], align=True)
+"""error_known: cross_elevation, elevation hold the true error at stamp_ns, direction the target in FLU [m];
+timer_ns: time past a lock level; written, released: results put into the ring and taken from it since the start."""
 
 CONSTANTS = np.dtype([
     ('target', target.TARGET),
     ('beamwidth', 'f8'), ('slope', 'f8'), ('angle_scale', 'f8'), ('full_scale', 'f8'),
     ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'),
     ('samples', 'i8'), ('tau', 'f8'), ('period_ns', 'i8'), ('agc_gain', 'f8'), ('level_gain', 'f8'),
-    ('smoothing', 'i8'), ('smoothing_gain', 'f8'),
+    ('smoothing', 'i8'), ('smoothing_gain', 'f8'), ('smoothing_samples', 'i8'), ('held', 'i8'),
     ('power', 'f8'), ('reference_range', 'f8'), ('half_exponent', 'f8'), ('horizon_mask', 'f8'),
     ('acquire_power', 'f8'), ('lose_power', 'f8'), ('acquire_ns', 'i8'), ('lose_ns', 'i8'),
-    ('latency_ns', 'i8')], align=True)
+    ('latency_ns', 'i8'),
+    ('rate_measured', 'i8'), ('rate_sigma', 'f8'), ('range_measured', 'i8'), ('range_sigma', 'f8'),
+    ('range_variance', 'f8')], align=True)
 """slope: true k_m; angle_scale: theta3 over the k_m the receiver assumes;
-powers: carrier power in one sample over noise power in one sample."""
+powers: carrier power in one sample over noise power in one sample; range_variance: in single precision."""
 
 INPUTS = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
-                   ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3)], align=True)
+                   ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3), ('azimuth_rate', 'f8'), ('elevation_rate', 'f8'),
+                   ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
 """Step's stamp [ns]; joint states there and fresh (0 or 1); beam on the deck [rad]; true attitude deck -> earth;
-ENU position of the antenna against the station [m]."""
+ENU position of the antenna against the station [m]; rates of the beam on the deck [rad/s]; velocity [m/s] and rate
+[rad/s] of the deck, FLU."""
 
 OUTPUTS = np.dtype([
     ('due', 'i8'), ('stamp_ns', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
-    ('locked', 'i8'), ('status', 'i8'),
+    ('locked', 'i8'), ('status', 'i8'), ('rate', 'f8', 2), ('range', 'f8'),
     ('true_cross_elevation', 'f8'), ('true_elevation', 'f8'),
     ('target_valid', 'i8'), ('target_position', 'f8', 3), ('target_velocity', 'f8', 3)], align=True)
 """due: 1 when a result comes out in this step; then stamp_ns (of its measurement), errors [rad] (NaN while not
-locked), C/N0 and locked belong to it. The rest belongs to this step: status (index into STATUSES), true error
-[rad], target ENU [m, m/s]; NaN where not known."""
+locked), C/N0, locked, rate of the errors [rad/s] and range [m] belong to it (NaN while not locked or not measured; the
+range is rounded to the single precision of its topic). The rest belongs to this step: status (index into STATUSES),
+true error [rad], target ENU [m, m/s]; NaN where not known."""
 
 
 def constants(params, period, built) -> np.ndarray:
@@ -85,7 +97,8 @@ def constants(params, period, built) -> np.ndarray:
     c['agc_gain'] = -math.expm1(-tau / receiver.agc_time_constant)
     c['level_gain'] = -math.expm1(-tau / receiver.cn0_time_constant)
     c['smoothing'] = SMOOTHINGS.index(receiver.smoothing)
-    c['smoothing_gain'] = 1.0 / receiver.smoothing_samples
+    c['smoothing_gain'], c['smoothing_samples'] = 1.0 / receiver.smoothing_samples, receiver.smoothing_samples
+    c['held'] = BEAMS.index(receiver.beam) == HELD
     c['power'] = _hertz(receiver.cn0_dbhz) * tau
     c['reference_range'], c['half_exponent'] = receiver.reference_range, 0.5 * receiver.range_exponent
     c['horizon_mask'] = receiver.horizon_mask
@@ -93,6 +106,9 @@ def constants(params, period, built) -> np.ndarray:
     c['lose_power'] = _hertz(receiver.lose_level_dbhz) * tau
     c['acquire_ns'], c['lose_ns'] = round(receiver.acquire_time * 1e9), round(receiver.lose_time * 1e9)
     c['latency_ns'] = round(receiver.latency * 1e9)
+    c['rate_measured'], c['rate_sigma'] = receiver.rate.measured, receiver.rate.sigma
+    c['range_measured'], c['range_sigma'] = receiver.ranging.measured, receiver.ranging.sigma
+    c['range_variance'] = np.float32(receiver.ranging.sigma**2)
     return c
 
 
@@ -105,7 +121,8 @@ def initial_state() -> np.ndarray:
 
 def normals_per_step(params) -> int:
     """How many standard normals `step` takes of TrackingReceiverParameters' receiver."""
-    return NORMALS_PER_SAMPLE * params.receiver.samples_per_step
+    receiver = params.receiver
+    return NORMALS_PER_SAMPLE * receiver.samples_per_step + 2 * receiver.rate.measured + receiver.ranging.measured
 
 
 def angle_noise(params, cn0_dbhz, period):
@@ -113,9 +130,19 @@ def angle_noise(params, cn0_dbhz, period):
     antenna, receiver = params.antenna, params.receiver
     tau = period / receiver.samples_per_step
     one_sample = thermal_noise(antenna.beamwidth, antenna.slope, _hertz(cn0_dbhz), tau)
-    if receiver.smoothing == 'recursion':
-        return one_sample / math.sqrt(2.0 * receiver.smoothing_samples - 1.0)
-    return one_sample / math.sqrt(receiver.samples_per_step)
+    independent = {'none': receiver.samples_per_step, 'recursion': 2.0 * receiver.smoothing_samples - 1.0,
+                   'moving_average': receiver.smoothing_samples}
+    return one_sample / math.sqrt(independent[receiver.smoothing])
+
+
+def age(params, period):
+    """How long before its stamp [s] an error was measured in the mean, off a beam that stands; 0 off one that moves,
+    where the error of the stamp and the mean of a step differ as little as the error itself does within it."""
+    receiver = params.receiver
+    if BEAMS.index(receiver.beam) != HELD:
+        return 0.0
+    return (smoothing.delay(receiver.smoothing, receiver.samples_per_step, receiver.smoothing_samples)
+            * period / receiver.samples_per_step)
 
 
 def _hertz(cn0_dbhz):
@@ -163,18 +190,17 @@ def sample(s, c, amplitude, v_x, v_e, normals, first):
 def measure(s, c, amplitude, dX, dE, normals):
     """(cross-elevation, elevation) [rad] of one step, true error running from the state's to (dX, dE)."""
     from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (dX, dE)
-    sum_x, sum_e = 0.0, 0.0
+    smooth_x, smooth_e = s.smooth_cross_elevation, s.smooth_elevation
+    smoothing.begin(smooth_x)
+    smoothing.begin(smooth_e)
     for k in range(c.samples):
         part = (k + 1.0) / c.samples
         x, e = sample(s, c, amplitude, (from_X + part * (dX - from_X)) / c.beamwidth,
                       (from_E + part * (dE - from_E)) / c.beamwidth, normals, NORMALS_PER_SAMPLE * k)
-        sum_x += x
-        sum_e += e
-        s.smooth_cross_elevation += c.smoothing_gain * (x - s.smooth_cross_elevation)
-        s.smooth_elevation += c.smoothing_gain * (e - s.smooth_elevation)
-    if c.smoothing == RECURSION:
-        return s.smooth_cross_elevation, s.smooth_elevation
-    return sum_x / c.samples, sum_e / c.samples
+        smoothing.put(smooth_x, x, c.smoothing_gain)
+        smoothing.put(smooth_e, e, c.smoothing_gain)
+    return (smoothing.smoothed(smooth_x, c.smoothing, c.samples, c.smoothing_samples),
+            smoothing.smoothed(smooth_e, c.smoothing, c.samples, c.smoothing_samples))
 
 
 @compiled
@@ -191,12 +217,31 @@ def lock(s, c, elapsed_ns):
 
 
 @compiled
-def delay(s, c, o, stamp_ns, cross_elevation, elevation, cn0_dbhz):
+def rate_and_range(c, i, e, n, u, v_e, v_n, v_u, normals):
+    """(cross-elevation rate, elevation rate [rad/s], range [m]) of a target at ENU [m], moving with v [m/s], as
+    measured; NaN for what is not."""
+    rate_x, rate_e, distance = math.nan, math.nan, math.nan
+    first = NORMALS_PER_SAMPLE * c.samples
+    if c.rate_measured != 0:
+        rate_x, rate_e = error_rate(i.mat_ed, i.position, i.twist_linear, i.twist_angular, i.azimuth, i.elevation,
+                                    i.azimuth_rate, i.elevation_rate, e, n, u, v_e, v_n, v_u)
+        rate_x += c.rate_sigma * normals[first]
+        rate_e += c.rate_sigma * normals[first + 1]
+        first += 2
+    if c.range_measured != 0:
+        e, n, u = e - i.position[0], n - i.position[1], u - i.position[2]
+        distance = float(np.float32(math.sqrt(e * e + n * n + u * u) + c.range_sigma * normals[first]))
+    return rate_x, rate_e, distance
+
+
+@compiled
+def delay(s, c, o, stamp_ns, cross_elevation, elevation, cn0_dbhz, rate_x, rate_e, distance):
     """Put a result into the ring and release the newest measured at or before stamp_ns - latency."""
     slot = s.written % RING
     s.ring_stamp_ns[slot], s.ring_locked[slot] = stamp_ns, s.locked
     s.ring_cross_elevation[slot], s.ring_elevation[slot] = cross_elevation, elevation
     s.ring_cn0_dbhz[slot] = cn0_dbhz
+    s.ring_rate[slot, 0], s.ring_rate[slot, 1], s.ring_range[slot] = rate_x, rate_e, distance
     s.written += 1
     s.released = max(s.released, s.written - RING)
     while s.released < s.written and s.ring_stamp_ns[s.released % RING] <= stamp_ns - c.latency_ns:
@@ -205,6 +250,7 @@ def delay(s, c, o, stamp_ns, cross_elevation, elevation, cn0_dbhz):
         o.due, o.stamp_ns, o.locked = 1, s.ring_stamp_ns[slot], s.ring_locked[slot]
         o.cross_elevation, o.elevation = s.ring_cross_elevation[slot], s.ring_elevation[slot]
         o.cn0_dbhz = s.ring_cn0_dbhz[slot]
+        o.rate[0], o.rate[1], o.range = s.ring_rate[slot, 0], s.ring_rate[slot, 1], s.ring_range[slot]
 
 
 @compiled
@@ -212,6 +258,7 @@ def forget(o):
     """Outputs of a step that knows nothing yet."""
     o.due, o.stamp_ns, o.locked = 0, 0, 0
     o.cross_elevation, o.elevation, o.cn0_dbhz = math.nan, math.nan, math.nan
+    o.rate[0], o.rate[1], o.range = math.nan, math.nan, math.nan
     o.true_cross_elevation, o.true_elevation = math.nan, math.nan
     o.target_valid = 0
     for axis in range(3):
@@ -237,11 +284,17 @@ def step(state, constants, inputs, outputs, breaks, coefficients, normals):
 
     known = inputs_known(i)
     cross_elevation, elevation = math.nan, math.nan
+    rate_x, rate_e, distance = math.nan, math.nan, math.nan
     if known:
         dX, dE, amplitude = 0.0, 0.0, 0.0
         if valid:
+            rate_x, rate_e, distance = rate_and_range(c, i, e, n, u, v_e, v_n, v_u, normals)
             e, n, u = e - i.position[0], n - i.position[1], u - i.position[2]
             x, y, z = to_deck(i.mat_ed, e, n, u)
+            if c.held and s.error_known:
+                s.cross_elevation, s.elevation = offsets(i.azimuth, i.elevation, s.direction[0], s.direction[1],
+                                                         s.direction[2])
+            s.direction[0], s.direction[1], s.direction[2] = x, y, z
             dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
             amplitude = carrier_amplitude(c, e, n, u)
             o.true_cross_elevation, o.true_elevation = dX, dE
@@ -256,5 +309,6 @@ def step(state, constants, inputs, outputs, breaks, coefficients, normals):
         o.status = NO_JOINTS
     if s.locked == 0:
         cross_elevation, elevation = math.nan, math.nan
+        rate_x, rate_e, distance = math.nan, math.nan, math.nan
     cn0_dbhz = 10.0 * math.log10(max(s.level_power - 1.0, POWER_FLOOR) / c.tau)
-    delay(s, c, o, i.stamp_ns, cross_elevation, elevation, cn0_dbhz)
+    delay(s, c, o, i.stamp_ns, cross_elevation, elevation, cn0_dbhz, rate_x, rate_e, distance)

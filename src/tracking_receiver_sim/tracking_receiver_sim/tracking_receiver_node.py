@@ -6,7 +6,7 @@ import numpy as np
 from pedestal_common import records, shell
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
-from tracking_receiver_sim.wire import ERROR, JOINTS, SHIP, TARGET, TrackingReceiver
+from tracking_receiver_sim.wire import JOINTS, SHIP, TrackingReceiver
 
 FAULTS = (receiver.NO_TARGET, receiver.NO_JOINTS, receiver.STAMP_ORDER)
 
@@ -21,9 +21,8 @@ class TrackingReceiverNode(shell.Shell):
         self.outputs = self.unit.outputs
         self.fault = receiver.LOCKED
         self.joints, self.ship = (records.only(self.unit.heard, name) for name in (JOINTS, SHIP))
-        self.error, self.truth = (records.only(self.unit.said, name) for name in (ERROR, TARGET))
-        self.send_error = self.writer(ERROR)
-        self.send_truth = self.writer(TARGET)
+        self.says = [(message, records.only(self.unit.said, name), self.writer(name))
+                     for name, message in self.unit.messages.items()]
         self.diagnose_with(self.diagnose)
         self.follow(JOINTS, self.unit.followers, self.step)
 
@@ -31,15 +30,14 @@ class TrackingReceiverNode(shell.Shell):
         records.take(self.joints, joints)
         records.take(self.ship, followers.get(SHIP))
         self.unit.answer()
-        outputs, messages = self.outputs[0], self.unit.messages
+        outputs = self.outputs[0]
         if outputs['status'] in FAULTS:
             self.fault = int(outputs['status'])
         self.begin_step(stamp)
-        if outputs['due']:
-            records.put(messages[ERROR], self.error)
-            self.send_error(messages[ERROR])
-        records.put(messages[TARGET], self.truth)
-        self.send_truth(messages[TARGET])
+        for message, place, send in self.says:
+            if place.stamp[0] != records.NEVER:
+                records.put(message, place)
+                send(message)
 
     def diagnose(self):
         """What is now, and the last fault since the last diagnosis."""

@@ -10,7 +10,8 @@ from pedestal_common.records import NEVER
 from tracking_receiver_sim import receiver, target
 
 JOINTS, SHIP, ERROR, TARGET = 'joint_states', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
-HEARD, SAID = records.of(JOINTS, SHIP), records.of(ERROR, TARGET)
+RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
+HEARD, SAID = records.of(JOINTS, SHIP), records.of(ERROR, RATE, RANGE, TARGET)
 
 BLOCK = 2000
 """Steps whose noise is drawn at once."""
@@ -33,8 +34,12 @@ class TrackingReceiver:
         self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
         self.rng = noise.generator(params.seed, 'tracking_receiver')
         self.normals = receiver.normals_per_step(params)
-        self.messages = {ERROR: messages.Vector3Stamped(header=messages.header('beam'), vector=messages.vector3()),
-                         TARGET: messages.odometry('earth', 'target')}
+        self.messages = {ERROR: messages.vector3_stamped('beam')}
+        if params.receiver.rate.measured:
+            self.messages[RATE] = messages.vector3_stamped('beam')
+        if params.receiver.ranging.measured:
+            self.messages[RANGE] = messages.range_message('beam', params.antenna.beamwidth)
+        self.messages[TARGET] = messages.odometry('earth', 'target')
         self.followers = {SHIP: 0.0} if on_ship else {}
         self.events = {}
 
@@ -61,19 +66,25 @@ def hear(u, joints, ship):
     """Records of the messages of a step -> inputs of the receiver; the ship stays where it was until the next."""
     u.stamp_ns = joints.stamp
     u.azimuth, u.elevation = joints.position[0], joints.position[1]
+    u.azimuth_rate, u.elevation_rate = joints.velocity[0], joints.velocity[1]
     u.valid = 1
     if ship.stamp != NEVER:
         q = ship.orientation
         line_of_sight.rotation(q[0], q[1], q[2], q[3], u.mat_ed)
         for i in range(3):
             u.position[i] = ship.position[i]
+            u.twist_linear[i], u.twist_angular[i] = ship.twist_linear[i], ship.twist_angular[i]
 
 
 @compiled
-def say(o, stamp, error, target_truth):
+def say(o, c, stamp, error, rate, distance, target_truth):
     """Outputs of the receiver -> records of its messages."""
     error.stamp = o.stamp_ns if o.due == 1 else NEVER
     error.vector[0], error.vector[1], error.vector[2] = o.cross_elevation, o.elevation, o.cn0_dbhz
+    rate.stamp = error.stamp if c.rate_measured != 0 else NEVER
+    rate.vector[0], rate.vector[1], rate.vector[2] = o.rate[0], o.rate[1], c.rate_sigma
+    distance.stamp = error.stamp if c.range_measured != 0 else NEVER
+    distance.range[0], distance.variance[0] = o.range, c.range_variance
     target_truth.stamp = stamp
     target_truth.orientation[3] = 1.0
     for i in range(3):
@@ -87,4 +98,4 @@ def answers(state, constants, inputs, outputs, breaks, coefficients, normals, he
         h, y = heard[k], said[k]
         hear(inputs[0], h[JOINTS], h[SHIP])
         receiver.step(state, constants, inputs, outputs, breaks, coefficients, normals[k])
-        say(outputs[0], h[JOINTS].stamp, y[ERROR], y[TARGET])
+        say(outputs[0], constants[0], h[JOINTS].stamp, y[ERROR], y[RATE], y[RANGE], y[TARGET])
