@@ -348,7 +348,7 @@ def _share():
 
 
 TABLE_WIDTH = 120
-"""Columns that the table of a study or of several beams may take, also where the terminal has fewer: one line a row."""
+"""Columns that the table of a study or of several beams may take on any terminal, so that a row is one line."""
 
 
 def _show_study(title, rows):

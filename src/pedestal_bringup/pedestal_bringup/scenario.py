@@ -320,7 +320,7 @@ def _spread(name, sections, header, seed):
 
 
 def _error_age(values):
-    """How long [s] before its stamp an error of a beam that stands belongs: the mean delay of the receiver's samples."""
+    """How long [s] before its stamp an error of a beam that stands belongs: the mean delay of the samples in it."""
     tracking = parameters.build(parameters_of('tracking_receiver'), values)
     r = tracking.receiver
     return smoothing.delay(r.smoothing, r.samples_per_step, r.smoothing_samples) * tracking.period / r.samples_per_step

@@ -135,8 +135,10 @@ def graph(beams=0):
 
 
 def read_by(node, nodes, flags=(), beams=0):
-    """The topics `node` reads for which a graph of these nodes has a writer; the recorder reads every one. flags: those
-    of FLAGS that are set."""
+    """The topics `node` reads for which a graph of these nodes has a writer; the recorder reads every one.
+
+    flags: those of FLAGS that are set.
+    """
     return [topic for topic in graph(beams).values()
             if (node in topic.readers or node == 'recorder') and any(w in nodes for w in topic.writers)
             and (not topic.flag or topic.flag in flags)]
