@@ -8,7 +8,7 @@ others is a scenario and parameters: `pedestal run SCENARIO --param ...` takes t
 """
 import importlib
 
-NAMES = ('servo', 'backlash', 'bode', 'filters')
+NAMES = ('servo', 'backlash', 'bode', 'filters', 'phased-array')
 
 
 def study(name):

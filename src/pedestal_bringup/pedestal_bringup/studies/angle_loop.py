@@ -1,9 +1,9 @@
 """The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop and the one that is better.
 
 Each is one compiled kernel of the laws the nodes run: the receiver's smoothing and pattern, the loop of the beam or a
-target filter, the electronic beam. Sample i of the grid is what the receiver measures over the millisecond that ends at its
-stamp i GRID, off the beam that stood in it; a target is given at the middles of these milliseconds. A command stamped
-i GRID is in force from the millisecond after i GRID + delay on.
+target filter, the electronic beam. Sample i of the grid is what the receiver measures over the millisecond that ends
+at its stamp i GRID, off the beam that stood in it; a target is given at the middles of these milliseconds. A command
+stamped i GRID is in force from the millisecond after i GRID + delay on.
 """
 import dataclasses
 import math
@@ -52,7 +52,8 @@ class Paper:
         beam, seen = np.zeros(len(target)), np.zeros(len(target))
         _paper(beam_loop.FORMS.index(self.form), self.alpha, self.period, self.delta, self.slope, self.beamwidth,
                self.lost, SMOOTHINGS[self.smoothing], np.asarray(target), nothing if rate is None else rate,
-               nothing if noise is None else noise, np.zeros(1, SMOOTHERS), *_beam(self.delay, self.period), beam, seen)
+               nothing if noise is None else noise, np.zeros(1, SMOOTHERS), *_beam(self.delay, self.period), beam,
+               seen)
         return beam, seen
 
 
