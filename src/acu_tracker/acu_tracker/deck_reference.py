@@ -75,6 +75,18 @@ def earth_rates(mat_ed, wx, wy, wz, x, y, z, dx, dy, dz):
 
 
 @compiled
+def smoothed_acceleration(before, w, w_before, T, tau):
+    """Angular acceleration from two rates T [s] apart, low-passed with tau [s]; before: what it was."""
+    return before + T / (tau + T) * ((w - w_before) / T - before)
+
+
+@compiled
+def turn(w, dw, T):
+    """Angle that a rate w and its derivative dw turn in T [s]."""
+    return T * w + 0.5 * T * T * dw
+
+
+@compiled
 def turned(qx, qy, qz, qw, rx, ry, rz):
     """The attitude after the deck has turned by the rotation vector r [rad] (FLU): q (x) exp(r/2)."""
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
