@@ -7,7 +7,7 @@
     drive_shell   the shell of both nodes that own the drive's time
     speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    the controller's laws
     motor, thermal, brake, gear_train, friction, structure, wind                         the plant's laws
-    electronic_beam, beam_wire    in the drive's place: the beam of a phased array, delay and hold; between its messages
+    electronic_beam, beam_wire    in the drive's place: the beam of a phased array, delay and hold; its wire
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
