@@ -1,4 +1,4 @@
-"""The four cores composed without ROS: the closed loop of a scenario (of one beam) as one compiled call, for studies.
+"""The four cores composed without ROS: the closed loop of a scenario as one compiled call, for studies and benches.
 
 The order within a step is the graph's: ship, INS, receiver, control unit, drive. Each core is the same compiled step
 its node calls and draws the same noise, so a run here equals the lockstep run of the scenario to the last bit.
@@ -44,10 +44,11 @@ class Cores:
     beam: bool
 
 
-def cores(scenario) -> Cores:
-    """The cores of a scenario as its nodes would make them."""
-    ship, navigation, tracking, acu, adu = (scenario.node_parameters(node) for node in
-                                            ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu'))
+def cores(scenario, beam='') -> Cores:
+    """The cores of a scenario as its nodes would make them; beam: of several, '' for the first."""
+    prefix = f'{beam}/' if beam else scenario.prefixes[0]
+    ship, navigation, tracking, acu, adu = map(scenario.node_parameters, (
+        'ship_motion', 'ins', f'{prefix}tracking_receiver', f'{prefix}acu', 'adu'))
     built = target.build(tracking.target, tracking.duration)
     if scenario.header.beam:
         beam = Beam(adu)
@@ -58,7 +59,7 @@ def cores(scenario) -> Cores:
         drive_unit.read(adu_core[0], adu_core[1], adu_core[3])
     program = (np.zeros(0), np.zeros((0, 2)))
     if scenario.header.program.source != 'none':
-        program = program_track.checked(*program_table(scenario))
+        program = program_track.checked(*program_table(scenario, prefix))
     acu_inputs = np.zeros(1, control_unit.INPUTS)
     acu_inputs['stabilised'] = scenario.header.ship
     acu_inputs['encoder_valid'] = 1

@@ -350,8 +350,11 @@ def chosen(recording, nodes, file_values):
     return found
 
 
-def file_parameters(path):
-    """{node: {dotted name: value}} of a ROS 2 parameter file or a scenario. Raises ScenarioError."""
+def file_parameters(path, beam=''):
+    """{node: {dotted name: value}} of a ROS 2 parameter file or a scenario, of several beams those of one ('beam_2/').
+
+    Raises ScenarioError.
+    """
     try:
         tree = yaml.safe_load(path.read_text())
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -359,9 +362,12 @@ def file_parameters(path):
     if not isinstance(tree, dict):
         raise RecomputeError(f'--params-file {path}: must hold a section for a node')
     if 'scenario' in tree and 'recorder' not in tree:
-        return scenario.load(str(path)).values
+        chosen = scenario.load(str(path))
+        return {node: chosen.given(beam + node if node in topics.BEAM_NODES else node) for node in chosen.values
+                if not topics.beam_of(node)}
     found = {}
-    for node, body in tree.items():
+    for name, body in tree.items():
+        node = name.removeprefix(beam)
         if node in KINDS:
             if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
                 raise RecomputeError(f'--params-file {path}: section {node} must hold ros__parameters')

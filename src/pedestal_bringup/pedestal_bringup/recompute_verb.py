@@ -11,9 +11,9 @@ from pedestal_common.steps import SECOND
 
 def main(options):
     """(lines to print, rows, whether all is well) of the verb's options. Raises ValueError for what fits nothing."""
-    given = recompute.file_parameters(options.params_file) if options.params_file else None
     recording = recompute.Recording(options.bag, {None: None, 'lockstep': True}.get(options.pacing, False),
                                     options.beam)
+    given = recompute.file_parameters(options.params_file, recording.bag.beam) if options.params_file else None
     nodes = recompute.chosen(recording, options.node, given)
     changes = recompute.overrides(options.param, nodes)
     if changes:

@@ -268,13 +268,13 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     of_beams = [name for name in topics.members(topics.BEAM_NODES, header.graph_beams) if topics.beam_of(name)]
     for node in sections:
         if topics.beam_of(node) and node not in of_beams:
-            raise ScenarioError(f'scenario {name}: section {node!r}: there are {header.beams} beams')
+            raise ScenarioError(f'scenario {name}: section {node!r}: the scenario has beams = {header.beams}')
     for node in (*NODE_KINDS, *of_beams):
         sections.setdefault(node, {})
         _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
     _spread(name, sections, header, seed)
     for node in of_beams:
-        _spread_to_beam(node, sections, header, seed)
+        _spread_to_beam(name, node, sections, header, seed)
     for node, values in sections.items():
         typed = parameters.as_dict(_checked(name, node, kind(node, header.beam).parameters, _whole(sections, node)))
         sections[node] = {key: typed[key] for key in values}
@@ -326,7 +326,7 @@ def _error_age(values):
     return smoothing.delay(r.smoothing, r.samples_per_step, r.smoothing_samples) * tracking.period / r.samples_per_step
 
 
-def _spread_to_beam(node, sections, header, seed):
+def _spread_to_beam(name, node, sections, header, seed):
     """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
     values, beam = sections[node], topics.beam_of(node)
     receiver = f'{beam}/tracking_receiver'
@@ -337,6 +337,10 @@ def _spread_to_beam(node, sections, header, seed):
         own = sections.get(f'{beam}/{owner}', {})
         if topics.plain(node) == other and key in own:
             values.setdefault(told, own[key])
+    for key, _ in MEASURED:
+        if key in sections[receiver]:
+            raise ScenarioError(f'scenario {name}, {receiver}: {key}: is the same for every beam; say it in '
+                                'tracking_receiver')
     if node != receiver and any(key.startswith('receiver.s') for key in sections[receiver]):
         values.setdefault('tracker.receiver.age', _error_age(_whole(sections, receiver)))
 
