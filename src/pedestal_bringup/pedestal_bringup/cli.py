@@ -70,7 +70,7 @@ def _parser():
     scenarios.set_defaults(verb=_scenarios)
 
     listed = verbs.add_parser('parameters', help='list the parameters of a node: default, range, unit, meaning')
-    listed.add_argument('node', help='acu, adu, tracking_receiver, ship_motion, ins, recorder or scenario')
+    listed.add_argument('node', help='acu, adu, beam_steering, tracking_receiver, ship_motion, ins, recorder ...')
     listed.set_defaults(verb=_parameters)
 
     program = verbs.add_parser('program', help='send the program track of a scenario to a running ACU')
@@ -96,6 +96,7 @@ def _parser():
     report = verbs.add_parser('report', help='write a recording as one HTML file with its figures')
     report.add_argument('bag', type=pathlib.Path)
     report.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
+    _add_beam(report)
     report.add_argument('--png', type=pathlib.Path, metavar='DIR', help='also write each figure as PNG')
     report.set_defaults(verb=_report)
 
@@ -143,10 +144,16 @@ def _parser():
     return parser
 
 
+def _add_beam(verb):
+    verb.add_argument('--beam', default='', metavar='NAME', help='of a recording of several, as beam_2; default: the '
+                      'first')
+
+
 def _add_recompute(verbs):
     verb = verbs.add_parser('recompute', help='feed recorded inputs to a node again and compare its outputs',
                             description=RECOMPUTE, formatter_class=argparse.RawDescriptionHelpFormatter)
     verb.add_argument('bag', type=pathlib.Path)
+    _add_beam(verb)
     verb.add_argument('--node', action='append', default=[], metavar='NODE',
                       help='acu, adu, tracking_receiver, ins or ship_motion; may be repeated; default: every node')
     verb.add_argument('--param', action='append', default=[], metavar='[NODE.]KEY=VALUE',
@@ -203,15 +210,20 @@ def _run(options):
             print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
             return EXIT_STOPPED
     recording = read(bag)
-    tracked = results.tracking(recording)
-    values = {**results.summary(tracked), **consistency.summary(consistency.read(recording, tracked))}
-    values['lost_steps'] = (float(outcome.drive['lost_steps']), '')
-    values['realtime_factor'] = (outcome.drive['realtime_factor'], '')
-    values['messages'] = (float(outcome.recorder['messages']), '')
-    _show(f'{chosen.name}: {chosen.header.title}', values)
+    of_beams = []
+    for prefix in chosen.prefixes:
+        beam = recording.view(prefix[:-1])
+        tracked = results.tracking(beam)
+        of_beams.append({**results.summary(tracked), **consistency.summary(consistency.read(beam, tracked))})
+    whole = {'lost_steps': (float(outcome.drive['lost_steps']), ''),
+             'realtime_factor': (outcome.drive['realtime_factor'], ''),
+             'messages': (float(outcome.recorder['messages']), '')}
+    _show(f'{chosen.name}: {chosen.header.title}', [prefix[:-1] for prefix in chosen.prefixes], of_beams, whole)
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     if options.json:
-        _write_json(options.json, {'name': chosen.name, 'rows': results.rows(chosen.name, values),
+        rows = [row for prefix, values in zip(chosen.prefixes, of_beams)
+                for row in results.rows(f'{chosen.name}/{prefix}'.rstrip('/'), values)]
+        _write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                    'mcap_sha256': outcome.recorder['sha256']})
     check = verify(bag)
     if not check.complete:
@@ -228,14 +240,22 @@ def _new_bag(given, scenario):
     return bag
 
 
-def _show(title, values):
+def _show(title, beams, of_beams, whole):
+    """A table of metrics: a column for each beam, one for a single one (beams: ['']), and what belongs to the run."""
     table = Table(title=title, title_justify='left')
     table.add_column('metric')
-    table.add_column('value', justify='right')
+    for beam in beams:
+        table.add_column(beam or 'value', justify='right')
     table.add_column('unit')
-    for metric, (value, unit) in values.items():
-        table.add_row(metric, f'{value:.6g}' if math.isfinite(value) else 'not measured', unit)
-    Console().print(table)
+    for metric, (_, unit) in of_beams[0].items():
+        table.add_row(metric, *(_number(values[metric][0]) for values in of_beams), unit)
+    for metric, (value, unit) in whole.items():
+        table.add_row(metric, _number(value), *[''] * (len(beams) - 1), unit)
+    Console(width=max(Console().width, TABLE_WIDTH) if len(beams) > 1 else None).print(table)
+
+
+def _number(value):
+    return f'{value:.6g}' if math.isfinite(value) else 'not measured'
 
 
 def _write_json(path, content):
@@ -295,7 +315,7 @@ def _rerun(options):
 
 def _report(options):
     from pedestal_bringup import report
-    print(report.write(options.bag, options.output, options.png))
+    print(report.write(options.bag, options.output, options.png, options.beam))
     return 0
 
 
@@ -356,7 +376,7 @@ def _share():
 
 
 TABLE_WIDTH = 120
-"""Columns that the table of a study may take, also where the terminal has fewer: one line a row."""
+"""Columns that the table of a study or of several beams may take on any terminal, so that a row is one line."""
 
 
 def _show_study(title, rows):

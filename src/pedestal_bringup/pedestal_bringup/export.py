@@ -101,9 +101,9 @@ def _times(stamps):
 
 def _header(name, type_name, column):
     unit = None
-    if name in _OWN:
-        unit = _OWN[name].get(column)
-    elif name in topics.BY_NAME:
+    if topics.plain(name) in _OWN:
+        unit = _OWN[topics.plain(name)].get(column)
+    elif topics.plain(name) in topics.BY_NAME:
         units = _UNITS.get(type_name, {})
         unit = next((units[part] for part in reversed(column.split('.')) if part in units), None)
     return f'{column} [{unit}]' if unit else column

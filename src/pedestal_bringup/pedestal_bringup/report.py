@@ -42,13 +42,14 @@ figure svg { display: block; width: 100%; height: auto; min-width: 26rem; }
 """
 
 
-def write(bag_path, output=None, png_folder=None) -> pathlib.Path:
+def write(bag_path, output=None, png_folder=None, beam='') -> pathlib.Path:
     """Write the report of a bag and return where: output, default report.html in the bag (beside a bare .mcap).
 
-    png_folder: also each figure, and the overview, as PNG there. The same bag gives the same bytes.
+    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there. The same bag
+    gives the same bytes.
     Raises bag.BagError when the bag cannot be read to its end, OSError when the report cannot be written.
     """
-    bag = bags.read(bag_path)
+    bag = bags.read(bag_path, beam)
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'report.html'
     recording = _recording(bag)
     page = _page(bag, recording)
@@ -260,7 +261,7 @@ def _figure(spec, recording):
 
 def _page(bag, recording):
     check = verify(bag.path)
-    name = bag.metadata.get('scenario') or bag.file.stem
+    name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     data = bag.file.read_bytes()
@@ -293,7 +294,7 @@ def _page(bag, recording):
     if not check.complete:
         parts.append('<h2 id="gaps">What the recording lacks</h2><ul>' + ''.join(
             f'<li>{html.escape(problem)}</li>' for problem in _problems(check)) + '</ul>')
-    absent = [topic for topic in topics.BY_NAME if topic not in bag.topics or not bag.rows(topic).size]
+    absent = [topic for topic in bag.graph if topic not in bag.topics or not bag.rows(topic).size]
     if absent:
         parts.append(f'<p class="soft">No message in this bag of: {", ".join(absent)}.</p>')
     parts.append('<h2 id="figures">Figures</h2><p class="soft">The paper: antenna tracking with a Kalman filter and a '

@@ -39,7 +39,8 @@ def _pointing(beam, target, ship, attitude, known_attitude, estimate, error, fil
 class Tracking:
     """A run as arrays on the drive's steps; angles in rad, NaN where nothing was measured.
 
-    t (n,) s; azimuth, elevation (n,) encoders; reference (n, 2) deck angles that the ACU follows, NaN in standby;
+    t (n,) s; azimuth, elevation (n,) encoders; reference (n, 2) deck angles that the ACU follows, NaN in standby and
+    of an electronic beam, which is told where to be later;
     cross_elevation, elevation_error (n,) true error;
     measured (n, 2) receiver errors and cn0 (n,) at their stamp; filtered (n, 2) the estimate seen from the
     beam, as cross-elevation and elevation; beam_earth (n, 2); target_earth (n, 2) and range (n,) m; mode (n,) text;
@@ -101,7 +102,7 @@ def tracking(bag) -> Tracking:
     automatic = mode == 'autotrack'
     start = t[automatic][0] + SETTLING if automatic.any() else math.inf
     reference = at_steps('acu/reference', ('azimuth.position', 'elevation.position'))
-    reference[(mode == 'standby') | (mode == '')] = np.nan
+    reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t, beam[:, 0], beam[:, 1], reference, error[:, 0], error[:, 1], measured[:, :2], measured[:, 2],
                     filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
                     automatic & (t >= start))
