@@ -37,7 +37,9 @@ OUTPUTS = np.dtype([
     ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
     ('reference', 'f8', (2, 3)),                                                # deck angle, rate, acceleration at t_k
-    ('innovation', 'f8', (2,)), ('nis', 'f8', (2,)),                            # nu, nu2/S; NaN: no error this step
+    ('covariance', 'f8', (2, 3)), ('probability', 'f8', (2, 4)),                # p11, p12, p22 at t_k; of MODELS
+    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
+    ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
     ('coasting', 'i8'), ('locked', 'i8'), ('invalid_input', 'i8'),
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)
@@ -52,13 +54,16 @@ STATE = np.dtype([
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
 ], align=True)
 
-CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('ahead', 'f8'), ('notch', 'f8', (2, 5))], align=True)
+CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('ahead', 'f8'),
+                      ('notch', 'f8', (2, 5))], align=True)
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of an AcuParameters: the parameters, `ahead` = t_m - t_k [s], the notches' coefficients."""
+    """Constants (1,) of an AcuParameters: the parameters, those of the target filter, `ahead` = t_m - t_k [s], the
+    notches' coefficients."""
     c = np.zeros(1, CONSTANTS)
     c['p'] = record(params, AcuParameters)
+    c['tracker'] = tracker.constants(params.tracker, params.azimuth.filter, params.elevation.filter)
     c['ahead'] = params.command_delay + 0.5 * params.period
     for i, axis in enumerate((params.azimuth, params.elevation)):
         c['notch'][0, i] = notch.coefficients(axis.notch.frequency, axis.notch.width, axis.notch.depth, params.period)
@@ -145,7 +150,7 @@ def attitude_at(s, p, t):
 
 
 @compiled
-def take_error(s, p, u, o):
+def take_error(s, p, c, u, o):
     """Filter y = encoder at the stamp of the error, displaced by the error, in earth angles on a ship."""
     e = p.tracker.receiver
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
@@ -164,12 +169,10 @@ def take_error(s, p, u, o):
     R = tracker.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e.beamwidth, e.slope, e.integration,
                                e.sigma_floor)
     cos_el = max(math.cos(elevation), 0.01)
-    outcome, o.innovation[0], o.innovation[1], o.nis[0], o.nis[1] = tracker.observe(
-        s.tracker, p.tracker, p.azimuth.a_max, p.elevation.a_max, u.error_stamp, azimuth, elevation,
-        R / (cos_el * cos_el), R)
+    (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
+     o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, u.error_stamp, azimuth, elevation, R / (cos_el * cos_el), R,
+                                 math.nan, math.nan, math.nan, math.nan)
     if outcome == tracker.STALE:
-        o.innovation[:] = math.nan
-        o.nis[:] = math.nan
         return _ERROR_STAMP
     return _ERROR_GATED if outcome == tracker.GATED else 0
 
@@ -261,7 +264,7 @@ def seat(s, p, u):
 
 
 @compiled
-def raw_target(s, p, times, angles, t):
+def raw_target(s, p, c, times, angles, t):
     """Deck (A, dA, ddA, E, dE, ddE) at t of what the mode follows, the azimuth on the turn that fits."""
     if s.mode == modes.STOW:
         s.turn = s.azimuth.position
@@ -275,10 +278,7 @@ def raw_target(s, p, times, angles, t):
         if s.entered:
             below, above = program_track.azimuth_travel(times, angles, t)
     else:
-        T = t - s.tracker.stamp
-        A, dA, ddA = tracker.outlook(s.tracker.azimuth, T, p.tracker.alpha)
-        E, dE, ddE = tracker.outlook(s.tracker.elevation, T, p.tracker.alpha)
-        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
+        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, *tracker.outlook(s.tracker, c, t))
     s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
     return s.turn, dA, ddA, E, dE, ddE
 
@@ -289,8 +289,11 @@ def clear(o):
     o.coasting, o.invalid_input = 0, 0
     o.torque[:] = 0.0
     o.innovation[:] = math.nan
+    o.rate_innovation[:] = math.nan
     o.nis[:] = math.nan
     o.estimate[:] = math.nan
+    o.covariance[:] = math.nan
+    o.probability[:] = math.nan
     o.reference[:] = 0.0
     o.angle_limited[:] = 0
     o.rate_limited[:] = 0
@@ -311,6 +314,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         o.reason = modes.BAD_STAMP
         return
     clear(o)
+    tracker.adopt(s.tracker, constants[0].tracker)
     rows = max(u.program_count, 0)
     times, angles = program_times[:rows], program_angles[:rows]
     jumped = dt > p.step_gap
@@ -326,7 +330,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     if u.stabilised and not take_attitude(s, p, u):
         flags |= _ATTITUDE
     if u.error_valid:
-        flags |= take_error(s, p, u, o)
+        flags |= take_error(s, p, constants[0].tracker, u, o)
     if u.preset_valid:
         if math.isfinite(u.preset[0] + u.preset[1]):
             s.preset[0], s.preset[1] = u.preset[0], u.preset[1]
@@ -345,9 +349,9 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     else:
         t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
         t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
-        A, dA, ddA, E, dE, ddE = raw_target(s, p, times, angles, t_azimuth)
+        A, dA, ddA, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_azimuth)
         if t_elevation != t_azimuth:
-            _, _, _, E, dE, ddE = raw_target(s, p, times, angles, t_elevation)
+            _, _, _, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_elevation)
         position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
                            u.velocity[0], dt, o, 0)
         position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
@@ -357,7 +361,6 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
 
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
+    o.gated = s.tracker.gated
     if s.tracker.running:
-        T = u.stamp - s.tracker.stamp
-        o.estimate[0, 0], o.estimate[0, 1], o.estimate[0, 2] = tracker.outlook(s.tracker.azimuth, T, p.tracker.alpha)
-        o.estimate[1, 0], o.estimate[1, 1], o.estimate[1, 2] = tracker.outlook(s.tracker.elevation, T, p.tracker.alpha)
+        tracker.read(s.tracker, constants[0].tracker, u.stamp, o)

@@ -32,7 +32,8 @@ class Acu:
         self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
         self.inputs[0]['stabilised'], self.inputs[0]['drive_ready'] = on_ship, 1
         self.outputs[0]['mode'] = modes.STANDBY
-        self.outputs['innovation'] = self.outputs['nis'] = math.nan
+        for name in ('innovation', 'rate_innovation', 'nis', 'covariance', 'probability'):
+            self.outputs[name] = math.nan
         self.times, self.angles = np.zeros(0), np.zeros((0, 2))
         self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
         self.remembers = self.state, self.inputs, self.outputs
