@@ -33,9 +33,9 @@ COMMAND_LINES = {
     'range': (['leo_pass', '--param', 'adu.period=0.5'], ['adu: period = 0.5 s: must be 0.001 to 0.02']),
     'NaN': (['leo_pass', '--param', 'tracking_receiver.receiver.cn0_dbhz=.nan'],
             ['receiver.cn0_dbhz = nan dB-Hz: must be 0 to 120']),
-    'type': (['leo_pass', '--param', 'acu.azimuth.a_max=fast'], ["azimuth.a_max = 'fast': must be a number"]),
+    'type': (['leo_pass', '--param', 'acu.azimuth.stow=fast'], ["azimuth.stow = 'fast': must be a number"]),
     'group': (['leo_pass', '--param', 'acu.azimuth=1'], ["unknown parameter 'azimuth'"]),
-    'list for a number': (['leo_pass', '--param', 'acu.azimuth.a_max=[1.0]'], ['azimuth.a_max = ']),
+    'list for a number': (['leo_pass', '--param', 'acu.azimuth.stow=[1.0]'], ['azimuth.stow = ']),
     'mapping for a text': (['leo_pass', '--param', 'recorder.scenario={a: 1}'], ['scenario = ']),
     'duration': (['leo_pass', '--duration', 'nan'], ['duration = nan s: must be 0.1 to 86400']),
     'seed': (['leo_pass', '--seed', '-1'], ['seed = -1']),
@@ -54,7 +54,8 @@ def test_command_line(case, capsys, one_line, tmp_path):
 
 
 SCENARIO_FILES = {
-    'misspelt key': ('acu:\n  ros__parameters:\n    azimuth:\n      a_mx: 1.0\n', "did you mean 'azimuth.a_max'?"),
+    'misspelt key': ('scenario: {ros__parameters: {}}\nacu:\n  ros__parameters:\n    azimuth:\n      stwo: 1.0\n',
+                     "did you mean 'azimuth.stow'?"),
     'misspelt header': ('acu: {ros__parameters: {}}\n', 'the section `scenario` is missing'),
     'section': ('scenario: {ros__parameters: {}}\nantenna: {ros__parameters: {}}\n', "section 'antenna' is no node"),
     'no ros__parameters': ('scenario: {duration: 2.0}\n', "section 'scenario' must hold ros__parameters"),
@@ -69,8 +70,6 @@ SCENARIO_FILES = {
 @pytest.mark.parametrize('case', SCENARIO_FILES)
 def test_scenario_file(case, capsys, one_line, tmp_path):
     content, text = SCENARIO_FILES[case]
-    if 'a_mx' in str(content):
-        content = 'scenario: {ros__parameters: {}}\n' + content
     file = tmp_path / 'mine.yaml'
     file.write_bytes(content if isinstance(content, bytes) else content.encode())
     line = refused(capsys, one_line, 'run', file, '--bag', tmp_path / 'bag')

@@ -194,8 +194,8 @@ def test_a_missing_input_is_named(runs, rewrite, pedestal):
 def test_a_changed_parameter_is_reported_old_against_new(runs, pedestal, tmp_path):
     """A wilder target model follows faster and filters less."""
     path, rows = runs['leo'].bag, tmp_path / 'rows.json'
-    code, said, _ = pedestal(path, '--param', 'acu.azimuth.a_max=0.4', '--param', 'acu.elevation.a_max=0.4', '--json',
-                             rows)
+    code, said, _ = pedestal(path, '--param', 'acu.azimuth.filter.current_statistical.a_max=0.4', '--param',
+                             'acu.elevation.filter.current_statistical.a_max=0.4', '--json', rows)
     assert code == 0
     assert 'the recorded antenna does not move with the recomputed command' in said
     values = {row['metric']: row['value'] for row in json.loads(rows.read_text())['rows']}
@@ -243,7 +243,7 @@ def test_a_bag_with_inputs_only_gets_its_outputs(inputs_only, runs, pedestal, tm
 
 
 def test_a_bag_with_inputs_only_and_a_changed_parameter(inputs_only, pedestal):
-    code, said, _ = pedestal(inputs_only, '--node', 'acu', '--param', 'tracker.alpha=2')
+    code, said, _ = pedestal(inputs_only, '--node', 'acu', '--param', 'azimuth.filter.current_statistical.alpha=2')
     assert code == 0
     assert 'old is recomputed with the parameters unchanged' in said
     assert lines_of(said, ESTIMATE)[1].split()[0] == 'azimuth.position'
@@ -376,13 +376,13 @@ def test_speed_is_measured(runs):
 BAD = {
     'no bag': ((), 'nowhere: No such file or directory'),
     'node': (('--node', 'radio'), '--node radio: must be one of ship_motion, ins, tracking_receiver, acu, adu'),
-    'parameter': (('--node', 'acu', '--param', 'tracker.alfa=1'), "did you mean 'tracker.alpha'?"),
-    'value': (('--node', 'acu', '--param', 'tracker.alpha=-1'), 'tracker.alpha = -1'),
+    'parameter': (('--node', 'acu', '--param', 'tracker.gates=9'), "did you mean 'tracker.gate'?"),
+    'value': (('--node', 'acu', '--param', 'tracker.gate=-1'), 'tracker.gate = -1'),
     'no node of the parameter': (('--param', 'alpha=1'), "--param 'alpha=1': must be node.key=value"),
     'another node': (('--node', 'acu', '--param', 'adu.period=0.01'), 'adu is not recomputed; that is acu'),
     'file': (('--params-file', 'nowhere.yaml'), '--params-file nowhere.yaml: '),
     'node not there': (('--node', 'ins'), 'no ship/imu/data_raw in it, which the node hears'),
-    'live and changed': (('--live', '--param', 'acu.tracker.alpha=1'), '--param does not go with it'),
+    'live and changed': (('--live', '--param', 'acu.tracker.gate=9'), '--param does not go with it'),
     'live in realtime': (('--live', '--pacing', 'realtime', '--node', 'acu'), '--live feeds in lockstep'),
     'output': (('--output', '.'), '--output . exists already'),
 }

@@ -202,6 +202,36 @@ def test_controllers_while_it_tracks(plant):
     assert plant.client.trigger('acu/standby')[0]
 
 
+def test_filters_while_it_tracks(plant):
+    """The antenna obeys and follows a target by its errors alone; every change of the filter leaves the command alone,
+    and what cannot be a filter is refused."""
+    azimuth, first, rates = 0.3, plant.stamp * 1e-9, []
+
+    def track(steps):
+        nonlocal azimuth
+        for _ in range(steps):
+            error = (0.3 + 0.02 * (plant.stamp * 1e-9 - first) - azimuth) * math.cos(0.5)
+            plant.step(position=(azimuth, 0.5), error=(error, 0.0, 60.0))
+            rates.append(plant.client.heard['acu/rate_command'][-1].velocity[0])
+            azimuth += PERIOD * 1e-9 * rates[-1]
+
+    track(150)
+    assert plant.client.trigger('acu/autotrack')[0]
+    track(300)
+    for kind in ('imm', 'alpha_beta', 'singer', 'imm_ukf', 'current_statistical'):
+        before = len(rates)
+        assert put(plant, 'azimuth.filter.kind', kind).successful
+        track(100)
+        assert plant.mode == 'autotrack' and abs(rates[before] - rates[before - 1]) < 1e-4, kind
+        assert rates[-1] == pytest.approx(0.02, abs=1e-3)
+    result = put(plant, 'azimuth.filter.imm.models', 'cv constant')
+    assert not result.successful
+    assert "azimuth.filter.imm.models = 'cv constant': must be two or more of cv, ca" in result.reason
+    values = {value.key: value.value for value in plant.client.diagnosed('').values}
+    assert int(values['errors gated']) >= 0
+    assert plant.client.trigger('acu/standby')[0]
+
+
 def test_a_drive_that_does_not_follow(plant):
     plant.client.write('adu/state')
     plant.client.publish('adu/state', messages.String(data='emergency stop'))

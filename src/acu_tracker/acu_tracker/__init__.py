@@ -1,7 +1,7 @@
 """The antenna control unit: from the receiver's angle error to the rate command of the drive.
 
 `control_unit.step` runs once per drive step:
-    error + encoder -> y -> `tracker` (Kalman filter per axis) -> prediction to the instant of the command
+    error + encoder -> y -> `tracker` (an `axis_filter` each) -> prediction to the instant of the command
     -> `deck_reference` (earth -> deck) -> `position_loop` (`shaper`; `pid`, `feedforward` or `adrc`; `notch`)
     -> rate and torque; of an electronically steered beam (`beam_loop`) -> its angles.
 `modes` decides which target is followed. Frames and angles as in `pedestal_common`.
@@ -13,7 +13,10 @@ Symbols
     T, x = alpha T  time between two errors; the same without a unit                    [s], [-]
     X = (x1 x2 x3)  estimate: angle, rate, acceleration                                 [rad, rad/s, rad/s2]
     Phi, U, Q, P    transition, input, process noise, covariance of X
+    F, H, K         Phi of any of the `motion_models`; what is measured of X; gain of the filter
     y, R, nu, S     measured angle, its variance, innovation, variance of the innovation
+    alpha, beta, gamma      constant gains of angle, rate, acceleration (`alpha_beta`)          [-]
+    mu, cbar        `imm`: probability of a model; the same as predicted                 [-]
     A, E            azimuth (clockwise), elevation; dA, ddA ... their time derivatives  [rad, rad/s, rad/s2]
     w, dw           rate and angular acceleration of the deck, FLU                      [rad/s, rad/s2]
     t_k             stamp of the drive step                                             [s]
@@ -33,5 +36,6 @@ Symbols
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
 
 References: paper 000 (Ma Jijun et al. 2023, 'current' statistical model filter of an antenna; PID position loop);
-paper 001 (TD, ESO and NLC of a gyrocompass); Han 2009 (fhan).
+paper 001 (TD, ESO and NLC of a gyrocompass); paper 003 (Lin Di et al. 2020, interacting models); paper 004 (Li Hongwei
+et al. 2018, angle and rate measured); Han 2009 (fhan).
 """

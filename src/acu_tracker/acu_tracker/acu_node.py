@@ -106,7 +106,7 @@ class AcuNode(shell.Shell):
         self.invalid = 0
         values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
                   ('coasting', str(int(outputs['coasting']))), ('drive', self.drive_state),
-                  ('invalid_input', ' '.join(invalid))]
+                  ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated'])))]
         for axis, limited in zip(messages.AXES, np.transpose([outputs[f'{kind}_limited'] for kind in
                                                               ('angle', 'rate', 'acceleration')])):
             values.append((f'{axis} limited', ' '.join(kind for kind, on in zip(('angle', 'rate', 'acceleration'),

@@ -126,16 +126,16 @@ def _predicted(m, x1, x2, x3, p11, p12, p13, p22, p23, p33, T):
 
 
 @compiled
-def innovation(f, y, R):
-    """(nu, S) of a measured angle against what `predict` left."""
-    x1, _, _, p11, _, _, _, _, _ = imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
-    return y - x1, p11 + R
+def expected(f):
+    """(angle, rate, p11, p12, p22) of what `predict` left."""
+    x1, x2, _, p11, p12, _, p22, _, _ = imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
+    return x1, x2, p11, p12, p22
 
 
 @compiled
 def consistency(f, y, R, y_rate, R_rate):
     """(nu, nu of the rate, nu' S^-1 nu) against what `predict` left; y_rate NaN: of the angle alone."""
-    x1, x2, _, p11, p12, _, p22, _, _ = imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
+    x1, x2, p11, p12, p22 = expected(f)
     nu, nu_rate = y - x1, y_rate - x2
     if math.isnan(nu_rate):
         return nu, nu_rate, nu * nu / (p11 + R)

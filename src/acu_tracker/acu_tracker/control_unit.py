@@ -10,7 +10,14 @@ from acu_tracker import deck_reference, modes, notch, position_loop, program_tra
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import displaced, earth_angles, earth_direction, rotation, to_earth
+from pedestal_common.line_of_sight import (
+    displaced,
+    displaced_motion,
+    earth_angles,
+    earth_direction,
+    rotation,
+    to_earth,
+)
 from pedestal_common.parameters import record, record_type
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
@@ -40,10 +47,9 @@ OUTPUTS = np.dtype([
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
     ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
                                                                                 # of a beam at t_m: the command
-    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # NaN: no error, no rate this step
-    ('nis', 'f8', (2,)),                                                        # nu' S^-1 nu of what was measured
-    ('sigma', 'f8', (2,)), ('rate_sigma', 'f8', (2,)), ('correlation', 'f8', (2,)),     # of the estimate at t_k
-    ('probability', 'f8', (2, 4)),                                              # of MODELS; NaN: not in the bank
+    ('covariance', 'f8', (2, 3)), ('probability', 'f8', (2, 4)),                # p11, p12, p22 at t_k; of MODELS
+    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
+    ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
     ('coasting', 'i8'), ('locked', 'i8'), ('invalid_input', 'i8'),
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)
@@ -59,13 +65,16 @@ STATE = np.dtype([
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
 ], align=True)
 
-CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('ahead', 'f8'), ('notch', 'f8', (2, 5))], align=True)
+CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('ahead', 'f8'),
+                      ('notch', 'f8', (2, 5))], align=True)
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of an AcuParameters: the parameters, `ahead` = t_m - t_k [s], the notches' coefficients."""
+    """Constants (1,) of an AcuParameters: the parameters, those of the target filter, `ahead` = t_m - t_k [s], the
+    notches' coefficients."""
     c = np.zeros(1, CONSTANTS)
     c['p'] = record(params, AcuParameters)
+    c['tracker'] = tracker.constants(params.tracker, params.azimuth.filter, params.elevation.filter)
     c['ahead'] = params.command_delay + 0.5 * params.period
     for i, axis in enumerate((params.azimuth, params.elevation)):
         c['notch'][0, i] = notch.coefficients(axis.notch.frequency, axis.notch.width, axis.notch.depth, params.period)
@@ -152,7 +161,8 @@ def attitude_at(s, p, t):
 
 @compiled
 def met(s, p, i, j, f, index):
-    """The encoder of an axis at a fraction f between two rows: in between, or the beam that stood up to the newer."""
+    """Column `index` of the encoder's history, of an axis p, a share f between two rows: in between, or of a beam that
+    stood up to the newer."""
     a, b = s.encoder.sample[i, index], s.encoder.sample[j, index]
     if p.controller == position_loop.BEAM:
         return b if f > 1e-6 else a
@@ -160,7 +170,19 @@ def met(s, p, i, j, f, index):
 
 
 @compiled
-def take_error(s, p, u, o):
+def target_rates(s, u, A, E, dA, dE):
+    """Rates (azimuth, elevation) of the target: those of the antenna at A, E and of the error, on a ship turned into
+    earth angles by the attitude `s` was last asked for."""
+    x, y, z, dx, dy, dz = displaced_motion(A, E, dA, dE, u.cross_elevation, u.elevation, u.error_rate[0],
+                                           u.error_rate[1])
+    if s.stabilised:
+        return deck_reference.earth_rates(s.mat_ed, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
+    _, dA, _, _, dE, _ = deck_reference.moving_angles(x, y, z, dx, dy, dz, 0.0, 0.0, 0.0)
+    return dA, dE
+
+
+@compiled
+def take_error(s, p, c, u, o):
     """Filter y = encoder at the instant of the error, displaced by the error, in earth angles on a ship."""
     e = p.tracker.receiver
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
@@ -178,15 +200,18 @@ def take_error(s, p, u, o):
         # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
         y, x, z = earth_direction(azimuth, elevation)
         azimuth, elevation = earth_angles(*to_earth(s.mat_ed, x, -y, z))
+    azimuth_rate, elevation_rate = math.nan, math.nan
+    if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
+        azimuth_rate, elevation_rate = target_rates(s, u, A, E, met(s, p.azimuth, i, j, f, 2),
+                                                    met(s, p.elevation, i, j, f, 3))
     R = tracker.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e.beamwidth, e.slope, e.integration,
                                e.sigma_floor)
+    R_rate = u.error_rate_sigma * u.error_rate_sigma
     cos_el = max(math.cos(elevation), 0.01)
-    outcome, o.innovation[0], o.innovation[1], o.nis[0], o.nis[1] = tracker.observe(
-        s.tracker, p.tracker, p.azimuth.a_max, p.elevation.a_max, t, azimuth, elevation,
-        R / (cos_el * cos_el), R)
+    (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
+     o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, t, azimuth, elevation, R / (cos_el * cos_el), R,
+                                 azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate)
     if outcome == tracker.STALE:
-        o.innovation[:] = math.nan
-        o.nis[:] = math.nan
         return _ERROR_STAMP
     return _ERROR_GATED if outcome == tracker.GATED else 0
 
@@ -288,7 +313,7 @@ def seat(s, p, u):
 
 
 @compiled
-def raw_target(s, p, times, angles, t):
+def raw_target(s, p, c, times, angles, t):
     """Deck (A, dA, ddA, E, dE, ddE) at t of what the mode follows, the azimuth on the turn that fits."""
     if s.mode == modes.STOW:
         s.turn = s.azimuth.position
@@ -302,10 +327,7 @@ def raw_target(s, p, times, angles, t):
         if s.entered:
             below, above = program_track.azimuth_travel(times, angles, t)
     else:
-        T = t - s.tracker.stamp
-        A, dA, ddA = tracker.outlook(s.tracker.azimuth, T, p.tracker.alpha)
-        E, dE, ddE = tracker.outlook(s.tracker.elevation, T, p.tracker.alpha)
-        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
+        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, *tracker.outlook(s.tracker, c, t))
     s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
     return s.turn, dA, ddA, E, dE, ddE
 
@@ -318,11 +340,9 @@ def clear(o):
     o.innovation[:] = math.nan
     o.rate_innovation[:] = math.nan
     o.nis[:] = math.nan
-    o.sigma[:] = math.nan
-    o.rate_sigma[:] = math.nan
-    o.correlation[:] = math.nan
-    o.probability[:] = math.nan
     o.estimate[:] = math.nan
+    o.covariance[:] = math.nan
+    o.probability[:] = math.nan
     o.reference[:] = 0.0
     o.angle_limited[:] = 0
     o.rate_limited[:] = 0
@@ -343,6 +363,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         o.reason = modes.BAD_STAMP
         return
     clear(o)
+    tracker.adopt(s.tracker, constants[0].tracker)
     rows = max(u.program_count, 0)
     times, angles = program_times[:rows], program_angles[:rows]
     jumped = dt > p.step_gap
@@ -359,7 +380,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     if u.stabilised and not take_attitude(s, p, u):
         flags |= _ATTITUDE
     if u.error_valid:
-        flags |= take_error(s, p, u, o)
+        flags |= take_error(s, p, constants[0].tracker, u, o)
     if u.preset_valid:
         if math.isfinite(u.preset[0] + u.preset[1]):
             s.preset[0], s.preset[1] = u.preset[0], u.preset[1]
@@ -378,9 +399,9 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     else:
         t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
         t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
-        A, dA, ddA, E, dE, ddE = raw_target(s, p, times, angles, t_azimuth)
+        A, dA, ddA, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_azimuth)
         if t_elevation != t_azimuth:
-            _, _, _, E, dE, ddE = raw_target(s, p, times, angles, t_elevation)
+            _, _, _, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_elevation)
         autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
         if p.azimuth.controller == position_loop.BEAM:
             position_loop.steer(s.azimuth, p.azimuth, A, dA, ddA, s.error[0], V_A, autotrack, dt, o, 0)
@@ -397,7 +418,6 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
 
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
+    o.gated = s.tracker.gated
     if s.tracker.running:
-        T = u.stamp - s.tracker.stamp
-        o.estimate[0, 0], o.estimate[0, 1], o.estimate[0, 2] = tracker.outlook(s.tracker.azimuth, T, p.tracker.alpha)
-        o.estimate[1, 0], o.estimate[1, 1], o.estimate[1, 2] = tracker.outlook(s.tracker.elevation, T, p.tracker.alpha)
+        tracker.read(s.tracker, constants[0].tracker, u.stamp, o)

@@ -3,6 +3,7 @@ import dataclasses
 import math
 
 from acu_tracker.beam_loop import FORMS
+from acu_tracker.filter_params import Filter
 from acu_tracker.history import LENGTH
 from acu_tracker.modes import MODES
 from acu_tracker.position_loop import CONTROLLERS
@@ -25,10 +26,8 @@ class ReceiverLaw(Parameters):
 class TrackerParameters(Parameters):
     """The target filter and what it takes for a lock."""
 
-    alpha: float = parameter(0.1, 1e-4, 100.0, '1/s', "manoeuvre frequency of the 'current' statistical model: one "
-                             'over the time an acceleration lasts')
-    sigma_a_floor: float = parameter(0.3, 0.0, 1.0, '', 'least sigma_a over a_max; without it the filter locks')
-    gate: float = parameter(25.0, 1.0, 1e6, '', 'largest nu2/S of both axes together that is believed')
+    gate: float = parameter(25.0, 1.0, 1e6, '', "largest nu' S^-1 nu of the two angles that is believed; with rates "
+                            'the one as rarely exceeded')
     gate_restart: int = parameter(20, 1, 100000, '', 'errors refused in a row before the filter restarts on them')
     restart_gap: float = parameter(1.0, 1e-3, 1000.0, 's', 'gap between errors after which the filter restarts')
     initial_rate: float = parameter(0.1, 1e-6, 100.0, 'rad/s', 'standard deviation of the rate at the start')
@@ -128,9 +127,9 @@ class Limits(Parameters):
 class AxisParameters(Parameters):
     """One axis."""
 
-    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
     stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode stow')
     preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
+    filter: Filter = group(Filter)
     controller: str = choice('feedforward', CONTROLLERS, 'of the position loop; may be changed while it runs')
     pid: Pid = group(Pid)
     feedforward: Feedforward = group(Feedforward)
@@ -155,7 +154,6 @@ class AxisParameters(Parameters):
 class Elevation(AxisParameters):
     """Elevation: a lighter axis on its own limits."""
 
-    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
     stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'deck angle of mode stow')
     preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
     feedforward: Feedforward = group(Feedforward, inertia=288.0, friction=45.0)

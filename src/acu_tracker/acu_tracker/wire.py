@@ -135,7 +135,8 @@ def say(o, stamp, command, estimate, reference, filtered):
         # In the order of messages.FILTER.
         numbers = filtered.position[10 * i:]
         numbers[0], numbers[1], numbers[2] = o.innovation[i], o.rate_innovation[i], o.nis[i]
-        numbers[3], numbers[4], numbers[5] = o.sigma[i], o.rate_sigma[i], o.correlation[i]
+        numbers[3], numbers[4] = math.sqrt(o.covariance[i, 0]), math.sqrt(o.covariance[i, 2])
+        numbers[5] = o.covariance[i, 1] / (numbers[3] * numbers[4])
         for model in range(4):
             numbers[6 + model] = o.probability[i, model]
 

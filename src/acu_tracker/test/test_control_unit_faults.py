@@ -59,6 +59,7 @@ def test_outlier_is_gated(Rig):
     rig.run(1.0)
     rig.step(cross_elevation=0.3)
     assert rig.invalid == {'error_gated'} and rig.outputs['nis'][0, 0] > 25.0
+    assert rig.outputs['gated'] == 1
     assert np.abs(rig.run(0.5)[:, 2:]).max() < 1e-5
 
 

@@ -88,7 +88,10 @@ def test_loss_without_a_program_ends_in_standby(Rig):
     rig = Rig(Rig.moving, initial_mode='autotrack', **Rig.QUICK, **{'tracker.coast_time': 0.5})
     rig.run(2.0)
     rig.receiver_on = False
-    rows = rig.run(1.0)
+    known = rig.outputs['covariance'].copy()
+    rig.run(0.4)
+    assert rig.outputs['coasting'] and (rig.outputs['covariance'][..., [0, 2]] > 2 * known[..., [0, 2]]).all()
+    rows = rig.run(0.6)
     assert (rig.mode, rig.reason) == ('standby', 'signal lost')
     assert not np.any(rows[-1, :2])
     rig.receiver_on = True

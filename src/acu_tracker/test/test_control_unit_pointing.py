@@ -54,9 +54,8 @@ def test_error_between_two_encoder_stamps(Rig):
 
 def test_azimuth_is_as_much_noisier_as_cross_elevation_is_shorter(Rig):
     rig = Rig(target=lambda t: (0.5, 1.2), at=(0.5, 1.2))
-    rig.step()
-    t = rig.state['tracker'][0]
-    assert t['azimuth']['p11'] == pytest.approx(t['elevation']['p11'] / math.cos(1.2)**2, rel=1e-9)
+    azimuth, elevation = rig.step()['covariance'][:, 0]
+    assert azimuth == pytest.approx(elevation / math.cos(1.2)**2, rel=1e-9)
 
 
 def test_cross_elevation_becomes_azimuth(Rig):
@@ -121,6 +120,21 @@ def test_noise_in_is_less_noise_out(Rig):
     errors = rig.run(20.0)[1000:, 2:]
     assert np.sqrt(np.mean(errors**2)) < 0.4 * 5e-4
     assert np.abs(rig.outputs['nis']).max() < 25.0
+
+
+def test_filter_is_changed_while_it_tracks(Rig):
+    """The step of a change is like any other: its rate command moves by no more than the noise has moved it before."""
+    rig = Rig(Rig.moving, initial_mode='autotrack', sigma=5e-4, **Rig.QUICK, **{'tracker.receiver.sigma_floor': 5e-4})
+    rows = rig.run(10.0)
+    for kind in ('imm', 'alpha_beta', 'singer', 'imm'):
+        steps = np.abs(np.diff(rows[-400:, :2], axis=0))
+        rig.put(**{'azimuth.filter.kind': kind, 'elevation.filter.kind': kind})
+        assert (np.abs(rig.step()['rate'] - rows[-1, :2]) <= steps.max(axis=0)).all()
+        rows = rig.run(3.0)
+        assert np.abs(rows[:, 2:]).max() < 2 * 5e-4
+        assert rig.mode == 'autotrack' and rig.outputs['gated'] == 0
+    probability = rig.outputs['probability'][0]
+    assert np.isnan(probability[:, 2]).all() and np.nansum(probability) == pytest.approx(2.0)
 
 
 def test_program_takes_the_turn_that_holds_the_whole_pass(Rig):

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import expm
 
-from acu_tracker import motion_models, tracker
+from acu_tracker import motion_models
 
 CASES = [(0.1, 0.01), (0.5, 0.005), (0.5, 0.0999), (0.7, 0.3), (2.0, 0.24999), (2.0, 0.25001), (5.0, 0.4), (1.0, 3.0)]
 
@@ -22,6 +22,14 @@ def van_loan(alpha, T):
     phi = block[3:, 3:].T
     S = np.linalg.inv(S)
     return S @ phi @ np.linalg.inv(S), S @ (phi @ block[:3, 3:]) @ S.T * T**5
+
+
+def model(kind, **values):
+    m = np.zeros(1, motion_models.MODEL)
+    m['kind'] = motion_models.MODELS.index(kind)
+    for name, value in values.items():
+        m[name] = value
+    return m[0]
 
 
 def symmetric(q11, q12, q13, q22, q23, q33):
@@ -61,18 +69,36 @@ def test_noise_stays_definite_for_small_alpha_t(alpha, T):
 
 
 @pytest.mark.parametrize('alpha, T', CASES)
-def test_prediction_is_phi_x_plus_u_abar(alpha, T):
-    """tracker.predict takes Phi1 X for Phi X + U abar, abar the estimated acceleration (paper 000, eq. 2, 6)."""
+def test_prediction_of_current_statistical_is_phi_x_plus_u_abar(alpha, T):
+    """Phi1 X for Phi X + U abar, abar the estimated acceleration (paper 000, eq. 2, 6)."""
     X = np.array([0.3, -0.2, 0.15])
-    axis = np.zeros(1, tracker.AXIS)
-    axis['x1'], axis['x2'], axis['x3'] = X
     f13, f23, f33 = motion_models.fading(alpha, T)
     Phi = np.array([[1, T, f13], [0, 1, f23], [0, 0, f33]])
     # u1 with the inner 1/alpha that the print lacks; rise = 1 - e^(-alpha T).
     rise = -math.expm1(-alpha * T)
     U = np.array([(-T + alpha * T * T / 2 + rise / alpha) / alpha, T - rise / alpha, rise])
-    predicted = tracker.predict(axis[0], T, alpha, 1.0, 0.3)[:3]
-    np.testing.assert_allclose(predicted, Phi @ X + U * X[2], rtol=1e-12)
+    m = model('current_statistical', alpha=alpha, a_max=1.0)
+    np.testing.assert_allclose(motion_models.predicted(m, *X, T), Phi @ X + U * X[2], rtol=1e-12)
+
+
+CONTINUOUS = {'cv': ([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [0, 0.3, 0]),
+              'ca': ([[0, 1, 0], [0, 0, 1], [0, 0, 0]], [0, 0, 0.3]),
+              'singer': ([[0, 1, 0], [0, 0, 1], [0, 0, -0.7]], [0, 0, math.sqrt(2 * 0.7) * 0.2])}
+
+
+@pytest.mark.parametrize('kind', CONTINUOUS)
+@pytest.mark.parametrize('T', [0.005, 0.3, 2.0])
+def test_every_model_against_van_loan(kind, T):
+    """dX = A X dt + g dw: transition and Q by one matrix exponential; the third state of cv is 0 at once."""
+    A, g = np.array(CONTINUOUS[kind][0], float), np.array(CONTINUOUS[kind][1])
+    block = expm(np.block([[-A, np.outer(g, g)], [np.zeros((3, 3)), A.T]]) * T)
+    phi = block[3:, 3:].T
+    m = model(kind, noise=0.3, alpha=0.7, sigma=0.2)
+    f13, f23, f33 = motion_models.transition(m, T)
+    np.testing.assert_allclose([[1, T, f13], [0, 1, f23]], phi[:2], rtol=1e-12, atol=1e-15)
+    assert f33 == (0.0 if kind == 'cv' else pytest.approx(phi[2, 2], rel=1e-12))
+    np.testing.assert_allclose(symmetric(*motion_models.process_noise(m, 5.0, T)), phi @ block[:3, 3:], rtol=1e-7,
+                               atol=1e-18)
 
 
 def test_modified_rayleigh_variance_by_quadrature():

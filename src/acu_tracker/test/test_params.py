@@ -31,5 +31,6 @@ def test_what_does_not_go_together_is_refused(values, line):
 
 
 def test_constants_hold_the_parameters():
-    c = control_unit.constants(build(AcuParameters, {'azimuth.a_max': 0.123, 'command_delay': 0.01}))
-    assert c['p']['azimuth']['a_max'] == 0.123 and c['ahead'] == 0.0125
+    c = control_unit.constants(build(AcuParameters, {'azimuth.filter.current_statistical.a_max': 0.123,
+                                                       'command_delay': 0.01}))
+    assert c['tracker']['azimuth']['models'][0, 0]['a_max'] == 0.123 and c['ahead'] == 0.0125

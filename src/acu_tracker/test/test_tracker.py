@@ -1,166 +1,158 @@
 import math
 
-import numba
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
-from acu_tracker import tracker
+from acu_tracker import axis_filter, tracker
+from acu_tracker.axis_filter import KINDS
+from acu_tracker.filter_params import Filter
 from acu_tracker.params import TrackerParameters
-from pedestal_common.parameters import record
+from pedestal_common.parameters import build, record
 
 DEG = math.pi / 180
 T = 0.01
 SIGMA = 0.03 * DEG
+RATE_SIGMA = 0.1 * DEG
+NONE = math.nan
 
 
-@numba.njit(error_model='numpy')
-def filtered(state, constants, a_max, stamps, measured, R, estimates, nis):
-    for k in range(len(stamps)):
-        t = state[0]
-        _, _, _, nis[k], _ = tracker.observe(t, constants[0], a_max, a_max, stamps[k], measured[k], 0.0, R, R)
-        estimates[k, 0], estimates[k, 1], estimates[k, 2] = t.azimuth.x1, t.azimuth.x2, t.azimuth.x3
+class Target:
+    """A tracker of both axes with the same filter; errors of variance SIGMA^2."""
 
+    def __init__(self, tracker_params=None, **filter_params):
+        self.params = TrackerParameters(**(tracker_params or {}))
+        self.p, self.state = record(self.params)[0], np.zeros(1, tracker.TRACKER)
+        self.put(**filter_params)
 
-def track(stamps, measured, a_max, sigma=SIGMA, **changes):
-    constants = record(TrackerParameters(**{'gate': 1e6, **changes}))
-    estimates, nis = np.empty((len(stamps), 3)), np.empty(len(stamps))
-    state = np.zeros(1, tracker.TRACKER)
-    filtered(state, constants, a_max, stamps, measured, sigma * sigma, estimates, nis)
-    return estimates, nis, state[0]
+    def put(self, **filter_params):
+        params = build(Filter, {'current_statistical.a_max': 0.02, **filter_params})
+        self.c = tracker.constants(self.params, params, params)[0]
+        tracker.adopt(self.state[0], self.c)
 
+    def observe(self, stamp, azimuth, elevation=0.0, azimuth_rate=NONE, elevation_rate=NONE):
+        """(outcome, nu azimuth, elevation, of their rates, nu' S^-1 nu of azimuth, elevation)."""
+        return tracker.observe(self.state[0], self.p, self.c, stamp, azimuth, elevation, SIGMA**2, SIGMA**2,
+                               azimuth_rate, elevation_rate, RATE_SIGMA**2, RATE_SIGMA**2)
 
-def flyby(distance, speed=15.0, seconds=60.0):
-    t = np.arange(0.0, seconds, T)
-    x = speed * (t - seconds / 2) / distance
-    peak = 0.375 * math.sqrt(3) * (speed / distance)**2
-    return t, np.arctan(x), speed / distance / (1 + x * x), peak
+    def outlook(self, stamp):
+        return np.array(tracker.outlook(self.state[0], self.c, stamp))
 
+    def variances(self, T=0.0):
+        return axis_filter.variances(self.state[0]['azimuth'], self.c['azimuth'], T)
 
-def s_turns(rate=3.5 * DEG, reversal=1.0, uniform=10.0, seconds=60.0):
-    """Constant rate up and down, half-cosine reversals: peak acceleration pi * rate / reversal."""
-    t = np.arange(0.0, seconds, T)
-    half = uniform + reversal
-    phase, sign = t % half, 1 - 2 * (np.floor(t / half) % 2)
-    turning = np.clip((phase - uniform) / reversal, 0, 1)
-    rates = sign * rate * np.cos(np.pi * turning)
-    return t, np.concatenate(([0.0], np.cumsum(0.5 * (rates[1:] + rates[:-1]) * T))), rates
-
-
-def reductions(distance, runs=8):
-    t, angle, rate, peak = flyby(distance)
-    later = t > 3.0
-    squares = []
-    for seed in range(runs):
-        noise = np.random.default_rng(seed).normal(0, SIGMA, len(t))
-        estimates, _, _ = track(t, angle + noise, 1.2 * peak)
-        squares.append(np.mean((estimates[later, 0] - angle[later])**2))
-    return SIGMA / math.sqrt(np.mean(squares))
-
-
-@pytest.mark.parametrize('distance, least', [(500.0, 6.5), (60.0, 2.8)])
-def test_noise_reduction_on_the_flyby(distance, least):
-    reduction = reductions(distance)
-    print(f'flyby at {distance:g} m, 0.03 deg white at 100 Hz: noise reduced {reduction:.2f} times')
-    assert reduction >= least
-
-
-def test_target_beyond_a_max_locks_the_filter_and_the_floor_cures_it():
-    t, angle, _ = s_turns()
-    noisy = angle + np.random.default_rng(1).normal(0, SIGMA, len(t))
-    locked, _, _ = track(t, noisy, 3.0 * DEG, alpha=0.5, sigma_a_floor=0.0)
-    floored, _, _ = track(t, noisy, 3.0 * DEG, alpha=0.5)
-    later = t > 3.0
-    assert np.abs(locked[later, 0] - angle[later]).max() > 1.0 * DEG
-    assert np.sqrt(np.mean((floored[later, 0] - angle[later])**2)) < 0.035 * DEG
-
-
-def test_innovations_are_white_and_of_unit_variance_when_the_model_fits():
-    rng = np.random.default_rng(5)
-    t = np.arange(0.0, 400.0, T)
-    a_max, alpha = 0.02, 0.5
-    # A Singer process, its variance the least the filter assumes (sigma_a is 0.3 to 0.52 a_max).
-    e = math.exp(-alpha * T)
-    a = np.empty(len(t))
-    a[0] = 0.0
-    drive = 0.3 * a_max * math.sqrt(1 - e * e) * rng.standard_normal(len(t))
-    for k in range(1, len(t)):
-        a[k] = e * a[k - 1] + drive[k]
-    angle = np.cumsum(np.cumsum(a) * T) * T
-    _, nis, _ = track(t, angle + rng.normal(0, SIGMA, len(t)), a_max, alpha=alpha)
-    assert np.mean(nis[500:]) == pytest.approx(1.0, abs=0.03)
-
-
-def test_quadratic_motion_is_followed_without_bias():
-    t = np.arange(0.0, 20.0, T)
-    estimates, _, _ = track(t, 0.3 + 0.02 * t + 0.5 * 0.004 * t * t, 0.02)
-    np.testing.assert_allclose(estimates[-1], [0.3 + 0.02 * t[-1] + 0.002 * t[-1]**2, 0.02 + 0.004 * t[-1], 0.004],
-                               rtol=1e-6)
+    def locked(self, overdue=0.0):
+        return bool(tracker.locked(self.state[0], self.p, overdue))
 
 
 def test_azimuth_is_unwrapped_against_the_estimate():
+    target = Target()
     t = np.arange(0.0, 20.0, T)
     angle = 3.0 + 0.05 * t
-    estimates, nis, _ = track(t, (angle + math.pi) % (2 * math.pi) - math.pi, 0.02, gate=25.0)
-    assert estimates[-1, 0] == pytest.approx(angle[-1], abs=1e-6)
-    assert nis.max() < 100.0
+    outcomes = [target.observe(stamp, (y + math.pi) % (2 * math.pi) - math.pi)[0] for stamp, y in zip(t, angle)]
+    assert outcomes == [tracker.STARTED] + [tracker.BELIEVED] * (len(t) - 1)
+    assert target.outlook(t[-1])[0] == pytest.approx(angle[-1], abs=1e-6)
 
 
-def observe(state, stamp, azimuth, R=SIGMA**2, **changes):
-    constants = record(TrackerParameters(**changes))
-    return tracker.observe(state[0], constants[0], 0.02, 0.02, stamp, azimuth, 0.0, R, R)
-
-
-def test_stale_gated_and_restarted_measurements():
-    state = np.zeros(1, tracker.TRACKER)
+def test_stale_gated_counted_and_restarted_measurements():
+    target = Target()
     for k in range(300):
-        observe(state, k * T, 0.1)
-    before = state.copy()
-    assert observe(state, 299 * T, 0.1)[0] == tracker.STALE
-    assert observe(state, 1.0, 0.1)[0] == tracker.STALE
-    np.testing.assert_array_equal(state, before)
+        target.observe(k * T, 0.1)
+    before = target.state.copy()
+    assert target.observe(299 * T, 0.1)[0] == tracker.STALE
+    assert target.observe(1.0, 0.1)[0] == tracker.STALE
+    np.testing.assert_array_equal(target.state, before)
 
-    outcome, nu, _, nis, _ = observe(state, 300 * T, 0.2)
+    outcome, nu, _, _, _, nis, _ = target.observe(300 * T, 0.2)
     assert outcome == tracker.GATED and nu == pytest.approx(0.1, abs=1e-9) and nis > 25.0
-    assert state['azimuth'] == before['azimuth'] and state['in_a_row'] == 0
+    for name in ('x', 'p', 'mu'):
+        np.testing.assert_array_equal(target.state['azimuth'][name], before['azimuth'][name])
+    assert target.state['in_a_row'] == 0 and target.state['gated'] == 1
 
     for k in range(301, 301 + 18):
-        assert observe(state, k * T, 0.2)[0] == tracker.GATED
-    assert observe(state, 320 * T, 0.2)[0] == tracker.STARTED
-    assert state['azimuth']['x1'] == 0.2
+        assert target.observe(k * T, 0.2)[0] == tracker.GATED
+    assert target.observe(320 * T, 0.2)[0] == tracker.STARTED
+    assert target.outlook(320 * T)[0] == 0.2 and target.state['gated'] == 20
 
-    assert observe(state, 320 * T + 0.9, 0.2)[0] == tracker.BELIEVED
-    assert observe(state, 320 * T + 2.0, 0.7)[0] == tracker.STARTED
-    assert state['azimuth']['x1'] == pytest.approx(0.7)
+    assert target.observe(320 * T + 0.9, 0.2)[0] == tracker.BELIEVED
+    assert target.observe(320 * T + 2.0, 0.7)[0] == tracker.STARTED
+    assert target.outlook(320 * T + 2.0)[0] == pytest.approx(0.7)
+    assert target.state['gated'] == 20
 
 
 def test_only_refusals_in_a_row_restart():
-    state = np.zeros(1, tracker.TRACKER)
-    outcomes = [observe(state, k * T, 0.1 if k < 300 or k % 15 == 0 else 0.2)[0] for k in range(400)]
+    target = Target()
+    outcomes = [target.observe(k * T, 0.1 if k < 300 or k % 15 == 0 else 0.2)[0] for k in range(400)]
     assert outcomes[0] == tracker.STARTED and tracker.STARTED not in outcomes[1:]
     assert outcomes[301:315] == [tracker.GATED] * 14 and outcomes[315] == tracker.BELIEVED
 
 
-def test_lock_needs_a_row_of_fresh_errors_and_convergence():
-    constants = record(TrackerParameters(lock_count=50))
-    state = np.zeros(1, tracker.TRACKER)
+@pytest.mark.parametrize('gate', [1.0, 9.0, 25.0, 600.0])
+@pytest.mark.parametrize('freedom', [3, 4])
+def test_gate_with_rates_is_as_rarely_exceeded(gate, freedom):
+    limit = tracker.constants(TrackerParameters(gate=gate), Filter(), Filter())['gates'][0, freedom - 2]
+    assert chi2.logsf(limit, freedom) == pytest.approx(-gate / 2, rel=1e-9)
+
+
+def test_rates_are_gated_together_with_the_angles():
+    target = Target(rate_measurement=True)
+    for k in range(300):
+        assert target.observe(k * T, 0.1 + 0.01 * k * T, 0.0, 0.01, 0.0)[0] != tracker.GATED
+    # Without a rate (the sensor is late) the angles alone are believed.
+    assert target.observe(3.0, 0.13, 0.0)[0] == tracker.BELIEVED
+    outcome, _, _, nu_rate, _, _, _ = target.observe(3.01, 0.1301, 0.0, 0.01 + 8 * RATE_SIGMA, 0.0)
+    assert outcome == tracker.GATED and nu_rate == pytest.approx(8 * RATE_SIGMA, rel=1e-2)
+    # A filter that is not to use the rate does not look at it.
+    target.put(rate_measurement=False)
+    assert target.observe(3.02, 0.1302, 0.0, 1.0, 0.0)[0] == tracker.BELIEVED
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_lock_needs_a_row_of_fresh_errors_and_convergence(kind):
+    target = Target({'lock_count': 50}, kind=kind)
     locks = []
-    for k in range(200):
-        observe(state, k * T, 0.1)
-        locks.append(bool(tracker.locked(state[0], constants[0], 0.0)))
+    for k in range(300):
+        target.observe(k * T, 0.1)
+        locks.append(target.locked())
     assert not any(locks[:49]) and all(locks[60:])
-    assert not tracker.locked(state[0], constants[0], 0.11)
-    observe(state, 199 * T + 0.5, 0.1)
-    assert not tracker.locked(state[0], constants[0], 0.0)
+    assert not target.locked(overdue=0.11)
+    target.observe(299 * T + 0.5, 0.1)
+    assert not target.locked()
 
 
-def test_outlook_coasts_with_fading_acceleration():
-    axis = np.zeros(1, tracker.AXIS)
-    axis['x1'], axis['x2'], axis['x3'] = 0.1, 0.2, 0.3
-    alpha, t = 0.5, np.linspace(0, 3, 30001)
-    a = 0.3 * np.exp(-alpha * t)
-    v = 0.2 + np.concatenate(([0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))))
-    p = 0.1 + np.concatenate(([0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))))
-    np.testing.assert_allclose(tracker.outlook(axis[0], 3.0, alpha), (p[-1], v[-1], a[-1]), rtol=1e-8)
+def moving(t):
+    return 0.3 + 0.02 * t + 0.001 * t * t, 0.02 + 0.002 * t
+
+
+@pytest.mark.parametrize('before', KINDS)
+def test_filter_changes_without_a_bump(before):
+    """Into every other kind and back, in the middle of an accelerated track: angle, rate and covariance go on as they
+    were, no error is gated, and the error stays within five of the standard deviations the filter claims."""
+    rng = np.random.default_rng(4)
+    target, worst = Target(kind=before), 0.0
+    others = [kind for after in KINDS for kind in (after, before)]
+    for k in range(1, 200 * len(others)):
+        angle, rate = moving(k * T)
+        target.observe(k * T, angle + SIGMA * rng.standard_normal())
+        if k > 200:
+            worst = max(worst, abs(target.outlook(k * T)[0] - angle))
+        if k % 200 == 0:
+            was, known = target.outlook(k * T), target.variances()
+            target.put(kind=others[k // 200 - 1])
+            np.testing.assert_allclose(target.outlook(k * T)[:2], was[:2], rtol=1e-14)
+            np.testing.assert_allclose(target.variances(), known, rtol=1e-9)
+    assert worst < 5.0
+    assert target.state['gated'] == 0
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_covariance_grows_in_a_coast(kind):
+    target = Target(kind=kind)
+    for k in range(500):
+        target.observe(k * T, 0.1)
+    grown = np.array([target.variances(T) for T in (0.0, 0.1, 0.5, 1.0, 3.0)])
+    assert (np.diff(grown[:, 0]) > 0).all()
+    assert (np.diff(grown[:, 2]) >= (0 if kind == 'alpha_beta' else 1e-30)).all()
 
 
 def test_receiver_law():

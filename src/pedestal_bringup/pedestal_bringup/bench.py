@@ -1,5 +1,6 @@
 """`pedestal bench`: ratios measured in one run on this machine, each against its floor."""
 import json
+import math
 import os
 import pathlib
 import statistics
@@ -11,15 +12,19 @@ import time
 import llvmlite.binding
 import numba
 import numpy as np
+from filterpy.kalman import IMMEstimator, KalmanFilter
 from rich.console import Console
 from rich.table import Table
 
+from acu_tracker import axis_filter
+from acu_tracker.filter_params import Filter
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup import bag, bare_ring, closed_loop, graph, recompute, replay, scenario, solve_ivp_axis
 from pedestal_bringup.verify import verify
 from pedestal_common import messages
 from pedestal_common.compiled import compiled
+from pedestal_common.parameters import build
 
 ROUNDS = 3
 RING_STEPS = 3000
@@ -120,6 +125,60 @@ def _drive_steps(state, constants, inputs, outputs, count):
         drive_unit.step(state, constants, inputs, outputs)
 
 
+FILTER_STEPS = 20_000
+FILTERPY_STEPS = 500
+FILTER_PERIOD = 0.01
+
+
+def filter_step(kind):
+    """Time [us] of one prediction and correction of an axis_filter kind on a noisy ramp."""
+    constants = axis_filter.constants(build(Filter, {'kind': kind}))
+    t = FILTER_PERIOD * np.arange(FILTER_STEPS)
+    y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
+    variance, state = np.full(FILTER_STEPS, 2.5e-7), np.zeros(1, axis_filter.FILTER)
+    _filter_steps(state, constants, t, y, variance)
+    return best_of(lambda: _filter_steps(state, constants, t, y, variance)) / FILTER_STEPS * 1e6
+
+
+@compiled
+def _filter_steps(state, constants, t, y, R):
+    f, c = state[0], constants[0]
+    axis_filter.start(f, c, y[0], R[0], 0.1)
+    for k in range(1, len(y)):
+        axis_filter.predict(f, c, t[k] - t[k - 1])
+        axis_filter.correct(f, c, y[k], R[k], math.nan, math.nan)
+
+
+def filterpy_steps():
+    """Times [us] of predict and update of filterpy's KalmanFilter of three states and IMMEstimator of three such."""
+    def three():
+        made = KalmanFilter(3, 1)
+        made.F = np.array([[1.0, FILTER_PERIOD, 0.5 * FILTER_PERIOD**2], [0.0, 1.0, FILTER_PERIOD], [0.0, 0.0, 1.0]])
+        made.H, made.R, made.Q = np.array([[1.0, 0.0, 0.0]]), np.array([[2.5e-7]]), 1e-6 * np.eye(3)
+        return made
+
+    def run(estimator):
+        for _ in range(FILTERPY_STEPS):
+            estimator.predict()
+            estimator.update(np.zeros((1, 1)))
+
+    chain = 0.001 + 0.997 * np.eye(3)
+    estimators = three(), IMMEstimator([three() for _ in range(3)], np.full(3, 1 / 3), chain)
+    return [best_of(lambda made=made: run(made), 3) / FILTERPY_STEPS * 1e6 for made in estimators]
+
+
+def filter_rows():
+    """One step of one filter and of three interacting ones, against filterpy's in the same run."""
+    rows = []
+    for metric, kind, target, theirs in zip(('kalman', 'imm3'), ('current_statistical', 'imm'), ('<= 2', '<= 10'),
+                                            filterpy_steps()):
+        ours = filter_step(kind)
+        rows += [row('core', f'{metric}_step_us', ours, 'us', target),
+                 row('filterpy', f'{metric}_step_us', theirs, 'us'),
+                 row('filterpy', f'{metric}_ratio', theirs / ours, '')]
+    return rows
+
+
 def bench_core():
     """The compiled core against its targets and against the same axis through scipy."""
     params = AduParameters(initial_elevation=0.7)
@@ -141,7 +200,7 @@ def bench_core():
     rows = [row('core', 'substep_ns', substep, 'ns', '<= 45'),
             row('core', 'realtime_factor', factor, '', '>= 200'),
             row('solve_ivp', 'substep_ns', scipy_substep, 'ns'),
-            row('solve_ivp', 'ratio', scipy_substep / substep, '')]
+            row('solve_ivp', 'ratio', scipy_substep / substep, ''), *filter_rows()]
     show(f'compiled core, one core of {llvmlite.binding.get_host_cpu_name()}, numba {numba.__version__}', rows)
     return rows
 

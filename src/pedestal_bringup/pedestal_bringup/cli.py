@@ -197,7 +197,7 @@ def _check_json(path):
 
 
 def _run(options):
-    from pedestal_bringup import graph, results, scenario
+    from pedestal_bringup import consistency, graph, results, scenario
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
     chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
@@ -210,7 +210,11 @@ def _run(options):
             print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
             return EXIT_STOPPED
     recording = read(bag)
-    of_beams = [results.summary(results.tracking(recording.view(prefix[:-1]))) for prefix in chosen.prefixes]
+    of_beams = []
+    for prefix in chosen.prefixes:
+        beam = recording.view(prefix[:-1])
+        tracked = results.tracking(beam)
+        of_beams.append({**results.summary(tracked), **consistency.summary(consistency.read(beam, tracked))})
     whole = {'lost_steps': (float(outcome.drive['lost_steps']), ''),
              'realtime_factor': (outcome.drive['realtime_factor'], ''),
              'messages': (float(outcome.recorder['messages']), '')}

@@ -20,11 +20,11 @@ RESULT = np.dtype([('t', 'f8'), ('position', 'f8', 2), ('load_position', 'f8', 2
                    ('motor_torque', 'f8', (2, 2)), ('motor_velocity', 'f8', (2, 2)), ('bias', 'f8', 2),
                    ('rate', 'f8', 2), ('feedforward', 'f8', 2), ('measured', 'f8', 2), ('true_error', 'f8', 2),
                    ('estimate', 'f8', (2, 3)), ('reference', 'f8', (2, 3)), ('mode', 'i8'),
-                   ('innovation', 'f8', 2), ('rate_innovation', 'f8', 2), ('nis', 'f8', 2), ('sigma', 'f8', 2),
-                   ('rate_sigma', 'f8', 2), ('correlation', 'f8', 2), ('probability', 'f8', (2, 4))], align=True)
+                   ('innovation', 'f8', 2), ('rate_innovation', 'f8', 2), ('nis', 'f8', 2),
+                   ('covariance', 'f8', (2, 3)), ('probability', 'f8', (2, 4))], align=True)
 """One step t_k: encoders and true load angle [rad], torque on the load and of the motors [Nm], motor speeds [rad/s],
 bias torque [Nm], the ACU's rate command [rad/s] and feed-forward torque [Nm], the receiver's error and the true one
-(cross-elevation, elevation) [rad]; from `innovation` on what acu/filter tells."""
+(cross-elevation, elevation) [rad]; innovations, NIS, covariance and probabilities of control_unit.OUTPUTS."""
 
 
 @dataclasses.dataclass
@@ -222,8 +222,8 @@ def _record(row, inputs, acu, error):
         row.rate[i], row.feedforward[i] = acu.rate[i], acu.torque[i]
         for j in range(3):
             row.estimate[i, j], row.reference[i, j] = acu.estimate[i, j], acu.reference[i, j]
+            row.covariance[i, j] = acu.covariance[i, j]
         row.innovation[i], row.rate_innovation[i], row.nis[i] = acu.innovation[i], acu.rate_innovation[i], acu.nis[i]
-        row.sigma[i], row.rate_sigma[i], row.correlation[i] = acu.sigma[i], acu.rate_sigma[i], acu.correlation[i]
         for j in range(4):
             row.probability[i, j] = acu.probability[i, j]
 

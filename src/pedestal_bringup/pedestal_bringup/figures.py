@@ -39,7 +39,8 @@ class Recording:
     """What the figures draw. run: results.Tracking, None without truth; motors, receiver: tables, None when empty.
 
     modes: [(start, stop [s], mode)]; statuses: [(stamp [s], node, level, message)]; no_truth: why run is None;
-    raw_angles (n, 2): earth angles of the target as measured [rad]; beamwidth [rad], NaN when the bag does not say.
+    raw_angles (n, 2): earth angles of the target as measured [rad]; beamwidth [rad], NaN when the bag does not say;
+    filter: consistency.Consistency, None without acu/filter.
     """
     run: typing.Any
     no_truth: str
@@ -49,6 +50,7 @@ class Recording:
     modes: list
     statuses: list
     beamwidth: float
+    filter: typing.Any = None
 
     def lacks(self, need):
         """Why a figure that needs this cannot be drawn; '' when it can."""
@@ -58,6 +60,11 @@ class Recording:
             return '' if self.motors else 'no message of adu/motor_states'
         if need == 'modes':
             return '' if self.modes or self.statuses else 'no message of acu/mode or diagnostics'
+        if need == 'filter':
+            return '' if self.filter is not None else 'no message of acu/filter'
+        if need == 'bank':
+            return '' if self.filter is None or np.isfinite(self.filter.probability).sum(axis=2).max() > 1 else \
+                'one model of motion alone'
         if not self.receiver:
             return 'no message of tracking_receiver/angle_error'
         return 'the receiver never locked' if need == 'lock' and not np.isfinite(self.receiver['x']).any() else ''
@@ -136,12 +143,12 @@ def _slowest(run, angles):
     return start, start + ZOOM
 
 
-def _panels(rows, columns=1, height=1.75, **options):
+def new_panels(rows, columns=1, height=1.75, **options):
     figure = Figure(figsize=(WIDTH, 0.5 + height * rows), layout='constrained')
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def _line(axes, t, y, window=None, **options):
+def draw_line(axes, t, y, window=None, **options):
     if window is not None:
         inside = (t >= window[0]) & (t <= window[1])
         t, y = t[inside], y[inside]
@@ -150,7 +157,7 @@ def _line(axes, t, y, window=None, **options):
         axes.set_xlim(t[0], t[-1])
 
 
-def _legend(figure, axes, **options):
+def outside_legend(figure, axes, **options):
     figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4, **options)
 
 
@@ -173,23 +180,23 @@ AXES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
 def _draw_errors(axes, recording, i, window=None):
     run = recording.run
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
-    _line(axes, run.t, raw, window, color=RAW, linewidth=0.7, label='receiver, before the filter')
+    draw_line(axes, run.t, raw, window, color=RAW, linewidth=0.7, label='receiver, before the filter')
     if window is not None:
         truth = np.degrees((run.cross_elevation, run.elevation_error)[i])
-        _line(axes, run.t, truth, window, color=TRUTH, label='truth')
+        draw_line(axes, run.t, truth, window, color=TRUTH, label='truth')
     else:
         _scale_to(axes, run.t, raw, run.tracking)
-    _line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
+    draw_line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
     axes.set_ylabel('error [deg]')
     axes.set_title(AXES[i][0])
 
 
 def _errors(recording, window=None):
-    figure, panels = _panels(2, sharex=True)
+    figure, panels = new_panels(2, sharex=True)
     for i in range(2):
         _draw_errors(panels[i, 0], recording, i, window)
     panels[1, 0].set_xlabel('time [s]')
-    _legend(figure, panels[0, 0])
+    outside_legend(figure, panels[0, 0])
     return figure
 
 
@@ -203,21 +210,21 @@ def error_zoom(recording):
 
 def _angles(recording, zoomed):
     run = recording.run
-    figure, panels = _panels(2, sharex=True)
+    figure, panels = new_panels(2, sharex=True)
     truth = np.column_stack([_continuous(run.target_earth[:, i]) for i in range(2)])
     window = _slowest(run, truth) if zoomed else None
     for i, axes in enumerate(panels[:, 0]):
         beam = _continuous(run.beam_earth[:, i], truth[:, i])
         scale = np.cos(run.beam_earth[:, 1] + run.filtered[:, 1]) if i == 0 else 1.0
         filtered = beam + np.degrees(run.filtered[:, i] / scale)
-        _line(axes, run.t, _continuous(recording.raw_angles[:, i], truth[:, i]), window, color=RAW,
+        draw_line(axes, run.t, _continuous(recording.raw_angles[:, i], truth[:, i]), window, color=RAW,
               linewidth=0.8 if zoomed else 2.5, label='measured, before the filter')
         if zoomed:
-            _line(axes, run.t, truth[:, i], window, color=TRUTH, label='truth')
-        _line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
+            draw_line(axes, run.t, truth[:, i], window, color=TRUTH, label='truth')
+        draw_line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
         axes.set_ylabel(f'{AXES[i][1]} [deg]')
     axes.set_xlabel('time [s]')
-    _legend(figure, panels[0, 0])
+    outside_legend(figure, panels[0, 0])
     return figure
 
 
@@ -231,14 +238,14 @@ def angle_zoom(recording):
 
 def azimuth(recording):
     run = recording.run
-    figure, panels = _panels(1, height=2.4)
+    figure, panels = new_panels(1, height=2.4)
     axes = panels[0, 0]
     beam = _continuous(run.beam_earth[:, 0])
-    _line(axes, run.t, _continuous(run.target_earth[:, 0], beam), color=TRUTH, linewidth=2.5, label='target')
-    _line(axes, run.t, beam, color=FILTERED, label='antenna')
+    draw_line(axes, run.t, _continuous(run.target_earth[:, 0], beam), color=TRUTH, linewidth=2.5, label='target')
+    draw_line(axes, run.t, beam, color=FILTERED, label='antenna')
     axes.set_xlabel('time [s]')
     axes.set_ylabel('azimuth [deg]')
-    _legend(figure, axes)
+    outside_legend(figure, axes)
     return figure
 
 
@@ -252,7 +259,7 @@ def _shade_modes(axes, recording):
 def _draw_pointing(axes, recording, i):
     run = recording.run
     error = np.degrees((run.cross_elevation, run.elevation_error)[i])
-    _line(axes, run.t, error, color=TRUTH, linewidth=0.8)
+    draw_line(axes, run.t, error, color=TRUTH, linewidth=0.8)
     _scale_to(axes, run.t, error, run.tracking)
     if np.isfinite(recording.beamwidth):
         for sign in (-0.1, 0.1):
@@ -263,12 +270,12 @@ def _draw_pointing(axes, recording, i):
 
 def pointing(recording):
     run = recording.run
-    figure, panels = _panels(3, sharex=True)
+    figure, panels = new_panels(3, sharex=True)
     off = np.degrees(np.hypot(run.cross_elevation, run.elevation_error))
     for i in range(2):
         _draw_pointing(panels[i, 0], recording, i)
     axes = panels[2, 0]
-    _line(axes, run.t, np.where(off > 0.0, off, np.nan), color=TRUTH, linewidth=0.8)
+    draw_line(axes, run.t, np.where(off > 0.0, off, np.nan), color=TRUTH, linewidth=0.8)
     axes.set_yscale('log' if np.any(off > 0.0) else 'linear')
     axes.set_title('angle between beam and target, whole run')
     axes.set_ylabel('off axis [deg]')
@@ -290,9 +297,9 @@ def _draw_torques(axes, recording, axis, window=None):
     motors = recording.motors
     first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
     width = 0.7 if window is None else 1.0
-    _line(axes, motors['t'], first, window, color=MOTOR_1, linewidth=width, label='motor 1')
-    _line(axes, motors['t'], second, window, color=MOTOR_2, linewidth=width, label='motor 2')
-    _line(axes, motors['t'], 0.5 * (first - second), window, color=INK, linewidth=0.9, linestyle='--',
+    draw_line(axes, motors['t'], first, window, color=MOTOR_1, linewidth=width, label='motor 1')
+    draw_line(axes, motors['t'], second, window, color=MOTOR_2, linewidth=width, label='motor 2')
+    draw_line(axes, motors['t'], 0.5 * (first - second), window, color=INK, linewidth=0.9, linestyle='--',
           label='bias, half their difference')
     axes.set_ylabel('torque [Nm]')
     axes.set_title(axis)
@@ -305,7 +312,7 @@ def _start(recording):
 
 def torques(recording):
     window = _start(recording)
-    figure, panels = _panels(2, 2, height=2.0, sharex='col', sharey='row', width_ratios=(3, 2))
+    figure, panels = new_panels(2, 2, height=2.0, sharex='col', sharey='row', width_ratios=(3, 2))
     for row, axis in zip(panels, ('azimuth', 'elevation')):
         _draw_torques(row[0], recording, axis)
         _draw_torques(row[1], recording, axis, window)
@@ -313,15 +320,15 @@ def torques(recording):
         row[1].set_ylabel('')
     for axes in panels[1]:
         axes.set_xlabel('time [s]')
-    _legend(figure, panels[0, 0])
+    outside_legend(figure, panels[0, 0])
     return figure
 
 
 def carrier(recording):
     table = recording.receiver
-    figure, panels = _panels(1, height=2.2)
+    figure, panels = new_panels(1, height=2.2)
     axes = panels[0, 0]
-    _line(axes, table['t'], table['z'], color=RAW, linewidth=0.8, label='C/N0')
+    draw_line(axes, table['t'], table['z'], color=RAW, linewidth=0.8, label='C/N0')
     for first, last in spans(np.isfinite(table['x'])):
         axes.axvspan(table['t'][first], table['t'][last], color=LOCKED, alpha=0.15, linewidth=0.0)
     handles, labels = axes.get_legend_handles_labels()
@@ -373,7 +380,7 @@ def timeline(recording):
         stops = [stamp for stamp, _ in own[1:]] + [end]
         rows.append((f'{node} diagnostics', [(start, stop - start, LEVELS[min(level, 3)][1])
                                              for (start, level), stop in zip(own, stops)]))
-    figure, panels = _panels(1, height=0.35 + 0.3 * len(rows))
+    figure, panels = new_panels(1, height=0.35 + 0.3 * len(rows))
     axes = panels[0, 0]
     for i, (_, bars) in enumerate(rows):
         for colour in dict.fromkeys(colour for *_, colour in bars):

@@ -8,7 +8,7 @@ import pathlib
 import numpy as np
 
 from pedestal_bringup import bag as bags
-from pedestal_bringup import figures, results
+from pedestal_bringup import consistency, figures, filter_figures, results
 from pedestal_bringup.verify import verify
 from pedestal_common import topics
 
@@ -58,7 +58,7 @@ def write(bag_path, output=None, png_folder=None, beam='') -> pathlib.Path:
     if png_folder is not None:
         folder = pathlib.Path(png_folder)
         folder.mkdir(parents=True, exist_ok=True)
-        for spec in (*figures.FIGURES, figures.OVERVIEW):
+        for spec in (*figures.FIGURES, *filter_figures.FIGURES, figures.OVERVIEW):
             if not _missing(spec, recording):
                 figures.render(spec, recording, folder / f'{spec.key}.png')
     return output
@@ -111,7 +111,15 @@ def _recording(bag):
     except ValueError:
         beamwidth = math.nan
     return figures.Recording(run, no_truth, raw, motors, _table(bag, 'tracking_receiver/angle_error'), _modes(bag),
-                             statuses, beamwidth)
+                             statuses, beamwidth, _filter(bag, run))
+
+
+def _filter(bag, run):
+    """The consistency.Consistency, None without truth or without its numbers."""
+    try:
+        return consistency.read(bag, run) if run is not None and _table(bag, 'acu/filter') is not None else None
+    except KeyError:
+        return None
 
 
 def _modes(bag):
@@ -170,6 +178,31 @@ def _torques(recording):
              *(_number(results.rms(recording.motors[f'{axis}_motor_{i}.effort']), 'Nm')
                for axis in ('azimuth', 'elevation')),
              ''] for i in (1, 2)] if recording.motors else []
+
+
+def _honesty(found):
+    """The table of the filter's consistency, and a sentence for each axis."""
+    judged = [consistency.axis(found, i) for i in range(2)]
+
+    def row(name, field, unit='', scale=1.0):
+        return [name, *(_number(scale * getattr(axis, field), unit) for axis in judged), '']
+
+    degrees = math.degrees(1.0)
+    rows = [row('mean NIS', 'nis'), row('expected of an honest filter', 'nis_expected'),
+            row(f'NIS inside their {100.0 * consistency.PART:g} % band', 'nis_inside', '%', 100.0),
+            row('mean NEES (angle and rate)', 'nees'),
+            [f'{100.0 * consistency.PART:g} % band of the mean, 2 expected',
+             *(' to '.join(map(_number, axis.nees_band)) for axis in judged), ''],
+            row('independent errors', 'count'),
+            row('angle error, rms', 'error', 'deg', degrees), row('sigma it states', 'sigma', 'deg', degrees),
+            row('rate error, rms', 'rate_error', 'deg/s', degrees),
+            row('rate sigma it states', 'rate_sigma', 'deg/s', degrees)]
+    said = ''.join(f'<p>{name.capitalize()}: {html.escape(axis.verdict)}.</p>'
+                   for name, axis in zip(('azimuth', 'elevation'), judged))
+    return _rows(['', 'azimuth', 'elevation', ''], rows, 'n') + said + (
+        '<p class="soft">Over the evaluated part. NIS: innovations in units of what the filter expects of them; NEES: '
+        'errors against the truth in units of what it states. On a ship the attitude error of the INS is among them, '
+        'which no filter of the target knows.</p>')
 
 
 def _loop(bag, check):
@@ -268,6 +301,10 @@ def _page(bag, recording):
                  'dual-motor anti-backlash drive, its UAV experiment. Grey: measured, blue: filtered or achieved, '
                  'orange: truth.</p>')
     parts += [_figure(spec, recording) for spec in figures.FIGURES]
+    parts.append('<h2 id="filter">Is the filter honest?</h2>')
+    if recording.filter is not None:
+        parts.append(_honesty(recording.filter))
+    parts += [_figure(spec, recording) for spec in filter_figures.FIGURES]
     parts.append('<h2 id="diagnostics">Diagnostics that were not OK</h2>')
     rows = _diagnostics(recording.statuses)
     if rows:

@@ -1,5 +1,6 @@
 """What a recorded run achieved: pointing against truth, filter noise, lock, lost steps. Shared by run and report."""
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -61,10 +62,11 @@ class Tracking:
     tracking: np.ndarray
 
 
-def _on_grid(t, table, columns):
-    """Columns of a table at the stamps t; NaN where the topic has no message of that stamp."""
+def on_grid(bag, t, topic, columns):
+    """Columns of a topic at the stamps t; NaN where it has no message of that stamp."""
     out = np.full((t.size, len(columns)), np.nan)
-    if table is not None and len(table['t']):
+    table = bag.table(topic) if topic in bag.topics else {'t': ()}
+    if len(table['t']):
         _, here, there = np.intersect1d(np.round(t * 1e9), np.round(table['t'] * 1e9), return_indices=True)
         for i, column in enumerate(columns):
             out[here, i] = table[column][there]
@@ -77,22 +79,20 @@ def tracking(bag) -> Tracking:
     if missing:
         raise ValueError(f'{bag.path}: no {" and no ".join(missing)} in it, so nothing can be compared with the truth')
 
-    def on_grid(topic, columns):
-        return _on_grid(t, bag.table(topic) if topic in bag.topics else None, columns)
-
     joints = bag.table('joint_states')
     t = joints['t']
+    at_steps = functools.partial(on_grid, bag, t)
     beam = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
-    target = on_grid('target/truth', ('position.x', 'position.y', 'position.z'))
+    target = at_steps('target/truth', ('position.x', 'position.y', 'position.z'))
     quaternion = ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w')
     if 'ship/truth' in bag.topics:
-        ship = on_grid('ship/truth', ('position.x', 'position.y', 'position.z'))
-        attitude, known_attitude = on_grid('ship/truth', quaternion), on_grid('ship/imu/data', quaternion)
+        ship = at_steps('ship/truth', ('position.x', 'position.y', 'position.z'))
+        attitude, known_attitude = at_steps('ship/truth', quaternion), at_steps('ship/imu/data', quaternion)
     else:
         ship = np.zeros((t.size, 3))
         attitude = known_attitude = np.tile(line_of_sight.ASHORE, (t.size, 1))
-    measured = on_grid('tracking_receiver/angle_error', ('x', 'y', 'z'))
-    estimate = on_grid('acu/estimate', ('azimuth.position', 'elevation.position'))
+    measured = at_steps('tracking_receiver/angle_error', ('x', 'y', 'z'))
+    estimate = at_steps('acu/estimate', ('azimuth.position', 'elevation.position'))
     error, filtered, beam_earth = np.empty((3, t.size, 2))
     _pointing(beam, target, ship, attitude, known_attitude, estimate, error, filtered, beam_earth)
     relative = target - ship
@@ -101,7 +101,7 @@ def tracking(bag) -> Tracking:
     mode = modes(bag, t)
     automatic = mode == 'autotrack'
     start = t[automatic][0] + SETTLING if automatic.any() else math.inf
-    reference = on_grid('acu/reference', ('azimuth.position', 'elevation.position'))
+    reference = at_steps('acu/reference', ('azimuth.position', 'elevation.position'))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t, beam[:, 0], beam[:, 1], reference, error[:, 0], error[:, 1], measured[:, :2], measured[:, 2],
                     filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,

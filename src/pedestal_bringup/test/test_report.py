@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from pedestal_bringup import bag as bags
-from pedestal_bringup import figures, report, results
+from pedestal_bringup import consistency, figures, filter_figures, report, results
 from pedestal_common import messages, topics
 
 T = 5_000_000
 STEPS = 1000
 NOISE = math.radians(0.03)
 ASHORE = ('clock', 'joint_states', 'adu/motor_states', 'tracking_receiver/angle_error', 'target/truth',
-          'acu/estimate', 'acu/mode', 'diagnostics')
+          'acu/estimate', 'acu/filter', 'acu/mode', 'diagnostics')
 
 
 def stamped(message, k):
@@ -43,7 +43,11 @@ def step(k, rng, locked=True, effort=True):
         0.0001 + noise[1] if locked and k >= 40 else math.nan, 45.0))
     point = messages.trajectory_point()
     point.positions[:] = azimuth + 0.1 * noise[0], elevation + 0.1 * noise[1]
-    made = {'joint_states': joints, 'adu/motor_states': motors, 'target/truth': target,
+    point.velocities[:] = 0.1 + 0.01 * noise[0], 0.01 * noise[1]
+    told = messages.named_numbers(messages.FILTER)
+    told.position[:] = [value for nu in noise for value in (
+        nu, math.nan, (nu / NOISE)**2, 0.1 * NOISE, 0.02 * NOISE, 0.0, 0.3, 0.3, math.nan, 0.4)]
+    made = {'joint_states': joints, 'acu/filter': told, 'adu/motor_states': motors, 'target/truth': target,
             'tracking_receiver/angle_error': error, 'acu/estimate': messages.joint_trajectory('earth', [point])}
     return {name: stamped(message, k) for name, message in made.items()}
 
@@ -136,9 +140,9 @@ def page(whole, tmp_path_factory):
 
 def test_every_figure_and_section_is_there(page):
     page, folder = page
-    keys = [spec.key for spec in figures.FIGURES]
+    keys = [spec.key for spec in (*figures.FIGURES, *filter_figures.FIGURES)]
     assert page.drawn == keys
-    assert {'results', 'figures', 'diagnostics', *keys} <= set(page.ids)
+    assert {'results', 'figures', 'filter', 'diagnostics', *keys} <= set(page.ids)
     assert page.open == []
     for number in (7, 8, 9, 10, 11):
         assert f'figure {number} of the paper' in page.text
@@ -181,6 +185,18 @@ def test_numbers_are_those_of_the_summary(page, whole):
     assert read('load torque, rms of the run') == [100.0, 50.0]
     assert rows['lost steps'] == ['0'] and rows['steps'] == [str(STEPS)]
     assert rows['recording'][0].startswith('complete')
+
+
+def test_the_filter_is_judged(page, whole):
+    found = consistency.read(bags.read(whole), results.tracking(bags.read(whole)))
+    for axis, i in (('azimuth', 0), ('elevation', 1)):
+        judged = consistency.axis(found, i)
+        assert f'{axis.capitalize()}: {judged.verdict}.' in page[0].text
+        assert judged.nis == pytest.approx(1.0, rel=0.2)
+        assert [float(page[0].rows['mean NIS'][i]), float(page[0].rows['mean NEES (angle and rate)'][i])] == \
+            pytest.approx([judged.nis, judged.nees], rel=1e-3)
+    # Angle and rate are made one tenth and one hundredth of the same noise; the filter states half of the latter.
+    assert consistency.axis(found, 1).nees == pytest.approx(1.0 + 0.25, rel=0.2)
 
 
 def test_text_of_the_bag_is_escaped_and_repeats_are_one_row(page):

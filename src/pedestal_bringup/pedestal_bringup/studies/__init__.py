@@ -8,7 +8,8 @@ others is a scenario and parameters: `pedestal run SCENARIO --param ...` takes t
 """
 import importlib
 
-NAMES = ('servo', 'backlash', 'bode', 'filters', 'phased-array')
+NAMES = ('servo', 'backlash', 'bode', 'filters', 'manoeuvre', 'pareto', 'imm-feedforward', 'rate-measurement',
+         'phased-array')
 
 
 def study(name):

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from scipy.signal import lfilter
 
-from acu_tracker import axis_filter
+from acu_tracker import axis_filter, unscented
 from pedestal_common.compiled import compiled
 
 PERIOD = 0.01
@@ -19,8 +19,8 @@ INITIAL_RATE = 0.1
 """Standard deviation of the rate at the start [rad/s], as the tracker has it."""
 
 MOMENTS = np.dtype([('runs', 'f8'), ('angle', 'f8'), ('angle2', 'f8'), ('rate', 'f8'), ('rate2', 'f8'),
-                    ('acceleration2', 'f8'), ('raw2', 'f8'), ('variance', 'f8'), ('rate_variance', 'f8'),
-                    ('nis', 'f8'), ('mu', 'f8', (axis_filter.BANK,))])
+                    ('acceleration', 'f8'), ('acceleration2', 'f8'), ('raw2', 'f8'), ('variance', 'f8'),
+                    ('rate_variance', 'f8'), ('nis', 'f8'), ('mu', 'f8', (axis_filter.BANK,))])
 """Sums over runs at one time: errors of angle, rate, acceleration and of the raw angle, their squares, the variances
 the filter believes, normalised innovations squared, mode probabilities."""
 
@@ -36,10 +36,10 @@ class Noise:
     rate_sigma: float | None = None
 
 
-def drawn(seed, first, count, n):
-    """Standard normal noise of angle and rate, each (count, n), of the runs from `first` on."""
-    noise = np.array([np.random.default_rng((seed, first + i)).standard_normal((2, n)) for i in range(count)])
-    return noise[:, 0], noise[:, 1]
+def drawn(seed, first, count, n, sensors=2):
+    """Standard normal noise (sensors, count, n) of the runs from `first` on; the first sensor is the angle."""
+    runs = [np.random.default_rng((seed, first + i)).standard_normal((sensors, n)) for i in range(count)]
+    return np.stack(runs, axis=1)
 
 
 def coloured(white, bandwidth):
@@ -78,21 +78,68 @@ def _add_runs(c, t, angle, rate, acceleration, y, R, y_rate, R_rate, initial_rat
     for run in range(len(y)):
         axis_filter.estimates(c, t, y[run], R, y_rate[run], R_rate, initial_rate, out)
         for k in range(len(t)):
-            s, o = sums[k], out[k]
-            d1, d2, d3 = o.angle - angle[k], o.rate - rate[k], o.acceleration - acceleration[k]
-            raw = y[run, k] - angle[k]
-            s.runs += 1.0
-            s.angle += d1
-            s.angle2 += d1 * d1
-            s.rate += d2
-            s.rate2 += d2 * d2
-            s.acceleration2 += d3 * d3
-            s.raw2 += raw * raw
-            s.variance += o.variance
-            s.rate_variance += o.rate_variance
-            s.nis += o.nis
-            for j in range(len(o.mu)):
-                s.mu[j] += o.mu[j]
+            _add(sums[k], out[k], angle[k], rate[k], acceleration[k], y[run, k])
+
+
+@compiled
+def _add(s, o, angle, rate, acceleration, y):
+    """Add to MOMENTS an ESTIMATE of what is angle, rate and acceleration, after the measured angle y."""
+    d1, d2, d3, raw = o.angle - angle, o.rate - rate, o.acceleration - acceleration, y - angle
+    s.runs += 1.0
+    s.angle += d1
+    s.angle2 += d1 * d1
+    s.rate += d2
+    s.rate2 += d2 * d2
+    s.acceleration += d3
+    s.acceleration2 += d3 * d3
+    s.raw2 += raw * raw
+    s.variance += o.variance
+    s.rate_variance += o.rate_variance
+    s.nis += o.nis
+    for j in range(len(o.mu)):
+        s.mu[j] += o.mu[j]
+
+
+def unscented_moments(params, t, truth, distance, noise, range_sigma, seed, first, count):
+    """MOMENTS (n,) of the azimuth of the IMM of unscented filters (params: filter_params.Ukf).
+
+    The target is at elevation 0, `distance` (n,) [m] away, measured with range_sigma [m], white; both angles as
+    `noise` says, the azimuth with the same draws as in `records`.
+    """
+    nu, _, nu_elevation, nu_range = drawn(seed, first, count, len(t), 4)
+    if noise.bandwidth is not None:
+        nu, nu_elevation = coloured(nu, noise.bandwidth), coloured(nu_elevation, noise.bandwidth)
+    sums = np.zeros(len(t), MOMENTS)
+    _add_unscented_runs(unscented.constants(params), PERIOD, *truth, truth[0] + noise.sigma * nu,
+                        noise.sigma * nu_elevation, noise.sigma**2, distance + range_sigma * nu_range, range_sigma**2,
+                        INITIAL_RATE**2, sums)
+    return sums
+
+
+@compiled
+def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, ranges, R_range, rate_variance, sums):
+    out = np.zeros(1, axis_filter.ESTIMATE)
+    o = out[0]
+    o.mu[:] = math.nan
+    for run in range(len(azimuth)):
+        state = np.zeros(1, unscented.STATE)
+        s = state[0]
+        for k in range(len(angle)):
+            A, E, r = azimuth[run, k], elevation[run, k], ranges[run, k]
+            o.nis = math.nan
+            if k == 0:
+                unscented.start(s, c[0], A, 0.0, 0.0, E, 0.0, 0.0, R, 0.0, rate_variance, R, 0.0, rate_variance, r,
+                                R_range)
+            else:
+                unscented.predict(s, c[0], T)
+                nu, S, _, _, _, _ = unscented.innovation(s, A, E, r, R, R, R_range)
+                o.nis = nu * nu / S
+                unscented.correct(s, A, E, r)
+            o.angle, o.rate, o.acceleration, _, _, _ = unscented.outlook(s, c[0], 0.0)
+            o.variance, o.covariance, o.rate_variance, _, _, _, _ = unscented.variances(s, c[0], 0.0)
+            for j in range(len(unscented.MODES)):
+                o.mu[unscented.MODES[j]] = s.mu[j]
+            _add(sums[k], o, angle[k], rate[k], acceleration[k], A)
 
 
 def added(sums, more):

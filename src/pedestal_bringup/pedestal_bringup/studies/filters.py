@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from acu_tracker.axis_filter import KINDS
-from acu_tracker.filter_params import Filter
+from acu_tracker.filter_params import Filter, Ukf
 from acu_tracker.motion_models import MODELS
 from pedestal_bringup import monte_carlo
 from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
@@ -39,7 +39,13 @@ RATES = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (
 FILTERS = {**{kind: Filter(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
            **{name: Filter(kind='current_statistical') for name in RATES}}
 
-FIXED = ('imm',)
+FIXED = ('imm', 'imm_ukf')
+"""Filters that keep their default parameters."""
+
+RANGED = ('flyby-60m', 1.0)
+"""Where imm_ukf is shown, and the standard deviation of the range it measures [m]."""
+
+SHOWN_FILTERS = (*FILTERS, 'imm_ukf')
 
 SHOWN = 'white-0.03'
 """The noise of the figures and of the table of remarks."""
@@ -108,6 +114,11 @@ def batch(item):
     for name, params in filters.items():
         sums = measured(params, profile, NOISES[noise], RATES.get(name), SEED, first, count)
         found[name] = settled(sums), sums[::THINNED].copy()
+    if profile == RANGED[0]:
+        t = times()
+        sums = ensemble.unscented_moments(Ukf(), t, profiles.truth(profile, t), profiles.distance(profile, t),
+                                          NOISES[noise], RANGED[1], SEED, first, count)
+        found['imm_ukf'] = settled(sums), sums[::THINNED].copy()
     return found
 
 
@@ -115,7 +126,7 @@ def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE
     """on: the profiles, noises: names of NOISES; fewer than all for a quick look."""
     pool = pool or monte_carlo.Pool(1)
     wanted = [(profile, noise, name) for profile in on for noise in noises for name in FILTERS if name not in FIXED]
-    filters = {name: FILTERS[name] for name in FIXED}
+    filters = {name: FILTERS[name] for name in FILTERS if name in FIXED}
     tuned = {(profile, noise): dict(filters) for profile in on for noise in noises}
     for (profile, noise, name), params in zip(wanted, pool.map(
             tune, wanted, lambda share, text: progress(0.5 * share, f'tuning, {text}'))):
@@ -156,6 +167,8 @@ def shown(found):
 
 
 def _cell(at):
+    if at is None:
+        return 34 * ' '
     at = {metric: value for metric, (value, _) in at.items()}
     return (f'{at["angle_rms_deg"]:.4f} ({at["reduction"]:.1f})  {at["rate_rms_deg_s"]:.4f}  '
             f'{at["angle_over_sigma"]:.2f} {at["rate_over_sigma"]:.2f}').ljust(34)
@@ -168,8 +181,8 @@ def remarks(values, tuned, runs):
     on = [profile for profile, noise in tuned if noise == SHOWN]
     if on:
         found.append(f'{"":30}' + ''.join(f'{profile:34}' for profile in on).rstrip())
-        found += [f'{name:30}' + ''.join(_cell(values[profile, name, SHOWN]) for profile in on).rstrip()
-                  for name in FILTERS]
+        found += [f'{name:30}' + ''.join(_cell(values.get((profile, name, SHOWN))) for profile in on).rstrip()
+                  for name in SHOWN_FILTERS]
     for colour in ('white', 'coloured'):
         doubtful = {}
         for (_, name, noise), at in values.items():
@@ -240,10 +253,10 @@ def bars(values, on, metric, label, colour, text):
     """A panel of bars for each profile: figure, panels."""
     figure, axes = experiment.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
     for panel, profile in zip(axes[0], on):
-        found = [values[profile, name, SHOWN] for name in FILTERS]
-        drawn = panel.barh(list(FILTERS), [metric(name, at) for name, at in zip(FILTERS, found)],
-                           color=[colour(name) for name in FILTERS])
-        panel.bar_label(drawn, [text(name, at) for name, at in zip(FILTERS, found)], padding=2, fontsize=6)
+        found = {name: values.get((profile, name, SHOWN)) for name in SHOWN_FILTERS}
+        drawn = panel.barh(list(found), [metric(name, at) if at else 0.0 for name, at in found.items()],
+                           color=[colour(name) for name in found])
+        panel.bar_label(drawn, [text(name, at) if at else '' for name, at in found.items()], padding=2, fontsize=6)
         panel.margins(x=0.35)
         panel.locator_params(axis='x', nbins=3)
         panel.grid(axis='y', visible=False)
@@ -297,7 +310,7 @@ def noise_figure(values, on):
     figure, axes = experiment.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
     for panel, profile in zip(axes[0], on):
         for noise, colour, marker in zip(NOISES, (RAW, RAW, FILTERED, FILTERED), 'o^o^'):
-            there = [name for name in FILTERS if (profile, name, noise) in values]
+            there = [name for name in SHOWN_FILTERS if (profile, name, noise) in values]
             panel.plot([values[profile, name, noise]['reduction'][0] for name in there], there, marker,
                            color=colour, ms=4.0, linestyle='', label=f'{noise} deg',
                            fillstyle='full' if marker == 'o' else 'none')

@@ -37,6 +37,11 @@ def truth(name, t):
     return {'s-turn-500m': s_turn, 's-20deg': lambda t: s_motion(t, STROKE, RATE, REVERSAL)}[name](t)
 
 
+def distance(name, t):
+    """Of a flyby from the antenna [m]."""
+    return np.hypot(NEAREST[name], SPEED * (t - 0.5 * DURATION))
+
+
 def flyby(t, w):
     """A straight line passed at speed over distance w [rad/s], nearest at t = 0."""
     u = w * t

@@ -1,0 +1,130 @@
+"""Filters in the graph as a user starts it: rate and range measured, models by probability, changed while tracking."""
+import json
+import signal
+
+import numpy as np
+import pytest
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup import cli, closed_loop, consistency, export, results, scenario
+from pedestal_bringup.verify import verify
+from pedestal_common import messages
+
+SECONDS = 5.0
+PARAMS = ['acu.tracker.lock_count=20', 'tracking_receiver.receiver.rate.measured=true',
+          'tracking_receiver.receiver.ranging.measured=true', 'tracking_receiver.receiver.latency=0.01',
+          *(f'acu.{axis}.filter.{change}' for axis in messages.AXES
+            for change in ('kind=imm', 'rate_measurement=true'))]
+
+
+def switched(run, connect):
+    """Change the filters of a running graph to interacting models once it tracks."""
+    client = connect(run.domain_id)
+    client.read('acu/mode')
+    client.until(lambda: any(message.data == 'autotrack' for message in client.heard['acu/mode']))
+    imm = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value='imm')
+    request = SetParameters.Request(parameters=[Parameter(name=f'{axis}.filter.kind', value=imm)
+                                                for axis in messages.AXES])
+    return [result.successful for result in client.call('acu/set_parameters', SetParameters, request).results]
+
+
+@pytest.fixture(scope='module')
+def runs(start_run, connect):
+    """A run with rate and range, on a ship, and one whose filters are changed on the way."""
+    params = [word for param in PARAMS for word in ('--param', param)]
+    started = {'measured': start_run('ship_pass', '--pacing', 'lockstep', '--duration', f'{SECONDS:g}', *params),
+               'switched': start_run('uav_flyby', '--pacing', 'lockstep', '--duration', '15', '--param', PARAMS[0])}
+    assert switched(started['switched'], connect) == [True, True]
+    for run in started.values():
+        result = run.finish(180.0)
+        assert result.returncode == 0, result.stderr
+    return started
+
+
+@pytest.fixture(scope='module')
+def told(runs):
+    """(Bag, Consistency) of the run with rate and range."""
+    bag = bags.read(runs['measured'].bag)
+    return bag, consistency.read(bag, results.tracking(bag))
+
+
+def test_every_topic_is_recorded(runs):
+    report = verify(runs['measured'].bag)
+    assert report.complete, report.lines()
+    assert {'tracking_receiver/angle_rate', 'tracking_receiver/range', 'acu/filter'} <= {
+        topic.name for topic in report.topics}
+    assert not {'tracking_receiver/angle_rate', 'tracking_receiver/range'} & {
+        topic.name for topic in verify(runs['switched'].bag).topics}
+
+
+def test_recomputed_to_the_last_bit(runs, capsys, monkeypatch):
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    for node in ('tracking_receiver', 'acu'):
+        assert cli.main(['recompute', str(runs['measured'].bag), '--node', node, '--absolute', '0', '--relative',
+                         '0']) == 0
+        said = capsys.readouterr().out
+        assert said.splitlines()[-1] == f'{node}: identical'
+    assert 'acu/filter' in said
+
+
+def test_composed_cores_equal_the_run(told):
+    composed = closed_loop.run(closed_loop.cores(scenario.load('ship_pass', PARAMS, duration=SECONDS)))
+    bag, found = told
+    estimate = bag.table('acu/estimate')
+    for i, axis in enumerate(messages.AXES):
+        assert np.array_equal(estimate[f'{axis}.velocity'], composed['estimate'][:, i, 1], equal_nan=True)
+        for name in ('innovation', 'rate_innovation', 'nis', 'probability'):
+            assert np.array_equal(getattr(found, name)[:, i], composed[name][:, i], equal_nan=True), name
+        assert np.array_equal(found.sigma[:, i], np.sqrt(composed['covariance'][:, i, 0]), equal_nan=True)
+
+
+def test_what_the_filter_tells(told):
+    """Angle and rate are measured in every step, both with the noise the filter expects, from a rolling deck."""
+    bag, found = told
+    on = found.tracking
+    assert on.sum() > 200
+    assert np.all(found.freedoms[on] == 2.0)
+    for i in range(2):
+        assert consistency.axis(found, i).nis == pytest.approx(2.0, abs=0.4)
+    probability = found.probability[on]
+    assert np.nansum(probability, axis=2) == pytest.approx(1.0)
+    assert np.isfinite(probability).all(axis=(0, 1)).tolist() == [name != 'singer' for name in messages.MODELS]
+    assert np.all(np.abs(found.correlation[on]) <= 1.0) and np.all(found.sigma[on] > 0.0)
+    header = list(export.table(bag, 'acu/filter'))
+    assert 'azimuth_rate_sigma.position [rad/s]' in header and 'elevation_nis.position' in header
+    assert 'range [m]' in export.table(bag, 'tracking_receiver/range')
+
+
+def test_rows_and_report(runs, told, run_process):
+    run = runs['measured']
+    values = {row['metric']: row['value'] for row in json.loads(run.json.read_text())['rows']}
+    for i, axis in enumerate(messages.AXES):
+        judged = consistency.axis(told[1], i)
+        assert (values[f'{axis}_nis_mean'], values[f'{axis}_nees_mean']) == (judged.nis, judged.nees)
+    assert cli.main(['report', str(run.bag)]) == 0
+    page = (run.bag / 'report.html').read_text()
+    assert '<figure id="probabilities"><h3>Motion models</h3><figcaption>' in page
+    assert 'Azimuth: ' in page and 'of honest filters have' in page
+
+
+def test_a_filter_changed_while_it_tracks_makes_no_bump(runs):
+    bag = bags.read(runs['switched'].bag)
+    found = consistency.read(bag, results.tracking(bag))
+    changed = np.flatnonzero(np.isfinite(found.probability[:, 0, messages.MODELS.index('cv')]))[0]
+    assert bag.table('acu/mode')['data'] == ['program', 'autotrack']
+    assert np.all(results.modes(bag, found.t)[changed - 1:] == 'autotrack')
+    change = np.abs(np.diff(np.column_stack([bag.table('acu/rate_command')[f'{axis}.velocity']
+                                             for axis in messages.AXES]), axis=0))
+    before, after = slice(changed - 50, changed - 1), slice(changed - 1, changed + 50)
+    assert np.all(change[after].max(axis=0) < 5.0 * change[before].max(axis=0))
+    assert np.all(np.abs(found.error[changed:changed + 50]) < 5.0 * found.sigma[changed:changed + 50])
+
+
+@pytest.mark.parametrize('override, text', [
+    ('acu.receiver_rate=true', 'acu: receiver_rate = True: must be False'),
+    ('recorder.receiver_range=true', 'recorder: receiver_range = True: must be False')])
+def test_a_topic_nobody_measures_is_not_waited_for(override, text):
+    with pytest.raises(scenario.ScenarioError, match=text):
+        scenario.load('leo_pass', [override])
