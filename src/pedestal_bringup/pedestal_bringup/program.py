@@ -25,10 +25,11 @@ def program_messages(scenario):
     """{topic: JointTrajectory} of a scenario's program track for every beam; {} where it has none."""
     if scenario.header.program.source == 'none':
         return {}
-    return {f'{prefix}acu/program_track': _message(*program_table(scenario, prefix)) for prefix in scenario.prefixes}
+    return {f'{prefix}acu/program_track': program_message(*program_table(scenario, prefix))
+            for prefix in scenario.prefixes}
 
 
-def _message(times, angles):
+def program_message(times, angles):
     points = []
     for time, (azimuth, elevation) in zip(times, angles):
         point = messages.trajectory_point()
