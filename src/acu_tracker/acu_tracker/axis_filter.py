@@ -96,7 +96,7 @@ def start(f, c, y, R, rate_sigma):
 
 @compiled
 def adopt(f, c):
-    """If the bank has changed: the new models start from the combined estimate and covariance of the old."""
+    """If the bank is another than before: its models start from the combined estimate and covariance of the old."""
     if f.bank != c.bank:
         _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
 
@@ -115,7 +115,6 @@ def move(f, c, angle, rate, acceleration):
 @compiled
 def predict(f, c, T):
     """The bank T [s] after its last measurement, into the prior fields; the state itself stays."""
-    adopt(f, c)
     f.T = T
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
