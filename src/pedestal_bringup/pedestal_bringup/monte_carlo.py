@@ -6,10 +6,12 @@ answers, so that memory stays bounded whatever --runs is.
 """
 import contextlib
 import logging
+import multiprocessing.resource_tracker
 import re
 import signal
 
 import joblib
+from joblib.externals import loky
 
 TIMEOUT = 10.0
 """How long a scheduler, or its first worker, is waited for [s]."""
@@ -56,7 +58,7 @@ class Pool:
         items = list(items)
         options = {'n_jobs': -1} if self.scheduler else {'n_jobs': min(self.workers, len(items) or 1),
                                                          'backend': 'loky'}
-        with _ctrl_c_held_back():
+        with _ctrl_c_held_back() if options['n_jobs'] > 1 else contextlib.nullcontext():
             results = joblib.Parallel(return_as='generator', **options)(map(joblib.delayed(function), items))
         with contextlib.closing(results):
             for done, result in enumerate(results, 1):
@@ -66,7 +68,12 @@ class Pool:
 
 @contextlib.contextmanager
 def _ctrl_c_held_back():
-    """Ctrl-C reaches every process of a terminal; those started now never hear it: this one does, and ends them."""
+    """Ctrl-C reaches every process of a terminal; those started now never hear it: this one does, and ends them.
+
+    The trackers that go with the first worker let it through when they start, so they are started before.
+    """
+    multiprocessing.resource_tracker.ensure_running()
+    loky.backend.resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -75,7 +82,7 @@ def _ctrl_c_held_back():
 
 
 def _end_local():
-    joblib.externals.loky.get_reusable_executor(reuse=True).shutdown(kill_workers=True)
+    loky.get_reusable_executor(reuse=True).shutdown(kill_workers=True)
 
 
 def _client(address):

@@ -1,154 +1,32 @@
 """Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter against the IMM.
 
-The target moves to and fro through 20 deg at 3.5 deg/s and turns round in a half cosine. Every 10 ms the tracker says
-how far the antenna missed it 40 ms ago, with noise. What the antenna's encoder said then plus the miss is the line of
-sight, y; a filter of `acu_tracker.axis_filter` makes rate v and acceleration a of it, and the rate loop is told
+The loop is `feedforward_loop`: 20 deg to and fro at 3.5 deg/s, a miss every 10 ms that is 40 ms old. `imm` feeds
+forward rate and acceleration as they were at the time of the miss, `imm-predicted` as they will be in the middle of
+the interval in which the command is in force, d + T / 2 later; `perfect-state` is told the truth of that instant. All
+filters see the same noise.
 
-    u = K_p miss(t - d) + k_v v + k_a a,        W(s) = w^2 / (s^2 + 2 zeta w s + w^2),
-
-where k_v + k_a s are the first two terms of 1 / W(s), so that a constant acceleration leaves no miss. `imm` takes v
-and a as they were at the time of the miss, `imm-predicted` as they will be in the middle of the interval in which u is
-in force, d + T / 2 later; `perfect-state` is told the truth of that instant. All filters see the same noise.
+`drive-...` is the same through the product: receiver with the same latency, control unit, motors and gears, one run.
+There the target does nothing but turn round, one half cosine after the other, which is a sine.
 """
 import dataclasses
 import math
 
 import numpy as np
-from scipy.linalg import expm
 
-from acu_tracker import axis_filter, feedforward
 from acu_tracker.filter_params import Filter
+from acu_tracker.modes import AUTOTRACK
 from acu_tracker.motion_models import MODELS
 from pedestal_bringup import monte_carlo
 from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment, profiles
+from pedestal_bringup.studies import experiment, feedforward_loop
 from pedestal_bringup.studies.experiment import Result, row
-from pedestal_common import noise
-from pedestal_common.compiled import compiled
+from pedestal_bringup.studies.feedforward_loop import REVERSALS, SIGMA, Source, T, ca, cv, filter_of, imm, outcomes
 
 RUNS = 50
 """Of each case, the noise drawn anew."""
 
-T = 0.01
-"""Between two misses [s]."""
-
-DELAY = 4
-"""Age of a miss when it comes, in T."""
-
-SIGMA = math.radians(0.02)
-"""Of a miss [rad]."""
-
-K_P = 5.0
-"""Of the miss [1/s]."""
-
-RATE_LOOP = (2.0 * math.pi * 8.0, 0.7)
-"""w [rad/s], zeta."""
-
-STROKE, SPEED = math.radians(20.0), math.radians(3.5)
-"""Between the turning points [rad], outside the reversals [rad/s]."""
-
-REVERSALS = {'azimuth': 1.0, 'elevation': 1.6}
-"""Duration of a reversal [s]: 11 and 6.9 deg/s2 at its peak. The paper does not print it."""
-
-PERIODS = 2
-"""Of the motion that count, after half of one to settle."""
-
-CALM = 2.0
-"""After a reversal the rate is called uniform from then on [s]."""
-
-BATCH = 25
-"""Runs of one piece of work."""
-
-
-def feedforward_gains(w, zeta):
-    """(k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2: paper 003's c1, c2, corrected, for this W."""
-    return 1.0, 2.0 * zeta / w
-
-
-def rate_loop_step(w, zeta):
-    """M (3, 4) of (theta, omega, omega') T later = M (theta, omega, omega', u), u constant: exact."""
-    A = np.zeros((4, 4))
-    A[0, 1] = A[1, 2] = 1.0
-    A[2, 1:] = -w * w, -2.0 * zeta * w, w * w
-    return expm(A * T)[:3]
-
-
-K_V, K_A = feedforward_gains(*RATE_LOOP)
-
-STEP = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('mu', 'f8', axis_filter.BANK)], align=True)
-"""True angle less antenna [rad]; rate [rad/s] and acceleration [rad/s2] fed forward; probability of each model."""
-
-
-@compiled
-def _follow(target, known, f, c, lead, M, normals, out):
-    """Runs of the loop: target (n, 3), normals (runs, n) into out (runs, n).
-
-    known (n, 2): rate and acceleration to feed forward; (0, 2): those of the filter f, c, `lead` [s] after its miss.
-    """
-    R = SIGMA * SIGMA
-    encoder = np.empty(len(target))
-    for i in range(len(normals)):
-        theta, omega, omega_dot = target[0]
-        for k in range(len(target)):
-            encoder[k] = theta
-            e, v, a = 0.0, target[0, 1], target[0, 2]
-            j = k - DELAY
-            if j >= 0:
-                e = target[j, 0] + SIGMA * normals[i, j] - encoder[j]
-                y = encoder[j] + e
-                if j == 0:
-                    axis_filter.start(f[0], c[0], y, R, SPEED)
-                else:
-                    axis_filter.predict(f[0], c[0], T)
-                    axis_filter.correct(f[0], c[0], y, R, math.nan, math.nan)
-                _, v, a = axis_filter.outlook(f[0], c[0], lead)
-            if len(known) > 0:
-                v, a = known[k]
-            u = feedforward.rate(e, 0.0, v, K_P, K_V) + K_A * a
-            step = out[i, k]
-            step.miss, step.rate, step.acceleration = target[k, 0] - theta, v, a
-            axis_filter.probabilities(f[0], c[0], step.mu)
-            theta, omega, omega_dot = (
-                theta + M[0, 1] * omega + M[0, 2] * omega_dot + M[0, 3] * u,
-                M[1, 1] * omega + M[1, 2] * omega_dot + M[1, 3] * u,
-                M[2, 1] * omega + M[2, 2] * omega_dot + M[2, 3] * u)
-
-
-@dataclasses.dataclass(frozen=True)
-class Source:
-    """Where rate and acceleration come from: a filter, or None for the truth; `predicted` to the instant of the
-    command, or as they were when the miss was measured."""
-    filter: Filter | None
-    predicted: bool = False
-
-
-def filter_of(kind, **groups):
-    """A filter_params.Filter of a kind with groups of its parameters changed: cv=dict(noise=...)."""
-    return Filter(kind=kind, **{name: dataclasses.replace(getattr(Filter(), name), **values)
-                                for name, values in groups.items()})
-
-
-def cv(q):
-    """Constant rate; q [deg/s2/sqrt(Hz)]."""
-    return Source(filter_of('cv', cv={'noise': math.radians(q)}))
-
-
-def ca(q):
-    """Constant acceleration; q [deg/s3/sqrt(Hz)]."""
-    return Source(filter_of('ca', ca={'noise': math.radians(q)}))
-
-
-def imm(q_ca, predicted):
-    """A quiet cv, a ca of q_ca [deg/s3/sqrt(Hz)], a lively current_statistical; each holds for 5 s."""
-    default = Filter().imm
-    bank = {
-        'models': 'cv ca current_statistical', 'dwell': 5.0,
-        'cv': dataclasses.replace(default.cv, noise=math.radians(0.003)),
-        'ca': dataclasses.replace(default.ca, noise=math.radians(q_ca)),
-        'current_statistical': dataclasses.replace(default.current_statistical, alpha=4.0, a_max=math.radians(40.0),
-                                                   floor=0.3)}
-    return Source(filter_of('imm', imm=bank), predicted)
-
+DRIVE_SECONDS, DRIVE_START, DRIVE_ELEVATION = 36.0, 6.0, 0.5
+"""Of the runs through the product: duration, what of it is left to the hand-over to autotrack [s], where [rad]."""
 
 CV = (0.1, 0.2, 0.3, 0.5, 4.0)
 """Process noises of the conventional filter [deg/s2/sqrt(Hz)]."""
@@ -171,85 +49,39 @@ CASES |= {f'{axis}/{name}': (axis, source) for axis in REVERSALS for name, sourc
 CASES |= {cv_name(axis, q): (axis, cv(q)) for axis in REVERSALS for q in CV}
 
 
-def motion(axis):
-    """(t (n,) [s], target (n, 3), its period [s]): the S motion of an axis, half a period and PERIODS more."""
-    reversal = REVERSALS[axis]
-    period = 2.0 * (STROKE / SPEED + reversal * (1.0 - 2.0 / math.pi))
-    t = T * np.arange(round((0.5 + PERIODS) * period / T))
-    return t, np.column_stack(profiles.s_motion(t, STROKE, SPEED, reversal)), period
+def drive_case(axis, tuned):
+    """A Case of reversals without a pause on an axis, tracked with a Filter."""
+    w = math.pi / REVERSALS[axis]
+    amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
+                  feedforward_loop.SPEED / w if name == axis else 0.0 for name in REVERSALS}
+    return experiment.Case(axis, 'uav_flyby', {
+        'tracking_receiver.target.kind': 'sine', 'tracking_receiver.target.angle.frequency': 0.5 * w / math.pi,
+        'tracking_receiver.target.angle.range': 510.0, 'tracking_receiver.target.angle.elevation': DRIVE_ELEVATION,
+        **amplitudes, 'tracking_receiver.receiver.latency': feedforward_loop.DELAY * T, 'scenario.program.interval': T,
+        'adu.initial_azimuth': 0.0, 'adu.initial_elevation': DRIVE_ELEVATION,
+        **{f'acu.{axis}.filter.{name}': value for name, value in named(tuned).items()
+           if value != named(Filter())[name]}}, DRIVE_SECONDS)
 
 
-def steps_of(axis, source, first, count):
-    """STEP records (count, n) of runs first ... first + count - 1 of a Source on an axis; run i has the noise of i."""
-    t, target, _ = motion(axis)
-    lead = (DELAY + 0.5) * T if source.predicted else 0.0
-    known = np.zeros((0, 2))
-    if source.filter is None:
-        at = t + 0.5 * T if source.predicted else t - DELAY * T
-        known = np.column_stack(profiles.s_motion(at, STROKE, SPEED, REVERSALS[axis])[1:])
-    normals = np.array([noise.generator(first + i, 'tracking_receiver').standard_normal(len(t)) for i in range(count)])
-    out = np.zeros((count, len(t)), STEP)
-    _follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(source.filter or Filter()), lead,
-            rate_loop_step(*RATE_LOOP), normals, out)
-    return out
-
-
-SUMS = np.dtype([('miss', 'f8'), ('miss_squared', 'f8'), ('rate_error_squared', 'f8')])
-"""Over runs, at one step [rad, rad2, rad2/s2]."""
-
-
-def batch(item):
-    """(SUMS (n,), sum of the largest misses of each run [rad]) of an item (axis, source, first run, how many)."""
-    axis, source, first, count = item
-    steps = steps_of(axis, source, first, count)
-    t, target, period = motion(axis)
-    sums = np.zeros(len(t), SUMS)
-    sums['miss'] = steps['miss'].sum(axis=0)
-    sums['miss_squared'] = np.square(steps['miss']).sum(axis=0)
-    sums['rate_error_squared'] = np.square(steps['rate'] - target[:, 1]).sum(axis=0)
-    return sums, float(np.abs(steps['miss'][:, t >= 0.5 * period]).max(axis=1).sum())
-
-
-@dataclasses.dataclass(frozen=True)
-class Outcome:
-    """What came of the runs of a Source on an axis: over them at each step (n,) the mean miss, its rms [rad], the rms
-    error of the rate [rad/s]; the mean of the largest misses [rad]."""
-    axis: str
-    miss_mean: np.ndarray
-    miss_rms: np.ndarray
-    rate_rms: np.ndarray
-    peak: float
-
-    def measures(self):
-        """{metric: (value, unit)}: miss over all, in the worst second, its peak; noise of a uniform rate."""
-        t, target, period = motion(self.axis)
-        counts = t >= 0.5 * period
-        squares = np.square(self.miss_rms[counts])
-        second = round(1.0 / T)
-        windows = np.convolve(squares, np.full(second, 1.0 / second), 'valid')
-        turning = np.convolve(np.abs(target[:, 1]) < 0.999 * SPEED, np.ones(round(CALM / T)))[:len(t)] > 0.5
-        return {'miss_rms_deg': (math.degrees(math.sqrt(squares.mean())), 'deg'),
-                'miss_worst_second_deg': (math.degrees(math.sqrt(windows.max())), 'deg'),
-                'miss_peak_deg': (math.degrees(self.peak), 'deg'),
-                'rate_noise_deg_s': (math.degrees(experiment.rms(self.rate_rms[counts & ~turning])), 'deg/s')}
-
-
-def outcomes(cases, count, pool, progress=lambda share, text: None):
-    """{name: Outcome} of `count` runs of each of cases {name: (axis, source)}."""
-    pieces = monte_carlo.batches(count, BATCH)
-    items = [(axis, source, *piece) for axis, source in cases.values() for piece in pieces]
-    done = pool.map(batch, items, progress)
+def named(parameters, prefix=''):
+    """{dotted name: value} of nested parameters."""
     found = {}
-    for name, (axis, _) in cases.items():
-        sums, peaks = [], 0.0
-        for _ in pieces:
-            more, peak = next(done)
-            sums.append(more)
-            peaks += peak
-        total = {field: sum(part[field] for part in sums) / count for field in SUMS.names}
-        found[name] = Outcome(axis, total['miss'], np.sqrt(total['miss_squared']),
-                              np.sqrt(total['rate_error_squared']), peaks / count)
+    for name, value in vars(parameters).items():
+        found |= named(value, f'{prefix}{name}.') if dataclasses.is_dataclass(value) else {prefix + name: value}
     return found
+
+
+DRIVE_CASES = {
+    f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSALS for name, tuned in {
+        'kalman-cv': cv(USUAL_CV[axis]).filter, 'imm': SOURCES['imm'].filter, 'imm-default': filter_of('imm')}.items()}
+
+
+def driven(case):
+    """(t, true error of the axis, each (n,) [s, rad]) of a Case while it counts; NaN if autotrack was left."""
+    record = case.run()
+    record = record[record['t'] >= DRIVE_START]
+    error = record['true_error'][:, list(REVERSALS).index(case.name)]
+    return record['t'], error if np.all(record['mode'] == AUTOTRACK) else np.full_like(error, math.nan)
 
 
 TARGETS = {
@@ -299,20 +131,32 @@ def rows(found):
     return result
 
 
+def drive_rows(driven):
+    """The rows of {name of DRIVE_CASES: (t, error)}."""
+    result = []
+    for name, (_, error) in driven.items():
+        result += [row(name, 'miss_rms_deg', math.degrees(experiment.rms(error)), 'deg'),
+                   row(name, 'miss_peak_deg', math.degrees(experiment.peak(error)), 'deg')]
+        usual = f'{name.partition("/")[0]}/drive-kalman-cv'
+        if name != usual:
+            ratio = experiment.rms(driven[usual][1]) / experiment.rms(error)
+            result.append(row(name, 'miss_ratio_to_kalman_cv', ratio, '', 3.0, '>= 3'))
+    return result
+
+
 def remarks(found):
     """What the rows do not say by themselves."""
     value = {(name, metric): value for name, outcome in found.items()
              for metric, (value, _) in outcome.measures().items()}
-    late = (DELAY + 0.5) * T
-    steepest = math.pi * math.degrees(SPEED) / REVERSALS['azimuth']
+    late = (feedforward_loop.DELAY + 0.5) * T
+    steepest = math.pi * math.degrees(feedforward_loop.SPEED) / REVERSALS['azimuth']
     return [
-        'Not printed in the paper and chosen here: the time of a reversal, sample time, noise, delay, rate loop, K_p '
-        'and every constant of the filters. Its "largest miss (RMS)" is read as the rms over the whole motion; the '
-        'rms of the worst second is the row below.',
+        'Not printed in the paper and chosen here: the time of a reversal, sample time, noise '
+        f'({math.degrees(SIGMA):g} deg), delay, rate loop, K_p and every constant of the filters. Its "largest miss '
+        '(RMS)" is read as the rms over the whole motion; miss_worst_second_deg is the rms of the worst second.',
         f'What is fed forward {1e3 * late:g} ms late (d + T / 2) misses by a (d + T / 2) / K_p in a long turn, '
-        f'{steepest * late / K_P:.3f} deg at the {steepest:.1f} deg/s2 of the azimuth: that is most of what `imm` '
-        'has left, and what the prediction takes away. A constant rate estimate is nothing that prediction could '
-        'change: kalman-cv is the same with it.',
+        f'{steepest * late / feedforward_loop.K_P:.3f} deg at the {steepest:.1f} deg/s2 of the azimuth: '
+        'imm-predicted is without that. The rate of kalman-cv is the same predicted or not.',
         'perfect-state is what noise of the miss and jerk in the rate loop leave: the limit of this servo.',
         f'The elevation of the paper (0.1 deg) needs a conventional filter of {USUAL_CV["elevation"]:g} '
         f'deg/s2/sqrt(Hz); with the {USUAL_CV["azimuth"]:g} of its azimuth it misses by '
@@ -323,23 +167,28 @@ def remarks(found):
         f'{value["azimuth/kalman-ca-40-predicted", "rate_noise_deg_s"]:.2f} deg/s of noise on the rate where the IMM '
         f'has {value["azimuth/imm-predicted", "rate_noise_deg_s"]:.3f}. Hence miss_ratio_at_equal_rate_noise: against '
         'the conventional filter that is tuned to the same noise. The IMM was tuned on the azimuth and left so.',
+        'drive: the control unit predicts over the known latency and commands the estimated angle, so the miss is the '
+        "filter's error. imm-default is the IMM as the product comes. The azimuth's kalman-cv is so far off in every "
+        'turn that the gate refuses its errors and starts it anew, which helps it: it misses more without a gate '
+        '(acu.tracker.gate). One run each: '
+        f'{DRIVE_CASES["azimuth/drive-imm-default"].command()}',
     ]
 
 
 COLOURS = {'kalman-cv': TRUTH, 'imm': MOTOR_1, 'imm-predicted': FILTERED, 'perfect-state': INK}
 
 
-def figures(found):
-    """{name: function that draws it}."""
+def figures(found, through):
+    """{name: function that draws it} of all Outcomes and of the runs through the product."""
     return {'azimuth': lambda: miss_figure('azimuth', 'figures 8 and 9', found),
             'elevation': lambda: miss_figure('elevation', 'figures 10 and 11', found),
             'feedforward': feedforward_figure, 'probabilities': probability_figure,
-            'tunings': lambda: tuning_figure(found)}
+            'tunings': lambda: tuning_figure(found), 'drive': lambda: drive_figure(through)}
 
 
 def from_first_turn(axis):
     """(time [s] from the first step that counts on, which steps (n,) those are, the target (n, 3))."""
-    t, target, period = motion(axis)
+    t, target, period = feedforward_loop.motion(axis)
     counts = t >= 0.5 * period
     return t[counts] - 0.5 * period, counts, target
 
@@ -351,8 +200,8 @@ def miss_figure(axis, those, found):
     t, counts, _ = from_first_turn(axis)
     for name, panel in zip(names, axes[:, 0]):
         case = f'{axis}/{name}'
-        panel.plot(t, np.degrees(steps_of(*CASES[case], 0, 1)['miss'][0, counts]), color=RAW, linewidth=0.7,
-                   label='one run')
+        one = feedforward_loop.steps_of(*CASES[case], 0, 1)['miss'][0, counts]
+        panel.plot(t, np.degrees(one), color=RAW, linewidth=0.7, label='one run')
         panel.plot(t, np.degrees(found[case].miss_mean[counts]), color=COLOURS[name], linewidth=1.4,
                    label='mean of the runs')
         panel.set_title(f'{name}: {found[case].measures()["miss_rms_deg"][0]:.3f} deg rms')
@@ -371,8 +220,8 @@ def feedforward_figure():
                                         (axes[1, 0], 'acceleration', 2, 'acceleration [deg/s2]')):
         panel.plot(t, np.degrees(target[counts, column]), color=INK, linestyle='--', label='truth')
         for name in ('kalman-cv', 'imm', 'imm-predicted'):
-            panel.plot(t, np.degrees(steps_of(*CASES[f'azimuth/{name}'], 0, 1)[field][0, counts]), color=COLOURS[name],
-                       label=name)
+            one = feedforward_loop.steps_of(*CASES[f'azimuth/{name}'], 0, 1)[field][0, counts]
+            panel.plot(t, np.degrees(one), color=COLOURS[name], label=name)
         panel.set_ylabel(label)
     turn = t[np.argmax(np.abs(target[counts, 2]))]
     axes[0, 0].set_xlim(turn - 1.5, turn + 2.5)
@@ -383,10 +232,10 @@ def feedforward_figure():
 
 
 def probability_figure():
-    """Which model the IMM believes in while the target turns, mean of BATCH runs."""
+    """Which model the IMM believes in while the target turns, mean of one BATCH."""
     figure, axes = experiment.panels(2, size=(7.4, 4.6), sharex=True, height_ratios=(1, 1.6))
     t, counts, target = from_first_turn('azimuth')
-    mu = steps_of(*CASES['azimuth/imm'], 0, BATCH)['mu'][:, counts].mean(axis=0)
+    mu = feedforward_loop.steps_of(*CASES['azimuth/imm'], 0, feedforward_loop.BATCH)['mu'][:, counts].mean(axis=0)
     axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=INK)
     axes[0, 0].set_ylabel('acceleration\n[deg/s2]')
     axes[0, 0].set_title('the target, and the probability of each model of imm')
@@ -419,6 +268,23 @@ def tuning_figure(found):
     return figure
 
 
+def drive_figure(through):
+    """Miss of the product in reversals without a pause, each filter."""
+    figure, axes = experiment.panels(2, size=(7.4, 4.8), sharex=True)
+    for axis, panel in zip(REVERSALS, axes[:, 0]):
+        for name, colour in (('kalman-cv', TRUTH), ('imm', MOTOR_1), ('imm-default', FILTERED)):
+            t, miss = through[f'{axis}/drive-{name}']
+            panel.plot(t, np.degrees(miss), color=colour, label=name)
+        panel.set_xlim(DRIVE_START, DRIVE_START + 8.0)
+        panel.set_ylabel('miss [deg]')
+        panel.set_title(f'{axis}: control unit, motors and gears, target in reversals of {REVERSALS[axis]:g} s')
+    axes[0, 0].legend(loc='upper right', ncols=3)
+    axes[1, 0].set_xlabel('time [s]')
+    return figure
+
+
 def run(progress, runs=RUNS, pool=None) -> Result:
     found = outcomes(CASES, runs, pool or monte_carlo.Pool(1), progress)
-    return Result(rows(found), figures(found), remarks(found))
+    progress(None, 'the whole chain')
+    through = {name: driven(case) for name, case in DRIVE_CASES.items()}
+    return Result(rows(found) + drive_rows(through), figures(found, through), remarks(found))

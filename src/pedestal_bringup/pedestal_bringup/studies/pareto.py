@@ -80,8 +80,8 @@ def frontier(points, name):
 
 
 def miss_at(front, noise):
-    """Miss on a frontier at a rate noise, log-log between its points; NaN where every tuning has more noise."""
-    return math.exp(np.interp(math.log(noise), *np.log(front), left=math.nan, right=math.log(front[1, -1])))
+    """Miss on a frontier at a rate noise that it comes down to, log-log between its points."""
+    return math.exp(np.interp(math.log(noise), *np.log(front)))
 
 
 def noise_at(front, miss):
@@ -96,11 +96,13 @@ def rows(points):
              row('imm-predicted', 'rate_noise_deg_s', noise, 'deg/s')]
     for name in TUNINGS:
         front = frontier(points, name)
-        found += [row(name, 'miss_at_equal_rate_noise_deg', miss_at(front, noise), 'deg'),
-                  row(name, 'miss_ratio_at_equal_rate_noise', miss_at(front, noise) / miss, '', None,
-                      TARGET if name in ('cv', 'ca') else None),
-                  row(name, 'least_miss_deg', front[1, -1], 'deg'),
+        found += [row(name, 'least_miss_deg', front[1, -1], 'deg'),
                   row(name, 'rate_noise_at_least_miss_deg_s', front[0, -1], 'deg/s')]
+        if front[0, 0] <= noise:
+            equal = miss_at(front, noise)
+            found += [row(name, 'miss_at_equal_rate_noise_deg', equal, 'deg'),
+                      row(name, 'miss_ratio_at_equal_rate_noise', equal / miss, '', None,
+                          TARGET if name == 'cv' else None)]
         if front[1, -1] <= miss:
             found.append(row(name, 'rate_noise_at_equal_miss_deg_s', noise_at(front, miss), 'deg/s'))
     return found
@@ -110,11 +112,14 @@ def remarks(points):
     """What the rows do not say by themselves."""
     tuned = '; '.join(f'{name}: {what} {values[0]:g} to {values[-1]:g}'
                       for name, (what, values, _) in TUNINGS.items())
-    miss = points['reference', 0.0][1]
+    noise, miss = points['reference', 0.0]
+    loud = [name for name in TUNINGS if frontier(points, name)[0, 0] > noise]
     never = [name for name in TUNINGS if frontier(points, name)[1, -1] > miss]
-    found = [f'Every filter is predicted to the instant of its command; tuned are {tuned}. The rows read the curves at '
-             'the rate noise and the miss of imm-predicted (study imm-feedforward), straight between two tunings on '
-             'logarithmic scales.']
+    found = [f'Every filter is predicted to the instant of its command; tuned are {tuned}. The rows read the curves '
+             'at the rate noise and the miss of imm-predicted (study imm-feedforward), straight between two tunings '
+             'on logarithmic scales.']
+    if loud:
+        found.append(f'No tuning of {", ".join(loud)} has as little rate noise as imm-predicted.')
     if never:
         found.append(f'No tuning of {", ".join(never)} misses as little as imm-predicted, whatever its rate noise.')
     return found
