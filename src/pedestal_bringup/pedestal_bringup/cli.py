@@ -5,6 +5,7 @@ import inspect
 import json
 import math
 import pathlib
+import shlex
 import signal
 import sys
 
@@ -38,6 +39,7 @@ def main(args=None) -> int:
     """Exit code 0; 1 with one line on stderr for anything that went wrong; 2 for a wrong command line."""
     parser = _parser()
     options = parser.parse_args(args)
+    options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
@@ -64,6 +66,8 @@ def _parser():
     run.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     run.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
                      help='change a parameter, as acu.azimuth.feedforward.bandwidth=20; may be repeated')
+    run.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
+                     help='ROS 2 parameter file whose values replace those of the scenario, as `pedestal tune` writes')
     run.set_defaults(verb=_run)
 
     scenarios = verbs.add_parser('scenarios', help='list the scenarios')
@@ -120,6 +124,19 @@ def _parser():
     export.set_defaults(verb=_export)
 
     _add_recompute(verbs)
+
+    tune = verbs.add_parser('tune', help='find the parameters of a filter or of the feed-forward')
+    tune.add_argument('source', metavar='BAG|SCENARIO', help='a recording: innovations; a scenario: pointing error')
+    tune.add_argument('--filter', metavar='KIND', help='the kind of filter to tune')
+    tune.add_argument('--feedforward', action='store_true', help="the gains that follow from the drive's rate loop")
+    tune.add_argument('--axis', choices=('azimuth', 'elevation', 'both'), default='both', help='default: both')
+    tune.add_argument('--seed', type=int, metavar='N', help='first seed; default: what the scenario says')
+    tune.add_argument('--runs', type=int, metavar='N', help='seeds to tune on, the next one judges; default: 2')
+    tune.add_argument('--duration', type=float, metavar='S', help='of a run')
+    tune.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
+                      help='change a parameter of the scenario; may be repeated')
+    tune.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: NAME-KIND.yaml')
+    tune.set_defaults(verb=_tune)
 
     replay = verbs.add_parser('replay', help='publish a recording into a live graph')
     replay.add_argument('bag', type=pathlib.Path)
@@ -200,7 +217,8 @@ def _run(options):
     from pedestal_bringup import consistency, graph, results, scenario
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
-    chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
+    changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
+    chosen = scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
     bag = _new_bag(options.bag, chosen.name)
     _check_json(options.json)
     with _progress(chosen.header.duration) as progress:
@@ -412,6 +430,14 @@ def _recompute(options):
     if options.json:
         _write_json(options.json, {'name': 'recompute', 'rows': rows})
     return 0 if well else 1
+
+
+def _tune(options):
+    from pedestal_bringup import tune
+    with _share() as progress:
+        lines = tune.main(options, options.command, progress)
+    print('\n'.join(lines))
+    return 0
 
 
 def _replay(options):
