@@ -2,7 +2,7 @@
 
     alpha_beta, alpha_beta_gamma    cv or ca without process noise, corrected with constant gains
     cv, ca, singer, current_statistical     a Kalman filter with that model of motion
-    imm             interacting models; imm_ukf is the same here, the bank it falls back on without a range
+    imm             interacting models; imm_ukf is the same here, what it falls back on without a range
 
 The state stays at the last measurement that was believed; whoever needs it later predicts.
 """
@@ -96,15 +96,25 @@ def start(f, c, y, R, rate_sigma):
 
 @compiled
 def adopt(f, c):
-    """If the bank has changed: the new models start from the combined estimate and covariance of the old."""
+    """If the bank is another than before: its models start from the combined estimate and covariance of the old."""
     if f.bank != c.bank:
         _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
 
 
 @compiled
+def move(f, c, angle, rate, acceleration):
+    """Shift the models so that together they estimate this, as far as they have an acceleration; the rest stays."""
+    x1, x2, x3 = outlook(f, c, 0.0)
+    for j in range(c.count):
+        f.x[j, 0] += angle - x1
+        f.x[j, 1] += rate - x2
+        if c.models[j].kind != motion_models.CV:
+            f.x[j, 2] += acceleration - x3
+
+
+@compiled
 def predict(f, c, T):
     """The bank T [s] after its last measurement, into the prior fields; the state itself stays."""
-    adopt(f, c)
     f.T = T
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):

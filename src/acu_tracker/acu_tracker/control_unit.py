@@ -48,6 +48,7 @@ OUTPUTS = np.dtype([
     ('reference', 'f8', (2, 3)),                                                # deck angle, rate, acceleration at t_k
     ('covariance', 'f8', (2, 3)), ('probability', 'f8', (2, 4)),                # p11, p12, p22 at t_k; of MODELS
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
+    ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
     ('coasting', 'i8'), ('locked', 'i8'), ('invalid_input', 'i8'),
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
@@ -198,9 +199,12 @@ def take_error(s, p, c, u, o):
     cos_el = max(math.cos(elevation), 0.01)
     (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
      o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, u.error_stamp, azimuth, elevation, R / (cos_el * cos_el), R,
-                                 azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate)
+                                 azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate, u.range,
+                                 u.range_variance)
     if outcome == tracker.STALE:
         return _ERROR_STAMP
+    if o.nis[0] == o.nis[0]:
+        o.innovation_sigma[0], o.innovation_sigma[1] = math.sqrt(s.tracker.S[0]), math.sqrt(s.tracker.S[1])
     return _ERROR_GATED if outcome == tracker.GATED else 0
 
 
@@ -317,6 +321,7 @@ def clear(o):
     o.torque[:] = 0.0
     o.innovation[:] = math.nan
     o.rate_innovation[:] = math.nan
+    o.innovation_sigma[:] = math.nan
     o.nis[:] = math.nan
     o.estimate[:] = math.nan
     o.covariance[:] = math.nan

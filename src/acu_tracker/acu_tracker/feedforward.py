@@ -1,6 +1,11 @@
-"""Rate, torque and friction of the shaped reference fed forward, PI on what is left of the error.
+"""Rate, acceleration, torque and friction of the shaped reference fed forward, PI on what is left of the error.
 
-u = k_v v(t_m) + K_p e + I,    tau = J a(t_m) + Tc tanh(v(t_m) / v_s);    e at t_k, t_m = middle of the command.
+u = k_v v(t_m) + k_a a(t_m) + K_p e + I,    tau = J a(t_m) + Tc tanh(v(t_m) / v_s);
+e at t_k, t_m = middle of the command.
+
+k_v + k_a s are the first terms of 1 / W(s), W the rate loop of the drive less the delay that t_m covers: of
+W = (b0 + b1 s + ...) / (a1 + a2 s + ...) they are a1 / b0 and a2 / b0 - a1 b1 / b0^2 (paper 003, eq. 14 to 18; its c2
+holds for b0 = 1, the captions of 17 and 18 are swapped); of a second order 1 and 2 zeta / w_s.
 """
 import math
 
@@ -8,9 +13,15 @@ from pedestal_common.compiled import compiled
 
 
 @compiled
-def rate(e, integral, v, K_p, k_v):
-    """Rate command [rad/s] of an error e [rad] and a reference rate v [rad/s]."""
-    return k_v * v + K_p * e + integral
+def ahead(v, a, k_v, k_a):
+    """What of the rate command [rad/s] is fed forward: of a reference rate v [rad/s] and acceleration a [rad/s2]."""
+    return k_v * v + k_a * a
+
+
+@compiled
+def rate(e, integral, fed, K_p):
+    """Rate command [rad/s] of an error e [rad] and what is fed forward."""
+    return fed + K_p * e + integral
 
 
 @compiled

@@ -75,3 +75,16 @@ class Filter(Parameters):
     singer: Singer = group(Singer)
     current_statistical: CurrentStatistical = group(CurrentStatistical)
     imm: Imm = group(Imm)
+
+
+@dataclasses.dataclass(frozen=True)
+class Ukf(Parameters):
+    """Cartesian CV and CA of filter kind imm_ukf, where the receiver measures the range."""
+
+    cv_noise: float = parameter(0.1, 1e-6, 1e4, 'm/s2/sqrt(Hz)', 'white acceleration of a target that flies straight')
+    ca_noise: float = parameter(3.0, 1e-6, 1e5, 'm/s3/sqrt(Hz)', 'white jerk of a target that turns')
+    dwell: float = parameter(5.0, 1e-3, 1e4, 's', 'how long it does either')
+    initial_speed: float = parameter(100.0, 1e-3, 1e5, 'm/s', 'standard deviation of the radial speed at the start')
+    initial_acceleration: float = parameter(5.0, 1e-6, 1e4, 'm/s2', 'of the acceleration at the start')
+    range_share: float = parameter(0.1, 1e-6, 1.0, '', 'standard deviation of the range over the range above which '
+                                   'the filter of the angles takes over')

@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from acu_tracker.filter_params import Filter
+from acu_tracker.filter_params import Filter, Ukf
 from acu_tracker.history import LENGTH
 from acu_tracker.modes import MODES
 from acu_tracker.position_loop import CONTROLLERS
@@ -33,6 +33,7 @@ class TrackerParameters(Parameters):
     coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack is left')
     handover: bool = flag(True, 'program hands over to autotrack by itself once locked')
     receiver: ReceiverLaw = group(ReceiverLaw)
+    ukf: Ukf = group(Ukf)
 
     def check(self):
         if self.coast_time < self.coast_after:
@@ -56,7 +57,9 @@ class Feedforward(Parameters):
 
     bandwidth: float = parameter(20.0, 0.0, 500.0, 'rad/s', 'of the position loop: K_p')
     integral: float = parameter(0.05, 0.0, 10.0, '', 'K_i / K_p^2; 0.25: both poles of the loop at K_p / 2')
-    rate_feedforward: float = parameter(1.0, 0.0, 2.0, '', 'share of the reference rate fed forward')
+    rate_feedforward: float = parameter(1.0, 0.0, 2.0, '', 'k_v: share of the reference rate fed forward')
+    acceleration_feedforward: float = parameter(0.0, -1.0, 1.0, 's', 'k_a: of the reference acceleration; 0 where '
+                                                'inertia does it')
     inertia: float = parameter(280.0, 0.0, 1e9, 'kg m2', 'load and motors, seen at the load')
     friction: float = parameter(60.0, 0.0, 1e7, 'Nm', 'Coulomb friction Tc fed forward')
     friction_rate: float = parameter(0.002, 1e-6, 1.0, 'rad/s', 'rate at which 76 % of the friction is fed forward')

@@ -146,8 +146,8 @@ def wanted(axis, p, e, v1, v2):
         return pid.rate(e, axis.integral, axis.derivative, p.pid.bandwidth, p.pid.derivative), 0.0
     if p.controller == FEEDFORWARD:
         c = p.feedforward
-        return (feedforward.rate(e, axis.integral, axis.rate, c.bandwidth, c.rate_feedforward),
-                c.rate_feedforward * axis.rate)
+        fed = feedforward.ahead(axis.rate, axis.acceleration, c.rate_feedforward, c.acceleration_feedforward)
+        return feedforward.rate(e, axis.integral, fed, c.bandwidth), fed
     c = p.adrc
     return (adrc.rate(axis.z[0], axis.z[1], axis.z[2], v1, v2, axis.rate, c.bandwidth, c.rate_bandwidth), axis.rate)
 

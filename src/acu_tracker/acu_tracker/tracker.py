@@ -1,23 +1,30 @@
-"""The target filter: an axis_filter for each axis; one gate, coasting, lock.
+"""The target filter: an axis_filter for each axis, for kind imm_ukf a Cartesian one of both; one gate, coasting, lock.
 
 Between believed errors the state stays at the stamp of the last one; everybody who needs it later predicts.
+The Cartesian filter begins on the first range, where the axes' filters are, and is used once it knows the rates twice
+as well. They run on beside it, and go on where it was once it does not know the range any more.
 """
 import math
 
 import numpy as np
 
-from acu_tracker import axis_filter
+from acu_tracker import axis_filter, unscented
+from acu_tracker.motion_models import CA, CV
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import wrap
 
 CONSTANTS = np.dtype([('azimuth', axis_filter.CONSTANTS), ('elevation', axis_filter.CONSTANTS),
-                      ('gates', 'f8', (3,))], align=True)
-"""gates: largest nu' S^-1 nu that is believed, for 2, 3 and 4 numbers measured at once."""
+                      ('gates', 'f8', (3,)), ('cartesian', unscented.CONSTANTS), ('range_share_2', 'f8'),
+                      ('wanted', 'i8', (2,))], align=True)
+"""gates: largest nu' S^-1 nu that is believed, for 2, 3 and 4 numbers measured at once; range_share_2: square of
+ukf.range_share; wanted: 1 for azimuth, elevation of kind imm_ukf."""
 
 TRACKER = np.dtype([('azimuth', axis_filter.FILTER), ('elevation', axis_filter.FILTER), ('stamp', 'f8'),
-                    ('running', 'i8'), ('in_a_row', 'i8'), ('refused', 'i8'), ('gated', 'i8'), ('converged', 'i8')],
+                    ('running', 'i8'), ('in_a_row', 'i8'), ('refused', 'i8'), ('gated', 'i8'), ('converged', 'i8'),
+                    ('cartesian', unscented.STATE), ('ranged', 'i8'), ('used', 'i8', (2,)), ('S', 'f8', (2,))],
                    align=True)
-"""in_a_row: errors believed, refused: errors gated since the other happened; gated: in all."""
+"""in_a_row: errors believed, refused: errors gated since the other happened; gated: in all; ranged: 1 while the
+Cartesian filter runs; used: 1 for an axis that takes its estimate; S: variances of the last innovations."""
 
 STARTED, BELIEVED, GATED, STALE = range(4)
 
@@ -40,6 +47,8 @@ def constants(params, azimuth, elevation) -> np.ndarray:
     c = np.zeros(1, CONSTANTS)
     c['azimuth'], c['elevation'] = axis_filter.constants(azimuth), axis_filter.constants(elevation)
     c['gates'] = params.gate, chi_square(params.gate, 3), chi_square(params.gate, 4)
+    c['cartesian'], c['range_share_2'] = unscented.constants(params.ukf), params.ukf.range_share**2
+    c['wanted'] = azimuth.kind == 'imm_ukf', elevation.kind == 'imm_ukf'
     return c
 
 
@@ -57,12 +66,44 @@ def adopt(t, c):
     if t.running:
         axis_filter.adopt(t.azimuth, c.azimuth)
         axis_filter.adopt(t.elevation, c.elevation)
+    if (t.used[0] and not c.wanted[0]) or (t.used[1] and not c.wanted[1]):
+        hand_back(t, c)
+
+
+@compiled
+def hand_back(t, c):
+    """The filters of the axes go on where the Cartesian one is, which ends."""
+    A, dA, ddA, E, dE, ddE = outlook(t, c, t.stamp)
+    axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
+    axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
+    t.ranged = t.used[0] = t.used[1] = 0
+
+
+@compiled
+def begin_cartesian(t, c, range_, R_range):
+    """The Cartesian filter starts where the filters of the axes are, at a first range [m]."""
+    A, dA, ddA, E, dE, ddE = outlook(t, c, t.stamp)
+    a11, a12, a22, e11, e12, e22 = variances(t, c, t.stamp)
+    unscented.start(t.cartesian, c.cartesian, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, range_, R_range)
+    t.ranged = 1
+
+
+@compiled
+def use_cartesian(t, c):
+    """Use the Cartesian estimate for an axis that wants it, from when on it knows the rate twice as well."""
+    if (t.used[0] or not c.wanted[0]) and (t.used[1] or not c.wanted[1]):
+        return
+    _, _, a22, _, _, e22, _ = unscented.variances(t.cartesian, c.cartesian, 0.0)
+    if c.wanted[0] and a22 <= 0.25 * axis_filter.variances(t.azimuth, c.azimuth, 0.0)[2]:
+        t.used[0] = 1
+    if c.wanted[1] and e22 <= 0.25 * axis_filter.variances(t.elevation, c.elevation, 0.0)[2]:
+        t.used[1] = 1
 
 
 @compiled
 def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_rate, elevation_rate, R_azimuth_rate,
-            R_elevation_rate):
-    """Take one measured direction and its rates (NaN: none), with their variances; p the TrackerParameters.
+            R_elevation_rate, range_, R_range):
+    """Take one measured direction, its rates and the range (NaN: none), with their variances; p the TrackerParameters.
 
     (what became of it, nu azimuth, nu elevation, nu of their rates, nu' S^-1 nu azimuth, elevation); NaN unless
     there was a prediction to compare with.
@@ -71,9 +112,10 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
     none = math.nan
     if t.running and T <= 0.0:
         return STALE, none, none, none, none, none, none
-    a, e = t.azimuth, t.elevation
+    a, e, x = t.azimuth, t.elevation, t.cartesian
     azimuth_rate = azimuth_rate if c.azimuth.rate_measurement else none
     elevation_rate = elevation_rate if c.elevation.rate_measurement else none
+    range_ = range_ if range_ > 0.0 and R_range > 0.0 else none
     nu_a = nu_e = nu_da = nu_de = nis_a = nis_e = none
     outcome = STARTED
     if t.running and T <= p.restart_gap:
@@ -83,10 +125,23 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
         azimuth = near + wrap(azimuth - near)
         nu_a, nu_da, nis_a = axis_filter.consistency(a, azimuth, R_azimuth, azimuth_rate, R_azimuth_rate)
         nu_e, nu_de, nis_e = axis_filter.consistency(e, elevation, R_elevation, elevation_rate, R_elevation_rate)
+        t.S[0], t.S[1] = axis_filter.expected(a)[2] + R_azimuth, axis_filter.expected(e)[2] + R_elevation
+        if t.ranged:
+            unscented.predict(x, c.cartesian, T)
+            n_a, S_a, n_e, S_e, n_r, S_r = unscented.innovation(x, azimuth, elevation, range_, R_azimuth, R_elevation,
+                                                                R_range)
+            if n_r * n_r > c.gates[0] * S_r:
+                range_ = none
+            if t.used[0]:
+                nu_a, nu_da, nis_a, t.S[0] = n_a, none, n_a * n_a / S_a, S_a
+            if t.used[1]:
+                nu_e, nu_de, nis_e, t.S[1] = n_e, none, n_e * n_e / S_e, S_e
         rates = (1 if nu_da == nu_da else 0) + (1 if nu_de == nu_de else 0)
         if nis_a + nis_e <= c.gates[rates]:
             axis_filter.correct(a, c.azimuth, azimuth, R_azimuth, azimuth_rate, R_azimuth_rate)
             axis_filter.correct(e, c.elevation, elevation, R_elevation, elevation_rate, R_elevation_rate)
+            if t.ranged:
+                unscented.correct(x, azimuth, elevation, range_)
             outcome = BELIEVED
         else:
             t.gated += 1
@@ -95,15 +150,22 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
                 t.in_a_row = 0
                 return GATED, nu_a, nu_e, nu_da, nu_de, nis_a, nis_e
     if outcome == STARTED:
-        near = axis_filter.outlook(a, c.azimuth, 0.0)[0] if t.running else azimuth
+        near = outlook(t, c, t.stamp)[0] if t.running else azimuth
         axis_filter.start(a, c.azimuth, near + wrap(azimuth - near), R_azimuth, p.initial_rate)
         axis_filter.start(e, c.elevation, elevation, R_elevation, p.initial_rate)
-        t.in_a_row = 0
+        t.in_a_row = t.ranged = t.used[0] = t.used[1] = 0
     t.running, t.stamp, t.refused = 1, stamp, 0
+    if t.ranged:
+        if unscented.range_known(x, c.range_share_2):
+            use_cartesian(t, c)
+        else:
+            hand_back(t, c)
+    elif (c.wanted[0] or c.wanted[1]) and R_range <= c.range_share_2 * range_ * range_:
+        begin_cartesian(t, c, range_, R_range)
     t.in_a_row = 1 if T > p.coast_after else t.in_a_row + 1
     # Converged: the estimate is at least twice as good as one measurement.
-    t.converged = (axis_filter.variances(a, c.azimuth, 0.0)[0] < 0.25 * R_azimuth
-                   and axis_filter.variances(e, c.elevation, 0.0)[0] < 0.25 * R_elevation)
+    a11, _, _, e11, _, _ = variances(t, c, stamp)
+    t.converged = a11 < 0.25 * R_azimuth and e11 < 0.25 * R_elevation
     return outcome, nu_a, nu_e, nu_da, nu_de, nis_a, nis_e
 
 
@@ -119,16 +181,39 @@ def outlook(t, c, stamp):
     T = stamp - t.stamp
     A, dA, ddA = axis_filter.outlook(t.azimuth, c.azimuth, T)
     E, dE, ddE = axis_filter.outlook(t.elevation, c.elevation, T)
+    if t.used[0] or t.used[1]:
+        B, dB, ddB, F, dF, ddF = unscented.outlook(t.cartesian, c.cartesian, T)
+        if t.used[0]:
+            A, dA, ddA = A + wrap(B - A), dB, ddB
+        if t.used[1]:
+            E, dE, ddE = F, dF, ddF
     return A, dA, ddA, E, dE, ddE
+
+
+@compiled
+def variances(t, c, stamp):
+    """(p11, p12, p22) of azimuth, then of elevation at a stamp that is not before the last error."""
+    T = max(stamp - t.stamp, 0.0)
+    a11, a12, a22 = axis_filter.variances(t.azimuth, c.azimuth, T)
+    e11, e12, e22 = axis_filter.variances(t.elevation, c.elevation, T)
+    if t.used[0] or t.used[1]:
+        b11, b12, b22, f11, f12, f22, _ = unscented.variances(t.cartesian, c.cartesian, T)
+        if t.used[0]:
+            a11, a12, a22 = b11, b12, b22
+        if t.used[1]:
+            e11, e12, e22 = f11, f12, f22
+    return a11, a12, a22, e11, e12, e22
 
 
 @compiled
 def read(t, c, stamp, o):
     """What is known of the target at a stamp, into o.estimate, .covariance, .probability (2, ...)."""
-    T = max(stamp - t.stamp, 0.0)
-    o.estimate[0, 0], o.estimate[0, 1], o.estimate[0, 2] = axis_filter.outlook(t.azimuth, c.azimuth, T)
-    o.estimate[1, 0], o.estimate[1, 1], o.estimate[1, 2] = axis_filter.outlook(t.elevation, c.elevation, T)
-    o.covariance[0, 0], o.covariance[0, 1], o.covariance[0, 2] = axis_filter.variances(t.azimuth, c.azimuth, T)
-    o.covariance[1, 0], o.covariance[1, 1], o.covariance[1, 2] = axis_filter.variances(t.elevation, c.elevation, T)
+    x, p = o.estimate, o.covariance
+    x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = outlook(t, c, max(stamp, t.stamp))
+    p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2] = variances(t, c, stamp)
     axis_filter.probabilities(t.azimuth, c.azimuth, o.probability[0])
     axis_filter.probabilities(t.elevation, c.elevation, o.probability[1])
+    for i in range(2):
+        if t.used[i]:
+            o.probability[i, :] = math.nan
+            o.probability[i, CV], o.probability[i, CA] = t.cartesian.mu[0], t.cartesian.mu[1]

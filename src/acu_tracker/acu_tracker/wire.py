@@ -133,12 +133,13 @@ def say(o, stamp, command, estimate, reference, filtered):
         estimate.velocity[i], reference.velocity[i] = o.estimate[i, 1], o.reference[i, 1]
         estimate.acceleration[i], reference.acceleration[i] = o.estimate[i, 2], o.reference[i, 2]
         # In the order of messages.FILTER.
-        numbers = filtered.position[10 * i:]
+        numbers = filtered.position[11 * i:]
         numbers[0], numbers[1], numbers[2] = o.innovation[i], o.rate_innovation[i], o.nis[i]
         numbers[3], numbers[4] = math.sqrt(o.covariance[i, 0]), math.sqrt(o.covariance[i, 2])
         numbers[5] = o.covariance[i, 1] / (numbers[3] * numbers[4])
+        numbers[6] = o.innovation_sigma[i]
         for model in range(4):
-            numbers[6 + model] = o.probability[i, model]
+            numbers[7 + model] = o.probability[i, model]
 
 
 @compiled

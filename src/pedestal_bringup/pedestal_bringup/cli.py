@@ -1,9 +1,11 @@
 """The command line `pedestal`: thin verbs over graph, bag, report, studies and bench."""
 import argparse
 import contextlib
+import inspect
 import json
 import math
 import pathlib
+import shlex
 import signal
 import sys
 
@@ -37,6 +39,7 @@ def main(args=None) -> int:
     """Exit code 0; 1 with one line on stderr for anything that went wrong; 2 for a wrong command line."""
     parser = _parser()
     options = parser.parse_args(args)
+    options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
@@ -63,6 +66,8 @@ def _parser():
     run.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     run.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
                      help='change a parameter, as acu.azimuth.feedforward.bandwidth=20; may be repeated')
+    run.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
+                     help='ROS 2 parameter file whose values replace those of the scenario, as `pedestal tune` writes')
     run.set_defaults(verb=_run)
 
     scenarios = verbs.add_parser('scenarios', help='list the scenarios')
@@ -102,6 +107,11 @@ def _parser():
     study.add_argument('name', nargs='?', metavar='NAME', help='without one: list the studies')
     study.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     study.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
+    study.add_argument('--runs', type=int, metavar='N', help='of each case; default: what the study says')
+    workers = study.add_mutually_exclusive_group()
+    workers.add_argument('--workers', type=int, metavar='N', help='processes for the runs; default: one per core')
+    workers.add_argument('--scheduler', metavar='ADDRESS', help="Dask cluster for the runs, as tcp://host:8786; needs "
+                         "pip install 'pedestal_bringup[cluster]' here and the pedestal packages there")
     study.set_defaults(verb=_study)
 
     export = verbs.add_parser('export', help='write a recording as one table per topic, CSV or Parquet')
@@ -113,6 +123,19 @@ def _parser():
     export.set_defaults(verb=_export)
 
     _add_recompute(verbs)
+
+    tune = verbs.add_parser('tune', help='find the parameters of a filter or of the feed-forward')
+    tune.add_argument('source', metavar='BAG|SCENARIO', help='a recording: innovations; a scenario: pointing error')
+    tune.add_argument('--filter', metavar='KIND', help='the kind of filter to tune')
+    tune.add_argument('--feedforward', action='store_true', help="the gains that follow from the drive's rate loop")
+    tune.add_argument('--axis', choices=('azimuth', 'elevation', 'both'), default='both', help='default: both')
+    tune.add_argument('--seed', type=int, metavar='N', help='first seed; default: what the scenario says')
+    tune.add_argument('--runs', type=int, metavar='N', help='seeds to tune on, the next one judges; default: 2')
+    tune.add_argument('--duration', type=float, metavar='S', help='of a run')
+    tune.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
+                      help='change a parameter of the scenario; may be repeated')
+    tune.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: NAME-KIND.yaml')
+    tune.set_defaults(verb=_tune)
 
     replay = verbs.add_parser('replay', help='publish a recording into a live graph')
     replay.add_argument('bag', type=pathlib.Path)
@@ -187,7 +210,8 @@ def _run(options):
     from pedestal_bringup import consistency, graph, results, scenario
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
-    chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
+    changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
+    chosen = scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
     bag = _new_bag(options.bag, chosen.name)
     _check_json(options.json)
     with _progress(chosen.header.duration) as progress:
@@ -304,19 +328,37 @@ def _study(options):
     from pedestal_bringup.studies import experiment
     output = options.output or pathlib.Path('studies', options.name)
     _check_json(options.json)
-    output.mkdir(parents=True, exist_ok=True)
-    with _share() as progress:
-        result = studies.study(options.name).run(progress)
+    study = studies.study(options.name)
+    with contextlib.ExitStack() as stack:
+        many = _many_runs(options, study, stack)
+        output.mkdir(parents=True, exist_ok=True)
+        progress = stack.enter_context(_share())
+        result = study.run(progress, **many)
         for name, draw in result.figures.items():
             progress(None, f'drawing {name}')
             experiment.save(draw, output / f'{name}.png')
-    _show_study(f'study {options.name}', result.rows)
+    _show_study(f'study {options.name}', result.rows if result.shown is None else result.shown)
     for remark in result.remarks:
         print(remark)
     print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')
     if options.json:
         _write_json(options.json, {'name': options.name, 'rows': result.rows})
     return 0
+
+
+def _many_runs(options, study, stack):
+    """What a study of many runs is told beside its progress; the pool is closed with the stack."""
+    asked = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
+    if 'runs' not in inspect.signature(study.run).parameters:
+        for name, value in asked.items():
+            if value is not None:
+                raise ValueError(f'--{name} {value}: study {options.name} has one run of each case')
+        return {}
+    if asked['runs'] is not None and asked['runs'] < 1:
+        raise ValueError(f'--runs {options.runs}: must be at least 1')
+    from pedestal_bringup import monte_carlo
+    return {'runs': options.runs or study.RUNS,
+            'pool': stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))}
 
 
 @contextlib.contextmanager
@@ -368,6 +410,14 @@ def _recompute(options):
     if options.json:
         _write_json(options.json, {'name': 'recompute', 'rows': rows})
     return 0 if well else 1
+
+
+def _tune(options):
+    from pedestal_bringup import tune
+    with _share() as progress:
+        lines = tune.main(options, options.command, progress)
+    print('\n'.join(lines))
+    return 0
 
 
 def _replay(options):

@@ -5,6 +5,7 @@
 import dataclasses
 import difflib
 import importlib.resources
+import json
 import pathlib
 import re
 import typing
@@ -194,6 +195,22 @@ def parse_override(text):
         return node, key, yaml.load(right, Loader=_Loader)
     except yaml.YAMLError as error:
         raise ScenarioError(f'--param {text!r}: no valid YAML value: {" ".join(str(error).split())}') from None
+
+
+def file_overrides(path):
+    """Texts 'node.key=value' of a ROS 2 parameter file."""
+    try:
+        tree = yaml.load(path.read_text(), Loader=_Loader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ScenarioError(f'--params-file {path}: {" ".join(str(error).split())}') from None
+    if not isinstance(tree, dict) or not tree:
+        raise ScenarioError(f'--params-file {path}: must hold a section for a node')
+    texts = []
+    for node, body in tree.items():
+        if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
+            raise ScenarioError(f'--params-file {path}: section {node} must hold ros__parameters')
+        texts += [f'{node}.{key}={json.dumps(value)}' for key, value in dotted(body['ros__parameters']).items()]
+    return texts
 
 
 def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):

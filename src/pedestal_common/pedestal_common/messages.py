@@ -37,7 +37,7 @@ AXES = ('azimuth', 'elevation')
 MODELS = ('cv', 'ca', 'singer', 'current_statistical')
 """Motion models of the ACU's filters, in the order of their probabilities."""
 FILTER = tuple(f'{axis}_{name}' for axis in AXES for name in (
-    'innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation', *MODELS))
+    'innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation', 'innovation_sigma', *MODELS))
 """Names of the numbers on acu/filter."""
 MOTORS = ('azimuth_motor_1', 'azimuth_motor_2', 'elevation_motor_1', 'elevation_motor_2')
 

@@ -1,0 +1,137 @@
+"""Filter kind imm_ukf in the tracker: the Cartesian estimate while there is a range, the filters of the axes else."""
+import math
+
+import numpy as np
+import pytest
+
+from acu_tracker import tracker
+from acu_tracker.filter_params import Filter, Ukf
+from acu_tracker.params import TrackerParameters
+from pedestal_common.parameters import record
+
+DEG = math.pi / 180.0
+T = 0.02
+SIGMA, RANGE_SIGMA = 0.03 * DEG, 1.0
+BOTH = ('imm_ukf', 'imm_ukf')
+
+
+class Pass:
+    """A straight pass at 60 m and 15 m/s, tracked from its beginning; the azimuth goes through south."""
+
+    def __init__(self, kinds=BOTH, seconds=50.0, seed=1, **params):
+        t = np.arange(0.0, seconds, T)
+        east, north, up = 15.0 * (25.0 - t), np.full_like(t, -60.0), np.full_like(t, 20.0)
+        self.truth = np.column_stack((np.unwrap(np.arctan2(east, north)), np.arctan2(up, np.hypot(east, north))))
+        self.rates = np.gradient(self.truth, T, axis=0)
+        self.range = np.sqrt(east**2 + north**2 + up**2)
+        self.params = TrackerParameters(**params)
+        self.p, self.state = record(self.params)[0], np.zeros(1, tracker.TRACKER)
+        self.noise = np.random.default_rng(seed).normal(size=(len(t), 3))
+        self.t, self.k, self.estimates = t, 0, np.full((len(t), 6), math.nan)
+        self.put(kinds)
+
+    def put(self, kinds):
+        self.c = tracker.constants(self.params, *(Filter(kind=kind) for kind in kinds))[0]
+        tracker.adopt(self.state[0], self.c)
+
+    def now(self, stamp=None):
+        return np.array(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
+
+    def take(self, seconds, ranged=True, offset=0.0, range_offset=0.0):
+        """Take the errors of the next seconds; the outcomes."""
+        outcomes = []
+        for _ in range(round(seconds / T)):
+            k, (A, E) = self.k, self.truth[self.k] + offset
+            a, e, r = self.noise[k] * (SIGMA / math.cos(E), SIGMA, RANGE_SIGMA)
+            distance = self.range[k] + r + range_offset if ranged else math.nan
+            outcomes.append(tracker.observe(
+                self.state[0], self.p, self.c, self.t[k], (A + a + math.pi) % (2.0 * math.pi) - math.pi, E + e,
+                (SIGMA / math.cos(E))**2, SIGMA**2, math.nan, math.nan, math.nan, math.nan, distance,
+                RANGE_SIGMA**2)[0])
+            self.k += 1
+            self.estimates[k] = self.now()
+        return outcomes
+
+    def rate_rms(self, start=5.0):
+        rows = slice(round(start / T), self.k - 1)
+        return np.sqrt(np.mean((self.estimates[rows][:, [1, 4]] - self.rates[rows])**2, axis=0)) / DEG
+
+
+def test_the_range_takes_the_geometry_out_of_the_rate():
+    rms = {}
+    for kinds in (BOTH, ('imm', 'imm')):
+        tracked = Pass(kinds)
+        assert set(tracked.take(49.0)[1:]) == {tracker.BELIEVED}
+        assert tracked.state['ranged'][0] == (kinds == BOTH)
+        rms[kinds] = tracked.rate_rms()
+    print({kinds[0]: value.round(4).tolist() for kinds, value in rms.items()}, 'deg/s')
+    assert np.all(rms[BOTH] < 0.5 * rms['imm', 'imm'])
+
+
+def test_an_axis_of_another_kind_keeps_its_own_estimate():
+    mixed, alone = Pass(('imm_ukf', 'cv')), Pass(('cv', 'cv'))
+    for tracked in (mixed, alone):
+        tracked.take(20.0)
+    assert mixed.estimates[:mixed.k, 3:].tobytes() == alone.estimates[:alone.k, 3:].tobytes()
+    assert mixed.rate_rms()[0] < 0.5 * alone.rate_rms()[0]
+
+
+def largest_step(estimates):
+    """Largest change (6,) of angles, rates, accelerations between neighbours, less what angles do by their rates."""
+    steps = np.diff(estimates, axis=0)
+    for angle in (0, 3):
+        steps[:, angle] -= T * estimates[:-1, angle + 1]
+    return np.abs(steps).max(axis=0)
+
+
+def test_no_bump_when_the_first_range_comes():
+    """Switching over steps the rate by no more than the filters wandered in the second before."""
+    tracked = Pass()
+    tracked.take(22.0, ranged=False)
+    first = tracked.k
+    while not tracked.state['used'].all():
+        tracked.take(T)
+        assert tracked.k < first + 100
+    took = tracked.k
+    tracked.take(3.0)
+    wander = np.ptp(tracked.estimates[first - 50:first, [1, 4]] - tracked.rates[first - 50:first], axis=0)
+    steps = largest_step(tracked.estimates[first - 1:tracked.k])[[1, 4]]
+    print(f'in use {T * (took - first):.2f} s after the first range; largest step of the rates {steps / DEG} deg/s, '
+          f'wander before {wander / DEG}')
+    error = tracked.estimates[took:tracked.k, [1, 4]] - tracked.rates[took:tracked.k]
+    assert np.all(steps < 1.5 * wander) and np.abs(error).max() < 0.2 * DEG
+
+
+def test_no_bump_when_the_range_is_lost_or_the_kind_changes():
+    tracked = Pass()
+    tracked.take(20.0)
+    before = tracked.now()
+    for kinds in (('imm_ukf', 'imm'), BOTH, ('ca', 'current_statistical')):
+        tracked.put(kinds)
+        assert tracked.now()[[0, 1, 3, 4]] == pytest.approx(before[[0, 1, 3, 4]], abs=1e-12)
+    lost = Pass()
+    lost.take(15.0)
+    lost.take(1.0, ranged=False)
+    assert lost.state['used'].all()
+    lost.params = TrackerParameters(ukf=Ukf(range_share=1e-4))
+    lost.put(BOTH)
+    lost.take(0.2, ranged=False)
+    assert not lost.state['used'].any() and not lost.state['ranged'].any()
+    assert np.all(largest_step(lost.estimates[lost.k - 12:lost.k])[[1, 4]] < 0.1 * DEG)
+    lost.params = TrackerParameters()
+    lost.put(BOTH)
+    lost.take(2.0)
+    assert lost.state['used'].all()
+
+
+def test_bad_ranges_and_directions_are_not_believed():
+    tracked = Pass()
+    tracked.take(10.0)
+    before = tracked.state['cartesian']['x'].copy()
+    for wrong in (30.0, -1e9, math.inf, math.nan):
+        assert tracked.take(T, range_offset=wrong) == [tracker.BELIEVED]
+    assert np.abs(tracked.state['cartesian']['x'] - before)[0, :, :3].max() < 3.0
+    assert tracked.take(T, offset=1.0 * DEG) == [tracker.GATED]
+    outcomes = tracked.take(21 * T, offset=3.0 * DEG)
+    assert tracker.STARTED in outcomes and np.isfinite(tracked.now()).all()
+    assert abs(tracked.now()[3] - tracked.truth[tracked.k - 1, 1] - 3.0 * DEG) < 0.1 * DEG
