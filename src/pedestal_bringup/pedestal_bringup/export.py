@@ -26,7 +26,8 @@ _UNITS = {
     'nav_msgs/msg/Odometry': {'position': 'm', 'linear': 'm/s', 'angular': 'rad/s'},
 }
 """Units of the topics in the table of topics: {type: {part of the column's name: unit}}."""
-_FILTER = {'innovation': 'rad', 'sigma': 'rad', 'rate_innovation': 'rad/s', 'rate_sigma': 'rad/s'}
+_FILTER = {'innovation': 'rad', 'innovation_sigma': 'rad', 'sigma': 'rad', 'rate_innovation': 'rad/s',
+           'rate_sigma': 'rad/s'}
 _OWN = {
     'tracking_receiver/angle_error': {'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'},
     'tracking_receiver/angle_rate': {'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'},

@@ -111,7 +111,8 @@ def test_true_rates_seen_from_a_sailing_ship():
 
 def test_names_are_those_of_the_models_and_axes():
     assert messages.MODELS == motion_models.MODELS
-    assert len(messages.FILTER) == 2 * (len(consistency.NAMES) + len(messages.MODELS))
+    told = {f'{axis}_{name}' for axis in messages.AXES for name in (*consistency.NAMES, *messages.MODELS)}
+    assert told | {f'{axis}_innovation_sigma' for axis in messages.AXES} == set(messages.FILTER)
 
 
 @pytest.mark.parametrize('smoothing', SMOOTHINGS)

@@ -86,7 +86,7 @@ class Graph:
         rclpy.init(args=[], context=self.context, domain_id=domain)
         self.node = rclpy.create_node('graph', context=self.context)
         self.publishers = {}
-        for topic in topics.TOPICS:
+        for topic in topics.read_by('recorder', topics.NODES):
             durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.qos == 'state' else DurabilityPolicy.VOLATILE
             profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE,
                                  durability=durability)
