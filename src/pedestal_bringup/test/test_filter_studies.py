@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from acu_tracker import axis_filter
 from acu_tracker.filter_params import Filter
+from pedestal_bringup import cli
 from pedestal_bringup.studies import ensemble, experiment, filters, manoeuvre, pareto, tuning
 from pedestal_bringup.studies.ensemble import Noise
 from pedestal_common.parameters import as_dict
@@ -196,19 +197,24 @@ def test_at_equal_rate_noise_the_imm_misses_less():
 
 
 def test_the_command_takes_runs_and_workers(tmp_path):
-    def study(*arguments):
-        return subprocess.run([sys.executable, '-m', 'pedestal_bringup.cli', 'study', *arguments], cwd=tmp_path,
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=100)
-
-    done = study('manoeuvre', '--runs', '3', '--workers', '1', '--json', 'rows.json')
+    done = subprocess.run([sys.executable, '-m', 'pedestal_bringup.cli', 'study', 'manoeuvre', '--runs', '3',
+                           '--workers', '1', '--json', 'rows.json'], cwd=tmp_path, stdin=subprocess.DEVNULL,
+                          capture_output=True, text=True, timeout=100)
     assert (done.returncode, done.stderr) == (0, '')
     rows = json.loads((tmp_path / 'rows.json').read_text())['rows']
     assert rows == manoeuvre.run(quiet, 3).rows
     assert len(list((tmp_path / 'studies' / 'manoeuvre').glob('*.png'))) == 3
-    for arguments, message in ((('manoeuvre', '--runs', '0'), '--runs 0: must be at least 1'),
-                               (('manoeuvre', '--workers', '-1'), '--workers -1: must be at least 1'),
-                               (('servo', '--runs', '3'), '--runs 3: study servo has one run of each case'),
-                               (('manoeuvre', '--scheduler', 'x'), '--scheduler x: must be an address')):
-        done = study(*arguments)
-        assert done.returncode == 1 and done.stderr.startswith(f'pedestal: error: {message}')
-        assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize('arguments, message', [
+    (('manoeuvre', '--runs', '0'), '--runs 0: must be at least 1'),
+    (('manoeuvre', '--workers', '-1'), '--workers -1: must be at least 1'),
+    (('servo', '--runs', '3'), '--runs 3: study servo has one run of each case'),
+    (('manoeuvre', '--scheduler', 'x'), '--scheduler x: must be an address')])
+def test_runs_and_workers_that_cannot_be_are_refused(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cli.signal, 'signal', lambda number, handler: None)
+    assert cli.main(['study', *arguments]) == 1
+    stdout, stderr = capsys.readouterr()
+    assert stdout == '' and stderr.startswith(f'pedestal: error: {message}') and len(stderr.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []

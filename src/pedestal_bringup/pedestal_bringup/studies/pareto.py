@@ -11,21 +11,21 @@ import numpy as np
 
 from pedestal_bringup import monte_carlo
 from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment, imm_feedforward
+from pedestal_bringup.studies import experiment, feedforward_loop
 from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.imm_feedforward import Source
+from pedestal_bringup.studies.feedforward_loop import Source
 
 RUNS = 50
 """Of each tuning, as many as in the paper."""
 
 AXIS = 'azimuth'
 
-REFERENCE = imm_feedforward.SOURCES['imm-predicted']
-"""IMM-A of the study imm-feedforward: the point that the rows compare with."""
+REFERENCE = feedforward_loop.imm(40.0, True)
+"""imm-predicted of the study imm-feedforward: the point that the rows compare with."""
 
 
 def _cs(a_max):
-    return Source(imm_feedforward.filter_of('current_statistical', current_statistical={
+    return Source(feedforward_loop.filter_of('current_statistical', current_statistical={
         'alpha': 0.5, 'a_max': math.radians(a_max)}))
 
 
@@ -34,11 +34,11 @@ def _logarithmic(low, high, points):
 
 
 TUNINGS = {
-    'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), imm_feedforward.cv),
-    'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), imm_feedforward.ca),
+    'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), feedforward_loop.cv),
+    'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), feedforward_loop.ca),
     'current_statistical': ('a_max [deg/s2], alpha 0.5 1/s', _logarithmic(0.5, 1000.0, 13), _cs),
-    'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10), lambda q: imm_feedforward.imm(q, True))}
-"""{filter: (what is tuned, its values, the imm_feedforward.Source of a value)}."""
+    'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10), lambda q: feedforward_loop.imm(q, True))}
+"""{filter: (what is tuned, its values, the Source of a value)}."""
 
 COLOURS = {'cv': TRUTH, 'ca': RAW, 'current_statistical': MOTOR_2, 'imm': FILTERED}
 
@@ -54,7 +54,7 @@ def cases():
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
-    found = imm_feedforward.outcomes(cases(), runs, pool or monte_carlo.Pool(1), progress)
+    found = feedforward_loop.outcomes(cases(), runs, pool or monte_carlo.Pool(1), progress)
     points = {case: measured(outcome) for case, outcome in found.items()}
     return Result(rows(points), {'miss': lambda: miss_figure(points)}, remarks(points))
 
