@@ -52,11 +52,14 @@ def domain(monkeypatch, tmp_path_factory):
             profile.write_text(PROFILE)
             monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(profile))
             yield number
+            while Recorder.started:
+                Recorder.started.pop().kill()
             return
 
 
 class Recorder:
-    """The recorder as a process."""
+    """The recorder as a process; the fixture `domain` ends those that a failing test leaves."""
+    started = []
 
     def __init__(self, directory, pacing, *arguments, nodes=NODES, **options):
         known = ('-p', f'graph.nodes:={",".join(nodes)}') if nodes else ()
@@ -64,6 +67,7 @@ class Recorder:
             [sys.executable, '-m', 'pedestal_bringup.recorder_node', '--ros-args', '-p', f'bag:={directory}',
              '-p', f'graph.pacing:={pacing}', *known, *arguments],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+        self.started.append(self.process)
 
     def end(self, number=signal.SIGINT):
         """(exit code, JSON of the last line of stdout, stderr) after the signal; None sends none."""
