@@ -5,6 +5,7 @@ import dataclasses
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter
 
 SEED_MAX = 2 ** 31 - 1
+IMU_OUTPUTS = ('sample', 'increment')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,6 +80,13 @@ class ImuParameters(Parameters):
     accelerometer_bias_y: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along y')
     accelerometer_bias_z: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along z')
     accelerometer_noise: float = parameter(1e-4, 0.0, 1.0, 'm/s/sqrt(s)', 'velocity random walk')
+    gyro_scale: float = parameter(0.0, -0.1, 0.1, '-', "error of the gyros' scale factor")
+    gyro_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each gyro axis is turned towards the next')
+    gyro_quantum: float = parameter(0.0, 0.0, 0.01, 'rad', 'smallest angle increment; 0: no quantisation')
+    accelerometer_scale: float = parameter(0.0, -0.1, 0.1, '-', "error of the accelerometers' scale factor")
+    accelerometer_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each axis is turned towards the next')
+    accelerometer_quantum: float = parameter(0.0, 0.0, 0.1, 'm/s', 'smallest velocity increment; 0: no quantisation')
+    output: str = choice('sample', IMU_OUTPUTS, 'rates at the stamp, or their means since the last sample')
     seed: int = parameter(2, 0, SEED_MAX, '-', 'seed of the noise')
 
 
