@@ -1,7 +1,10 @@
-"""Kalman filter of three states (angle, rate, acceleration) with one angle measured: H = [1 0 0].
+"""Kalman filter of three states (angle, rate, acceleration): the angle is measured, the rate where a sensor gives it.
 
-The covariance is kept as its upper triangle (p11, p12, p13, p22, p23, p33), symmetric by construction.
+The covariance is kept as its upper triangle (p11, p12, p13, p22, p23, p33), symmetric by construction. Two
+measurements of one instant are taken one after the other, which is exact as their errors are independent.
 """
+import math
+
 from pedestal_common.compiled import compiled
 
 
@@ -18,16 +21,46 @@ def predict_covariance(p11, p12, p13, p22, p23, p33, T, f13, f23, f33, q11, q12,
 
 
 @compiled
-def innovation(x1, p11, y, R):
-    """(nu, nu^2 / S): the innovation and its square in units of its variance."""
-    nu = y - x1
-    return nu, nu * nu / (p11 + R)
-
-
-@compiled
 def update(x1, x2, x3, p11, p12, p13, p22, p23, p33, nu, R):
-    """X, P after the innovation nu (eq. 8, 9, 10); K = P H' / S, P H' R / S is p1j - K1 p1j without the difference."""
+    """X, P after an innovation nu of the angle, H = [1 0 0] (paper 000, eq. 8, 9, 10).
+
+    K = P H' / S; the measured row of P is P H' R / S, which is p1j - K1 p1j without the difference.
+    """
     S = p11 + R
     k1, k2, k3 = p11 / S, p12 / S, p13 / S
     return (x1 + k1 * nu, x2 + k2 * nu, x3 + k3 * nu,
             k1 * R, k2 * R, k3 * R, p22 - k2 * p12, p23 - k2 * p13, p33 - k3 * p13)
+
+
+@compiled
+def update_rate(x1, x2, x3, p11, p12, p13, p22, p23, p33, nu, R):
+    """The same for an innovation of the rate, H = [0 1 0] (paper 004, eq. 34)."""
+    S = p22 + R
+    k1, k2, k3 = p12 / S, p22 / S, p23 / S
+    return (x1 + k1 * nu, x2 + k2 * nu, x3 + k3 * nu,
+            p11 - k1 * p12, k1 * R, p13 - k1 * p23, k2 * R, k3 * R, p33 - k3 * p23)
+
+
+@compiled
+def update_with_gain(x1, x2, x3, p11, p12, p13, p22, p23, p33, nu, R, k1, k2, k3):
+    """The same for the angle with any gain K: P = (1 - K H) P (1 - K H)' + K R K' (Joseph), multiplied out."""
+    S = p11 + R
+    return (x1 + k1 * nu, x2 + k2 * nu, x3 + k3 * nu,
+            p11 - 2.0 * k1 * p11 + k1 * k1 * S,
+            p12 - k1 * p12 - k2 * p11 + k1 * k2 * S,
+            p13 - k1 * p13 - k3 * p11 + k1 * k3 * S,
+            p22 - 2.0 * k2 * p12 + k2 * k2 * S,
+            p23 - k2 * p13 - k3 * p12 + k2 * k3 * S,
+            p33 - 2.0 * k3 * p13 + k3 * k3 * S)
+
+
+@compiled
+def log_likelihood(nu, S):
+    """Logarithm of the normal density of an innovation nu of variance S, less the constant -log(2 pi) / 2."""
+    return -0.5 * (nu * nu / S + math.log(S))
+
+
+@compiled
+def nis(nu, nu_rate, s11, s12, s22):
+    """nu' S^-1 nu of an innovation of angle and rate."""
+    return (s22 * nu * nu - 2.0 * s12 * nu * nu_rate + s11 * nu_rate * nu_rate) / (s11 * s22 - s12 * s12)

@@ -28,8 +28,8 @@ def start(axis, y, R, rate_sigma, a_max):
 @compiled
 def predict(axis, T, alpha, a_max, floor):
     """(x1, x2, x3, P) after T: Phi1 X = Phi X + U abar, abar the estimated acceleration (paper 000, eq. 6, 11)."""
-    f13, f23, f33 = motion_models.transition(alpha, T)
-    q11, q12, q13, q22, q23, q33 = motion_models.process_noise(alpha, T)
+    f13, f23, f33 = motion_models.fading(alpha, T)
+    q11, q12, q13, q22, q23, q33 = motion_models.fading_noise(alpha, T)
     k = 2.0 * alpha * motion_models.acceleration_variance(axis.x3, a_max, floor)
     p = kalman.predict_covariance(axis.p11, axis.p12, axis.p13, axis.p22, axis.p23, axis.p33, T, f13, f23, f33,
                                   k * q11, k * q12, k * q13, k * q22, k * q23, k * q33)
@@ -47,7 +47,7 @@ def update(axis, x1, x2, x3, p, nu, R):
 @compiled
 def outlook(axis, T, alpha):
     """(angle, rate, acceleration) T after the estimate: Phi X, so that in a long coast the acceleration fades."""
-    f13, f23, f33 = motion_models.transition(alpha, T)
+    f13, f23, f33 = motion_models.fading(alpha, T)
     return axis.x1 + T * axis.x2 + f13 * axis.x3, axis.x2 + f23 * axis.x3, f33 * axis.x3
 
 
@@ -70,8 +70,8 @@ def observe(t, c, a_max_azimuth, a_max_elevation, stamp, azimuth, elevation, R_a
     if t.running and T <= c.restart_gap:
         a1, a2, a3, a_p = predict(t.azimuth, T, c.alpha, a_max_azimuth, c.sigma_a_floor)
         e1, e2, e3, e_p = predict(t.elevation, T, c.alpha, a_max_elevation, c.sigma_a_floor)
-        nu_a, nis_a = kalman.innovation(a1, a_p[0], a1 + wrap(azimuth - a1), R_azimuth)
-        nu_e, nis_e = kalman.innovation(e1, e_p[0], elevation, R_elevation)
+        nu_a, nu_e = wrap(azimuth - a1), elevation - e1
+        nis_a, nis_e = nu_a * nu_a / (a_p[0] + R_azimuth), nu_e * nu_e / (e_p[0] + R_elevation)
         if nis_a + nis_e <= c.gate:
             update(t.azimuth, a1, a2, a3, a_p, nu_a, R_azimuth)
             update(t.elevation, e1, e2, e3, e_p, nu_e, R_elevation)

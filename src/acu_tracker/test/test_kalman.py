@@ -5,9 +5,9 @@ from scipy.linalg import solve_discrete_are
 from acu_tracker import kalman, motion_models
 
 T, ALPHA, R = 0.01, 0.5, 2.5e-7
-F13, F23, F33 = motion_models.transition(ALPHA, T)
+F13, F23, F33 = motion_models.fading(ALPHA, T)
 F = np.array([[1, T, F13], [0, 1, F23], [0, 0, F33]])
-QS = tuple(0.3 * q for q in motion_models.process_noise(ALPHA, T))
+QS = tuple(0.3 * q for q in motion_models.fading_noise(ALPHA, T))
 H = np.array([[1.0, 0.0, 0.0]])
 
 
@@ -20,7 +20,8 @@ def run(measurements, x, p):
         x = F @ x
         p = kalman.predict_covariance(*p, T, F13, F23, F33, *QS)
         prior = full(p)
-        nu, nis = kalman.innovation(x[0], p[0], y, R)
+        nu = y - x[0]
+        nis = nu * nu / (p[0] + R)
         x1, x2, x3, *p = kalman.update(*x, *p, nu, R)
         x = np.array([x1, x2, x3])
         yield x, full(p), prior, nu, nis

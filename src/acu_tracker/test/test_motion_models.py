@@ -31,9 +31,9 @@ def symmetric(q11, q12, q13, q22, q23, q33):
 @pytest.mark.parametrize('alpha, T', CASES)
 def test_transition_and_noise_against_van_loan(alpha, T):
     phi, q = van_loan(alpha, T)
-    f13, f23, f33 = motion_models.transition(alpha, T)
+    f13, f23, f33 = motion_models.fading(alpha, T)
     np.testing.assert_allclose([[1, T, f13], [0, 1, f23], [0, 0, f33]], phi, rtol=1e-11, atol=1e-300)
-    np.testing.assert_allclose(symmetric(*motion_models.process_noise(alpha, T)), q, rtol=2e-9)
+    np.testing.assert_allclose(symmetric(*motion_models.fading_noise(alpha, T)), q, rtol=2e-9)
 
 
 @pytest.mark.parametrize('alpha, T', CASES)
@@ -47,14 +47,14 @@ def test_noise_against_quadrature(alpha, T):
     pairs = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
     integrals = [quad(lambda s, i, j: g(s)[i] * g(s)[j], 0, T, args=(i, j), epsabs=0, epsrel=1e-10)[0]
                  for i, j in pairs]
-    np.testing.assert_allclose(motion_models.process_noise(alpha, T), integrals, rtol=1e-8)
+    np.testing.assert_allclose(motion_models.fading_noise(alpha, T), integrals, rtol=1e-8)
 
 
 @pytest.mark.parametrize('alpha', [1e-4, 0.1, 0.5])
 @pytest.mark.parametrize('T', [1e-4, 0.005, 0.01])
 def test_noise_stays_definite_for_small_alpha_t(alpha, T):
     scale = np.diag([T**-2.5, T**-1.5, T**-0.5])
-    q = scale @ symmetric(*motion_models.process_noise(alpha, T)) @ scale
+    q = scale @ symmetric(*motion_models.fading_noise(alpha, T)) @ scale
     # In the limit of white jerk.
     np.testing.assert_allclose(q, [[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1]], rtol=0.02)
     assert np.linalg.eigvalsh(q).min() > 1e-4
@@ -66,7 +66,7 @@ def test_prediction_is_phi_x_plus_u_abar(alpha, T):
     X = np.array([0.3, -0.2, 0.15])
     axis = np.zeros(1, tracker.AXIS)
     axis['x1'], axis['x2'], axis['x3'] = X
-    f13, f23, f33 = motion_models.transition(alpha, T)
+    f13, f23, f33 = motion_models.fading(alpha, T)
     Phi = np.array([[1, T, f13], [0, 1, f23], [0, 0, f33]])
     # u1 with the inner 1/alpha that the print lacks; rise = 1 - e^(-alpha T).
     rise = -math.expm1(-alpha * T)

@@ -1,6 +1,7 @@
 """The command line `pedestal`: thin verbs over graph, bag, report, studies and bench."""
 import argparse
 import contextlib
+import inspect
 import json
 import math
 import pathlib
@@ -102,6 +103,11 @@ def _parser():
     study.add_argument('name', nargs='?', metavar='NAME', help='without one: list the studies')
     study.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     study.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
+    study.add_argument('--runs', type=int, metavar='N', help='of each case; default: what the study says')
+    workers = study.add_mutually_exclusive_group()
+    workers.add_argument('--workers', type=int, metavar='N', help='processes for the runs; default: one per core')
+    workers.add_argument('--scheduler', metavar='ADDRESS', help="Dask cluster for the runs, as tcp://host:8786; needs "
+                         "pip install 'pedestal_bringup[cluster]' here and the pedestal packages there")
     study.set_defaults(verb=_study)
 
     export = verbs.add_parser('export', help='write a recording as one table per topic, CSV or Parquet')
@@ -302,19 +308,37 @@ def _study(options):
     from pedestal_bringup.studies import experiment
     output = options.output or pathlib.Path('studies', options.name)
     _check_json(options.json)
-    output.mkdir(parents=True, exist_ok=True)
-    with _share() as progress:
-        result = studies.study(options.name).run(progress)
+    study = studies.study(options.name)
+    with contextlib.ExitStack() as stack:
+        many = _many_runs(options, study, stack)
+        output.mkdir(parents=True, exist_ok=True)
+        progress = stack.enter_context(_share())
+        result = study.run(progress, **many)
         for name, draw in result.figures.items():
             progress(None, f'drawing {name}')
             experiment.save(draw, output / f'{name}.png')
-    _show_study(f'study {options.name}', result.rows)
+    _show_study(f'study {options.name}', result.rows if result.shown is None else result.shown)
     for remark in result.remarks:
         print(remark)
     print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')
     if options.json:
         _write_json(options.json, {'name': options.name, 'rows': result.rows})
     return 0
+
+
+def _many_runs(options, study, stack):
+    """What a study of many runs is told beside its progress; the pool is closed with the stack."""
+    asked = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
+    if 'runs' not in inspect.signature(study.run).parameters:
+        for name, value in asked.items():
+            if value is not None:
+                raise ValueError(f'--{name} {value}: study {options.name} has one run of each case')
+        return {}
+    if asked['runs'] is not None and asked['runs'] < 1:
+        raise ValueError(f'--runs {options.runs}: must be at least 1')
+    from pedestal_bringup import monte_carlo
+    return {'runs': options.runs or study.RUNS,
+            'pool': stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))}
 
 
 @contextlib.contextmanager

@@ -49,10 +49,14 @@ def sine_case(case, w, periods):
 
 @dataclasses.dataclass
 class Result:
-    """What a study found: rows as of `row`, figures {name: function that draws a Figure}, remarks in sentences."""
+    """What a study found: rows as of `row`, figures {name: function that draws a Figure}, remarks in sentences.
+
+    shown: the rows that are printed, where they are too many for a terminal; None: all.
+    """
     rows: list
     figures: dict
     remarks: list = dataclasses.field(default_factory=list)
+    shown: list | None = None
 
 
 def row(case, metric, value, unit, paper=None, target=None):

@@ -1,0 +1,27 @@
+"""Filters of constant gain: X += (alpha, beta / T, gamma / (2 T^2)) nu, predicted at constant rate or acceleration.
+
+One number, alpha, sets each; a relation gives the others.
+"""
+import math
+
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def benedict_bordner(alpha):
+    """beta of the alpha-beta filter that is best for its noise in the transient of a ramp (Benedict, Bordner 1962)."""
+    return alpha * alpha / (2.0 - alpha)
+
+
+@compiled
+def kalata(alpha):
+    """(beta, gamma) of the alpha-beta-gamma filter: the steady Kalman filter of a constant acceleration that takes an
+    independent step at every measurement (Kalata 1984)."""
+    beta = 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
+    return beta, beta * beta / alpha
+
+
+@compiled
+def gain(alpha, beta, gamma, T):
+    """(k1, k2, k3) of the gains over T [s]."""
+    return alpha, beta / T, gamma / (2.0 * T * T)

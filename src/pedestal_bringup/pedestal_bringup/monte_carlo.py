@@ -1,0 +1,98 @@
+"""Many runs at once: on the cores of this machine, or on the Dask cluster behind a scheduler.
+
+A study cuts its runs into batches whose size and seeds do not depend on who works, and adds their results in order: so
+the same numbers come out to the last bit whatever the pool. A batch reduces its runs (sums, not records) before it
+answers, so that memory stays bounded whatever --runs is.
+"""
+import contextlib
+import logging
+import re
+import signal
+
+import joblib
+
+TIMEOUT = 10.0
+"""How long a scheduler, or its first worker, is waited for [s]."""
+
+
+def batches(runs, size):
+    """The (first, count) of every batch of at most `size` runs."""
+    return [(first, min(size, runs - first)) for first in range(0, runs, size)]
+
+
+class Pool:
+    """Workers for `map`: local processes (None: one per core), or a Dask scheduler's, 'tcp://host:port'.
+
+    Use as a context; one local worker is this process and needs none. Raises ValueError for no worker at all,
+    RuntimeError where Dask is missing or nobody answers.
+    """
+
+    def __init__(self, workers=None, scheduler=None):
+        if workers is not None and workers < 1:
+            raise ValueError(f'--workers {workers}: must be at least 1')
+        if scheduler is not None and not re.fullmatch(r'(\w+://)?.+:\d+', scheduler):
+            raise ValueError(f'--scheduler {scheduler}: must be an address such as tcp://host:8786')
+        self.workers = workers or joblib.cpu_count()
+        self.scheduler = scheduler
+        self._stack = contextlib.ExitStack()
+
+    def __enter__(self):
+        if self.scheduler is None:
+            if self.workers > 1:
+                self._stack.callback(_end_local)
+        else:
+            client = self._stack.enter_context(_client(self.scheduler))
+            self._stack.enter_context(joblib.parallel_config(backend='dask', client=client))
+        return self
+
+    def __exit__(self, *raised):
+        return self._stack.__exit__(*raised)
+
+    def map(self, function, items, progress=lambda share, text: None):
+        """Yield function(item) of every item, in their order. function: of a module, so that it can be sent.
+
+        progress(share done, text) is called after each.
+        """
+        items = list(items)
+        options = {'n_jobs': -1} if self.scheduler else {'n_jobs': min(self.workers, len(items) or 1),
+                                                         'backend': 'loky'}
+        with _ctrl_c_held_back():
+            results = joblib.Parallel(return_as='generator', **options)(map(joblib.delayed(function), items))
+        with contextlib.closing(results):
+            for done, result in enumerate(results, 1):
+                progress(done / len(items), f'{done} of {len(items)} batches')
+                yield result
+
+
+@contextlib.contextmanager
+def _ctrl_c_held_back():
+    """Ctrl-C reaches every process of a terminal; those started now never hear it: this one does, and ends them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_local():
+    joblib.externals.loky.get_reusable_executor(reuse=True).shutdown(kill_workers=True)
+
+
+def _client(address):
+    try:
+        import distributed
+    except ImportError:
+        raise RuntimeError(f"--scheduler {address}: Dask is not installed: pip install 'pedestal_bringup[cluster]'"
+                           ) from None
+    for name in ('distributed', 'tornado'):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what went wrong is raised as well
+    try:
+        client = distributed.Client(address, timeout=TIMEOUT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise RuntimeError(f'--scheduler {address}: nobody answers as a Dask scheduler: {error}') from None
+    try:
+        client.wait_for_workers(1, timeout=TIMEOUT)
+    except TimeoutError:
+        client.close()
+        raise RuntimeError(f'--scheduler {address}: no worker came within {TIMEOUT:g} s') from None
+    return client

@@ -1,0 +1,324 @@
+"""Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
+
+Cases <profile>/<filter>/<noise>, measurements at 100 Hz. Every filter but imm is tuned for each profile and noise by
+the procedure of `tuning` for the least angle rms over TUNING_RUNS records of other seeds; imm has one fixed tuning,
+its default parameters. `-rate-X`: with an independent rate measurement of X deg/s rms. Moments are over all runs,
+after SETTLED.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.axis_filter import KINDS
+from acu_tracker.filter_params import Filter, Ukf
+from acu_tracker.motion_models import MODELS
+from pedestal_bringup import monte_carlo
+from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.studies import ensemble, experiment, profiles, tuning
+from pedestal_bringup.studies.ensemble import Noise
+from pedestal_bringup.studies.experiment import Result, row
+
+RUNS = 200
+"""Of each case."""
+
+BATCH = 25
+"""Runs that one worker makes at a time."""
+
+SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
+
+SETTLED = 3.0
+"""What comes before is not counted [s]."""
+
+NOISES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
+          for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
+"""rms [deg]; coloured: through a first-order lag of 5 Hz."""
+
+RATES = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
+"""Filters with a rate measurement, its standard deviation [rad/s]."""
+
+FILTERS = {**{kind: Filter(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
+           **{name: Filter(kind='current_statistical') for name in RATES}}
+
+FIXED = ('imm', 'imm_ukf')
+"""Filters that keep their default parameters."""
+
+RANGED = ('flyby-60m', 1.0)
+"""Where imm_ukf is shown, and the standard deviation of the range it measures [m]."""
+
+SHOWN_FILTERS = (*FILTERS, 'imm_ukf')
+
+SHOWN = 'white-0.03'
+"""The noise of the figures and of the table of remarks."""
+
+TARGETS = {
+    ('flyby-500m', 'current_statistical', 'reduction'): '>= 6.5',
+    ('flyby-60m', 'current_statistical', 'reduction'): '>= 2.8',
+    ('flyby-500m', 'current_statistical-rate-0.1', 'reduction'): '>= 7.3',
+    ('flyby-60m', 'current_statistical-rate-0.1', 'reduction'): '>= 5.2',
+    ('flyby-500m', 'imm', 'angle_rms_deg'): '<= 0.0075', ('flyby-60m', 'imm', 'angle_rms_deg'): '<= 0.0090',
+    ('s-turn-500m', 'imm', 'angle_rms_deg'): '<= 0.0078', ('s-20deg', 'imm', 'angle_rms_deg'): '<= 0.0097'}
+"""Of the noise white-0.03."""
+
+PAPER = {('flyby-500m', 'current_statistical', 'reduction'): 7.0,
+         ('flyby-60m', 'current_statistical', 'reduction'): 3.0}
+"""Paper 000, figures 7 to 10."""
+
+HONEST = (0.8, 1.25)
+"""Mean NIS per degree of freedom, and error over the sigma that the filter gives it, where it knows its errors."""
+
+
+def freedom(name):
+    """Degrees of freedom of the innovation of a filter."""
+    return 1 + (name in RATES)
+
+
+def times():
+    return ensemble.PERIOD * np.arange(round(profiles.DURATION / ensemble.PERIOD))
+
+
+def measured(params, profile, noise, rate_sigma, seed, first, count):
+    """MOMENTS over time (n,) of one filter."""
+    t = times()
+    noise = Noise(noise.sigma, noise.bandwidth, rate_sigma)
+    truth = profiles.truth(profile, t)
+    return ensemble.moments(params, t, truth, noise, ensemble.records(truth, noise, seed, first, count))
+
+
+def settled(sums):
+    """Total of MOMENTS over time once the filter has settled."""
+    return ensemble.total(sums[round(SETTLED / ensemble.PERIOD):])
+
+
+def tune(item):
+    """The filter of an item (profile, noise, filter), its parameters found on the tuning seeds."""
+    profile, noise, name = item
+    t = times()
+    told = Noise(NOISES[noise].sigma, NOISES[noise].bandwidth, RATES.get(name))
+    truth = profiles.truth(profile, t)
+    records = ensemble.records(truth, told, TUNING_SEED, 0, TUNING_RUNS)
+
+    def angle_rms(params):
+        return ensemble.rms(settled(ensemble.moments(params, t, truth, told, records)), 'angle').item()
+
+    return tuning.tuned(FILTERS[name], angle_rms)[0]
+
+
+THINNED = 10
+"""Figures show every tenth measurement."""
+
+
+def batch(item):
+    """{filter: (total, MOMENTS over thinned time)} of an item (profile, noise, {filter: parameters}, first, count)."""
+    profile, noise, filters, first, count = item
+    found = {}
+    for name, params in filters.items():
+        sums = measured(params, profile, NOISES[noise], RATES.get(name), SEED, first, count)
+        found[name] = settled(sums), sums[::THINNED].copy()
+    if profile == RANGED[0]:
+        t = times()
+        sums = ensemble.unscented_moments(Ukf(), t, profiles.truth(profile, t), profiles.distance(profile, t),
+                                          NOISES[noise], RANGED[1], SEED, first, count)
+        found['imm_ukf'] = settled(sums), sums[::THINNED].copy()
+    return found
+
+
+def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISES)) -> Result:
+    """on: the profiles, noises: names of NOISES; fewer than all for a quick look."""
+    pool = pool or monte_carlo.Pool(1)
+    wanted = [(profile, noise, name) for profile in on for noise in noises for name in FILTERS if name not in FIXED]
+    filters = {name: FILTERS[name] for name in FILTERS if name in FIXED}
+    tuned = {(profile, noise): dict(filters) for profile in on for noise in noises}
+    for (profile, noise, name), params in zip(wanted, pool.map(
+            tune, wanted, lambda share, text: progress(0.5 * share, f'tuning, {text}'))):
+        tuned[profile, noise][name] = params
+    items = [(*key, tuned[key], first, count) for key in tuned for first, count in monte_carlo.batches(runs, BATCH)]
+    totals, over_time = {}, {}
+    for (profile, noise, *_), found in zip(items, pool.map(
+            batch, items, lambda share, text: progress(0.5 + 0.5 * share, f'{runs} runs of each case, {text}'))):
+        for name, (sums, thinned) in found.items():
+            case = profile, name, noise
+            totals[case] = ensemble.added(totals[case], sums) if case in totals else sums
+            over_time[case] = ensemble.added(over_time[case], thinned) if case in over_time else thinned
+    values = {case: metrics(sums) for case, sums in totals.items()}
+    return Result(rows(values), figures(values, over_time), remarks(values, tuned, runs), shown=shown(rows(values)))
+
+
+def metrics(sums):
+    """{metric: (value, unit)}; where a filter knows its errors nis_mean is its freedom and both _over_sigma are 1."""
+    angle, rate, raw = (ensemble.rms(sums, name).item() for name in ('angle', 'rate', 'raw'))
+    runs = sums['runs'].item()
+    return {'angle_rms_deg': (math.degrees(angle), 'deg'), 'rate_rms_deg_s': (math.degrees(rate), 'deg/s'),
+            'reduction': (raw / angle, ''), 'nis_mean': (sums['nis'].item() / runs, ''),
+            'angle_over_sigma': (angle / math.sqrt(sums['variance'].item() / runs), ''),
+            'rate_over_sigma': (rate / math.sqrt(sums['rate_variance'].item() / runs), '')}
+
+
+def rows(values):
+    """A row for every metric of every case (profile, filter, noise)."""
+    return [row('/'.join(case), metric, value, unit,
+                PAPER.get((*case[:2], metric)) if case[2] == SHOWN else None,
+                TARGETS.get((*case[:2], metric)) if case[2] == SHOWN else None)
+            for case, found in values.items() for metric, (value, unit) in found.items()]
+
+
+def shown(found):
+    """The rows that are printed: too many for a terminal are left to the file."""
+    return [row for row in found if row['target']]
+
+
+def _cell(at):
+    if at is None:
+        return 34 * ' '
+    at = {metric: value for metric, (value, _) in at.items()}
+    return (f'{at["angle_rms_deg"]:.4f} ({at["reduction"]:.1f})  {at["rate_rms_deg_s"]:.4f}  '
+            f'{at["angle_over_sigma"]:.2f} {at["rate_over_sigma"]:.2f}').ljust(34)
+
+
+def remarks(values, tuned, runs):
+    """What the rows do not say by themselves."""
+    found = [f'{runs} runs of each case. Angle rms [deg] (reduction), rate rms [deg/s], error over own sigma of angle '
+             f'and rate, noise {SHOWN} deg; every case is in the rows of --json.']
+    on = [profile for profile, noise in tuned if noise == SHOWN]
+    if on:
+        found.append(f'{"":30}' + ''.join(f'{profile:34}' for profile in on).rstrip())
+        found += [f'{name:30}' + ''.join(_cell(values.get((profile, name, SHOWN))) for profile in on).rstrip()
+                  for name in SHOWN_FILTERS]
+    for colour in ('white', 'coloured'):
+        doubtful = {}
+        for (_, name, noise), at in values.items():
+            measures = {'NIS': at['nis_mean'][0] / freedom(name), 'angle': at['angle_over_sigma'][0],
+                        'rate': at['rate_over_sigma'][0]}
+            if noise.startswith(colour):
+                for what, value in measures.items():
+                    if not HONEST[0] <= value <= HONEST[1]:
+                        doubtful.setdefault(name, {}).setdefault(what, []).append(value)
+        listed = [f'    {name}: '
+                  + ', '.join(f'{what} {min(off):.2f} to {max(off):.2f}' for what, off in at.items())
+                  for name, at in doubtful.items()]
+        if listed:
+            found += [f'Not honest under {colour} noise, NIS per degree of freedom or error over own sigma outside '
+                      f'{HONEST[0]:g} to {HONEST[1]:g} in some case:', *listed]
+    pairs = [(values[profile, name, noise]['reduction'][0],
+              values[profile, name, noise.replace('white', 'coloured')]['reduction'][0])
+             for profile, name, noise in values if noise == SHOWN
+             and (profile, name, noise.replace('white', 'coloured')) in values and name == 'current_statistical']
+    if pairs:
+        found.append('A reduction is one of white noise at 100 Hz: at the same rms within 5 Hz current_statistical '
+                     f'comes down from {", ".join(f"{white:.1f}" for white, _ in pairs)} to '
+                     f'{", ".join(f"{colour:.1f}" for _, colour in pairs)}. Filters take the noise for white.')
+    return found
+
+
+def figures(values, over_time):
+    """{name: function that draws it} of the cases with the noise SHOWN."""
+    on = list(dict.fromkeys(profile for profile, _, noise in values if noise == SHOWN))
+    if not on:
+        return {}
+    return {'errors': lambda: errors_figure(over_time, on), 'rates': lambda: errors_figure(over_time, on, 'rate'),
+            'rms': lambda: rms_figure(values, on), 'nis': lambda: nis_figure(values, on),
+            'probabilities': lambda: probabilities_figure(over_time, on),
+            'noise': lambda: noise_figure(values, on)}
+
+
+COMPARED = {'current_statistical': RAW, 'current_statistical-rate-0.1': FILTERED, 'imm': TRUTH}
+"""Filters of the error figures, with their colours."""
+
+
+def errors_figure(over_time, on, what='angle'):
+    """Ensemble of the error over time, mean +-1 sigma, and dashed the sigma that the filter itself believes."""
+    figure, axes = experiment.panels(len(on), len(COMPARED), size=(7.4, 1.0 + 1.4 * len(on)), sharex=True,
+                                     sharey='row')
+    t = times()[::THINNED]
+    after = t >= SETTLED
+    for line, profile in zip(axes, on):
+        for panel, (name, colour) in zip(line, COMPARED.items()):
+            sums = over_time[profile, name, SHOWN][after]
+            mean = np.degrees(sums[what] / sums['runs'])
+            sigma = np.degrees(np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - (sums[what] / sums['runs']) ** 2,
+                                                  0.0)))
+            believed = np.degrees(np.sqrt(sums['variance' if what == 'angle' else 'rate_variance'] / sums['runs']))
+            panel.fill_between(t[after], mean - sigma, mean + sigma, color=colour, alpha=0.35, linewidth=0.0)
+            panel.plot(t[after], mean, color=colour, linewidth=0.8)
+            for side in (-1.0, 1.0):
+                panel.plot(t[after], side * believed, color=INK, linewidth=0.7, linestyle='--')
+        line[0].set_ylabel(f'{profile}\n[deg{"" if what == "angle" else "/s"}]')
+    for panel, name in zip(axes[0], COMPARED):
+        panel.set_title(name)
+    for panel in axes[-1]:
+        panel.set_xlabel('time [s]')
+    return figure
+
+
+def bars(values, on, metric, label, colour, text):
+    """A panel of bars for each profile: figure, panels."""
+    figure, axes = experiment.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
+    for panel, profile in zip(axes[0], on):
+        found = {name: values.get((profile, name, SHOWN)) for name in SHOWN_FILTERS}
+        drawn = panel.barh(list(found), [metric(name, at) if at else 0.0 for name, at in found.items()],
+                           color=[colour(name) for name in found])
+        panel.bar_label(drawn, [text(name, at) if at else '' for name, at in found.items()], padding=2, fontsize=6)
+        panel.margins(x=0.35)
+        panel.locator_params(axis='x', nbins=3)
+        panel.grid(axis='y', visible=False)
+        panel.set_title(profile)
+        panel.set_xlabel(label)
+    axes[0, 0].invert_yaxis()
+    return figure, axes[0]
+
+
+def _colour(name):
+    return TRUTH if name in FIXED else FILTERED if name in RATES else RAW
+
+
+def rms_figure(values, on):
+    """Angle rms of every filter; the number on a bar is the reduction."""
+    return bars(values, on, lambda name, at: at['angle_rms_deg'][0], 'angle rms [deg]', _colour,
+                lambda name, at: f'{at["reduction"][0]:.1f}')[0]
+
+
+def nis_figure(values, on):
+    """Mean NIS per degree of freedom of every filter; 1: it knows its errors."""
+    def nis(name, at):
+        return at['nis_mean'][0] / freedom(name)
+
+    figure, panels = bars(values, on, nis, 'NIS per degree of freedom', _colour,
+                          lambda name, at: f'{nis(name, at):.2f}')
+    for panel in panels:
+        panel.axvline(1.0, color=INK, linewidth=0.8)
+        panel.axvspan(*HONEST, color=INK, alpha=0.12, linewidth=0.0)
+    return figure
+
+
+def probabilities_figure(over_time, on):
+    """Mode probabilities of the imm, mean over the runs."""
+    figure, axes = experiment.panels(len(on), size=(7.4, 1.0 + 1.2 * len(on)), sharex=True, sharey=True)
+    for panel, profile in zip(axes[:, 0], on):
+        sums = over_time[profile, 'imm', SHOWN]
+        for j, (name, colour) in enumerate(zip(MODELS, (MOTOR_1, MOTOR_2, RAW, TRUTH))):
+            mu = sums['mu'][:, j] / sums['runs']
+            if np.isfinite(mu).any():
+                panel.plot(times()[::THINNED], mu, color=colour, label=name)
+        panel.set_title(profile)
+        panel.set_ylim(0.0, 1.0)
+    axes[-1, 0].set_xlabel('time [s]')
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside upper right', ncols=4)
+    return figure
+
+
+def noise_figure(values, on):
+    """Reduction of every filter under each noise: what it owes to the bandwidth of the receiver."""
+    figure, axes = experiment.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
+    for panel, profile in zip(axes[0], on):
+        for noise, colour, marker in zip(NOISES, (RAW, RAW, FILTERED, FILTERED), 'o^o^'):
+            there = [name for name in SHOWN_FILTERS if (profile, name, noise) in values]
+            panel.plot([values[profile, name, noise]['reduction'][0] for name in there], there, marker,
+                           color=colour, ms=4.0, linestyle='', label=f'{noise} deg',
+                           fillstyle='full' if marker == 'o' else 'none')
+        panel.axvline(1.0, color=INK, linewidth=0.8)
+        panel.set_xlim(left=0.0)
+        panel.locator_params(axis='x', nbins=4)
+        panel.set_title(profile)
+        panel.set_xlabel('reduction')
+    axes[0, 0].invert_yaxis()
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside upper right', ncols=4)
+    return figure

@@ -1,0 +1,133 @@
+"""The study imm-feedforward: its loop against closed forms and against filterpy and scipy, its rows."""
+import math
+
+import control
+import filterpy.kalman
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
+
+from acu_tracker import axis_filter
+from acu_tracker.filter_params import Filter
+from pedestal_bringup import monte_carlo
+from pedestal_bringup.studies import experiment
+from pedestal_bringup.studies import imm_feedforward as study
+from pedestal_common import noise
+
+T, W, ZETA = study.T, *study.RATE_LOOP
+
+
+def rate_loop():
+    """(theta, omega, omega') over T under a rate command that is held."""
+    return control.sample_system(control.ss([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, -W * W, -2.0 * ZETA * W]],
+                                            [[0.0], [0.0], [W * W]], np.eye(3), np.zeros((3, 1))), T, 'zoh')
+
+
+def test_the_rate_loop_is_the_sampled_one():
+    plant = rate_loop()
+    assert study.rate_loop_step(W, ZETA) == pytest.approx(np.hstack([plant.A, plant.B]), rel=1e-9, abs=1e-12)
+    z = np.exp(2j * math.pi * np.array([0.5, 5.0, 40.0]) * T)
+    transfer = control.sample_system(control.tf([W * W], [1.0, 2.0 * ZETA * W, W * W, 0.0]), T, 'zoh')
+    assert [plant(x)[0, 0] for x in z] == pytest.approx(transfer(z), rel=1e-6)
+
+
+def test_the_gains_leave_only_the_jerk():
+    """1 - W(s) (k_v + k_a s) = s^2 / w^2 - ...: at 0.1 Hz what is left is (s / w)^2 and turned by 180 deg."""
+    k_v, k_a = study.feedforward_gains(W, ZETA)
+    s = 2j * math.pi * 0.1
+    assert 1.0 - W * W * (k_v + k_a * s) / (s * s + 2.0 * ZETA * W * s + W * W) == pytest.approx((s / W)**2, rel=0.03)
+
+
+def followed(angle, late):
+    """Miss after 8 s, no noise, of a target with a polynomial angle; its true state fed forward, `late` [s]."""
+    t = T * np.arange(800)
+    target = np.column_stack([angle.deriv(i)(t) if i else angle(t) for i in range(3)])
+    known = np.column_stack([angle.deriv(i)(t + 0.5 * T - late) for i in (1, 2)])
+    out = np.zeros((1, len(t)), study.STEP)
+    study._follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(Filter()), 0.0,
+                  study.rate_loop_step(W, ZETA), np.zeros((1, len(t))), out)
+    return out['miss'][0, -1]
+
+
+@pytest.mark.parametrize('coefficients, late, left', [
+    ([0.1, 0.2], 0.0, 0.0), ([0.1, 0.2], 0.045, 0.0), ([0.1, 0.2, 0.05], 0.0, 0.0),
+    ([0.1, 0.2, 0.05], 0.045, 0.1 * 0.045 / study.K_P),
+    ([0.0, 0.1, 0.0, 0.01], 0.0, 0.06 * (1.0 / W**2 - T * T / 24.0) / study.K_P)])
+def test_what_a_polynomial_leaves(coefficients, late, left):
+    """Of a delay a * late / K_p; of jerk j what W lacks, j / w^2, less what holding a rate over T adds, j T^2 / 24."""
+    assert followed(np.polynomial.Polynomial(coefficients), late) == pytest.approx(left, rel=1e-4, abs=1e-9)
+
+
+def test_one_run_is_what_filterpy_and_scipy_make_of_it():
+    q, axis = math.radians(0.3), 'elevation'
+    t, target, _ = study.motion(axis)
+    ours = study.steps_of(axis, study.cv(0.3), 3, 1)[0]
+    normals = noise.generator(3, 'tracking_receiver').standard_normal(len(t))
+    kalman = filterpy.kalman.KalmanFilter(2, 1)
+    kalman.F = np.array([[1.0, T], [0.0, 1.0]])
+    kalman.H, kalman.R = np.array([[1.0, 0.0]]), np.array([[study.SIGMA**2]])
+    kalman.Q = q * q * np.array([[T**3 / 3.0, T * T / 2.0], [T * T / 2.0, T]])
+    kalman.P = np.diag([study.SIGMA**2, study.SPEED**2])
+    plant, x = rate_loop(), target[0].copy()
+    theta, miss = [], []
+    for k in range(len(t)):
+        theta.append(x[0])
+        miss.append(target[k, 0] - theta[-1])
+        u, j = target[0, 1] + study.K_A * target[0, 2], k - 4
+        if j >= 0:
+            y = target[j, 0] + study.SIGMA * normals[j]
+            if j == 0:
+                kalman.x = np.array([[y], [0.0]])
+            else:
+                kalman.predict()
+                kalman.update(y)
+            u = 5.0 * (y - theta[j]) + kalman.x[1, 0]
+        x = plant.A @ x + plant.B[:, 0] * u
+    assert ours['miss'] == pytest.approx(np.array(miss), abs=1e-9)
+
+
+def test_noise_of_the_rate_is_the_steady_states():
+    """Gains by Riccati; as the target has no noise, the measured one through them by Lyapunov."""
+    q, R = math.radians(0.5), study.SIGMA**2
+    F, H = np.array([[1.0, T], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+    P = solve_discrete_are(F.T, H.T, q * q * np.array([[T**3 / 3.0, T * T / 2.0], [T * T / 2.0, T]]), R)
+    K = P @ H.T / (P[0, 0] + R)
+    expected = math.degrees(math.sqrt(solve_discrete_lyapunov((np.eye(2) - K @ H) @ F, K @ K.T * R)[1, 1]))
+    found = study.outcomes({'cv': ('azimuth', study.cv(0.5))}, 50, monte_carlo.Pool(1))['cv']
+    assert found.measures()['rate_noise_deg_s'][0] == pytest.approx(expected, rel=0.03)
+
+
+def test_an_outcome_is_that_of_all_its_runs():
+    """More than one batch, against one array of all runs."""
+    case = ('azimuth', study.SOURCES['imm-predicted'])
+    count = study.BATCH + 3
+    found = study.outcomes({'case': case}, count, monte_carlo.Pool(1))['case']
+    miss = study.steps_of(*case, 0, count)['miss']
+    t, _, period = study.motion('azimuth')
+    assert found.miss_mean == pytest.approx(miss.mean(axis=0), abs=1e-12)
+    counts = t >= 0.5 * period
+    values = found.measures()
+    assert values['miss_rms_deg'][0] == pytest.approx(math.degrees(experiment.rms(miss[:, counts])))
+    assert values['miss_peak_deg'][0] == pytest.approx(np.degrees(np.abs(miss[:, counts]).max(axis=1).mean()))
+    assert values['miss_rms_deg'][0] < values['miss_worst_second_deg'][0] < values['miss_peak_deg'][0]
+
+
+@pytest.fixture(scope='module')
+def result():
+    return study.run(lambda share, text: None, runs=10)
+
+
+def test_no_row_misses_its_target(result):
+    named = {(row['case'], row['metric']): row for row in result.rows}
+    assert len(named) == len(result.rows)
+    for axis in study.REVERSALS:
+        for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state'):
+            assert {(f'{axis}/{name}', 'miss_rms_deg'), (f'{axis}/{name}', 'rate_noise_deg_s')} <= named.keys()
+    assert sum(row['target'] is not None for row in result.rows) == 11
+    assert [row for row in result.rows if experiment.missed(row)] == []
+
+
+def test_every_figure_is_drawn(result, tmp_path):
+    for name, draw in result.figures.items():
+        experiment.save(draw, tmp_path / f'{name}.png')
+        assert (tmp_path / f'{name}.png').stat().st_size > 10000
