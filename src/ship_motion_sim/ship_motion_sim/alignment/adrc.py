@@ -12,6 +12,8 @@ from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import extended_observer, levelling, slope, steady_state
 from ship_motion_sim.alignment.conditions import SIGMA_UNKNOWN
 
+CALM = 1.2      # surprise of a sea as expected, its own noise included [-]
+
 CONSTANTS = np.dtype([
     ('w_o', 'f8'), ('w_c', 'f8'),           # bandwidth of observer and of level control [rad/s]
     ('start', 'f8'),                        # the commands count from here on [s]
@@ -60,10 +62,12 @@ def azimuth_sigma(c, k, window, surprise):
     """1 sigma [rad] of the slope over a window [s].
 
     Random walk under the parabola's weights: 1.2 / window. The commands' own noise is the second derivative of the
-    velocity's integral, so only the ends of the window see it: 2 x 6^2 / window^4 of the velocity's variance.
+    velocity's integral, so only the ends of the window see it: 2 x 6^2 / window^4 of the velocity's variance, to which
+    all that surprises the observer (swell) is added.
     """
     g, w_north = k.gravity, k.earth_rate[1]
-    noise = 72.0 * surprise * c.velocity_variance / (g * window * window)**2
+    variance = c.velocity_variance + max(surprise - CALM, 0.0) * c.innovation_variance
+    noise = 72.0 * variance / (g * window * window)**2
     return min(math.sqrt(noise + 1.2 * k.gyro_noise**2 / window + k.gyro_bias**2) / w_north, SIGMA_UNKNOWN)
 
 
@@ -87,6 +91,5 @@ def step(s, c, k, v_east, v_north, h):
     w_east = slope.slope(s.first[0], s.second[0], count)
     w_north = slope.slope(s.first[1], s.second[1], count)
     s.azimuth = math.atan2(w_east, k.earth_rate[1] + w_north)
-    wider = max(o.surprise, 1.0)
-    s.azimuth_sigma = azimuth_sigma(c, k, count * h, wider)
-    s.level_sigma = math.sqrt(wider) * c.level
+    s.azimuth_sigma = azimuth_sigma(c, k, count * h, o.surprise)
+    s.level_sigma = math.sqrt(max(o.surprise, 1.0)) * c.level

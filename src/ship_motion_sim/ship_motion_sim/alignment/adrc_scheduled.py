@@ -1,4 +1,4 @@
-"""Level by ADRC with an observer whose bandwidth falls as 6/t: quick at first, quiet later. Azimuth straight from z3."""
+"""Level by ADRC with an observer whose bandwidth falls as 6/t: quick at first, quiet later. Azimuth from z3."""
 import numpy as np
 
 from pedestal_common.compiled import compiled

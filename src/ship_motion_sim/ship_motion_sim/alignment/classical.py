@@ -1,4 +1,4 @@
-"""The fourth-order gyrocompass: a wrong azimuth tilts the north channel, and the tilt's velocity turns the azimuth back.
+"""The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity turns the azimuth back.
 
 v' = g a - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N with K1 = K4 = 2 s0, k2 = 4 s0^2/g,
 K3 = 4 s0^4/g: all four poles at -s0 +- j s0 (reference/nav.md section 1.2). 180 deg of azimuth is an unstable

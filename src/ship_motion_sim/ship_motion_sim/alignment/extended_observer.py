@@ -1,7 +1,7 @@
 """The linear extended state observer of a level channel: x1' = x2, x2' = x3 + b0 u, y = x1. Paper 001 equation (9).
 
-Linear, as the paper's is in effect: its delta = 20000 keeps fal in its linear zone. With fixed gains, scheduled ones or
-those of a Kalman filter; the covariance below holds for any.
+Linear, as the paper's is in effect: its delta = 20000 keeps fal in its linear zone. With fixed gains, scheduled ones
+or those of a Kalman filter; the covariance below holds for any.
 """
 import math
 

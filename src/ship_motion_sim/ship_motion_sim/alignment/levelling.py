@@ -1,7 +1,7 @@
-"""The level commands of an ADRC: tracking differentiator and nonlinear combination, paper 001 equations (7), (8), (11).
+"""The level commands of an ADRC: tracking differentiator and nonlinear combination; paper 001 (7), (8), (11).
 
-(11) is u = (u0 - z3) / b0. As printed, u0 - z3 / b0, the east channel (b0 < 0) is positive feedback and ends at 180 deg
-of level; the north one works with a gain g times too high (reference/nav.md section 1.1).
+(11) is u = (u0 - z3) / b0. As printed, u0 - z3 / b0, the east channel (b0 < 0) is positive feedback and ends at
+180 deg of level; the north one works with a gain g times too high (reference/nav.md section 1.1).
 """
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan

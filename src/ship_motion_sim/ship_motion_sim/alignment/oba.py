@@ -1,8 +1,8 @@
 """Optimisation-based alignment: which rotation brings what was felt onto what gravity must have done? No loop.
 
-a = int C_b^b0 f dt (gyros only, b0 the deck at the start) is, but for the velocity, C_n0^b0 b, b = -int C_n^n0 g dt.
-The rotation b0 -> n0 that brings the vectors a onto b with least squares is the eigenvector of a 4 x 4 matrix (Horn
-1987, equation 25). The centroid of either bundle is taken off: that is the unknown velocity at the start (Wu 2013 takes
+a = int C_b^b0 f dt (gyros only, b0 the deck at the start) is, but for the velocity, C_n0^b0 b with
+b = -int C_n^n0 g dt. The rotation b0 -> n0 that brings the vectors a onto b with least squares is the eigenvector of
+a 4 x 4 matrix (Horn 1987). The centroid of either bundle is taken off: that is the unknown velocity at the start (Wu 2013 takes
 it for zero, 25 times worse here at 100 s), and what is left of swell averages out.
 """
 import math
