@@ -250,11 +250,14 @@ def compute(recording, unit, fed, states=None, requests=()):
 
 
 def outputs_of(unit, fed, said):
-    """{topic: Output} of what a unit said."""
+    """{topic: Output} of what a unit said. A text belongs to the step its writer answers with it, by the answer's
+    stamp where that is late."""
     found = {}
+    answer = next(said[name]['stamp'] for name in unit.SAID.names if name not in unit.WORDS)
+    stamps = np.where(answer != NEVER, answer, fed.stamps)
     for name in unit.SAID.names:
         if name in unit.WORDS:
-            found[name] = _announced(fed.stamps, said[name], unit.WORDS[name])
+            found[name] = _announced(stamps, said[name], unit.WORDS[name])
         else:
             place = records.slot(said, name)
             sent = place.stamp != NEVER

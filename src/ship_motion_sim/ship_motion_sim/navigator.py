@@ -62,13 +62,13 @@ def constants(p, method, aid, latitude) -> np.ndarray:
 def initial_state(constants, quaternion) -> np.ndarray:
     """The record (1,) of STATE at power-up; quaternion (x, y, z, w) deck -> n' as it is taken for true."""
     state = np.zeros(1, STATE)
-    begin(state, constants, *map(float, quaternion))
+    begin(state[0], constants[0], *map(float, quaternion))
     return state
 
 
 @compiled
-def begin(state, constants, qx, qy, qz, qw):
-    s, c = state[0], constants[0]
+def begin(s, c, qx, qy, qz, qw):
+    """Power-up: records STATE, zero so far, and CONSTANTS."""
     if c.method == OBA:
         qx, qy, qz, qw = 0.0, 0.0, 0.0, 1.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
@@ -131,7 +131,8 @@ def follow(s, c, method, aid, h):
         adrc_scheduled.step(s.adrc_scheduled, k, v_east, v_north, h)
         take(s, s.adrc_scheduled)
     else:
-        riccati_eso.step(s.riccati_eso, k, v_east, v_north, h)
+        w_c = riccati_eso.W_C_NAVIGATING if s.stage == NAVIGATING else riccati_eso.W_C_ALIGNING
+        riccati_eso.step(s.riccati_eso, k, v_east, v_north, h, w_c)
         take(s, s.riccati_eso)
 
 
@@ -196,9 +197,11 @@ def fly_free(s, k, h):
 
 
 @compiled
-def step(state, constants, angle, force, dt, aid):
-    """One IMU interval of dt [s]: angle, force (3,) its increments, FLU [rad, m/s]; aid (3,) [m/s], finite."""
-    s, c = state[0], constants[0]
+def step(s, c, angle, force, dt, aid):
+    """One IMU interval of dt [s]; records STATE, CONSTANTS.
+
+    angle, force (3,): its increments, FLU [rad, m/s]; aid (3,) [m/s], finite.
+    """
     k, inertial = c.conditions, c.method == OBA and s.stage == ALIGNING
     if inertial:
         strapdown.step(s.strapdown, angle, force, dt, s.no_rate, s.no_rate, 0.0)

@@ -109,7 +109,7 @@ def align(state, constants, angle, force, dt, every, found):
     """Run a navigator on these increments; found: FOUND at every `every`-th."""
     aid = np.zeros(3)
     for k in range(len(angle)):
-        navigator.step(state, constants, angle[k], force[k], dt, aid)
+        navigator.step(state[0], constants[0], angle[k], force[k], dt, aid)
         if (k + 1) % every == 0:
             s, out = state[0], found[(k + 1) // every - 1]
             q = out.quaternion

@@ -16,8 +16,9 @@ Symbols
     w_c             commanded rate of n' against the earth, in n' (E, N, U)         [rad/s]
     w_N, g          north part of the earth's rate, gravity                         [rad/s, m/s2]
     v_E, v_N        level velocity in n' less what an aid says it is: the error     [m/s]
-    x1, x2, x3      v, its rate, the rate of that without command; z1, z2, z3 as observed. North: x2 = g a_x,
-                    x3 = g (-sin az w_N - eps_E), b0 = g; east: x2 = -g a_y, x3 = -g ((1 - cos az) w_N - eps_N), b0 = -g
+    x1, x2, x3      v, its rate, the rate of that without command; z1, z2, z3 as observed
+                    north: x2 = g a_x, x3 = g (-sin az w_N - eps_E), b0 = g
+                    east: x2 = -g a_y, x3 = -g ((1 - cos az) w_N - eps_N), b0 = -g
     b0 u            what a command does to x2: u = w_cE (north channel), w_cN (east)
     v1, v2          reference of x1, x2 out of the tracking differentiator
     w_o, w_c (level)    bandwidth of observer and of level control                  [rad/s]

@@ -7,7 +7,8 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import extended_observer, levelling
 
-W_C = 1.0       # of the level control [rad/s]; what it does is known exactly and does not touch the estimate
+W_C_ALIGNING, W_C_NAVIGATING = 1.0, 0.1
+"""Bandwidth of the level control [rad/s]: quick to level a deck, slow where only noise is left to follow."""
 
 STATE = np.dtype([
     ('observer', extended_observer.STATE),
@@ -28,14 +29,15 @@ def limit(o, k, h):
 
 
 @compiled
-def step(s, k, v_east, v_north, h):
-    """One step; records STATE, CONDITIONS."""
+def step(s, k, v_east, v_north, h, w_c):
+    """One step; records STATE, CONDITIONS. What control of bandwidth w_c [rad/s] does is known exactly: it does not
+    touch the estimate."""
     o = s.observer
     for i in range(2):
         s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
     extended_observer.predict(o, h)
     l1, l2, l3, variance = limit(o, k, h)
     extended_observer.correct(o, v_east, v_north, l1, l2, l3, variance, h)
-    levelling.level(o, k, s.v1, s.v2, W_C, s.command)
+    levelling.level(o, k, s.v1, s.v2, w_c, s.command)
     s.azimuth = extended_observer.azimuth(o, k)
     s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k)
