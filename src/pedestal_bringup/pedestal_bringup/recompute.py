@@ -294,7 +294,9 @@ def recompute(recording, node, params, requests=None) -> Recomputed:
     unit = kind.unit(params, recording.has(kind.ship))
     fed = feed(recording, unit, kind.trigger)
     if requests is None:
-        states = {step: text for name in unit.WORDS for step, text in recording.states(name, fed.stamps).items()}
+        # an INS tells its state and cannot be asked for one
+        told = unit.WORDS if hasattr(unit, 'request') else ()
+        states = {step: text for name in told for step, text in recording.states(name, fed.stamps).items()}
         said, made = compute(recording, unit, fed, states)
     else:
         said, made = compute(recording, unit, fed, requests=requests)

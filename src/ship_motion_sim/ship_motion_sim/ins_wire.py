@@ -34,7 +34,6 @@ class Ins:
         data.orientation_covariance = np.zeros(9)
         rate_noise = params.rate_noise if params.method == 'model' else 0.0     # zeros: unknown
         data.angular_velocity_covariance = (np.eye(3) * rate_noise**2).ravel()
-        self.remembers = self.state, self.inputs, self.outputs
         self.messages = {DATA: data}
         self.followers, self.events = {}, {}
 
@@ -42,10 +41,6 @@ class Ins:
         """Compile what answers."""
         self._answers(self.state.copy(), self.constants, self.inputs.copy(), self.outputs.copy(),
                       np.zeros((1, ins.NORMALS)), self.heard, self.said.copy())
-
-    def services_to(self, _text):
-        """Nothing can be asked of an INS."""
-        return []
 
     def answer(self):
         """Answer `heard` with `said`."""
