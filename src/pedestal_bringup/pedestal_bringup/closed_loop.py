@@ -63,7 +63,7 @@ def cores(scenario) -> Cores:
     receiver_inputs['valid'] = 1
     return Cores(
         ship=(motion.constants(ship.ship), np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS),
-              imu.constants(ship), np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)),
+              imu.initial_state(), imu.constants(ship), np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)),
         ins=(ins.initial_state(), ins.constants(navigation), np.zeros(1, ins.INPUTS), np.zeros(1, ins.OUTPUTS)),
         receiver=(receiver.initial_state(), receiver.constants(tracking, adu.period, built), receiver_inputs,
                   np.zeros(1, receiver.OUTPUTS)),
@@ -80,12 +80,12 @@ def cores(scenario) -> Cores:
 @compiled
 def _ship(k, stamp_ns, period, ship, navigation, imu_normals, ins_normals):
     """Truth, IMU and INS of step k."""
-    constants, inputs, truth, imu_constants, imu_inputs, felt = ship
+    constants, inputs, truth, imu_state, imu_constants, imu_inputs, felt = ship
     ins_state, ins_constants, ins_inputs, ins_outputs = navigation
-    inputs[0].t = stamp_ns * 1e-9
+    inputs[0].t = imu_inputs[0].t = stamp_ns * 1e-9
     motion.step(constants, inputs, truth)
     imu_inputs[0].dt = period
-    imu.step(imu_constants, imu_inputs, truth, felt, imu_normals[k])
+    imu.step(imu_state, imu_constants, constants, imu_inputs, truth, felt, imu_normals[k])
     ins_inputs[0].stamp_ns = stamp_ns
     for i in range(3):
         ins_inputs[0].angular_velocity[i] = felt[0].angular_velocity[i]

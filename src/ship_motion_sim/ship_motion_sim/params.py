@@ -2,9 +2,10 @@
 both hold the group `ship`, which must be the same in both (ins.step says when it is not)."""
 import dataclasses
 
-from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter
+from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
 
 SEED_MAX = 2 ** 31 - 1
+IMU_OUTPUTS = ('sample', 'increment')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +46,9 @@ class ShipParameters(Parameters):
     sea_state: int = parameter(5, 0, 6, '-', '3 to 6 take height and period from the table; 0: as given below')
     significant_height: float = parameter(0.0, 0.0, 20.0, 'm', 'Hs, with sea_state 0 only')
     peak_period: float = parameter(0.0, 0.0, 25.0, 's', 'Tp, with sea_state 0 only')
+    spectrum: str = choice('jonswap', ('jonswap', 'file'), 'of the waves; file: as measured, instead of a sea state')
     gamma: float = parameter(3.3, 1.0, 10.0, '-', 'peak enhancement of JONSWAP; 1 is Bretschneider')
+    spectrum_file: str = text('', 'CSV with columns frequency_hz, density_m2_per_hz')
     wave_angle_deg: float = parameter(45.0, 0.0, 360.0, 'deg',
                                       'where the waves travel to, clockwise from the bow: 0 following, 180 head')
     spread_deg: float = parameter(15.0, 0.0, 60.0, 'deg', 'standard deviation of the direction of single waves')
@@ -57,6 +60,9 @@ class ShipParameters(Parameters):
     plain: PlainParameters = group(PlainParameters)
 
     def check(self):
+        if (self.spectrum == 'file') != bool(self.spectrum_file):
+            raise ParameterError(f"spectrum_file = '{self.spectrum_file}': must name a CSV file with spectrum = file, "
+                                 'and be empty otherwise')
         if self.sea_state in (1, 2):
             raise ParameterError(f'sea_state = {self.sea_state}: must be 3 to 6, or 0 for significant_height and '
                                  'peak_period')
@@ -79,7 +85,22 @@ class ImuParameters(Parameters):
     accelerometer_bias_y: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along y')
     accelerometer_bias_z: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along z')
     accelerometer_noise: float = parameter(1e-4, 0.0, 1.0, 'm/s/sqrt(s)', 'velocity random walk')
+    gyro_scale: float = parameter(0.0, -0.1, 0.1, '-', "error of the gyros' scale factor")
+    gyro_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each gyro axis is turned towards the next')
+    gyro_quantum: float = parameter(0.0, 0.0, 0.01, 'rad', 'smallest angle increment; 0: no quantisation')
+    accelerometer_scale: float = parameter(0.0, -0.1, 0.1, '-', "error of the accelerometers' scale factor")
+    accelerometer_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each axis is turned towards the next')
+    accelerometer_quantum: float = parameter(0.0, 0.0, 0.1, 'm/s', 'smallest velocity increment; 0: no quantisation')
+    output: str = choice('sample', IMU_OUTPUTS, 'rates at the stamp, or their means since the last sample')
     seed: int = parameter(2, 0, SEED_MAX, '-', 'seed of the noise')
+
+
+@dataclasses.dataclass(frozen=True)
+class NmeaParameters(Parameters):
+    """The true attitude as NMEA 0183 (HEHDT, PASHR) over UDP, for third-party equipment."""
+    port: int = parameter(0, 0, 65535, '-', 'UDP port the datagrams are sent to; 0: none are sent')
+    host: str = text('127.0.0.1', 'address they are sent to')
+    rate: float = parameter(10.0, 0.1, 100.0, 'Hz', "datagrams per second of the drive's time")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,6 +108,7 @@ class ShipMotionParameters(Parameters):
     """ship_motion_node."""
     ship: ShipParameters = group(ShipParameters)
     imu: ImuParameters = group(ImuParameters)
+    nmea: NmeaParameters = group(NmeaParameters)
 
 
 @dataclasses.dataclass(frozen=True)
