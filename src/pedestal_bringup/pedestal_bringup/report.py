@@ -8,7 +8,7 @@ import pathlib
 import numpy as np
 
 from pedestal_bringup import bag as bags
-from pedestal_bringup import consistency, figures, filter_figures, results
+from pedestal_bringup import consistency, figures, filter_figures, isolation, results
 from pedestal_bringup.verify import verify
 from pedestal_common import topics
 
@@ -179,6 +179,17 @@ def _torques(recording):
              ''] for i in (1, 2)] if recording.motors else []
 
 
+def _isolation(found):
+    """Rows on what the ship's rotation leaves in the pointing error; none ashore."""
+    if found is None:
+        return []
+    degrees = math.degrees(1.0)
+    return [["line of sight moved by the ship's rotation, rms per axis", _number(found.motion * degrees, 'deg')],
+            ['pointing error that follows it, rms per axis', _number(found.coherent * degrees, 'deg')],
+            ['isolation', _number(found.isolation, 'dB')],
+            ['isolation that noise alone would show', _number(found.limit, 'dB')]]
+
+
 def _honesty(found):
     """The table of the filter's consistency, and a sentence for each axis."""
     judged = [consistency.axis(found, i) for i in range(2)]
@@ -289,6 +300,7 @@ def _page(bag, recording):
         run_rows = [[label, _number(values[key][0], unit)] for label, key, unit in (
             ("receiver's single-sample noise", 'single_sample_noise_deg', 'deg'), ('first lock', 'lock_time_s', 's'),
             ('time in autotrack', 'autotrack_time_s', 's'), ('time evaluated', 'evaluated_time_s', 's'))]
+        run_rows += _isolation(isolation.read(bag, recording.run))
     parts.append(_rows(None, run_rows + _loop(bag, check), 'n'))
     if not check.complete:
         parts.append('<h2 id="gaps">What the recording lacks</h2><ul>' + ''.join(

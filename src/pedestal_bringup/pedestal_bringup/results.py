@@ -167,7 +167,8 @@ def _max(values):
     return float(np.max(np.abs(values))) if values.size else math.nan
 
 
-TARGETS = {'pointing_to_noise': '<= 0.4', 'lost_steps': '0', 'realtime_factor': '>= 4 in lockstep'}
+TARGETS = {'pointing_to_noise': '<= 0.4', 'lost_steps': '0', 'realtime_factor': '>= 4 in lockstep',
+           'isolation_db': '>= 60'}
 
 
 def rows(case, values):
