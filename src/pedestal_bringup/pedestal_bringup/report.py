@@ -105,12 +105,8 @@ def _recording(bag):
     statuses = [(log / 1e9, status.name, int(status.level), status.message)
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status
                 ] if _table(bag, 'diagnostics') else []
-    try:
-        beamwidth = float(bag.metadata.get('beamwidth', 'nan'))
-    except ValueError:
-        beamwidth = math.nan
     return figures.Recording(run, no_truth, raw, motors, _table(bag, 'tracking_receiver/angle_error'), _modes(bag),
-                             statuses, beamwidth, _filter(bag, run))
+                             statuses, results.beamwidth(bag), _filter(bag, run))
 
 
 def _filter(bag, run):
@@ -299,7 +295,8 @@ def _page(bag, recording):
                      '</p>')
         run_rows = [[label, _number(values[key][0], unit)] for label, key, unit in (
             ("receiver's single-sample noise", 'single_sample_noise_deg', 'deg'), ('first lock', 'lock_time_s', 's'),
-            ('time in autotrack', 'autotrack_time_s', 's'), ('time evaluated', 'evaluated_time_s', 's'))]
+            ('time in autotrack', 'autotrack_time_s', 's'), ('time evaluated', 'evaluated_time_s', 's'),
+            ('time further than half a beamwidth off, once tracking', 'loss_s', 's'))]
         run_rows += _isolation(isolation.read(bag, recording.run))
     parts.append(_rows(None, run_rows + _loop(bag, check), 'n'))
     if not check.complete:

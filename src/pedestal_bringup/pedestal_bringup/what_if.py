@@ -20,7 +20,7 @@ class Overlay:
     """A recording whose outputs of one node are replaced: topics and table(topic) as of a bag.Bag."""
 
     def __init__(self, bag, outputs):
-        self.path, self._bag, self._outputs = bag.path, bag, outputs
+        self.path, self.metadata, self._bag, self._outputs = bag.path, bag.metadata, bag, outputs
         self.topics = {**bag.topics, **dict.fromkeys(outputs, '')}
 
     def table(self, topic):
