@@ -4,8 +4,8 @@ The axis leaves the target at t1, turns as fast as it may, and meets it again at
 meanwhile takes the angle at which the beam is closest to the target. For each way round t1 is chosen so that least
 signal is lost; t2 follows from it.
 
-A path (n, 6) is the target in the frame of the levelled deck (FLU), one row every h seconds from t0 on: the unit
-vector, and by `complete` its azimuth counted through all turns, the least and the largest azimuth from there to the end.
+A path (n, 6) is the target in the frame of the levelled deck (FLU), one row every h seconds from t0 on: the unit vector,
+and by `complete` its azimuth counted through all turns, the least and the largest azimuth from there to the end.
 """
 import math
 
@@ -152,9 +152,10 @@ def complete(path, below, above):
 
 @compiled
 def seat(plan, path, t0, h, turn):
-    """Put a laid slew on the turn of the axis, which is at `turn` at the first row of the path."""
+    """Put a laid slew on the turn of the axis, which is near `turn` at the first row of the path."""
     first = path[int((plan.t1 - t0) / h), 3]
-    start = turn - path[0, 3] + first + wrap(plan.azimuth1 - first)
+    turns = math.floor((turn - path[0, 3]) / (2.0 * math.pi) + 0.5)
+    start = 2.0 * math.pi * turns + first + wrap(plan.azimuth1 - first)
     plan.azimuth2 += start - plan.azimuth1
     plan.azimuth1 = start
 
