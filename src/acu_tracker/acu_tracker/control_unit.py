@@ -1,16 +1,18 @@
 """The antenna control unit: one `step` per drive step, from encoders, receiver error and attitude to the rate command.
 
-The estimate lives in earth angles when a ship attitude is given, otherwise in deck angles.
+The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`.
 """
 import math
 
 import numpy as np
 
-from acu_tracker import deck_reference, modes, notch, position_loop, program_track, tracker
+from acu_tracker import ahead, deck_reference, estimate_frame, modes, notch, position_loop, program_track, tracker
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
+from pedestal_common import blockage
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import (
+    ASHORE,
     displaced,
     displaced_motion,
     earth_angles,
@@ -26,6 +28,9 @@ INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'at
 (_STAMP, _ENCODER, _ERROR, _ERROR_STAMP, _ERROR_GATED, _ATTITUDE, _PROGRAM, _PRESET,
  _STEP_GAP) = (1 << i for i in range(len(INVALID_INPUTS)))
 
+BELIEVED = 0.5
+"""Beamwidths that the beam may be meant to be off the target for the receiver's error still to be taken."""
+
 INPUTS = np.dtype([
     ('stamp', 'f8'),                                                            # t_k [s]
     ('position', 'f8', (2,)), ('velocity', 'f8', (2,)), ('encoder_valid', 'i8'),  # deck azimuth, elevation
@@ -36,6 +41,7 @@ INPUTS = np.dtype([
     ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
+    ('aligning', 'i8'),                                                         # 1: the INS does not know it yet
     ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
     ('program_count', 'i8'),                                                    # rows of the table in use
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
@@ -50,7 +56,7 @@ OUTPUTS = np.dtype([
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
-    ('coasting', 'i8'), ('locked', 'i8'), ('invalid_input', 'i8'),
+    ('coasting', 'i8'), ('locked', 'i8'), ('blocked', 'i8'), ('invalid_input', 'i8'),
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)
 
@@ -59,21 +65,25 @@ STATE = np.dtype([
     ('encoder', history_type(4)),                                               # azimuth, elevation, their rates
     ('attitude', history_type(10)),                                             # quaternion, w, dw
     ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
-    ('turn', 'f8'),                                                            # raw azimuth last followed
+    ('turn', 'f8'), ('seen', 'f8', (2,)),         # raw azimuth last followed; deck angles of the target then
     ('preset', 'f8', (2,)),
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
+    ('frame', estimate_frame.FRAME), ('mat_fd', 'f8', (3, 3)),                 # of the filter; deck -> it
+    ('ahead', ahead.AHEAD), ('aligning', 'i8'), ('blocked', 'i8'),
+    ('off', 'f8'), ('excused', 'f8'),                           # beam meant to be off by [rad]; last such stamp [s]
 ], align=True)
 
 CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('ahead', 'f8'),
-                      ('notch', 'f8', (2, 5))], align=True)
+                      ('notch', 'f8', (2, 5)), ('sectors', 'f8', (blockage.MOST, 3))], align=True)
 
 
 def constants(params) -> np.ndarray:
     """Constants (1,) of an AcuParameters: the parameters, those of the target filter, `ahead` = t_m - t_k [s], the
-    notches' coefficients."""
+    notches' coefficients, hidden sectors."""
     c = np.zeros(1, CONSTANTS)
     c['p'] = record(params, AcuParameters)
     c['tracker'] = tracker.constants(params.tracker, params.azimuth.filter, params.elevation.filter)
+    c['sectors'] = blockage.sectors(params.blockage)
     c['ahead'] = params.command_delay + 0.5 * params.period
     for i, axis in enumerate((params.azimuth, params.elevation)):
         c['notch'][0, i] = notch.coefficients(axis.notch.frequency, axis.notch.width, axis.notch.depth, params.period)
@@ -86,6 +96,10 @@ def initial_state(params) -> np.ndarray:
     s['stamp'] = -math.inf
     s['pending'] = modes.MODES.index(params.initial_mode)
     s['preset'] = params.azimuth.preset, params.elevation.preset
+    s['excused'] = s['ahead']['looked'] = s['ahead']['latest'] = -math.inf
+    s['ahead']['hidden'] = math.nan
+    s['ahead']['mean'] = ASHORE
+    s['frame']['mat'] = np.eye(3)
     return s
 
 
@@ -126,12 +140,19 @@ def take_attitude(s, p, u):
             before = h.sample[last, 7 + i]
             rise = (w[i] - h.sample[last, 4 + i]) / T
             h.sample[row, 7 + i] = before + T / (p.attitude_smoothing + T) * (rise - before)
+    ahead.take_attitude(s.ahead, u.attitude_stamp, h.sample[row, :4], p.keyhole.mean_time)
     return True
 
 
 @compiled
 def attitude_at(s, p, t):
-    """Set s.mat_ed, s.w, s.dw to the attitude at t: between two samples, or predicted from the last one."""
+    """Set s.mat_ed, s.w, s.dw to the attitude at t: between two samples, or predicted from the last one; ashore it is
+    always the same."""
+    if not s.stabilised:
+        rotation(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3], s.mat_ed)
+        s.w[:] = 0.0
+        s.dw[:] = 0.0
+        return True
     h = s.attitude
     last = h.sample[h.newest]
     T = t - h.stamp[h.newest]
@@ -163,10 +184,13 @@ def attitude_at(s, p, t):
 @compiled
 def target_rates(s, u, a, b, f):
     """Rates (azimuth, elevation) of the target: those of the antenna, a share f between two encoder samples a and b,
-    and of the error, on a ship turned into earth angles by the attitude `s` was last asked for."""
+    and of the error, turned into the frame of the filter by the attitude `s` was last asked for."""
     x, y, z, dx, dy, dz = displaced_motion(
         a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), a[3] + f * (b[3] - a[3]),
         u.cross_elevation, u.elevation, u.error_rate[0], u.error_rate[1])
+    if s.frame.tilted:
+        estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
+        return deck_reference.earth_rates(s.mat_fd, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
     if s.stabilised:
         return deck_reference.earth_rates(s.mat_ed, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
     _, dA, _, _, dE, _ = deck_reference.moving_angles(x, y, z, dx, dy, dz, 0.0, 0.0, 0.0)
@@ -175,21 +199,30 @@ def target_rates(s, u, a, b, f):
 
 @compiled
 def take_error(s, p, c, u, o):
-    """Filter y = encoder at the stamp of the error, displaced by the error, in earth angles on a ship."""
+    """Filter y = encoder at the stamp of the error, displaced by the error, in the angles of the estimate.
+
+    While the beam is meant to be off the target the receiver's reading is none.
+    """
     e = p.tracker.receiver
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
         return _ERROR
+    if s.off > BELIEVED * e.beamwidth:
+        return 0
+    if not s.tracker.running:
+        estimate_frame.level(s.frame)
     i, j, f = bracket(s.encoder, u.error_stamp)
     if i < 0:
         return _ERROR_STAMP
     a, b = s.encoder.sample[i], s.encoder.sample[j]
     azimuth, elevation = displaced(a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), u.cross_elevation, u.elevation)
-    if u.stabilised:
+    if s.stabilised or s.frame.tilted:
         if not attitude_at(s, p, u.error_stamp):
             return _ATTITUDE
         # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
         y, x, z = earth_direction(azimuth, elevation)
         azimuth, elevation = earth_angles(*to_earth(s.mat_ed, x, -y, z))
+        if s.frame.tilted:
+            azimuth, elevation = estimate_frame.measured(s.frame, azimuth, elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
         azimuth_rate, elevation_rate = target_rates(s, u, a, b, f)
@@ -200,17 +233,53 @@ def take_error(s, p, c, u, o):
     (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
      o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, u.error_stamp, azimuth, elevation, R / (cos_el * cos_el), R,
                                  azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate, u.range,
-                                 u.range_variance)
+                                 u.range_variance, math.inf if excused(s, p) else p.tracker.restart_gap)
     if outcome == tracker.STALE:
         return _ERROR_STAMP
+    reframe(s, c)
     if o.nis[0] == o.nis[0]:
         o.innovation_sigma[0], o.innovation_sigma[1] = math.sqrt(s.tracker.S[0]), math.sqrt(s.tracker.S[1])
     return _ERROR_GATED if outcome == tracker.GATED else 0
 
 
 @compiled
+def reframe(s, c):
+    """Let the filter go on in the frame that suits the elevation of the target."""
+    t, f = s.tracker, s.frame
+    A, dA, ddA, E, dE, ddE = tracker.outlook(t, c, t.stamp)
+    if not (f.tilted or E > estimate_frame.RAISE):
+        return
+    e, n, u, de, dn, du, dde, ddn, ddu = estimate_frame.moving_in_earth(f, A, dA, ddA, E, dE, ddE)
+    if f.tilted and u >= math.sin(estimate_frame.LOWER):
+        return
+    if f.tilted:
+        estimate_frame.level(f)
+    else:
+        estimate_frame.tilt(f, e, n, u, de, dn, du)
+    tracker.turn(t, c, *estimate_frame.moving_in_frame(f, e, n, u, de, dn, du, dde, ddn, ddu))
+
+
+@compiled
+def excused(s, p):
+    """Whether the receiver is silent for a reason, a keyhole or a hidden sector, or has been until just now."""
+    return s.stamp - s.excused <= p.tracker.coast_time
+
+
+@compiled
+def estimated_target(s, p, c, t):
+    """Deck angles at t of the target as estimated."""
+    A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
+    if not s.frame.tilted:
+        return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
+    attitude_at(s, p, t)
+    estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
+    return deck_reference.deck_angles(s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA,
+                                      E, dE, ddE)
+
+
+@compiled
 def seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
-    """Deck angles of a target at t, given in the estimate's frame."""
+    """Deck angles of a target at t, given in earth angles."""
     if s.stabilised and attitude_at(s, p, t):
         return deck_reference.deck_angles(s.mat_ed, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2],
                                           A, dA, ddA, E, dE, ddE)
@@ -244,11 +313,14 @@ def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
     """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
     flags = 0
     encoder_ok = s.encoder.count > 0 and s.encoder.stamp[s.encoder.newest] == s.stamp
-    attitude_ok = not s.stabilised or attitude_at(s, p, t_m)
-    lost = not s.tracker.running or overdue(s, p) > p.tracker.coast_time
+    attitude = modes.NONE
+    if s.stabilised:
+        attitude = (modes.INS_ALIGNING if s.aligning else modes.NONE if attitude_at(s, p, t_m) else
+                    modes.ATTITUDE_INVALID)
+    lost = not s.tracker.running or (overdue(s, p) > p.tracker.coast_time and not excused(s, p))
     program = program_track.status(times, s.stamp)
     wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)
-    if program == modes.NONE and attitude_ok and wanted:
+    if program == modes.NONE and attitude == modes.NONE and wanted:
         A, _, _, E, _, _ = program_target(s, p, times, angles, t_m)
         if not math.isfinite(A + E):
             program, flags = modes.NO_PROGRAM, _PROGRAM
@@ -257,7 +329,7 @@ def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
             program = outside(deck_reference.nearest_turn(A, s.turn, low, high, 0.0, 0.0), E, p)
     o.locked = tracker.locked(s.tracker, p.tracker, overdue(s, p))
     mode, reason, result = modes.next_mode(
-        s.mode, request, encoder_ok, drive_ready, attitude_ok, program, outside(p.azimuth.stow, p.elevation.stow, p),
+        s.mode, request, encoder_ok, drive_ready, attitude, program, outside(p.azimuth.stow, p.elevation.stow, p),
         outside(s.preset[0], s.preset[1], p), o.locked, lost, p.tracker.handover)
     if result == modes.ACCEPTED:
         s.pending = modes.NO_REQUEST
@@ -295,6 +367,69 @@ def seat(s, p, u):
 
 
 @compiled
+def levelled(s, c, times, angles, t):
+    """Azimuth on the levelled deck of a plan, (A, dA, ddA) at t of what the mode follows."""
+    if s.mode == modes.PROGRAM:
+        A, dA, ddA = program_track.interpolated(times, angles, t, 0)
+        E, dE, ddE = program_track.interpolated(times, angles, t, 1)
+        A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.ahead.level, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA,
+                                                         E, dE, ddE)
+    else:
+        estimate_frame.from_deck(s.frame, s.ahead.level, s.mat_fd)
+        A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+                                                         *tracker.outlook(s.tracker, c, t))
+    return A, dA, ddA
+
+
+@compiled
+def look_ahead(s, p, c, sectors, times, angles):
+    """Now and then: what the target will ask of the axes."""
+    h = s.ahead
+    if s.mode != modes.PROGRAM and s.mode != modes.AUTOTRACK:
+        ahead.forget(h)
+        return
+    if s.stamp - h.looked < ahead.INTERVAL or (h.what == ahead.KEYHOLE and s.stamp <= h.plan.t2):
+        return
+    known = program_track.status(times, s.stamp) == modes.NONE
+    e = n = u = de = dn = du = 0.0
+    if s.mode == modes.AUTOTRACK:
+        e, n, u, de, dn, du, _, _, _ = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c, s.stamp))
+        if known:
+            x, y, z = earth_direction(program_track.interpolated(times, angles, s.stamp, 0)[0],
+                                      program_track.interpolated(times, angles, s.stamp, 1)[0])
+            known = e * x + n * y + u * z > ahead.LIKE_PROGRAM
+    ahead.look(h, p, sectors, s.stamp, s.turn, times, angles, known, s.mode == modes.AUTOTRACK, e, n, u, de, dn, du)
+
+
+@compiled
+def explain(s, c):
+    """Note why the receiver hears nothing: the target is hidden, or the beam on its way through the keyhole."""
+    follows = s.mode == modes.PROGRAM or s.mode == modes.AUTOTRACK
+    s.blocked = follows and blockage.blocked(c.sectors, s.seen[0], s.seen[1])
+    why = (modes.BLOCKED if s.blocked else
+           modes.KEYHOLE if follows and ahead.slewing(s.ahead, s.stamp) else modes.NONE)
+    if why != modes.NONE:
+        s.excused, s.reason = s.stamp, why
+    elif s.reason == modes.BLOCKED or s.reason == modes.KEYHOLE:
+        s.reason = modes.NONE
+
+
+@compiled
+def read_estimate(s, c, o):
+    """What is known of the target now, in earth angles."""
+    t, f, x, p = s.tracker, s.frame, o.estimate, o.covariance
+    tracker.read(t, c, s.stamp, o)
+    if f.tilted:
+        A, E = x[0, 0], x[1, 0]
+        e, n, u, de, dn, du, dde, ddn, ddu = estimate_frame.moving_in_earth(f, x[0, 0], x[0, 1], x[0, 2], x[1, 0],
+                                                                            x[1, 1], x[1, 2])
+        x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = deck_reference.moving_angles(n, -e, u, dn, -de, du,
+                                                                                            ddn, -dde, ddu)
+        for i in range(3):
+            p[0, i], p[1, i] = estimate_frame.earth_variances(f, A, E, x[0, 0], x[1, 0], p[0, i], p[1, i])
+
+
+@compiled
 def raw_target(s, p, c, times, angles, t):
     """Deck (A, dA, ddA, E, dE, ddE) at t of what the mode follows, the azimuth on the turn that fits."""
     if s.mode == modes.STOW:
@@ -309,7 +444,14 @@ def raw_target(s, p, c, times, angles, t):
         if s.entered:
             below, above = program_track.azimuth_travel(times, angles, t)
     else:
-        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, *tracker.outlook(s.tracker, c, t))
+        A, dA, ddA, E, dE, ddE = estimated_target(s, p, c, t)
+    s.seen[0], s.seen[1] = A, E
+    s.off = 0.0
+    if ahead.slewing(s.ahead, t):
+        B, dB, ddB = (A, dA, ddA) if not s.stabilised else levelled(s, c, times, angles, t)
+        s.turn, dA, ddA, E, dE, ddE, s.off = ahead.through(s.ahead, t, A, dA, ddA, E, dE, ddE, B, dB, ddB,
+                                                           p.elevation.limits.high - p.keyhole.elevation_margin)
+        return s.turn, dA, ddA, E, dE, ddE
     s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
     return s.turn, dA, ddA, E, dE, ddE
 
@@ -317,7 +459,7 @@ def raw_target(s, p, c, times, angles, t):
 @compiled
 def clear(o):
     """Outputs of a step in which nothing has happened yet."""
-    o.coasting, o.invalid_input = 0, 0
+    o.coasting, o.blocked, o.invalid_input = 0, 0, 0
     o.torque[:] = 0.0
     o.innovation[:] = math.nan
     o.rate_innovation[:] = math.nan
@@ -352,13 +494,14 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     jumped = dt > p.step_gap
     flags = _STEP_GAP if jumped and math.isfinite(s.stamp) else 0
     dt = p.period if jumped else dt
-    s.stamp = u.stamp
+    s.stamp, s.aligning = u.stamp, u.aligning
 
     encoder_ok = take_encoder(s, u)
     if not encoder_ok:
         flags |= _ENCODER
     if u.stabilised != s.stabilised:
         s.stabilised, s.tracker.running = u.stabilised, 0
+        ahead.forget(s.ahead)
     if u.stabilised and not take_attitude(s, p, u):
         flags |= _ATTITUDE
     if u.error_valid:
@@ -389,10 +532,13 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
                            u.velocity[1], dt, o, 1)
         s.entered = 0
+        explain(s, constants[0])
+        o.blocked = s.blocked
         o.coasting = s.mode == modes.AUTOTRACK and overdue(s, p) > p.tracker.coast_after
 
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
     o.gated = s.tracker.gated
     if s.tracker.running:
-        tracker.read(s.tracker, constants[0].tracker, u.stamp, o)
+        read_estimate(s, constants[0].tracker, o)
+    look_ahead(s, p, constants[0].tracker, constants[0].sectors, times, angles)

@@ -66,6 +66,21 @@ def earth_rates(mat_ed, wx, wy, wz, x, y, z, dx, dy, dz):
 
 
 @compiled
+def best_elevation(a, da, dda, x, y, z, dx, dy, dz, ddx, ddy, ddz):
+    """(E, dE, ddE) at which a beam at azimuth a is closest to a moving FLU unit vector; beyond pi/2 over the top.
+
+    E = atan2(z, b), b = x cos a - y sin a the part of the direction along the beam's azimuth.
+    """
+    sa, ca = math.sin(a), math.cos(a)
+    b, c = x * ca - y * sa, -x * sa - y * ca
+    db = dx * ca - dy * sa + da * c
+    ddb = ddx * ca - ddy * sa + 2.0 * da * (-dx * sa - dy * ca) + dda * c - da * da * b
+    r2 = max(b * b + z * z, 1e-12)
+    dE = (b * dz - z * db) / r2
+    return math.atan2(z, b), dE, (b * ddz - z * ddb - 2.0 * dE * (b * db + z * dz)) / r2
+
+
+@compiled
 def turned(qx, qy, qz, qw, rx, ry, rz):
     """The attitude after the deck has turned by the rotation vector r [rad] (FLU): q (x) exp(r/2)."""
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
