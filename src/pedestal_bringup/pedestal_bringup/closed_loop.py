@@ -46,6 +46,8 @@ def cores(scenario) -> Cores:
     """The cores of a scenario as its nodes would make them."""
     ship, navigation, tracking, acu, adu = (scenario.node_parameters(node) for node in
                                             ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu'))
+    if navigation.method != 'model':
+        raise ValueError(f"ins.method = '{navigation.method}': must be model in the closed loop without nodes")
     built = target.build(tracking.target, tracking.duration)
     drive_outputs = np.zeros(1, drive_unit.OUTPUTS)
     adu_core = (drive_unit.initial_state(adu), drive_unit.constants(adu), np.zeros(1, drive_unit.INPUTS),

@@ -22,7 +22,8 @@ _MOTION = {'position': 'rad', 'velocity': 'rad/s', 'acceleration': 'rad/s2', 'ef
 _UNITS = {
     'sensor_msgs/msg/JointState': _MOTION,
     'trajectory_msgs/msg/JointTrajectory': _MOTION,
-    'sensor_msgs/msg/Imu': {'angular_velocity': 'rad/s', 'linear_acceleration': 'm/s2'},
+    'sensor_msgs/msg/Imu': {'angular_velocity': 'rad/s', 'linear_acceleration': 'm/s2',
+                            'orientation_variance': 'rad2'},
     'nav_msgs/msg/Odometry': {'position': 'm', 'linear': 'm/s', 'angular': 'rad/s'},
 }
 """Units of the topics in the table of topics: {type: {part of the column's name: unit}}."""

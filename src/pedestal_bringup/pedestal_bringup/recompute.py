@@ -250,11 +250,14 @@ def compute(recording, unit, fed, states=None, requests=()):
 
 
 def outputs_of(unit, fed, said):
-    """{topic: Output} of what a unit said."""
+    """{topic: Output} of what a unit said. A text belongs to the step its writer answers with it, by the answer's
+    stamp where that is late."""
     found = {}
+    answer = next(said[name]['stamp'] for name in unit.SAID.names if name not in unit.WORDS)
+    stamps = np.where(answer != NEVER, answer, fed.stamps)
     for name in unit.SAID.names:
         if name in unit.WORDS:
-            found[name] = _announced(fed.stamps, said[name], unit.WORDS[name])
+            found[name] = _announced(stamps, said[name], unit.WORDS[name])
         elif name in unit.messages:
             place = records.slot(said, name)
             sent = place.stamp != NEVER
@@ -291,7 +294,9 @@ def recompute(recording, node, params, requests=None) -> Recomputed:
     unit = kind.unit(params, recording.has(kind.ship))
     fed = feed(recording, unit, kind.trigger)
     if requests is None:
-        states = {step: text for name in unit.WORDS for step, text in recording.states(name, fed.stamps).items()}
+        # an INS tells its state and cannot be asked for one
+        told = unit.WORDS if hasattr(unit, 'request') else ()
+        states = {step: text for name in told for step, text in recording.states(name, fed.stamps).items()}
         said, made = compute(recording, unit, fed, states)
     else:
         said, made = compute(recording, unit, fed, requests=requests)

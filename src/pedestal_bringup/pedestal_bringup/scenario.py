@@ -76,6 +76,7 @@ KNOWN = (
     ('tracking_receiver', 'antenna.slope', 'acu', 'tracker.receiver.slope'),
     ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
     ('ins', 'latency', 'acu', 'attitude_latency'),
+    ('ship_motion', 'imu.output', 'ins', 'imu_output'),
 )
 """(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
 

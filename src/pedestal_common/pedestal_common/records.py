@@ -41,7 +41,8 @@ _KINDS = {
     'Range': (_type(('range', 1), ('variance', 1)), ('range', 'variance')),
     'Vector3Stamped': (_type(('vector', 3)), ('x', 'y', 'z')),
     'Odometry': _spatial(('position', 3), ('orientation', 4), ('twist_linear', 3), ('twist_angular', 3)),
-    'Imu': _spatial(('orientation', 4), ('angular_velocity', 3), ('linear_acceleration', 3)),
+    'Imu': _spatial(('orientation', 4), ('angular_velocity', 3), ('linear_acceleration', 3),
+                    ('orientation_variance', 3)),
 }
 _NAMED = {'adu/motor_states': _joints(messages.MOTORS),
           'acu/filter': (_type(('position', len(messages.FILTER))),
@@ -115,7 +116,7 @@ def _odometry_numbers(message):
 
 def _imu_numbers(message):
     q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
-    return q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z
+    return (q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z, *message.orientation_covariance[::4].tolist())
 
 
 def put(message, place):
@@ -154,7 +155,8 @@ def _put_odometry(message, numbers):
 
 def _put_imu(message, numbers):
     q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
-    q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z = numbers.tolist()
+    q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z = numbers[:10].tolist()
+    message.orientation_covariance[::4] = numbers[10:]
 
 
 _TAKE = {messages.JointState: _joint_numbers, messages.Vector3Stamped: _vector_numbers,

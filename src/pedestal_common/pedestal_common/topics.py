@@ -50,6 +50,8 @@ TOPICS = (
           'specific force [m/s2] and angular rate [rad/s] (REP 145); orientation_covariance[0] = -1'),
     Topic('ship/imu/data', 'sensor_msgs/msg/Imu', ('ins',), ('acu',), 'step', 'step',
           'attitude deck -> earth and deck rate [rad/s] as the INS knows them'),
+    Topic('ins/state', 'std_msgs/msg/String', ('ins',), (), 'state', 'change',
+          'aligning, or aligned once the heading is known well enough; an INS that never says it counts as aligned'),
     Topic('tracking_receiver/angle_error', 'geometry_msgs/msg/Vector3Stamped', ('tracking_receiver',), ('acu',),
           'step', 'step', 'x cross-elevation error [rad], y elevation error [rad], z C/N0 [dB-Hz]; x, y NaN unlocked'),
     Topic('tracking_receiver/angle_rate', 'geometry_msgs/msg/Vector3Stamped', ('tracking_receiver',), ('acu',),

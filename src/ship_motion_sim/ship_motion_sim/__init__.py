@@ -5,6 +5,7 @@ motion.step     time -> the ship's truth (stateless: the same seed and time give
 imu.step        truth -> specific force and angular rate as REP 145 wants them
 strapdown.step  increments of angle and velocity -> attitude and velocity in a computed frame
 ins.step        stamp of an IMU message -> attitude and deck rate as a late and imperfect INS knows them
+aligning_ins.step   an IMU message -> the same by an INS that integrates it: alignment, then navigation (navigator)
 
 Frames
     earth   ENU tangent plane at the place where the ship is at t = 0.

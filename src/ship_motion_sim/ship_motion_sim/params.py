@@ -6,6 +6,8 @@ from pedestal_common.parameters import ParameterError, Parameters, choice, group
 
 SEED_MAX = 2 ** 31 - 1
 IMU_OUTPUTS = ('sample', 'increment')
+METHODS = ('model', 'classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba')
+AIDS = ('none', 'log', 'gnss')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,8 +130,41 @@ class ShipMotionParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class AdrcParameters(Parameters):
+    """Method adrc: what reproduces paper 001's figure 4 (reference/nav.md section 1.2)."""
+    observer: float = parameter(0.3, 0.01, 20.0, 'rad/s', 'bandwidth of the extended state observer')
+    control: float = parameter(1.0, 0.01, 20.0, 'rad/s', 'bandwidth of the level control')
+    start: float = parameter(60.0, 1.0, 3600.0, 's', 'the level commands count from here on')
+
+
+@dataclasses.dataclass(frozen=True)
+class AlignmentParameters(Parameters):
+    """How an INS with gyros aligns itself, and what it is told of them and of the sea."""
+    step: float = parameter(0.02, 0.001, 1.0, 's', 'of the alignment laws; at least the period of the IMU')
+    initial_heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'taken for true at power-up; may be any')
+    aligned_sigma: float = parameter(0.0035, 1e-5, 0.5, 'rad', 'it navigates once the 1-sigma of heading is below')
+    velocity_disturbance: float = parameter(0.05, 1e-4, 10.0, 'm/s',
+                                            'rms of the velocity of sea and aid per step and axis, taken for white')
+    gyro_noise: float = parameter(1.45e-6, 1e-9, 0.01, 'rad/sqrt(s)', 'angle random walk of the gyros')
+    gyro_bias: float = parameter(4.85e-8, 0.0, 0.1, 'rad/s', '1-sigma of what the bias of a level gyro may be')
+    accelerometer_bias: float = parameter(3e-4, 0.0, 1.0, 'm/s2', 'the same of an accelerometer')
+    classical_bandwidth: float = parameter(0.025, 0.005, 0.2, 'rad/s', 'method classical: s0 of its four poles')
+    adrc: AdrcParameters = group(AdrcParameters)
+
+
+@dataclasses.dataclass(frozen=True)
+class AidParameters(Parameters):
+    """A velocity from outside, so that neither swell nor speed is taken for an error of the INS."""
+    source: str = choice('none', AIDS, 'log: in deck axes; gnss: in ENU, before alignment only with method oba')
+    noise: float = parameter(0.02, 0.0, 10.0, 'm/s', 'rms white noise of it, per axis and IMU sample')
+
+
+@dataclasses.dataclass(frozen=True)
 class InsParameters(Parameters):
-    """ins_node: how far and how late its attitude is. `ship` is the ship_motion node's."""
+    """ins_node. Method `model`: the truth with parametrised errors (roll_bias ... imu_tolerance). The others integrate
+    the IMU and align by themselves. `ship` is the ship_motion node's: of it they take the latitude, and the velocity
+    that an aid measures."""
+    method: str = choice('model', METHODS, 'parametrised errors, or how it aligns')
     roll_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of roll')
     pitch_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of pitch')
     heading_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of heading, clockwise')
@@ -143,4 +178,13 @@ class InsParameters(Parameters):
     imu_tolerance: float = parameter(0.005, 1e-6, 1.0, 'rad/s',
                                      'largest difference between the IMU and the ship as the INS knows it')
     seed: int = parameter(3, 0, SEED_MAX, '-', 'seed of the errors')
+    imu_output: str = choice('sample', IMU_OUTPUTS, "the IMU's `output`")
+    alignment: AlignmentParameters = group(AlignmentParameters)
+    aid: AidParameters = group(AidParameters)
     ship: ShipParameters = group(ShipParameters)
+
+    def check(self):
+        if self.aid.source == 'gnss' and self.method not in ('model', 'oba'):
+            raise ParameterError("aid.source = 'gnss': must be none or log unless method = oba, for its velocity is "
+                                 'of no use before the heading is known')
+

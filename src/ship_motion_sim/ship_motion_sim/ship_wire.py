@@ -67,7 +67,7 @@ def answers(last, ship, inputs, truth, imu_state, imu_constants, imu_inputs, fel
         imu.step(imu_state, imu_constants, ship, imu_inputs, truth, felt, normals[k])
         pose, raw = said[k][TRUTH], said[k][RAW]
         pose.stamp = raw.stamp = stamp
-        raw.orientation[3] = 1.0
+        raw.orientation[3], raw.orientation_variance[0] = 1.0, -1.0     # REP 145: no orientation
         for i in range(4):
             pose.orientation[i] = o.quaternion[i]
         for i in range(3):

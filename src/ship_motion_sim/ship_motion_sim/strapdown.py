@@ -2,10 +2,10 @@
 
     step(state, angle, force, dt, earth_rate, command, gravity)
 
-C' = C [w_ib x] - [(w_ie + w_c) x] C,  v' = C f - 2 w_ie x v - g u  (reference/nav.md section 1.1); w_c is the rate an
-alignment turns n' with. Position is held, so there is no transport rate: the tangent plane in which the truth is given
-(see imu.specific_force) has none either. Coning and sculling from the increment before, as in Savage 1998: "Strapdown
-Inertial Navigation Integration Algorithm Design", part 1 equation 35, part 2 equation 27.
+C' = C [w_ib x] - [(w_ie + w_c) x] C (reference/nav.md section 1.1), v' = C f - (2 w_ie + w_c) x v - g u; w_c is the
+rate an alignment turns n' with, and the velocity's components with it. Position is held, so there is no transport
+rate: the tangent plane in which the truth is given (see imu.specific_force) has none either. Coning and sculling from
+the increment before, as in Savage 1998, "Strapdown Inertial Navigation Integration Algorithm Design".
 """
 import math
 
@@ -87,10 +87,11 @@ def step(s, angle, force, dt, earth_rate, command, gravity):
     tx, ty, tz = (-dt * (earth_rate[0] + command[0]), -dt * (earth_rate[1] + command[1]),
                   -dt * (earth_rate[2] + command[2]))
     hx, hy, hz = cross(0.5 * tx, 0.5 * ty, 0.5 * tz, gx, gy, gz)        # n' turns meanwhile
-    cx, cy, cz = cross(earth_rate[0], earth_rate[1], earth_rate[2], v[0], v[1], v[2])
-    v[0] += gx + hx - 2.0 * dt * cx
-    v[1] += gy + hy - 2.0 * dt * cy
-    v[2] += gz + hz - 2.0 * dt * cz - dt * gravity
+    cx, cy, cz = cross(2.0 * earth_rate[0] + command[0], 2.0 * earth_rate[1] + command[1],
+                       2.0 * earth_rate[2] + command[2], v[0], v[1], v[2])
+    v[0] += gx + hx - dt * cx
+    v[1] += gy + hy - dt * cy
+    v[2] += gz + hz - dt * cz - dt * gravity
     ux, uy, uz = coning(a[0], a[1], a[2], b[0], b[1], b[2])
     px, py, pz, pw = turn(ux, uy, uz)
     px, py, pz, pw = product(q[0], q[1], q[2], q[3], px, py, pz, pw)
