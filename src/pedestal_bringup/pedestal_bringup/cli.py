@@ -190,7 +190,7 @@ def _check_json(path):
 
 
 def _run(options):
-    from pedestal_bringup import consistency, graph, isolation, results, scenario
+    from pedestal_bringup import consistency, graph, isolation, known_attitude, results, scenario
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
     chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
@@ -205,7 +205,8 @@ def _run(options):
     recording = read(bag)
     tracked = results.tracking(recording)
     values = {**results.summary(tracked), **consistency.summary(consistency.read(recording, tracked)),
-              **isolation.summary(isolation.read(recording, tracked))}
+              **isolation.summary(isolation.read(recording, tracked)),
+              **known_attitude.summary(known_attitude.read(recording))}
     values['lost_steps'] = (float(outcome.drive['lost_steps']), '')
     values['realtime_factor'] = (outcome.drive['realtime_factor'], '')
     values['messages'] = (float(outcome.recorder['messages']), '')

@@ -15,7 +15,7 @@ T = DT * np.arange(N)
 
 @pytest.fixture(scope='module')
 def ship():
-    """(target ENU (n, 3), attitude (n, 4), deck rate (n, 3), offsets of the direction from that on a level deck (n, 2)):
+    """(target ENU (n, 3), attitude (n, 4), deck rate (n, 3), offset of the direction from that on a level deck (n, 2)):
     a target passes a ship that rolls, pitches and yaws about a heading of 60 deg."""
     roll = 0.06 * np.sin(0.55 * T) + 0.03 * np.sin(0.83 * T + 1.0)
     pitch = 0.02 * np.sin(0.9 * T + 0.3)
@@ -55,8 +55,8 @@ def test_noise_alone_gives_the_floor_and_hides_only_what_is_below_it(ship, pole)
     random = np.random.default_rng(5)
     coherent, floors = [], []
     for _ in range(25):
-        noise = 1e-4 * math.sqrt(1.0 - pole**2) * signal.lfilter([1.0], [1.0, -pole], random.standard_normal((N, 2)),
-                                                                 axis=0)
+        white = random.standard_normal((N, 2))
+        noise = 1e-4 * math.sqrt(1.0 - pole**2) * signal.lfilter([1.0], [1.0, -pole], white, axis=0)
         found = isolation.measure(DT, noise, target, attitude, rate)
         coherent.append(found.coherent)
         floors.append(found.floor)
