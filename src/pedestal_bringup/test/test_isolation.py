@@ -15,7 +15,7 @@ T = DT * np.arange(N)
 
 @pytest.fixture(scope='module')
 def ship():
-    """(target ENU (n, 3), attitude (n, 4), deck rate (n, 3), offset of the direction from that on a level deck (n, 2)):
+    """(target ENU (n, 3), attitude (n, 4), deck rate (n, 3), offsets (n, 2) from the direction on a level deck):
     a target passes a ship that rolls, pitches and yaws about a heading of 60 deg."""
     roll = 0.06 * np.sin(0.55 * T) + 0.03 * np.sin(0.83 * T + 1.0)
     pitch = 0.02 * np.sin(0.9 * T + 0.3)
