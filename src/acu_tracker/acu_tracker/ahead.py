@@ -70,6 +70,13 @@ def take_attitude(h, stamp, quaternion, mean_time):
 
 
 @compiled
+def program_direction(times, table, t):
+    """ENU unit vector of the program track at t."""
+    return earth_direction(program_track.interpolated(times, table, t, 0)[0],
+                           program_track.interpolated(times, table, t, 1)[0])
+
+
+@compiled
 def lay_out(h, t0, step, times, table, from_program, turned, e, n, u, de, dn, du):
     """Fill the path from t0 on, on h.next_level; how many rows the program holds, all along a great circle.
 
@@ -80,8 +87,7 @@ def lay_out(h, t0, step, times, table, from_program, turned, e, n, u, de, dn, du
     ax = ay = az = 0.0
     c = 1.0
     if from_program and turned:
-        px, py, pz = earth_direction(program_track.interpolated(times, table, t0, 0)[0],
-                                     program_track.interpolated(times, table, t0, 1)[0])
+        px, py, pz = program_direction(times, table, t0)
         ax, ay, az = deck_reference.cross(px, py, pz, e, n, u)
         c = px * e + py * n + pz * u
     for i in range(ROWS):
@@ -89,8 +95,7 @@ def lay_out(h, t0, step, times, table, from_program, turned, e, n, u, de, dn, du
         if from_program:
             if t > times[-1]:
                 return i
-            x, y, z = earth_direction(program_track.interpolated(times, table, t, 0)[0],
-                                      program_track.interpolated(times, table, t, 1)[0])
+            x, y, z = program_direction(times, table, t)
             if turned:
                 # Rodrigues about a = p x u, |a| the sine and c the cosine of the angle.
                 bx, by, bz = deck_reference.cross(ax, ay, az, x, y, z)

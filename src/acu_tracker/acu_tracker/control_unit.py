@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from acu_tracker import ahead, deck_reference, estimate_frame, modes, notch, position_loop, program_track, tracker
+from acu_tracker.attitude import attitude_at, take_attitude
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common import blockage
@@ -17,7 +18,6 @@ from pedestal_common.line_of_sight import (
     displaced_motion,
     earth_angles,
     earth_direction,
-    rotation,
     to_earth,
 )
 from pedestal_common.parameters import record, record_type
@@ -112,73 +112,6 @@ def take_encoder(s, u):
         for i in range(2):
             s.encoder.sample[row, i], s.encoder.sample[row, 2 + i] = u.position[i], u.velocity[i]
     return ok
-
-
-@compiled
-def take_attitude(s, p, u):
-    """Remember a new attitude with its rate and low-passed angular acceleration; False where it is unusable."""
-    q, w = u.quaternion, u.deck_rate
-    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    if not (u.attitude_valid and abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
-        return False
-    h = s.attitude
-    last = h.newest
-    T = u.attitude_stamp - h.stamp[last] if h.count > 0 else math.inf
-    if not (T > 0.0 and u.attitude_stamp <= u.stamp):
-        return T == 0.0
-    row = push(h, u.attitude_stamp)
-    # One sign of the quaternion, so that neighbours can be averaged.
-    dot = 0.0
-    for i in range(4):
-        dot += q[i] * h.sample[last, i]
-    for i in range(4):
-        h.sample[row, i] = q[i] / norm if dot >= 0.0 else -q[i] / norm
-    for i in range(3):
-        h.sample[row, 4 + i] = w[i]
-        h.sample[row, 7 + i] = 0.0
-        if T <= p.attitude_timeout:
-            before = h.sample[last, 7 + i]
-            rise = (w[i] - h.sample[last, 4 + i]) / T
-            h.sample[row, 7 + i] = before + T / (p.attitude_smoothing + T) * (rise - before)
-    ahead.take_attitude(s.ahead, u.attitude_stamp, h.sample[row, :4], p.keyhole.mean_time)
-    return True
-
-
-@compiled
-def attitude_at(s, p, t):
-    """Set s.mat_ed, s.w, s.dw to the attitude at t: between two samples, or predicted from the last one; ashore it is
-    always the same."""
-    if not s.stabilised:
-        rotation(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3], s.mat_ed)
-        s.w[:] = 0.0
-        s.dw[:] = 0.0
-        return True
-    h = s.attitude
-    last = h.sample[h.newest]
-    T = t - h.stamp[h.newest]
-    if h.count == 0 or T > p.attitude_timeout:
-        return False
-    if T >= 0.0:
-        for i in range(3):
-            s.dw[i] = last[7 + i]
-            s.w[i] = last[4 + i] + T * last[7 + i]
-        half = 0.5 * T * T
-        x, y, z, w = deck_reference.turned(
-            last[0], last[1], last[2], last[3], T * last[4] + half * last[7], T * last[5] + half * last[8],
-            T * last[6] + half * last[9])
-    else:
-        i, j, f = bracket(h, t)
-        if i < 0:
-            return False
-        a, b = h.sample[i], h.sample[j]
-        for k in range(3):
-            s.w[k] = a[4 + k] + f * (b[4 + k] - a[4 + k])
-            s.dw[k] = b[7 + k]
-        x, y, z, w = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), \
-            a[3] + f * (b[3] - a[3])
-    norm = math.sqrt(x * x + y * y + z * z + w * w)
-    rotation(x / norm, y / norm, z / norm, w / norm, s.mat_ed)
-    return True
 
 
 @compiled
@@ -372,12 +305,11 @@ def levelled(s, c, times, angles, t):
     if s.mode == modes.PROGRAM:
         A, dA, ddA = program_track.interpolated(times, angles, t, 0)
         E, dE, ddE = program_track.interpolated(times, angles, t, 1)
-        A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.ahead.level, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA,
-                                                         E, dE, ddE)
+        s.mat_fd[:] = s.ahead.level
     else:
+        A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
         estimate_frame.from_deck(s.frame, s.ahead.level, s.mat_fd)
-        A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-                                                         *tracker.outlook(s.tracker, c, t))
+    A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA, E, dE, ddE)
     return A, dA, ddA
 
 
@@ -395,8 +327,7 @@ def look_ahead(s, p, c, sectors, times, angles):
     if s.mode == modes.AUTOTRACK:
         e, n, u, de, dn, du, _, _, _ = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c, s.stamp))
         if known:
-            x, y, z = earth_direction(program_track.interpolated(times, angles, s.stamp, 0)[0],
-                                      program_track.interpolated(times, angles, s.stamp, 1)[0])
+            x, y, z = ahead.program_direction(times, angles, s.stamp)
             known = e * x + n * y + u * z > ahead.LIKE_PROGRAM
     ahead.look(h, p, sectors, s.stamp, s.turn, times, angles, known, s.mode == modes.AUTOTRACK, e, n, u, de, dn, du)
 
@@ -522,11 +453,15 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         position_loop.rest(s.azimuth, p.azimuth, dt, o, 0)
         position_loop.rest(s.elevation, p.elevation, dt, o, 1)
     else:
+        # The azimuth wants its target at one instant, the elevation perhaps at another.
         t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
         t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
-        A, dA, ddA, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_azimuth)
-        if t_elevation != t_azimuth:
-            _, _, _, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_elevation)
+        A = dA = ddA = E = dE = ddE = 0.0
+        for i in range(1 if t_elevation == t_azimuth else 2):
+            B, dB, ddB, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles,
+                                                t_azimuth if i == 0 else t_elevation)
+            if i == 0:
+                A, dA, ddA = B, dB, ddB
         position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
                            u.velocity[0], dt, o, 0)
         position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],

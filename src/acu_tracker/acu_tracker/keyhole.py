@@ -4,7 +4,7 @@ The axis leaves the target at t1, turns as fast as it may, and meets it again at
 meanwhile takes the angle at which the beam is closest to the target. For each way round t1 is chosen so that least
 signal is lost; t2 follows from it.
 
-A path (n, 6) is the target in the frame of the levelled deck (FLU), one row every h seconds from t0 on: the unit vector,
+A path (n, 6) is the target in the frame of the levelled deck (FLU), one row every h seconds from t0: the unit vector,
 and by `complete` its azimuth counted through all turns, the least and the largest azimuth from there to the end.
 """
 import math
