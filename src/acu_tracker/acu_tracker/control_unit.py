@@ -6,7 +6,17 @@ import math
 
 import numpy as np
 
-from acu_tracker import ahead, deck_reference, estimate_frame, modes, notch, position_loop, program_track, tracker
+from acu_tracker import (
+    ahead,
+    deck_reference,
+    estimate_frame,
+    lever_arm,
+    modes,
+    notch,
+    position_loop,
+    program_track,
+    tracker,
+)
 from acu_tracker.attitude import attitude_at, take_attitude
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
@@ -71,6 +81,7 @@ STATE = np.dtype([
     ('frame', estimate_frame.FRAME), ('mat_fd', 'f8', (3, 3)),                 # of the filter; deck -> it
     ('ahead', ahead.AHEAD), ('aligning', 'i8'), ('blocked', 'i8'),
     ('off', 'f8'), ('excused', 'f8'),                           # beam meant to be off by [rad]; last such stamp [s]
+    ('arm', 'f8', (3,)), ('range', 'f8'),                       # lever arm over range [-]; from the INS [m], 0: none
 ], align=True)
 
 CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('ahead', 'f8'),
@@ -121,11 +132,11 @@ def target_rates(s, u, a, b, f):
     x, y, z, dx, dy, dz = displaced_motion(
         a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), a[3] + f * (b[3] - a[3]),
         u.cross_elevation, u.elevation, u.error_rate[0], u.error_rate[1])
-    if s.frame.tilted:
+    if s.stabilised or s.frame.tilted:
         estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
+        x, y, z, dx, dy, dz, _, _, _ = deck_reference.from_lever_arm(-s.arm[0], -s.arm[1], -s.arm[2], x, y, z, dx, dy,
+                                                                    dz, 0.0, 0.0, 0.0)
         return deck_reference.earth_rates(s.mat_fd, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
-    if s.stabilised:
-        return deck_reference.earth_rates(s.mat_ed, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
     _, dA, _, _, dE, _ = deck_reference.moving_angles(x, y, z, dx, dy, dz, 0.0, 0.0, 0.0)
     return dA, dE
 
@@ -153,7 +164,7 @@ def take_error(s, p, c, u, o):
             return _ATTITUDE
         # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
         y, x, z = earth_direction(azimuth, elevation)
-        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, x, -y, z))
+        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, *lever_arm.from_ins(s, p.lever_arm, u.range, x, -y, z)))
         if s.frame.tilted:
             azimuth, elevation = estimate_frame.measured(s.frame, azimuth, elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
@@ -202,12 +213,13 @@ def excused(s, p):
 def estimated_target(s, p, c, t):
     """Deck angles at t of the target as estimated."""
     A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
-    if not s.frame.tilted:
+    if not s.frame.tilted and s.range == 0.0:
         return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
     attitude_at(s, p, t)
     estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
-    return deck_reference.deck_angles(s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA,
-                                      E, dE, ddE)
+    return deck_reference.moving_angles(*deck_reference.from_lever_arm(
+        s.arm[0], s.arm[1], s.arm[2], *deck_reference.deck_motion(
+            s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA, E, dE, ddE)))
 
 
 @compiled
@@ -346,18 +358,13 @@ def explain(s, c):
 
 
 @compiled
-def read_estimate(s, c, o):
-    """What is known of the target now, in earth angles."""
-    t, f, x, p = s.tracker, s.frame, o.estimate, o.covariance
-    tracker.read(t, c, s.stamp, o)
-    if f.tilted:
-        A, E = x[0, 0], x[1, 0]
-        e, n, u, de, dn, du, dde, ddn, ddu = estimate_frame.moving_in_earth(f, x[0, 0], x[0, 1], x[0, 2], x[1, 0],
-                                                                            x[1, 1], x[1, 2])
-        x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = deck_reference.moving_angles(n, -e, u, dn, -de, du,
-                                                                                            ddn, -dde, ddu)
-        for i in range(3):
-            p[0, i], p[1, i] = estimate_frame.earth_variances(f, A, E, x[0, 0], x[1, 0], p[0, i], p[1, i])
+def read_estimate(s, p, c, o):
+    """What is known of the target now, in earth angles of the antenna."""
+    tracker.read(s.tracker, c, s.stamp, o)
+    if s.frame.tilted:
+        estimate_frame.put_in_earth(s.frame, o.estimate, o.covariance)
+    if s.range > 0.0 and attitude_at(s, p, s.stamp):
+        lever_arm.to_antenna(s, o.estimate)
 
 
 @compiled
@@ -475,5 +482,5 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
     o.gated = s.tracker.gated
     if s.tracker.running:
-        read_estimate(s, constants[0].tracker, o)
+        read_estimate(s, p, constants[0].tracker, o)
     look_ahead(s, p, constants[0].tracker, constants[0].sectors, times, angles)
