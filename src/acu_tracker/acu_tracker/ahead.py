@@ -18,9 +18,6 @@ INTERVAL = 1.0
 """Seconds from one look ahead to the next."""
 LIKE_PROGRAM = math.cos(math.radians(3.0))
 """The program is believed in autotrack while it is closer to the estimate than this (cosine)."""
-MOTION = math.radians(0.5)
-"""Deck motion [rad rms] from which on an announced loss is only rough: it moves the zenith of the deck itself."""
-
 WHATS = ('none', 'keyhole', 'no turn')
 NONE, KEYHOLE, NO_TURN = range(len(WHATS))
 
@@ -31,7 +28,7 @@ AHEAD = np.dtype([
     ('next_level', 'f8', (3, 3)), ('path', 'f8', (ROWS, 6)),
     ('hidden', 'f8', (2,)), ('hidden_number', 'i8'),
 ], align=True)
-"""mean, spread: mean attitude and mean square [rad2] of the deck's angle from it, `latest` the stamp of the last;
+"""mean, spread: mean attitude and mean square [rad2] of the deck's tilt from it, `latest` the stamp of the last;
 looked: when the path was last laid out; what: one of WHATS; number: of the plan, counted; plan: while `what` is
 KEYHOLE; level: levelled deck -> earth of the plan; hidden: from when until when [s] a sector will hide the target,
 NaN none; hidden_number: counted."""
@@ -64,9 +61,18 @@ def take_attitude(h, stamp, quaternion, mean_time):
             norm += h.mean[i] * h.mean[i]
         for i in range(4):
             h.mean[i] /= math.sqrt(norm)
-        off = 2.0 * math.acos(min(abs(dot), 1.0))
-        h.spread += share * (off * off - h.spread)
+        a, b = h.mean, quaternion
+        x = 2.0 * (b[0] * b[2] - b[3] * b[1] - a[0] * a[2] + a[3] * a[1])
+        y = 2.0 * (b[1] * b[2] + b[3] * b[0] - a[1] * a[2] - a[3] * a[0])
+        h.spread += share * (x * x + y * y - h.spread)
     h.latest = stamp
+
+
+@compiled
+def program_direction(times, table, t):
+    """ENU unit vector of the program track at t."""
+    return earth_direction(program_track.interpolated(times, table, t, 0)[0],
+                           program_track.interpolated(times, table, t, 1)[0])
 
 
 @compiled
@@ -80,8 +86,7 @@ def lay_out(h, t0, step, times, table, from_program, turned, e, n, u, de, dn, du
     ax = ay = az = 0.0
     c = 1.0
     if from_program and turned:
-        px, py, pz = earth_direction(program_track.interpolated(times, table, t0, 0)[0],
-                                     program_track.interpolated(times, table, t0, 1)[0])
+        px, py, pz = program_direction(times, table, t0)
         ax, ay, az = deck_reference.cross(px, py, pz, e, n, u)
         c = px * e + py * n + pz * u
     for i in range(ROWS):
@@ -89,8 +94,7 @@ def lay_out(h, t0, step, times, table, from_program, turned, e, n, u, de, dn, du
         if from_program:
             if t > times[-1]:
                 return i
-            x, y, z = earth_direction(program_track.interpolated(times, table, t, 0)[0],
-                                      program_track.interpolated(times, table, t, 1)[0])
+            x, y, z = program_direction(times, table, t)
             if turned:
                 # Rodrigues about a = p x u, |a| the sine and c the cosine of the angle.
                 bx, by, bz = deck_reference.cross(ax, ay, az, x, y, z)
@@ -124,7 +128,8 @@ def look(h, p, sectors, t0, turn, times, table, from_program, turned, e, n, u, d
     look_for_sectors(h, sectors, path, t0, step)
     r, a = p.azimuth.shaper, p.azimuth.limits
     found = keyhole.plan(h.tried, h.trial, path, t0, step, turn, k.share * r.rate, k.share * r.acceleration, a.low,
-                         a.high, p.elevation.limits.high - k.elevation_margin, 0.5 * p.tracker.receiver.beamwidth)
+                         a.high, p.elevation.limits.high - k.elevation_margin, 0.5 * p.tracker.receiver.beamwidth,
+                         math.sqrt(0.5 * h.spread))
     if found == keyhole.AHEAD and h.tried.t1 - t0 <= k.notice:
         keyhole.copy(h.tried, h.plan)
         h.plan.culmination, h.plan.highest, h.plan.needed = h.tried.culmination, h.tried.highest, h.tried.needed
@@ -174,9 +179,7 @@ def through(h, t, A, dA, ddA, E, dE, ddE, B, dB, ddB, highest):
     """
     plan = h.plan
     a, da, dda = keyhole.slew(plan, t)
-    T = plan.t2 - plan.t1
-    x = 1.0 - 2.0 * (t - plan.t1) / T
-    g, dg, ddg = x**4, -8.0 * x**3 / T, 48.0 * x * x / (T * T)
+    g, dg, ddg = keyhole.true_deck_share(plan, t)
     D = wrap(A - B)
     a += g * D
     da += dg * D + g * (dA - dB)

@@ -6,7 +6,18 @@ import math
 
 import numpy as np
 
-from acu_tracker import ahead, deck_reference, estimate_frame, modes, notch, position_loop, program_track, tracker
+from acu_tracker import (
+    ahead,
+    deck_reference,
+    estimate_frame,
+    lever_arm,
+    modes,
+    notch,
+    position_loop,
+    program_track,
+    tracker,
+)
+from acu_tracker.attitude import attitude_at, take_attitude
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common import blockage
@@ -17,7 +28,6 @@ from pedestal_common.line_of_sight import (
     displaced_motion,
     earth_angles,
     earth_direction,
-    rotation,
     to_earth,
 )
 from pedestal_common.parameters import record, record_type
@@ -71,6 +81,7 @@ STATE = np.dtype([
     ('frame', estimate_frame.FRAME), ('mat_fd', 'f8', (3, 3)),                 # of the filter; deck -> it
     ('ahead', ahead.AHEAD), ('aligning', 'i8'), ('blocked', 'i8'),
     ('off', 'f8'), ('excused', 'f8'),                           # beam meant to be off by [rad]; last such stamp [s]
+    ('arm', 'f8', (3,)), ('range', 'f8'),                       # lever arm over range [-]; from the INS [m], 0: none
 ], align=True)
 
 CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('ahead', 'f8'),
@@ -115,84 +126,17 @@ def take_encoder(s, u):
 
 
 @compiled
-def take_attitude(s, p, u):
-    """Remember a new attitude with its rate and low-passed angular acceleration; False where it is unusable."""
-    q, w = u.quaternion, u.deck_rate
-    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    if not (u.attitude_valid and abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
-        return False
-    h = s.attitude
-    last = h.newest
-    T = u.attitude_stamp - h.stamp[last] if h.count > 0 else math.inf
-    if not (T > 0.0 and u.attitude_stamp <= u.stamp):
-        return T == 0.0
-    row = push(h, u.attitude_stamp)
-    # One sign of the quaternion, so that neighbours can be averaged.
-    dot = 0.0
-    for i in range(4):
-        dot += q[i] * h.sample[last, i]
-    for i in range(4):
-        h.sample[row, i] = q[i] / norm if dot >= 0.0 else -q[i] / norm
-    for i in range(3):
-        h.sample[row, 4 + i] = w[i]
-        h.sample[row, 7 + i] = 0.0
-        if T <= p.attitude_timeout:
-            before = h.sample[last, 7 + i]
-            rise = (w[i] - h.sample[last, 4 + i]) / T
-            h.sample[row, 7 + i] = before + T / (p.attitude_smoothing + T) * (rise - before)
-    ahead.take_attitude(s.ahead, u.attitude_stamp, h.sample[row, :4], p.keyhole.mean_time)
-    return True
-
-
-@compiled
-def attitude_at(s, p, t):
-    """Set s.mat_ed, s.w, s.dw to the attitude at t: between two samples, or predicted from the last one; ashore it is
-    always the same."""
-    if not s.stabilised:
-        rotation(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3], s.mat_ed)
-        s.w[:] = 0.0
-        s.dw[:] = 0.0
-        return True
-    h = s.attitude
-    last = h.sample[h.newest]
-    T = t - h.stamp[h.newest]
-    if h.count == 0 or T > p.attitude_timeout:
-        return False
-    if T >= 0.0:
-        for i in range(3):
-            s.dw[i] = last[7 + i]
-            s.w[i] = last[4 + i] + T * last[7 + i]
-        half = 0.5 * T * T
-        x, y, z, w = deck_reference.turned(
-            last[0], last[1], last[2], last[3], T * last[4] + half * last[7], T * last[5] + half * last[8],
-            T * last[6] + half * last[9])
-    else:
-        i, j, f = bracket(h, t)
-        if i < 0:
-            return False
-        a, b = h.sample[i], h.sample[j]
-        for k in range(3):
-            s.w[k] = a[4 + k] + f * (b[4 + k] - a[4 + k])
-            s.dw[k] = b[7 + k]
-        x, y, z, w = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), \
-            a[3] + f * (b[3] - a[3])
-    norm = math.sqrt(x * x + y * y + z * z + w * w)
-    rotation(x / norm, y / norm, z / norm, w / norm, s.mat_ed)
-    return True
-
-
-@compiled
 def target_rates(s, u, a, b, f):
     """Rates (azimuth, elevation) of the target: those of the antenna, a share f between two encoder samples a and b,
     and of the error, turned into the frame of the filter by the attitude `s` was last asked for."""
     x, y, z, dx, dy, dz = displaced_motion(
         a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), a[3] + f * (b[3] - a[3]),
         u.cross_elevation, u.elevation, u.error_rate[0], u.error_rate[1])
-    if s.frame.tilted:
+    if s.stabilised or s.frame.tilted:
         estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
+        x, y, z, dx, dy, dz, _, _, _ = deck_reference.from_lever_arm(-s.arm[0], -s.arm[1], -s.arm[2], x, y, z, dx, dy,
+                                                                    dz, 0.0, 0.0, 0.0)
         return deck_reference.earth_rates(s.mat_fd, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
-    if s.stabilised:
-        return deck_reference.earth_rates(s.mat_ed, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
     _, dA, _, _, dE, _ = deck_reference.moving_angles(x, y, z, dx, dy, dz, 0.0, 0.0, 0.0)
     return dA, dE
 
@@ -220,7 +164,7 @@ def take_error(s, p, c, u, o):
             return _ATTITUDE
         # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
         y, x, z = earth_direction(azimuth, elevation)
-        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, x, -y, z))
+        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, *lever_arm.from_ins(s, p.lever_arm, u.range, x, -y, z)))
         if s.frame.tilted:
             azimuth, elevation = estimate_frame.measured(s.frame, azimuth, elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
@@ -269,12 +213,13 @@ def excused(s, p):
 def estimated_target(s, p, c, t):
     """Deck angles at t of the target as estimated."""
     A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
-    if not s.frame.tilted:
+    if not s.frame.tilted and s.range == 0.0:
         return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
     attitude_at(s, p, t)
     estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
-    return deck_reference.deck_angles(s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA,
-                                      E, dE, ddE)
+    return deck_reference.moving_angles(*deck_reference.from_lever_arm(
+        s.arm[0], s.arm[1], s.arm[2], *deck_reference.deck_motion(
+            s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA, E, dE, ddE)))
 
 
 @compiled
@@ -372,12 +317,11 @@ def levelled(s, c, times, angles, t):
     if s.mode == modes.PROGRAM:
         A, dA, ddA = program_track.interpolated(times, angles, t, 0)
         E, dE, ddE = program_track.interpolated(times, angles, t, 1)
-        A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.ahead.level, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA,
-                                                         E, dE, ddE)
+        s.mat_fd[:] = s.ahead.level
     else:
+        A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
         estimate_frame.from_deck(s.frame, s.ahead.level, s.mat_fd)
-        A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-                                                         *tracker.outlook(s.tracker, c, t))
+    A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA, E, dE, ddE)
     return A, dA, ddA
 
 
@@ -395,8 +339,7 @@ def look_ahead(s, p, c, sectors, times, angles):
     if s.mode == modes.AUTOTRACK:
         e, n, u, de, dn, du, _, _, _ = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c, s.stamp))
         if known:
-            x, y, z = earth_direction(program_track.interpolated(times, angles, s.stamp, 0)[0],
-                                      program_track.interpolated(times, angles, s.stamp, 1)[0])
+            x, y, z = ahead.program_direction(times, angles, s.stamp)
             known = e * x + n * y + u * z > ahead.LIKE_PROGRAM
     ahead.look(h, p, sectors, s.stamp, s.turn, times, angles, known, s.mode == modes.AUTOTRACK, e, n, u, de, dn, du)
 
@@ -415,18 +358,13 @@ def explain(s, c):
 
 
 @compiled
-def read_estimate(s, c, o):
-    """What is known of the target now, in earth angles."""
-    t, f, x, p = s.tracker, s.frame, o.estimate, o.covariance
-    tracker.read(t, c, s.stamp, o)
-    if f.tilted:
-        A, E = x[0, 0], x[1, 0]
-        e, n, u, de, dn, du, dde, ddn, ddu = estimate_frame.moving_in_earth(f, x[0, 0], x[0, 1], x[0, 2], x[1, 0],
-                                                                            x[1, 1], x[1, 2])
-        x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = deck_reference.moving_angles(n, -e, u, dn, -de, du,
-                                                                                            ddn, -dde, ddu)
-        for i in range(3):
-            p[0, i], p[1, i] = estimate_frame.earth_variances(f, A, E, x[0, 0], x[1, 0], p[0, i], p[1, i])
+def read_estimate(s, p, c, o):
+    """What is known of the target now, in earth angles of the antenna."""
+    tracker.read(s.tracker, c, s.stamp, o)
+    if s.frame.tilted:
+        estimate_frame.put_in_earth(s.frame, o.estimate, o.covariance)
+    if s.range > 0.0 and attitude_at(s, p, s.stamp):
+        lever_arm.to_antenna(s, o.estimate)
 
 
 @compiled
@@ -522,11 +460,15 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         position_loop.rest(s.azimuth, p.azimuth, dt, o, 0)
         position_loop.rest(s.elevation, p.elevation, dt, o, 1)
     else:
+        # The azimuth wants its target at one instant, the elevation perhaps at another.
         t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
         t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
-        A, dA, ddA, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_azimuth)
-        if t_elevation != t_azimuth:
-            _, _, _, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_elevation)
+        A = dA = ddA = E = dE = ddE = 0.0
+        for i in range(1 if t_elevation == t_azimuth else 2):
+            B, dB, ddB, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles,
+                                                t_azimuth if i == 0 else t_elevation)
+            if i == 0:
+                A, dA, ddA = B, dB, ddB
         position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
                            u.velocity[0], dt, o, 0)
         position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
@@ -540,5 +482,5 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
     o.gated = s.tracker.gated
     if s.tracker.running:
-        read_estimate(s, constants[0].tracker, o)
+        read_estimate(s, p, constants[0].tracker, o)
     look_ahead(s, p, constants[0].tracker, constants[0].sectors, times, angles)

@@ -89,6 +89,17 @@ def earth_variances(f, A, E, azimuth, elevation, pa, pe):
 
 
 @compiled
+def put_in_earth(f, x, p):
+    """An estimate x (2, 3), azimuth and elevation with their derivatives, and its (p11, p12, p22) p (2, 3), given in
+    the frame: the same in the earth's."""
+    A, E = x[0, 0], x[1, 0]
+    e, n, u, de, dn, du, dde, ddn, ddu = moving_in_earth(f, A, x[0, 1], x[0, 2], E, x[1, 1], x[1, 2])
+    x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = moving_angles(n, -e, u, dn, -de, du, ddn, -dde, ddu)
+    for i in range(3):
+        p[0, i], p[1, i] = earth_variances(f, A, E, x[0, 0], x[1, 0], p[0, i], p[1, i])
+
+
+@compiled
 def measured(f, azimuth, elevation):
     """(azimuth, elevation) in the frame of an ENU direction's earth angles."""
     e, n, u = to_deck(f.mat, *earth_direction(azimuth, elevation))

@@ -4,7 +4,7 @@ The axis leaves the target at t1, turns as fast as it may, and meets it again at
 meanwhile takes the angle at which the beam is closest to the target. For each way round t1 is chosen so that least
 signal is lost; t2 follows from it.
 
-A path (n, 6) is the target in the frame of the levelled deck (FLU), one row every h seconds from t0 on: the unit vector,
+A path (n, 6) is the target in the frame of the levelled deck (FLU), one row every h seconds from t0: the unit vector,
 and by `complete` its azimuth counted through all turns, the least and the largest azimuth from there to the end.
 """
 import math
@@ -21,9 +21,9 @@ PLAN = np.dtype([('t1', 'f8'), ('t2', 'f8'), ('azimuth1', 'f8'), ('azimuth2', 'f
                 align=True)
 """The slew: leaves the target at t1 [s] with azimuth1, rate1, meets it at t2; peak: its largest rate, signed;
 culmination [s] and highest: elevation there on the levelled deck; needed: largest azimuth rate following would take;
-loss: time [s] further than half a beamwidth off; worst: largest angle off [rad]; cost: share of signal lost, in
-seconds, other_cost: of the other way round, inf where the limits forbid it; long_way: 1 where the slew goes against
-the target's own way."""
+loss: expected time [s] further than half a beamwidth off; worst: largest angle off [rad]; cost: share of signal
+lost, in seconds, other_cost: of the other way round, inf where the limits forbid it; long_way: 1 where the slew goes
+against the target's own way."""
 
 CANDIDATES, LEVELS, SAMPLES, BISECTIONS = 48, 4, 160, 24
 
@@ -114,25 +114,31 @@ def begin(plan, path, t0, h, way, t1, after, last, rate, acceleration):
 
 
 @compiled
-def judge(plan, path, t0, h, highest, half_beam, samples):
-    """Set what a laid slew costs: cost = integral of x^8 / (1 + x^8), x in half beamwidths (the loss
-    made smooth, and still a choice where nothing is lost); loss; worst."""
+def true_deck_share(plan, t):
+    """(g, dg, ddg) [1, 1/s, 1/s2]: how far a slew follows the true deck at t, 1 at its ends, 0 in its middle."""
+    T = plan.t2 - plan.t1
+    x = 1.0 - 2.0 * (t - plan.t1) / T
+    return x**4, -8.0 * x**3 / T, 48.0 * x * x / (T * T)
+
+
+@compiled
+def judge(plan, path, t0, h, highest, half_beam, tilt, samples):
+    """Set what a laid slew costs: cost = integral of x^8 / (1 + x^8), x in half beamwidths (the loss made smooth, and
+    still a choice where nothing is lost); loss; worst. tilt: of the deck [rad rms about one axis], normally
+    distributed, which a slew cannot follow.
+    """
     T = (plan.t2 - plan.t1) / samples
-    cost = loss = worst = before = 0.0
-    for i in range(1, samples + 1):
-        t = plan.t1 + i * T
+    cost = loss = worst = 0.0
+    for i in range(samples):
+        t = plan.t1 + (i + 0.5) * T
         x, y, z, _, _, _ = along(path, t0, h, t)
         here = off_beam(slew(plan, t)[0], x, y, z, highest)
         x2 = (here / half_beam)**2
         x8 = x2 * x2 * x2 * x2
         cost += T * x8 / (1.0 + x8)
         worst = max(worst, here)
-        out, was = here - half_beam, before - half_beam
-        if out > 0.0 and was > 0.0:
-            loss += T
-        elif out > 0.0 or was > 0.0:
-            loss += T * max(out, was) / abs(out - was)
-        before = here
+        sigma = math.sqrt(2.0) * max(tilt * (1.0 - true_deck_share(plan, t)[0]), 1e-9)
+        loss += T * (1.0 - 0.5 * (math.erf((half_beam - here) / sigma) + math.erf((half_beam + here) / sigma)))
     plan.cost, plan.loss, plan.worst = cost, loss, worst
 
 
@@ -186,23 +192,24 @@ def find(path, h, rate, acceleration):
 
 
 @compiled
-def attempt(trial, path, t0, h, turn, way, t1, after, rate, acceleration, low, high, highest, half_beam, samples):
+def attempt(trial, path, t0, h, turn, way, t1, after, rate, acceleration, low, high, highest, half_beam, tilt,
+            samples):
     """Lay, seat and judge a slew that leaves at t1: (laid at all, its cost, inf where it does not fit the limits)."""
     if t1 < t0 or not begin(trial, path, t0, h, way, t1, after, t0 + (len(path) - 1) * h, rate, acceleration):
         return False, math.inf
     seat(trial, path, t0, h, turn)
     if not fits(trial, path, t0, h, low, high):
         return True, math.inf
-    judge(trial, path, t0, h, highest, half_beam, samples)
+    judge(trial, path, t0, h, highest, half_beam, tilt, samples)
     return True, trial.cost
 
 
 @compiled
-def plan(best, trial, path, t0, h, turn, rate, acceleration, low, high, highest, half_beam):
+def plan(best, trial, path, t0, h, turn, rate, acceleration, low, high, highest, half_beam, tilt):
     """Find the keyhole of a completed path and the best slew through it: NOTHING, AHEAD, NO_TURN or BEYOND.
 
     best, trial: PLAN records, filled. turn: azimuth of the axis at the first row. rate, acceleration: what the slew
-    may use. low, high: limits of the azimuth; highest: of the elevation. Bounded: two ways round,
+    may use. low, high: limits of the azimuth; highest: of the elevation; tilt: see `judge`. Bounded: two ways round,
     CANDIDATES + 9 LEVELS slews of SAMPLES each.
     """
     first, last, needed = find(path, h, rate, acceleration)
@@ -223,7 +230,7 @@ def plan(best, trial, path, t0, h, turn, rate, acceleration, low, high, highest,
             for k in range(-around, around + 1):
                 t1 = min(middle + k * step, t_in)
                 possible, here = attempt(trial, path, t0, h, turn, way, t1, t_out, rate, acceleration, low, high,
-                                         highest, half_beam, SAMPLES if around > 0 else 10 * SAMPLES)
+                                         highest, half_beam, tilt, SAMPLES if around > 0 else 10 * SAMPLES)
                 laid |= possible and side == 0
                 if here < cost:
                     centre, cost = t1, here

@@ -153,6 +153,15 @@ class Elevation(AxisParameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class LeverArm(Parameters):
+    """Where the antenna stands on the deck, FLU from the INS. Used where the range is measured."""
+
+    x: float = parameter(0.0, -500.0, 500.0, 'm', 'forward')
+    y: float = parameter(0.0, -500.0, 500.0, 'm', 'to port')
+    z: float = parameter(0.0, -500.0, 500.0, 'm', 'up')
+
+
+@dataclasses.dataclass(frozen=True)
 class Keyhole(Parameters):
     """How a pass through the zenith of the deck is planned."""
 
@@ -177,6 +186,7 @@ class AcuParameters(Parameters):
     initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
     attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')
+    lever_arm: LeverArm = group(LeverArm)
     blockage: str = text('', SECTORS_DOC)
     keyhole: Keyhole = group(Keyhole)
     tracker: TrackerParameters = group(TrackerParameters)

@@ -24,14 +24,14 @@ def azimuth(t, E0):
     return math.atan2(math.sin(s), math.cos(s) * math.cos(E0))
 
 
-def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, below=0.0, above=0.0):
+def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.0, tilt=0.0):
     """(what was found, the plan); turn: whole turns of the axis at the start."""
     path = np.zeros((ROWS, 6))
     path[:, :3] = target(start + H * np.arange(ROWS), E0)
-    keyhole.complete(path, below, above)
+    keyhole.complete(path, 0.0, above)
     best, trial = np.zeros(1, keyhole.PLAN), np.zeros(1, keyhole.PLAN)
     found = keyhole.plan(best[0], trial[0], path, start, H, path[0, 3] + turn, rate, ACCELERATION, low, high, HIGHEST,
-                         HALF_BEAM)
+                         HALF_BEAM, tilt)
     return found, best[0]
 
 
@@ -124,6 +124,14 @@ def test_over_the_top_either_way_is_as_good():
     _, plan = planned(0.5 * math.pi)
     assert plan['other_cost'] == pytest.approx(plan['cost'], rel=2e-3)
     assert abs(plan['azimuth2'] - plan['azimuth1']) == pytest.approx(math.pi, abs=1e-3)
+
+
+def test_a_deck_that_tilts_by_more_than_the_beam_loses_all_of_the_slew():
+    E0 = math.radians(88.0)
+    losses = [planned(E0, tilt=tilt)[1]['loss'] for tilt in (0.0, 0.1 * HALF_BEAM, HALF_BEAM, 10.0 * HALF_BEAM)]
+    plan = planned(E0)[1]
+    assert losses[1] == pytest.approx(losses[0], rel=0.03) and losses[2] > losses[0]
+    assert 0.85 < losses[3] / (plan['t2'] - plan['t1']) < 1.0
 
 
 def test_begun_late_or_not_seen_to_its_end():

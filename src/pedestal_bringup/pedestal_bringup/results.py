@@ -83,6 +83,18 @@ def on_grid(bag, t, topic, columns):
     return out
 
 
+def lever_arm(bag, attitude):
+    """(n, 3) ENU [m] from base_link to the antenna, at attitudes (n, 4) of the deck; 0 in a bag that says none."""
+    told = bag.configuration['parameters'].get('tracking_receiver', {})
+    arm = np.array([told.get(f'lever_arm.{axis}', 0.0) for axis in 'xyz'])
+    found, mat_ed = np.zeros((len(attitude), 3)), np.empty((3, 3))
+    if arm.any():
+        for row, quaternion in zip(found, attitude):
+            line_of_sight.rotation(*quaternion, mat_ed)
+            row[:] = mat_ed @ arm
+    return found
+
+
 def tracking(bag) -> Tracking:
     """The Tracking of a bag (bag.Bag). Raises ValueError when it has no joint_states or target/truth."""
     missing = [name for name in ('joint_states', 'target/truth') if name not in bag.topics]
@@ -98,6 +110,7 @@ def tracking(bag) -> Tracking:
     if 'ship/truth' in bag.topics:
         ship = at_steps('ship/truth', ('position.x', 'position.y', 'position.z'))
         attitude, known_attitude = at_steps('ship/truth', quaternion), at_steps('ship/imu/data', quaternion)
+        ship = ship + lever_arm(bag, attitude)
     else:
         ship = np.zeros((t.size, 3))
         attitude = known_attitude = np.tile(line_of_sight.ASHORE, (t.size, 1))

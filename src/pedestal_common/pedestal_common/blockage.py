@@ -1,4 +1,4 @@
-"""Sectors of the deck where the superstructure hides the target. Angles as in `line_of_sight`: clockwise from the bow."""
+"""Sectors of the deck where the superstructure hides the target; azimuth clockwise from the bow."""
 import math
 
 import numpy as np
@@ -25,8 +25,9 @@ def sectors(text) -> np.ndarray:
                                  'azimuth_low azimuth_high elevation_high [rad]') from None
         low, high, top = row
         if not (0.0 < high - low <= 2.0 * math.pi and abs(low) <= 2.0 * math.pi and abs(top) <= 0.5 * math.pi):
-            raise ParameterError(f'blockage = {text!r}: sector {" ".join(words)!r}: azimuth_high must be 0 to '
-                                 '6.2832 rad above azimuth_low, azimuth_low within 6.2832, elevation_high within 1.5708')
+            raise ParameterError(f'blockage = {text!r}: sector {" ".join(words)!r}: azimuth_high must be '
+                                 '0 to 6.2832 rad above azimuth_low, azimuth_low within 6.2832, elevation_high within '
+                                 '1.5708')
     return table
 
 
