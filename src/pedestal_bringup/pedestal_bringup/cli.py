@@ -205,7 +205,7 @@ def _run(options):
     recording = read(bag)
     tracked = results.tracking(recording)
     values = {**results.summary(tracked), **consistency.summary(consistency.read(recording, tracked)),
-              **isolation.summary(isolation.read(recording, tracked)),
+              **results.announced_losses(recording), **isolation.summary(isolation.read(recording, tracked)),
               **known_attitude.summary(known_attitude.read(recording))}
     values['lost_steps'] = (float(outcome.drive['lost_steps']), '')
     values['realtime_factor'] = (outcome.drive['realtime_factor'], '')

@@ -18,7 +18,6 @@ the limit (or above, by chance) says that the ship is not to be seen in the erro
 shows more (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
 """
 import dataclasses
-import functools
 import math
 
 import numpy as np
@@ -101,17 +100,17 @@ def read(bag, run):
     """The Isolation of a bag (bag.Bag) whose results.Tracking is `run`; None ashore or when too little was tracked."""
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None
-    at_steps = functools.partial(results.on_grid, bag, run.t)
-    place = [f'position.{letter}' for letter in 'xyz']
-    ship = at_steps('ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),
-                                   *(f'twist.angular.{letter}' for letter in 'xyz'), *place])
-    target = at_steps('target/truth', place) - ship[:, 7:]
+    ship = results.on_grid(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),
+                                                      *(f'twist.angular.{letter}' for letter in 'xyz')])
+    azimuth, elevation = run.target_earth.T
+    target = np.column_stack((np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation),
+                              np.sin(elevation)))
     error = np.column_stack((run.cross_elevation, run.elevation_error))
     on = run.tracking & np.isfinite(np.column_stack((ship, target, error))).all(axis=1)
     dt = float(np.median(np.diff(run.t)))
     if np.sum(on) * dt < LEAST:
         return None
-    return measure(dt, error[on], target[on], ship[on, :4], ship[on, 4:7])
+    return measure(dt, error[on], target[on], ship[on, :4], ship[on, 4:])
 
 
 def summary(found) -> dict:

@@ -196,6 +196,18 @@ def _loss(run):
     return float(np.sum(off > 0.5 * run.beamwidth) * np.median(np.diff(run.t)))
 
 
+def announced_losses(bag) -> dict:
+    """{'keyhole_loss_predicted_s': (value, unit)}: what the ACU said beforehand in its diagnostics that it would lose
+    in keyholes, each counted once; nothing where it said nothing of the kind."""
+    found = {}
+    for _, _, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
+        for status in array.status:
+            said = {value.key: value.value for value in status.values}
+            if 'keyhole_loss_s' in said:
+                found[said['keyhole_begins_s']] = float(said['keyhole_loss_s'])
+    return {'keyhole_loss_predicted_s': (sum(found.values()), 's')} if found else {}
+
+
 def _max(values):
     values = values[np.isfinite(values)]
     return float(np.max(np.abs(values))) if values.size else math.nan
