@@ -5,9 +5,9 @@ import sys
 import numpy as np
 from std_srvs.srv import Trigger
 
-from acu_tracker import control_unit, modes
+from acu_tracker import announcement, control_unit, modes
 from acu_tracker.params import AcuParameters
-from acu_tracker.wire import DRIVE, JOINTS, MODE, PROGRAM, Acu
+from acu_tracker.wire import DRIVE, INS, JOINTS, MODE, PROGRAM, Acu
 from pedestal_common import messages, records, shell
 
 
@@ -21,6 +21,8 @@ class AcuNode(shell.Shell):
         self.joints = records.only(self.unit.heard, JOINTS)
         self.follower_places = [(name, records.only(self.unit.heard, name)) for name in self.unit.followers]
         self.announced = None
+        self.ahead = self.unit.state[0]['ahead']
+        self.told = (0, 0)
         self.refused = ''
         self.drive_state = 'unknown'
         self.invalid = 0
@@ -31,8 +33,11 @@ class AcuNode(shell.Shell):
         self.says = [(message, records.only(self.unit.said, name), self.writer(name))
                      for name, message in self.unit.messages.items()]
         self.send_mode = self.writer(MODE)
+        self.send_keyhole, self.send_hidden = self.writer('acu/keyhole'), self.writer('acu/blockage')
         self.reader(PROGRAM, self.on_program)
         self.reader(DRIVE, self.on_drive_state)
+        if INS in self.unit.events:
+            self.reader(INS, self.unit.take_ins_state)
         for mode in range(len(modes.MODES)):
             self.create_service(Trigger, f'acu/{modes.MODES[mode]}', self.service(mode))
         self.create_service(Trigger, 'acu/reset_faults', self.on_reset_faults)
@@ -73,6 +78,8 @@ class AcuNode(shell.Shell):
         self.begin_step(stamp)
         if outputs['mode'] != self.announced:
             self.announce_mode()
+        if self.ahead['number'] != self.told[0] or self.ahead['hidden_number'] != self.told[1]:
+            self.announce_ahead()
         for message, place, send in self.says:
             records.put(message, place)
             send(message)
@@ -80,6 +87,16 @@ class AcuNode(shell.Shell):
     def announce_mode(self):
         self.announced = int(self.outputs[0]['mode'])
         self.announce(self.send_mode, messages.String(data=modes.MODES[self.announced]))
+
+    def announce_ahead(self):
+        """Say what is new of a keyhole or a hidden sector; it stands until there is another."""
+        keyholes, hidden = self.told
+        self.told = int(self.ahead['number']), int(self.ahead['hidden_number'])
+        if self.told[0] != keyholes:
+            text = announcement.keyhole(self.ahead, self.parameters.tracker.receiver.beamwidth)
+            self.announce(self.send_keyhole, messages.String(data=text))
+        if self.told[1] != hidden:
+            self.announce(self.send_hidden, messages.String(data=announcement.hidden(self.ahead)))
 
     def service(self, mode):
         """The callback of a mode's service: asks the mode machine at once and answers with what it reads back."""
@@ -113,6 +130,7 @@ class AcuNode(shell.Shell):
                                                                                  limited) if on)))
         for axis, innovation, nis in zip(messages.AXES, outputs['innovation'], outputs['nis']):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
+        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(self.ahead)]
         if self.refused:
             return shell.WARN, self.refused, values
         if self.steps.refused:

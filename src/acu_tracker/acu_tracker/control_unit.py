@@ -1,21 +1,33 @@
 """The antenna control unit: one `step` per drive step, from encoders, receiver error and attitude to the rate command.
 
-The estimate lives in earth angles when a ship attitude is given, otherwise in deck angles.
+The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`.
 """
 import math
 
 import numpy as np
 
-from acu_tracker import deck_reference, modes, notch, position_loop, program_track, tracker
+from acu_tracker import (
+    ahead,
+    deck_reference,
+    estimate_frame,
+    lever_arm,
+    modes,
+    notch,
+    position_loop,
+    program_track,
+    tracker,
+)
+from acu_tracker.attitude import attitude_at, take_attitude
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
+from pedestal_common import blockage
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import (
+    ASHORE,
     displaced,
     displaced_motion,
     earth_angles,
     earth_direction,
-    rotation,
     to_earth,
 )
 from pedestal_common.parameters import record, record_type
@@ -25,6 +37,9 @@ INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'at
 """Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
 (_STAMP, _ENCODER, _ERROR, _ERROR_STAMP, _ERROR_GATED, _ATTITUDE, _PROGRAM, _PRESET,
  _STEP_GAP) = (1 << i for i in range(len(INVALID_INPUTS)))
+
+BELIEVED = 0.5
+"""Beamwidths that the beam may be meant to be off the target for the receiver's error still to be taken."""
 
 INPUTS = np.dtype([
     ('stamp', 'f8'),                                                            # t_k [s]
@@ -36,6 +51,7 @@ INPUTS = np.dtype([
     ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
+    ('aligning', 'i8'),                                                         # 1: the INS does not know it yet
     ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
     ('program_count', 'i8'),                                                    # rows of the table in use
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
@@ -51,7 +67,7 @@ OUTPUTS = np.dtype([
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
-    ('coasting', 'i8'), ('locked', 'i8'), ('invalid_input', 'i8'),
+    ('coasting', 'i8'), ('locked', 'i8'), ('blocked', 'i8'), ('invalid_input', 'i8'),
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)
 
@@ -60,22 +76,27 @@ STATE = np.dtype([
     ('encoder', history_type(4)),                                               # azimuth, elevation, their rates
     ('attitude', history_type(10)),                                             # quaternion, w, dw
     ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
-    ('turn', 'f8'),                                                            # raw azimuth last followed
+    ('turn', 'f8'), ('seen', 'f8', (2,)),         # raw azimuth last followed; deck angles of the target then
     ('preset', 'f8', (2,)),
     ('error', 'f8', (2,)),                                                      # of this step, azimuth, elevation
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
+    ('frame', estimate_frame.FRAME), ('mat_fd', 'f8', (3, 3)),                 # of the filter; deck -> it
+    ('ahead', ahead.AHEAD), ('aligning', 'i8'), ('blocked', 'i8'),
+    ('off', 'f8'), ('excused', 'f8'),                           # beam meant to be off by [rad]; last such stamp [s]
+    ('arm', 'f8', (3,)), ('range', 'f8'),                       # lever arm over range [-]; from the INS [m], 0: none
 ], align=True)
 
 CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('ahead', 'f8'),
-                      ('notch', 'f8', (2, 5))], align=True)
+                      ('notch', 'f8', (2, 5)), ('sectors', 'f8', (blockage.MOST, 3))], align=True)
 
 
 def constants(params) -> np.ndarray:
     """Constants (1,) of an AcuParameters: the parameters, those of the target filter, `ahead` = t_m - t_k [s], the
-    notches' coefficients."""
+    notches' coefficients, hidden sectors."""
     c = np.zeros(1, CONSTANTS)
     c['p'] = record(params, AcuParameters)
     c['tracker'] = tracker.constants(params.tracker, params.azimuth.filter, params.elevation.filter)
+    c['sectors'] = blockage.sectors(params.blockage)
     c['ahead'] = params.command_delay + 0.5 * params.period
     for i, axis in enumerate((params.azimuth, params.elevation)):
         c['notch'][0, i] = notch.coefficients(axis.notch.frequency, axis.notch.width, axis.notch.depth, params.period)
@@ -88,6 +109,10 @@ def initial_state(params) -> np.ndarray:
     s['stamp'] = -math.inf
     s['pending'] = modes.MODES.index(params.initial_mode)
     s['preset'] = params.azimuth.preset, params.elevation.preset
+    s['excused'] = s['ahead']['looked'] = s['ahead']['latest'] = -math.inf
+    s['ahead']['hidden'] = math.nan
+    s['ahead']['mean'] = ASHORE
+    s['frame']['mat'] = np.eye(3)
     return s
 
 
@@ -103,64 +128,6 @@ def take_encoder(s, u):
 
 
 @compiled
-def take_attitude(s, p, u):
-    """Remember a new attitude with its rate and low-passed angular acceleration; False where it is unusable."""
-    q, w = u.quaternion, u.deck_rate
-    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    if not (u.attitude_valid and abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
-        return False
-    h = s.attitude
-    last = h.newest
-    T = u.attitude_stamp - h.stamp[last] if h.count > 0 else math.inf
-    if not (T > 0.0 and u.attitude_stamp <= u.stamp):
-        return T == 0.0
-    row = push(h, u.attitude_stamp)
-    # One sign of the quaternion, so that neighbours can be averaged.
-    dot = 0.0
-    for i in range(4):
-        dot += q[i] * h.sample[last, i]
-    for i in range(4):
-        h.sample[row, i] = q[i] / norm if dot >= 0.0 else -q[i] / norm
-    for i in range(3):
-        h.sample[row, 4 + i] = w[i]
-        h.sample[row, 7 + i] = 0.0
-        if T <= p.attitude_timeout:
-            h.sample[row, 7 + i] = deck_reference.smoothed_acceleration(
-                h.sample[last, 7 + i], w[i], h.sample[last, 4 + i], T, p.attitude_smoothing)
-    return True
-
-
-@compiled
-def attitude_at(s, p, t):
-    """Set s.mat_ed, s.w, s.dw to the attitude at t: between two samples, or predicted from the last one."""
-    h = s.attitude
-    last = h.sample[h.newest]
-    T = t - h.stamp[h.newest]
-    if h.count == 0 or T > p.attitude_timeout:
-        return False
-    if T >= 0.0:
-        for i in range(3):
-            s.dw[i] = last[7 + i]
-            s.w[i] = last[4 + i] + T * last[7 + i]
-        x, y, z, w = deck_reference.turned(
-            last[0], last[1], last[2], last[3], deck_reference.turn(last[4], last[7], T),
-            deck_reference.turn(last[5], last[8], T), deck_reference.turn(last[6], last[9], T))
-    else:
-        i, j, f = bracket(h, t)
-        if i < 0:
-            return False
-        a, b = h.sample[i], h.sample[j]
-        for k in range(3):
-            s.w[k] = a[4 + k] + f * (b[4 + k] - a[4 + k])
-            s.dw[k] = b[7 + k]
-        x, y, z, w = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), \
-            a[3] + f * (b[3] - a[3])
-    norm = math.sqrt(x * x + y * y + z * z + w * w)
-    rotation(x / norm, y / norm, z / norm, w / norm, s.mat_ed)
-    return True
-
-
-@compiled
 def met(s, p, i, j, f, index):
     """Column `index` of the encoder's history, of an axis p, a share f between two rows: in between, or of a beam that
     stood up to the newer."""
@@ -172,22 +139,32 @@ def met(s, p, i, j, f, index):
 
 @compiled
 def target_rates(s, u, A, E, dA, dE):
-    """Rates (azimuth, elevation) of the target: those of the antenna at A, E and of the error, on a ship turned into
-    earth angles by the attitude `s` was last asked for."""
+    """Rates (azimuth, elevation) of the target: those of the antenna at A, E and of the error, turned into the frame
+    of the filter by the attitude `s` was last asked for."""
     x, y, z, dx, dy, dz = displaced_motion(A, E, dA, dE, u.cross_elevation, u.elevation, u.error_rate[0],
                                            u.error_rate[1])
-    if s.stabilised:
-        return deck_reference.earth_rates(s.mat_ed, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
+    if s.stabilised or s.frame.tilted:
+        estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
+        x, y, z, dx, dy, dz, _, _, _ = deck_reference.from_lever_arm(-s.arm[0], -s.arm[1], -s.arm[2], x, y, z, dx, dy,
+                                                                    dz, 0.0, 0.0, 0.0)
+        return deck_reference.earth_rates(s.mat_fd, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
     _, dA, _, _, dE, _ = deck_reference.moving_angles(x, y, z, dx, dy, dz, 0.0, 0.0, 0.0)
     return dA, dE
 
 
 @compiled
 def take_error(s, p, c, u, o):
-    """Filter y = encoder at the instant of the error, displaced by the error, in earth angles on a ship."""
+    """Filter y = encoder at the instant of the error, displaced by the error, in the angles of the estimate.
+
+    While the beam is meant to be off the target the receiver's reading is none.
+    """
     e = p.tracker.receiver
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
         return _ERROR
+    if s.off > BELIEVED * e.beamwidth:
+        return 0
+    if not s.tracker.running:
+        estimate_frame.level(s.frame)
     t = u.error_stamp - e.age
     i, j, f = bracket(s.encoder, t)
     if i < 0:
@@ -195,12 +172,14 @@ def take_error(s, p, c, u, o):
     A, E = met(s, p.azimuth, i, j, f, 0), met(s, p.elevation, i, j, f, 1)
     azimuth, elevation = displaced(A, E, u.cross_elevation, u.elevation)
     s.error[0], s.error[1] = azimuth - A, elevation - E
-    if u.stabilised:
+    if s.stabilised or s.frame.tilted:
         if not attitude_at(s, p, t):
             return _ATTITUDE
         # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
         y, x, z = earth_direction(azimuth, elevation)
-        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, x, -y, z))
+        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, *lever_arm.from_ins(s, p.lever_arm, u.range, x, -y, z)))
+        if s.frame.tilted:
+            azimuth, elevation = estimate_frame.measured(s.frame, azimuth, elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
         azimuth_rate, elevation_rate = target_rates(s, u, A, E, met(s, p.azimuth, i, j, f, 2),
@@ -212,17 +191,54 @@ def take_error(s, p, c, u, o):
     (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
      o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, t, azimuth, elevation, R / (cos_el * cos_el), R,
                                  azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate, u.range,
-                                 u.range_variance)
+                                 u.range_variance, math.inf if excused(s, p) else p.tracker.restart_gap)
     if outcome == tracker.STALE:
         return _ERROR_STAMP
+    reframe(s, c)
     if o.nis[0] == o.nis[0]:
         o.innovation_sigma[0], o.innovation_sigma[1] = math.sqrt(s.tracker.S[0]), math.sqrt(s.tracker.S[1])
     return _ERROR_GATED if outcome == tracker.GATED else 0
 
 
 @compiled
+def reframe(s, c):
+    """Let the filter go on in the frame that suits the elevation of the target."""
+    t, f = s.tracker, s.frame
+    A, dA, ddA, E, dE, ddE = tracker.outlook(t, c, t.stamp)
+    if not (f.tilted or E > estimate_frame.RAISE):
+        return
+    e, n, u, de, dn, du, dde, ddn, ddu = estimate_frame.moving_in_earth(f, A, dA, ddA, E, dE, ddE)
+    if f.tilted and u >= math.sin(estimate_frame.LOWER):
+        return
+    if f.tilted:
+        estimate_frame.level(f)
+    else:
+        estimate_frame.tilt(f, e, n, u, de, dn, du)
+    tracker.turn(t, c, *estimate_frame.moving_in_frame(f, e, n, u, de, dn, du, dde, ddn, ddu))
+
+
+@compiled
+def excused(s, p):
+    """Whether the receiver is silent for a reason, a keyhole or a hidden sector, or has been until just now."""
+    return s.stamp - s.excused <= p.tracker.coast_time
+
+
+@compiled
+def estimated_target(s, p, c, t):
+    """Deck angles at t of the target as estimated."""
+    A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
+    if not s.frame.tilted and s.range == 0.0:
+        return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
+    attitude_at(s, p, t)
+    estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
+    return deck_reference.moving_angles(*deck_reference.from_lever_arm(
+        s.arm[0], s.arm[1], s.arm[2], *deck_reference.deck_motion(
+            s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA, E, dE, ddE)))
+
+
+@compiled
 def seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
-    """Deck angles of a target at t, given in the estimate's frame."""
+    """Deck angles of a target at t, given in earth angles."""
     if s.stabilised and attitude_at(s, p, t):
         return deck_reference.deck_angles(s.mat_ed, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2],
                                           A, dA, ddA, E, dE, ddE)
@@ -266,11 +282,14 @@ def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
     """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
     flags = 0
     encoder_ok = s.encoder.count > 0 and s.encoder.stamp[s.encoder.newest] == s.stamp
-    attitude_ok = not s.stabilised or attitude_at(s, p, t_m)
-    lost = not s.tracker.running or overdue(s, p) > p.tracker.coast_time
+    attitude = modes.NONE
+    if s.stabilised:
+        attitude = (modes.INS_ALIGNING if s.aligning else modes.NONE if attitude_at(s, p, t_m) else
+                    modes.ATTITUDE_INVALID)
+    lost = not s.tracker.running or (overdue(s, p) > p.tracker.coast_time and not excused(s, p))
     program = program_track.status(times, s.stamp)
     wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)
-    if program == modes.NONE and attitude_ok and wanted:
+    if program == modes.NONE and attitude == modes.NONE and wanted:
         A, _, _, E, _, _ = program_target(s, p, times, angles, t_m)
         if not math.isfinite(A + E):
             program, flags = modes.NO_PROGRAM, _PROGRAM
@@ -279,7 +298,7 @@ def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
             program = outside(deck_reference.nearest_turn(A, s.turn, low, high, 0.0, 0.0), E, p)
     o.locked = tracker.locked(s.tracker, p.tracker, overdue(s, p))
     mode, reason, result = modes.next_mode(
-        s.mode, request, encoder_ok, drive_ready, attitude_ok, program, outside(p.azimuth.stow, p.elevation.stow, p),
+        s.mode, request, encoder_ok, drive_ready, attitude, program, outside(p.azimuth.stow, p.elevation.stow, p),
         outside(s.preset[0], s.preset[1], p), o.locked, lost, p.tracker.handover)
     if result == modes.ACCEPTED:
         s.pending = modes.NO_REQUEST
@@ -317,6 +336,62 @@ def seat(s, p, u):
 
 
 @compiled
+def levelled(s, c, times, angles, t):
+    """Azimuth on the levelled deck of a plan, (A, dA, ddA) at t of what the mode follows."""
+    if s.mode == modes.PROGRAM:
+        A, dA, ddA = program_track.interpolated(times, angles, t, 0)
+        E, dE, ddE = program_track.interpolated(times, angles, t, 1)
+        s.mat_fd[:] = s.ahead.level
+    else:
+        A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
+        estimate_frame.from_deck(s.frame, s.ahead.level, s.mat_fd)
+    A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA, E, dE, ddE)
+    return A, dA, ddA
+
+
+@compiled
+def look_ahead(s, p, c, sectors, times, angles):
+    """Now and then: what the target will ask of the axes."""
+    h = s.ahead
+    if s.mode != modes.PROGRAM and s.mode != modes.AUTOTRACK:
+        ahead.forget(h)
+        return
+    if s.stamp - h.looked < ahead.INTERVAL or (h.what == ahead.KEYHOLE and s.stamp <= h.plan.t2):
+        return
+    known = program_track.status(times, s.stamp) == modes.NONE
+    e = n = u = de = dn = du = 0.0
+    if s.mode == modes.AUTOTRACK:
+        e, n, u, de, dn, du, _, _, _ = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c, s.stamp))
+        if known:
+            x, y, z = ahead.program_direction(times, angles, s.stamp)
+            known = e * x + n * y + u * z > ahead.LIKE_PROGRAM
+    ahead.look(h, p, sectors, s.stamp, s.turn, times, angles, known, s.mode == modes.AUTOTRACK, e, n, u, de, dn, du)
+
+
+@compiled
+def explain(s, c):
+    """Note why the receiver hears nothing: the target is hidden, or the beam on its way through the keyhole."""
+    follows = s.mode == modes.PROGRAM or s.mode == modes.AUTOTRACK
+    s.blocked = follows and blockage.blocked(c.sectors, s.seen[0], s.seen[1])
+    why = (modes.BLOCKED if s.blocked else
+           modes.KEYHOLE if follows and ahead.slewing(s.ahead, s.stamp) else modes.NONE)
+    if why != modes.NONE:
+        s.excused, s.reason = s.stamp, why
+    elif s.reason == modes.BLOCKED or s.reason == modes.KEYHOLE:
+        s.reason = modes.NONE
+
+
+@compiled
+def read_estimate(s, p, c, o):
+    """What is known of the target now, in earth angles of the antenna."""
+    tracker.read(s.tracker, c, s.stamp, o)
+    if s.frame.tilted:
+        estimate_frame.put_in_earth(s.frame, o.estimate, o.covariance)
+    if s.range > 0.0 and attitude_at(s, p, s.stamp):
+        lever_arm.to_antenna(s, o.estimate)
+
+
+@compiled
 def raw_target(s, p, c, times, angles, t):
     """Deck (A, dA, ddA, E, dE, ddE) at t of what the mode follows, the azimuth on the turn that fits."""
     if s.mode == modes.STOW:
@@ -331,7 +406,14 @@ def raw_target(s, p, c, times, angles, t):
         if s.entered:
             below, above = program_track.azimuth_travel(times, angles, t)
     else:
-        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, *tracker.outlook(s.tracker, c, t))
+        A, dA, ddA, E, dE, ddE = estimated_target(s, p, c, t)
+    s.seen[0], s.seen[1] = A, E
+    s.off = 0.0
+    if ahead.slewing(s.ahead, t):
+        B, dB, ddB = (A, dA, ddA) if not s.stabilised else levelled(s, c, times, angles, t)
+        s.turn, dA, ddA, E, dE, ddE, s.off = ahead.through(s.ahead, t, A, dA, ddA, E, dE, ddE, B, dB, ddB,
+                                                           p.elevation.limits.high - p.keyhole.elevation_margin)
+        return s.turn, dA, ddA, E, dE, ddE
     s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
     return s.turn, dA, ddA, E, dE, ddE
 
@@ -339,7 +421,7 @@ def raw_target(s, p, c, times, angles, t):
 @compiled
 def clear(o):
     """Outputs of a step in which nothing has happened yet."""
-    o.coasting, o.invalid_input = 0, 0
+    o.coasting, o.blocked, o.invalid_input = 0, 0, 0
     o.torque[:] = 0.0
     o.innovation[:] = math.nan
     o.rate_innovation[:] = math.nan
@@ -374,7 +456,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     jumped = dt > p.step_gap
     flags = _STEP_GAP if jumped and math.isfinite(s.stamp) else 0
     dt = p.period if jumped else dt
-    s.stamp = u.stamp
+    s.stamp, s.aligning = u.stamp, u.aligning
 
     encoder_ok = take_encoder(s, u)
     if not encoder_ok:
@@ -382,6 +464,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     s.error[0] = s.error[1] = math.nan
     if u.stabilised != s.stabilised:
         s.stabilised, s.tracker.running = u.stabilised, 0
+        ahead.forget(s.ahead)
     if u.stabilised and not take_attitude(s, p, u):
         flags |= _ATTITUDE
     if u.error_valid:
@@ -402,11 +485,15 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         position_loop.rest(s.azimuth, p.azimuth, dt, o, 0)
         position_loop.rest(s.elevation, p.elevation, dt, o, 1)
     else:
+        # The azimuth wants its target at one instant, the elevation perhaps at another.
         t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
         t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
-        A, dA, ddA, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_azimuth)
-        if t_elevation != t_azimuth:
-            _, _, _, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles, t_elevation)
+        A = dA = ddA = E = dE = ddE = 0.0
+        for i in range(1 if t_elevation == t_azimuth else 2):
+            B, dB, ddB, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles,
+                                                t_azimuth if i == 0 else t_elevation)
+            if i == 0:
+                A, dA, ddA = B, dB, ddB
         autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
         if p.azimuth.controller == position_loop.BEAM:
             position_loop.steer(s.azimuth, p.azimuth, A, dA, ddA, s.error[0], V_A, autotrack, dt, o, 0)
@@ -419,10 +506,13 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
             position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m,
                                u.position[1], u.velocity[1], dt, o, 1)
         s.entered = 0
+        explain(s, constants[0])
+        o.blocked = s.blocked
         o.coasting = s.mode == modes.AUTOTRACK and overdue(s, p) > p.tracker.coast_after
 
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
     o.gated = s.tracker.gated
     if s.tracker.running:
-        tracker.read(s.tracker, constants[0].tracker, u.stamp, o)
+        read_estimate(s, p, constants[0].tracker, o)
+    look_ahead(s, p, constants[0].tracker, constants[0].sectors, times, angles)

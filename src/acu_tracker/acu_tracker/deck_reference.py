@@ -42,8 +42,9 @@ def cross(ax, ay, az, bx, by, bz):
 
 
 @compiled
-def deck_angles(mat_ed, wx, wy, wz, dwx, dwy, dwz, A, dA, ddA, E, dE, ddE):
-    """Deck (A, dA, ddA, E, dE, ddE) of earth angles; mat_ed (3, 3) deck -> earth, w, dw of the deck in FLU."""
+def deck_motion(mat_ed, wx, wy, wz, dwx, dwy, dwz, A, dA, ddA, E, dE, ddE):
+    """FLU unit vector of earth angles and its first and second derivative on the deck (nine floats); mat_ed (3, 3)
+    deck -> earth, w, dw of the deck in FLU."""
     e, n, u, de, dn, du, dde, ddn, ddu = moving_direction(A, dA, ddA, E, dE, ddE)
     x, y, z = to_deck(mat_ed, e, n, u)
     ex, ey, ez = to_deck(mat_ed, de, dn, du)
@@ -52,7 +53,30 @@ def deck_angles(mat_ed, wx, wy, wz, dwx, dwy, dwz, A, dA, ddA, E, dE, ddE):
     ax, ay, az = cross(dwx, dwy, dwz, x, y, z)
     # w x (2 M' u' - w x u_d)
     bx, by, bz = cross(wx, wy, wz, 2.0 * ex - cx, 2.0 * ey - cy, 2.0 * ez - cz)
-    return moving_angles(x, y, z, ex - cx, ey - cy, ez - cz, fx - bx - ax, fy - by - ay, fz - bz - az)
+    return x, y, z, ex - cx, ey - cy, ez - cz, fx - bx - ax, fy - by - ay, fz - bz - az
+
+
+@compiled
+def deck_angles(mat_ed, wx, wy, wz, dwx, dwy, dwz, A, dA, ddA, E, dE, ddE):
+    """Deck (A, dA, ddA, E, dE, ddE) of earth angles; the rest as in deck_motion."""
+    return moving_angles(*deck_motion(mat_ed, wx, wy, wz, dwx, dwy, dwz, A, dA, ddA, E, dE, ddE))
+
+
+@compiled
+def from_lever_arm(rx, ry, rz, x, y, z, dx, dy, dz, ddx, ddy, ddz):
+    """A moving FLU unit vector seen from r, lever arm over range [-], instead of from the origin: nine floats.
+
+    v = u - r; n = v / |v|, n' = (v' - n (n.v')) / |v|, and so on. r is fixed on the deck, the range taken as constant.
+    """
+    x, y, z = x - rx, y - ry, z - rz
+    k = 1.0 / math.sqrt(x * x + y * y + z * z)
+    x, y, z, dx, dy, dz, ddx, ddy, ddz = k * x, k * y, k * z, k * dx, k * dy, k * dz, k * ddx, k * ddy, k * ddz
+    along = x * dx + y * dy + z * dz
+    nx, ny, nz = dx - along * x, dy - along * y, dz - along * z
+    # n'' = v''/|v| - 2 n' (n.v')/|v| - n d/dt(n.v'/|v|) - n (n.v'/|v|)^2, from |v| n = v.
+    bend = x * ddx + y * ddy + z * ddz + nx * nx + ny * ny + nz * nz
+    return (x, y, z, nx, ny, nz, ddx - 2.0 * along * nx - bend * x, ddy - 2.0 * along * ny - bend * y,
+            ddz - 2.0 * along * nz - bend * z)
 
 
 @compiled
@@ -84,6 +108,21 @@ def smoothed_acceleration(before, w, w_before, T, tau):
 def turn(w, dw, T):
     """Angle that a rate w and its derivative dw turn in T [s]."""
     return T * w + 0.5 * T * T * dw
+
+
+@compiled
+def best_elevation(a, da, dda, x, y, z, dx, dy, dz, ddx, ddy, ddz):
+    """(E, dE, ddE) at which a beam at azimuth a is closest to a moving FLU unit vector; beyond pi/2 over the top.
+
+    E = atan2(z, b), b = x cos a - y sin a the part of the direction along the beam's azimuth.
+    """
+    sa, ca = math.sin(a), math.cos(a)
+    b, c = x * ca - y * sa, -x * sa - y * ca
+    db = dx * ca - dy * sa + da * c
+    ddb = ddx * ca - ddy * sa + 2.0 * da * (-dx * sa - dy * ca) + dda * c - da * da * b
+    r2 = max(b * b + z * z, 1e-12)
+    dE = (b * dz - z * db) / r2
+    return math.atan2(z, b), dE, (b * ddz - z * ddb - 2.0 * dE * (b * db + z * dz)) / r2
 
 
 @compiled

@@ -6,16 +6,18 @@ STANDBY, STOW, PRESET, PROGRAM, AUTOTRACK = range(len(MODES))
 
 REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'attitude invalid', 'no program track',
            'before program track', 'after program track', 'receiver not locked', 'outside limits', 'unknown mode',
-           'stamp does not advance', 'drive not ready')
+           'stamp does not advance', 'drive not ready', 'INS aligning', 'blocked', 'keyhole')
 (NONE, REQUESTED, LOCKED, SIGNAL_LOST, ENCODER_INVALID, ATTITUDE_INVALID, NO_PROGRAM, BEFORE_PROGRAM,
- AFTER_PROGRAM, NOT_LOCKED, OUTSIDE_LIMITS, UNKNOWN_MODE, BAD_STAMP, DRIVE_NOT_READY) = range(len(REASONS))
+ AFTER_PROGRAM, NOT_LOCKED, OUTSIDE_LIMITS, UNKNOWN_MODE, BAD_STAMP, DRIVE_NOT_READY, INS_ALIGNING,
+ BLOCKED, KEYHOLE) = range(len(REASONS))
 
 NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 
 
 @compiled
-def obstacle(request, encoder_ok, drive_ready, attitude_ok, program, stow, preset, locked):
-    """Why a mode cannot be entered now, NONE if it can. `program`, `stow`, `preset`: NONE or their own obstacle."""
+def obstacle(request, encoder_ok, drive_ready, attitude, program, stow, preset, locked):
+    """Why a mode cannot be entered now, NONE if it can. `attitude`, `program`, `stow`, `preset`: NONE or their own
+    obstacle."""
     if request == STANDBY:
         return NONE
     if request < STANDBY or request > AUTOTRACK:
@@ -28,15 +30,15 @@ def obstacle(request, encoder_ok, drive_ready, attitude_ok, program, stow, prese
         return stow
     if request == PRESET:
         return preset
-    if not attitude_ok:
-        return ATTITUDE_INVALID
+    if attitude != NONE:
+        return attitude
     if request == PROGRAM:
         return program
     return NONE if locked else NOT_LOCKED
 
 
 @compiled
-def next_mode(mode, request, encoder_ok, drive_ready, attitude_ok, program, stow, preset, locked, lost, handover):
+def next_mode(mode, request, encoder_ok, drive_ready, attitude, program, stow, preset, locked, lost, handover):
     """(mode, reason, result) of one step.
 
     request     mode asked for, NO_REQUEST for none
@@ -48,7 +50,7 @@ def next_mode(mode, request, encoder_ok, drive_ready, attitude_ok, program, stow
     """
     result = NO_REQUEST
     if request != NO_REQUEST:
-        why = obstacle(request, encoder_ok, drive_ready, attitude_ok, program, stow, preset, locked)
+        why = obstacle(request, encoder_ok, drive_ready, attitude, program, stow, preset, locked)
         if why == NONE:
             return request, REQUESTED, ACCEPTED
         result = REFUSED
@@ -61,8 +63,8 @@ def next_mode(mode, request, encoder_ok, drive_ready, attitude_ok, program, stow
     if not drive_ready:
         return STANDBY, DRIVE_NOT_READY, result
     if mode == PROGRAM or mode == AUTOTRACK:
-        if not attitude_ok:
-            return STANDBY, ATTITUDE_INVALID, result
+        if attitude != NONE:
+            return STANDBY, attitude, result
         if mode == PROGRAM and locked and handover:
             return AUTOTRACK, LOCKED, result
         if mode == PROGRAM and program != NONE and program != OUTSIDE_LIMITS:

@@ -7,7 +7,9 @@ from acu_tracker.filter_params import Filter, Ukf
 from acu_tracker.history import LENGTH
 from acu_tracker.modes import MODES
 from acu_tracker.position_loop import CONTROLLERS
-from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter
+from pedestal_common.blockage import DOC as SECTORS_DOC
+from pedestal_common.blockage import sectors
+from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,6 +167,26 @@ class Elevation(AxisParameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class LeverArm(Parameters):
+    """Where the antenna stands on the deck, FLU from the INS. Used where the range is measured."""
+
+    x: float = parameter(0.0, -500.0, 500.0, 'm', 'forward')
+    y: float = parameter(0.0, -500.0, 500.0, 'm', 'to port')
+    z: float = parameter(0.0, -500.0, 500.0, 'm', 'up')
+
+
+@dataclasses.dataclass(frozen=True)
+class Keyhole(Parameters):
+    """How a pass through the zenith of the deck is planned."""
+
+    horizon: float = parameter(60.0, 1.0, 1000.0, 's', 'how far ahead it is looked for; longer than the slew')
+    notice: float = parameter(20.0, 0.0, 1000.0, 's', 'a plan is made for good this long before the slew begins')
+    share: float = parameter(0.95, 0.1, 1.0, '', "share of the shaper's rate and acceleration that a plan uses")
+    elevation_margin: float = parameter(0.01, 0.0, 0.5, 'rad', 'a plan stays this far below elevation.limits.high')
+    mean_time: float = parameter(60.0, 1.0, 3600.0, 's', 'over which the attitude is averaged to the levelled deck')
+
+
+@dataclasses.dataclass(frozen=True)
 class AcuParameters(Parameters):
     """The antenna control unit."""
 
@@ -178,11 +200,15 @@ class AcuParameters(Parameters):
     initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
     attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')
+    lever_arm: LeverArm = group(LeverArm)
+    blockage: str = text('', SECTORS_DOC)
+    keyhole: Keyhole = group(Keyhole)
     tracker: TrackerParameters = group(TrackerParameters)
     azimuth: AxisParameters = group(AxisParameters)
     elevation: Elevation = group(Elevation)
 
     def check(self):
+        sectors(self.blockage)
         for name in ('command_delay', 'receiver_latency', 'attitude_latency'):
             if getattr(self, name) > (LENGTH - 4) * self.period:
                 raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {LENGTH - 4} periods, '

@@ -80,6 +80,14 @@ def hand_back(t, c):
 
 
 @compiled
+def turn(t, c, A, dA, ddA, E, dE, ddE):
+    """The angles are counted in another frame, where the target is at these now; the covariance stays."""
+    hand_back(t, c)
+    axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
+    axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
+
+
+@compiled
 def begin_cartesian(t, c, range_, R_range):
     """The Cartesian filter starts where the filters of the axes are, at a first range [m]."""
     A, dA, ddA, E, dE, ddE = outlook(t, c, t.stamp)
@@ -102,8 +110,9 @@ def use_cartesian(t, c):
 
 @compiled
 def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_rate, elevation_rate, R_azimuth_rate,
-            R_elevation_rate, range_, R_range):
-    """Take one measured direction, its rates and the range (NaN: none), with their variances; p the TrackerParameters.
+            R_elevation_rate, range_, R_range, restart_gap):
+    """Take one measured direction, its rates and the range (NaN: none), with their variances; p the TrackerParameters;
+    the filter restarts after restart_gap [s] without one.
 
     (what became of it, nu azimuth, nu elevation, nu of their rates, nu' S^-1 nu azimuth, elevation); NaN unless
     there was a prediction to compare with.
@@ -118,7 +127,7 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
     range_ = range_ if range_ > 0.0 and R_range > 0.0 else none
     nu_a = nu_e = nu_da = nu_de = nis_a = nis_e = none
     outcome = STARTED
-    if t.running and T <= p.restart_gap:
+    if t.running and T <= restart_gap:
         axis_filter.predict(a, c.azimuth, T)
         axis_filter.predict(e, c.elevation, T)
         near = axis_filter.expected(a)[0]

@@ -14,7 +14,7 @@ from pedestal_common.records import NEVER
 JOINTS, ERROR, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 COMMAND, ESTIMATE, REFERENCE, MODE = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode'
-FILTER, PROGRAM, DRIVE = 'acu/filter', 'acu/program_track', 'adu/state'
+FILTER, PROGRAM, DRIVE, INS = 'acu/filter', 'acu/program_track', 'adu/state', 'ins/state'
 HEARD = records.of(JOINTS, ERROR, RATE, RANGE, ATTITUDE)
 SAID = records.of(COMMAND, ESTIMATE, REFERENCE, FILTER, more=(MODE,))
 
@@ -47,7 +47,8 @@ class Acu:
                           **({RATE: params.receiver_latency} if params.receiver_rate else {}),
                           **({RANGE: params.receiver_latency} if params.receiver_range else {}),
                           **({ATTITUDE: params.attitude_latency} if on_ship else {})}
-        self.events = {PROGRAM: self.take_program, DRIVE: self.take_drive_state}
+        self.events = {PROGRAM: self.take_program, DRIVE: self.take_drive_state,
+                       **({INS: self.take_ins_state} if on_ship else {})}
         self.configure(params)
 
     def configure(self, params):
@@ -66,6 +67,10 @@ class Acu:
     def take_drive_state(self, message):
         """A drive that never says how it is counts as ready."""
         self.inputs[0]['drive_ready'] = message.data == 'enabled'
+
+    def take_ins_state(self, message):
+        """An INS that never says how it is counts as aligned."""
+        self.inputs[0]['aligning'] = message.data == 'aligning'
 
     def prepare(self):
         """Compile `answers` and `request`."""

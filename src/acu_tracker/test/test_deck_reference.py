@@ -78,3 +78,40 @@ def test_a_deck_rate_comes_back_to_earth(t):
     here = 0.5 * (before + after)
     got = deck_reference.earth_rates(attitude(t).as_matrix(), *body_rate(t), *here, *(after - before) / (2.0 * h))
     assert got == pytest.approx((0.03 + 0.004 * t, 0.02 - 0.002 * t), abs=1e-7)
+
+
+@pytest.mark.parametrize('t', [0.0, 4.4])
+def test_the_end_of_a_lever_arm_sees_the_target_from_there(t):
+    """Place and motion of a direction less r / range, against differences."""
+    arm = np.array([0.02, -0.05, 0.3])
+
+    def seen(t):
+        A, E = earth(t)
+        u = attitude(t).inv().apply([math.cos(E) * math.sin(A), math.cos(E) * math.cos(A), math.sin(E)])
+        return u, (u - arm) / np.linalg.norm(u - arm)
+    h = 1e-3
+    (u0, n0), (u1, n1), (u2, n2) = (seen(t + d) for d in (-h, 0.0, h))
+    got = np.array(deck_reference.from_lever_arm(*arm, *u1, *(u2 - u0) / (2 * h), *(u2 - 2 * u1 + u0) / h**2))
+    np.testing.assert_allclose(got[:3], n1, atol=1e-14)
+    np.testing.assert_allclose(got[3:6], (n2 - n0) / (2 * h), atol=1e-7)
+    np.testing.assert_allclose(got[6:], (n2 - 2 * n1 + n0) / h**2, atol=1e-6)
+
+
+def test_the_best_elevation_is_closest_to_the_target():
+    """Its angle against a search, its rates against differences, over the top as well."""
+    def beam(t):
+        return 2.5 * math.sin(0.4 * t + 0.1)
+    h = 1e-3
+    for t in np.arange(0.0, 12.0, 0.83):
+        A, E = earth(t)
+        rates = (0.03 + 0.004 * t, 0.004), (0.02 - 0.002 * t, -0.002)
+        e, n, u, de, dn, du, dde, ddn, ddu = deck_reference.moving_direction(A, *rates[0], E, *rates[1])
+        got = deck_reference.best_elevation(beam(t), math.cos(0.4 * t + 0.1), -0.4 * math.sin(0.4 * t + 0.1), n, -e, u,
+                                            dn, -de, du, ddn, -dde, ddu)
+        grid = np.linspace(0.0, math.pi, 20001)
+        along = math.cos(E) * math.cos(A - beam(t)) * np.cos(grid) + math.sin(E) * np.sin(grid)
+        assert got[0] == pytest.approx(grid[np.argmax(along)], abs=2e-4)
+        before, here, after = (math.atan2(math.tan(earth(at)[1]), math.cos(earth(at)[0] - beam(at)))
+                               for at in (t - h, t, t + h))
+        assert got[1] == pytest.approx((after - before) / (2 * h), abs=1e-5)
+        assert got[2] == pytest.approx((after - 2 * here + before) / h**2, abs=1e-3)

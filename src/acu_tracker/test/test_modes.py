@@ -9,6 +9,7 @@ from acu_tracker.modes import (
     BEFORE_PROGRAM,
     DRIVE_NOT_READY,
     ENCODER_INVALID,
+    INS_ALIGNING,
     LOCKED,
     NO_PROGRAM,
     NO_REQUEST,
@@ -25,7 +26,7 @@ from acu_tracker.modes import (
     UNKNOWN_MODE,
 )
 
-GOOD = dict(encoder_ok=True, drive_ready=True, attitude_ok=True, program=NONE, stow=NONE, preset=NONE, locked=True,
+GOOD = dict(encoder_ok=True, drive_ready=True, attitude=NONE, program=NONE, stow=NONE, preset=NONE, locked=True,
             lost=False, handover=False)
 ARGUMENTS = tuple(GOOD)
 
@@ -48,8 +49,10 @@ def test_every_mode_is_reached_from_every_mode(mode, request_):
     (PROGRAM, dict(program=BEFORE_PROGRAM), BEFORE_PROGRAM),
     (PROGRAM, dict(program=AFTER_PROGRAM), AFTER_PROGRAM),
     (PROGRAM, dict(program=OUTSIDE_LIMITS), OUTSIDE_LIMITS),
-    (PROGRAM, dict(attitude_ok=False), ATTITUDE_INVALID),
-    (AUTOTRACK, dict(attitude_ok=False), ATTITUDE_INVALID),
+    (PROGRAM, dict(attitude=ATTITUDE_INVALID), ATTITUDE_INVALID),
+    (AUTOTRACK, dict(attitude=ATTITUDE_INVALID), ATTITUDE_INVALID),
+    (PROGRAM, dict(attitude=INS_ALIGNING), INS_ALIGNING),
+    (AUTOTRACK, dict(attitude=INS_ALIGNING), INS_ALIGNING),
     (AUTOTRACK, dict(locked=False), NOT_LOCKED),
     (STOW, dict(encoder_ok=False), ENCODER_INVALID),
     (STOW, dict(drive_ready=False), DRIVE_NOT_READY),
@@ -66,7 +69,7 @@ def test_refusals_name_the_reason_and_change_nothing(request_, changes, reason):
 
 
 def test_standby_is_never_refused():
-    everything = dict(encoder_ok=False, drive_ready=False, attitude_ok=False)
+    everything = dict(encoder_ok=False, drive_ready=False, attitude=ATTITUDE_INVALID)
     assert next_mode(AUTOTRACK, STANDBY, **everything) == (STANDBY, REQUESTED, ACCEPTED)
 
 
@@ -77,13 +80,15 @@ def test_standby_is_never_refused():
     (PROGRAM, dict(program=AFTER_PROGRAM), (STANDBY, AFTER_PROGRAM)),
     (PROGRAM, dict(program=NO_PROGRAM), (STANDBY, NO_PROGRAM)),
     (PROGRAM, dict(program=OUTSIDE_LIMITS), (PROGRAM, NONE)),
-    (PROGRAM, dict(attitude_ok=False), (STANDBY, ATTITUDE_INVALID)),
+    (PROGRAM, dict(attitude=ATTITUDE_INVALID), (STANDBY, ATTITUDE_INVALID)),
     (AUTOTRACK, dict(lost=True), (PROGRAM, SIGNAL_LOST)),
     (AUTOTRACK, dict(lost=True, program=AFTER_PROGRAM), (STANDBY, SIGNAL_LOST)),
     (AUTOTRACK, dict(locked=False), (AUTOTRACK, NONE)),
-    (AUTOTRACK, dict(attitude_ok=False), (STANDBY, ATTITUDE_INVALID)),
-    (PRESET, dict(attitude_ok=False), (PRESET, NONE)),
-    (STOW, dict(attitude_ok=False, lost=True), (STOW, NONE)),
+    (PROGRAM, dict(attitude=INS_ALIGNING), (STANDBY, INS_ALIGNING)),
+    (STOW, dict(attitude=INS_ALIGNING), (STOW, NONE)),
+    (AUTOTRACK, dict(attitude=ATTITUDE_INVALID), (STANDBY, ATTITUDE_INVALID)),
+    (PRESET, dict(attitude=ATTITUDE_INVALID), (PRESET, NONE)),
+    (STOW, dict(attitude=ATTITUDE_INVALID, lost=True), (STOW, NONE)),
     (STANDBY, dict(encoder_ok=False, handover=True), (STANDBY, NONE)),
     (STANDBY, dict(drive_ready=False, handover=True), (STANDBY, NONE)),
 ] + [(mode, dict(encoder_ok=False), (STANDBY, ENCODER_INVALID)) for mode in (STOW, PRESET, PROGRAM, AUTOTRACK)]

@@ -33,7 +33,8 @@ class Target:
     def observe(self, stamp, azimuth, elevation=0.0, azimuth_rate=NONE, elevation_rate=NONE):
         """(outcome, nu azimuth, elevation, of their rates, nu' S^-1 nu of azimuth, elevation)."""
         return tracker.observe(self.state[0], self.p, self.c, stamp, azimuth, elevation, SIGMA**2, SIGMA**2,
-                               azimuth_rate, elevation_rate, RATE_SIGMA**2, RATE_SIGMA**2, NONE, NONE)
+                               azimuth_rate, elevation_rate, RATE_SIGMA**2, RATE_SIGMA**2, NONE, NONE,
+                               self.p['restart_gap'])
 
     def outlook(self, stamp):
         return np.array(tracker.outlook(self.state[0], self.c, stamp))

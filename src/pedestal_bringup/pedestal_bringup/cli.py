@@ -214,7 +214,7 @@ def _check_json(path):
 
 
 def _run(options):
-    from pedestal_bringup import consistency, graph, results, scenario
+    from pedestal_bringup import consistency, graph, isolation, known_attitude, results, scenario
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
@@ -232,7 +232,9 @@ def _run(options):
     for prefix in chosen.prefixes:
         beam = recording.view(prefix[:-1])
         tracked = results.tracking(beam)
-        of_beams.append({**results.summary(tracked), **consistency.summary(consistency.read(beam, tracked))})
+        of_beams.append({**results.summary(tracked), **consistency.summary(consistency.read(beam, tracked)),
+                         **results.announced_losses(beam), **isolation.summary(isolation.read(beam, tracked)),
+                         **known_attitude.summary(known_attitude.read(beam))})
     whole = {'lost_steps': (float(outcome.drive['lost_steps']), ''),
              'realtime_factor': (outcome.drive['realtime_factor'], ''),
              'messages': (float(outcome.recorder['messages']), '')}

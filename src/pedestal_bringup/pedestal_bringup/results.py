@@ -44,7 +44,8 @@ class Tracking:
     cross_elevation, elevation_error (n,) true error;
     measured (n, 2) receiver errors and cn0 (n,) at their stamp; filtered (n, 2) the estimate seen from the
     beam, as cross-elevation and elevation; beam_earth (n, 2); target_earth (n, 2) and range (n,) m; mode (n,) text;
-    tracking (n,) bool: in autotrack and settled.
+    tracking (n,) bool: in autotrack and settled, since (n,) bool: that or later; beamwidth rad, NaN when the bag does
+    not say.
     """
     t: np.ndarray
     azimuth: np.ndarray
@@ -60,6 +61,16 @@ class Tracking:
     range: np.ndarray
     mode: np.ndarray
     tracking: np.ndarray
+    since: np.ndarray
+    beamwidth: float
+
+
+def beamwidth(bag):
+    """The beamwidth [rad] a bag was recorded with, NaN when it does not say."""
+    try:
+        return float(bag.metadata.get('beamwidth', 'nan'))
+    except ValueError:
+        return math.nan
 
 
 def on_grid(bag, t, topic, columns):
@@ -71,6 +82,18 @@ def on_grid(bag, t, topic, columns):
         for i, column in enumerate(columns):
             out[here, i] = table[column][there]
     return out
+
+
+def lever_arm(bag, attitude):
+    """(n, 3) ENU [m] from base_link to the antenna, at attitudes (n, 4) of the deck; 0 in a bag that says none."""
+    told = bag.configuration['parameters'].get('tracking_receiver', {})
+    arm = np.array([told.get(f'lever_arm.{axis}', 0.0) for axis in 'xyz'])
+    found, mat_ed = np.zeros((len(attitude), 3)), np.empty((3, 3))
+    if arm.any():
+        for row, quaternion in zip(found, attitude):
+            line_of_sight.rotation(*quaternion, mat_ed)
+            row[:] = mat_ed @ arm
+    return found
 
 
 def tracking(bag) -> Tracking:
@@ -88,6 +111,7 @@ def tracking(bag) -> Tracking:
     if 'ship/truth' in bag.topics:
         ship = at_steps('ship/truth', ('position.x', 'position.y', 'position.z'))
         attitude, known_attitude = at_steps('ship/truth', quaternion), at_steps('ship/imu/data', quaternion)
+        ship = ship + lever_arm(bag, attitude)
     else:
         ship = np.zeros((t.size, 3))
         attitude = known_attitude = np.tile(line_of_sight.ASHORE, (t.size, 1))
@@ -105,7 +129,7 @@ def tracking(bag) -> Tracking:
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t, beam[:, 0], beam[:, 1], reference, error[:, 0], error[:, 1], measured[:, :2], measured[:, 2],
                     filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
-                    automatic & (t >= start))
+                    automatic & (t >= start), t >= start, beamwidth(bag))
 
 
 def modes(bag, t):
@@ -129,7 +153,9 @@ def summary(run: Tracking) -> dict:
     *_following_*_deg: reference less encoder over every step outside standby, tracking or not;
     pointing_*_deg: both axes together, per axis and sample (not the angle off the beam);
     single_sample_noise_deg: rms of the receiver's error minus the true one, per axis and sample;
-    noise_reduction: that divided by the rms error of the filtered line of sight against truth.
+    noise_reduction: that divided by the rms error of the filtered line of sight against truth;
+    loss_s: how long the target was further than half a beamwidth off the beam, in whatever mode, from when on the run
+    counts as tracking.
     """
     on = run.tracking
     degrees = math.degrees(1.0)
@@ -158,9 +184,29 @@ def summary(run: Tracking) -> dict:
         'lock_time_s': (float(run.t[locked][0]) if locked.any() else math.nan, 's'),
         'autotrack_time_s': (float(np.sum(run.mode == 'autotrack') * np.median(np.diff(run.t))), 's'),
         'tracked_percent': (100.0 * float(np.mean(run.mode == 'autotrack')), '%'),
+        'loss_s': (_loss(run), 's'),
         'evaluated_time_s': (float(np.sum(on) * np.median(np.diff(run.t))), 's'),
     }
     return values
+
+
+def _loss(run):
+    if not (run.since.any() and math.isfinite(run.beamwidth)):
+        return math.nan
+    off = np.hypot(run.cross_elevation, run.elevation_error)[run.since]
+    return float(np.sum(off > 0.5 * run.beamwidth) * np.median(np.diff(run.t)))
+
+
+def announced_losses(bag) -> dict:
+    """{'keyhole_loss_predicted_s': (value, unit)}: what the ACU said beforehand in its diagnostics that it would lose
+    in keyholes, each counted once; nothing where it said nothing of the kind."""
+    found = {}
+    for _, _, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
+        for status in array.status:
+            said = {value.key: value.value for value in status.values}
+            if 'keyhole_loss_s' in said:
+                found[said['keyhole_begins_s']] = float(said['keyhole_loss_s'])
+    return {'keyhole_loss_predicted_s': (sum(found.values()), 's')} if found else {}
 
 
 def _max(values):
@@ -168,7 +214,8 @@ def _max(values):
     return float(np.max(np.abs(values))) if values.size else math.nan
 
 
-TARGETS = {'pointing_to_noise': '<= 0.4', 'lost_steps': '0', 'realtime_factor': '>= 4 in lockstep'}
+TARGETS = {'pointing_to_noise': '<= 0.4', 'lost_steps': '0', 'realtime_factor': '>= 4 in lockstep',
+           'isolation_db': '>= 60'}
 
 
 def rows(case, values):

@@ -95,6 +95,8 @@ KNOWN = (
     ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
     ('ins', 'latency', 'acu', 'attitude_latency'),
     ('ship_motion', 'imu.output', 'ins', 'imu_output'),
+    *(('tracking_receiver', f'lever_arm.{axis}', 'acu', f'lever_arm.{axis}') for axis in 'xyz'),
+    ('tracking_receiver', 'blockage', 'acu', 'blockage'),
 )
 """(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
 

@@ -20,7 +20,8 @@ class Overlay:
     """A recording whose outputs of one node are replaced: topics, beams and table(topic) as of a bag.Bag."""
 
     def __init__(self, bag, outputs):
-        self.path, self.beams, self._bag, self._outputs = bag.path, bag.beams, bag, outputs
+        self.path, self.beams, self.metadata = bag.path, bag.beams, bag.metadata
+        self._bag, self._outputs = bag, outputs
         self.topics = {**bag.topics, **dict.fromkeys(outputs, '')}
 
     def table(self, topic):

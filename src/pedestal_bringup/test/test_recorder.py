@@ -136,7 +136,8 @@ def rows():
     return [(name, stamp, data + bytes(-len(data) % 4)) for name, stamp, data in made]
 
 
-ANSWERS = {'acu/mode': 'acu/rate_command', 'adu/state': 'clock'}
+ANSWERS = {'acu/mode': 'acu/rate_command', 'acu/keyhole': 'acu/rate_command', 'acu/blockage': 'acu/rate_command',
+           'adu/state': 'clock'}
 
 
 def shuffled(rows, seed):

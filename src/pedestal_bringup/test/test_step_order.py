@@ -10,7 +10,8 @@ T = 5_000_000
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
 RECORDED = topics.read_by('recorder', NODES)
 NAMES = [topic.name for topic in RECORDED]
-ANSWERS = {'acu/mode': 'acu/rate_command', 'adu/state': 'clock'}
+ANSWERS = {'acu/mode': 'acu/rate_command', 'acu/keyhole': 'acu/rate_command', 'acu/blockage': 'acu/rate_command',
+           'adu/state': 'clock'}
 """The first step topic of whoever writes a `change` topic."""
 SPEAKERS = [node for node in topics.NODES if node in topics.BY_NAME['diagnostics'].writers and node in NODES]
 

@@ -8,13 +8,15 @@ class TableError(ValueError):
     """A file is no such table; one line naming file, line, column, value and allowed range."""
 
 
-def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step') -> np.ndarray:
-    """The rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}.
+def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step', optional=None) -> np.ndarray:
+    """The rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}, then of the optional
+    ones, which are 0 where the file has none.
 
     The first column grows from row to row, by at most max_step (called step_name in the error). Columns of other
     names are passed over. Units are the last part of a name, as in time_s. Raises TableError.
     """
     first, *_ = columns
+    optional = optional or {}
     unit = first.rpartition('_')[2]
     rows = []
     try:
@@ -23,9 +25,10 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
             missing = [name for name in columns if name not in (reader.fieldnames or ())]
             if missing:
                 raise TableError(f'{path}: line 1: column {missing[0]!r} is missing')
+            there = {**columns, **{name: limits for name, limits in optional.items() if name in reader.fieldnames}}
             for row in reader:
-                rows.append([_cell(path, reader.line_num, name, row[name], *limits)
-                             for name, limits in columns.items()])
+                rows.append([_cell(path, reader.line_num, name, row[name], *there[name]) if name in there else 0.0
+                             for name in (*columns, *optional)])
                 step = rows[-1][0] - rows[-2][0] if len(rows) > 1 else max_step
                 if not 0.0 < step <= max_step:
                     limit = f' and at most {step_name} = {max_step:g} {unit}' if np.isfinite(max_step) else ''

@@ -1,5 +1,6 @@
 """How a ship moves on a seaway, what an IMU on it feels and what its INS reports.
 
+recording       a recorded motion as piecewise polynomials, where motion.step is not to make waves
 motion.step     time -> the ship's truth (stateless: the same seed and time give the same bits in any order)
 imu.step        truth -> specific force and angular rate as REP 145 wants them
 strapdown.step  increments of angle and velocity -> attitude and velocity in a computed frame

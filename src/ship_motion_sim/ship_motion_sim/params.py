@@ -42,9 +42,17 @@ class PlainParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class RecordedParameters(Parameters):
+    """A recorded motion; columns and signs in recording.py."""
+    path: str = text('', 'CSV with columns time_s, roll_deg, pitch_deg, heading_deg (surge_m, sway_m, heave_m)')
+    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first row')
+    max_gap: float = parameter(2.0, 0.001, 60.0, 's', 'largest time between two rows')
+
+
+@dataclasses.dataclass(frozen=True)
 class ShipParameters(Parameters):
     """Sea, course and hull: everything the ship's truth depends on."""
-    motion: str = choice('waves', ('waves', 'plain'), 'waves from a spectrum, or plain sines')
+    motion: str = choice('waves', ('waves', 'plain', 'recorded'), 'waves from a spectrum, plain sines, or a CSV')
     sea_state: int = parameter(5, 0, 6, '-', '3 to 6 take height and period from the table; 0: as given below')
     significant_height: float = parameter(0.0, 0.0, 20.0, 'm', 'Hs, with sea_state 0 only')
     peak_period: float = parameter(0.0, 0.0, 25.0, 's', 'Tp, with sea_state 0 only')
@@ -54,14 +62,22 @@ class ShipParameters(Parameters):
     wave_angle_deg: float = parameter(45.0, 0.0, 360.0, 'deg',
                                       'where the waves travel to, clockwise from the bow: 0 following, 180 head')
     spread_deg: float = parameter(15.0, 0.0, 60.0, 'deg', 'standard deviation of the direction of single waves')
-    heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'mean heading, clockwise from north')
+    heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'mean heading, clockwise from north; recorded: 0, it is '
+                                   "the record's")
     speed: float = parameter(7.0, 0.0, 25.0, 'm/s', 'along the mean heading')
     latitude_deg: float = parameter(47.0, -89.0, 89.0, 'deg', 'geodetic latitude: gravity and earth rate')
     seed: int = parameter(1, 0, SEED_MAX, '-', 'seed of the seaway')
     hull: HullParameters = group(HullParameters)
     plain: PlainParameters = group(PlainParameters)
+    recorded: RecordedParameters = group(RecordedParameters)
 
     def check(self):
+        if (self.motion == 'recorded') != bool(self.recorded.path):
+            raise ParameterError(f"recorded.path = '{self.recorded.path}': must name a CSV file with motion = "
+                                 'recorded, and be empty otherwise')
+        if self.motion == 'recorded' and self.heading_deg != 0.0:
+            raise ParameterError(f'heading_deg = {self.heading_deg:g} deg: must be 0 with motion = recorded, whose '
+                                 'heading is in the file')
         if (self.spectrum == 'file') != bool(self.spectrum_file):
             raise ParameterError(f"spectrum_file = '{self.spectrum_file}': must name a CSV file with spectrum = file, "
                                  'and be empty otherwise')

@@ -58,6 +58,8 @@ class ShipMotionNode(shell.Shell):
                 return shell.ERROR, names[status], values
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
+        if self.unit.over():
+            return shell.WARN, 'the recorded motion is over, the ship lies still', values
         if self.unsent:
             return shell.WARN, self.unsent, values
         return shell.OK, 'under way', values

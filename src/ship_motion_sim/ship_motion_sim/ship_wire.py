@@ -39,6 +39,11 @@ class ShipMotion:
         answers(self.last.copy(), self.ship, self.inputs, self.truth, self.imu_state.copy(), self.imu, self.imu_inputs,
                 self.felt, np.zeros((1, imu.NORMALS)), self.heard, self.said.copy())
 
+    def over(self):
+        """Whether the last tick lies past the end of a recorded motion."""
+        ship = self.ship[0]
+        return ship['pieces'] > 0 and self.last[0] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
+
     def answer(self):
         """Answer `heard` with `said`."""
         self.answers(self.heard, self.said)

@@ -417,3 +417,39 @@ def test_latency_that_does_not_fit_the_ring_is_refused():
 def test_bad_parameters_are_refused(values, message):
     with pytest.raises(ParameterError, match=message):
         build(TrackingReceiverParameters, values)
+
+
+def test_the_antenna_stands_at_the_end_of_its_arm():
+    """Error, range and rate of a moving deck against scipy's rotation and differences of the true error."""
+    arm = np.array([12.0, -4.0, 25.0])
+    bench = Bench(QUIET | MEASURED | {'target.angle.range': 800.0, 'receiver.samples_per_step': 1,
+                                      **{f'lever_arm.{axis}': value for axis, value in zip('xyz', arm)}})
+    velocity, h = np.array([3.0, -2.0, 0.5]), 1e-4
+    place = 800.0 * np.array([math.cos(0.6) * math.sin(0.3), math.cos(0.6) * math.cos(0.3), math.sin(0.6)])
+
+    def deck(t):
+        return Rotation.from_euler('ZYX', [1.4 + 0.02 * t, 0.05 * math.sin(t), 0.1 * math.cos(0.8 * t)])
+
+    def seen(t):
+        return deck(t).inv().apply(place - velocity * t) - arm
+    x, y, z = seen(2.0)
+    beam = math.atan2(-y, x), math.atan2(z, math.hypot(x, y)) - 0.002
+    bench.point(*beam)
+    bench.inputs['mat_ed'], bench.inputs['position'] = deck(2.0).as_matrix(), velocity * 2.0
+    bench.inputs['twist_angular'] = (deck(2.0 - h).inv() * deck(2.0 + h)).as_rotvec() / (2 * h)
+    bench.inputs['twist_linear'] = deck(2.0).inv().apply(velocity)
+    out = bench.run(100)[-1]
+    np.testing.assert_allclose([out['true_cross_elevation'], out['true_elevation']], [0.0, 0.002], atol=1e-9)
+    assert out['range'] == pytest.approx(np.linalg.norm([x, y, z]), abs=1e-3)
+    before, after = (np.array(receiver.offsets(*beam, *seen(2.0 + d))) for d in (-h, h))
+    np.testing.assert_allclose(out['rate'], (after - before) / (2 * h), atol=1e-6)
+
+
+def test_no_signal_through_the_superstructure():
+    bench = Bench(QUIET | {'blockage': '0.2 0.4 0.7'})
+    out = bench.run(200)[-1]
+    assert out['status'] == receiver.HIDDEN and not out['locked']
+    assert out['true_cross_elevation'] == pytest.approx(0.0, abs=1e-12)
+    bench.inputs['mat_ed'] = Rotation.from_euler('Z', math.pi / 2 - 0.2).as_matrix()
+    bench.point(0.1, 0.6)
+    assert bench.run(200)[-1]['status'] == receiver.LOCKED

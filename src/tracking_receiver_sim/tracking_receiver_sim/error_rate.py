@@ -8,9 +8,9 @@ def error_rate(mat_ed, position, twist_linear, twist_angular, azimuth, elevation
                e, n, u, v_e, v_n, v_u):
     """(d dX/dt, d dE/dt) [rad/s] of a target at ENU [m], moving with v [m/s], off a beam at deck angles.
 
-    mat_ed (3, 3) deck -> earth; position (3,) ENU of the antenna [m]; twist_linear, twist_angular (3,) velocity
-    [m/s] and rate [rad/s] of the deck, FLU. Exact: the target's place in the deck frame is r = M' (p - position), and
-    r' = M' v - v_deck - w x r.
+    mat_ed (3, 3) deck -> earth; position (3,) ENU of the antenna [m]; twist_linear, twist_angular (3,) its velocity
+    [m/s] and the rate [rad/s] of the deck, FLU. Exact: the target's place in the deck frame is
+    r = M' (p - position), and r' = M' v - v_deck - w x r.
     """
     x, y, z = to_deck(mat_ed, e - position[0], n - position[1], u - position[2])
     vx, vy, vz = to_deck(mat_ed, v_e, v_n, v_u)

@@ -2,6 +2,8 @@
 import dataclasses
 import math
 
+from pedestal_common.blockage import DOC as SECTORS_DOC
+from pedestal_common.blockage import sectors
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 from tracking_receiver_sim.smoothing import SMOOTHINGS, WINDOW
 
@@ -136,12 +138,25 @@ class ReceiverParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class LeverArm(Parameters):
+    """Where the antenna stands on the deck, FLU from base_link, which is the INS."""
+    x: float = parameter(0.0, -500.0, 500.0, 'm', 'forward')
+    y: float = parameter(0.0, -500.0, 500.0, 'm', 'to port')
+    z: float = parameter(0.0, -500.0, 500.0, 'm', 'up')
+
+
+@dataclasses.dataclass(frozen=True)
 class TrackingReceiverParameters(Parameters):
     """Parameters of tracking_receiver_node."""
+    lever_arm: LeverArm = group(LeverArm)
+    blockage: str = text('', SECTORS_DOC)
     target: TargetParameters = group(TargetParameters)
     antenna: AntennaParameters = group(AntennaParameters)
     receiver: ReceiverParameters = group(ReceiverParameters)
     seed: int = parameter(1, 0, 2**31 - 1, '1', 'of the receiver noise')
+
+    def check(self):
+        sectors(self.blockage)
 
 
 @dataclasses.dataclass(frozen=True)

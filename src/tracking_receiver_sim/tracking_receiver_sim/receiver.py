@@ -15,8 +15,9 @@ import math
 
 import numpy as np
 
+from pedestal_common import blockage
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import earth_angles, offsets, to_deck
+from pedestal_common.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
 from tracking_receiver_sim import smoothing, target
 from tracking_receiver_sim.error_rate import error_rate
@@ -25,8 +26,8 @@ from tracking_receiver_sim.params import BEAMS, HELD
 from tracking_receiver_sim.smoothing import SMOOTHINGS
 
 STATUSES = ('locked', 'no lock', 'target below the horizon', 'target outside its track', 'joint states not valid',
-            'stamp not after the one before')
-LOCKED, NO_LOCK, BELOW_HORIZON, NO_TARGET, NO_JOINTS, STAMP_ORDER = range(6)
+            'stamp not after the one before', 'target hidden by the superstructure')
+LOCKED, NO_LOCK, BELOW_HORIZON, NO_TARGET, NO_JOINTS, STAMP_ORDER, HIDDEN = range(7)
 
 NORMALS_PER_SAMPLE = 6
 """Real and imaginary noise of the sum and of the two difference channels."""
@@ -43,9 +44,11 @@ STATE = np.dtype([
     ('written', 'i8'), ('released', 'i8'),
     ('ring_stamp_ns', 'i8', RING), ('ring_locked', 'i8', RING),
     ('ring_cross_elevation', 'f8', RING), ('ring_elevation', 'f8', RING), ('ring_cn0_dbhz', 'f8', RING),
-    ('ring_rate', 'f8', (RING, 2)), ('ring_range', 'f8', RING)], align=True)
+    ('ring_rate', 'f8', (RING, 2)), ('ring_range', 'f8', RING),
+    ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3)], align=True)
 """error_known: cross_elevation, elevation hold the true error at stamp_ns, direction the target in FLU [m];
-timer_ns: time past a lock level; written, released: results put into the ring and taken from it since the start."""
+timer_ns: time past a lock level; written, released: results put into the ring and taken from it since the start;
+antenna: its ENU position against the station [m], antenna_velocity: FLU [m/s]."""
 
 CONSTANTS = np.dtype([
     ('target', target.TARGET),
@@ -57,7 +60,7 @@ CONSTANTS = np.dtype([
     ('acquire_power', 'f8'), ('lose_power', 'f8'), ('acquire_ns', 'i8'), ('lose_ns', 'i8'),
     ('latency_ns', 'i8'),
     ('rate_measured', 'i8'), ('rate_sigma', 'f8'), ('range_measured', 'i8'), ('range_sigma', 'f8'),
-    ('range_variance', 'f8')], align=True)
+    ('range_variance', 'f8'), ('lever_arm', 'f8', 3), ('sectors', 'f8', (blockage.MOST, 3))], align=True)
 """slope: true k_m; angle_scale: theta3 over the k_m the receiver assumes;
 powers: carrier power in one sample over noise power in one sample; range_variance: in single precision."""
 
@@ -65,8 +68,8 @@ INPUTS = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('ele
                    ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3), ('azimuth_rate', 'f8'), ('elevation_rate', 'f8'),
                    ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
 """Step's stamp [ns]; joint states there and fresh (0 or 1); beam on the deck [rad]; true attitude deck -> earth;
-ENU position of the antenna against the station [m]; rates of the beam on the deck [rad/s]; velocity [m/s] and rate
-[rad/s] of the deck, FLU."""
+ENU position of base_link against the station [m]; rates of the beam on the deck [rad/s]; velocity of base_link [m/s]
+and rate of the deck [rad/s], FLU."""
 
 OUTPUTS = np.dtype([
     ('due', 'i8'), ('stamp_ns', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
@@ -109,6 +112,8 @@ def constants(params, period, built) -> np.ndarray:
     c['rate_measured'], c['rate_sigma'] = receiver.rate.measured, receiver.rate.sigma
     c['range_measured'], c['range_sigma'] = receiver.ranging.measured, receiver.ranging.sigma
     c['range_variance'] = np.float32(receiver.ranging.sigma**2)
+    c['lever_arm'] = params.lever_arm.x, params.lever_arm.y, params.lever_arm.z
+    c['sectors'] = blockage.sectors(params.blockage)
     return c
 
 
@@ -159,10 +164,22 @@ def inputs_known(i):
 
 
 @compiled
-def carrier_amplitude(c, e, n, u):
-    """Sum voltage on axis from a target at an ENU vector [m] of the antenna; 0 below the horizon mask."""
+def place_antenna(s, c, i):
+    """Where the antenna stands and how it moves: p + M r, v + w x r with the lever arm r."""
+    x, y, z = c.lever_arm[0], c.lever_arm[1], c.lever_arm[2]
+    wx, wy, wz = i.twist_angular[0], i.twist_angular[1], i.twist_angular[2]
+    e, n, u = to_earth(i.mat_ed, x, y, z)
+    s.antenna[0], s.antenna[1], s.antenna[2] = i.position[0] + e, i.position[1] + n, i.position[2] + u
+    s.antenna_velocity[0] = i.twist_linear[0] + wy * z - wz * y
+    s.antenna_velocity[1] = i.twist_linear[1] + wz * x - wx * z
+    s.antenna_velocity[2] = i.twist_linear[2] + wx * y - wy * x
+
+
+@compiled
+def carrier_amplitude(c, e, n, u, hidden):
+    """Sum voltage on axis from a target at an ENU vector [m] of the antenna; 0 below the horizon mask and hidden."""
     _, elevation = earth_angles(e, n, u)
-    if not elevation >= c.horizon_mask:
+    if hidden or not elevation >= c.horizon_mask:
         return 0.0
     distance = max(math.sqrt(e * e + n * n + u * u), 1.0)
     return math.sqrt(c.power) * (c.reference_range / distance)**c.half_exponent
@@ -217,19 +234,19 @@ def lock(s, c, elapsed_ns):
 
 
 @compiled
-def rate_and_range(c, i, e, n, u, v_e, v_n, v_u, normals):
+def rate_and_range(s, c, i, e, n, u, v_e, v_n, v_u, normals):
     """(cross-elevation rate, elevation rate [rad/s], range [m]) of a target at ENU [m], moving with v [m/s], as
     measured; NaN for what is not."""
     rate_x, rate_e, distance = math.nan, math.nan, math.nan
     first = NORMALS_PER_SAMPLE * c.samples
     if c.rate_measured != 0:
-        rate_x, rate_e = error_rate(i.mat_ed, i.position, i.twist_linear, i.twist_angular, i.azimuth, i.elevation,
+        rate_x, rate_e = error_rate(i.mat_ed, s.antenna, s.antenna_velocity, i.twist_angular, i.azimuth, i.elevation,
                                     i.azimuth_rate, i.elevation_rate, e, n, u, v_e, v_n, v_u)
         rate_x += c.rate_sigma * normals[first]
         rate_e += c.rate_sigma * normals[first + 1]
         first += 2
     if c.range_measured != 0:
-        e, n, u = e - i.position[0], n - i.position[1], u - i.position[2]
+        e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
         distance = float(np.float32(math.sqrt(e * e + n * n + u * u) + c.range_sigma * normals[first]))
     return rate_x, rate_e, distance
 
@@ -287,22 +304,25 @@ def step(state, constants, inputs, outputs, breaks, coefficients, normals):
     rate_x, rate_e, distance = math.nan, math.nan, math.nan
     if known:
         dX, dE, amplitude = 0.0, 0.0, 0.0
+        hidden = False
         if valid:
-            rate_x, rate_e, distance = rate_and_range(c, i, e, n, u, v_e, v_n, v_u, normals)
-            e, n, u = e - i.position[0], n - i.position[1], u - i.position[2]
+            place_antenna(s, c, i)
+            rate_x, rate_e, distance = rate_and_range(s, c, i, e, n, u, v_e, v_n, v_u, normals)
+            e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
             x, y, z = to_deck(i.mat_ed, e, n, u)
             if c.held and s.error_known:
                 s.cross_elevation, s.elevation = offsets(i.azimuth, i.elevation, s.direction[0], s.direction[1],
                                                          s.direction[2])
             s.direction[0], s.direction[1], s.direction[2] = x, y, z
             dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
-            amplitude = carrier_amplitude(c, e, n, u)
+            hidden = blockage.blocked(c.sectors, *angles(x, y, z))
+            amplitude = carrier_amplitude(c, e, n, u, hidden)
             o.true_cross_elevation, o.true_elevation = dX, dE
         cross_elevation, elevation = measure(s, c, amplitude, dX, dE, normals)
         s.cross_elevation, s.elevation = dX, dE
         s.error_known = valid
         lock(s, c, elapsed_ns)
-        o.status = (NO_TARGET if valid == 0 else BELOW_HORIZON if amplitude == 0.0 else
+        o.status = (NO_TARGET if valid == 0 else HIDDEN if hidden else BELOW_HORIZON if amplitude == 0.0 else
                     LOCKED if s.locked != 0 else NO_LOCK)
     else:
         s.error_known, s.locked, s.timer_ns = 0, 0, 0

@@ -1,0 +1,47 @@
+"""What the operator is told of what lies ahead, and its numbers for the diagnostics. `h`: an `ahead.AHEAD` record."""
+import math
+
+from acu_tracker import ahead
+
+
+def keyhole(h, beamwidth):
+    """The text of acu/keyhole; beamwidth [rad]."""
+    if h['what'] == ahead.NO_TURN:
+        return 'keyhole ahead: no turn of the azimuth holds the pass, the axis will stop at the end of its travel'
+    plan = h['plan']
+    way = 'clockwise' if plan['peak'] > 0.0 else 'counter-clockwise'
+    if plan['other_cost'] == math.inf:
+        other = 'the other way round is closed by the limits'
+    else:
+        other = f'the other way round would lose {plan["other_cost"] - plan["cost"]:.1f} s more'
+    text = (f'keyhole at {plan["culmination"]:.1f} s, elevation {_deg(plan["highest"]):.1f} deg: azimuth leaves the '
+            f'target at {plan["t1"]:.1f} s, goes {abs(_deg(plan["azimuth2"] - plan["azimuth1"])):.0f} deg {way} and '
+            f'meets it at {plan["t2"]:.1f} s; expected loss {plan["loss"]:.1f} s, at most '
+            f'{_deg(plan["worst"]):.2f} deg off; {other}')
+    if h['motion'] > 0.25 * beamwidth:
+        text += f'; rough, as the deck moves by {_deg(h["motion"]):.2f} deg rms'
+    return text
+
+
+def hidden(h):
+    """The text of acu/blockage."""
+    begin, end = h['hidden']
+    return f'target hidden from {begin:.1f} s to {end:.1f} s'
+
+
+def numbers(h):
+    """[(key, value text)] of what is planned; nothing where nothing is."""
+    values = [('keyhole', ahead.WHATS[h['what']])]
+    if h['what'] == ahead.KEYHOLE:
+        plan = h['plan']
+        values += [('keyhole_begins_s', f'{plan["t1"]:.3f}'), ('keyhole_ends_s', f'{plan["t2"]:.3f}'),
+                   ('keyhole_loss_s', f'{plan["loss"]:.3f}'), ('keyhole_worst_deg', f'{_deg(plan["worst"]):.3f}'),
+                   ('keyhole_needed_deg_s', f'{_deg(plan["needed"]):.3g}'),
+                   ('deck_motion_deg', f'{_deg(h["motion"]):.3f}')]
+    if h['hidden'][0] == h['hidden'][0]:
+        values += [('hidden_from_s', f'{h["hidden"][0]:.1f}'), ('hidden_to_s', f'{h["hidden"][1]:.1f}')]
+    return values
+
+
+def _deg(angle):
+    return math.degrees(angle)

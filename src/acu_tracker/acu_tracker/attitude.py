@@ -1,0 +1,72 @@
+"""The attitude of the deck: what the INS said, and what it is at any instant near it. `s` is the unit's STATE."""
+import math
+
+from acu_tracker import ahead, deck_reference
+from acu_tracker.history import bracket, push
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import ASHORE, rotation
+
+
+@compiled
+def take_attitude(s, p, u):
+    """Remember a new attitude with its rate and low-passed angular acceleration; False where it is unusable."""
+    q, w = u.quaternion, u.deck_rate
+    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    if not (u.attitude_valid and abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
+        return False
+    h = s.attitude
+    last = h.newest
+    T = u.attitude_stamp - h.stamp[last] if h.count > 0 else math.inf
+    if not (T > 0.0 and u.attitude_stamp <= u.stamp):
+        return T == 0.0
+    row = push(h, u.attitude_stamp)
+    # One sign of the quaternion, so that neighbours can be averaged.
+    dot = 0.0
+    for i in range(4):
+        dot += q[i] * h.sample[last, i]
+    for i in range(4):
+        h.sample[row, i] = q[i] / norm if dot >= 0.0 else -q[i] / norm
+    for i in range(3):
+        h.sample[row, 4 + i] = w[i]
+        h.sample[row, 7 + i] = 0.0
+        if T <= p.attitude_timeout:
+            h.sample[row, 7 + i] = deck_reference.smoothed_acceleration(
+                h.sample[last, 7 + i], w[i], h.sample[last, 4 + i], T, p.attitude_smoothing)
+    ahead.take_attitude(s.ahead, u.attitude_stamp, h.sample[row, :4], p.keyhole.mean_time)
+    return True
+
+
+@compiled
+def attitude_at(s, p, t):
+    """Set s.mat_ed, s.w, s.dw to the attitude at t: between two samples, or predicted from the last one; ashore it is
+    always the same."""
+    if not s.stabilised:
+        rotation(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3], s.mat_ed)
+        s.w[:] = 0.0
+        s.dw[:] = 0.0
+        return True
+    h = s.attitude
+    last = h.sample[h.newest]
+    T = t - h.stamp[h.newest]
+    if h.count == 0 or T > p.attitude_timeout:
+        return False
+    if T >= 0.0:
+        for i in range(3):
+            s.dw[i] = last[7 + i]
+            s.w[i] = last[4 + i] + T * last[7 + i]
+        x, y, z, w = deck_reference.turned(
+            last[0], last[1], last[2], last[3], deck_reference.turn(last[4], last[7], T),
+            deck_reference.turn(last[5], last[8], T), deck_reference.turn(last[6], last[9], T))
+    else:
+        i, j, f = bracket(h, t)
+        if i < 0:
+            return False
+        a, b = h.sample[i], h.sample[j]
+        for k in range(3):
+            s.w[k] = a[4 + k] + f * (b[4 + k] - a[4 + k])
+            s.dw[k] = b[7 + k]
+        x, y, z, w = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), \
+            a[3] + f * (b[3] - a[3])
+    norm = math.sqrt(x * x + y * y + z * z + w * w)
+    rotation(x / norm, y / norm, z / norm, w / norm, s.mat_ed)
+    return True

@@ -1,0 +1,153 @@
+"""The whole unit through the zenith, past the superstructure, at the end of a long arm, with an INS that aligns."""
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from acu_tracker import ahead, announcement
+from acu_tracker.modes import AUTOTRACK, PRESET, PROGRAM, STOW
+from pedestal_common import line_of_sight
+
+BEAMWIDTH = 0.0175
+SLOW = {'azimuth.shaper.rate': 0.1745, 'azimuth.limits.rate': 0.2, 'azimuth.shaper.acceleration': 0.35,
+        'azimuth.filter.current_statistical.a_max': 0.002, 'elevation.filter.current_statistical.a_max': 0.002}
+"""10 deg/s; a satellite's acceleration."""
+
+
+W, CULMINATION = math.radians(0.87), 32.0
+
+
+def overhead(E0):
+    """A great circle at W that culminates at E0: earth azimuth, elevation."""
+    def target(t):
+        s = W * (t - CULMINATION)
+        return (math.atan2(math.sin(s), math.cos(s) * math.cos(E0)) + 0.3,
+                math.asin(min(math.cos(s) * math.sin(E0), 1.0)))
+    return target
+
+
+def heard(rig, seconds, visible=lambda deck: True):
+    """Run with a receiver that loses a target 0.7 beamwidths off or not visible; (n, 2) stamp, angle off [rad]."""
+    rows = []
+    for _ in range(round(seconds / rig.T)):
+        t = rig.k * rig.T
+        off = math.hypot(*rig.error(t, rig.angle))
+        rig.receiver_on = off < 0.7 * BEAMWIDTH and visible(rig.deck(t))
+        rig.step()
+        rows.append((t, off))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize('mode, with_program', [('program', True), ('autotrack', False)])
+def test_through_the_keyhole(Rig, mode, with_program):
+    """10 deg/s where following takes 25: the loss is what was announced, and the target is met again."""
+    rig = Rig(overhead(math.radians(88.0)), at=overhead(math.radians(88.0))(0.0), initial_mode='program', sigma=2e-4,
+              **SLOW, **{'tracker.handover': mode == 'autotrack', 'tracker.receiver.sigma_floor': 2e-4})
+    rig.program(start=-2.0, rows=90)
+    heard(rig, 2.0)
+    rig.inputs['program_count'] = 90 if with_program else 0
+    before = heard(rig, 18.0)
+    said = announcement.keyhole(rig.state[0]['ahead'], BEAMWIDTH)
+    plan = rig.state['ahead']['plan'][0].copy()
+    assert before[:, 1].max() < 1e-3 and plan['t1'] > before[-1, 0]
+    during = heard(rig, 25.0)
+    assert rig.mode == mode
+    after = heard(rig, 5.0)
+    loss = np.sum(during[:, 1] > 0.5 * BEAMWIDTH) * rig.T
+    print(f'{mode}: predicted {plan["loss"]:.2f} s, lost {loss:.2f} s; {said}')
+    assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 5.0
+    assert plan['worst'] == pytest.approx(during[:, 1].max(), rel=0.2)
+    assert after[:, 1].max() < 1e-3 and rig.mode == mode
+    A, E = rig.target((rig.k - 1) * rig.T)
+    np.testing.assert_allclose(rig.outputs['estimate'][0, :, 0], [A, E], atol=2e-3)
+    assert f'expected loss {plan["loss"]:.1f} s' in said and 'clockwise' in said
+
+
+def test_a_mast_hides_the_target(Rig):
+    """Autotrack coasts behind the mast for longer than coast_time, says why, and goes on after it."""
+    sector = (0.62, 0.82)
+    rig = Rig(lambda t: (0.5 + 0.03 * t, 0.5), at=(0.5, 0.5), initial_mode='autotrack', sigma=2e-5, **Rig.QUICK,
+              **{'tracker.receiver.sigma_floor': 2e-5, 'blockage': f'{sector[0]} {sector[1]} 0.8',
+                 'azimuth.filter.current_statistical.a_max': 0.002})
+    heard(rig, 3.5)
+    begin, end = rig.state['ahead']['hidden'][0]
+    assert (begin, end) == (pytest.approx(4.0, abs=0.2), pytest.approx(32.0 / 3.0, abs=0.2))
+    assert announcement.hidden(rig.state[0]['ahead']).startswith('target hidden from')
+    rig.run(0.1)
+    for _ in range(2):
+        off = heard(rig, 3.4, lambda deck: not sector[0] <= deck[0] <= sector[1])
+        assert (rig.mode, rig.reason) == ('autotrack', 'blocked') and rig.outputs['blocked'][0] == 1
+        assert off[:, 1].max() < 0.5 * BEAMWIDTH
+    heard(rig, 2.0, lambda deck: not sector[0] <= deck[0] <= sector[1])
+    off = heard(rig, 2.0)
+    assert (rig.mode, rig.reason) == ('autotrack', 'none') and not rig.outputs['blocked'][0]
+    assert off[:, 1].max() < 1e-3
+    rig.receiver_on = False
+    rig.run(4.0)
+    assert rig.mode == 'standby'
+
+
+def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
+    rig = Rig(stabilised=True, at=(0.4, 0.5))
+    rig.program()
+    rig.run(0.5, aligning=1)
+    for mode in (PROGRAM, AUTOTRACK):
+        assert not rig.ask(mode) and (rig.mode, rig.reason) == ('standby', 'INS aligning')
+    for mode in (STOW, PRESET):
+        assert rig.ask(mode)
+        rig.run(0.1, aligning=1)
+        assert rig.mode == ('stow', 'preset')[mode - STOW]
+    rig.run(0.1, aligning=0)
+    assert rig.ask(PROGRAM)
+    rig.run(0.1, aligning=0)
+    rig.run(0.1, aligning=1)
+    assert (rig.mode, rig.reason) == ('standby', 'INS aligning')
+    ashore = Rig()
+    ashore.program()
+    ashore.step(aligning=1)
+    assert ashore.ask(PROGRAM)
+
+
+@pytest.mark.parametrize('ranged', [True, False])
+def test_the_lever_arm_moves_a_near_target(Rig, ranged):
+    """A buoy 400 m away seen from a mast of 30 m that rolls: with a range the estimate does not see the mast swing."""
+    place, arm = np.array([300.0, 250.0, 80.0]), np.array([5.0, -3.0, 30.0])
+
+    def seen(t):
+        e, n, u = place - Rig.rolling(t).apply(arm)
+        return line_of_sight.earth_angles(e, n, u)
+    rig = Rig(seen, attitude=Rig.rolling, stabilised=True, initial_mode='autotrack', at=(0.5, 0.2), **Rig.QUICK,
+              **{f'lever_arm.{axis}': value for axis, value in zip('xyz', arm)})
+    rig.angle = rig.deck(0.0)
+    worst, swing = 0.0, []
+    for k in range(2400):
+        t = rig.k * rig.T
+        distance = np.linalg.norm(place - rig.attitude(t).apply(arm)) if ranged else math.nan
+        off = math.hypot(*rig.error(t, rig.angle))
+        rig.step(range=distance, range_variance=1.0)
+        if k > 1400:
+            worst = max(worst, off)
+            estimate = rig.outputs['estimate'][0]
+            swing.append((*(estimate[:, 0] - seen(t)), rig.state['tracker']['azimuth']['x'][0, 0, 1]))
+    swing = np.array(swing)
+    print(f'range measured {ranged}: off {worst:.2e} rad, filtered rate {np.ptp(swing[:, 2]):.2e} rad/s')
+    assert rig.mode == 'autotrack'
+    assert np.abs(swing[:, :2]).max() < 2e-4
+    assert np.ptp(swing[:, 2]) < 2e-3 if ranged else np.ptp(swing[:, 2]) > 1e-2
+    assert worst < 2e-4
+
+
+def test_the_levelled_deck_is_the_mean_of_its_attitudes():
+    """Roll and pitch average out, the heading stays; the spread is the mean square of the tilt."""
+    h = np.zeros(1, ahead.AHEAD)
+    h['latest'] = -math.inf
+    times = 0.05 * np.arange(2400)
+    tilts = []
+    for t in times:
+        attitude = Rotation.from_euler('ZYX', [0.7, 0.03 * math.sin(0.9 * t), 0.05 * math.sin(0.6 * t)])
+        ahead.take_attitude(h[0], t, attitude.as_quat() * (-1.0 if int(t) % 2 else 1.0), 60.0)
+        tilts.append(math.acos(attitude.as_matrix()[2, 2]))
+    off = Rotation.from_quat(h['mean'][0]).inv() * Rotation.from_euler('Z', 0.7)
+    assert off.magnitude() < 3e-3
+    assert math.sqrt(h['spread'][0]) == pytest.approx(np.sqrt(np.mean(np.square(tilts))), rel=0.1)

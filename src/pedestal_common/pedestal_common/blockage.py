@@ -1,0 +1,43 @@
+"""Sectors of the deck where the superstructure hides the target; azimuth clockwise from the bow."""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.parameters import ParameterError
+
+MOST = 8
+DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low azimuth_high elevation_high; ...' [rad] on the "
+       'deck, clockwise from low to high; empty: none')
+
+
+def sectors(text) -> np.ndarray:
+    """The table (MOST, 3) [rad] that `blocked` takes, of a text as in DOC; ParameterError names what is wrong."""
+    table = np.full((MOST, 3), -math.inf)
+    parts = [part.split() for part in text.split(';') if part.strip()]
+    if len(parts) > MOST:
+        raise ParameterError(f'blockage = {text!r}: {len(parts)} sectors; must be at most {MOST}')
+    for row, words in zip(table, parts):
+        try:
+            row[:] = [float(word) for word in words]
+        except ValueError:
+            raise ParameterError(f'blockage = {text!r}: sector {" ".join(words)!r}: must be three numbers, '
+                                 'azimuth_low azimuth_high elevation_high [rad]') from None
+        low, high, top = row
+        if not (0.0 < high - low <= 2.0 * math.pi and abs(low) <= 2.0 * math.pi and abs(top) <= 0.5 * math.pi):
+            raise ParameterError(f'blockage = {text!r}: sector {" ".join(words)!r}: azimuth_high must be '
+                                 '0 to 6.2832 rad above azimuth_low, azimuth_low within 6.2832, elevation_high within '
+                                 '1.5708')
+    return table
+
+
+@compiled
+def blocked(table, azimuth, elevation):
+    """Whether a direction of the deck lies in a sector; not where it is NaN."""
+    for i in range(MOST):
+        low, high, top = table[i, 0], table[i, 1], table[i, 2]
+        if elevation <= top:
+            beyond = azimuth - low
+            if beyond - 2.0 * math.pi * math.floor(beyond / (2.0 * math.pi)) <= high - low:
+                return True
+    return False
