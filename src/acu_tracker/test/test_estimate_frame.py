@@ -45,7 +45,8 @@ def test_variances_turn_with_the_frame():
     A, E = 0.05 + sigma[0] * rng.normal(size=4000), 0.02 + sigma[1] * rng.normal(size=4000)
     seen = np.column_stack((np.cos(E) * np.sin(A), np.cos(E) * np.cos(A), np.sin(E))) @ frame['mat'].T
     azimuth, elevation = np.arctan2(seen[:, 0], seen[:, 1]), np.arcsin(seen[:, 2])
-    told = estimate_frame.earth_variances(frame, 0.05, 0.02, azimuth.mean(), elevation.mean(), sigma[0]**2, sigma[1]**2)
+    told = estimate_frame.earth_variances(frame, 0.05, 0.02, azimuth.mean(), elevation.mean(), sigma[0]**2,
+                                          sigma[1]**2)
     np.testing.assert_allclose(told, [azimuth.var(), elevation.var()], rtol=0.1)
 
 
