@@ -149,7 +149,7 @@ def test_tuning_of_many_parameters_begins_where_they_are():
 
 
 def test_a_criterion_that_never_works_is_refused():
-    with pytest.raises(ValueError, match='cv: no cv.noise gives a finite criterion'):
+    with pytest.raises(ValueError, match='no cv.noise gives a finite criterion'):
         tuning.tuned(Filter(kind='cv'), lambda params: math.nan)
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from pedestal_common import topics
 
-SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'diagnostics'}
+SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'diagnostics'}
 
 
 def test_a_graph_with_a_drive_is_the_table_itself():
