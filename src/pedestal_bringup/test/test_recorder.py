@@ -137,7 +137,7 @@ def rows():
 
 
 ANSWERS = {'acu/mode': 'acu/rate_command', 'acu/keyhole': 'acu/rate_command', 'acu/blockage': 'acu/rate_command',
-           'adu/state': 'clock'}
+           'adu/state': 'clock', 'ins/state': 'ship/imu/data'}
 
 
 def shuffled(rows, seed):
