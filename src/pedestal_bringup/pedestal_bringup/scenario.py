@@ -18,7 +18,7 @@ from adu_drive.params import AduNodeParameters, BeamParameters
 from pedestal_bringup.params import RecorderParameters
 from pedestal_common import parameters, topics
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
-from tracking_receiver_sim import smoothing
+from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 
@@ -334,21 +334,20 @@ def _spread(name, sections, header, seed):
             sections[node].setdefault(told, sections[owner][key])
     if header.beam:
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
-        sections['acu'].setdefault('tracker.receiver.age', _error_age(sections['tracking_receiver']))
-
-
-def _error_age(values):
-    """How long [s] before its stamp an error of a beam that stands belongs: the mean delay of the samples in it."""
-    tracking = parameters.build(parameters_of('tracking_receiver'), values)
-    r = tracking.receiver
-    return smoothing.delay(r.smoothing, r.samples_per_step, r.smoothing_samples) * tracking.period / r.samples_per_step
+        for prefix in topics.prefixes(header.graph_beams):
+            tracking = _checked(name, f'{prefix}tracking_receiver', TrackingReceiverNodeParameters,
+                                _whole(sections, f'{prefix}tracking_receiver'))
+            for key, value in (('age', receiver.age(tracking, tracking.period)),
+                               ('beam_age', receiver.beam_age(tracking, tracking.period))):
+                if f'tracker.receiver.{key}' not in sections['acu']:
+                    sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
 
 
 def _spread_to_beam(name, node, sections, header, seed):
     """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
     values, beam = sections[node], topics.beam_of(node)
-    receiver = f'{beam}/tracking_receiver'
-    if node == receiver and (seed is not None or 'seed' not in values):
+    own_receiver = f'{beam}/tracking_receiver'
+    if node == own_receiver and (seed is not None or 'seed' not in values):
         spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
         values['seed'] = int(spread.generate_state(1)[0] >> 1)
     for owner, key, other, told in KNOWN:
@@ -356,11 +355,9 @@ def _spread_to_beam(name, node, sections, header, seed):
         if topics.plain(node) == other and key in own:
             values.setdefault(told, own[key])
     for key, _ in MEASURED:
-        if key in sections[receiver]:
-            raise ScenarioError(f'scenario {name}, {receiver}: {key}: is the same for every beam; say it in '
+        if key in sections[own_receiver]:
+            raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: is the same for every beam; say it in '
                                 'tracking_receiver')
-    if node != receiver and any(key.startswith('receiver.s') for key in sections[receiver]):
-        values.setdefault('tracker.receiver.age', _error_age(_whole(sections, receiver)))
 
 
 def _checked(name, section, parameters_type, values):
