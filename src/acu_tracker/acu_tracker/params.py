@@ -135,7 +135,8 @@ class AxisParameters(Parameters):
     stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode stow')
     preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
     filter: Filter = group(Filter)
-    controller: str = choice('feedforward', CONTROLLERS, 'of the position loop; may be changed while it runs')
+    controller: str = choice('feedforward', CONTROLLERS, 'of the position loop; may be changed while it runs; of '
+                             'an array always beam, and of no other drive')
     pid: Pid = group(Pid)
     feedforward: Feedforward = group(Feedforward)
     adrc: Adrc = group(Adrc)
@@ -184,8 +185,20 @@ class AcuParameters(Parameters):
     azimuth: AxisParameters = group(AxisParameters)
     elevation: Elevation = group(Elevation)
 
+    def check_drive(self, array):
+        """Raises ParameterError unless both controllers steer a beam where the drive is an array, else none."""
+        for axis in ('azimuth', 'elevation'):
+            controller = getattr(self, axis).controller
+            if (controller == 'beam') != array:
+                raise ParameterError(f"{axis}.controller = '{controller}': must "
+                                     + ('be beam: the drive is an array' if array else
+                                        f'be one of {", ".join(CONTROLLERS[:-1])}: the drive has motors'))
+
     def check(self):
-        for name in ('command_delay', 'receiver_latency', 'attitude_latency'):
+        kept = ['receiver_latency', 'attitude_latency']
+        if {self.azimuth.controller, self.elevation.controller} != {'beam'}:  # which keeps no reference until then
+            kept.append('command_delay')
+        for name in kept:
             if getattr(self, name) > (LENGTH - 4) * self.period:
                 raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {LENGTH - 4} periods, '
                                      f'{(LENGTH - 4) * self.period:g} s')

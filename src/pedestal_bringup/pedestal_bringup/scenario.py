@@ -1,7 +1,10 @@
 """Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
 
-`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged.
+`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged, but for an array of
+several beams: its nodes are `/beam_1/acu` and so on, which the section `acu` does not match. They take the file that
+`pedestal run` leaves beside the bag, parameters.yaml.
 """
+import contextlib
 import dataclasses
 import difflib
 import importlib.resources
@@ -287,6 +290,9 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     for node in sections:
         if topics.beam_of(node) and node not in of_beams:
             raise ScenarioError(f'scenario {name}: section {node!r}: the scenario has beams = {header.beams}')
+    if header.beam:
+        for axis in ('azimuth', 'elevation'):
+            sections.setdefault('acu', {}).setdefault(f'{axis}.controller', 'beam')
     for node in (*NODE_KINDS, *of_beams):
         sections.setdefault(node, {})
         _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
@@ -294,7 +300,11 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     for node in of_beams:
         _spread_to_beam(name, node, sections, header, seed)
     for node, values in sections.items():
-        typed = parameters.as_dict(_checked(name, node, kind(node, header.beam).parameters, _whole(sections, node)))
+        checked = _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
+        if topics.plain(node) == 'acu':
+            with _named(name, node):
+                checked.check_drive(header.beam)
+        typed = parameters.as_dict(checked)
         sections[node] = {key: typed[key] for key in values}
     return Scenario(name, header, sections)
 
@@ -305,10 +315,12 @@ def _spread(name, sections, header, seed):
     Raises ScenarioError where a node was told something else.
     """
     def tell(node, key, value):
-        told = sections[node].setdefault(key, value)
-        if told != value:
-            raise ScenarioError(f'scenario {name}, {node}: {key} = {told}: must be {value}, as is said elsewhere; '
-                                'leave it out here')
+        sections[node].setdefault(key, value)
+        for section in [section for section in sections if topics.plain(section) == node]:
+            told = sections[section].get(key, value)
+            if told != value:
+                raise ScenarioError(f'scenario {name}, {section}: {key} = {told}: must be {value}, as is said '
+                                    'elsewhere; leave it out here')
 
     for node in ('adu', 'recorder', 'tracking_receiver'):
         tell(node, 'duration', header.duration)
@@ -327,7 +339,8 @@ def _spread(name, sections, header, seed):
     for key, told in MEASURED:
         measured = sections['tracking_receiver'].get(key, False)
         for node in ('acu', 'recorder'):
-            if measured or told in sections[node]:
+            if measured or any(told in values for section, values in sections.items()
+                               if topics.plain(section) == node):
                 tell(node, told, measured)
     for owner, key, node, told in KNOWN:
         if key in sections[owner]:
@@ -361,7 +374,14 @@ def _spread_to_beam(name, node, sections, header, seed):
 
 
 def _checked(name, section, parameters_type, values):
-    try:
+    with _named(name, section):
         return parameters.build(parameters_type, values)
+
+
+@contextlib.contextmanager
+def _named(name, section):
+    """A ParameterError becomes a ScenarioError that names the section."""
+    try:
+        yield
     except parameters.ParameterError as error:
         raise ScenarioError(f'scenario {name}, {section}: {error}') from None
