@@ -18,18 +18,22 @@ from pedestal_common import messages
 FOUR, SWAY = 'phased_array_four', 'phased_array_sway'
 BEAMS = [f'beam_{i}' for i in range(1, 5)]
 FAST = ('--param', 'acu.tracker.lock_count=20')
-LENGTH = {'four': 3.0, 'sway': 2.0, 'sway 1 ms': 1.0}
+LENGTH = {'four': 3.0, 'sway': 2.0, 'sway 1 ms': 1.0, 'type 1': 2.0}
+TYPE_1 = [f'acu.{axis}.beam.{key}' for axis in ('azimuth', 'elevation')
+          for key in ('form=type_1', 'rate_compensation=0.85')]
 
 
 @pytest.fixture(scope='module')
 def runs(start_run):
     """Finished runs by name."""
-    started = {'four': start_run(FOUR, '--duration', '3', *FAST)}
+    started = {'four': start_run(FOUR, '--duration', '3', *FAST, '--param',
+                                 'beam_2/tracking_receiver.antenna.beamwidth=0.04')}
     done = started['four'].finish()
     assert done.returncode == 0, done.stderr
     started['sway'] = start_run(SWAY, '--duration', '2', *FAST)
     started['sway 1 ms'] = start_run(SWAY, '--duration', '1', *FAST, '--param', 'adu.period=0.001')
-    for name in ('sway', 'sway 1 ms'):
+    started['type 1'] = start_run(SWAY, '--duration', '2', *FAST, *(f'--param={value}' for value in TYPE_1))
+    for name in ('sway', 'sway 1 ms', 'type 1'):
         done = started[name].finish()
         assert done.returncode == 0, done.stderr
     return started
@@ -100,6 +104,37 @@ def test_report_and_export_of_one_beam(runs, tmp_path):
         bags.read(runs['four'].bag, 'beam_5')
 
 
+def test_a_beam_has_the_beamwidth_of_its_own_antenna(views):
+    assert [view.metadata['beamwidth'] for view in views.values()] == ['0.052', '0.04', '0.052', '0.052']
+
+
+def test_a_node_of_another_beam_is_not_recomputed(runs):
+    recording = recompute.Recording(runs['four'].bag, beam='beam_2')
+    assert recompute.chosen(recording, ['beam_2/acu'], None) == ['acu']
+    with pytest.raises(recompute.RecomputeError, match='--node beam_3/acu: .* say --beam beam_3 --node acu'):
+        recompute.chosen(recording, ['beam_3/acu'], None)
+
+
+def test_ctrl_c_ends_an_array_in_order(start_run):
+    run = start_run(FOUR, *FAST)
+    deadline = time.monotonic() + 60.0
+    while not run.recorded():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    run.process.send_signal(signal.SIGINT)
+    done = run.finish()
+    assert (done.returncode, done.stderr) == (130, f'pedestal: stopped; what was recorded is in {run.bag}\n')
+    assert run.pids() == {}
+    recorded = bags.read(run.bag)
+    assert all(len(recorded.rows(f'{beam}/joint_states')) > 50 for beam in BEAMS) and not recorded.damage
+
+
+def test_an_acu_of_an_array_steers_beams(start_node, one_line):
+    done = start_node('acu', '-p', 'graph.beams:=1').finish()
+    assert done.returncode == 1
+    assert one_line(done.stderr).endswith("azimuth.controller = 'feedforward': must be beam: the drive is an array")
+
+
 COLUMNS = {
     'joint_states': [('azimuth.position', 'position', 0), ('elevation.position', 'position', 1)],
     'tracking_receiver/angle_error': [('x', 'measured', 0), ('y', 'measured', 1)],
@@ -110,7 +145,8 @@ COLUMNS = {
 
 
 @pytest.mark.parametrize('name, scenario_name, beam, more', [
-    ('four', FOUR, 'beam_3', []), ('sway', SWAY, '', []), ('sway 1 ms', SWAY, '', ['adu.period=0.001'])])
+    ('four', FOUR, 'beam_3', []), ('sway', SWAY, '', []), ('sway 1 ms', SWAY, '', ['adu.period=0.001']),
+    ('type 1', SWAY, '', TYPE_1)])
 def test_the_composed_cores_equal_the_nodes(runs, name, scenario_name, beam, more):
     chosen = scenario.load(scenario_name, [FAST[1], *more], duration=LENGTH[name])
     composed = closed_loop.run(closed_loop.cores(chosen, beam))

@@ -199,6 +199,9 @@ def test_controllers_while_it_tracks(plant):
         assert abs(lag) < 0.05 / 20.0
     result = put(plant, 'azimuth.controller', 'lqr')
     assert not result.successful and 'must be one of pid, feedforward, adrc' in result.reason
+    result = put(plant, 'azimuth.controller', 'beam')
+    assert not result.successful and result.reason == (
+        "azimuth.controller = 'beam': must be one of pid, feedforward, adrc: the drive has motors")
     assert plant.client.trigger('acu/standby')[0]
 
 

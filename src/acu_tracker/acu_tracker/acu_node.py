@@ -46,6 +46,9 @@ class AcuNode(shell.Shell):
 
         self.follow(JOINTS, self.unit.followers, self.step)
 
+    def check_parameters(self, params):
+        params.check_drive(self.graph.beams > 0)
+
     def reconfigure(self):
         self.unit.configure(self.parameters)
 

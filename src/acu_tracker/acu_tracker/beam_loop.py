@@ -8,6 +8,8 @@ R(k+1/k), so that the error itself is the innovation and a ramp is met without e
 `tracked`, the third form, needs no law of its own: y = beam in force + error goes into the target's filter, and the
 beam is its prediction for the middle of the interval in which it will be in force.
 """
+import math
+
 from pedestal_common.compiled import compiled
 
 FORMS = ('tracked', 'type_1', 'type_2')
@@ -36,3 +38,13 @@ def type_2(R, v, error, alpha, beta, T, compensation):
 def coasted(R, v, T, compensation):
     """Both without an error: the prediction stands."""
     return R + v * T + compensation * T, v
+
+
+@compiled
+def step(form, R, v, error, alpha, beta, T, compensation):
+    """(beam, its rate) of TYPE_1 or TYPE_2; arguments as of type_1, the error NaN where none came."""
+    if math.isnan(error):
+        return coasted(R, v, T, compensation)
+    if form == TYPE_1:
+        return type_1(R, v, error, alpha, beta, T, compensation)
+    return type_2(R, v, error, alpha, beta, T, compensation)

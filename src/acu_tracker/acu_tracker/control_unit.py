@@ -131,12 +131,9 @@ def take_encoder(s, u):
 
 
 @compiled
-def met(s, p, i, j, f, index):
-    """Column `index` of the encoder's history, of an axis p, a share f between two rows: in between, or of a beam that
-    stood up to the newer."""
+def met(s, i, j, f, index):
+    """Column `index` of the encoder's history, a share f between two rows."""
     a, b = s.encoder.sample[i, index], s.encoder.sample[j, index]
-    if p.controller == position_loop.BEAM:
-        return b if f > 1e-6 else a
     return a + f * (b - a)
 
 
@@ -159,7 +156,10 @@ def target_rates(s, u, A, E, dA, dE):
 def take_error(s, p, c, u, o):
     """Filter y = encoder at the instant of the error, displaced by the error, in the angles of the estimate.
 
-    While the beam is meant to be off the target the receiver's reading is none.
+    The error is the mean of samples that were taken while a beam jumped from step to step: target and beam each have
+    an instant that they are the mean of. Between two steps the mean moves as a straight line does, so that it is exact
+    of a ramp, whatever the weights of the samples are. While the beam is meant to be off the target the receiver's
+    reading is none.
     """
     e = p.tracker.receiver
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
@@ -169,10 +169,10 @@ def take_error(s, p, c, u, o):
     if not s.tracker.running:
         estimate_frame.level(s.frame)
     t = u.error_stamp - e.age
-    i, j, f = bracket(s.encoder, t)
+    i, j, f = bracket(s.encoder, u.error_stamp - e.beam_age)
     if i < 0:
         return _ERROR_STAMP
-    A, E = met(s, p.azimuth, i, j, f, 0), met(s, p.elevation, i, j, f, 1)
+    A, E = met(s, i, j, f, 0), met(s, i, j, f, 1)
     azimuth, elevation = displaced(A, E, u.cross_elevation, u.elevation)
     s.error[0], s.error[1] = azimuth - A, elevation - E
     if s.stabilised or s.frame.tilted:
@@ -185,8 +185,7 @@ def take_error(s, p, c, u, o):
             azimuth, elevation = estimate_frame.measured(s.frame, azimuth, elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
-        azimuth_rate, elevation_rate = target_rates(s, u, A, E, met(s, p.azimuth, i, j, f, 2),
-                                                    met(s, p.elevation, i, j, f, 3))
+        azimuth_rate, elevation_rate = target_rates(s, u, A, E, met(s, i, j, f, 2), met(s, i, j, f, 3))
     R = tracker.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e.beamwidth, e.slope, e.integration,
                                e.sigma_floor)
     R_rate = u.error_rate_sigma * u.error_rate_sigma

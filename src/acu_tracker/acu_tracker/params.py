@@ -22,6 +22,8 @@ class ReceiverLaw(Parameters):
     sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not fall with C/N0 (encoder, phase)')
     age: float = parameter(0.0, 0.0, 0.5, 's', 'an error is the one of this long before its stamp: of a beam that '
                            'stands, the middle of the samples it is the mean of')
+    beam_age: float = parameter(0.0, 0.0, 0.5, 's', 'the encoders that belong to it are those of this long before: of '
+                                'a beam that stands, the mean of those in the samples')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,7 +137,8 @@ class AxisParameters(Parameters):
     stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode stow')
     preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
     filter: Filter = group(Filter)
-    controller: str = choice('feedforward', CONTROLLERS, 'of the position loop; may be changed while it runs')
+    controller: str = choice('feedforward', CONTROLLERS, 'of the position loop; may be changed while it runs; of '
+                             'an array always beam, and of no other drive')
     pid: Pid = group(Pid)
     feedforward: Feedforward = group(Feedforward)
     adrc: Adrc = group(Adrc)
@@ -207,9 +210,21 @@ class AcuParameters(Parameters):
     azimuth: AxisParameters = group(AxisParameters)
     elevation: Elevation = group(Elevation)
 
+    def check_drive(self, array):
+        """Raises ParameterError unless both controllers steer a beam where the drive is an array, else none."""
+        for axis in ('azimuth', 'elevation'):
+            controller = getattr(self, axis).controller
+            if (controller == 'beam') != array:
+                raise ParameterError(f"{axis}.controller = '{controller}': must "
+                                     + ('be beam: the drive is an array' if array else
+                                        f'be one of {", ".join(CONTROLLERS[:-1])}: the drive has motors'))
+
     def check(self):
         sectors(self.blockage)
-        for name in ('command_delay', 'receiver_latency', 'attitude_latency'):
+        kept = ['receiver_latency', 'attitude_latency']
+        if {self.azimuth.controller, self.elevation.controller} != {'beam'}:  # which keeps no reference until then
+            kept.append('command_delay')
+        for name in kept:
             if getattr(self, name) > (LENGTH - 4) * self.period:
                 raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {LENGTH - 4} periods, '
                                      f'{(LENGTH - 4) * self.period:g} s')
@@ -217,10 +232,11 @@ class AcuParameters(Parameters):
             if getattr(self, name).notch.frequency * self.period >= 0.5:
                 raise ParameterError(f'{name}.notch.frequency = {getattr(self, name).notch.frequency:g} Hz: must be '
                                      f'below half the step rate, {0.5 / self.period:g} Hz')
-        oldest = self.receiver_latency + self.tracker.receiver.age
-        if oldest > (LENGTH - 4) * self.period:
-            raise ParameterError(f'tracker.receiver.age = {self.tracker.receiver.age:g} s: with receiver_latency must '
-                                 f'be 0 to {LENGTH - 4} periods, {(LENGTH - 4) * self.period:g} s')
+        for name in ('age', 'beam_age'):
+            age = getattr(self.tracker.receiver, name)
+            if self.receiver_latency + age > (LENGTH - 4) * self.period:
+                raise ParameterError(f'tracker.receiver.{name} = {age:g} s: with receiver_latency must be 0 to '
+                                     f'{LENGTH - 4} periods, {(LENGTH - 4) * self.period:g} s')
         longest = self.attitude_timeout - self.command_delay - 0.5 * self.period
         if self.attitude_latency >= longest:
             raise ParameterError(f'attitude_latency = {self.attitude_latency:g} s: must be below attitude_timeout - '

@@ -2,10 +2,9 @@
 
 `pid` acts on the raw target at t_k. `feedforward` and `adrc` act on the shaped reference as it was planned for t_k and
 feed the one of t_m forward. A shaped reference that nobody follows rests on the antenna's own angle and rate.
-`beam` steers an electronic beam: the raw target at t_m is the command, there is nothing to control.
+`beam` steers an electronic beam, there is nothing to control: the command is the raw target at t_m or, in autotrack of
+the forms type_1 and type_2, what paper 002's loop makes of the receiver's error.
 """
-import math
-
 import numpy as np
 
 from acu_tracker import adrc, alpha_beta, beam_loop, feedforward, notch, pid, shaper
@@ -117,12 +116,9 @@ def steer(axis, p, A, dA, ddA, error, V, autotrack, T, o, index):
     axis.acceleration = 0.0
     if not autotrack or b.form == beam_loop.TRACKED:
         axis.position, axis.rate, axis.acceleration = A, dA, ddA
-    elif not math.isfinite(error):
-        axis.position, axis.rate = beam_loop.coasted(axis.position, axis.rate, T, compensation)
-    elif b.form == beam_loop.TYPE_1:
-        axis.position, axis.rate = beam_loop.type_1(axis.position, axis.rate, error, b.alpha, beta, T, compensation)
     else:
-        axis.position, axis.rate = beam_loop.type_2(axis.position, axis.rate, error, b.alpha, beta, T, compensation)
+        axis.position, axis.rate = beam_loop.step(b.form, axis.position, axis.rate, error, b.alpha, beta, T,
+                                                  compensation)
     if not p.limits.low <= axis.position <= p.limits.high:
         axis.position, axis.rate, axis.acceleration = min(max(axis.position, p.limits.low), p.limits.high), 0.0, 0.0
         o.angle_limited[index] = 1
@@ -223,7 +219,7 @@ def step(axis, p, notch_constants, A, dA, ddA, t_k, t_m, y, dy, dt, o, index):
     observer of adrc is fed with the realised command.
     """
     handover = axis.controller != p.controller
-    if handover and (axis.controller == PID or axis.controller == BEAM):
+    if handover and axis.controller == PID:
         seat_reference(axis, t_k, y, dy)
     if p.controller == PID:
         take_raw(axis, p, A, dA, ddA, t_k, y, dy, o, index)

@@ -160,10 +160,10 @@ def test_the_beam_is_held_inside_its_limits(beam):
     assert o['reference'][0].tolist() == [0.8, 0.0, 0.0] and o['angle_limited'].tolist() == [1, 0]
 
 
-@pytest.mark.parametrize('age', [0.0025, 0.005, 0.012])
-def test_an_error_of_before_its_stamp_is_met_with_the_beam_that_stood_then(beam, age):
+@pytest.mark.parametrize('age, beam_age', [(0.0025, 0.0), (0.005, 0.005), (0.012, 0.01)])
+def test_an_error_of_before_its_stamp_is_met_with_the_beam_that_stood_then(beam, age, beam_age):
     """The beam jumps at every step; the receiver measures `age` before the stamp it gives."""
-    rig = beam(lambda t: (0.5 + 0.02 * t, 0.6), **{'tracker.receiver.age': age})
+    rig = beam(lambda t: (0.5 + 0.02 * t, 0.6), **{'tracker.receiver.age': age, 'tracker.receiver.beam_age': beam_age})
     for k in range(400):
         rig.angle = np.array([0.5 + 0.01 * math.sin(2.0 * k), 0.6 - 0.01 * math.cos(3.0 * k)])
         t = k * rig.T - age
@@ -172,3 +172,17 @@ def test_an_error_of_before_its_stamp_is_met_with_the_beam_that_stood_then(beam,
         dx, de = rig.error(t, stood)
         o = rig.step(cross_elevation=dx, elevation=de)
     np.testing.assert_allclose(o['estimate'][:, 0], [0.5 + 0.02 * 399 * rig.T, 0.6], atol=1e-7)
+
+
+@pytest.mark.parametrize('weights', [[0.2] * 5, [0.05] * 20, [1.0 / 13.0] * 13, 0.05 * 0.95**np.arange(300)])
+def test_an_error_that_is_a_mean_over_several_steps_is_met_with_the_mean_of_their_beams(beam, weights):
+    """Five samples a step, the newest first: the target moves through them, the beam steps along with it."""
+    ages, stairs = np.arange(len(weights)) / 5.0 * beam.T, np.arange(len(weights)) // 5
+    rate, of_beam = 0.5, {'tracker.receiver.age': np.average(ages, weights=weights),
+                          'tracker.receiver.beam_age': np.average(stairs, weights=weights) * beam.T}
+    rig = beam(lambda t: (0.5 + rate * t, 0.0), at=(0.5, 0.0), **of_beam)
+    for k in range(400):
+        rig.angle = np.array([0.5 + rate * k * rig.T - 0.001, 0.0])
+        off = 0.001 + rate * np.average(stairs * rig.T - ages, weights=weights)
+        o = rig.step(cross_elevation=off, elevation=0.0)
+    assert o['estimate'][0, 0] == pytest.approx(0.5 + rate * 399 * rig.T, abs=1e-6)

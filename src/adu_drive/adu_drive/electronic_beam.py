@@ -18,34 +18,37 @@ LARGEST = 1e3
 CONSTANTS = np.dtype([('delay_ns', 'i8'), ('timeout_ns', 'i8')], align=True)
 
 STATE = np.dtype([('ring_stamp_ns', 'i8', (RING,)), ('ring_position', 'f8', (RING, 2)), ('written', 'i8'),
-                  ('released', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,)), ('since_ns', 'i8')],
-                 align=True)
+                  ('released', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))], align=True)
 """written, released: commands put into the ring and taken from it since the start; command_stamp_ns: of the newest
-that was believed; position: the beam in force (azimuth, elevation) [rad], since_ns: the stamp since which it is."""
+that was believed; position: the beam in force (azimuth, elevation) [rad]."""
 
 INPUTS = np.dtype([('stamp_ns', 'i8'), ('due', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))],
                   align=True)
 """Stamp t_k of the step [ns]; due 1: a command came, with its stamp and its beam (azimuth, elevation) [rad]."""
 
-OUTPUTS = np.dtype([('position', 'f8', (2,)), ('since_ns', 'i8'), ('stale', 'i8'), ('invalid_command', 'i8')],
-                   align=True)
-"""At t_k+1: the beam that was in force from t_k on (azimuth, elevation) [rad] and the stamp since which it is (NEVER:
-the initial one); stale 1: the newest believed command was older than the timeout at t_k, or there was none;
-invalid_command 1: the command of this step was no angle or not newer than the one before. The beam stays then."""
+OUTPUTS = np.dtype([('position', 'f8', (2,)), ('stale', 'i8'), ('invalid_command', 'i8')], align=True)
+"""At t_k+1: the beam that was in force from t_k on (azimuth, elevation) [rad]; stale 1: the newest believed command
+was older than the timeout at t_k, or there was none; invalid_command 1: the command of this step was no angle or not
+newer than the one before. The beam stays then."""
+
+
+def check_delay(period, transport_delay):
+    """Raises ParameterError where the commands on their way do not fit into the ring; both in s."""
+    if transport_delay >= (RING - 1) * period:
+        raise ParameterError(f'transport_delay = {transport_delay:g} s: must be below {RING - 1} periods of '
+                             f'{period:g} s')
 
 
 def constants(period, transport_delay, timeout) -> np.ndarray:
     """CONSTANTS (1,) of a step `period` [s], a delay [s] and the age [s] at which a command is stale."""
-    if transport_delay >= (RING - 1) * period:
-        raise ParameterError(f'transport_delay = {transport_delay:g} s: must be below {RING - 1} periods of '
-                             f'{period:g} s')
+    check_delay(period, transport_delay)
     return np.array([(round(transport_delay * 1e9), round(timeout * 1e9))], CONSTANTS)
 
 
 def initial_state(azimuth, elevation) -> np.ndarray:
     """STATE (1,): the beam at these angles [rad], no command yet."""
     s = np.zeros(1, STATE)
-    s['position'], s['since_ns'], s['command_stamp_ns'] = (azimuth, elevation), NEVER, NEVER
+    s['position'], s['command_stamp_ns'] = (azimuth, elevation), NEVER
     return s
 
 
@@ -70,7 +73,6 @@ def release(s, c, stamp_ns):
         slot = s.released % RING
         s.position[0], s.position[1] = s.ring_position[slot, 0], s.ring_position[slot, 1]
         s.released += 1
-        s.since_ns = stamp_ns
 
 
 @compiled
@@ -78,7 +80,6 @@ def read(state, outputs):
     """Outputs as they are now: at t_0, before the first step."""
     s, y = state[0], outputs[0]
     y.position[0], y.position[1] = s.position[0], s.position[1]
-    y.since_ns = s.since_ns
 
 
 @compiled

@@ -3,6 +3,7 @@ what the paper leaves open: reference/servo.md section 1."""
 import dataclasses
 import math
 
+from adu_drive import electronic_beam
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter
 
 SPEED_PERIOD = 0.5e-3
@@ -274,3 +275,11 @@ class BeamParameters(RunParameters):
     transport_delay: float = parameter(0.0, 0.0, 0.5, 's', 'a command takes effect this much later')
     initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'of every beam at t = 0')
     initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'of every beam at t = 0')
+
+    def check(self):
+        super().check()
+        periods = self.transport_delay / self.period
+        if abs(periods - round(periods)) > 1e-6:
+            raise ParameterError(f'transport_delay = {self.transport_delay:g} s: must be a multiple of the period '
+                                 f'{self.period:g} s: a beam changes at the steps')
+        electronic_beam.check_delay(self.period, self.transport_delay)

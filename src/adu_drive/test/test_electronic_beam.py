@@ -7,7 +7,6 @@ import pytest
 from adu_drive import electronic_beam
 from adu_drive.electronic_beam import RING
 from pedestal_common.parameters import ParameterError
-from pedestal_common.records import NEVER
 
 MS = 1_000_000
 
@@ -46,17 +45,15 @@ def test_beam_in_force_is_the_newest_command_whose_delay_is_over(delay):
             if fresh:
                 given.append((stamp, k, wanted))
         there = [(max(-(-(s + round(delay * 1e9)) // MS), came), w) for s, came, w in given]
-        there = [(since, w) for since, w in there if since <= k]
-        since, expected = (there[-1][0] * MS, there[-1][1]) if there else (NEVER, [0.1, 0.2])
-        assert o['position'].tolist() == list(expected)
-        assert o['since_ns'] == since
+        there = [w for since, w in there if since <= k]
+        assert o['position'].tolist() == list(there[-1] if there else [0.1, 0.2])
 
 
 def test_without_delay_a_command_is_in_force_in_the_interval_that_follows_its_stamp():
     beam = Beam()
-    assert beam.outputs['position'][0].tolist() == [0.1, 0.2] and beam.outputs['since_ns'][0] == NEVER
+    assert beam.outputs['position'][0].tolist() == [0.1, 0.2]
     o = beam.step((0.5, 0.6))
-    assert o['position'].tolist() == [0.5, 0.6] and o['since_ns'] == 0
+    assert o['position'].tolist() == [0.5, 0.6]
 
 
 @pytest.mark.parametrize('command', [(math.nan, 0.1), (0.1, math.inf), (1e9, 0.0)])

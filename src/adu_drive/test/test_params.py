@@ -6,6 +6,7 @@ from adu_drive import drive_unit
 from adu_drive.params import (
     AduParameters,
     AxisParameters,
+    BeamParameters,
     BiasParameters,
     EncoderParameters,
     FrictionParameters,
@@ -34,6 +35,9 @@ def test_table_1_of_paper_000():
     (lambda: FrictionParameters(breakaway=50.0), 'breakaway = 50'),
     (lambda: AxisParameters(motor_1=MotorParameters(voltage=200.0)), 'limits.rate = 2.45'),
     (lambda: EncoderParameters(load_bits=math.nan), 'load_bits'),
+    (lambda: BeamParameters(period=0.01, transport_delay=0.021), 'transport_delay = 0.021 s: must be a multiple of'),
+    (lambda: BeamParameters(period=1e-4, transport_delay=0.3), 'transport_delay = 0.3 s: must be below 511 periods'),
+    (lambda: BeamParameters(period=0.01, duration=0.015), 'duration = 0.015'),
     (lambda: build(AduParameters, {'wind.gust.kind': 'davenport'}), 'gust.kind = davenport'),
     (lambda: build(AduParameters, {'azimuth.gear_train.lsh': 0.0}), "did you mean 'azimuth.gear_train.lash'"),
 ])

@@ -313,6 +313,9 @@ class Bag:
         if 'parameters' in self.metadata_records:
             seen.metadata_records['parameters'] = own(self.metadata_records['parameters'])
         seen.__dict__.pop('configuration', None)
+        tracking = seen.configuration['parameters'].get('tracking_receiver', {})
+        if 'antenna.beamwidth' in tracking:
+            seen.metadata['beamwidth'] = str(tracking['antenna.beamwidth'])
         return seen
 
     @functools.cached_property

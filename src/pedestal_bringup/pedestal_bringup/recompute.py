@@ -341,7 +341,11 @@ def compare(recording, outputs, unit, tolerance) -> list:
 def chosen(recording, nodes, file_values):
     """The nodes to recompute: those named, else those whose parameters are known and whose inputs and outputs are
     there, and the ACU also without outputs; of a recording that does not say how it was made, the ACU."""
+    nodes = [node.removeprefix(recording.bag.beam) for node in nodes]
     for node in nodes:
+        if topics.beam_of(node):
+            raise RecomputeError(f'--node {node}: of one beam at a time; say --beam {topics.beam_of(node)} --node '
+                                 f'{topics.plain(node)}')
         if node not in KINDS:
             raise RecomputeError(f'--node {node}: must be one of {", ".join(KINDS)}')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
@@ -397,8 +401,12 @@ def parameters_of(recording, node, file_values=None, changes=()):
     """The parameter dataclass of a node: of the file, else as recorded, else the defaults; then changed."""
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
+    array = recording.bag.beams > 0
     try:
-        return parameters.build(scenario.kind(node, recording.bag.beams > 0).parameters, {**values, **dict(changes)})
+        params = parameters.build(scenario.kind(node, array).parameters, {**values, **dict(changes)})
+        if node == 'acu':
+            params.check_drive(array)
+        return params
     except parameters.ParameterError as error:
         raise RecomputeError(f'{node}: {error}') from None
 

@@ -35,13 +35,30 @@ def _pointing(beam, target, ship, attitude, known_attitude, estimate, error, fil
         filtered[k, 0], filtered[k, 1] = line_of_sight.offsets(azimuth, elevation, x, y, z)
 
 
+@compiled
+def _began(beam, error, out):
+    for k in range(1, len(beam)):
+        azimuth, elevation = line_of_sight.displaced(beam[k - 1, 0], beam[k - 1, 1], error[k - 1, 0], error[k - 1, 1])
+        x, y, z = line_of_sight.direction(azimuth, elevation)
+        out[k, 0], out[k, 1] = line_of_sight.offsets(beam[k, 0], beam[k, 1], x, y, z)
+
+
+def began(beam, error):
+    """Pointing error (n, 2) at the beginning of the intervals in which a beam (n, 2) [rad] that jumps at the steps
+    stood, from the one (n, 2) at their ends, the stamps: beam k against the target of k - 1; NaN in the first."""
+    out = np.full(beam.shape, np.nan)
+    _began(np.ascontiguousarray(beam), np.ascontiguousarray(error), out)
+    return out
+
+
 @dataclasses.dataclass
 class Tracking:
     """A run as arrays on the drive's steps; angles in rad, NaN where nothing was measured.
 
     t (n,) s; azimuth, elevation (n,) encoders; reference (n, 2) deck angles that the ACU follows, NaN in standby and
     of an electronic beam, which is told where to be later;
-    cross_elevation, elevation_error (n,) true error;
+    cross_elevation, elevation_error (n,) true error; begun (n, 2) both at the beginning of the interval that ends
+    there, of an electronic beam, else NaN;
     measured (n, 2) receiver errors and cn0 (n,) at their stamp; filtered (n, 2) the estimate seen from the
     beam, as cross-elevation and elevation; beam_earth (n, 2); target_earth (n, 2) and range (n,) m; mode (n,) text;
     tracking (n,) bool: in autotrack and settled, since (n,) bool: that or later; beamwidth rad, NaN when the bag does
@@ -63,6 +80,7 @@ class Tracking:
     tracking: np.ndarray
     since: np.ndarray
     beamwidth: float
+    begun: np.ndarray
 
 
 def beamwidth(bag):
@@ -129,7 +147,8 @@ def tracking(bag) -> Tracking:
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t, beam[:, 0], beam[:, 1], reference, error[:, 0], error[:, 1], measured[:, :2], measured[:, 2],
                     filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
-                    automatic & (t >= start), t >= start, beamwidth(bag))
+                    automatic & (t >= start), t >= start, beamwidth(bag),
+                    began(beam, error) if bag.beams else np.full_like(error, np.nan))
 
 
 def modes(bag, t):
@@ -150,9 +169,11 @@ def rms(values):
 def summary(run: Tracking) -> dict:
     """{metric: (value, unit)} over the settled autotrack part of a run; NaN when it never tracked.
 
-    *_following_*_deg: reference less encoder over every step outside standby, tracking or not;
-    pointing_*_deg: both axes together, per axis and sample (not the angle off the beam);
-    single_sample_noise_deg: rms of the receiver's error minus the true one, per axis and sample;
+    *_following_*_deg: reference less encoder over every step outside standby, tracking or not, of a drive with motors;
+    pointing_*_deg: both axes together, per axis and sample (not the angle off the beam); of an electronic beam, which
+    stands from step to step, at the end or at the beginning of its intervals, whichever is larger;
+    single_sample_noise_deg: rms of the receiver's error minus the true one, per axis and sample; of an electronic beam
+    minus that of the middle of the interval, which the receiver measures;
     noise_reduction: that divided by the rms error of the filtered line of sight against truth;
     loss_s: how long the target was further than half a beamwidth off the beam, in whatever mode, from when on the run
     counts as tracking.
@@ -160,24 +181,32 @@ def summary(run: Tracking) -> dict:
     on = run.tracking
     degrees = math.degrees(1.0)
     true = np.column_stack((run.cross_elevation, run.elevation_error))[on]
-    raw = (run.measured[on] - true) * degrees
+    begun = run.begun[on]
+    standing = np.isfinite(run.begun).any()
+    raw = (run.measured[on] - (0.5 * (true + begun) if standing else true)) * degrees
     filtered = (run.filtered[on] - true) * degrees
     locked = np.isfinite(run.measured[:, 0])
     noise = rms(raw)
+
+    def larger(measure, axis=slice(None)):
+        return max(measure(error[:, axis]) for error in ((true, begun) if standing else (true,)))
+
     following = (run.reference - np.column_stack((run.azimuth, run.elevation))) * degrees
-    values = {
+    followed = {} if standing else {
         'azimuth_following_rms_deg': (rms(following[:, 0]), 'deg'),
         'azimuth_following_max_deg': (_max(following[:, 0]), 'deg'),
         'elevation_following_rms_deg': (rms(following[:, 1]), 'deg'),
-        'elevation_following_max_deg': (_max(following[:, 1]), 'deg'),
-        'pointing_rms_deg': (rms(true) * degrees, 'deg'),
-        'pointing_max_deg': (_max(true) * degrees, 'deg'),
-        'cross_elevation_rms_deg': (rms(true[:, 0]) * degrees, 'deg'),
-        'elevation_rms_deg': (rms(true[:, 1]) * degrees, 'deg'),
-        'cross_elevation_max_deg': (_max(true[:, 0]) * degrees, 'deg'),
-        'elevation_max_deg': (_max(true[:, 1]) * degrees, 'deg'),
+        'elevation_following_max_deg': (_max(following[:, 1]), 'deg')}
+    values = {
+        **followed,
+        'pointing_rms_deg': (larger(rms) * degrees, 'deg'),
+        'pointing_max_deg': (larger(_max) * degrees, 'deg'),
+        'cross_elevation_rms_deg': (larger(rms, 0) * degrees, 'deg'),
+        'elevation_rms_deg': (larger(rms, 1) * degrees, 'deg'),
+        'cross_elevation_max_deg': (larger(_max, 0) * degrees, 'deg'),
+        'elevation_max_deg': (larger(_max, 1) * degrees, 'deg'),
         'single_sample_noise_deg': (noise, 'deg'),
-        'pointing_to_noise': (rms(true) * degrees / noise, ''),
+        'pointing_to_noise': (larger(rms) * degrees / noise, ''),
         'noise_reduction_cross_elevation': (rms(raw[:, 0]) / rms(filtered[:, 0]), ''),
         'noise_reduction_elevation': (rms(raw[:, 1]) / rms(filtered[:, 1]), ''),
         'noise_reduction': (noise / rms(filtered), ''),

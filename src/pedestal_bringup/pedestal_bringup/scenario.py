@@ -1,7 +1,10 @@
 """Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
 
-`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged.
+`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged, but for an array of
+several beams: its nodes are `/beam_1/acu` and so on, which the section `acu` does not match. They take the file that
+`pedestal run` leaves beside the bag, parameters.yaml.
 """
+import contextlib
 import dataclasses
 import difflib
 import importlib.resources
@@ -18,7 +21,7 @@ from adu_drive.params import AduNodeParameters, BeamParameters
 from pedestal_bringup.params import RecorderParameters
 from pedestal_common import parameters, topics
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
-from tracking_receiver_sim import smoothing
+from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 
@@ -289,6 +292,9 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     for node in sections:
         if topics.beam_of(node) and node not in of_beams:
             raise ScenarioError(f'scenario {name}: section {node!r}: the scenario has beams = {header.beams}')
+    if header.beam:
+        for axis in ('azimuth', 'elevation'):
+            sections.setdefault('acu', {}).setdefault(f'{axis}.controller', 'beam')
     for node in (*NODE_KINDS, *of_beams):
         sections.setdefault(node, {})
         _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
@@ -296,7 +302,11 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     for node in of_beams:
         _spread_to_beam(name, node, sections, header, seed)
     for node, values in sections.items():
-        typed = parameters.as_dict(_checked(name, node, kind(node, header.beam).parameters, _whole(sections, node)))
+        checked = _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
+        if topics.plain(node) == 'acu':
+            with _named(name, node):
+                checked.check_drive(header.beam)
+        typed = parameters.as_dict(checked)
         sections[node] = {key: typed[key] for key in values}
     return Scenario(name, header, sections)
 
@@ -307,10 +317,12 @@ def _spread(name, sections, header, seed):
     Raises ScenarioError where a node was told something else.
     """
     def tell(node, key, value):
-        told = sections[node].setdefault(key, value)
-        if told != value:
-            raise ScenarioError(f'scenario {name}, {node}: {key} = {told}: must be {value}, as is said elsewhere; '
-                                'leave it out here')
+        sections[node].setdefault(key, value)
+        for section in [section for section in sections if topics.plain(section) == node]:
+            told = sections[section].get(key, value)
+            if told != value:
+                raise ScenarioError(f'scenario {name}, {section}: {key} = {told}: must be {value}, as is said '
+                                    'elsewhere; leave it out here')
 
     for node in ('adu', 'recorder', 'tracking_receiver'):
         tell(node, 'duration', header.duration)
@@ -329,28 +341,28 @@ def _spread(name, sections, header, seed):
     for key, told in MEASURED:
         measured = sections['tracking_receiver'].get(key, False)
         for node in ('acu', 'recorder'):
-            if measured or told in sections[node]:
+            if measured or any(told in values for section, values in sections.items()
+                               if topics.plain(section) == node):
                 tell(node, told, measured)
     for owner, key, node, told in KNOWN:
         if key in sections[owner]:
             sections[node].setdefault(told, sections[owner][key])
     if header.beam:
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
-        sections['acu'].setdefault('tracker.receiver.age', _error_age(sections['tracking_receiver']))
-
-
-def _error_age(values):
-    """How long [s] before its stamp an error of a beam that stands belongs: the mean delay of the samples in it."""
-    tracking = parameters.build(parameters_of('tracking_receiver'), values)
-    r = tracking.receiver
-    return smoothing.delay(r.smoothing, r.samples_per_step, r.smoothing_samples) * tracking.period / r.samples_per_step
+        for prefix in topics.prefixes(header.graph_beams):
+            tracking = _checked(name, f'{prefix}tracking_receiver', TrackingReceiverNodeParameters,
+                                _whole(sections, f'{prefix}tracking_receiver'))
+            for key, value in (('age', receiver.age(tracking, tracking.period)),
+                               ('beam_age', receiver.beam_age(tracking, tracking.period))):
+                if f'tracker.receiver.{key}' not in sections['acu']:
+                    sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
 
 
 def _spread_to_beam(name, node, sections, header, seed):
     """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
     values, beam = sections[node], topics.beam_of(node)
-    receiver = f'{beam}/tracking_receiver'
-    if node == receiver and (seed is not None or 'seed' not in values):
+    own_receiver = f'{beam}/tracking_receiver'
+    if node == own_receiver and (seed is not None or 'seed' not in values):
         spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
         values['seed'] = int(spread.generate_state(1)[0] >> 1)
     for owner, key, other, told in KNOWN:
@@ -358,15 +370,20 @@ def _spread_to_beam(name, node, sections, header, seed):
         if topics.plain(node) == other and key in own:
             values.setdefault(told, own[key])
     for key, _ in MEASURED:
-        if key in sections[receiver]:
-            raise ScenarioError(f'scenario {name}, {receiver}: {key}: is the same for every beam; say it in '
+        if key in sections[own_receiver]:
+            raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: is the same for every beam; say it in '
                                 'tracking_receiver')
-    if node != receiver and any(key.startswith('receiver.s') for key in sections[receiver]):
-        values.setdefault('tracker.receiver.age', _error_age(_whole(sections, receiver)))
 
 
 def _checked(name, section, parameters_type, values):
-    try:
+    with _named(name, section):
         return parameters.build(parameters_type, values)
+
+
+@contextlib.contextmanager
+def _named(name, section):
+    """A ParameterError becomes a ScenarioError that names the section."""
+    try:
+        yield
     except parameters.ParameterError as error:
         raise ScenarioError(f'scenario {name}, {section}: {error}') from None

@@ -69,8 +69,22 @@ def test_the_graph_has_no_more_than_half_a_period_and_the_loops_own_error(values
 
 def test_figures_are_drawn(result, tmp_path):
     assert set(result.figures) >= {f'figure-{n}' for n in (3, 4, 5, 7, 9)} | {'figure-6-left', 'figure-6-right'}
+    for name, draw in result.figures.items():
+        figure = draw()
+        lines = [line for axes in figure.axes for line in axes.get_lines()]
+        assert lines and all(np.isfinite(line.get_ydata()).any() for line in lines), name
     experiment.save(result.figures['figure-7'], tmp_path / 'figure-7.png')
     assert (tmp_path / 'figure-7.png').stat().st_size > 10000
+
+
+def test_a_beam_that_is_right_in_the_middle_is_off_at_the_ends_of_its_millisecond(values):
+    """By the rate of the target: 30 deg/s, and what is left of the sway's 7.85 deg/s."""
+    assert values['best/ramp', 'ends_max_error_deg'] == pytest.approx(0.015, abs=1e-4)
+    rate = phased_array.SWAY * 2.0 * math.pi / phased_array.SWAY_PERIOD
+    limit = phased_array.isolation(0.5 * rate * GRID)
+    for case in ('best/sway-ins', 'best/sway-ins/exact-stamps'):
+        assert values[case, 'ends_isolation_db'] == pytest.approx(limit, abs=4.0)
+        assert values[case, 'ends_isolation_db'] < limit + 0.01
 
 
 @pytest.mark.parametrize('hold, delay', [(1, 20), (10, 20), (5, 150)])

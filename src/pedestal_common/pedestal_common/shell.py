@@ -150,6 +150,7 @@ class Shell(Node):
                    if name not in known and not name.startswith('qos_overrides')]
         self.parameters = parameters.build(self._parameters_type, {**own, **dict.fromkeys(unknown)})
         self.graph = parameters.build(GraphParameters, graph, 'graph.')
+        self.check_parameters(self.parameters)
         if live:
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)
@@ -164,7 +165,12 @@ class Shell(Node):
     def _changed(self, changes):
         values = parameters.as_dict(self.parameters)
         values.update({change.name: change.value for change in changes if change.name in values})
-        return parameters.build(self._parameters_type, values)
+        changed = parameters.build(self._parameters_type, values)
+        self.check_parameters(changed)
+        return changed
+
+    def check_parameters(self, params):
+        """Overridden where parameters must fit the graph; raises ParameterError."""
 
     def _on_set(self, changes):
         try:

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from pedestal_common.line_of_sight import ashore_matrix
 from pedestal_common.parameters import ParameterError, build
-from tracking_receiver_sim import monopulse, receiver, target
+from tracking_receiver_sim import monopulse, receiver, smoothing, target
 from tracking_receiver_sim.params import TrackingReceiverParameters
 
 PERIOD = 0.005
@@ -276,6 +276,23 @@ def test_a_held_beam_jumps_at_the_step_and_only_the_target_moves(samples):
 def test_age_of_an_error(values, age):
     params = build(TrackingReceiverParameters, {**values, 'receiver.samples_per_step': 5})
     assert receiver.age(params, PERIOD) == pytest.approx(age)
+
+
+@pytest.mark.parametrize('kind, n', [('none', 20), ('recursion', 20), ('recursion', 7), ('moving_average', 20),
+                                     ('moving_average', 13), ('moving_average', 3)])
+@pytest.mark.parametrize('beam', ['held', 'moving'])
+def test_age_of_the_beam_is_that_of_the_steps_its_samples_were_taken_in(kind, n, beam):
+    """What the smoothing makes of samples that are the number of their step."""
+    samples, steps, state = 5, 300, np.zeros(1, smoothing.SMOOTHER).view(np.recarray)[0]
+    for step in range(steps):
+        smoothing.begin(state)
+        for _ in range(samples):
+            smoothing.put(state, float(step), 1.0 / n)
+    seen = smoothing.smoothed(state, smoothing.SMOOTHINGS.index(kind), samples, n)
+    expected = (steps - 1 - seen) * PERIOD if beam == 'held' else 0.0
+    params = build(TrackingReceiverParameters, {'receiver.beam': beam, 'receiver.smoothing': kind,
+                                                'receiver.smoothing_samples': n, 'receiver.samples_per_step': samples})
+    assert receiver.beam_age(params, PERIOD) == pytest.approx(expected, abs=1e-12)
 
 
 def test_samples_follow_the_error_between_steps():

@@ -150,6 +150,15 @@ def age(params, period):
             * period / receiver.samples_per_step)
 
 
+def beam_age(params, period):
+    """How long before its stamp [s] the beam that an error was measured off belongs in the mean, by the stamps of the
+    joint states: of a beam that stands through a step, those at its end."""
+    receiver = params.receiver
+    if BEAMS.index(receiver.beam) != HELD:
+        return 0.0
+    return smoothing.steps_back(receiver.smoothing, receiver.samples_per_step, receiver.smoothing_samples) * period
+
+
 def _hertz(cn0_dbhz):
     return 10.0**(0.1 * cn0_dbhz)
 

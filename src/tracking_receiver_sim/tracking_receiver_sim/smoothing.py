@@ -51,3 +51,14 @@ def smoothed(s, kind, samples, n):
 def delay(kind, samples, n):
     """Mean delay in samples of a kind of SMOOTHINGS: how long before the newest sample the result belongs."""
     return {'none': 0.5 * (samples - 1), 'recursion': n - 1.0, 'moving_average': 0.5 * (n - 1)}[kind]
+
+
+def steps_back(kind, samples, n):
+    """How many steps before the last one the samples in the result were taken in the mean: `delay` in whole steps of
+    `samples`."""
+    if kind == 'none':
+        return 0.0
+    if kind == 'recursion':
+        kept = (1.0 - 1.0 / n)**samples
+        return kept / (1.0 - kept)
+    return sum(k // samples for k in range(n)) / n

@@ -131,12 +131,7 @@ def _paper(form, alpha, period, delta, slope, beamwidth, lost, kind, target, rat
             smoothing.put(s, sample, 1.0 / LENGTH)
         if i % period == 0:
             error = math.nan if math.isnan(sample) else smoothing.smoothed(s, kind, 1, LENGTH)
-            if math.isnan(error):
-                R, v = beam_loop.coasted(R, v, T, delta * rate[i])
-            elif form == beam_loop.TYPE_1:
-                R, v = beam_loop.type_1(R, v, error, alpha, beta, T, delta * rate[i])
-            else:
-                R, v = beam_loop.type_2(R, v, error, alpha, beta, T, delta * rate[i])
+            R, v = beam_loop.step(form, R, v, error, alpha, beta, T, delta * rate[i])
         seen[i] = error
         command(inputs[0], i, i % period == 0, R)
         electronic_beam.step(state, constants, inputs, outputs)
