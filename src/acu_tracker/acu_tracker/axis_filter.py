@@ -90,15 +90,26 @@ def _fill(f, c, estimate):
 def start(f, c, y, R, rate_sigma):
     """Begin at a measured angle y [rad] of variance R, the rate unknown to rate_sigma [rad/s]."""
     _fill(f, c, (y, 0.0, 0.0, R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0))
-    for j in range(c.count):
-        f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
+    _open_acceleration(f, c, rate_sigma)
 
 
 @compiled
-def adopt(f, c):
-    """If the bank is another than before: its models start from the combined estimate and covariance of the old."""
+def adopt(f, c, rate_sigma):
+    """If the bank is another than before: its models start from the combined estimate and covariance of the old.
+
+    Of an acceleration that the old one does not know they know as much as at a `start` with rate_sigma.
+    """
     if f.bank != c.bank:
+        unknown = f.bank == 1 << motion_models.CV
         _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
+        if unknown:
+            _open_acceleration(f, c, rate_sigma)
+
+
+@compiled
+def _open_acceleration(f, c, rate_sigma):
+    for j in range(c.count):
+        f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
 
 
 @compiled

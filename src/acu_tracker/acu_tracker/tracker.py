@@ -61,11 +61,11 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, theta3, k_m, tau, floor
 
 
 @compiled
-def adopt(t, c):
+def adopt(t, p, c):
     """The constants may have changed: a filter of another kind goes on from the estimate of the one before."""
     if t.running:
-        axis_filter.adopt(t.azimuth, c.azimuth)
-        axis_filter.adopt(t.elevation, c.elevation)
+        axis_filter.adopt(t.azimuth, c.azimuth, p.initial_rate)
+        axis_filter.adopt(t.elevation, c.elevation, p.initial_rate)
     if (t.used[0] and not c.wanted[0]) or (t.used[1] and not c.wanted[1]):
         hand_back(t, c)
 

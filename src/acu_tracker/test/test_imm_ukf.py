@@ -32,7 +32,7 @@ class Pass:
 
     def put(self, kinds):
         self.c = tracker.constants(self.params, *(Filter(kind=kind) for kind in kinds))[0]
-        tracker.adopt(self.state[0], self.c)
+        tracker.adopt(self.state[0], self.p, self.c)
 
     def now(self, stamp=None):
         return np.array(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
