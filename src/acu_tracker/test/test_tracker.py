@@ -163,6 +163,22 @@ def test_covariance_grows_in_a_coast(kind):
     assert (np.diff(grown[:, 2]) >= (0 if kind == 'alpha_beta' else 1e-30)).all()
 
 
+@pytest.mark.parametrize('gap', [0.1, 0.5, 0.9])
+@pytest.mark.parametrize('kind', KINDS)
+def test_an_error_is_compared_with_what_was_told_in_the_coast(kind, gap):
+    """Out of a turn, the innovation after a gap is measured from the estimate of that time, in sigmas of its
+    covariance: the antenna points where the gate is."""
+    target = Target({'gate': 1e6}, kind=kind)
+    for k in range(300):
+        target.observe(k * T, 0.1 + 0.02 * k * T + 0.5 * 0.02 * max(k * T - 2.0, 0.0)**2)
+    stamp = 299 * T + gap
+    angle, variance = target.outlook(stamp)[0], target.variances(gap)[0]
+    outcome, nu, _, _, _, nis, _ = target.observe(stamp, 0.3)
+    assert outcome == tracker.BELIEVED and nu == pytest.approx(0.3 - angle, abs=1e-12)
+    assert target.state['S'][0, 0] == pytest.approx(variance + SIGMA**2, rel=1e-12)
+    assert nis == pytest.approx(nu**2 / (variance + SIGMA**2), rel=1e-12)
+
+
 def test_receiver_law():
     # theta3 / (k_m sqrt(2 C/N0 tau)): 1 deg, 1.6, 40 dB-Hz, 10 ms -> 1 / (1.6 sqrt(200)) deg
     R = tracker.error_variance(0.0, 0.0, 40.0, DEG, 1.6, 0.01, 0.0)
