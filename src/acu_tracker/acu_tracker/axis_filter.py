@@ -28,7 +28,8 @@ FILTER = np.dtype([('bank', 'i8'), ('count', 'i8'), ('T', 'f8'),
                    ('weights', 'f8', (BANK,))], align=True)
 """x, p, mu: estimate, covariance (upper triangle) and probability of each model, after the last measurement.
 
-The same _prior: predicted by T [s] from there, set by `predict`. weights: scratch.
+The same _prior: predicted by T [s] from there, set by `predict`, which all that is said of a later time goes through.
+weights: scratch.
 """
 
 ESTIMATE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
@@ -90,15 +91,26 @@ def _fill(f, c, estimate):
 def start(f, c, y, R, rate_sigma):
     """Begin at a measured angle y [rad] of variance R, the rate unknown to rate_sigma [rad/s]."""
     _fill(f, c, (y, 0.0, 0.0, R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0))
-    for j in range(c.count):
-        f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
+    _open_acceleration(f, c, rate_sigma)
 
 
 @compiled
-def adopt(f, c):
-    """If the bank is another than before: its models start from the combined estimate and covariance of the old."""
+def adopt(f, c, rate_sigma):
+    """If the bank is another than before: its models start from the combined estimate and covariance of the old.
+
+    Of an acceleration that the old one does not know they know as much as at a `start` with rate_sigma.
+    """
     if f.bank != c.bank:
+        unknown = f.bank == 1 << motion_models.CV
         _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
+        if unknown:
+            _open_acceleration(f, c, rate_sigma)
+
+
+@compiled
+def _open_acceleration(f, c, rate_sigma):
+    for j in range(c.count):
+        f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
 
 
 @compiled
@@ -114,7 +126,7 @@ def move(f, c, angle, rate, acceleration):
 
 @compiled
 def predict(f, c, T):
-    """The bank T [s] after its last measurement, into the prior fields; the state itself stays."""
+    """The bank T [s] >= 0 after its last measurement, into the prior fields; the state itself stays."""
     f.T = T
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
@@ -137,15 +149,14 @@ def _predicted(m, x1, x2, x3, p11, p12, p13, p22, p23, p33, T):
 
 @compiled
 def expected(f):
-    """(angle, rate, p11, p12, p22) of what `predict` left."""
-    x1, x2, _, p11, p12, _, p22, _, _ = imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
-    return x1, x2, p11, p12, p22
+    """(x1, x2, x3, p11, p12, p13, p22, p23, p33) of what `predict` left: mean and covariance of the bank."""
+    return imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
 
 
 @compiled
 def consistency(f, y, R, y_rate, R_rate):
     """(nu, nu of the rate, nu' S^-1 nu) against what `predict` left; y_rate NaN: of the angle alone."""
-    x1, x2, p11, p12, p22 = expected(f)
+    x1, x2, _, p11, p12, _, p22, _, _ = expected(f)
     nu, nu_rate = y - x1, y_rate - x2
     if math.isnan(nu_rate):
         return nu, nu_rate, nu * nu / (p11 + R)
@@ -179,32 +190,17 @@ def correct(f, c, y, R, y_rate, R_rate):
 
 @compiled
 def outlook(f, c, T):
-    """(angle, rate, acceleration) T [s] after the estimate: Phi X, so that in a long coast an acceleration fades."""
-    angle = rate = acceleration = 0.0
-    for j in range(c.count):
-        mu, x = f.mu[j], f.x[j]
-        f13, f23, f33 = motion_models.transition(c.models[j], T)
-        angle += mu * (x[0] + T * x[1] + f13 * x[2])
-        rate += mu * (x[1] + f23 * x[2])
-        acceleration += mu * f33 * x[2]
-    return angle, rate, acceleration
+    """(angle, rate, acceleration) T [s] >= 0 after the estimate: what a measurement then is compared with."""
+    predict(f, c, T)
+    x1, x2, x3, _, _, _, _, _, _ = expected(f)
+    return x1, x2, x3
 
 
 @compiled
 def variances(f, c, T):
-    """(p11, p12, p22) T [s] >= 0 after the estimate: variances of angle and rate, p12 between them."""
-    x1, x2, _ = outlook(f, c, T)
-    p11 = p12 = p22 = 0.0
-    for j in range(c.count):
-        m, mu, x, p = c.models[j], f.mu[j], f.x[j], f.p[j]
-        f13, f23, f33 = motion_models.transition(m, T)
-        q11, q12, q13, q22, q23, q33 = motion_models.process_noise(m, x[2], T)
-        a11, a12, _, a22, _, _ = kalman.predict_covariance(p[0], p[1], p[2], p[3], p[4], p[5], T, f13, f23, f33,
-                                                           q11, q12, q13, q22, q23, q33)
-        d1, d2 = x[0] + T * x[1] + f13 * x[2] - x1, x[1] + f23 * x[2] - x2
-        p11 += mu * (a11 + d1 * d1)
-        p12 += mu * (a12 + d1 * d2)
-        p22 += mu * (a22 + d2 * d2)
+    """(p11, p12, p22) of the same: variances of angle and rate, p12 between them."""
+    predict(f, c, T)
+    _, _, _, p11, p12, _, p22, _, _ = expected(f)
     return p11, p12, p22
 
 
@@ -226,6 +222,7 @@ def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
     state = np.zeros(1, FILTER)
     f, m = state[0], c[0]
     f.mu[:] = last = math.nan
+    f.count = m.count
     for k in range(len(t)):
         o = out[k]
         o.innovation = o.rate_innovation = o.nis = math.nan
@@ -241,6 +238,6 @@ def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
             correct(f, m, y[k], R[k], rate, R_rate[k])
             last = t[k]
         T = max(t[k] - last, 0.0)
-        o.angle, o.rate, o.acceleration = outlook(f, m, T)
-        o.variance, o.covariance, o.rate_variance = variances(f, m, T)
+        predict(f, m, T)
+        o.angle, o.rate, o.acceleration, o.variance, o.covariance, _, o.rate_variance, _, _ = expected(f)
         probabilities(f, m, o.mu)

@@ -445,7 +445,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         o.reason = modes.BAD_STAMP
         return
     clear(o)
-    tracker.adopt(s.tracker, constants[0].tracker)
+    tracker.adopt(s.tracker, p.tracker, constants[0].tracker)
     rows = max(u.program_count, 0)
     times, angles = program_times[:rows], program_angles[:rows]
     jumped = dt > p.step_gap

@@ -24,11 +24,17 @@ def switching(T, dwell, count):
 
 @compiled
 def mix(mu, count, stay, switch, j, weights):
-    """weights[i] = probability that model i held before, given that j holds now; returns cbar_j, that of j now."""
+    """weights[i] = probability that model i held before, given that j holds now; returns cbar_j, that of j now.
+
+    A model that cannot hold now (at once after a measurement that ruled it out) keeps its own state.
+    """
     total = 0.0
     for i in range(count):
         weights[i] = mu[i] * (stay if i == j else switch)
         total += weights[i]
+    if total == 0.0:
+        weights[j] = 1.0
+        return 0.0
     for i in range(count):
         weights[i] /= total
     return total

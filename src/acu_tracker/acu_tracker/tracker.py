@@ -61,11 +61,11 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, theta3, k_m, tau, floor
 
 
 @compiled
-def adopt(t, c):
+def adopt(t, p, c):
     """The constants may have changed: a filter of another kind goes on from the estimate of the one before."""
     if t.running:
-        axis_filter.adopt(t.azimuth, c.azimuth)
-        axis_filter.adopt(t.elevation, c.elevation)
+        axis_filter.adopt(t.azimuth, c.azimuth, p.initial_rate)
+        axis_filter.adopt(t.elevation, c.elevation, p.initial_rate)
     if (t.used[0] and not c.wanted[0]) or (t.used[1] and not c.wanted[1]):
         hand_back(t, c)
 
@@ -90,8 +90,9 @@ def turn(t, c, A, dA, ddA, E, dE, ddE):
 @compiled
 def begin_cartesian(t, c, range_, R_range):
     """The Cartesian filter starts where the filters of the axes are, at a first range [m]."""
-    A, dA, ddA, E, dE, ddE = outlook(t, c, t.stamp)
-    a11, a12, a22, e11, e12, e22 = variances(t, c, t.stamp)
+    predict(t, c, t.stamp)
+    A, dA, ddA, E, dE, ddE = expected(t)
+    a11, a12, a22, e11, e12, e22 = expected_variances(t)
     unscented.start(t.cartesian, c.cartesian, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, range_, R_range)
     t.ranged = 1
 
@@ -134,7 +135,7 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
         azimuth = near + wrap(azimuth - near)
         nu_a, nu_da, nis_a = axis_filter.consistency(a, azimuth, R_azimuth, azimuth_rate, R_azimuth_rate)
         nu_e, nu_de, nis_e = axis_filter.consistency(e, elevation, R_elevation, elevation_rate, R_elevation_rate)
-        t.S[0], t.S[1] = axis_filter.expected(a)[2] + R_azimuth, axis_filter.expected(e)[2] + R_elevation
+        t.S[0], t.S[1] = axis_filter.expected(a)[3] + R_azimuth, axis_filter.expected(e)[3] + R_elevation
         if t.ranged:
             unscented.predict(x, c.cartesian, T)
             n_a, S_a, n_e, S_e, n_r, S_r = unscented.innovation(x, azimuth, elevation, range_, R_azimuth, R_elevation,
@@ -187,13 +188,22 @@ def locked(t, p, overdue):
 
 
 @compiled
-def outlook(t, c, stamp):
-    """Angle, rate, acceleration of azimuth and elevation at a stamp."""
-    T = stamp - t.stamp
-    A, dA, ddA = axis_filter.outlook(t.azimuth, c.azimuth, T)
-    E, dE, ddE = axis_filter.outlook(t.elevation, c.elevation, T)
+def predict(t, c, stamp):
+    """Both axes and the Cartesian filter, where it is used, at a stamp; before the last error they stay at that."""
+    T = max(stamp - t.stamp, 0.0)
+    axis_filter.predict(t.azimuth, c.azimuth, T)
+    axis_filter.predict(t.elevation, c.elevation, T)
     if t.used[0] or t.used[1]:
-        B, dB, ddB, F, dF, ddF = unscented.outlook(t.cartesian, c.cartesian, T)
+        unscented.predict(t.cartesian, c.cartesian, T)
+
+
+@compiled
+def expected(t):
+    """Angle, rate, acceleration of azimuth and elevation of what `predict` left."""
+    A, dA, ddA, _, _, _, _, _, _ = axis_filter.expected(t.azimuth)
+    E, dE, ddE, _, _, _, _, _, _ = axis_filter.expected(t.elevation)
+    if t.used[0] or t.used[1]:
+        B, dB, ddB, F, dF, ddF = unscented.expected_angles(t.cartesian)
         if t.used[0]:
             A, dA, ddA = A + wrap(B - A), dB, ddB
         if t.used[1]:
@@ -202,13 +212,12 @@ def outlook(t, c, stamp):
 
 
 @compiled
-def variances(t, c, stamp):
-    """(p11, p12, p22) of azimuth, then of elevation at a stamp that is not before the last error."""
-    T = max(stamp - t.stamp, 0.0)
-    a11, a12, a22 = axis_filter.variances(t.azimuth, c.azimuth, T)
-    e11, e12, e22 = axis_filter.variances(t.elevation, c.elevation, T)
+def expected_variances(t):
+    """(p11, p12, p22) of azimuth, then of elevation, of what `predict` left."""
+    _, _, _, a11, a12, _, a22, _, _ = axis_filter.expected(t.azimuth)
+    _, _, _, e11, e12, _, e22, _, _ = axis_filter.expected(t.elevation)
     if t.used[0] or t.used[1]:
-        b11, b12, b22, f11, f12, f22, _ = unscented.variances(t.cartesian, c.cartesian, T)
+        b11, b12, b22, f11, f12, f22, _ = unscented.expected_variances(t.cartesian)
         if t.used[0]:
             a11, a12, a22 = b11, b12, b22
         if t.used[1]:
@@ -217,11 +226,26 @@ def variances(t, c, stamp):
 
 
 @compiled
+def outlook(t, c, stamp):
+    """Angle, rate, acceleration of azimuth and elevation at a stamp: what an error of then is compared with."""
+    predict(t, c, stamp)
+    return expected(t)
+
+
+@compiled
+def variances(t, c, stamp):
+    """(p11, p12, p22) of azimuth, then of elevation, at a stamp."""
+    predict(t, c, stamp)
+    return expected_variances(t)
+
+
+@compiled
 def read(t, c, stamp, o):
     """What is known of the target at a stamp, into o.estimate, .covariance, .probability (2, ...)."""
     x, p = o.estimate, o.covariance
-    x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = outlook(t, c, max(stamp, t.stamp))
-    p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2] = variances(t, c, stamp)
+    predict(t, c, stamp)
+    x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = expected(t)
+    p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2] = expected_variances(t)
     axis_filter.probabilities(t.azimuth, c.azimuth, o.probability[0])
     axis_filter.probabilities(t.elevation, c.elevation, o.probability[1])
     for i in range(2):

@@ -284,18 +284,17 @@ def _moving_angles(x):
 
 
 @compiled
+def expected_angles(s):
+    """(A, dA, ddA, E, dE, ddE) of what `predict` left, both modes together; A in (-pi, pi]."""
+    _mixed(s.x_prior, s.p_prior, s.c, s.mean, s.covariance)
+    return _moving_angles(s.mean)
+
+
+@compiled
 def outlook(s, c, T):
-    """(A, dA, ddA, E, dE, ddE) T [s] after the last measurement, both modes together; A in (-pi, pi]."""
-    x = s.mean
-    x[:] = 0.0
-    for j in range(2):
-        f13, f23, f33 = motion_models.transition(c.models[j], T)
-        for i in range(3):
-            p, v, a = s.x[j, i], s.x[j, i + 3], s.x[j, i + 6]
-            x[i] += s.mu[j] * (p + T * v + f13 * a)
-            x[i + 3] += s.mu[j] * (v + f23 * a)
-            x[i + 6] += s.mu[j] * f33 * a
-    return _moving_angles(x)
+    """The same T [s] >= 0 after the last measurement. Writes the prior fields."""
+    predict(s, c, T)
+    return expected_angles(s)
 
 
 @compiled
@@ -312,13 +311,16 @@ def _projected(p, g, h, v):
 
 @compiled
 def variances(s, c, T):
-    """Variances (angle, angle and rate, rate) of the azimuth, the same of the elevation, and of the range, T after the
-    last measurement: both modes with their spread, linearised. Writes the prior fields."""
-    for j in range(2):
-        s.x_prior[j, :] = s.x[j]
-        s.p_prior[j, :, :] = s.p[j]
-        _moved(s.x_prior[j], s.p_prior[j], c.models[j], T)
-    _mixed(s.x_prior, s.p_prior, s.mu, s.mean, s.covariance)
+    """`expected_variances` T [s] >= 0 after the last measurement. Writes the prior fields."""
+    predict(s, c, T)
+    return expected_variances(s)
+
+
+@compiled
+def expected_variances(s):
+    """Variances (angle, angle and rate, rate) of the azimuth, the same of the elevation, and of the range, of what
+    `predict` left: both modes with their spread, linearised."""
+    _mixed(s.x_prior, s.p_prior, s.c, s.mean, s.covariance)
     x, p = s.mean, s.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]
     rho2 = max(e * e + n * n, 1e-12 * u * u)

@@ -220,35 +220,54 @@ def test_quadratic_motion_is_followed_without_bias():
                                [0.3 + 0.02 * t[-1] + 0.002 * t[-1]**2, 0.02 + 0.004 * t[-1], 0.004], rtol=1e-6)
 
 
-def test_outlook_coasts_with_fading_acceleration():
-    c = axis_filter.constants(build(Filter, {'current_statistical.alpha': 0.5}))[0]
+@pytest.mark.parametrize('kind, alpha', [('singer', 0.5), ('current_statistical', 0.0)])
+def test_outlook_coasts_as_the_model_moves(kind, alpha):
+    """The acceleration of singer fades, that of current_statistical has itself for its mean and stays."""
+    c = axis_filter.constants(build(Filter, {'kind': kind, f'{kind}.alpha': 0.5}))[0]
     f = np.zeros(1, axis_filter.FILTER)[0]
-    f['mu'][0], f['x'][0] = 1.0, (0.1, 0.2, 0.3)
+    f['count'], f['mu'][0], f['x'][0] = 1, 1.0, (0.1, 0.2, 0.3)
     t = np.linspace(0, 3, 30001)
-    a = 0.3 * np.exp(-0.5 * t)
+    a = 0.3 * np.exp(-alpha * t)
     v = 0.2 + np.concatenate(([0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))))
     p = 0.1 + np.concatenate(([0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))))
     np.testing.assert_allclose(axis_filter.outlook(f, c, 3.0), (p[-1], v[-1], a[-1]), rtol=1e-8)
 
 
 def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
-    """A million targets, each of a model drawn by its probability, in a state drawn by its covariance, moved on."""
+    """A million targets, each of a model drawn by its probability, in a state drawn by its covariance; then the model
+    that moves it on is drawn, as the chain says, that one or the other."""
+    dwell, ahead = 1.5, 0.7
     c = axis_filter.constants(build(Filter, {'kind': 'imm', 'imm.models': 'cv ca', 'imm.cv.noise': 1e-2,
-                                             'imm.ca.noise': 3e-2}))[0]
-    f, rng, ahead = np.zeros(1, axis_filter.FILTER)[0], np.random.default_rng(9), 0.7
-    f['mu'][:2] = 0.3, 0.7
+                                             'imm.ca.noise': 3e-2, 'imm.dwell': dwell}))[0]
+    f, rng = np.zeros(1, axis_filter.FILTER)[0], np.random.default_rng(9)
+    f['count'], f['mu'][:2] = 2, (0.3, 0.7)
     f['x'][:2] = (1.0, 0.2, 0.0), (1.002, 0.21, 0.03)
     f['p'][:2] = (1e-6, 1e-7, 0, 1e-4, 0, 0), (4e-6, 1e-6, 0, 2e-4, 1e-5, 1e-4)
-    chosen, parts = rng.random(1_000_000) < 0.3, []
-    for j, kind in enumerate(('cv', 'ca')):
-        p, count = f['p'][j], np.count_nonzero(chosen if j == 0 else ~chosen)
+    held = (rng.random(1_000_000) < 0.7).astype(int)
+    X = np.empty((len(held), 3))
+    for i in range(2):
+        p = f['p'][i]
         P = np.array([[p[0], p[1], p[2]], [p[1], p[3], p[4]], [p[2], p[4], p[5]]])
-        A, g = SOURCES[kind][0], (0, 1e-2, 0) if j == 0 else (0, 0, 3e-2)
+        X[held == i] = rng.multivariate_normal(f['x'][i], P, np.count_nonzero(held == i))
+    holds = np.where(rng.random(len(held)) < expm(np.array([[-1, 1], [1, -1]]) / dwell * ahead)[0, 0], held, 1 - held)
+    for j, (kind, g) in enumerate((('cv', (0, 1e-2, 0)), ('ca', (0, 0, 3e-2)))):
+        A = SOURCES[kind][0]
         block = expm(np.block([[-np.array(A), np.outer(g, g)], [np.zeros((3, 3)), np.transpose(A)]]) * ahead)
         phi = block[3:, 3:].T
-        moved = rng.multivariate_normal(f['x'][j], P, count) @ phi.T
-        parts.append(moved + rng.multivariate_normal(np.zeros(3), phi @ block[:3, 3:], count))
-    X = np.concatenate(parts)
+        # The third state of cv is 0 at once, its angle and rate do not hear of it.
+        moved = X[holds == j] @ (phi if kind == 'ca' else np.diag([1.0, 1.0, 0.0]) @ phi).T
+        X[holds == j] = moved + rng.multivariate_normal(np.zeros(3), phi @ block[:3, 3:], len(moved))
     np.testing.assert_allclose(axis_filter.outlook(f, c, ahead), X.mean(axis=0), atol=3e-5)
     C = np.cov(X[:, :2].T)
     np.testing.assert_allclose(axis_filter.variances(f, c, ahead), (C[0, 0], C[0, 1], C[1, 1]), rtol=5e-3)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_outlook_now_is_the_estimate_even_if_a_model_is_ruled_out(kind):
+    c = axis_filter.constants(build(Filter, {'kind': kind}))[0]
+    f = np.zeros(1, axis_filter.FILTER)[0]
+    axis_filter.start(f, c, 0.1, SIGMA**2, 0.1)
+    f['mu'] = 0.0
+    f['mu'][0] = 1.0
+    assert axis_filter.outlook(f, c, 0.0) == (0.1, 0.0, 0.0)
+    np.testing.assert_allclose(axis_filter.variances(f, c, 0.0), (SIGMA**2, 0.0, 0.01), rtol=1e-14)

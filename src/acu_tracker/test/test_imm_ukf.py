@@ -32,7 +32,7 @@ class Pass:
 
     def put(self, kinds):
         self.c = tracker.constants(self.params, *(Filter(kind=kind) for kind in kinds))[0]
-        tracker.adopt(self.state[0], self.c)
+        tracker.adopt(self.state[0], self.p, self.c)
 
     def now(self, stamp=None):
         return np.array(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
@@ -122,6 +122,21 @@ def test_no_bump_when_the_range_is_lost_or_the_kind_changes():
     lost.put(BOTH)
     lost.take(2.0)
     assert lost.state['used'].all()
+
+
+def test_a_direction_is_compared_with_what_was_told_in_the_coast():
+    """The unscented transform of the gate against the linearised one that is told."""
+    tracked = Pass()
+    tracked.take(15.0)
+    tracked.k += round(0.8 / T)
+    stamp, (A, E) = tracked.t[tracked.k], tracked.truth[tracked.k]
+    told = tracked.now(stamp)
+    a11, _, _, e11, _, _ = tracker.variances(tracked.state[0], tracked.c, stamp)
+    _, nu_a, nu_e, *_ = tracker.observe(tracked.state[0], tracked.p, tracked.c, stamp, A, E, 1e-9, 1e-9, math.nan,
+                                        math.nan, math.nan, math.nan, math.nan, math.nan)
+    sigma = np.sqrt(tracked.state['S'][0])
+    assert sigma == pytest.approx(np.sqrt((a11 + 1e-9, e11 + 1e-9)), rel=0.01)
+    assert np.abs([nu_a - (A - told[0]), nu_e - (E - told[3])]).max() < 0.05 * sigma.min()
 
 
 def test_bad_ranges_and_directions_are_not_believed():

@@ -138,6 +138,7 @@ def test_rates_and_accelerations_are_derivatives_of_the_angles():
               [-30.3, -52.1, 21.1, 14.4, -3.2, 2.1, 1.5, -2.0, 0.7]]
     s['mu'] = 0.3, 0.7
     c = unscented.constants(Ukf())
+    c['dwell'] = 1e9
     h = 1e-3
     before, now, after = (np.array(unscented.outlook(s[0], c[0], 1.0 + k * h)) for k in (-1, 0, 1))
     for angle in (0, 3):
@@ -155,9 +156,11 @@ def test_variances_are_those_of_many_targets():
     s['p'] = root @ np.swapaxes(root, 1, 2)
     c = unscented.constants(Ukf(cv_noise=1e-6, ca_noise=1e-6))
     found = unscented.variances(s[0], c[0], 0.5)
-    samples = []
-    for j, count in enumerate((15000, 35000)):
-        x = rng.multivariate_normal(s['x'][0, j], s['p'][0, j], count)
+    # Of the targets that were of mode i some are of mode j by then, which moved them.
+    stay, samples = 0.5 * (1.0 + math.exp(-2.0 * 0.5 / Ukf().dwell)), []
+    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        count = round(50000 * s['mu'][0, i] * (stay if i == j else 1.0 - stay))
+        x = rng.multivariate_normal(s['x'][0, i], s['p'][0, i], count)
         a = x[:, 6:] * j
         p, v = x[:, :3] + 0.5 * x[:, 3:6] + 0.125 * a, x[:, 3:6] + 0.5 * a
         h = 1e-4
