@@ -33,6 +33,9 @@ Symbols
     l1, l2, l3      adrc: gains of the observer over a step h; b0 = w_s, u0 the wanted y'' [-], [1/s], [1/s2]
     w, width, depth notch: centre, damping of its poles, what is left at the centre     [rad/s], [-], [-]
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
+    W, E0           rate of a target along its great circle, its highest elevation      [rad/s], [rad]
+    t1, t2          a slew through the keyhole leaves the target, and meets it again    [s]
+    r, rho, R       lever arm from INS to antenna; range of the antenna, of the INS     [m]
 
 References: paper 000 (Ma Jijun et al. 2023, 'current' statistical model filter of an antenna; PID position loop);
 paper 001 (TD, ESO and NLC of a gyrocompass); paper 003 (Lin Di et al. 2020, interacting models); paper 004 (Li Hongwei

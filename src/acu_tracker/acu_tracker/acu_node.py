@@ -21,7 +21,8 @@ class AcuNode(shell.Shell):
         self.joints = records.only(self.unit.heard, JOINTS)
         self.follower_places = [(name, records.only(self.unit.heard, name)) for name in self.unit.followers]
         self.announced = None
-        self.ahead = self.unit.state[0]['ahead']
+        self.state = self.unit.state[0]
+        self.ahead = self.state['ahead']
         self.told = (0, 0)
         self.refused = ''
         self.drive_state = 'unknown'
@@ -133,6 +134,8 @@ class AcuNode(shell.Shell):
         values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(self.ahead)]
         if self.refused:
             return shell.WARN, self.refused, values
+        if self.state['cramped']:
+            return shell.WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit', values
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
         if invalid == ['error_gated']:

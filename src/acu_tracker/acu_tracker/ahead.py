@@ -8,16 +8,15 @@ import math
 
 import numpy as np
 
-from acu_tracker import deck_reference, keyhole, program_track
+from acu_tracker import bridge, deck_reference, keyhole, program_track
 from pedestal_common.blockage import blocked
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import angles, earth_direction, rotation, to_deck, wrap
+from pedestal_common.line_of_sight import angles, rotation, to_deck, wrap
 
 ROWS = 1025
 INTERVAL = 1.0
 """Seconds from one look ahead to the next."""
-LIKE_PROGRAM = math.cos(math.radians(3.0))
-"""The program is believed in autotrack while it is closer to the estimate than this (cosine)."""
+
 WHATS = ('none', 'keyhole', 'no turn')
 NONE, KEYHOLE, NO_TURN = range(len(WHATS))
 
@@ -69,37 +68,21 @@ def take_attitude(h, stamp, quaternion, mean_time):
 
 
 @compiled
-def program_direction(times, table, t):
-    """ENU unit vector of the program track at t."""
-    return earth_direction(program_track.interpolated(times, table, t, 0)[0],
-                           program_track.interpolated(times, table, t, 1)[0])
+def lay_out(h, b, t0, step, times, table, from_program, e, n, u, de, dn, du):
+    """Fill the path from t0 on, on h.next_level; how many rows there are: as far as the program goes.
 
-
-@compiled
-def lay_out(h, t0, step, times, table, from_program, turned, e, n, u, de, dn, du):
-    """Fill the path from t0 on, on h.next_level; how many rows the program holds, all along a great circle.
-
-    e ... du: ENU unit vector of the target at t0 and its rate [1/s], in autotrack; turned: the program is turned by
-    the smallest rotation that lets it begin there.
+    b: the `bridge` by which the program is turned, none: as it is. Without the program the great circle of the ENU
+    unit vector (e, n, u) and its rate [1/s].
     """
     W = math.sqrt(de * de + dn * dn + du * du)
-    ax = ay = az = 0.0
-    c = 1.0
-    if from_program and turned:
-        px, py, pz = program_direction(times, table, t0)
-        ax, ay, az = deck_reference.cross(px, py, pz, e, n, u)
-        c = px * e + py * n + pz * u
     for i in range(ROWS):
         t = t0 + i * step
         if from_program:
             if t > times[-1]:
                 return i
-            x, y, z = program_direction(times, table, t)
-            if turned:
-                # Rodrigues about a = p x u, |a| the sine and c the cosine of the angle.
-                bx, by, bz = deck_reference.cross(ax, ay, az, x, y, z)
-                k = (ax * x + ay * y + az * z) / (1.0 + c)
-                x, y, z = c * x + bx + k * ax, c * y + by + k * ay, c * z + bz + k * az
+            x, y, z = program_track.direction(times, table, t)
+            if b.there:
+                x, y, z = bridge.turned(b, x, y, z)
         else:
             cos, sin = math.cos(W * i * step), math.sin(W * i * step) / W if W > 0.0 else 0.0
             x, y, z = cos * e + sin * de, cos * n + sin * dn, cos * u + sin * du
@@ -108,8 +91,9 @@ def lay_out(h, t0, step, times, table, from_program, turned, e, n, u, de, dn, du
 
 
 @compiled
-def look(h, p, sectors, t0, turn, times, table, from_program, turned, e, n, u, de, dn, du):
-    """Look for a keyhole and hidden sectors from t0 on; p the AcuParameters, turn: deck azimuth of the axis at t0.
+def look(h, b, p, sectors, t0, turn, times, table, from_program, e, n, u, de, dn, du):
+    """Look for a keyhole and hidden sectors from t0 on; p the AcuParameters, turn: deck azimuth of the axis at t0, the
+    rest as in `lay_out`.
 
     A plan is kept once its slew begins within `notice`, or as soon as it is known that no turn of the azimuth fits.
     """
@@ -117,7 +101,7 @@ def look(h, p, sectors, t0, turn, times, table, from_program, turned, e, n, u, d
     h.looked = t0
     rotation(q[0], q[1], q[2], q[3], h.next_level)
     step = k.horizon / (ROWS - 1)
-    rows = lay_out(h, t0, step, times, table, from_program, turned, e, n, u, de, dn, du)
+    rows = lay_out(h, b, t0, step, times, table, from_program, e, n, u, de, dn, du)
     if rows < 3:
         return
     path = h.path[:rows]

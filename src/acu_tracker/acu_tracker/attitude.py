@@ -1,7 +1,10 @@
-"""The attitude of the deck: what the INS said, and what it is at any instant near it. `s` is the unit's STATE."""
+"""The attitude of the deck: what the INS said, what it is at any instant near it, and how a target looks from there.
+
+`s` is the unit's STATE.
+"""
 import math
 
-from acu_tracker import ahead, deck_reference
+from acu_tracker import ahead, deck_reference, estimate_frame
 from acu_tracker.history import bracket, push
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import ASHORE, rotation
@@ -72,3 +75,35 @@ def attitude_at(s, p, t):
     norm = math.sqrt(x * x + y * y + z * z + w * w)
     rotation(x / norm, y / norm, z / norm, w / norm, s.mat_ed)
     return True
+
+
+@compiled
+def estimate_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
+    """Deck angles of a target at t, given in the frame of the filter."""
+    if not s.frame.tilted and s.range == 0.0:
+        return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
+    attitude_at(s, p, t)
+    estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
+    return deck_reference.moving_angles(*deck_reference.from_lever_arm(
+        s.arm[0], s.arm[1], s.arm[2], *deck_reference.deck_motion(
+            s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA, E, dE, ddE)))
+
+
+@compiled
+def seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
+    """Deck angles of a target at t, given in earth angles."""
+    if s.stabilised and attitude_at(s, p, t):
+        return deck_reference.deck_angles(s.mat_ed, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2],
+                                          A, dA, ddA, E, dE, ddE)
+    return A, dA, ddA, E, dE, ddE
+
+
+@compiled
+def levelled(s, framed, A, dA, ddA, E, dE, ddE):
+    """Azimuth on the levelled deck of a plan, (A, dA, ddA), of what `followed` gave."""
+    if framed:
+        estimate_frame.from_deck(s.frame, s.ahead.level, s.mat_fd)
+    else:
+        s.mat_fd[:] = s.ahead.level
+    A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA, E, dE, ddE)
+    return A, dA, ddA

@@ -8,6 +8,7 @@ import numpy as np
 
 from acu_tracker import (
     ahead,
+    bridge,
     deck_reference,
     estimate_frame,
     lever_arm,
@@ -17,7 +18,7 @@ from acu_tracker import (
     program_track,
     tracker,
 )
-from acu_tracker.attitude import attitude_at, take_attitude
+from acu_tracker.attitude import attitude_at, estimate_from_deck, levelled, seen_from_deck, take_attitude
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common import blockage
@@ -80,7 +81,9 @@ STATE = np.dtype([
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
     ('frame', estimate_frame.FRAME), ('mat_fd', 'f8', (3, 3)),                 # of the filter; deck -> it
     ('ahead', ahead.AHEAD), ('aligning', 'i8'), ('blocked', 'i8'),
+    ('cramped', 'i8'),                                          # 1: no turn of the azimuth held the whole program
     ('off', 'f8'), ('excused', 'f8'),                           # beam meant to be off by [rad]; last such stamp [s]
+    ('bridge', bridge.BRIDGE),                                  # program where the target was last seen
     ('arm', 'f8', (3,)), ('range', 'f8'),                       # lever arm over range [-]; from the INS [m], 0: none
 ], align=True)
 
@@ -210,25 +213,18 @@ def excused(s, p):
 
 
 @compiled
-def estimated_target(s, p, c, t):
-    """Deck angles at t of the target as estimated."""
+def followed(s, p, c, times, angles, t):
+    """(in the frame of the filter, A, dA, ddA, E, dE, ddE) at t of what program or autotrack follows: 1 for angles in
+    that frame, 0 for earth angles. A silence that has a reason is bridged by the program."""
+    if s.mode == modes.PROGRAM:
+        A, dA, ddA = program_track.interpolated(times, angles, t, 0)
+        E, dE, ddE = program_track.interpolated(times, angles, t, 1)
+        return 0, A, dA, ddA, E, dE, ddE
+    if s.bridge.there and silent(s, p) and excused(s, p) and program_track.status(times, t) == modes.NONE:
+        A, dA, ddA, E, dE, ddE = bridge.outlook(s.bridge, times, angles, t)
+        return 0, A, dA, ddA, E, dE, ddE
     A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
-    if not s.frame.tilted and s.range == 0.0:
-        return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
-    attitude_at(s, p, t)
-    estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
-    return deck_reference.moving_angles(*deck_reference.from_lever_arm(
-        s.arm[0], s.arm[1], s.arm[2], *deck_reference.deck_motion(
-            s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA, E, dE, ddE)))
-
-
-@compiled
-def seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
-    """Deck angles of a target at t, given in earth angles."""
-    if s.stabilised and attitude_at(s, p, t):
-        return deck_reference.deck_angles(s.mat_ed, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2],
-                                          A, dA, ddA, E, dE, ddE)
-    return A, dA, ddA, E, dE, ddE
+    return 1, A, dA, ddA, E, dE, ddE
 
 
 @compiled
@@ -313,40 +309,34 @@ def seat(s, p, u):
 
 
 @compiled
-def levelled(s, c, times, angles, t):
-    """Azimuth on the levelled deck of a plan, (A, dA, ddA) at t of what the mode follows."""
-    if s.mode == modes.PROGRAM:
-        A, dA, ddA = program_track.interpolated(times, angles, t, 0)
-        E, dE, ddE = program_track.interpolated(times, angles, t, 1)
-        s.mat_fd[:] = s.ahead.level
-    else:
-        A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
-        estimate_frame.from_deck(s.frame, s.ahead.level, s.mat_fd)
-    A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA, E, dE, ddE)
-    return A, dA, ddA
-
-
-@compiled
 def look_ahead(s, p, c, sectors, times, angles):
     """Now and then: what the target will ask of the axes."""
     h = s.ahead
     if s.mode != modes.PROGRAM and s.mode != modes.AUTOTRACK:
         ahead.forget(h)
+        s.cramped = 0
         return
     if s.stamp - h.looked < ahead.INTERVAL or (h.what == ahead.KEYHOLE and s.stamp <= h.plan.t2):
         return
-    known = program_track.status(times, s.stamp) == modes.NONE
-    e = n = u = de = dn = du = 0.0
-    if s.mode == modes.AUTOTRACK:
+    known, e, n, u, de, dn, du = True, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if s.mode == modes.PROGRAM:
+        s.bridge.there = 0
+    else:
         e, n, u, de, dn, du, _, _, _ = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c, s.stamp))
-        if known:
-            x, y, z = ahead.program_direction(times, angles, s.stamp)
-            known = e * x + n * y + u * z > ahead.LIKE_PROGRAM
-    ahead.look(h, p, sectors, s.stamp, s.turn, times, angles, known, s.mode == modes.AUTOTRACK, e, n, u, de, dn, du)
+        if not silent(s, p):
+            bridge.begin(s.bridge, times, angles, s.stamp, e, n, u)
+        known = s.bridge.there != 0 and program_track.status(times, s.stamp) == modes.NONE
+    ahead.look(h, s.bridge, p, sectors, s.stamp, s.turn, times, angles, known, e, n, u, de, dn, du)
 
 
 @compiled
-def explain(s, c):
+def silent(s, p):
+    """Whether no error is believed any more; an autotrack coasts."""
+    return overdue(s, p) > p.tracker.coast_after
+
+
+@compiled
+def explain(s, p, c, times, angles):
     """Note why the receiver hears nothing: the target is hidden, or the beam on its way through the keyhole."""
     follows = s.mode == modes.PROGRAM or s.mode == modes.AUTOTRACK
     s.blocked = follows and blockage.blocked(c.sectors, s.seen[0], s.seen[1])
@@ -354,6 +344,9 @@ def explain(s, c):
            modes.KEYHOLE if follows and ahead.slewing(s.ahead, s.stamp) else modes.NONE)
     if why != modes.NONE:
         s.excused, s.reason = s.stamp, why
+        if s.mode == modes.AUTOTRACK and not silent(s, p):
+            motion = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c.tracker, s.stamp))
+            bridge.begin(s.bridge, times, angles, s.stamp, motion[0], motion[1], motion[2])
     elif s.reason == modes.BLOCKED or s.reason == modes.KEYHOLE:
         s.reason = modes.NONE
 
@@ -377,21 +370,24 @@ def raw_target(s, p, c, times, angles, t):
     if s.mode == modes.PRESET:
         s.turn = s.azimuth.position
         return s.preset[0], 0.0, 0.0, s.preset[1], 0.0, 0.0
-    below = above = 0.0
-    if s.mode == modes.PROGRAM:
-        A, dA, ddA, E, dE, ddE = program_target(s, p, times, angles, t)
-        if s.entered:
-            below, above = program_track.azimuth_travel(times, angles, t)
+    framed, B, dB, ddB, F, dF, ddF = followed(s, p, c, times, angles, t)
+    if framed:
+        A, dA, ddA, E, dE, ddE = estimate_from_deck(s, p, t, B, dB, ddB, F, dF, ddF)
     else:
-        A, dA, ddA, E, dE, ddE = estimated_target(s, p, c, t)
+        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, B, dB, ddB, F, dF, ddF)
     s.seen[0], s.seen[1] = A, E
     s.off = 0.0
     if ahead.slewing(s.ahead, t):
-        B, dB, ddB = (A, dA, ddA) if not s.stabilised else levelled(s, c, times, angles, t)
+        B, dB, ddB = levelled(s, framed, B, dB, ddB, F, dF, ddF) if s.stabilised else (A, dA, ddA)
         s.turn, dA, ddA, E, dE, ddE, s.off = ahead.through(s.ahead, t, A, dA, ddA, E, dE, ddE, B, dB, ddB,
                                                            p.elevation.limits.high - p.keyhole.elevation_margin)
         return s.turn, dA, ddA, E, dE, ddE
+    below = above = 0.0
+    if s.entered and s.mode == modes.PROGRAM:
+        below, above = program_track.azimuth_travel(times, angles, t)
     s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
+    if s.entered and s.mode == modes.PROGRAM:
+        s.cramped = s.turn + below < p.azimuth.limits.low or s.turn + above > p.azimuth.limits.high
     return s.turn, dA, ddA, E, dE, ddE
 
 
@@ -475,9 +471,9 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
                            u.velocity[1], dt, o, 1)
         s.entered = 0
-        explain(s, constants[0])
+        explain(s, p, constants[0], times, angles)
         o.blocked = s.blocked
-        o.coasting = s.mode == modes.AUTOTRACK and overdue(s, p) > p.tracker.coast_after
+        o.coasting = s.mode == modes.AUTOTRACK and silent(s, p)
 
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command

@@ -6,7 +6,7 @@ import numpy as np
 from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
 from pedestal_common.compiled import compiled
 from pedestal_common.interval import interval
-from pedestal_common.line_of_sight import wrap
+from pedestal_common.line_of_sight import earth_direction, wrap
 
 MAX_ROWS = 100_000
 
@@ -75,6 +75,12 @@ def interpolated(times, angles, t, axis):
     c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
     return (y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
             (2.0 * c2 + 6.0 * x * c3) / (T * T))
+
+
+@compiled
+def direction(times, angles, t):
+    """ENU unit vector at t [s]."""
+    return earth_direction(interpolated(times, angles, t, 0)[0], interpolated(times, angles, t, 1)[0])
 
 
 @compiled

@@ -88,6 +88,15 @@ def test_a_mast_hides_the_target(Rig):
     assert rig.mode == 'standby'
 
 
+def test_a_program_that_fits_no_turn_is_told(Rig):
+    for travel, cramped in ((4.0, 0), (9.6, 1)):
+        rig = Rig(lambda t, travel=travel: (travel * t / 50.0, 0.6), at=(0.0, 0.6), initial_mode='program',
+                  **{'tracker.handover': False})
+        rig.program(rows=51)
+        rig.run(0.1)
+        assert rig.mode == 'program' and rig.state['cramped'][0] == cramped
+
+
 def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     rig = Rig(stabilised=True, at=(0.4, 0.5))
     rig.program()

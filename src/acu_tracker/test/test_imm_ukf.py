@@ -47,7 +47,7 @@ class Pass:
             outcomes.append(tracker.observe(
                 self.state[0], self.p, self.c, self.t[k], (A + a + math.pi) % (2.0 * math.pi) - math.pi, E + e,
                 (SIGMA / math.cos(E))**2, SIGMA**2, math.nan, math.nan, math.nan, math.nan, distance,
-                RANGE_SIGMA**2)[0])
+                RANGE_SIGMA**2, 1.0)[0])
             self.k += 1
             self.estimates[k] = self.now()
         return outcomes
