@@ -4,6 +4,7 @@ import json
 import math
 import socket
 import threading
+import types
 
 import numpy as np
 import pynmea2
@@ -11,7 +12,8 @@ import pytest
 
 from acu_tracker import modes
 from pedestal_bringup import bag as bags
-from pedestal_bringup import closed_loop, isolation, results, scenario
+from pedestal_bringup import closed_loop, comparison, isolation, known_attitude, recompute, results, scenario
+from pedestal_common import messages
 from ship_motion_sim import motion
 from tracking_receiver_sim import target
 
@@ -73,12 +75,47 @@ def test_without_noise_the_isolation_is_far_above_60_db():
     assert found.isolation > 80.0
 
 
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_the_loss_overhead_is_announced_beforehand(seed):
+    """Following would take over 100 deg/s where the azimuth has 12; autotrack is kept all the same."""
+    chosen = scenario.load('ship_overhead', seed=seed)
+    cores = closed_loop.cores(chosen)
+    steps = closed_loop.run(cores)
+    automatic = steps['mode'] == modes.AUTOTRACK
+    first = np.argmax(automatic)
+    plan = cores.acu[0]['ahead']['plan'][0]
+    assert automatic[first:].all() and plan['needed'] > math.radians(100.0)
+    off = np.hypot(*steps['true_error'].T)
+    t = steps['t']
+    lost = off > 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
+    loss = np.sum(lost[first:] & (t[first:] > t[first] + results.SETTLING)) * 0.005
+    assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 10.0
+    assert math.degrees(results.rms(off[t > plan['t2'] + 3.0])) < 0.02
+    assert abs(steps['rate'][first:, 0]).max() <= chosen.node_parameters('acu').azimuth.limits.rate + 1e-12
+
+
+def test_announced_losses_are_counted_once():
+    def array(*values):
+        return messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
+            level=0, name='acu', message='', hardware_id='', values=[
+                messages.KeyValue(key=key, value=value) for key, value in values])])
+    said = [array(('mode', 'program')), *2 * [array(('keyhole_begins_s', '45.8'), ('keyhole_loss_s', '12.6'))],
+            array(('keyhole_begins_s', '900.1'), ('keyhole_loss_s', '0.4'))]
+    bag = types.SimpleNamespace(topics={'diagnostics': ''}, messages=lambda topic: ((topic, 0, 0, m) for m in said))
+    assert results.announced_losses(bag) == {'keyhole_loss_predicted_s': (pytest.approx(13.0), 's')}
+    del said[1:]
+    assert results.announced_losses(bag) == {}
+
+
 @dataclasses.dataclass
 class Told:
-    """A short ship_pass: its bag, its rows, the datagrams it sent."""
+    """A ship_align_and_track made short by asking less of the alignment: its bag, its rows, the datagrams it sent."""
     bag: bags.Bag
     rows: dict
     datagrams: list
+
+
+SECONDS, DATAGRAMS, SIGMA = 78, 5, 0.012
 
 
 @pytest.fixture(scope='module')
@@ -96,19 +133,57 @@ def told(start_run):
                     pass
         listener = threading.Thread(target=listen)
         listener.start()
-        run = start_run('ship_pass', '--pacing', 'lockstep', '--duration', '24', '--param',
-                        f'ship_motion.nmea.port={ear.getsockname()[1]}', '--param', 'ship_motion.nmea.rate=5')
-        result = run.finish(120.0)
-        ended.set()
-        listener.join()
+        parameters = (f'ship_motion.nmea.port={ear.getsockname()[1]}', f'ship_motion.nmea.rate={DATAGRAMS}',
+                      f'ins.alignment.aligned_sigma={SIGMA}')
+        run = start_run('ship_align_and_track', '--pacing', 'lockstep', '--duration', str(SECONDS),
+                        *(part for parameter in parameters for part in ('--param', parameter)))
+        try:
+            result = run.finish(300.0)
+        finally:
+            ended.set()
+            listener.join()
     assert result.returncode == 0, result.stderr
     rows = {row['metric']: row for row in json.loads(run.json.read_text())['rows']}
     return Told(bags.read(run.bag), rows, heard)
 
 
+def test_the_chain_from_power_up_to_autotrack(told):
+    """The control unit waits for the INS, whose heading is 180 deg wrong at first, then acquires and tracks."""
+    known = known_attitude.read(told.bag)
+    assert abs(math.degrees(known.heading[0])) == pytest.approx(180.0, abs=10.0)
+    states, changes = told.bag.table('ins/state'), told.bag.table('acu/mode')
+    assert states['data'] == ['aligning', 'aligned'] and changes['data'] == ['standby', 'program', 'autotrack']
+    aligned = states['t'][1]
+    assert aligned <= changes['t'][1] <= aligned + 0.02
+    reasons = [(log / 1e9, value.value) for _, log, _, array in told.bag.messages('diagnostics')
+               for status in array.status if status.name == 'acu' for value in status.values if value.key == 'reason']
+    assert {reason for t, reason in reasons if 1.0 <= t < aligned} == {'INS aligning'}
+    assert told.rows['aligned_s']['value'] == aligned
+    heading = told.rows['heading_at_alignment_deg']['value']
+    assert told.rows['heading_sigma_at_alignment_deg']['value'] <= math.degrees(SIGMA)
+    assert abs(heading) < 3.0 * told.rows['heading_sigma_at_alignment_deg']['value']
+    assert told.rows['pointing_rms_deg']['value'] < 0.01 and told.rows['loss_s']['value'] == 0.0
+
+
+def test_the_rows_of_a_run_say_its_isolation(told):
+    found = isolation.read(told.bag, results.tracking(told.bag))
+    assert told.rows['isolation_db']['value'] == found.isolation and told.rows['isolation_db']['target'] == '>= 60'
+    assert told.rows['isolation_limit_db']['value'] == found.limit
+
+
+def test_the_chain_is_recomputed_from_its_recording(told):
+    """The INS that aligns and the control unit that waits for it answer the recorded messages with the same bits."""
+    recording = recompute.Recording(told.bag.path)
+    for node in ('ins', 'acu'):
+        done = recompute.recompute(recording, node, recompute.parameters_of(recording, node))
+        assert not done.requests and not done.feed.problem
+        for topic in recompute.compare(recording, done.outputs, done.unit, comparison.Tolerance()):
+            assert topic.identical, topic.lines()
+
+
 def test_datagrams_are_the_recorded_attitude_at_their_stamps(told):
     truth = told.bag.table('ship/truth')
-    assert 0.9 * 24 * 5 < len(told.datagrams) <= 24 * 5 + 1      # UDP may lose some
+    assert 0.9 * SECONDS * DATAGRAMS < len(told.datagrams) <= SECONDS * DATAGRAMS + 1      # UDP may lose some
     stamps = set()
     for datagram in told.datagrams:
         heading, attitude = (pynmea2.parse(line, check=True) for line in datagram.decode('ascii').splitlines())
@@ -130,10 +205,3 @@ def test_datagrams_are_the_recorded_attitude_at_their_stamps(told):
         assert attitude.pitch == pytest.approx(math.degrees(pitch), abs=1e-3)
         assert attitude.heave == pytest.approx(truth['position.z'][k], abs=1e-3)
     assert len(stamps) == len(told.datagrams)
-
-
-def test_the_rows_of_a_run_say_its_isolation(told):
-    found = isolation.read(told.bag, results.tracking(told.bag))
-    assert told.rows['isolation_db']['value'] == found.isolation and told.rows['isolation_db']['target'] == '>= 60'
-    assert told.rows['isolation_limit_db']['value'] == found.limit
-    assert told.rows['loss_s']['value'] == 0.0

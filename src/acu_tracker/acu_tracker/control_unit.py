@@ -279,8 +279,9 @@ def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
     encoder_ok = s.encoder.count > 0 and s.encoder.stamp[s.encoder.newest] == s.stamp
     attitude = modes.NONE
     if s.stabilised:
-        attitude = (modes.INS_ALIGNING if s.aligning else modes.NONE if attitude_at(s, p, t_m) else
-                    modes.ATTITUDE_INVALID)
+        # Before the first attitude it is not determined whether the INS has said how it is.
+        attitude = (modes.INS_ALIGNING if s.aligning and s.attitude.count > 0 else
+                    modes.NONE if attitude_at(s, p, t_m) else modes.ATTITUDE_INVALID)
     lost = not s.tracker.running or (overdue(s, p) > p.tracker.coast_time and not excused(s, p))
     program = program_track.status(times, s.stamp)
     wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)

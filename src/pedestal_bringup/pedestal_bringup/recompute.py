@@ -199,12 +199,14 @@ def feed(recording, unit, trigger) -> Feed:
 
 def _events(recording, unit, stamps, taken):
     """[(step before which it came, topic, row)] of the messages that no step waits for, in order; taken (n,): when the
-    last input of each step came."""
+    last input of each step came. What a writer says along with a follower that is late comes as late."""
     found = []
     for name in unit.events:
         if recording.has(name):
             if recording.has(COMMAND) or recording.bag.metadata.get('pacing') == 'lockstep':
-                steps = np.searchsorted(stamps, recording.steps(name))
+                late = max((latency for follower, latency in unit.followers.items()
+                            if topics.BY_NAME[follower].writers == topics.BY_NAME[name].writers), default=0.0)
+                steps = np.searchsorted(stamps - round(late * SECOND), recording.steps(name))
             else:
                 steps = np.searchsorted(taken, recording.arrival(name))
             found += [(step, name, row) for row, step in enumerate(steps.tolist())]
