@@ -155,12 +155,14 @@ def expected(f):
 
 @compiled
 def consistency(f, y, R, y_rate, R_rate):
-    """(nu, nu of the rate, nu' S^-1 nu) against what `predict` left; y_rate NaN: of the angle alone."""
+    """(nu, nu of the rate, nu^2 / S, and what the rate adds to nu' S^-1 nu) against what `predict` left.
+
+    The last is chi-square of one degree of freedom by itself: the rate given the angle. y_rate NaN: both its NaN.
+    """
     x1, x2, _, p11, p12, _, p22, _, _ = expected(f)
-    nu, nu_rate = y - x1, y_rate - x2
-    if math.isnan(nu_rate):
-        return nu, nu_rate, nu * nu / (p11 + R)
-    return nu, nu_rate, kalman.nis(nu, nu_rate, p11 + R, p12, p22 + R_rate)
+    nu, nu_rate, S = y - x1, y_rate - x2, p11 + R
+    more = nu_rate - p12 / S * nu
+    return nu, nu_rate, nu * nu / S, more * more / (p22 + R_rate - p12 * p12 / S)
 
 
 @compiled
@@ -234,7 +236,9 @@ def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
         elif measured and T > 0.0:
             rate = y_rate[k] if m.rate_measurement else math.nan
             predict(f, m, T)
-            o.innovation, o.rate_innovation, o.nis = consistency(f, y[k], R[k], rate, R_rate[k])
+            o.innovation, o.rate_innovation, o.nis, more = consistency(f, y[k], R[k], rate, R_rate[k])
+            if not math.isnan(more):
+                o.nis += more
             correct(f, m, y[k], R[k], rate, R_rate[k])
             last = t[k]
         T = max(t[k] - last, 0.0)

@@ -58,9 +58,3 @@ def update_with_gain(x1, x2, x3, p11, p12, p13, p22, p23, p33, nu, R, k1, k2, k3
 def log_likelihood(nu, S):
     """Logarithm of the normal density of an innovation nu of variance S, less the constant -log(2 pi) / 2."""
     return -0.5 * (nu * nu / S + math.log(S))
-
-
-@compiled
-def nis(nu, nu_rate, s11, s12, s22):
-    """nu' S^-1 nu of an innovation of angle and rate."""
-    return (s22 * nu * nu - 2.0 * s12 * nu * nu_rate + s11 * nu_rate * nu_rate) / (s11 * s22 - s12 * s12)

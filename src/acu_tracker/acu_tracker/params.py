@@ -30,12 +30,13 @@ class ReceiverLaw(Parameters):
 class TrackerParameters(Parameters):
     """The target filter and what it takes for a lock."""
 
-    gate: float = parameter(25.0, 1.0, 1e6, '', "largest nu' S^-1 nu of the two angles that is believed; with rates "
-                            'the one as rarely exceeded')
+    gate: float = parameter(25.0, 1.0, 1e6, '', "largest nu' S^-1 nu of the two angles that is believed; of a rate or "
+                            'a range the one as rarely exceeded')
     gate_restart: int = parameter(20, 1, 100000, '', 'errors refused in a row before the filter restarts on them')
     restart_gap: float = parameter(1.0, 1e-3, 1000.0, 's', 'gap between errors after which the filter restarts')
     initial_rate: float = parameter(0.1, 1e-6, 100.0, 'rad/s', 'standard deviation of the rate at the start')
-    lock_count: int = parameter(100, 1, 100000, '', 'errors believed in a row before program hands over')
+    lock_count: int = parameter(100, 1, 100000, '', 'errors believed in a row before program hands over, and rates '
+                                'that agree with them in a row before they are used')
     coast_after: float = parameter(0.1, 1e-3, 100.0, 's', 'time without an error after which autotrack coasts')
     coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack is left')
     handover: bool = flag(True, 'program hands over to autotrack by itself once locked')

@@ -14,39 +14,45 @@ from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import wrap
 
 CONSTANTS = np.dtype([('azimuth', axis_filter.CONSTANTS), ('elevation', axis_filter.CONSTANTS),
-                      ('gates', 'f8', (3,)), ('cartesian', unscented.CONSTANTS), ('range_share_2', 'f8'),
+                      ('gates', 'f8', (2,)), ('cartesian', unscented.CONSTANTS), ('range_share_2', 'f8'),
                       ('wanted', 'i8', (2,))], align=True)
-"""gates: largest nu' S^-1 nu that is believed, for 2, 3 and 4 numbers measured at once; range_share_2: square of
+"""gates: largest nu' S^-1 nu that is believed, of the two angles, of one rate or range; range_share_2: square of
 ukf.range_share; wanted: 1 for azimuth, elevation of kind imm_ukf."""
 
 TRACKER = np.dtype([('azimuth', axis_filter.FILTER), ('elevation', axis_filter.FILTER), ('stamp', 'f8'),
                     ('running', 'i8'), ('in_a_row', 'i8'), ('refused', 'i8'), ('gated', 'i8'), ('converged', 'i8'),
+                    ('rates_in_a_row', 'i8', (2,)), ('rates_gated', 'i8'), ('ranges_gated', 'i8'),
                     ('cartesian', unscented.STATE), ('ranged', 'i8'), ('used', 'i8', (2,)), ('S', 'f8', (2,))],
                    align=True)
-"""in_a_row: errors believed, refused: errors gated since the other happened; gated: in all; ranged: 1 while the
-Cartesian filter runs; used: 1 for an axis that takes its estimate; S: variances of the last innovations."""
+"""in_a_row: errors believed, refused: errors gated since the other happened; gated: in all; rates_in_a_row: rates of
+an axis that agreed with its angles; rates_gated, ranges_gated: those that did not; ranged: 1 while the Cartesian
+filter runs; used: 1 for an axis that takes its estimate; S: variances of the last innovations."""
 
 STARTED, BELIEVED, GATED, STALE = range(4)
 
 
-def chi_square(gate, freedom):
-    """What chi-square of 3 or 4 degrees of freedom exceeds as rarely as `gate` is exceeded by that of 2, e^(-gate/2).
+def gate_of_one(gate):
+    """What chi-square of one degree of freedom exceeds as rarely as `gate` is exceeded by that of two, e^(-gate/2).
 
-    The tails are e^(-x/2) times (1 + x/2) for 4, times sqrt(2 x / pi) + e^z^2 erfc(z) with z^2 = x/2 for 3.
+    The tail is erfc(z) with z^2 = x/2; e^z^2 erfc(z), which does not underflow, falls short of the other's by gate.
     """
-    x = gate
-    for _ in range(200):
+    low, high = 0.0, gate
+    for _ in range(100):
+        x = 0.5 * (low + high)
         z = math.sqrt(0.5 * x)
         scaled_erfc = math.exp(z * z) * math.erfc(z) if z < 20.0 else 1.0 / (z * math.sqrt(math.pi))
-        x = gate + 2.0 * math.log(1.0 + 0.5 * x if freedom == 4 else 2.0 * z / math.sqrt(math.pi) + scaled_erfc)
-    return x
+        if x - 2.0 * math.log(scaled_erfc) < gate:
+            low = x
+        else:
+            high = x
+    return high
 
 
 def constants(params, azimuth, elevation) -> np.ndarray:
     """Constants (1,) of a TrackerParameters and the Filter parameters of both axes."""
     c = np.zeros(1, CONSTANTS)
     c['azimuth'], c['elevation'] = axis_filter.constants(azimuth), axis_filter.constants(elevation)
-    c['gates'] = params.gate, chi_square(params.gate, 3), chi_square(params.gate, 4)
+    c['gates'] = params.gate, gate_of_one(params.gate)
     c['cartesian'], c['range_share_2'] = unscented.constants(params.ukf), params.ukf.range_share**2
     c['wanted'] = azimuth.kind == 'imm_ukf', elevation.kind == 'imm_ukf'
     return c
@@ -110,10 +116,29 @@ def use_cartesian(t, c):
 
 
 @compiled
+def believed_rate(t, p, c, i, rate, chi_square):
+    """A rate measured on axis i as it is to be taken, else NaN; chi_square: of it, given the angle and all before.
+
+    A rate can only be told to be wrong by what the angles alone have made of it, so it is taken once lock_count in a
+    row agreed with them: a sensor that is stuck or off must not take along a filter that has just started.
+    """
+    if math.isnan(chi_square):
+        return math.nan
+    if chi_square > c.gates[1]:
+        t.rates_gated += 1
+        t.rates_in_a_row[i] = 0
+        return math.nan
+    t.rates_in_a_row[i] += 1
+    return rate if t.rates_in_a_row[i] > p.lock_count else math.nan
+
+
+@compiled
 def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_rate, elevation_rate, R_azimuth_rate,
             R_elevation_rate, range_, R_range, restart_gap):
     """Take one measured direction, its rates and the range (NaN: none), with their variances; p the TrackerParameters;
     the filter restarts after restart_gap [s] without one.
+
+    The direction is believed or gated, and then each of the others by itself.
 
     (what became of it, nu azimuth, nu elevation, nu of their rates, nu' S^-1 nu azimuth, elevation); NaN unless
     there was a prediction to compare with.
@@ -133,21 +158,29 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
         axis_filter.predict(e, c.elevation, T)
         near = axis_filter.expected(a)[0]
         azimuth = near + wrap(azimuth - near)
-        nu_a, nu_da, nis_a = axis_filter.consistency(a, azimuth, R_azimuth, azimuth_rate, R_azimuth_rate)
-        nu_e, nu_de, nis_e = axis_filter.consistency(e, elevation, R_elevation, elevation_rate, R_elevation_rate)
+        nu_a, nu_da, nis_a, more_a = axis_filter.consistency(a, azimuth, R_azimuth, azimuth_rate, R_azimuth_rate)
+        nu_e, nu_de, nis_e, more_e = axis_filter.consistency(e, elevation, R_elevation, elevation_rate,
+                                                             R_elevation_rate)
         t.S[0], t.S[1] = axis_filter.expected(a)[3] + R_azimuth, axis_filter.expected(e)[3] + R_elevation
         if t.ranged:
             unscented.predict(x, c.cartesian, T)
             n_a, S_a, n_e, S_e, n_r, S_r = unscented.innovation(x, azimuth, elevation, range_, R_azimuth, R_elevation,
                                                                 R_range)
-            if n_r * n_r > c.gates[0] * S_r:
+            if n_r * n_r > c.gates[1] * S_r:
+                t.ranges_gated += 1
                 range_ = none
             if t.used[0]:
                 nu_a, nu_da, nis_a, t.S[0] = n_a, none, n_a * n_a / S_a, S_a
             if t.used[1]:
                 nu_e, nu_de, nis_e, t.S[1] = n_e, none, n_e * n_e / S_e, S_e
-        rates = (1 if nu_da == nu_da else 0) + (1 if nu_de == nu_de else 0)
-        if nis_a + nis_e <= c.gates[rates]:
+        direction = nis_a + nis_e
+        if nu_da == nu_da:
+            nis_a += more_a
+        if nu_de == nu_de:
+            nis_e += more_e
+        if direction <= c.gates[0]:
+            azimuth_rate = believed_rate(t, p, c, 0, azimuth_rate, more_a)
+            elevation_rate = believed_rate(t, p, c, 1, elevation_rate, more_e)
             axis_filter.correct(a, c.azimuth, azimuth, R_azimuth, azimuth_rate, R_azimuth_rate)
             axis_filter.correct(e, c.elevation, elevation, R_elevation, elevation_rate, R_elevation_rate)
             if t.ranged:
@@ -157,13 +190,13 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
             t.gated += 1
             if t.refused + 1 < p.gate_restart:
                 t.refused += 1
-                t.in_a_row = 0
+                t.in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
                 return GATED, nu_a, nu_e, nu_da, nu_de, nis_a, nis_e
     if outcome == STARTED:
         near = outlook(t, c, t.stamp)[0] if t.running else azimuth
         axis_filter.start(a, c.azimuth, near + wrap(azimuth - near), R_azimuth, p.initial_rate)
         axis_filter.start(e, c.elevation, elevation, R_elevation, p.initial_rate)
-        t.in_a_row = t.ranged = t.used[0] = t.used[1] = 0
+        t.in_a_row = t.ranged = t.used[0] = t.used[1] = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
     t.running, t.stamp, t.refused = 1, stamp, 0
     if t.ranged:
         if unscented.range_known(x, c.range_share_2):

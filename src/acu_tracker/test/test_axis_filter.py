@@ -183,6 +183,22 @@ def test_what_is_missing_or_does_not_advance_is_not_taken(kind):
         np.testing.assert_array_equal(out[taken][name], alone[name])
 
 
+def test_consistency_of_angle_and_rate_is_that_of_both_at_once():
+    f, rng = np.zeros(1, axis_filter.FILTER)[0], np.random.default_rng(1)
+    for _ in range(20):
+        root = rng.normal(size=(3, 3))
+        P = root @ root.T
+        f['count'], f['mu_prior'][0] = 1, 1.0
+        f['x_prior'][0], f['p_prior'][0] = rng.normal(size=3), P[np.triu_indices(3)]
+        y, R = rng.normal(size=2), rng.uniform(0.1, 1.0, 2)
+        nu, nu_rate, nis, more = axis_filter.consistency(f, y[0], R[0], y[1], R[1])
+        both = y - f['x_prior'][0, :2]
+        np.testing.assert_allclose((nu, nu_rate), both, rtol=1e-12)
+        assert nis == pytest.approx(both[0]**2 / (P[0, 0] + R[0]))
+        assert nis + more == pytest.approx(both @ np.linalg.solve(P[:2, :2] + np.diag(R), both))
+        assert np.isnan(axis_filter.consistency(f, y[0], R[0], math.nan, R[1])[3])
+
+
 def flyby(distance, speed=15.0, seconds=60.0):
     t = np.arange(0.0, seconds, T)
     x = speed * (t - seconds / 2) / distance

@@ -154,7 +154,7 @@ def _better(constants_of_filter, variance, period, hold, delay, tau, target, noi
             y = smoothing.smoothed(s, smoothing.NO_SMOOTHING, period, period)
             if running:
                 axis_filter.predict(f, c, period * GRID)
-                seen[i], _, _ = axis_filter.consistency(f, y, variance, math.nan, 0.0)
+                seen[i], _, _, _ = axis_filter.consistency(f, y, variance, math.nan, 0.0)
                 axis_filter.correct(f, c, y, variance, math.nan, 0.0)
             else:
                 axis_filter.start(f, c, y, variance, 1.0)
