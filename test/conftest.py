@@ -170,7 +170,8 @@ def start_run(reserve_domain, tmp_path_factory):
 
 MODULES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'ins': 'ship_motion_sim.ins_node',
            'tracking_receiver': 'tracking_receiver_sim.tracking_receiver_node', 'acu': 'acu_tracker.acu_node',
-           'adu': 'adu_drive.adu_node', 'recorder': 'pedestal_bringup.recorder_node'}
+           'adu': 'adu_drive.adu_node', 'beam_steering': 'adu_drive.beam_steering_node',
+           'recorder': 'pedestal_bringup.recorder_node'}
 
 
 @dataclasses.dataclass

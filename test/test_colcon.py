@@ -12,7 +12,7 @@ EXECUTABLES = {
     'ship_motion_sim': ['ins_node', 'ship_motion_node'],
     'tracking_receiver_sim': ['tracking_receiver_node'],
     'acu_tracker': ['acu_node'],
-    'adu_drive': ['adu_node'],
+    'adu_drive': ['adu_node', 'beam_steering_node'],
     'pedestal_bringup': ['pedestal', 'recorder_node'],
 }
 

@@ -16,7 +16,8 @@ EXECUTABLES = {
                         'ins_node': 'ship_motion_sim.ins_node:main'},
     'tracking_receiver_sim': {'tracking_receiver_node': 'tracking_receiver_sim.tracking_receiver_node:main'},
     'acu_tracker': {'acu_node': 'acu_tracker.acu_node:main'},
-    'adu_drive': {'adu_node': 'adu_drive.adu_node:main'},
+    'adu_drive': {'adu_node': 'adu_drive.adu_node:main',
+                  'beam_steering_node': 'adu_drive.beam_steering_node:main'},
     'pedestal_bringup': {'recorder_node': 'pedestal_bringup.recorder_node:main',
                          'pedestal': 'pedestal_bringup.cli:main'},
 }

@@ -104,7 +104,7 @@ def test_a_run_that_tracks_has_all_numbers(runs):
     assert [row['metric'] for row in rows if row['value'] is None] == []
 
 
-@pytest.mark.parametrize('name, topics', [('first', 12), ('ship', 15)])
+@pytest.mark.parametrize('name, topics', [('first', 13), ('ship', 16)])
 def test_recording_is_complete(runs, name, topics, run_process):
     done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'verify', runs[name].bag], 60.0)
     assert done.returncode == 0, done.stdout
@@ -126,6 +126,8 @@ COLUMNS = {
     'acu/estimate': [('azimuth.position', 'estimate', (0, 0)), ('elevation.velocity', 'estimate', (1, 1)),
                      ('azimuth.acceleration', 'estimate', (0, 2))],
     'acu/reference': [('azimuth.position', 'reference', (0, 0)), ('elevation.position', 'reference', (1, 0))],
+    'acu/filter': [('azimuth_innovation.position', 'innovation', 0), ('elevation_nis.position', 'nis', 1),
+                   ('azimuth_current_statistical.position', 'probability', (0, 3))],
     'tracking_receiver/angle_error': [('x', 'measured', 0), ('y', 'measured', 1)],
 }
 

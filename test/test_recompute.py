@@ -16,7 +16,7 @@ REFERENCES = pathlib.Path(__file__).parent.parent / 'bags' / 'reference'
 SHORT = ('--pacing', 'lockstep', '--param', 'acu.tracker.lock_count=20')
 EXACT = ('--absolute', '0', '--relative', '0')
 ESTIMATE, REFERENCE, MODE, ERROR = 'acu/estimate', 'acu/reference', 'acu/mode', 'tracking_receiver/angle_error'
-OUTPUTS = ('acu/rate_command', ESTIMATE, REFERENCE, MODE)
+OUTPUTS = ('acu/rate_command', ESTIMATE, REFERENCE, 'acu/filter', MODE)
 
 
 @pytest.fixture(scope='module')

@@ -22,7 +22,7 @@ def test_a_scenario_tracks(name, tmp_path):
         overrides = [f'tracking_receiver.target.track_file.path={file}']
     chosen = scenario.load(name, overrides, duration=DURATION)
     result = closed_loop.run(closed_loop.cores(chosen))
-    assert len(result) == round(DURATION / 0.005) + 1
+    assert len(result) == round(DURATION / chosen.node_parameters('adu').period) + 1
     assert result['mode'][-1] == modes.AUTOTRACK
     error = result['true_error'][result['t'] > DURATION - 0.5]
     assert np.isfinite(error).all()

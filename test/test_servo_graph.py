@@ -45,7 +45,7 @@ def test_nodes_and_study_agree(runs, name, record_property):
         for i, axis in enumerate(('azimuth', 'elevation')):
             there = composed[field][:count, i]
             difference = np.max(np.abs(table[f'{axis}.{quantity}'] - (there[:, 0] if there.ndim > 1 else there)))
-            record_property(f'{topic} {axis} {quantity}', difference)
+            record_property(f'{topic} {axis} {quantity}', float(difference))
             assert difference <= ALLOWED, (topic, axis, difference)
     moved = recorded.table('joint_states')['azimuth.position']
     assert np.ptp(moved) > 0.17

@@ -21,5 +21,6 @@ setup(
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'adu_node = adu_drive.adu_node:main',
+        'beam_steering_node = adu_drive.beam_steering_node:main',
     ]},
 )

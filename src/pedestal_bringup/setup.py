@@ -16,7 +16,7 @@ setup(
         ('share/' + package_name + '/launch', glob('launch/*.launch.py')),
     ],
     install_requires=['numpy', 'numba', 'mcap', 'zstandard', 'rosbags', 'matplotlib', 'rich', 'PyYAML', 'scipy',
-                      'filterpy', 'joblib'],
+                      'joblib', 'filterpy'],
     extras_require={'cluster': ['dask', 'distributed'], 'parquet': ['pyarrow'],
                     'test': ['pytest', 'mcap-ros2-support', 'pyarrow', 'control', 'dask', 'distributed']},
     python_requires='>=3.10',

@@ -3,7 +3,7 @@
 `control_unit.step` runs once per drive step:
     error + encoder -> y -> `tracker` (an `axis_filter` each) -> prediction to the instant of the command
     -> `deck_reference` (earth -> deck) -> `position_loop` (`shaper`; `pid`, `feedforward` or `adrc`; `notch`)
-    -> rate and torque.
+    -> rate and torque; of an electronically steered beam (`beam_loop`) -> its angles.
 `modes` decides which target is followed. Frames and angles as in `pedestal_common`.
 
 Symbols
@@ -31,6 +31,8 @@ Symbols
     z1, z2, z3      adrc: observed angle, rate, disturbance                             [rad, rad/s, rad/s2]
     w_c, w_o, w_s   adrc: poles of feedback, of observer, of the drive's rate loop      [rad/s]
     l1, l2, l3      adrc: gains of the observer over a step h; b0 = w_s, u0 the wanted y'' [-], [1/s], [1/s2]
+    R, v            beam_loop: angle of the beam, its rate; alpha, beta gains on them   [rad], [rad/s], [-]
+    delta, V        share compensated of V, the rate at which a fixed target moves with the deck [-], [rad/s]
     w, width, depth notch: centre, damping of its poles, what is left at the centre     [rad/s], [-], [-]
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
     W, E0           rate of a target along its great circle, its highest elevation      [rad/s], [rad]

@@ -33,9 +33,8 @@ def take_attitude(s, p, u):
         h.sample[row, 4 + i] = w[i]
         h.sample[row, 7 + i] = 0.0
         if T <= p.attitude_timeout:
-            before = h.sample[last, 7 + i]
-            rise = (w[i] - h.sample[last, 4 + i]) / T
-            h.sample[row, 7 + i] = before + T / (p.attitude_smoothing + T) * (rise - before)
+            h.sample[row, 7 + i] = deck_reference.smoothed_acceleration(
+                h.sample[last, 7 + i], w[i], h.sample[last, 4 + i], T, p.attitude_smoothing)
     ahead.take_attitude(s.ahead, u.attitude_stamp, h.sample[row, :4], p.keyhole.mean_time)
     return True
 
@@ -58,10 +57,9 @@ def attitude_at(s, p, t):
         for i in range(3):
             s.dw[i] = last[7 + i]
             s.w[i] = last[4 + i] + T * last[7 + i]
-        half = 0.5 * T * T
         x, y, z, w = deck_reference.turned(
-            last[0], last[1], last[2], last[3], T * last[4] + half * last[7], T * last[5] + half * last[8],
-            T * last[6] + half * last[9])
+            last[0], last[1], last[2], last[3], deck_reference.turn(last[4], last[7], T),
+            deck_reference.turn(last[5], last[8], T), deck_reference.turn(last[6], last[9], T))
     else:
         i, j, f = bracket(h, t)
         if i < 0:

@@ -62,7 +62,8 @@ OUTPUTS = np.dtype([
     ('mode', 'i8'), ('reason', 'i8'),                                            # codes of MODES and REASONS
     ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
-    ('reference', 'f8', (2, 3)),                                                # deck angle, rate, acceleration at t_k
+    ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
+                                                                                # of a beam at t_m: the command
     ('covariance', 'f8', (2, 3)), ('probability', 'f8', (2, 4)),                # p11, p12, p22 at t_k; of MODELS
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
@@ -78,6 +79,7 @@ STATE = np.dtype([
     ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
     ('turn', 'f8'), ('seen', 'f8', (2,)),         # raw azimuth last followed; deck angles of the target then
     ('preset', 'f8', (2,)),
+    ('error', 'f8', (2,)),                                                      # of this step, azimuth, elevation
     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
     ('frame', estimate_frame.FRAME), ('mat_fd', 'f8', (3, 3)),                 # of the filter; deck -> it
     ('ahead', ahead.AHEAD), ('aligning', 'i8'), ('blocked', 'i8'),
@@ -129,12 +131,21 @@ def take_encoder(s, u):
 
 
 @compiled
-def target_rates(s, u, a, b, f):
-    """Rates (azimuth, elevation) of the target: those of the antenna, a share f between two encoder samples a and b,
-    and of the error, turned into the frame of the filter by the attitude `s` was last asked for."""
-    x, y, z, dx, dy, dz = displaced_motion(
-        a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), a[3] + f * (b[3] - a[3]),
-        u.cross_elevation, u.elevation, u.error_rate[0], u.error_rate[1])
+def met(s, p, i, j, f, index):
+    """Column `index` of the encoder's history, of an axis p, a share f between two rows: in between, or of a beam that
+    stood up to the newer."""
+    a, b = s.encoder.sample[i, index], s.encoder.sample[j, index]
+    if p.controller == position_loop.BEAM:
+        return b if f > 1e-6 else a
+    return a + f * (b - a)
+
+
+@compiled
+def target_rates(s, u, A, E, dA, dE):
+    """Rates (azimuth, elevation) of the target: those of the antenna at A, E and of the error, turned into the frame
+    of the filter by the attitude `s` was last asked for."""
+    x, y, z, dx, dy, dz = displaced_motion(A, E, dA, dE, u.cross_elevation, u.elevation, u.error_rate[0],
+                                           u.error_rate[1])
     if s.stabilised or s.frame.tilted:
         estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
         x, y, z, dx, dy, dz, _, _, _ = deck_reference.from_lever_arm(-s.arm[0], -s.arm[1], -s.arm[2], x, y, z, dx, dy,
@@ -146,7 +157,7 @@ def target_rates(s, u, a, b, f):
 
 @compiled
 def take_error(s, p, c, u, o):
-    """Filter y = encoder at the stamp of the error, displaced by the error, in the angles of the estimate.
+    """Filter y = encoder at the instant of the error, displaced by the error, in the angles of the estimate.
 
     While the beam is meant to be off the target the receiver's reading is none.
     """
@@ -157,13 +168,15 @@ def take_error(s, p, c, u, o):
         return 0
     if not s.tracker.running:
         estimate_frame.level(s.frame)
-    i, j, f = bracket(s.encoder, u.error_stamp)
+    t = u.error_stamp - e.age
+    i, j, f = bracket(s.encoder, t)
     if i < 0:
         return _ERROR_STAMP
-    a, b = s.encoder.sample[i], s.encoder.sample[j]
-    azimuth, elevation = displaced(a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), u.cross_elevation, u.elevation)
+    A, E = met(s, p.azimuth, i, j, f, 0), met(s, p.elevation, i, j, f, 1)
+    azimuth, elevation = displaced(A, E, u.cross_elevation, u.elevation)
+    s.error[0], s.error[1] = azimuth - A, elevation - E
     if s.stabilised or s.frame.tilted:
-        if not attitude_at(s, p, u.error_stamp):
+        if not attitude_at(s, p, t):
             return _ATTITUDE
         # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
         y, x, z = earth_direction(azimuth, elevation)
@@ -172,13 +185,14 @@ def take_error(s, p, c, u, o):
             azimuth, elevation = estimate_frame.measured(s.frame, azimuth, elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
-        azimuth_rate, elevation_rate = target_rates(s, u, a, b, f)
+        azimuth_rate, elevation_rate = target_rates(s, u, A, E, met(s, p.azimuth, i, j, f, 2),
+                                                    met(s, p.elevation, i, j, f, 3))
     R = tracker.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e.beamwidth, e.slope, e.integration,
                                e.sigma_floor)
     R_rate = u.error_rate_sigma * u.error_rate_sigma
     cos_el = max(math.cos(elevation), 0.01)
     (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
-     o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, u.error_stamp, azimuth, elevation, R / (cos_el * cos_el), R,
+     o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, t, azimuth, elevation, R / (cos_el * cos_el), R,
                                  azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate, u.range,
                                  u.range_variance, math.inf if excused(s, p) else p.tracker.restart_gap)
     if outcome == tracker.STALE:
@@ -217,8 +231,7 @@ def followed(s, p, c, times, angles, t):
     """(in the frame of the filter, A, dA, ddA, E, dE, ddE) at t of what program or autotrack follows: 1 for angles in
     that frame, 0 for earth angles. A silence that has a reason is bridged by the program."""
     if s.mode == modes.PROGRAM:
-        A, dA, ddA = program_track.interpolated(times, angles, t, 0)
-        E, dE, ddE = program_track.interpolated(times, angles, t, 1)
+        A, dA, ddA, E, dE, ddE = program_track.outlook(times, angles, t)
         return 0, A, dA, ddA, E, dE, ddE
     if s.bridge.there and silent(s, p) and excused(s, p) and program_track.status(times, t) == modes.NONE:
         A, dA, ddA, E, dE, ddE = bridge.outlook(s.bridge, times, angles, t)
@@ -228,10 +241,19 @@ def followed(s, p, c, times, angles, t):
 
 
 @compiled
+def deck_rates(s, p, t):
+    """(azimuth, elevation) rate at which a fixed target where the beam is seems to move because the deck does; 0 where
+    nobody compensates for it."""
+    wanted = p.azimuth.beam.rate_compensation != 0.0 or p.elevation.beam.rate_compensation != 0.0
+    if wanted and s.stabilised and attitude_at(s, p, t):
+        return deck_reference.fixed_rates(s.w[0], s.w[1], s.w[2], s.azimuth.position, s.elevation.position)
+    return 0.0, 0.0
+
+
+@compiled
 def program_target(s, p, times, angles, t):
     """Deck angles of the program track at t; the azimuth not yet on a turn."""
-    A, dA, ddA = program_track.interpolated(times, angles, t, 0)
-    E, dE, ddE = program_track.interpolated(times, angles, t, 1)
+    A, dA, ddA, E, dE, ddE = program_track.outlook(times, angles, t)
     return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
 
 
@@ -245,8 +267,8 @@ def outside(azimuth, elevation, p):
 
 @compiled
 def overdue(s, p):
-    """How long [s] no error was believed, beyond the receiver's latency."""
-    return s.stamp - s.tracker.stamp - p.receiver_latency
+    """How long [s] no error was believed, beyond the receiver's latency and the age of its errors."""
+    return s.stamp - s.tracker.stamp - p.receiver_latency - p.tracker.receiver.age
 
 
 @compiled
@@ -433,6 +455,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     encoder_ok = take_encoder(s, u)
     if not encoder_ok:
         flags |= _ENCODER
+    s.error[0] = s.error[1] = math.nan
     if u.stabilised != s.stabilised:
         s.stabilised, s.tracker.running = u.stabilised, 0
         ahead.forget(s.ahead)
@@ -465,10 +488,17 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
                                                 t_azimuth if i == 0 else t_elevation)
             if i == 0:
                 A, dA, ddA = B, dB, ddB
-        position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
-                           u.velocity[0], dt, o, 0)
-        position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
-                           u.velocity[1], dt, o, 1)
+        autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
+        if p.azimuth.controller == position_loop.BEAM:
+            position_loop.steer(s.azimuth, p.azimuth, A, dA, ddA, s.error[0], V_A, autotrack, dt, o, 0)
+        else:
+            position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
+                               u.velocity[0], dt, o, 0)
+        if p.elevation.controller == position_loop.BEAM:
+            position_loop.steer(s.elevation, p.elevation, E, dE, ddE, s.error[1], V_E, autotrack, dt, o, 1)
+        else:
+            position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m,
+                               u.position[1], u.velocity[1], dt, o, 1)
         s.entered = 0
         explain(s, p, constants[0], times, angles)
         o.blocked = s.blocked

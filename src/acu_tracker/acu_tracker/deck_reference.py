@@ -6,7 +6,7 @@ Exact: the unit vector is differentiated twice, u_d = M' u, u_d' = M' u' - w x u
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import to_deck, to_earth, wrap
+from pedestal_common.line_of_sight import direction, to_deck, to_earth, wrap
 
 
 @compiled
@@ -80,6 +80,15 @@ def from_lever_arm(rx, ry, rz, x, y, z, dx, dy, dz, ddx, ddy, ddz):
 
 
 @compiled
+def fixed_rates(wx, wy, wz, A, E):
+    """(dA, dE) at which an earth-fixed direction, now at deck angles A, E, seems to move while the deck turns by w."""
+    x, y, z = direction(A, E)
+    cx, cy, cz = cross(wx, wy, wz, x, y, z)
+    _, dA, _, _, dE, _ = moving_angles(x, y, z, -cx, -cy, -cz, 0.0, 0.0, 0.0)
+    return dA, dE
+
+
+@compiled
 def earth_rates(mat_ed, wx, wy, wz, x, y, z, dx, dy, dz):
     """Rates (dA, dE) of the earth angles of a moving FLU unit vector on a deck that turns: u' = M (u_d' + w x u_d)."""
     cx, cy, cz = cross(wx, wy, wz, x, y, z)
@@ -87,6 +96,18 @@ def earth_rates(mat_ed, wx, wy, wz, x, y, z, dx, dy, dz):
     de, dn, du = to_earth(mat_ed, dx + cx, dy + cy, dz + cz)
     _, dA, _, _, dE, _ = moving_angles(n, -e, u, dn, -de, du, 0.0, 0.0, 0.0)
     return dA, dE
+
+
+@compiled
+def smoothed_acceleration(before, w, w_before, T, tau):
+    """Angular acceleration from two rates T [s] apart, low-passed with tau [s]; before: what it was."""
+    return before + T / (tau + T) * ((w - w_before) / T - before)
+
+
+@compiled
+def turn(w, dw, T):
+    """Angle that a rate w and its derivative dw turn in T [s]."""
+    return T * w + 0.5 * T * T * dw
 
 
 @compiled

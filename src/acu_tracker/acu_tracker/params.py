@@ -2,6 +2,7 @@
 import dataclasses
 import math
 
+from acu_tracker.beam_loop import FORMS
 from acu_tracker.filter_params import Filter, Ukf
 from acu_tracker.history import LENGTH
 from acu_tracker.modes import MODES
@@ -19,6 +20,8 @@ class ReceiverLaw(Parameters):
     slope: float = parameter(1.6, 0.1, 10.0, '', 'monopulse slope k_m: difference over sum per beamwidth')
     integration: float = parameter(0.005, 1e-6, 10.0, 's', 'integration time tau of one error')
     sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not fall with C/N0 (encoder, phase)')
+    age: float = parameter(0.0, 0.0, 0.5, 's', 'an error is the one of this long before its stamp: of a beam that '
+                           'stands, the middle of the samples it is the mean of')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,6 +81,16 @@ class Adrc(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class Beam(Parameters):
+    """The beam of a phased array (paper 002); alpha and rate_compensation belong to its own loops, type_1, type_2."""
+
+    form: str = choice('tracked', FORMS, "tracked: the target's filter predicted to t_m; type_1: the paper's loop; "
+                       'type_2: the same with the beam at its prediction')
+    alpha: float = parameter(0.1, 1e-3, 1.0, '', 'gain on the angle; beta by Benedict and Bordner')
+    rate_compensation: float = parameter(0.0, 0.0, 2.0, '', "delta: share of the deck's rate fed forward")
+
+
+@dataclasses.dataclass(frozen=True)
 class Notch(Parameters):
     """Takes a structural resonance out of the feedback."""
 
@@ -126,6 +139,7 @@ class AxisParameters(Parameters):
     pid: Pid = group(Pid)
     feedforward: Feedforward = group(Feedforward)
     adrc: Adrc = group(Adrc)
+    beam: Beam = group(Beam)
     notch: Notch = group(Notch)
     shaper: Shaper = group(Shaper)
     limits: Limits = group(Limits)
@@ -203,6 +217,10 @@ class AcuParameters(Parameters):
             if getattr(self, name).notch.frequency * self.period >= 0.5:
                 raise ParameterError(f'{name}.notch.frequency = {getattr(self, name).notch.frequency:g} Hz: must be '
                                      f'below half the step rate, {0.5 / self.period:g} Hz')
+        oldest = self.receiver_latency + self.tracker.receiver.age
+        if oldest > (LENGTH - 4) * self.period:
+            raise ParameterError(f'tracker.receiver.age = {self.tracker.receiver.age:g} s: with receiver_latency must '
+                                 f'be 0 to {LENGTH - 4} periods, {(LENGTH - 4) * self.period:g} s')
         longest = self.attitude_timeout - self.command_delay - 0.5 * self.period
         if self.attitude_latency >= longest:
             raise ParameterError(f'attitude_latency = {self.attitude_latency:g} s: must be below attitude_timeout - '

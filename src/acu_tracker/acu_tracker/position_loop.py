@@ -2,15 +2,18 @@
 
 `pid` acts on the raw target at t_k. `feedforward` and `adrc` act on the shaped reference as it was planned for t_k and
 feed the one of t_m forward. A shaped reference that nobody follows rests on the antenna's own angle and rate.
+`beam` steers an electronic beam: the raw target at t_m is the command, there is nothing to control.
 """
+import math
+
 import numpy as np
 
-from acu_tracker import adrc, feedforward, notch, pid, shaper
+from acu_tracker import adrc, alpha_beta, beam_loop, feedforward, notch, pid, shaper
 from acu_tracker.history import LENGTH, bracket, history_type, push
 from pedestal_common.compiled import compiled
 
-CONTROLLERS = ('pid', 'feedforward', 'adrc')
-PID, FEEDFORWARD, ADRC = range(len(CONTROLLERS))
+CONTROLLERS = ('pid', 'feedforward', 'adrc', 'beam')
+PID, FEEDFORWARD, ADRC, BEAM = range(len(CONTROLLERS))
 
 AXIS = np.dtype([
     ('controller', 'i8'), ('command', 'f8'),                                  # of the last step; [rad/s]
@@ -34,8 +37,14 @@ def limited(wanted, before, dt, rate, acceleration):
 
 @compiled
 def seat(axis, p, t_k, y, dy):
-    """Targets := actual: the controller starts from the encoder's angle y [rad] and rate dy [rad/s]."""
+    """Targets := actual: the controller starts from the encoder's angle y [rad] and rate dy [rad/s].
+
+    A beam stays where it was last told to be: what is in force comes a delay later and would go round for ever.
+    """
     axis.controller = p.controller
+    if p.controller == BEAM and axis.reference.count > 0:
+        axis.rate = 0.0
+        return
     seat_reference(axis, t_k, y, dy)
     seat_feedback(axis, t_k, y, dy)
     axis.error = axis.derivative = 0.0
@@ -93,6 +102,33 @@ def rest(axis, p, dt, o, index):
                                                              p.limits.acceleration)
     axis.integral = 0.0
     o.reference[index, 0] = axis.position
+
+
+@compiled
+def steer(axis, p, A, dA, ddA, error, V, autotrack, T, o, index):
+    """The beam of one axis: raw target (A, dA, ddA) at t_m to the command, which is o.reference, and its rate.
+
+    error: the receiver's, in this angle, NaN where none came; V: rate at which a fixed target seems to move because
+    the deck does; T [s] since the step before. Only autotrack of type_1 and type_2 closes its loop on them.
+    """
+    b = p.beam
+    beta, compensation = alpha_beta.benedict_bordner(b.alpha), b.rate_compensation * V
+    axis.controller = BEAM
+    axis.acceleration = 0.0
+    if not autotrack or b.form == beam_loop.TRACKED:
+        axis.position, axis.rate, axis.acceleration = A, dA, ddA
+    elif not math.isfinite(error):
+        axis.position, axis.rate = beam_loop.coasted(axis.position, axis.rate, T, compensation)
+    elif b.form == beam_loop.TYPE_1:
+        axis.position, axis.rate = beam_loop.type_1(axis.position, axis.rate, error, b.alpha, beta, T, compensation)
+    else:
+        axis.position, axis.rate = beam_loop.type_2(axis.position, axis.rate, error, b.alpha, beta, T, compensation)
+    if not p.limits.low <= axis.position <= p.limits.high:
+        axis.position, axis.rate, axis.acceleration = min(max(axis.position, p.limits.low), p.limits.high), 0.0, 0.0
+        o.angle_limited[index] = 1
+    axis.command = axis.rate
+    r = o.reference[index]
+    r[0], r[1], r[2] = axis.position, axis.rate, axis.acceleration
 
 
 @compiled
@@ -187,7 +223,7 @@ def step(axis, p, notch_constants, A, dA, ddA, t_k, t_m, y, dy, dt, o, index):
     observer of adrc is fed with the realised command.
     """
     handover = axis.controller != p.controller
-    if handover and axis.controller == PID:
+    if handover and (axis.controller == PID or axis.controller == BEAM):
         seat_reference(axis, t_k, y, dy)
     if p.controller == PID:
         take_raw(axis, p, A, dA, ddA, t_k, y, dy, o, index)

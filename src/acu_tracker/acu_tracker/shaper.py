@@ -6,18 +6,9 @@ within the limits is followed without lag, and a jump is made in minimum time wi
 import math
 
 from pedestal_common.compiled import compiled
+from pedestal_common.fhan import fhan
 
 SUB_STEPS = 4
-
-
-@compiled
-def fhan(x1, x2, r, h0):
-    """Time-optimal acceleration within +-r that brings x1'' = u to rest at 0, linear within h0 of it (Han 2009)."""
-    d = r * h0 * h0
-    a0 = h0 * x2
-    y = x1 + a0
-    a = a0 + y if abs(y) <= d else a0 + math.copysign(0.5 * (math.sqrt(d * (d + 8.0 * abs(y))) - d), y)
-    return -r * a / d if abs(a) <= d else -math.copysign(r, a)
 
 
 @compiled

@@ -172,9 +172,11 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
     elif (c.wanted[0] or c.wanted[1]) and R_range <= c.range_share_2 * range_ * range_:
         begin_cartesian(t, c, range_, R_range)
     t.in_a_row = 1 if T > p.coast_after else t.in_a_row + 1
-    # Converged: the estimate is at least twice as good as one measurement.
-    a11, _, _, e11, _, _ = variances(t, c, stamp)
-    t.converged = a11 < 0.25 * R_azimuth and e11 < 0.25 * R_elevation
+    # Converged: the rates across the line of sight are known four times as well as at the start. (The angle is no sign
+    # of it: a lively filter never knows that much better than its measurement.) R_azimuth grows as 1/cos2 does.
+    _, _, a22, _, _, e22 = variances(t, c, stamp)
+    known = (0.25 * p.initial_rate)**2
+    t.converged = a22 * R_elevation < known * R_azimuth and e22 < known
     return outcome, nu_a, nu_e, nu_da, nu_de, nis_a, nis_e
 
 

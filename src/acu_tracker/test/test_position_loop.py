@@ -9,6 +9,7 @@ from acu_tracker.params import AxisParameters, Feedforward
 from pedestal_common.parameters import build, record
 
 T = 0.005
+MECHANICAL = ('pid', 'feedforward', 'adrc')
 WIDE = {'limits.rate': 100.0, 'limits.acceleration': 1e5}
 
 
@@ -89,7 +90,7 @@ def test_pid_lags_a_ramp_by_the_rate_over_its_gain():
     assert 0.1 * 399 * T - angles[-1] == pytest.approx(0.1 / 20.0, rel=1e-9)
 
 
-@pytest.mark.parametrize('controller', position_loop.CONTROLLERS)
+@pytest.mark.parametrize('controller', MECHANICAL)
 def test_command_keeps_rate_and_acceleration(controller):
     _, commands, *_ = Axis(still(1.0), lag=176.0, controller=controller,
                           **{'limits.rate': 0.5, 'limits.acceleration': 4.0, 'shaper.rate': 0.5,
@@ -136,7 +137,7 @@ def tracking(t):
 
 
 @pytest.mark.parametrize('integral', [0.0, 0.25])
-@pytest.mark.parametrize('old, new', [(a, b) for a in position_loop.CONTROLLERS for b in position_loop.CONTROLLERS
+@pytest.mark.parametrize('old, new', [(a, b) for a in MECHANICAL for b in MECHANICAL
                                       if a != b])
 def test_switching_while_tracking_does_not_move_the_command(old, new, integral):
     """Also with the drive's lag, and a disturbance that the running controller has learnt."""

@@ -121,6 +121,15 @@ def test_lock_needs_a_row_of_fresh_errors_and_convergence(kind):
     assert not target.locked()
 
 
+@pytest.mark.parametrize('lively', [{'kind': 'alpha_beta', 'alpha_beta.alpha': 0.4}, {'kind': 'cv', 'cv.noise': 0.07}])
+def test_a_filter_no_better_than_its_measurements_locks_too(lively):
+    target = Target({'lock_count': 50}, **lively)
+    for k in range(120):
+        target.observe(k * T, 0.1)
+    assert target.variances()[0] > 0.25 * SIGMA**2
+    assert target.locked()
+
+
 def moving(t):
     return 0.3 + 0.02 * t + 0.001 * t * t, 0.02 + 0.002 * t
 

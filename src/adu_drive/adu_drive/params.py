@@ -249,13 +249,28 @@ class AduParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
-class AduNodeParameters(AduParameters):
-    """Parameters of adu_node: the drive, how long it runs and when a command is stale."""
+class RunParameters(Parameters):
+    """What a node that owns the time is told of its run."""
     duration: float = parameter(0.0, 0.0, 86400.0, 's',
                                 "end after this much of the drive's time; 0: run until stopped")
-    command_timeout: int = parameter(10, 1, 10000, 'periods', 'realtime: a command older than this stops the axes')
+    command_timeout: int = parameter(10, 1, 10000, 'periods', 'realtime: a command older than this is stale: the '
+                                     'axes stop, a beam stays')
 
     def check(self):
         super().check()
         if self.duration and abs(self.duration / self.period - round(self.duration / self.period)) > 1e-6:
             raise ParameterError(f'duration = {self.duration:g} s: must be a multiple of the period {self.period:g} s')
+
+
+@dataclasses.dataclass(frozen=True)
+class AduNodeParameters(RunParameters, AduParameters):
+    """Parameters of adu_node: the drive and its run."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BeamParameters(RunParameters):
+    """Parameters of beam_steering_node: the array and its run."""
+    period: float = parameter(5e-3, 1e-4, 0.1, 's', 'step T: the beam stands this long')
+    transport_delay: float = parameter(0.0, 0.0, 0.5, 's', 'a command takes effect this much later')
+    initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'of every beam at t = 0')
+    initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'of every beam at t = 0')

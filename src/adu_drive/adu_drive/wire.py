@@ -26,9 +26,10 @@ class Adu:
     """The drive of an AduNodeParameters; on_ship: it hears how its deck turns.
 
     heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
-    a step waits for; WORDS: {topic: function from its code in `said` to its text}.
+    a step waits for; WORDS: {topic: function from its code in `said` to its text}; SERVICES: what it can be asked for.
     """
-    HEARD, SAID, WORDS = HEARD, SAID, {STATE: drive_state.described}
+    HEARD, SAID, WORDS, COMMAND = HEARD, SAID, {STATE: drive_state.described}, COMMAND
+    SERVICES = tuple(drive_state.REQUESTS)
 
     def __init__(self, params, on_ship):
         self.constants, self.state = drive_unit.constants(params), drive_unit.initial_state(params)
@@ -59,13 +60,18 @@ class Adu:
         """One period on from the stamp of `heard`, obeying it; whether the command in force is stale."""
         return advance(self.state, self.constants, self.inputs, self.outputs, self.memory, self.heard)
 
-    def ask(self, what):
-        """Ask for one of drive_state.REQUESTS between two steps; drive_state.GRANTED, or why not."""
-        return drive_unit.request(self.state, self.constants, self.outputs, what)
+    def condition(self):
+        """The text of adu/state as it is now, also between two steps."""
+        return drive_state.described(int(self.outputs[0]['condition']))
+
+    def refusal(self, service):
+        """Ask for one of SERVICES between two steps: '' when granted, else why not."""
+        answer = drive_unit.request(self.state, self.constants, self.outputs, drive_state.REQUESTS[service])
+        return '' if answer == drive_state.GRANTED else drive_state.REFUSALS[answer]
 
     def request(self, service):
-        """The same by the name of its service; True when granted."""
-        return self.ask(drive_state.REQUESTS[service]) == drive_state.GRANTED
+        """The same; True when granted."""
+        return not self.refusal(service)
 
     def services_to(self, text):
         """The services that bring adu/state to a text."""

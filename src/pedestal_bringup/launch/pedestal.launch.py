@@ -10,6 +10,7 @@ from launch_ros.actions import Node
 
 from launch import LaunchDescription
 from pedestal_bringup import graph, scenario
+from pedestal_common import topics
 
 
 def start(context):
@@ -25,8 +26,9 @@ def start(context):
             send = ['pedestal', 'program', given['scenario'], '--duration', str(chosen.header.duration)]
             actions.append(ExecuteProcess(cmd=send, output='screen'))
             continue
-        package, module = scenario.NODE_KINDS[name].module.split('.')
-        node = Node(package=package, executable=module, name=name, parameters=[str(file)], output='screen')
+        package, module = chosen.kind(name).module.split('.')
+        node = Node(package=package, executable=module, name=topics.plain(name), namespace=topics.beam_of(name),
+                    parameters=[str(file)], output='screen')
         actions.append(node)
         if name == 'adu':
             end = OnProcessExit(target_action=node, on_exit=[EmitEvent(event=Shutdown())])

@@ -1,4 +1,5 @@
 """Bags: a rosbag2 directory (metadata.yaml version 9) with one MCAP file, written and read. No ROS here."""
+import copy
 import difflib
 import fcntl
 import functools
@@ -16,6 +17,7 @@ from mcap.stream_reader import get_chunk_data_stream
 from pedestal_bringup import columns
 from pedestal_bringup.container import MAGIC, MESSAGE, BagError, Container, compressed, reason
 from pedestal_common import messages
+from pedestal_common import topics as tables
 
 CHUNK_SIZE = 1_000_000
 CHUNK_SPAN = 1_000_000_000
@@ -108,12 +110,15 @@ class Writer:
             self._container.close()
 
 
-def read(path):
-    """The Bag in a directory or an .mcap file. Raises BagError when it is missing, empty, damaged or foreign."""
+def read(path, beam=None):
+    """The Bag in a directory or an .mcap file; beam: as that beam of an array sees it, '' for the first.
+
+    Raises BagError when it is missing, empty, damaged or foreign, or has no such beam.
+    """
     bag = load(path)
     if bag.damage:
         raise BagError(f'{bag.file}: {bag.damage}; `pedestal recover` makes a bag of what is there')
-    return bag
+    return bag if beam is None else bag.view(beam)
 
 
 def chosen_topics(bag, names):
@@ -179,11 +184,12 @@ class Bag:
 
     topics: {name without the leading '/': type}; metadata_records: {name: {text: text}};
     index: record array in the order of the file, one row per message: channel, sequence, log, publish [ns], chunk,
-    start, stop (where its bytes are); statistics: {name: count} as the file's summary says, None without one.
+    start, stop (where its bytes are); statistics: {name: count} as the file's summary says, None without one;
+    beam: the prefix of the beam of several that it is a view of, ''.
     """
 
     def __init__(self, path, file, data):
-        self.path, self.file = path, file
+        self.path, self.file, self.beam = path, file, ''
         self.topics, self.metadata_records, self.statistics, self.damage = {}, {}, None, ''
         self._data = data
         self._schemas, self._channels, self._chunks = {}, {}, []
@@ -269,6 +275,45 @@ class Bag:
     def metadata(self):
         """{text: text} of the run (the record `pedestal`); empty in a foreign bag."""
         return self.metadata_records.get('pedestal', {})
+
+    @property
+    def beams(self):
+        """Beams of the array that was recorded; 0: a drive with motors."""
+        several = sum(1 for name in self.topics if tables.plain(name) == 'joint_states' != name)
+        return several or int(self.metadata.get('beams', 0))
+
+    @property
+    def graph(self):
+        """{name: Topic} of the graph that was recorded."""
+        return tables.graph(self.beams)
+
+    def view(self, beam=''):
+        """The Bag as one beam of several sees it, '' for the first: what is its own under the plain names, what is
+        shared, and nothing of the others. A Bag of one beam is its own view. Raises BagError for no beam of it."""
+        known = tables.prefixes(self.beams)
+        if known == ('',) and beam:
+            raise BagError(f'{self.path}: beam {beam!r}: there is only one in it')
+        prefix = f'{beam}/' if beam else known[0]
+        if prefix not in known:
+            raise BagError(f'{self.path}: beam {beam!r}: must be one of {", ".join(name[:-1] for name in known)}')
+        if not prefix:
+            return self
+        seen = copy.copy(self)
+        seen.beam = prefix
+
+        def own(content):
+            return {tables.plain(name): value for name, value in content.items()
+                    if tables.beam_of(name) in ('', prefix[:-1])}
+        seen.topics = own(self.topics)
+        seen._channels = {channel: tables.plain(name) for channel, name in self._channels.items()
+                          if tables.beam_of(name) in ('', prefix[:-1])}
+        seen.index = self.index[np.isin(self.index.channel, list(seen._channels))]
+        seen.statistics = None if self.statistics is None else own(self.statistics)
+        seen.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}
+        if 'parameters' in self.metadata_records:
+            seen.metadata_records['parameters'] = own(self.metadata_records['parameters'])
+        seen.__dict__.pop('configuration', None)
+        return seen
 
     @functools.cached_property
     def configuration(self):

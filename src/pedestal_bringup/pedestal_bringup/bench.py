@@ -12,12 +12,12 @@ import time
 import llvmlite.binding
 import numba
 import numpy as np
-from filterpy.kalman import IMMEstimator, KalmanFilter
+from filterpy.kalman import IMMEstimator, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 from rich.console import Console
 from rich.table import Table
 
-from acu_tracker import axis_filter
-from acu_tracker.filter_params import Filter
+from acu_tracker import axis_filter, unscented
+from acu_tracker.filter_params import Filter, Ukf
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup import bag, bare_ring, closed_loop, graph, recompute, replay, scenario, solve_ivp_axis
@@ -149,30 +149,70 @@ def _filter_steps(state, constants, t, y, R):
         axis_filter.correct(f, c, y[k], R[k], math.nan, math.nan)
 
 
+def unscented_step():
+    """Time [us] of one prediction and correction of both Cartesian filters, azimuth, elevation and range measured."""
+    state, constants = np.zeros(1, unscented.STATE), unscented.constants(Ukf())
+    noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
+    measured = noise + np.outer(FILTER_PERIOD * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
+    _unscented_steps(state, constants, measured)
+    return best_of(lambda: _unscented_steps(state, constants, measured)) / FILTER_STEPS * 1e6
+
+
+@compiled
+def _unscented_steps(state, constants, measured):
+    s, c = state[0], constants[0]
+    R = 2.5e-7
+    unscented.start(s, c, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0, R, 0.0, 0.01, R, 0.0, 0.01, 500.0, 1.0)
+    for k in range(len(measured)):
+        A, E, r = measured[k]
+        unscented.predict(s, c, FILTER_PERIOD)
+        unscented.innovation(s, A, E, r, R, R, 1.0)
+        unscented.correct(s, A, E, r)
+
+
+def filterpy_unscented():
+    """filterpy's IMMEstimator of two UnscentedKalmanFilter of nine states, three numbers measured."""
+    def one():
+        made = UnscentedKalmanFilter(
+            9, 3, FILTER_PERIOD, lambda x: np.array([np.arctan2(x[0], x[1]), np.arctan2(x[2], np.hypot(x[0], x[1])),
+                                                     np.linalg.norm(x[:3])]),
+            lambda x, dt: F @ x, MerweScaledSigmaPoints(9, unscented.ALPHA, unscented.BETA, unscented.KAPPA))
+        made.x = np.array([0.0, 478.0, 148.0, 0.5, *np.zeros(5)])
+        made.Q, made.R = 0.01 * np.eye(9), np.diag([2.5e-7, 2.5e-7, 1.0])
+        return made
+
+    T = FILTER_PERIOD
+    F = np.kron([[1.0, T, 0.5 * T * T], [0.0, 1.0, T], [0.0, 0.0, 1.0]], np.eye(3))
+    return IMMEstimator([one(), one()], np.full(2, 0.5), np.array([[0.998, 0.002], [0.002, 0.998]]))
+
+
 def filterpy_steps():
-    """Times [us] of predict and update of filterpy's KalmanFilter of three states and IMMEstimator of three such."""
+    """Times [us] of predict and update of filterpy's KalmanFilter of three states, and of IMMEstimator of three such
+    and of two unscented filters."""
     def three():
         made = KalmanFilter(3, 1)
         made.F = np.array([[1.0, FILTER_PERIOD, 0.5 * FILTER_PERIOD**2], [0.0, 1.0, FILTER_PERIOD], [0.0, 0.0, 1.0]])
         made.H, made.R, made.Q = np.array([[1.0, 0.0, 0.0]]), np.array([[2.5e-7]]), 1e-6 * np.eye(3)
         return made
 
-    def run(estimator):
+    def run(estimator, measured):
         for _ in range(FILTERPY_STEPS):
             estimator.predict()
-            estimator.update(np.zeros((1, 1)))
+            estimator.update(measured)
 
     chain = 0.001 + 0.997 * np.eye(3)
-    estimators = three(), IMMEstimator([three() for _ in range(3)], np.full(3, 1 / 3), chain)
-    return [best_of(lambda made=made: run(made), 3) / FILTERPY_STEPS * 1e6 for made in estimators]
+    angle = np.zeros((1, 1))
+    cases = ((three(), angle), (IMMEstimator([three() for _ in range(3)], np.full(3, 1 / 3), chain), angle),
+             (filterpy_unscented(), np.array([0.0, 0.3, 500.0])))
+    return [best_of(lambda case=case: run(*case), 3) / FILTERPY_STEPS * 1e6 for case in cases]
 
 
 def filter_rows():
-    """One step of one filter and of three interacting ones, against filterpy's in the same run."""
+    """One step of one filter, of three interacting and of two unscented ones, against filterpy's in the same run."""
+    steps = filter_step('current_statistical'), filter_step('imm'), unscented_step()
     rows = []
-    for metric, kind, target, theirs in zip(('kalman', 'imm3'), ('current_statistical', 'imm'), ('<= 2', '<= 10'),
+    for metric, ours, target, theirs in zip(('kalman', 'imm3', 'imm_ukf'), steps, ('<= 2', '<= 10', None),
                                             filterpy_steps()):
-        ours = filter_step(kind)
         rows += [row('core', f'{metric}_step_us', ours, 'us', target),
                  row('filterpy', f'{metric}_step_us', theirs, 'us'),
                  row('filterpy', f'{metric}_ratio', theirs / ours, '')]

@@ -5,6 +5,7 @@ import inspect
 import json
 import math
 import pathlib
+import shlex
 import signal
 import sys
 
@@ -38,6 +39,7 @@ def main(args=None) -> int:
     """Exit code 0; 1 with one line on stderr for anything that went wrong; 2 for a wrong command line."""
     parser = _parser()
     options = parser.parse_args(args)
+    options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
@@ -64,13 +66,15 @@ def _parser():
     run.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
     run.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
                      help='change a parameter, as acu.azimuth.feedforward.bandwidth=20; may be repeated')
+    run.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
+                     help='ROS 2 parameter file whose values replace those of the scenario, as `pedestal tune` writes')
     run.set_defaults(verb=_run)
 
     scenarios = verbs.add_parser('scenarios', help='list the scenarios')
     scenarios.set_defaults(verb=_scenarios)
 
     listed = verbs.add_parser('parameters', help='list the parameters of a node: default, range, unit, meaning')
-    listed.add_argument('node', help='acu, adu, tracking_receiver, ship_motion, ins, recorder or scenario')
+    listed.add_argument('node', help='acu, adu, beam_steering, tracking_receiver, ship_motion, ins, recorder ...')
     listed.set_defaults(verb=_parameters)
 
     program = verbs.add_parser('program', help='send the program track of a scenario to a running ACU')
@@ -96,6 +100,7 @@ def _parser():
     report = verbs.add_parser('report', help='write a recording as one HTML file with its figures')
     report.add_argument('bag', type=pathlib.Path)
     report.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
+    _add_beam(report)
     report.add_argument('--png', type=pathlib.Path, metavar='DIR', help='also write each figure as PNG')
     report.set_defaults(verb=_report)
 
@@ -120,6 +125,19 @@ def _parser():
 
     _add_recompute(verbs)
 
+    tune = verbs.add_parser('tune', help='find the parameters of a filter or of the feed-forward')
+    tune.add_argument('source', metavar='BAG|SCENARIO', help='a recording: innovations; a scenario: pointing error')
+    tune.add_argument('--filter', metavar='KIND', help='the kind of filter to tune')
+    tune.add_argument('--feedforward', action='store_true', help="the gains that follow from the drive's rate loop")
+    tune.add_argument('--axis', choices=('azimuth', 'elevation', 'both'), default='both', help='default: both')
+    tune.add_argument('--seed', type=int, metavar='N', help='first seed; default: what the scenario says')
+    tune.add_argument('--runs', type=int, metavar='N', help='seeds to tune on, the next one judges; default: 2')
+    tune.add_argument('--duration', type=float, metavar='S', help='of a run')
+    tune.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
+                      help='change a parameter of the scenario; may be repeated')
+    tune.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: NAME-KIND.yaml')
+    tune.set_defaults(verb=_tune)
+
     replay = verbs.add_parser('replay', help='publish a recording into a live graph')
     replay.add_argument('bag', type=pathlib.Path)
     into = replay.add_mutually_exclusive_group()
@@ -143,10 +161,16 @@ def _parser():
     return parser
 
 
+def _add_beam(verb):
+    verb.add_argument('--beam', default='', metavar='NAME', help='of a recording of several, as beam_2; default: the '
+                      'first')
+
+
 def _add_recompute(verbs):
     verb = verbs.add_parser('recompute', help='feed recorded inputs to a node again and compare its outputs',
                             description=RECOMPUTE, formatter_class=argparse.RawDescriptionHelpFormatter)
     verb.add_argument('bag', type=pathlib.Path)
+    _add_beam(verb)
     verb.add_argument('--node', action='append', default=[], metavar='NODE',
                       help='acu, adu, tracking_receiver, ins or ship_motion; may be repeated; default: every node')
     verb.add_argument('--param', action='append', default=[], metavar='[NODE.]KEY=VALUE',
@@ -190,10 +214,11 @@ def _check_json(path):
 
 
 def _run(options):
-    from pedestal_bringup import consistency, graph, results, scenario
+    from pedestal_bringup import consistency, graph, isolation, known_attitude, results, scenario
     from pedestal_bringup.bag import read
     from pedestal_bringup.verify import verify
-    chosen = scenario.load(options.scenario, options.param, options.seed, options.duration, options.pacing)
+    changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
+    chosen = scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
     bag = _new_bag(options.bag, chosen.name)
     _check_json(options.json)
     with _progress(chosen.header.duration) as progress:
@@ -203,15 +228,22 @@ def _run(options):
             print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
             return EXIT_STOPPED
     recording = read(bag)
-    tracked = results.tracking(recording)
-    values = {**results.summary(tracked), **consistency.summary(consistency.read(recording, tracked))}
-    values['lost_steps'] = (float(outcome.drive['lost_steps']), '')
-    values['realtime_factor'] = (outcome.drive['realtime_factor'], '')
-    values['messages'] = (float(outcome.recorder['messages']), '')
-    _show(f'{chosen.name}: {chosen.header.title}', values)
+    of_beams = []
+    for prefix in chosen.prefixes:
+        beam = recording.view(prefix[:-1])
+        tracked = results.tracking(beam)
+        of_beams.append({**results.summary(tracked), **consistency.summary(consistency.read(beam, tracked)),
+                         **results.announced_losses(beam), **isolation.summary(isolation.read(beam, tracked)),
+                         **known_attitude.summary(known_attitude.read(beam))})
+    whole = {'lost_steps': (float(outcome.drive['lost_steps']), ''),
+             'realtime_factor': (outcome.drive['realtime_factor'], ''),
+             'messages': (float(outcome.recorder['messages']), '')}
+    _show(f'{chosen.name}: {chosen.header.title}', [prefix[:-1] for prefix in chosen.prefixes], of_beams, whole)
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     if options.json:
-        _write_json(options.json, {'name': chosen.name, 'rows': results.rows(chosen.name, values),
+        rows = [row for prefix, values in zip(chosen.prefixes, of_beams)
+                for row in results.rows(f'{chosen.name}/{prefix}'.rstrip('/'), values)]
+        _write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                    'mcap_sha256': outcome.recorder['sha256']})
     check = verify(bag)
     if not check.complete:
@@ -228,14 +260,22 @@ def _new_bag(given, scenario):
     return bag
 
 
-def _show(title, values):
+def _show(title, beams, of_beams, whole):
+    """A table of metrics: a column for each beam, one for a single one (beams: ['']), and what belongs to the run."""
     table = Table(title=title, title_justify='left')
     table.add_column('metric')
-    table.add_column('value', justify='right')
+    for beam in beams:
+        table.add_column(beam or 'value', justify='right')
     table.add_column('unit')
-    for metric, (value, unit) in values.items():
-        table.add_row(metric, f'{value:.6g}' if math.isfinite(value) else 'not measured', unit)
-    Console().print(table)
+    for metric, (_, unit) in of_beams[0].items():
+        table.add_row(metric, *(_number(values[metric][0]) for values in of_beams), unit)
+    for metric, (value, unit) in whole.items():
+        table.add_row(metric, _number(value), *[''] * (len(beams) - 1), unit)
+    Console(width=max(Console().width, TABLE_WIDTH) if len(beams) > 1 else None).print(table)
+
+
+def _number(value):
+    return f'{value:.6g}' if math.isfinite(value) else 'not measured'
 
 
 def _write_json(path, content):
@@ -295,7 +335,7 @@ def _rerun(options):
 
 def _report(options):
     from pedestal_bringup import report
-    print(report.write(options.bag, options.output, options.png))
+    print(report.write(options.bag, options.output, options.png, options.beam))
     return 0
 
 
@@ -356,7 +396,7 @@ def _share():
 
 
 TABLE_WIDTH = 120
-"""Columns that the table of a study may take, also where the terminal has fewer: one line a row."""
+"""Columns that the table of a study or of several beams may take on any terminal, so that a row is one line."""
 
 
 def _show_study(title, rows):
@@ -392,6 +432,14 @@ def _recompute(options):
     if options.json:
         _write_json(options.json, {'name': 'recompute', 'rows': rows})
     return 0 if well else 1
+
+
+def _tune(options):
+    from pedestal_bringup import tune
+    with _share() as progress:
+        lines = tune.main(options, options.command, progress)
+    print('\n'.join(lines))
+    return 0
 
 
 def _replay(options):

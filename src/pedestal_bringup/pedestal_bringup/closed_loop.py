@@ -8,7 +8,8 @@ import dataclasses
 import numpy as np
 
 from acu_tracker import control_unit, program_track
-from adu_drive import drive_unit
+from adu_drive import drive_unit, electronic_beam
+from adu_drive.beam_wire import Beam
 from pedestal_bringup.program import program_table
 from pedestal_common import line_of_sight, noise
 from pedestal_common.compiled import compiled
@@ -40,20 +41,27 @@ class Cores:
     period_ns: int
     steps: int
     on_ship: bool
+    beam: bool
 
 
-def cores(scenario) -> Cores:
-    """The cores of a scenario as its nodes would make them."""
-    ship, navigation, tracking, acu, adu = (scenario.node_parameters(node) for node in
-                                            ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu'))
+def cores(scenario, beam='') -> Cores:
+    """The cores of a scenario as its nodes would make them; beam: of several, '' for the first."""
+    prefix = f'{beam}/' if beam else scenario.prefixes[0]
+    ship, navigation, tracking, acu, adu = map(scenario.node_parameters, (
+        'ship_motion', 'ins', f'{prefix}tracking_receiver', f'{prefix}acu', 'adu'))
+    if navigation.method != 'model':
+        raise ValueError(f"ins.method = '{navigation.method}': must be model in the closed loop without nodes")
     built = target.build(tracking.target, tracking.duration)
-    drive_outputs = np.zeros(1, drive_unit.OUTPUTS)
-    adu_core = (drive_unit.initial_state(adu), drive_unit.constants(adu), np.zeros(1, drive_unit.INPUTS),
-                drive_outputs)
-    drive_unit.read(adu_core[0], adu_core[1], drive_outputs)
+    if scenario.header.beam:
+        beam = Beam(adu)
+        adu_core = beam.state, beam.constants, beam.inputs, beam.outputs
+    else:
+        adu_core = (drive_unit.initial_state(adu), drive_unit.constants(adu), np.zeros(1, drive_unit.INPUTS),
+                    np.zeros(1, drive_unit.OUTPUTS))
+        drive_unit.read(adu_core[0], adu_core[1], adu_core[3])
     program = (np.zeros(0), np.zeros((0, 2)))
     if scenario.header.program.source != 'none':
-        program = program_track.checked(*program_table(scenario))
+        program = program_track.checked(*program_table(scenario, prefix))
     acu_inputs = np.zeros(1, control_unit.INPUTS)
     acu_inputs['stabilised'] = scenario.header.ship
     acu_inputs['encoder_valid'] = 1
@@ -63,7 +71,7 @@ def cores(scenario) -> Cores:
     receiver_inputs['valid'] = 1
     return Cores(
         ship=(motion.constants(ship.ship), np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS),
-              imu.constants(ship), np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)),
+              imu.initial_state(), imu.constants(ship), np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)),
         ins=(ins.initial_state(), ins.constants(navigation), np.zeros(1, ins.INPUTS), np.zeros(1, ins.OUTPUTS)),
         receiver=(receiver.initial_state(), receiver.constants(tracking, adu.period, built), receiver_inputs,
                   np.zeros(1, receiver.OUTPUTS)),
@@ -74,18 +82,18 @@ def cores(scenario) -> Cores:
                  (noise.generator(navigation.seed, 'ins'), ins.NORMALS),
                  (noise.generator(tracking.seed, 'tracking_receiver'), receiver.normals_per_step(tracking))),
         period_ns=round(adu.period * 1e9), steps=round(scenario.header.duration / adu.period),
-        on_ship=scenario.header.ship)
+        on_ship=scenario.header.ship, beam=scenario.header.beam)
 
 
 @compiled
 def _ship(k, stamp_ns, period, ship, navigation, imu_normals, ins_normals):
     """Truth, IMU and INS of step k."""
-    constants, inputs, truth, imu_constants, imu_inputs, felt = ship
+    constants, inputs, truth, imu_state, imu_constants, imu_inputs, felt = ship
     ins_state, ins_constants, ins_inputs, ins_outputs = navigation
-    inputs[0].t = stamp_ns * 1e-9
+    inputs[0].t = imu_inputs[0].t = stamp_ns * 1e-9
     motion.step(constants, inputs, truth)
     imu_inputs[0].dt = period
-    imu.step(imu_constants, imu_inputs, truth, felt, imu_normals[k])
+    imu.step(imu_state, imu_constants, constants, imu_inputs, truth, felt, imu_normals[k])
     ins_inputs[0].stamp_ns = stamp_ns
     for i in range(3):
         ins_inputs[0].angular_velocity[i] = felt[0].angular_velocity[i]
@@ -121,40 +129,55 @@ def _hand_over_error(acu_inputs, constants, error):
 
 
 @compiled
+def _answer(k, stamp_ns, period, on_ship, ship, navigation, tracking, acu, breaks, coefficients, times, angles,
+            imu_normals, ins_normals, receiver_normals):
+    """Ship, INS, receiver and control unit at step k; the inputs of the latter hold where the antenna points."""
+    receiver_state, receiver_constants, seen, error = tracking
+    acu_state, acu_constants, acu_inputs, acu_outputs = acu
+    truth = ship[2]
+    if on_ship:
+        _ship(k, stamp_ns, period, ship, navigation, imu_normals, ins_normals)
+        _hand_over_attitude(acu_inputs, navigation[3])
+        for i in range(3):
+            seen[0].position[i] = truth[0].position[i]
+            seen[0].twist_linear[i] = truth[0].velocity_deck[i]
+            seen[0].twist_angular[i] = truth[0].angular_velocity[i]
+            for j in range(3):
+                seen[0].mat_ed[i, j] = truth[0].mat_ed[i, j]
+    position, velocity = acu_inputs[0].position, acu_inputs[0].velocity
+    seen[0].stamp_ns = stamp_ns
+    seen[0].azimuth, seen[0].elevation = position[0], position[1]
+    seen[0].azimuth_rate, seen[0].elevation_rate = velocity[0], velocity[1]
+    receiver.step(receiver_state, receiver_constants, seen, error, breaks, coefficients, receiver_normals[k])
+    _hand_over_error(acu_inputs, receiver_constants[0], error)
+    acu_inputs[0].stamp = stamp_ns * 1e-9
+    control_unit.step(acu_state, acu_constants, acu_inputs, acu_outputs, times, angles)
+
+
+@compiled
 def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, adu, breaks, coefficients, times, angles,
            imu_normals, ins_normals, receiver_normals, deck_rate, injected, result):
     """Steps first ... first + count - 1 into result[:count]."""
-    receiver_state, receiver_constants, seen, error = tracking
-    acu_state, acu_constants, acu_inputs, acu_outputs = acu
+    acu_inputs, acu_outputs = acu[2], acu[3]
     adu_state, adu_constants, adu_inputs, axes = adu
     truth = ship[2]
     period = period_ns * 1e-9
     for k in range(count):
         stamp_ns = (first + k) * period_ns
-        if on_ship:
-            _ship(k, stamp_ns, period, ship, navigation, imu_normals, ins_normals)
-            _hand_over_attitude(acu_inputs, navigation[3])
-            for i in range(3):
-                seen[0].position[i] = truth[0].position[i]
-                seen[0].twist_linear[i] = truth[0].velocity_deck[i]
-                seen[0].twist_angular[i] = truth[0].angular_velocity[i]
-                rise = (truth[0].angular_velocity[i] - deck_rate[i]) / period
-                adu_inputs[0].base_acceleration[i] = rise if first + k > 0 else 0.0
-                deck_rate[i] = truth[0].angular_velocity[i]
-                for j in range(3):
-                    seen[0].mat_ed[i, j] = truth[0].mat_ed[i, j]
         azimuth, elevation = axes[0].azimuth, axes[0].elevation
-        seen[0].stamp_ns = stamp_ns
-        seen[0].azimuth, seen[0].elevation = azimuth.position, elevation.position
-        seen[0].azimuth_rate, seen[0].elevation_rate = azimuth.velocity, elevation.velocity
-        receiver.step(receiver_state, receiver_constants, seen, error, breaks, coefficients, receiver_normals[k])
-        _hand_over_error(acu_inputs, receiver_constants[0], error)
-        acu_inputs[0].stamp = stamp_ns * 1e-9
         acu_inputs[0].drive_ready = axes[0].following
         acu_inputs[0].position[0], acu_inputs[0].position[1] = azimuth.position, elevation.position
         acu_inputs[0].velocity[0], acu_inputs[0].velocity[1] = azimuth.velocity, elevation.velocity
-        control_unit.step(acu_state, acu_constants, acu_inputs, acu_outputs, times, angles)
-        _record(result[k], stamp_ns * 1e-9, azimuth, elevation, acu_outputs[0], error[0])
+        _answer(k, stamp_ns, period, on_ship, ship, navigation, tracking, acu, breaks, coefficients, times, angles,
+                imu_normals, ins_normals, receiver_normals)
+        _record(result[k], acu_inputs[0], acu_outputs[0], tracking[3][0])
+        _record_axis(result[k], azimuth, 0)
+        _record_axis(result[k], elevation, 1)
+        if on_ship:
+            for i in range(3):
+                rise = (truth[0].angular_velocity[i] - deck_rate[i]) / period
+                adu_inputs[0].base_acceleration[i] = rise if first + k > 0 else 0.0
+                deck_rate[i] = truth[0].angular_velocity[i]
         rate, torque = acu_outputs[0].rate, acu_outputs[0].torque
         adu_inputs[0].azimuth.rate, adu_inputs[0].azimuth.torque = rate[0] + injected[k, 0], torque[0]
         adu_inputs[0].elevation.rate, adu_inputs[0].elevation.torque = rate[1] + injected[k, 1], torque[1]
@@ -163,17 +186,41 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
 
 
 @compiled
-def _record(row, t, azimuth, elevation, acu, error):
-    row.t, row.mode = t, acu.mode
-    row.position[0], row.position[1] = azimuth.position, elevation.position
-    row.load_position[0], row.load_position[1] = azimuth.load_position, elevation.load_position
-    row.torque[0], row.torque[1] = azimuth.torque, elevation.torque
-    row.bias[0], row.bias[1] = azimuth.bias, elevation.bias
+def _beam_steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, adu, breaks, coefficients, times,
+                angles, imu_normals, ins_normals, receiver_normals, injected, result):
+    """The same with an electronic beam in the drive's place."""
+    acu_inputs, acu_outputs = acu[2], acu[3]
+    beam_state, beam_constants, command, beam = adu
+    acu_inputs[0].drive_ready = 1
+    for k in range(count):
+        stamp_ns = (first + k) * period_ns
+        acu_inputs[0].position[0], acu_inputs[0].position[1] = beam[0].position[0], beam[0].position[1]
+        _answer(k, stamp_ns, period_ns * 1e-9, on_ship, ship, navigation, tracking, acu, breaks, coefficients, times,
+                angles, imu_normals, ins_normals, receiver_normals)
+        _record(result[k], acu_inputs[0], acu_outputs[0], tracking[3][0])
+        command[0].stamp_ns = command[0].command_stamp_ns = stamp_ns
+        command[0].due = 1
+        for i in range(2):
+            result[k].load_position[i] = beam[0].position[i]
+            command[0].position[i] = acu_outputs[0].reference[i, 0] + injected[k, i]
+        electronic_beam.step(beam_state, beam_constants, command, beam)
+
+
+@compiled
+def _record_axis(row, axis, i):
+    row.load_position[i], row.torque[i], row.bias[i] = axis.load_position, axis.torque, axis.bias
+    for j in range(2):
+        row.motor_torque[i, j], row.motor_velocity[i, j] = axis.motor_torque[j], axis.motor_velocity[j]
+
+
+@compiled
+def _record(row, inputs, acu, error):
+    """What the control unit had and said, and the receiver."""
+    row.t, row.mode = inputs.stamp, acu.mode
+    row.position[0], row.position[1] = inputs.position[0], inputs.position[1]
     row.measured[0], row.measured[1] = error.cross_elevation, error.elevation
     row.true_error[0], row.true_error[1] = error.true_cross_elevation, error.true_elevation
     for i in range(2):
-        row.motor_torque[0, i], row.motor_torque[1, i] = azimuth.motor_torque[i], elevation.motor_torque[i]
-        row.motor_velocity[0, i], row.motor_velocity[1, i] = azimuth.motor_velocity[i], elevation.motor_velocity[i]
         row.rate[i], row.feedforward[i] = acu.rate[i], acu.torque[i]
         for j in range(3):
             row.estimate[i, j], row.reference[i, j] = acu.estimate[i, j], acu.reference[i, j]
@@ -190,7 +237,8 @@ BLOCK = 2000
 def run(loop: Cores, injected=None) -> np.ndarray:
     """Every step 0 ... steps of a scenario's closed loop as RESULT records (steps + 1,).
 
-    injected (steps + 1, 2): rate [rad/s] of azimuth and elevation added to the command on its way to the drive.
+    injected (steps + 1, 2): azimuth and elevation rate [rad/s] added to the command on its way to the drive; of a beam
+    the angle [rad].
     """
     if injected is None:
         injected = np.zeros((loop.steps + 1, 2))
@@ -200,7 +248,10 @@ def run(loop: Cores, injected=None) -> np.ndarray:
         count = min(BLOCK, len(result) - first)
         normals = [stream.standard_normal((count if loop.on_ship or i == 2 else 0, width))
                    for i, (stream, width) in enumerate(loop.streams)]
-        _steps(first, count, loop.period_ns, loop.on_ship, loop.ship, loop.ins, loop.receiver, loop.acu, loop.adu,
-               loop.target.breaks, loop.target.coefficients, *loop.program, *normals, deck_rate,
-               injected[first:first + count], result[first:first + count])
+        inputs = (first, count, loop.period_ns, loop.on_ship, loop.ship, loop.ins, loop.receiver, loop.acu, loop.adu,
+                  loop.target.breaks, loop.target.coefficients, *loop.program, *normals)
+        if loop.beam:
+            _beam_steps(*inputs, injected[first:first + count], result[first:first + count])
+        else:
+            _steps(*inputs, deck_rate, injected[first:first + count], result[first:first + count])
     return result

@@ -23,6 +23,11 @@ STAMPED.update(name for name, (_, fields) in TYPESTORE.fielddefs.items()
 """Types whose bytes 4 to 12 are their stamp."""
 
 
+ORIENTATION_VARIANCE = {f'orientation_covariance[{4 * i}]': f'orientation_variance.{axis}'
+                        for i, axis in enumerate('xyz')}
+"""Of an Imu: the diagonal, which says how well an INS knows its attitude."""
+
+
 class _Walk:
     """The places of one message: numbers [(path, start, dtype)], texts {path: text}, fixed [(start, stop)]."""
 
@@ -92,7 +97,7 @@ def table(data, type_name, log):
     JointTrajectory  the first point: azimuth.position, azimuth.velocity, azimuth.acceleration, ...
     Vector3Stamped x, y, z
     Odometry       position.x, orientation.w, twist.linear.x, twist.angular.z, ...
-    Imu            orientation.w, angular_velocity.x, linear_acceleration.z, ...
+    Imu            orientation.w, angular_velocity.x, linear_acceleration.z, orientation_variance.z, ...
     String         data (a list of texts)
     others         the path of the field. Covariances and header are left out; a DiagnosticArray has `t` only.
     A number that a message lacks is NaN in its row. Raises ValueError when bytes are no such message.
@@ -129,6 +134,8 @@ def _fill(out, block, rows, type_name, count):
 
 def column(type_name, path, texts):
     """The column of a number at a path, None for one that is left out. texts: {path: text} of the message."""
+    if path in ORIENTATION_VARIANCE:
+        return ORIENTATION_VARIANCE[path]
     if path.startswith('header.') or 'covariance' in path:
         return None
     short = type_name.rpartition('/')[2]

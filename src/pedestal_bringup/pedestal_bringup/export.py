@@ -22,11 +22,13 @@ _MOTION = {'position': 'rad', 'velocity': 'rad/s', 'acceleration': 'rad/s2', 'ef
 _UNITS = {
     'sensor_msgs/msg/JointState': _MOTION,
     'trajectory_msgs/msg/JointTrajectory': _MOTION,
-    'sensor_msgs/msg/Imu': {'angular_velocity': 'rad/s', 'linear_acceleration': 'm/s2'},
+    'sensor_msgs/msg/Imu': {'angular_velocity': 'rad/s', 'linear_acceleration': 'm/s2',
+                            'orientation_variance': 'rad2'},
     'nav_msgs/msg/Odometry': {'position': 'm', 'linear': 'm/s', 'angular': 'rad/s'},
 }
 """Units of the topics in the table of topics: {type: {part of the column's name: unit}}."""
-_FILTER = {'innovation': 'rad', 'sigma': 'rad', 'rate_innovation': 'rad/s', 'rate_sigma': 'rad/s'}
+_FILTER = {'innovation': 'rad', 'innovation_sigma': 'rad', 'sigma': 'rad', 'rate_innovation': 'rad/s',
+           'rate_sigma': 'rad/s'}
 _OWN = {
     'tracking_receiver/angle_error': {'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'},
     'tracking_receiver/angle_rate': {'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'},
@@ -101,9 +103,9 @@ def _times(stamps):
 
 def _header(name, type_name, column):
     unit = None
-    if name in _OWN:
-        unit = _OWN[name].get(column)
-    elif name in topics.BY_NAME:
+    if topics.plain(name) in _OWN:
+        unit = _OWN[topics.plain(name)].get(column)
+    elif topics.plain(name) in topics.BY_NAME:
         units = _UNITS.get(type_name, {})
         unit = next((units[part] for part in reversed(column.split('.')) if part in units), None)
     return f'{column} [{unit}]' if unit else column

@@ -40,7 +40,7 @@ class Recording:
 
     modes: [(start, stop [s], mode)]; statuses: [(stamp [s], node, level, message)]; no_truth: why run is None;
     raw_angles (n, 2): earth angles of the target as measured [rad]; beamwidth [rad], NaN when the bag does not say;
-    filter: consistency.Consistency, None without acu/filter.
+    filter: consistency.Consistency, None without acu/filter; attitude: known_attitude.KnownAttitude, None ashore.
     """
     run: typing.Any
     no_truth: str
@@ -51,6 +51,7 @@ class Recording:
     statuses: list
     beamwidth: float
     filter: typing.Any = None
+    attitude: typing.Any = None
 
     def lacks(self, need):
         """Why a figure that needs this cannot be drawn; '' when it can."""
@@ -62,6 +63,8 @@ class Recording:
             return '' if self.modes or self.statuses else 'no message of acu/mode or diagnostics'
         if need == 'filter':
             return '' if self.filter is not None else 'no message of acu/filter'
+        if need == 'attitude':
+            return '' if self.attitude is not None else 'no INS in the run'
         if need == 'bank':
             return '' if self.filter is None or np.isfinite(self.filter.probability).sum(axis=2).max() > 1 else \
                 'one model of motion alone'

@@ -19,9 +19,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from pedestal_bringup import configuration
-from pedestal_bringup.program import program_message, program_table
+from pedestal_bringup.program import program_messages
 from pedestal_bringup.scenario import NODE_KINDS
-from pedestal_common import messages, parameters
+from pedestal_common import messages, parameters, topics
 from pedestal_common.shell import Shell, set_middleware_defaults
 
 LOG_LINES = 8
@@ -48,17 +48,19 @@ class Outcome:
 
 
 class Operator(Shell):
-    """Sends the program track and listens to the diagnostics of the others."""
+    """Sends the program tracks to a graph of `beams` (topics.graph) and listens to the diagnostics of the others."""
 
-    def __init__(self):
+    def __init__(self, beams=0):
         super().__init__('operator', parameters.Parameters)
+        self.topics = topics.graph(beams)
         self.time = 0.0
         self.heard = {}
         self.reader('diagnostics', self._take)
 
-    def send(self, table):
-        """The program track, latched."""
-        self.writer('acu/program_track')(program_message(*table))
+    def send(self, tracks):
+        """The program tracks {topic: message}, latched."""
+        for topic, message in tracks.items():
+            self.writer(topic)(message)
 
     def refuse_company(self):
         """Raise RunError when the nodes of another graph are on this domain: they would hear this one."""
@@ -105,13 +107,19 @@ def free_bag(scenario):
 
 def parameter_file(scenario, pacing, bag):
     """The scenario as a ROS 2 parameter file, every node told of the graph it is in."""
-    sections = yaml.safe_load(scenario.as_yaml())
-    for node in NODE_KINDS:
-        sections.setdefault(node, {'ros__parameters': {}})['ros__parameters'].update({
-            'graph.pacing': pacing, 'graph.nodes': ','.join(scenario.nodes),
-            'graph.deadline': scenario.header.deadline})
-    sections['recorder']['ros__parameters'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
-    return yaml.safe_dump(sections)
+    nodes = ','.join(dict.fromkeys(map(topics.plain, scenario.nodes)))
+    told = {'graph.pacing': pacing, 'graph.nodes': nodes, 'graph.beams': scenario.header.graph_beams,
+            'graph.deadline': scenario.header.deadline}
+    sections = {node: {**scenario.given(node), **told} for node in scenario.nodes if node != 'operator'}
+    sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
+    return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()})
+
+
+def command_line(node, kind, file):
+    """What starts a node, 'beam_2/acu' in the namespace of its beam, with a parameter file."""
+    beam = topics.beam_of(node)
+    return [sys.executable, '-m', kind.module, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []),
+            '--params-file', str(file)]
 
 
 def _end_with_parent():
@@ -167,10 +175,10 @@ class Graph:
 
     def __enter__(self):
         for node in self.scenario.nodes:
-            if node in NODE_KINDS:
-                with open(self.log / f'{node}.log', 'wb') as output:
+            if node != 'operator':
+                with open(self._log_of(node), 'wb') as output:
                     self.processes[node] = subprocess.Popen(
-                        [sys.executable, '-m', NODE_KINDS[node].module, '--ros-args', '--params-file', str(self.file)],
+                        command_line(node, self.scenario.kind(node), self.file),
                         stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
                         env={**os.environ, 'ROS_LOG_DIR': str(self.log)}, start_new_session=True,
                         preexec_fn=_end_with_parent)
@@ -196,9 +204,12 @@ class Graph:
             process.kill()
             return process.wait()
 
+    def _log_of(self, node):
+        return self.log / f'{node.replace("/", ".")}.log'
+
     def last_lines(self, node):
         """The end of a node's log."""
-        lines = (self.log / f'{node}.log').read_text(errors='replace').strip().splitlines()
+        lines = self._log_of(node).read_text(errors='replace').strip().splitlines()
         return lines[-LOG_LINES:]
 
     def result(self, node):
@@ -206,7 +217,7 @@ class Graph:
         for line in reversed(self.last_lines(node)):
             if line.startswith('{'):
                 return json.loads(line)
-        raise RunError(f'{node} ended without its result; its log is {self.log / (node + ".log")}')
+        raise RunError(f'{node} ended without its result; its log is {self._log_of(node)}')
 
     def ended(self):
         """{node: exit code} of the processes that have ended."""
@@ -221,7 +232,7 @@ class Graph:
         early = {node: code for node, code in self.ended().items() if code != 0 or node not in ('adu', 'recorder')}
         lines = {node: self.last_lines(node) for node in self.processes}
         said = '\n'.join(line for node in early for line in lines[node])
-        accused = ','.join(re.findall(r'silent: ([\w, ]+)', said)).replace(' ', '').split(',')
+        accused = ','.join(re.findall(r'silent: ([\w/, ]+)', said)).replace(' ', '').split(',')
         killed = [node for node, code in early.items() if code < 0]
         silent = [node for node in self.processes if node in accused and node not in early] or [
             node for node in (unheard,) if node is not None and node not in early]
@@ -237,7 +248,7 @@ class Graph:
             reason = f'ended before the run did, with exit code {early[culprit]}'
         log = '\n'.join(f'  | {line}' for line in lines[culprit]) or '  | (it logged nothing)'
         others = ''.join(f'\n  {node}: {lines[node][-1]}' for node in early if node != culprit and lines[node])
-        return RunError(f'{culprit} {reason}; its last log lines ({self.log / (culprit + ".log")}):\n{log}{others}')
+        return RunError(f'{culprit} {reason}; its last log lines ({self._log_of(culprit)}):\n{log}{others}')
 
 
 def run(scenario, bag, progress):
@@ -246,29 +257,28 @@ def run(scenario, bag, progress):
     progress(drive time [s]) is called as the run goes on. Raises RunError when a node fails, KeyboardInterrupt after
     a clean stop. The recording up to then stays readable.
     """
-    table = program_table(scenario) if scenario.header.program.source != 'none' else None
+    tracks = program_messages(scenario)
     graph = Graph(scenario, bag)
     set_middleware_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        operator = Operator()
+        operator = Operator(scenario.header.graph_beams)
         try:
             with sole_run(operator.context.get_domain_id()):
                 operator.refuse_company()
-                return _run(graph, operator, table, progress)
+                return _run(graph, operator, tracks, progress)
         finally:
             operator.destroy_node()
     finally:
         rclpy.try_shutdown()
 
 
-def _run(graph, operator, table, progress):
+def _run(graph, operator, tracks, progress):
     """Start the nodes, watch them to the end of the run, stop them in order."""
     header = graph.scenario.header
     patience = min(header.deadline, REALTIME_SILENCE) if header.pacing == 'realtime' else 2.0 * header.deadline
     with graph:
-        if table is not None:
-            operator.send(table)
+        operator.send(tracks)
         executor = SingleThreadedExecutor()
         executor.add_node(operator)
 
@@ -297,8 +307,8 @@ def send_program(scenario) -> int:
     set_middleware_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        operator = Operator()
-        operator.send(program_table(scenario))
+        operator = Operator(scenario.header.graph_beams)
+        operator.send(program_messages(scenario))
         executor = SingleThreadedExecutor()
         executor.add_node(operator)
         while True:

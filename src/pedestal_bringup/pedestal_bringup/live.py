@@ -4,7 +4,6 @@ import os
 import pathlib
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 
@@ -16,9 +15,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from pedestal_bringup import comparison, recompute
-from pedestal_bringup.graph import Operator, RunError, sole_run
-from pedestal_bringup.scenario import NODE_KINDS
+from pedestal_bringup import comparison, recompute, scenario
+from pedestal_bringup.graph import Operator, RunError, command_line, sole_run
 from pedestal_common import parameters, records, topics
 from pedestal_common.shell import QOS, message_class, set_middleware_defaults
 from pedestal_common.steps import SECOND
@@ -115,7 +113,9 @@ def _graph(recording, done):
 
 def _run(recording, done, params, nodes, folder):
     file, log = folder / 'parameters.yaml', folder / 'log'
-    values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(nodes)}
+    beams = recording.bag.beams
+    values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(nodes),
+              'graph.beams': beams}
     file.write_text(yaml.safe_dump({done.node: {'ros__parameters': values}}))
     heard = [name for name in (*done.feed.rows, *{name for _, name, _ in done.feed.events})
              if done.node not in topics.BY_NAME[name].writers]
@@ -123,8 +123,8 @@ def _run(recording, done, params, nodes, folder):
     with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:
         feeder.refuse_company()
         readers = feeder.readers(list(done.outputs), nodes)
-        process = subprocess.Popen([sys.executable, '-m', NODE_KINDS[done.node].module, '--ros-args', '--params-file',
-                                    str(file)], stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+        process = subprocess.Popen(command_line(done.node, scenario.kind(done.node, beams > 0), file),
+                                   stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                                    env={**os.environ, 'ROS_LOG_DIR': str(folder)})
         try:
             live = Live(feeder, readers, process, log)
@@ -160,7 +160,7 @@ def _feed(recording, done, live):
         names = [name for name, count in due.items() if len(feeder.answers[name]) < count[step]]
         return f'{", ".join(names)} for step {feed.stamps[step] / SECOND:.6f} s'
 
-    own = recompute.KINDS[done.node].trigger not in feeder.publishers_of
+    own = recompute.kind_of(recording, done.node).trigger not in feeder.publishers_of
     for step in range(len(feed.stamps)):
         for name, row in events[step]:
             feeder.announce_now(name, recording.data(name)[row])

@@ -6,10 +6,15 @@ answers, so that memory stays bounded whatever --runs is.
 """
 import contextlib
 import logging
+import multiprocessing.resource_tracker
 import re
 import signal
+import warnings
 
 import joblib
+from joblib.externals import loky
+
+from pedestal_common.compiled import COLUMNS, digest
 
 TIMEOUT = 10.0
 """How long a scheduler, or its first worker, is waited for [s]."""
@@ -56,17 +61,22 @@ class Pool:
         items = list(items)
         options = {'n_jobs': -1} if self.scheduler else {'n_jobs': min(self.workers, len(items) or 1),
                                                          'backend': 'loky'}
-        with _ctrl_c_held_back():
+        with _ctrl_c_held_back() if options['n_jobs'] > 1 else contextlib.nullcontext():
             results = joblib.Parallel(return_as='generator', **options)(map(joblib.delayed(function), items))
-        with contextlib.closing(results):
-            for done, result in enumerate(results, 1):
-                progress(done / len(items), f'{done} of {len(items)} batches')
-                yield result
+        self._stack.callback(_close, results)
+        for done, result in enumerate(results, 1):
+            progress(done / len(items), f'{done} of {len(items)} batches')
+            yield result
 
 
 @contextlib.contextmanager
 def _ctrl_c_held_back():
-    """Ctrl-C reaches every process of a terminal; those started now never hear it: this one does, and ends them."""
+    """Ctrl-C reaches every process of a terminal; those started now never hear it: this one does, and ends them.
+
+    The trackers that go with the first worker let it through when they start, so they are started before.
+    """
+    multiprocessing.resource_tracker.ensure_running()
+    loky.backend.resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -74,8 +84,15 @@ def _ctrl_c_held_back():
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+def _close(results):
+    """End what is still under way, if anything; joblib would warn that it was wasted."""
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')
+        results.close()
+
+
 def _end_local():
-    joblib.externals.loky.get_reusable_executor(reuse=True).shutdown(kill_workers=True)
+    loky.get_reusable_executor(reuse=True).shutdown(kill_workers=True)
 
 
 def _client(address):
@@ -92,7 +109,18 @@ def _client(address):
         raise RuntimeError(f'--scheduler {address}: nobody answers as a Dask scheduler: {error}') from None
     try:
         client.wait_for_workers(1, timeout=TIMEOUT)
+        others = [worker for worker, found in client.run(sources).items() if found != sources()]
+        problem = others and f'other versions of the pedestal packages or of numba on {", ".join(others)}'
     except TimeoutError:
+        problem = f'no worker came within {TIMEOUT:g} s'
+    except Exception as error:  # so Dask passes on what a worker could not import
+        problem = f'a worker cannot work: {error}'
+    if problem:
         client.close()
-        raise RuntimeError(f'--scheduler {address}: no worker came within {TIMEOUT:g} s') from None
+        raise RuntimeError(f'--scheduler {address}: {problem}')
     return client
+
+
+def sources():
+    """Digest of what makes the numbers: the packages' sources and the version of numba."""
+    return digest(('pedestal_common', *COLUMNS, 'pedestal_bringup'))

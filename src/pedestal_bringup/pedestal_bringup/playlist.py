@@ -16,18 +16,18 @@ from pedestal_common import topics
 SECOND = 1_000_000_000
 
 
-def reads(node, name):
-    """Whether a node of the graph reads a topic; the recorder reads every one."""
-    return node == 'recorder' or name in topics.BY_NAME and node in topics.BY_NAME[name].readers
+def reads(graph, node, name):
+    """Whether a node of the graph {name: Topic} reads a topic; the recorder reads every one."""
+    return node == 'recorder' or name in graph and node in graph[name].readers
 
 
-def writes(node, name):
-    return name in topics.BY_NAME and node in topics.BY_NAME[name].writers
+def writes(graph, node, name):
+    return name in graph and node in graph[name].writers
 
 
-def latched(name):
+def latched(graph, name):
     """Whether a topic holds until its next message."""
-    return name in topics.BY_NAME and topics.BY_NAME[name].qos == 'state'
+    return name in graph and graph[name].qos == 'state'
 
 
 def select(bag, nodes, names):
@@ -39,16 +39,16 @@ def select(bag, nodes, names):
         return bags.chosen_topics(bag, names)
     if not nodes:
         return list(bag.topics)
-    chosen = []
+    chosen, graph, known = [], bag.graph, topics.members(topics.NODES, bag.beams)
     for node in nodes:
-        if node not in topics.NODES:
-            near = difflib.get_close_matches(node, topics.NODES, n=1)
+        if node not in known:
+            near = difflib.get_close_matches(node, known, n=1)
             hint = f'did you mean {near[0]}? ' if near else ''
-            raise bags.BagError(f'--node {node} is no node; {hint}there are {", ".join(topics.NODES)}')
+            raise bags.BagError(f'--node {node} is no node; {hint}there are {", ".join(known)}')
         of_node = [name for name in bag.topics
-                   if reads(node, name) and not any(writes(other, name) for other in nodes)]
+                   if reads(graph, node, name) and not any(writes(graph, other, name) for other in nodes)]
         if not of_node:
-            wanted = ', '.join(topic.name for topic in topics.TOPICS if reads(node, topic.name))
+            wanted = ', '.join(name for name in graph if reads(graph, node, name))
             raise bags.BagError(f'{bag.path}: nothing in it for node {node}, which reads {wanted}')
         chosen += of_node
     return list(dict.fromkeys(chosen))
@@ -65,8 +65,7 @@ class Playlist:
     def __init__(self, bag, names, start, duration):
         self.bag, self.names = bag, names
         where, stamps, ranks = [], [], []
-        rank = {topic.name: number - len(topics.TOPICS) * latched(topic.name)
-                for number, topic in enumerate(topics.TOPICS)}
+        rank = {name: number - len(bag.graph) * latched(bag.graph, name) for number, name in enumerate(bag.graph)}
         for name in names:
             found = bag.where(name)
             where.append(found)

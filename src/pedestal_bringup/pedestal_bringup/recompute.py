@@ -19,6 +19,7 @@ import numpy as np
 import yaml
 
 from acu_tracker.wire import Acu
+from adu_drive.beam_wire import Beam
 from adu_drive.wire import Adu
 from pedestal_bringup import bag as bags
 from pedestal_bringup import comparison, scenario
@@ -30,6 +31,7 @@ from ship_motion_sim.ship_wire import ShipMotion
 from tracking_receiver_sim.wire import TrackingReceiver
 
 MODE, COMMAND, ERROR = 'acu/mode', 'acu/rate_command', 'tracking_receiver/angle_error'
+REFERENCE = 'acu/reference'
 AFTER_ALL = 2**63 - 1
 
 
@@ -46,6 +48,12 @@ def _never_locked(outputs, _inputs):
 def _never_moved(_outputs, inputs):
     command = inputs[COMMAND]
     return '' if (command.numbers[command.stamp != NEVER, 2:4] != 0.0).any() else 'the drive was never told to move'
+
+
+def _never_steered(_outputs, inputs):
+    reference = inputs[REFERENCE]
+    angles = reference.numbers[reference.stamp != NEVER, :2]
+    return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'
 
 
 def _never_sailed(outputs, _inputs):
@@ -71,16 +79,24 @@ KINDS = {
 }
 """The drive's steps begin with its own joint states."""
 
+BEAM = Kind(Beam, 'joint_states', 'ship/truth', _never_steered)
+"""What `adu` is where an array was recorded."""
+
+
+def kind_of(recording, node):
+    return BEAM if node == 'adu' and recording.bag.beams else KINDS[node]
+
 
 class RecomputeError(ValueError):
     """A bag does not hold what a recomputation needs, or an option fits nothing in it; one line."""
 
 
 class Recording:
-    """The messages of a bag by topic, read once. lockstep: how they are matched; None: as the bag says."""
+    """The messages of a bag by topic, read once; of several beams, those of one. lockstep: how they are matched; None:
+    as the bag says."""
 
-    def __init__(self, path, lockstep=None):
-        self.bag = bags.read(path)
+    def __init__(self, path, lockstep=None, beam=''):
+        self.bag = bags.read(path, beam)
         self.lockstep = self.bag.metadata.get('pacing') == 'lockstep' if lockstep is None else lockstep
         self._rows, self._data, self._outputs = {}, {}, {}
 
@@ -250,11 +266,14 @@ def compute(recording, unit, fed, states=None, requests=()):
 
 
 def outputs_of(unit, fed, said):
-    """{topic: Output} of what a unit said."""
+    """{topic: Output} of what a unit said. A text belongs to the step its writer answers with it, by the answer's
+    stamp where that is late."""
     found = {}
+    answer = next(said[name]['stamp'] for name in unit.SAID.names if name in unit.messages)
+    stamps = np.where(answer != NEVER, answer, fed.stamps)
     for name in unit.SAID.names:
         if name in unit.WORDS:
-            found[name] = _announced(fed.stamps, said[name], unit.WORDS[name])
+            found[name] = _announced(stamps, said[name], unit.WORDS[name])
         elif name in unit.messages:
             place = records.slot(said, name)
             sent = place.stamp != NEVER
@@ -287,11 +306,13 @@ class Recomputed:
 def recompute(recording, node, params, requests=None) -> Recomputed:
     """Recompute a node with parameters of its dataclass. requests {step: [service]}: what was asked of it; None: what
     its recorded states tell."""
-    kind = KINDS[node]
+    kind = kind_of(recording, node)
     unit = kind.unit(params, recording.has(kind.ship))
     fed = feed(recording, unit, kind.trigger)
     if requests is None:
-        states = {step: text for name in unit.WORDS for step, text in recording.states(name, fed.stamps).items()}
+        # an INS tells its state and cannot be asked for one
+        told = unit.WORDS if hasattr(unit, 'request') else ()
+        states = {step: text for name in told for step, text in recording.states(name, fed.stamps).items()}
         said, made = compute(recording, unit, fed, states)
     else:
         said, made = compute(recording, unit, fed, requests=requests)
@@ -303,7 +324,7 @@ def idle(recording, done) -> str:
     outputs = {name: recording.output(name) if recording.has(name) else output
                for name, output in done.outputs.items()}
     inputs = {name: records.slot(done.feed.heard, name) for name in done.unit.HEARD.names}
-    return KINDS[done.node].idle(outputs, inputs)
+    return kind_of(recording, done.node).idle(outputs, inputs)
 
 
 def compare(recording, outputs, unit, tolerance) -> list:
@@ -324,7 +345,8 @@ def chosen(recording, nodes, file_values):
         if node not in KINDS:
             raise RecomputeError(f'--node {node}: must be one of {", ".join(KINDS)}')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
-    able = [node for node, kind in KINDS.items() if recording.has(kind.trigger) and node in (known or ('acu',))
+    kinds = {node: kind_of(recording, node) for node in KINDS}
+    able = [node for node, kind in kinds.items() if recording.has(kind.trigger) and node in (known or ('acu',))
             and (node == 'acu' or any(map(recording.has, kind.unit.SAID.names)))]
     found = [node for node in KINDS if node in nodes] if nodes else able
     if not found:
@@ -333,8 +355,11 @@ def chosen(recording, nodes, file_values):
     return found
 
 
-def file_parameters(path):
-    """{node: {dotted name: value}} of a ROS 2 parameter file or a scenario. Raises ScenarioError."""
+def file_parameters(path, beam=''):
+    """{node: {dotted name: value}} of a ROS 2 parameter file or a scenario, of several beams those of one ('beam_2/').
+
+    Raises ScenarioError.
+    """
     try:
         tree = yaml.safe_load(path.read_text())
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -342,9 +367,12 @@ def file_parameters(path):
     if not isinstance(tree, dict):
         raise RecomputeError(f'--params-file {path}: must hold a section for a node')
     if 'scenario' in tree and 'recorder' not in tree:
-        return scenario.load(str(path)).values
+        chosen = scenario.load(str(path))
+        return {node: chosen.given(beam + node if node in topics.BEAM_NODES else node) for node in chosen.values
+                if not topics.beam_of(node)}
     found = {}
-    for node, body in tree.items():
+    for name, body in tree.items():
+        node = name.removeprefix(beam)
         if node in KINDS:
             if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
                 raise RecomputeError(f'--params-file {path}: section {node} must hold ros__parameters')
@@ -370,7 +398,7 @@ def parameters_of(recording, node, file_values=None, changes=()):
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
-        return parameters.build(scenario.NODE_KINDS[node].parameters, {**values, **dict(changes)})
+        return parameters.build(scenario.kind(node, recording.bag.beams > 0).parameters, {**values, **dict(changes)})
     except parameters.ParameterError as error:
         raise RecomputeError(f'{node}: {error}') from None
 

@@ -11,8 +11,9 @@ from pedestal_common.steps import SECOND
 
 def main(options):
     """(lines to print, rows, whether all is well) of the verb's options. Raises ValueError for what fits nothing."""
-    given = recompute.file_parameters(options.params_file) if options.params_file else None
-    recording = recompute.Recording(options.bag, {None: None, 'lockstep': True}.get(options.pacing, False))
+    recording = recompute.Recording(options.bag, {None: None, 'lockstep': True}.get(options.pacing, False),
+                                    options.beam)
+    given = recompute.file_parameters(options.params_file, recording.bag.beam) if options.params_file else None
     nodes = recompute.chosen(recording, options.node, given)
     changes = recompute.overrides(options.param, nodes)
     if changes:
@@ -68,7 +69,7 @@ def _title(recording, done, origin):
     stamps = done.feed.stamps / SECOND
     span = f'{stamps[0]:g} to {stamps[-1]:g} s' if len(stamps) else 'no step'
     pacing = 'lockstep' if recording.lockstep else 'realtime'
-    return f'{recording.bag.path}: {done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
+    return f'{recording.bag.path}: {recording.bag.beam}{done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
 
 
 def _remarks(recording, done):
@@ -151,7 +152,7 @@ def _old_against_new(recording, old, new, tolerance, changes):
 def _messages(recording, nodes, given):
     found = {}
     for node in nodes:
-        kind = recompute.KINDS[node]
+        kind = recompute.kind_of(recording, node)
         params = recompute.parameters_of(recording, node, given)
         found.update(kind.unit(params, recording.has(kind.ship)).messages)
     return found

@@ -35,11 +35,12 @@ class RecorderNode(Shell):
         nodes = self.graph.members
         if self.graph.lockstep and not nodes:
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
-        flags = [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
-        recorded = topics.read_by('recorder', nodes, flags) if nodes else topics.TOPICS
+        beams, flags = self.graph.beams, [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
+        recorded = topics.read_by('recorder', nodes, flags, beams) if nodes else list(self.topics.values())
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
-            'beamwidth': self.parameters.beamwidth, 'git': configuration.git_revision(), **configuration.versions()},
+            'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
+            'git': configuration.git_revision(), **configuration.versions()},
             configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
         self._order = StepOrder(recorded, nodes, self._bag.write)
         self._end = round(self.parameters.duration * SECOND) or None

@@ -76,7 +76,8 @@ class Recovered:
         lines = [gap.line() for gap in self.gaps]
         if self.lost:
             steps = max((count for name, count in self.lost.items()
-                         if name in topics.BY_NAME and topics.BY_NAME[name].rate == 'step'), default=0)
+                         if topics.plain(name) in topics.BY_NAME
+                         and topics.BY_NAME[topics.plain(name)].rate == 'step'), default=0)
             lines.append(f'lost in the middle: {steps} steps, {sum(self.lost.values())} messages: '
                          + ', '.join(f'{count} of {name}' for name, count in self.lost.items()))
         planned = self.duration is not None and self.last / 1e9 < self.duration

@@ -23,6 +23,13 @@ ANSWERS = {'ship_motion': ('clock', 'ship/truth'), 'tracking_receiver': ('joint_
 """{node: (topic, what the node answers it with in every step, stamped alike)}: what lockstep waits for. The drive
 asks: it says the step, and takes the answer. The INS answers late, by its latency: there is no waiting for it."""
 
+
+def answer_of(node, graph):
+    """ANSWERS of a node by its name in a graph; an array of several beams is asked by its first."""
+    return tuple(name if name is None or name in graph else f'{topics.beam_of(node) or "beam_1"}/{name}'
+                 for name in ANSWERS[topics.plain(node)])
+
+
 HELP = 'space: pause, go on   n or right arrow: one step   q: quit'
 WINDOW = 1000
 """Messages of a topic that may be unacknowledged: Fast DDS keeps 5000 and refuses more."""
@@ -30,7 +37,7 @@ WINDOW = 1000
 SETTLING = 0.5
 """Seconds from the last reader's coming to the first message: others are still finding each other."""
 
-UNKNOWN = '_NODE_NAME_UNKNOWN_'
+UNKNOWN = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
 """What rmw calls the node of a writer it has found before it has found the node."""
 
 LOOK, READERS_LOOK, KEY_LOOK = 0.1, 0.5, 0.05
@@ -93,10 +100,11 @@ class Player(Node):
         self.deadline, self.keyboard, self.stopped = deadline, keyboard, stopped
         self.companion = companion
         self.channels = {name: Channel(self._publisher(name, playlist.bag.topics[name])) for name in playlist.names}
-        self.answers = {node: ANSWERS[node] for node in nodes if node in ANSWERS}
+        self.graph = playlist.bag.graph
+        self.answers = {node: answer_of(node, self.graph) for node in nodes if topics.plain(node) in ANSWERS}
         self.asked, self.asked_steps, self.answered = {}, {}, dict.fromkeys(self.answers, -1)
         self.answer_count = dict.fromkeys(self.answers, 0)
-        for topic in topics.TOPICS:
+        for topic in self.graph.values():
             if any(node in topic.writers for node in nodes):
                 self._listen(topic)
         self.spinner = shell.make_executor()
@@ -109,7 +117,7 @@ class Player(Node):
         self.status = StatusLine()
 
     def _publisher(self, name, type_name):
-        topic = topics.BY_NAME.get(name)
+        topic = self.playlist.bag.graph.get(name)
         if topic is not None and topic.type != type_name:
             raise bags.BagError(f'{self.playlist.bag.path}: {name} is a {type_name}; must be a {topic.type}')
         try:
@@ -138,10 +146,10 @@ class Player(Node):
 
     def _writers(self, name):
         """The others that write a topic; of one that every node writes, those whose messages would be doubled."""
-        found = [info.node_name for info in self.get_publishers_info_by_topic(name)]
+        found = [shell.node_of(info) for info in self.get_publishers_info_by_topic(name)]
         if self.get_name() in found:
             found.remove(self.get_name())
-        topic = topics.BY_NAME.get(name)
+        topic = self.graph.get(name)
         return [node for node in found if topic is None or len(topic.writers) == 1 or node in topic.writers]
 
     def _unread(self):
@@ -149,8 +157,8 @@ class Player(Node):
         for name, channel in self.channels.items():
             if name == self.companion:
                 continue
-            readers = [info.node_name for info in self.get_subscriptions_info_by_topic(name)]
-            wanted = [node for node in self.nodes if reads(node, name)]
+            readers = [shell.node_of(info) for info in self.get_subscriptions_info_by_topic(name)]
+            wanted = [node for node in self.nodes if reads(self.graph, node, name)]
             lacking = [node for node in wanted if node not in readers]
             if lacking or channel.publisher.get_subscription_count() < max(1, len(wanted)):
                 return name, ', '.join(lacking or wanted) or 'anyone'
@@ -194,7 +202,7 @@ class Player(Node):
             self.position = stamp
             for name, data in group:
                 if name in self.channels:
-                    if latched(name):
+                    if latched(self.graph, name):
                         self._announce(name, stamp, data)
                     else:
                         self._send(name, stamp, data)
@@ -365,8 +373,9 @@ def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, dea
     bag = bags.read(path)
     chosen = select(bag, nodes, names)
     if rate is None:
-        _check_lockstep(nodes, chosen)
-    companion = 'clock' if 'clock' in bag.topics and not any(writes(node, 'clock') for node in nodes) else None
+        _check_lockstep(nodes, chosen, bag.graph)
+    of_node = any(writes(bag.graph, node, 'clock') for node in nodes)
+    companion = 'clock' if 'clock' in bag.topics and not of_node else None
     if companion in chosen:
         companion = None
     playlist = Playlist(bag, [*chosen, *filter(None, [companion])], start, duration)
@@ -392,18 +401,19 @@ def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, dea
             return Outcome(
                 str(path), {name: channel.sent for name, channel in player.channels.items()},
                 playlist.first / SECOND, player.position / SECOND, wall,
-                {node: player.asked_steps.get(node, 0) for node in player.answers if ANSWERS[node][0]},
-                {node: player.answer_count[node] for node in player.answers if ANSWERS[node][0]},
+                {node: player.asked_steps.get(node, 0) for node, (asked, _) in player.answers.items() if asked},
+                {node: player.answer_count[node] for node, (asked, _) in player.answers.items() if asked},
                 'stopped' if stopped() else 'quit' if player.quit else 'whole')
     finally:
         rclpy.try_shutdown()
 
 
-def _check_lockstep(nodes, chosen):
-    answering = [node for node in nodes if node in ANSWERS]
+def _check_lockstep(nodes, chosen, graph):
+    answering = [node for node in nodes if topics.plain(node) in ANSWERS]
     if not answering:
         why = f'{", ".join(nodes)} answers no step at its stamp' if nodes else 'say with --node who answers the steps'
         raise ValueError(f'--lockstep: {why}; there are {", ".join(ANSWERS)}')
     for node in answering:
-        if ANSWERS[node][0] not in (None, *chosen):
-            raise ValueError(f'--lockstep: {node} answers {ANSWERS[node][0]}, which is not published')
+        asked, _ = answer_of(node, graph)
+        if asked not in (None, *chosen):
+            raise ValueError(f'--lockstep: {node} answers {asked}, which is not published')

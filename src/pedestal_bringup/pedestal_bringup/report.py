@@ -7,8 +7,8 @@ import pathlib
 
 import numpy as np
 
+from pedestal_bringup import attitude_figures, consistency, figures, filter_figures, isolation, known_attitude, results
 from pedestal_bringup import bag as bags
-from pedestal_bringup import consistency, figures, filter_figures, results
 from pedestal_bringup.verify import verify
 from pedestal_common import topics
 
@@ -42,13 +42,14 @@ figure svg { display: block; width: 100%; height: auto; min-width: 26rem; }
 """
 
 
-def write(bag_path, output=None, png_folder=None) -> pathlib.Path:
+def write(bag_path, output=None, png_folder=None, beam='') -> pathlib.Path:
     """Write the report of a bag and return where: output, default report.html in the bag (beside a bare .mcap).
 
-    png_folder: also each figure, and the overview, as PNG there. The same bag gives the same bytes.
+    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there. The same bag
+    gives the same bytes.
     Raises bag.BagError when the bag cannot be read to its end, OSError when the report cannot be written.
     """
-    bag = bags.read(bag_path)
+    bag = bags.read(bag_path, beam)
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'report.html'
     recording = _recording(bag)
     page = _page(bag, recording)
@@ -57,7 +58,7 @@ def write(bag_path, output=None, png_folder=None) -> pathlib.Path:
     if png_folder is not None:
         folder = pathlib.Path(png_folder)
         folder.mkdir(parents=True, exist_ok=True)
-        for spec in (*figures.FIGURES, *filter_figures.FIGURES, figures.OVERVIEW):
+        for spec in (*figures.FIGURES, *filter_figures.FIGURES, *attitude_figures.FIGURES, figures.OVERVIEW):
             if not _missing(spec, recording):
                 figures.render(spec, recording, folder / f'{spec.key}.png')
     return output
@@ -105,18 +106,22 @@ def _recording(bag):
     statuses = [(log / 1e9, status.name, int(status.level), status.message)
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status
                 ] if _table(bag, 'diagnostics') else []
-    try:
-        beamwidth = float(bag.metadata.get('beamwidth', 'nan'))
-    except ValueError:
-        beamwidth = math.nan
     return figures.Recording(run, no_truth, raw, motors, _table(bag, 'tracking_receiver/angle_error'), _modes(bag),
-                             statuses, beamwidth, _filter(bag, run))
+                             statuses, results.beamwidth(bag), _filter(bag, run), _attitude(bag))
 
 
 def _filter(bag, run):
     """The consistency.Consistency, None without truth or without its numbers."""
     try:
         return consistency.read(bag, run) if run is not None and _table(bag, 'acu/filter') is not None else None
+    except KeyError:
+        return None
+
+
+def _attitude(bag):
+    """The known_attitude.KnownAttitude, None ashore or without its numbers."""
+    try:
+        return known_attitude.read(bag) if _table(bag, 'ship/imu/data') is not None else None
     except KeyError:
         return None
 
@@ -177,6 +182,27 @@ def _torques(recording):
              *(_number(results.rms(recording.motors[f'{axis}_motor_{i}.effort']), 'Nm')
                for axis in ('azimuth', 'elevation')),
              ''] for i in (1, 2)] if recording.motors else []
+
+
+def _deck(found):
+    values = known_attitude.summary(found)
+    return [[label, _number(*values[key])] for label, key in (
+        ('INS aligned at', 'aligned_s'), ('heading error then', 'heading_at_alignment_deg'),
+        ('1 sigma of heading then, as the INS says', 'heading_sigma_at_alignment_deg'),
+        ('heading error from then on, rms', 'heading_error_rms_deg'),
+        ('level error from then on, rms per axis', 'level_error_rms_deg'))]
+
+
+def _isolation(bag, recording):
+    """Rows on what the ship's rotation leaves in the pointing error; none where too little was tracked."""
+    found = isolation.read(bag, recording.run) if recording.run is not None else None
+    if found is None:
+        return []
+    degrees = math.degrees(1.0)
+    return [["line of sight moved by the ship's rotation, rms per axis", _number(found.motion * degrees, 'deg')],
+            ['pointing error that follows it, rms per axis', _number(found.coherent * degrees, 'deg')],
+            ['isolation', _number(found.isolation, 'dB')],
+            ['isolation that noise alone would show', _number(found.limit, 'dB')]]
 
 
 def _honesty(found):
@@ -260,7 +286,7 @@ def _figure(spec, recording):
 
 def _page(bag, recording):
     check = verify(bag.path)
-    name = bag.metadata.get('scenario') or bag.file.stem
+    name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     data = bag.file.read_bytes()
@@ -288,12 +314,13 @@ def _page(bag, recording):
                      '</p>')
         run_rows = [[label, _number(values[key][0], unit)] for label, key, unit in (
             ("receiver's single-sample noise", 'single_sample_noise_deg', 'deg'), ('first lock', 'lock_time_s', 's'),
-            ('time in autotrack', 'autotrack_time_s', 's'), ('time evaluated', 'evaluated_time_s', 's'))]
+            ('time in autotrack', 'autotrack_time_s', 's'), ('time evaluated', 'evaluated_time_s', 's'),
+            ('time further than half a beamwidth off, once tracking', 'loss_s', 's'))]
     parts.append(_rows(None, run_rows + _loop(bag, check), 'n'))
     if not check.complete:
         parts.append('<h2 id="gaps">What the recording lacks</h2><ul>' + ''.join(
             f'<li>{html.escape(problem)}</li>' for problem in _problems(check)) + '</ul>')
-    absent = [topic for topic in topics.BY_NAME if topic not in bag.topics or not bag.rows(topic).size]
+    absent = [topic for topic in bag.graph if topic not in bag.topics or not bag.rows(topic).size]
     if absent:
         parts.append(f'<p class="soft">No message in this bag of: {", ".join(absent)}.</p>')
     parts.append('<h2 id="figures">Figures</h2><p class="soft">The paper: antenna tracking with a Kalman filter and a '
@@ -304,6 +331,10 @@ def _page(bag, recording):
     if recording.filter is not None:
         parts.append(_honesty(recording.filter))
     parts += [_figure(spec, recording) for spec in filter_figures.FIGURES]
+    if recording.attitude is not None:
+        parts.append('<h2 id="attitude">The deck</h2>')
+        parts.append(_rows(None, _deck(recording.attitude) + _isolation(bag, recording), 'n'))
+        parts += [_figure(spec, recording) for spec in attitude_figures.FIGURES]
     parts.append('<h2 id="diagnostics">Diagnostics that were not OK</h2>')
     rows = _diagnostics(recording.statuses)
     if rows:

@@ -82,7 +82,8 @@ def configured(bag):
     chosen = scenario.parse(bag.metadata.get('scenario', ''), said['scenario'])
     values = {node: dict(values) for node, values in chosen.values.items()}
     for node, recorded in said['parameters'].items():
-        scenario.parameters_of(node)
+        if node not in chosen.nodes:
+            raise bags.BagError(f'{bag.file}: holds parameters of {node}, which is no node of its scenario')
         now = parameters.as_dict(chosen.node_parameters(node))
         values[node].update({key: value for key, value in recorded.items() if key not in now or now[key] != value})
     changed = dataclasses.replace(chosen, values=values)

@@ -39,11 +39,13 @@ def _pointing(beam, target, ship, attitude, known_attitude, estimate, error, fil
 class Tracking:
     """A run as arrays on the drive's steps; angles in rad, NaN where nothing was measured.
 
-    t (n,) s; azimuth, elevation (n,) encoders; reference (n, 2) deck angles that the ACU follows, NaN in standby;
+    t (n,) s; azimuth, elevation (n,) encoders; reference (n, 2) deck angles that the ACU follows, NaN in standby and
+    of an electronic beam, which is told where to be later;
     cross_elevation, elevation_error (n,) true error;
     measured (n, 2) receiver errors and cn0 (n,) at their stamp; filtered (n, 2) the estimate seen from the
     beam, as cross-elevation and elevation; beam_earth (n, 2); target_earth (n, 2) and range (n,) m; mode (n,) text;
-    tracking (n,) bool: in autotrack and settled.
+    tracking (n,) bool: in autotrack and settled, since (n,) bool: that or later; beamwidth rad, NaN when the bag does
+    not say.
     """
     t: np.ndarray
     azimuth: np.ndarray
@@ -59,6 +61,16 @@ class Tracking:
     range: np.ndarray
     mode: np.ndarray
     tracking: np.ndarray
+    since: np.ndarray
+    beamwidth: float
+
+
+def beamwidth(bag):
+    """The beamwidth [rad] a bag was recorded with, NaN when it does not say."""
+    try:
+        return float(bag.metadata.get('beamwidth', 'nan'))
+    except ValueError:
+        return math.nan
 
 
 def on_grid(bag, t, topic, columns):
@@ -114,10 +126,10 @@ def tracking(bag) -> Tracking:
     automatic = mode == 'autotrack'
     start = t[automatic][0] + SETTLING if automatic.any() else math.inf
     reference = at_steps('acu/reference', ('azimuth.position', 'elevation.position'))
-    reference[(mode == 'standby') | (mode == '')] = np.nan
+    reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t, beam[:, 0], beam[:, 1], reference, error[:, 0], error[:, 1], measured[:, :2], measured[:, 2],
                     filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
-                    automatic & (t >= start))
+                    automatic & (t >= start), t >= start, beamwidth(bag))
 
 
 def modes(bag, t):
@@ -141,7 +153,9 @@ def summary(run: Tracking) -> dict:
     *_following_*_deg: reference less encoder over every step outside standby, tracking or not;
     pointing_*_deg: both axes together, per axis and sample (not the angle off the beam);
     single_sample_noise_deg: rms of the receiver's error minus the true one, per axis and sample;
-    noise_reduction: that divided by the rms error of the filtered line of sight against truth.
+    noise_reduction: that divided by the rms error of the filtered line of sight against truth;
+    loss_s: how long the target was further than half a beamwidth off the beam, in whatever mode, from when on the run
+    counts as tracking.
     """
     on = run.tracking
     degrees = math.degrees(1.0)
@@ -170,9 +184,29 @@ def summary(run: Tracking) -> dict:
         'lock_time_s': (float(run.t[locked][0]) if locked.any() else math.nan, 's'),
         'autotrack_time_s': (float(np.sum(run.mode == 'autotrack') * np.median(np.diff(run.t))), 's'),
         'tracked_percent': (100.0 * float(np.mean(run.mode == 'autotrack')), '%'),
+        'loss_s': (_loss(run), 's'),
         'evaluated_time_s': (float(np.sum(on) * np.median(np.diff(run.t))), 's'),
     }
     return values
+
+
+def _loss(run):
+    if not (run.since.any() and math.isfinite(run.beamwidth)):
+        return math.nan
+    off = np.hypot(run.cross_elevation, run.elevation_error)[run.since]
+    return float(np.sum(off > 0.5 * run.beamwidth) * np.median(np.diff(run.t)))
+
+
+def announced_losses(bag) -> dict:
+    """{'keyhole_loss_predicted_s': (value, unit)}: what the ACU said beforehand in its diagnostics that it would lose
+    in keyholes, each counted once; nothing where it said nothing of the kind."""
+    found = {}
+    for _, _, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
+        for status in array.status:
+            said = {value.key: value.value for value in status.values}
+            if 'keyhole_loss_s' in said:
+                found[said['keyhole_begins_s']] = float(said['keyhole_loss_s'])
+    return {'keyhole_loss_predicted_s': (sum(found.values()), 's')} if found else {}
 
 
 def _max(values):
@@ -180,7 +214,8 @@ def _max(values):
     return float(np.max(np.abs(values))) if values.size else math.nan
 
 
-TARGETS = {'pointing_to_noise': '<= 0.4', 'lost_steps': '0', 'realtime_factor': '>= 4 in lockstep'}
+TARGETS = {'pointing_to_noise': '<= 0.4', 'lost_steps': '0', 'realtime_factor': '>= 4 in lockstep',
+           'isolation_db': '>= 60'}
 
 
 def rows(case, values):

@@ -5,17 +5,20 @@
 import dataclasses
 import difflib
 import importlib.resources
+import json
 import pathlib
 import re
 import typing
 
+import numpy as np
 import yaml
 
 from acu_tracker.params import AcuParameters
-from adu_drive.params import AduNodeParameters
+from adu_drive.params import AduNodeParameters, BeamParameters
 from pedestal_bringup.params import RecorderParameters
-from pedestal_common import parameters
+from pedestal_common import parameters, topics
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
+from tracking_receiver_sim import smoothing
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 
@@ -37,8 +40,20 @@ class ScenarioParameters(parameters.Parameters):
     pacing: str = parameters.choice('lockstep', ('lockstep', 'realtime'), 'who waits for whom')
     seed: int = parameters.parameter(1, 0, 2**31 - 1, '', 'seed of every noise stream')
     ship: bool = parameters.flag(False, 'the pedestal stands on a ship: ship_motion and ins take part')
+    beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
+    beams: int = parameters.parameter(1, 1, topics.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
+                                      'in a namespace beam_1 ...')
     deadline: float = parameters.parameter(60.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
     program: ProgramParameters = parameters.group(ProgramParameters)
+
+    def check(self):
+        if self.beams > 1 and not self.beam:
+            raise parameters.ParameterError(f'beams = {self.beams}: must be 1 unless beam = true')
+
+    @property
+    def graph_beams(self):
+        """Beams of the graph as topics.graph counts them."""
+        return self.beams if self.beam else 0
 
 
 class _Loader(yaml.SafeLoader):
@@ -67,6 +82,9 @@ NODE_KINDS = {
     'recorder': NodeKind('pedestal_bringup.recorder_node', RecorderParameters),
 }
 
+ARRAY = NodeKind('adu_drive.beam_steering_node', BeamParameters)
+"""What `adu` is in a scenario with `beam: true`."""
+
 
 KNOWN = (
     ('adu', 'period', 'acu', 'tracker.receiver.integration'),
@@ -76,6 +94,7 @@ KNOWN = (
     ('tracking_receiver', 'antenna.slope', 'acu', 'tracker.receiver.slope'),
     ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
     ('ins', 'latency', 'acu', 'attitude_latency'),
+    ('ship_motion', 'imu.output', 'ins', 'imu_output'),
     *(('tracking_receiver', f'lever_arm.{axis}', 'acu', f'lever_arm.{axis}') for axis in 'xyz'),
     ('tracking_receiver', 'blockage', 'acu', 'blockage'),
 )
@@ -92,21 +111,38 @@ class ScenarioError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """A checked scenario: its header and, for each node that takes part, the values that differ from the defaults."""
+    """A checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
+
+    Of several beams the values of `acu` hold for each `beam_2/acu`, whose own come on top.
+    """
     name: str
     header: ScenarioParameters
     values: dict
 
     @property
     def nodes(self):
-        """Nodes that take part, in the order of topics.NODES; the operator where there is a program track."""
+        """Nodes that take part, in the order of topics.NODES and of the beams; the operator where there is a program
+        track."""
         ship = ('ship_motion', 'ins') if self.header.ship else ()
         operator = ('operator',) if self.header.program.source != 'none' else ()
-        return (*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator)
+        return topics.members((*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator),
+                              self.header.graph_beams)
+
+    @property
+    def prefixes(self):
+        """What the names of each beam's nodes begin with; ('',) of a single one."""
+        return topics.prefixes(self.header.graph_beams)
+
+    def kind(self, node):
+        return kind(node, self.header.beam)
+
+    def given(self, node):
+        """{dotted name: value} of what this scenario says of a node."""
+        return _whole(self.values, node)
 
     def node_parameters(self, node):
         """The parameter dataclass of one node as this scenario sets it."""
-        return parameters.build(NODE_KINDS[node].parameters, self.values.get(node, {}))
+        return parameters.build(self.kind(node).parameters, self.given(node))
 
     def as_yaml(self):
         """The scenario as a ROS 2 parameter file."""
@@ -157,6 +193,20 @@ def dotted(tree, prefix=''):
     return flat
 
 
+def kind(node, beam=False):
+    """The NodeKind of a node, 'beam_2/acu' as well as 'acu'; beam: of a graph whose drive is an array."""
+    return ARRAY if beam and node == 'adu' else NODE_KINDS[topics.plain(node)]
+
+
+def _whole(sections, node):
+    """The values of a node, what holds for every beam first."""
+    return {**sections.get(topics.plain(node), {}), **sections.get(node, {})}
+
+
+def _is_node(name):
+    return topics.plain(name) in (topics.BEAM_NODES if topics.beam_of(name) else NODE_KINDS)
+
+
 def _sections(name, content):
     try:
         tree = yaml.load(content, Loader=_Loader)
@@ -166,7 +216,7 @@ def _sections(name, content):
         raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
     sections = {}
     for section, body in tree.items():
-        if section != 'scenario' and section not in NODE_KINDS:
+        if section != 'scenario' and not _is_node(section):
             raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(NODE_KINDS)}')
         whole = isinstance(body, dict) and list(body) == ['ros__parameters']
         values = body['ros__parameters'] or {} if whole else None
@@ -177,12 +227,13 @@ def _sections(name, content):
 
 
 def parameters_of(node):
-    """The parameter dataclass of a node or of the header `scenario`; ScenarioError for any other name."""
-    if node == 'scenario':
-        return ScenarioParameters
-    if node not in NODE_KINDS:
-        raise ScenarioError(f'{node!r} is no node; there are {", ".join(NODE_KINDS)}, scenario')
-    return NODE_KINDS[node].parameters
+    """The parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`; ScenarioError for
+    any other name."""
+    if node in ('scenario', 'beam_steering'):
+        return ScenarioParameters if node == 'scenario' else ARRAY.parameters
+    if not _is_node(node):
+        raise ScenarioError(f'{node!r} is no node; there are {", ".join(NODE_KINDS)}, beam_steering, scenario')
+    return kind(node).parameters
 
 
 def parse_override(text):
@@ -196,6 +247,22 @@ def parse_override(text):
         return node, key, yaml.load(right, Loader=_Loader)
     except yaml.YAMLError as error:
         raise ScenarioError(f'--param {text!r}: no valid YAML value: {" ".join(str(error).split())}') from None
+
+
+def file_overrides(path):
+    """Texts 'node.key=value' of a ROS 2 parameter file."""
+    try:
+        tree = yaml.load(path.read_text(), Loader=_Loader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ScenarioError(f'--params-file {path}: {" ".join(str(error).split())}') from None
+    if not isinstance(tree, dict) or not tree:
+        raise ScenarioError(f'--params-file {path}: must hold a section for a node')
+    texts = []
+    for node, body in tree.items():
+        if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
+            raise ScenarioError(f'--params-file {path}: section {node} must hold ros__parameters')
+        texts += [f'{node}.{key}={json.dumps(value)}' for key, value in dotted(body['ros__parameters']).items()]
+    return texts
 
 
 def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
@@ -218,11 +285,18 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
         if value is not None:
             header_values[key] = value
     header = _checked(name, 'scenario', ScenarioParameters, header_values)
-    for node in NODE_KINDS:
-        _checked(name, node, parameters_of(node), sections.setdefault(node, {}))
+    of_beams = [name for name in topics.members(topics.BEAM_NODES, header.graph_beams) if topics.beam_of(name)]
+    for node in sections:
+        if topics.beam_of(node) and node not in of_beams:
+            raise ScenarioError(f'scenario {name}: section {node!r}: the scenario has beams = {header.beams}')
+    for node in (*NODE_KINDS, *of_beams):
+        sections.setdefault(node, {})
+        _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
     _spread(name, sections, header, seed)
+    for node in of_beams:
+        _spread_to_beam(name, node, sections, header, seed)
     for node, values in sections.items():
-        typed = parameters.as_dict(_checked(name, node, parameters_of(node), values))
+        typed = parameters.as_dict(_checked(name, node, kind(node, header.beam).parameters, _whole(sections, node)))
         sections[node] = {key: typed[key] for key in values}
     return Scenario(name, header, sections)
 
@@ -250,7 +324,8 @@ def _spread(name, sections, header, seed):
         if key.startswith('ship.'):
             tell('ins', key, value)
     for node in ('acu', 'tracking_receiver'):
-        tell(node, 'period', sections['adu'].get('period', parameters.defaults(parameters_of('adu'))['period']))
+        tell(node, 'period', sections['adu'].get(
+            'period', parameters.defaults(kind('adu', header.beam).parameters)['period']))
     for key, told in MEASURED:
         measured = sections['tracking_receiver'].get(key, False)
         for node in ('acu', 'recorder'):
@@ -259,6 +334,35 @@ def _spread(name, sections, header, seed):
     for owner, key, node, told in KNOWN:
         if key in sections[owner]:
             sections[node].setdefault(told, sections[owner][key])
+    if header.beam:
+        sections['tracking_receiver'].setdefault('receiver.beam', 'held')
+        sections['acu'].setdefault('tracker.receiver.age', _error_age(sections['tracking_receiver']))
+
+
+def _error_age(values):
+    """How long [s] before its stamp an error of a beam that stands belongs: the mean delay of the samples in it."""
+    tracking = parameters.build(parameters_of('tracking_receiver'), values)
+    r = tracking.receiver
+    return smoothing.delay(r.smoothing, r.samples_per_step, r.smoothing_samples) * tracking.period / r.samples_per_step
+
+
+def _spread_to_beam(name, node, sections, header, seed):
+    """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
+    values, beam = sections[node], topics.beam_of(node)
+    receiver = f'{beam}/tracking_receiver'
+    if node == receiver and (seed is not None or 'seed' not in values):
+        spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
+        values['seed'] = int(spread.generate_state(1)[0] >> 1)
+    for owner, key, other, told in KNOWN:
+        own = sections.get(f'{beam}/{owner}', {})
+        if topics.plain(node) == other and key in own:
+            values.setdefault(told, own[key])
+    for key, _ in MEASURED:
+        if key in sections[receiver]:
+            raise ScenarioError(f'scenario {name}, {receiver}: {key}: is the same for every beam; say it in '
+                                'tracking_receiver')
+    if node != receiver and any(key.startswith('receiver.s') for key in sections[receiver]):
+        values.setdefault('tracker.receiver.age', _error_age(_whole(sections, receiver)))
 
 
 def _checked(name, section, parameters_type, values):

@@ -4,8 +4,6 @@ Arrival depends on the machine's load, the steps do not; so equal runs give equa
 """
 import heapq
 
-from pedestal_common.topics import NODES
-
 MAX_WAITING = 10_000
 SECOND = 1_000_000_000
 
@@ -30,7 +28,7 @@ class StepOrder:
         self._slots = []
         for index, topic in enumerate(topics):
             if topic.rate == 'second':
-                self._slots += [(index, topic, node) for node in NODES if node in topic.writers and node in nodes]
+                self._slots += [(index, topic, node) for node in topic.writers if node in nodes]
             else:
                 self._slots.append((index, topic, None))
         self._slot_of = {(topic.name, node): slot for slot, (_, topic, node) in enumerate(self._slots, 1)}

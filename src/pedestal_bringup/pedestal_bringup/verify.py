@@ -63,22 +63,23 @@ def verify(path) -> Report:
     rows = {name: bag.rows(name) for name in bag.topics}
     stamps = {name: columns.stamps([data for _, _, _, data in bag.raw(name)], bag.topics[name], rows[name].log)
               for name in bag.topics}
-    rates = {name: topics.BY_NAME[name].rate if name in topics.BY_NAME else '' for name in bag.topics}
+    graph = bag.graph
+    rates = {name: graph[name].rate if name in graph else '' for name in bag.topics}
     first, last, period = _grid(stamps, rates)
     ours = 'pacing' in bag.metadata
     checks = []
     for name, stamp in stamps.items():
-        problems = _order(stamp) if rates[name] and len(topics.BY_NAME[name].writers) == 1 else []
+        problems = _order(stamp) if rates[name] and len(graph[name].writers) == 1 else []
         if rates[name] == 'step':
-            problems += _steps(name, stamp, first, last, period)
+            problems += _steps(stamp, 'adu' in graph[name].writers, first, last, period)
             if ours and not np.array_equal(stamp, rows[name].log):
                 problems.append(f'{np.sum(stamp != rows[name].log)} messages logged at a time that is not their stamp')
         elif rates[name] == 'once' and stamp.size != 1:
             problems.append(f'{stamp.size} messages where one is due')
         elif rates[name] == 'second' and bag.metadata.get('pacing') == 'lockstep' and period:
             problems += _seconds(bag, name, stamp, first, last, period)
-        if name in topics.BY_NAME and bag.topics[name] != topics.BY_NAME[name].type:
-            problems.append(f'of type {bag.topics[name]}, where the graph has {topics.BY_NAME[name].type}')
+        if name in graph and bag.topics[name] != graph[name].type:
+            problems.append(f'of type {bag.topics[name]}, where the graph has {graph[name].type}')
         if ours:
             problems += _sequence(rows[name].sequence)
         checks.append(TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,
@@ -105,7 +106,8 @@ def _grid(stamps, rates):
     steps = {name: stamp for name, stamp in stamps.items() if rates[name] == 'step' and stamp.size}
     if not steps:
         return 0, 0, 0
-    grid = np.unique(steps.get('joint_states', next(iter(steps.values()))))
+    grid = np.unique(next((stamp for name, stamp in steps.items() if topics.plain(name) == 'joint_states'),
+                          next(iter(steps.values()))))
     period = int(np.median(np.diff(grid))) if grid.size > 1 else 0
     return int(grid[0]), int(max(grid[-1], *(stamp.max() for stamp in steps.values()))), period
 
@@ -128,7 +130,8 @@ def _ranges(numbers):
     return list(zip(numbers[np.r_[0, cuts + 1]].tolist(), numbers[np.r_[cuts, numbers.size - 1]].tolist()))
 
 
-def _steps(name, stamp, first, last, period):
+def _steps(stamp, of_drive, first, last, period):
+    """Steps that are missing, doubled or none; of_drive: written by the drive, which makes them."""
     if not stamp.size:
         return ['no message']
     problems = []
@@ -143,7 +146,7 @@ def _steps(name, stamp, first, last, period):
         problems.append(f'{off} stamps are no step')
     expected = np.arange((last - first) // period + 1)
     missing = _ranges(np.setdiff1d(expected, (unique - first) // period))
-    if 'adu' not in topics.BY_NAME[name].writers and missing and missing[-1][1] == expected[-1] \
+    if not of_drive and missing and missing[-1][1] == expected[-1] \
             and (missing[-1][1] - missing[-1][0] + 1) * period <= MAX_LATENCY:
         missing.pop()
     for start, stop in missing[:SHOWN]:
@@ -168,8 +171,8 @@ def _seconds(bag, name, stamp, first, last, period):
         except ValueError as error:
             return [f'unreadable at {at / 1e9:.6f} s: {error}']
         heard.setdefault(status[0].name if status else '', []).append(at)
-    nodes = [node for node in topics.BY_NAME[name].writers
-             if any(topic.name in bag.topics for topic in topics.TOPICS if topic.writers == (node,))]
+    nodes = [node for node in bag.graph[name].writers
+             if any(topic.name in bag.topics for topic in bag.graph.values() if topic.writers == (node,))]
     problems = []
     for node in nodes:
         missing = np.setdiff1d(expected, heard.get(node, []))

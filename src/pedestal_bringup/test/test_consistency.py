@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import signal, stats
 from scipy.spatial.transform import Rotation
 
 from acu_tracker import motion_models, tracker
@@ -17,11 +17,9 @@ from tracking_receiver_sim.params import SMOOTHINGS, TrackingReceiverParameters
 
 def correlated(rng, n, size, memory):
     """A stationary Gaussian series (n, size) of unit variance, each sample remembering this much of the last."""
-    out = np.empty((n, size))
-    out[0] = rng.standard_normal(size)
-    for k in range(1, n):
-        out[k] = memory * out[k - 1] + math.sqrt(1.0 - memory * memory) * rng.standard_normal(size)
-    return out
+    noise = rng.standard_normal((n, size))
+    noise[1:] *= math.sqrt(1.0 - memory * memory)
+    return signal.lfilter([1.0], [1.0, -memory], noise, axis=0)
 
 
 def made(rng, factor, n=6000, memory=0.98, freedoms=1):
@@ -113,7 +111,8 @@ def test_true_rates_seen_from_a_sailing_ship():
 
 def test_names_are_those_of_the_models_and_axes():
     assert messages.MODELS == motion_models.MODELS
-    assert len(messages.FILTER) == 2 * (len(consistency.NAMES) + len(messages.MODELS))
+    told = {f'{axis}_{name}' for axis in messages.AXES for name in (*consistency.NAMES, *messages.MODELS)}
+    assert told | {f'{axis}_innovation_sigma' for axis in messages.AXES} == set(messages.FILTER)
 
 
 @pytest.mark.parametrize('smoothing', SMOOTHINGS)

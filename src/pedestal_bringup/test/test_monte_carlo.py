@@ -1,10 +1,16 @@
 """Workers of the studies: the same numbers whoever works, and an end that leaves nothing behind."""
+import os
+import signal
+import subprocess
 import sys
+import time
 
+import distributed
 import numpy as np
 import pytest
 
 from pedestal_bringup import monte_carlo
+from pedestal_bringup.studies import manoeuvre
 
 
 def test_batches_hold_every_run_once():
@@ -38,12 +44,43 @@ def test_a_failing_batch_says_what_failed():
             list(pool.map(refuse, range(3)))
 
 
-def test_a_dask_cluster_gives_the_same_numbers():
-    distributed = pytest.importorskip('distributed')
+def test_a_study_gives_the_same_numbers_whoever_works():
+    runs = manoeuvre.BATCH + 3
+    expected = manoeuvre.run(lambda share, text: None, runs).rows
+    with monte_carlo.Pool(2) as pool:
+        assert manoeuvre.run(lambda share, text: None, runs, pool).rows == expected
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with monte_carlo.Pool(scheduler=cluster.scheduler_address) as pool:
-            found = numbers(pool)
-    assert np.array_equal(found, numbers(monte_carlo.Pool(1)))
+            assert manoeuvre.run(lambda share, text: None, runs, pool).rows == expected
+
+
+def living(group):
+    """Command lines of the processes of a group that still run."""
+    listed = subprocess.run(['ps', '-ww', '-eo', 'pgid=,stat=,args='], capture_output=True, text=True, check=True)
+    fields = [line.split(None, 2) for line in listed.stdout.splitlines()]
+    return [args for pgid, stat, args in fields if int(pgid) == group and not stat.startswith('Z')]
+
+
+@pytest.mark.parametrize('whom', ['terminal', 'process'])
+def test_ctrl_c_ends_a_study_and_its_workers(whom, tmp_path):
+    """A terminal sends it to every process, `kill` to one."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'pedestal_bringup.cli', 'study', 'manoeuvre', '--runs', '1000000', '--workers', '2'],
+        cwd=tmp_path, start_new_session=True, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    try:
+        deadline = time.monotonic() + 60.0
+        while sum('LokyProcess' in args for args in living(process.pid)) < 2:
+            assert time.monotonic() < deadline and process.poll() is None
+            time.sleep(0.05)
+        (os.killpg if whom == 'terminal' else os.kill)(process.pid, signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=60.0)
+        assert (process.returncode, stdout, stderr) == (130, '', 'pedestal: stopped\n')
+        while living(process.pid):
+            assert time.monotonic() < deadline + 60.0
+            time.sleep(0.05)
+    finally:
+        if living(process.pid):
+            os.killpg(process.pid, signal.SIGKILL)
 
 
 @pytest.mark.parametrize('options, message', [

@@ -52,11 +52,14 @@ def domain(monkeypatch, tmp_path_factory):
             profile.write_text(PROFILE)
             monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(profile))
             yield number
+            while Recorder.started:
+                Recorder.started.pop().kill()
             return
 
 
 class Recorder:
-    """The recorder as a process."""
+    """The recorder as a process; the fixture `domain` ends those that a failing test leaves."""
+    started = []
 
     def __init__(self, directory, pacing, *arguments, nodes=NODES, **options):
         known = ('-p', f'graph.nodes:={",".join(nodes)}') if nodes else ()
@@ -64,6 +67,7 @@ class Recorder:
             [sys.executable, '-m', 'pedestal_bringup.recorder_node', '--ros-args', '-p', f'bag:={directory}',
              '-p', f'graph.pacing:={pacing}', *known, *arguments],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+        self.started.append(self.process)
 
     def end(self, number=signal.SIGINT):
         """(exit code, JSON of the last line of stdout, stderr) after the signal; None sends none."""
@@ -86,7 +90,7 @@ class Graph:
         rclpy.init(args=[], context=self.context, domain_id=domain)
         self.node = rclpy.create_node('graph', context=self.context)
         self.publishers = {}
-        for topic in topics.TOPICS:
+        for topic in topics.read_by('recorder', topics.NODES):
             durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.qos == 'state' else DurabilityPolicy.VOLATILE
             profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE,
                                  durability=durability)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pedestal_bringup.studies import experiment
+from pedestal_bringup.studies import alignment, experiment
 
 T = np.arange(0.0, 3.0, 1e-4)
 
@@ -90,3 +90,18 @@ def test_off_is_a_word():
     loaded = experiment.Case('off', 'servo_step', {'adu.azimuth.bias.schedule': 'off'}).loaded()
     assert loaded.node_parameters('adu').azimuth.bias.schedule == 'off'
     assert yaml.safe_load(loaded.as_yaml())['adu']['ros__parameters']['azimuth.bias.schedule'] == 'off'
+
+
+def test_alignment_in_a_quick_form():
+    """Four runs: an rms is known to a third, so the bounds are three of those."""
+    rows = {(row['case'], row['metric']): row['value'] for row in alignment.run(lambda share, text: None, runs=4).rows}
+    assert {case for case, _ in rows if '/' not in case} == {*alignment.CASES, 'limit'}
+    assert rows['limit', 'azimuth_rms_arcmin_600s'] == pytest.approx(4.5, abs=0.05)
+    assert rows['limit', 'time_to_12arcmin_rms_s'] == pytest.approx(118, abs=2)
+    for case in ('riccati-eso', 'oba', 'adrc-scheduled'):
+        assert rows[case, 'azimuth_rms_arcmin_600s'] < 2.0 * rows['limit', 'azimuth_rms_arcmin_600s']
+        assert rows[case, 'level_rms_arcmin'] < 0.3
+        assert all(rows[f'{case}/quadrant-{n}', 'azimuth_rms_arcmin_300s'] < 20.0 for n in range(1, 5))
+    assert 0.5 < rows['adrc', 'level_rms_arcmin'] < 2.0 and rows['adrc', 'azimuth_rms_arcmin_300s'] < 20.0
+    assert rows['classical', 'azimuth_rms_arcmin_250s'] > 300.0 > 25.0 > rows['classical', 'azimuth_rms_arcmin_600s']
+    assert rows['oba/swell', 'azimuth_rms_arcmin_200s'] < 20.0 < rows['riccati-eso/swell', 'azimuth_rms_arcmin_200s']

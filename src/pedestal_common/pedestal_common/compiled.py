@@ -22,21 +22,22 @@ KEPT_DAYS = 7.0
 _ROOT = pathlib.Path(numba.config.CACHE_DIR or user_cache_dir()) / 'pedestal'
 
 
-def _digest(packages) -> str:
-    digest = hashlib.sha256(numba.__version__.encode())
+def digest(packages) -> str:
+    """Of the sources of packages and the version of the compiler."""
+    found = hashlib.sha256(numba.__version__.encode())
     for package in packages:
         spec = importlib.util.find_spec(package) if package != '__main__' else None
         if spec is not None and spec.origin is not None:
             for path in sorted(pathlib.Path(spec.origin).parent.rglob('*.py')):
-                digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+                found.update(path.read_bytes())
+    return found.hexdigest()[:16]
 
 
 @functools.cache
 def _cache_folder(package) -> str | None:
     """The cache of one package's laws: named after its own sources and all it may call."""
     columns = () if package == 'pedestal_common' else (package,) if package in COLUMNS else COLUMNS
-    folder = _ROOT / f'{package}-{_digest(("pedestal_common", *columns, package))}'
+    folder = _ROOT / f'{package}-{digest(("pedestal_common", *columns, package))}'
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)

@@ -7,6 +7,7 @@ its messages exists once.
 HEARD, SAID = of('joint_states', 'ship/truth'), of('acu/rate_command')
     one field per topic: stamp [ns], then the numbers; one that did not come, or is not to be sent, has stamp NEVER
 """
+import math
 import typing
 
 import numpy as np
@@ -41,7 +42,8 @@ _KINDS = {
     'Range': (_type(('range', 1), ('variance', 1)), ('range', 'variance')),
     'Vector3Stamped': (_type(('vector', 3)), ('x', 'y', 'z')),
     'Odometry': _spatial(('position', 3), ('orientation', 4), ('twist_linear', 3), ('twist_angular', 3)),
-    'Imu': _spatial(('orientation', 4), ('angular_velocity', 3), ('linear_acceleration', 3)),
+    'Imu': _spatial(('orientation', 4), ('angular_velocity', 3), ('linear_acceleration', 3),
+                    ('orientation_variance', 3)),
 }
 _NAMED = {'adu/motor_states': _joints(messages.MOTORS),
           'acu/filter': (_type(('position', len(messages.FILTER))),
@@ -90,12 +92,23 @@ def take(place, message):
         place.numbers[:] = _TAKE[type(message)](message)
 
 
-def _joint_numbers(message):
-    names, fields = message.name, (message.position, message.velocity, message.effort)
+def _of_axes(names, fields):
+    """The numbers of both axes of three fields; NaN for a name or a number that is not there."""
     # The usual case costs a tenth of looking for each name.
     if names == _AXES and len(fields[0]) == len(fields[1]) == len(fields[2]) == len(_AXES):
         return [value for values in fields for value in values.tolist()]
     return [value for values in fields for value in messages.by_name(names, values, messages.AXES)]
+
+
+def _joint_numbers(message):
+    return _of_axes(message.name, (message.position, message.velocity, message.effort))
+
+
+def _point_numbers(message):
+    if not message.points:
+        return math.nan
+    point = message.points[0]
+    return _of_axes(message.joint_names, (point.positions, point.velocities, point.accelerations))
 
 
 def _vector_numbers(message):
@@ -115,7 +128,7 @@ def _odometry_numbers(message):
 
 def _imu_numbers(message):
     q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
-    return q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z
+    return (q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z, *message.orientation_covariance[::4].tolist())
 
 
 def put(message, place):
@@ -154,11 +167,13 @@ def _put_odometry(message, numbers):
 
 def _put_imu(message, numbers):
     q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
-    q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z = numbers.tolist()
+    q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z = numbers[:10].tolist()
+    message.orientation_covariance[::4] = numbers[10:]
 
 
-_TAKE = {messages.JointState: _joint_numbers, messages.Vector3Stamped: _vector_numbers,
-         messages.Range: _range_numbers, messages.Odometry: _odometry_numbers, messages.Imu: _imu_numbers}
+_TAKE = {messages.JointState: _joint_numbers, messages.JointTrajectory: _point_numbers,
+         messages.Vector3Stamped: _vector_numbers, messages.Range: _range_numbers,
+         messages.Odometry: _odometry_numbers, messages.Imu: _imu_numbers}
 _PUT = {messages.JointState: _put_joints, messages.JointTrajectory: _put_trajectory,
         messages.Vector3Stamped: _put_vector, messages.Range: _put_range, messages.Odometry: _put_odometry,
         messages.Imu: _put_imu}

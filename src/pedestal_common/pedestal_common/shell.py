@@ -51,17 +51,23 @@ class GraphParameters(parameters.Parameters):
     pacing: str = parameters.choice('realtime', ('lockstep', 'realtime'), 'who waits for whom')
     nodes: str = parameters.text('', 'names of the nodes of this run, comma separated; each waits for its readers '
                                  'among them')
+    beams: int = parameters.parameter(0, 0, topics.MAX_BEAMS, '', 'beams of an electronic array, each of several in '
+                                      'its namespace beam_i; 0: a drive with motors')
     deadline: float = parameters.parameter(60.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
 
     def check(self):
-        for name in self.members:
+        for name in self._names:
             if name not in topics.NODES:
                 raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}' is none of "
                                                 f'{", ".join(topics.NODES)}')
 
     @property
     def members(self):
-        """`nodes` as a tuple."""
+        """`nodes` as a tuple, with the nodes of every beam."""
+        return topics.members(self._names, self.beams)
+
+    @property
+    def _names(self):
         return tuple(name for name in self.nodes.replace(' ', '').split(',') if name)
 
     @property
@@ -85,6 +91,11 @@ def message_class(type_name):
     """The rclpy class of 'package/msg/Name'."""
     package, _, name = type_name.split('/')
     return getattr(importlib.import_module(f'{package}.msg'), name)
+
+
+def node_of(info, root='/'):
+    """The name in the graph at a namespace (with a '/' at its end) of the node behind an endpoint, as 'beam_2/acu'."""
+    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'.removeprefix(root)
 
 
 def _descriptor(field, read_only):
@@ -111,9 +122,11 @@ class Shell(Node):
 
     def __init__(self, name, parameters_type, live=()):
         super().__init__(name)
-        self.name = name
         self._parameters_type = parameters_type
         self._declare(live)
+        self.topics = topics.graph(self.graph.beams)
+        self._root, self.beam = self._place(name)
+        self.name = self.beam + name
         self.finished = False
         self.failure = None
         self._publishers_by_topic = {}
@@ -121,6 +134,13 @@ class Shell(Node):
         self._stamp = 0
         self._started = False
         self._send_diagnostics = None
+
+    def _place(self, name):
+        """(namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their end."""
+        namespace = self.get_namespace().rstrip('/') + '/'
+        prefix = next((prefix for prefix in topics.prefixes(self.graph.beams) if name in topics.BEAM_NODES
+                       and namespace.endswith('/' + prefix)), '')
+        return namespace.removesuffix(prefix), prefix
 
     def _declare(self, live):
         graph = self._declare_all(GraphParameters, (), 'graph.')
@@ -160,19 +180,24 @@ class Shell(Node):
     def reconfigure(self):
         """`self.parameters` has changed; overridden by a node with live parameters."""
 
+    def _topic(self, name):
+        """(Topic, its name for ROS) of a topic of the table; a node of a beam names its own without the prefix."""
+        topic = self.topics.get(self.beam + name) or self.topics[name]
+        return topic, self._root + topic.name if self.beam else topic.name
+
     def writer(self, name):
         """A function that publishes a message of messages.py on a topic of the table."""
-        topic = topics.BY_NAME[name]
-        publisher = self.create_publisher(message_class(topic.type), topic.name, QOS[topic.qos])
+        topic, ros_name = self._topic(name)
+        publisher = self.create_publisher(message_class(topic.type), ros_name, QOS[topic.qos])
         self._publishers_by_topic[topic] = publisher
         to_bytes, publish = messages.serialize, publisher.publish
         return lambda message: publish(to_bytes(message))
 
     def reader(self, name, take):
         """Call take(message) for every message on a topic of the table; broken bytes end the node with a reason."""
-        topic = topics.BY_NAME[name]
+        topic, ros_name = self._topic(name)
         from_bytes, type_name = messages.deserialize, topic.type
-        self.create_subscription(message_class(topic.type), topic.name,
+        self.create_subscription(message_class(topic.type), ros_name,
                                  self._guarded(lambda data: take(from_bytes(data, type_name))), QOS[topic.qos],
                                  raw=True)
 
@@ -199,7 +224,7 @@ class Shell(Node):
         steps = Steps(trigger, {name: round(latency * SECOND) for name, latency in followers.items()},
                       self.graph.lockstep, answer)
         for name in (trigger, *followers):
-            if name in topics.BY_NAME:
+            if topics.plain(name) in topics.BY_NAME:
                 self.reader(name, self._stamped(steps, name))
         self.steps = steps
         self._progress = (None, time.monotonic())
@@ -212,7 +237,7 @@ class Shell(Node):
             self._progress = (pending, time.monotonic())
         elif time.monotonic() - self._progress[1] > self.graph.deadline:
             waiting = self.steps.waiting_for
-            silent = ', '.join(writer for name in waiting for writer in topics.BY_NAME[name].writers)
+            silent = ', '.join(writer for name in waiting for writer in self._topic(name)[0].writers)
             raise GraphError(f'no {", ".join(waiting)} for step {pending / SECOND:.6f} s after '
                              f'{self.graph.deadline:g} s; silent: {silent}')
 
@@ -282,8 +307,8 @@ class Shell(Node):
                 if _stop:
                     raise Stopped
                 time.sleep(0.01)
-        for topic in self._publishers_by_topic:
-            if len(topic.writers) == 1 and self.count_publishers(topic.name) > 1:
+        for topic, publisher in self._publishers_by_topic.items():
+            if len(topic.writers) == 1 and self.count_publishers(publisher.topic_name) > 1:
                 raise GraphError(f'{topic.name} already has a writer: another graph runs on ROS_DOMAIN_ID '
                                  f'{self.context.get_domain_id()}; set a free one')
 
@@ -293,7 +318,7 @@ class Shell(Node):
         if not wanted:
             return []
         there = self.get_subscriptions_info_by_topic(publisher.topic_name)
-        names = {info.node_name for info in there}
+        names = {node_of(info, self._root) for info in there}
         missing = [name for name in wanted if name not in names and topics.STAND_IN not in names]
         return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 

@@ -12,7 +12,12 @@ Rate
     once    one at stamp 0, before the first step
     second  one per writer at every whole second of the drive's time
     change  whenever the value changes; has no stamp, belongs to the step its writer answers next
+
+An electronic array of several beams has the nodes BEAM_NODES and their topics once per beam, with the prefix `beam_1/`
+... `beam_N/`; everything else is shared.
 """
+import functools
+import re
 import typing
 
 
@@ -32,6 +37,11 @@ NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'o
 
 STAND_IN = 'replay'
 """The node that replays a recording to the others."""
+
+BEAM_NODES = ('tracking_receiver', 'acu')
+"""The nodes each beam of an array has of its own."""
+
+MAX_BEAMS = 16
 
 _ALL = NODES[:-2]
 
@@ -85,14 +95,61 @@ BY_NAME = {topic.name: topic for topic in TOPICS}
 FLAGS = tuple(topic.flag for topic in TOPICS if topic.flag)
 
 
-def read_by(node, graph, flags=()):
-    """The topics `node` reads for which the graph has a writer; the recorder reads every one. flags: those of FLAGS
-    that are set."""
-    return [topic for topic in TOPICS
-            if (node in topic.readers or node == 'recorder') and any(w in graph for w in topic.writers)
+def beam_of(name):
+    """'beam_2' of a node or topic 'beam_2/...'; '' of one without a beam."""
+    found = re.match(r'beam_[1-9]\d*(?=/)', name)
+    return found[0] if found else ''
+
+
+def plain(name):
+    """The name of a node or topic without its beam."""
+    return name[len(beam_of(name)) + 1:] if beam_of(name) else name
+
+
+def prefixes(beams):
+    """What the names of each beam's nodes and topics begin with: nothing where there is one only."""
+    return tuple(f'beam_{i}/' for i in range(1, beams + 1)) if beams > 1 else ('',)
+
+
+def members(nodes, beams):
+    """The nodes of a graph, each of BEAM_NODES once per beam."""
+    return tuple(prefix + node for node in nodes for prefix in (prefixes(beams) if node in BEAM_NODES else ('',)))
+
+
+def of_beam(name):
+    """Whether each beam has a topic of this (plain) name of its own."""
+    return name in ('joint_states', 'target/truth') or name.partition('/')[0] in BEAM_NODES
+
+
+def _of_array(topic):
+    """The row where the drive is an electronic array: it obeys angles instead of rates and does not feel the ship."""
+    readers = tuple(node for node in topic.readers if node != 'adu')
+    return topic._replace(readers=(*readers, 'adu') if topic.name == 'acu/reference' else readers)
+
+
+@functools.cache
+def graph(beams=0):
+    """{name: Topic} of a graph; beams 0: the drive has motors, else it is an electronic array of so many beams."""
+    rows = [_of_array(topic) for topic in TOPICS if topic.name != 'adu/motor_states'] if beams else TOPICS
+    found = {}
+    for topic in rows:
+        for prefix in prefixes(beams) if of_beam(topic.name) else ('',):
+            writers, readers = (tuple(name for name in members(nodes, beams) if beam_of(name) in ('', prefix[:-1])
+                                      or not prefix) for nodes in (topic.writers, topic.readers))
+            found[prefix + topic.name] = topic._replace(name=prefix + topic.name, writers=writers, readers=readers)
+    return found
+
+
+def read_by(node, nodes, flags=(), beams=0):
+    """The topics `node` reads for which a graph of these nodes has a writer; the recorder reads every one.
+
+    flags: those of FLAGS that are set.
+    """
+    return [topic for topic in graph(beams).values()
+            if (node in topic.readers or node == 'recorder') and any(w in nodes for w in topic.writers)
             and (not topic.flag or topic.flag in flags)]
 
 
-def readers(topic, graph):
+def readers(topic, nodes):
     """The nodes that must read a topic before a graph of these nodes may start."""
-    return [node for node in graph if node in topic.readers or node == 'recorder']
+    return [node for node in nodes if node in topic.readers or node == 'recorder']

@@ -1,8 +1,11 @@
 """How a ship moves on a seaway, what an IMU on it feels and what its INS reports.
 
+recording       a recorded motion as piecewise polynomials, where motion.step is not to make waves
 motion.step     time -> the ship's truth (stateless: the same seed and time give the same bits in any order)
 imu.step        truth -> specific force and angular rate as REP 145 wants them
+strapdown.step  increments of angle and velocity -> attitude and velocity in a computed frame
 ins.step        stamp of an IMU message -> attitude and deck rate as a late and imperfect INS knows them
+aligning_ins.step   an IMU message -> the same by an INS that integrates it: alignment, then navigation (navigator)
 
 Frames
     earth   ENU tangent plane at the place where the ship is at t = 0.
@@ -24,5 +27,7 @@ Symbols
     U               speed through the water along the mean heading                  [m/s]
     w, dw           angular velocity of the deck against the earth, FLU, and its derivative  [rad/s, rad/s2]
     f               specific force, FLU: at rest +g along z                         [m/s2]
+    n'              the frame a strapdown computer takes for ENU, turned by w_c
+    w_ie, w_c       rotation of the earth; rate at which an alignment turns n'      [rad/s]
     mat_ed          rotation deck -> earth; quaternions are x, y, z, w and rotate the same way
 """

@@ -1,6 +1,10 @@
 """What a strapdown IMU at the deck's origin reports: specific force and angular rate as REP 145 wants them.
 
-    inputs['dt'] = step [s]; step(constants(params), inputs, truth, outputs, normals)
+    inputs['t'], inputs['dt'] = time, step [s]; step(state, constants, ship, inputs, truth, outputs, normals)
+
+output 'sample'      the rates at the stamp
+output 'increment'   the mean rates since the last sample: what an integrating IMU gives, divided by the interval.
+                     Exact: three-point Gauss quadrature of the analytic rates, whose error goes with dt^7.
 """
 import math
 
@@ -15,16 +19,32 @@ NORMALS = 6     # standard normals a step takes: three gyros, three acceleromete
 STATUS = ('ok', 'step is not positive', 'truth is not valid')
 OK, BAD_STEP, BAD_TRUTH = range(len(STATUS))
 
+_GAUSS = math.sqrt(0.15)    # the outer nodes of the three-point rule, from the middle, for an interval of 1
+
+ERRORS = np.dtype([                             # of three gyros or three accelerometers
+    ('bias', 'f8', (3,)),                       # [rad/s] or [m/s2]
+    ('noise', 'f8'),                            # density of the white noise [rad/sqrt(s)] or [m/s/sqrt(s)]
+    ('scale', 'f8'),                            # error of the scale factor [-]
+    ('misalignment', 'f8'),                     # sensing axis x is turned towards y, y towards z, z towards x [rad]
+    ('quantum', 'f8'),                          # of an increment [rad] or [m/s]; 0: none
+], align=True)
+
 CONSTANTS = np.dtype([
     ('earth_rate', 'f8', (3,)),                 # ENU [rad/s]
     ('gravity', 'f8'),                          # [m/s2]
-    ('gyro_bias', 'f8', (3,)),                  # [rad/s]
-    ('gyro_noise', 'f8'),                       # [rad/sqrt(s)]
-    ('accelerometer_bias', 'f8', (3,)),         # [m/s2]
-    ('accelerometer_noise', 'f8'),              # [m/s/sqrt(s)]
+    ('increment', 'i8'),                        # 1: mean rates since the last sample, 0: rates at the stamp
+    ('gyro', ERRORS), ('accelerometer', ERRORS),
 ], align=True)
 
-INPUTS = np.dtype([('dt', 'f8')], align=True)   # time since the last sample; in the first step, the period [s]
+STATE = np.dtype([
+    ('truth', motion.OUTPUTS),                  # at a node of the quadrature
+    ('angle_left', 'f8', (3,)), ('force_left', 'f8', (3,)),     # what quantisation kept back [rad, m/s]
+], align=True)
+
+INPUTS = np.dtype([
+    ('t', 'f8'),                                # of the sample [s]
+    ('dt', 'f8'),                               # since the last sample; in the first step, the period [s]
+], align=True)
 
 OUTPUTS = np.dtype([
     ('status', 'i8'),                           # index into STATUS; not OK: the rest is NaN
@@ -39,11 +59,18 @@ def constants(params: ShipMotionParameters) -> np.ndarray:
     record = np.zeros(1, CONSTANTS)
     record['earth_rate'] = earth.rate(latitude)
     record['gravity'] = earth.gravity(latitude)
-    record['gyro_bias'] = imu.gyro_bias_x, imu.gyro_bias_y, imu.gyro_bias_z
-    record['gyro_noise'] = imu.gyro_noise
-    record['accelerometer_bias'] = imu.accelerometer_bias_x, imu.accelerometer_bias_y, imu.accelerometer_bias_z
-    record['accelerometer_noise'] = imu.accelerometer_noise
+    record['increment'] = imu.output == 'increment'
+    for sensor in ('gyro', 'accelerometer'):
+        errors = record[sensor]
+        errors['bias'] = [getattr(imu, f'{sensor}_bias_{axis}') for axis in 'xyz']
+        for name in ('noise', 'scale', 'misalignment', 'quantum'):
+            errors[name] = getattr(imu, f'{sensor}_{name}')
     return record
+
+
+def initial_state() -> np.ndarray:
+    """The record (1,) of STATE before the first sample."""
+    return np.zeros(1, STATE)
 
 
 @compiled
@@ -69,21 +96,63 @@ def specific_force(truth, earth_rate, gravity):
 
 
 @compiled
-def step(constants, inputs, truth, outputs, normals):
-    """One sample. truth: motion.OUTPUTS (1,) at the instant of the sample; normals (NORMALS,) standard normals.
-
-    White noise is given as a density, so a sample carries density / sqrt(dt).
-    """
-    c, dt, ship, out = constants[0], inputs[0].dt, truth[0], outputs[0]
-    rate, force = out.angular_velocity, out.linear_acceleration
-    rate[0], rate[1], rate[2] = inertial_rate(ship, c.earth_rate)
-    force[0], force[1], force[2] = specific_force(ship, c.earth_rate, c.gravity)
-    out.status = OK
-    if ship.status != motion.OK:
-        out.status = BAD_TRUTH
-    elif not 0.0 < dt < math.inf:
-        out.status = BAD_STEP
-    per_sample = 1.0 / math.sqrt(dt) if out.status == OK else math.nan
+def mean_rates(s, c, ship, t, dt, rate, force):
+    """Fill rate and force (3,) with their means over [t - dt, t]; ship a record motion.CONSTANTS."""
     for i in range(3):
-        rate[i] += c.gyro_bias[i] + c.gyro_noise * per_sample * normals[i]
-        force[i] += c.accelerometer_bias[i] + c.accelerometer_noise * per_sample * normals[3 + i]
+        rate[i] = force[i] = 0.0
+    for node in range(3):
+        motion.truth(ship, t - 0.5 * dt + (node - 1) * _GAUSS * dt, s.truth)
+        weight = 8.0 / 18.0 if node == 1 else 5.0 / 18.0
+        wx, wy, wz = inertial_rate(s.truth, c.earth_rate)
+        fx, fy, fz = specific_force(s.truth, c.earth_rate, c.gravity)
+        rate[0] += weight * wx
+        rate[1] += weight * wy
+        rate[2] += weight * wz
+        force[0] += weight * fx
+        force[1] += weight * fy
+        force[2] += weight * fz
+
+
+@compiled
+def spoil(errors, dt, values, normals, first, left):
+    """Put the errors of three sensors on their true rates (3,), which were measured over dt.
+
+    White noise is given as a density, so a sample carries density / sqrt(dt). left (3,): the part of the increment
+    that was no whole quantum, kept for the next.
+    """
+    x, y, z = values[0], values[1], values[2]
+    per_sample = 1.0 / math.sqrt(dt)
+    for i in range(3):
+        across = y if i == 0 else z if i == 1 else x
+        values[i] += errors.scale * values[i] + errors.misalignment * across
+        values[i] += errors.bias[i] + errors.noise * per_sample * normals[first + i]
+        if errors.quantum > 0.0:
+            increment = values[i] * dt + left[i]
+            counted = errors.quantum * math.floor(increment / errors.quantum + 0.5)
+            left[i] = increment - counted
+            values[i] = counted / dt
+
+
+@compiled
+def step(state, constants, ship, inputs, truth, outputs, normals):
+    """One sample. ship: motion.CONSTANTS (1,); truth: motion.OUTPUTS (1,) at the instant of the sample; normals
+    (NORMALS,) standard normals."""
+    s, c, u, out = state[0], constants[0], inputs[0], outputs[0]
+    rate, force = out.angular_velocity, out.linear_acceleration
+    if truth[0].status != motion.OK:
+        out.status = BAD_TRUTH
+    elif not 0.0 < u.dt < math.inf:
+        out.status = BAD_STEP
+    else:
+        out.status = OK
+    if out.status != OK:
+        for i in range(3):
+            rate[i] = force[i] = math.nan
+        return
+    if c.increment == 1:
+        mean_rates(s, c, ship[0], u.t, u.dt, rate, force)
+    else:
+        rate[0], rate[1], rate[2] = inertial_rate(truth[0], c.earth_rate)
+        force[0], force[1], force[2] = specific_force(truth[0], c.earth_rate, c.gravity)
+    spoil(c.gyro, u.dt, rate, normals, 0, s.angle_left)
+    spoil(c.accelerometer, u.dt, force, normals, 3, s.force_left)

@@ -1,9 +1,9 @@
-"""The INS as its user meets it: the true attitude with parametrised errors, released after a latency.
+"""The INS as its user meets it: the true attitude with parametrised errors, released after a latency (method `model`).
 
 The node hears `ship/imu/data_raw` only. Attitude does not come through that door (REP 145 leaves it to `imu/data`),
 so the INS evaluates the stateless motion law with the same `ship` parameters at the stamp of each IMU message and
-adds its errors: nothing else is in its attitude, and a node that integrates the IMU can take its place. The IMU's
-rate is compared with the ship's: other ship parameters here than in ship_motion_node are a named status.
+adds its errors: nothing else is in its attitude, and aligning_ins, which integrates the IMU, takes its place. The
+IMU's rate is compared with the ship's: other ship parameters here than in ship_motion_node are a named status.
 """
 import math
 
@@ -32,17 +32,25 @@ CONSTANTS = np.dtype([
     ('rate_noise', 'f8'),                   # [rad/s]
     ('imu_tolerance', 'f8'),                # [rad/s]
     ('latency_ns', 'i8'),
+    ('variance', 'f8', (3,)),               # of roll, pitch, heading that the model declares [rad2]
 ], align=True)
 
-STATE = np.dtype([
-    ('last_stamp_ns', 'i8'),
-    ('wander', 'f8', (3,)),                 # slow error of roll, pitch, yaw [rad]
-    ('truth', motion.OUTPUTS),              # ship at the last stamp
+UNDER_WAY = [
     ('measured', 'i8'), ('released', 'i8'),     # samples counted; sample n lies at n % RING
     ('stamp_ns', 'i8', (RING,)),
     ('quaternion', 'f8', (RING, 4)),
     ('angular_velocity', 'f8', (RING, 3)),
     ('linear_acceleration', 'f8', (RING, 3)),
+    ('variance', 'f8', (RING, 3)),
+    ('stage', 'i8', (RING,)),
+]
+"""Results that wait for their latency to pass."""
+
+STATE = np.dtype([
+    ('last_stamp_ns', 'i8'),
+    ('wander', 'f8', (3,)),                 # slow error of roll, pitch, yaw [rad]
+    ('truth', motion.OUTPUTS),              # ship at the last stamp
+    *UNDER_WAY,
 ], align=True)
 
 INPUTS = np.dtype([
@@ -58,7 +66,12 @@ OUTPUTS = np.dtype([
     ('quaternion', 'f8', (4,)),             # x, y, z, w, deck -> earth, with error
     ('angular_velocity', 'f8', (3,)),       # deck against earth, FLU, with noise [rad/s]
     ('linear_acceleration', 'f8', (3,)),    # of the IMU message with this stamp [m/s2]
+    ('variance', 'f8', (3,)),               # of roll, pitch, heading as declared [rad2]
+    ('stage', 'i8'),                        # of this result, navigator.STAGES; NO_STAGE: the model, which has none
+    ('velocity', 'f8', (3,)),               # ENU, now, of an INS that navigates [m/s]
 ], align=True)
+
+NO_STAGE = -1
 
 
 def constants(params: InsParameters) -> np.ndarray:
@@ -73,7 +86,14 @@ def constants(params: InsParameters) -> np.ndarray:
     record['rate_noise'] = params.rate_noise
     record['imu_tolerance'] = params.imu_tolerance
     record['latency_ns'] = round(params.latency * 1e9)
+    record['variance'] = model_variance(params)
     return record
+
+
+def model_variance(p):
+    """Variance of roll, pitch and heading [rad2] that method model declares."""
+    return (p.roll_bias**2 + p.tilt_wander**2 + p.tilt_noise**2, p.pitch_bias**2 + p.tilt_wander**2 + p.tilt_noise**2,
+            p.heading_bias**2 + p.heading_wander**2 + p.heading_noise**2)
 
 
 def initial_state() -> np.ndarray:
@@ -114,6 +134,8 @@ def measure(c, s, stamp_ns, force, normals):
     for i in range(3):
         w[n, i] = truth.angular_velocity[i] + c.rate_noise * normals[6 + i]
         s.linear_acceleration[n, i] = force[i]
+        s.variance[n, i] = c.variance[i]
+    s.stage[n] = NO_STAGE
     s.stamp_ns[n] = stamp_ns
     s.measured += 1
 
@@ -133,6 +155,8 @@ def release(c, s, now_ns, out):
         for i in range(3):
             out.angular_velocity[i] = s.angular_velocity[n, i]
             out.linear_acceleration[i] = s.linear_acceleration[n, i]
+            out.variance[i] = s.variance[n, i]
+        out.stage = s.stage[n]
 
 
 @compiled
@@ -142,7 +166,7 @@ def step(state, constants, inputs, outputs, normals):
     A stamp that does not advance changes nothing; a message that is not finite is not measured. Both still say so.
     """
     s, c, i, out = state[0], constants[0], inputs[0], outputs[0]
-    out.status, out.due = OK, 0
+    out.status, out.due, out.stage = OK, 0, NO_STAGE
     if i.stamp_ns <= s.last_stamp_ns:
         out.status = BAD_STAMP
         return

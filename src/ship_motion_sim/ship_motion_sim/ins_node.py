@@ -1,9 +1,9 @@
 """ROS shell of the INS: hears the IMU, publishes attitude and deck rate as the INS knows them."""
 import sys
 
-from pedestal_common import records, shell
-from ship_motion_sim import ins
-from ship_motion_sim.ins_wire import DATA, RAW, Ins, attitude_variance
+from pedestal_common import messages, records, shell
+from ship_motion_sim import ins, navigator
+from ship_motion_sim.ins_wire import DATA, RAW, STATE, Ins
 from ship_motion_sim.params import InsParameters
 
 
@@ -15,7 +15,8 @@ class InsNode(shell.Shell):
         self.unit.prepare()
         self.worst = 0
         self.raw, self.data = records.only(self.unit.heard, RAW), records.only(self.unit.said, DATA)
-        self.send = self.writer(DATA)
+        self.send, self.send_state = self.writer(DATA), self.writer(STATE)
+        self.announced = ins.NO_STAGE
         self.diagnose_with(self.diagnose)
         self.follow(RAW, self.unit.followers, self.step)
 
@@ -25,18 +26,29 @@ class InsNode(shell.Shell):
         outputs, data = self.unit.outputs[0], self.unit.messages[DATA]
         self.worst = max(self.worst, int(outputs['status']))
         self.begin_step(stamp)
+        if outputs['stage'] != self.announced:
+            self.announced = int(outputs['stage'])
+            self.announce(self.send_state, messages.String(data=navigator.STAGES[self.announced]))
         if outputs['due']:
             records.put(data, self.data)
             self.send(data)
 
     def diagnose(self):
         status, self.worst = self.worst, 0
+        outputs = self.unit.outputs[0]
         values = [('latency_s', f'{self.parameters.latency:g}'),
-                  ('heading_error_rms_rad', f'{attitude_variance(self.parameters)[2]**0.5:g}')]
+                  ('heading_error_rms_rad', f'{outputs["variance"][2]**0.5:g}')]
+        if self.announced != ins.NO_STAGE:
+            values += [('method', self.parameters.method), ('state', navigator.STAGES[self.announced]),
+                       ('level_error_rms_rad', f'{outputs["variance"][0]**0.5:g}'),
+                       *((f'velocity_{axis}', f'{v:.3f}') for axis, v in zip(('east', 'north', 'up'),
+                                                                             outputs['velocity']))]
         if status:
             return shell.ERROR, ins.STATUS[status], values
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
+        if self.announced == navigator.ALIGNING:
+            return shell.WARN, navigator.STAGES[self.announced], values
         return shell.OK, 'navigating', values
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import quaternion, rotation, to_deck
-from ship_motion_sim import waves
+from ship_motion_sim import recording, waves
 from ship_motion_sim.params import ShipParameters
 from ship_motion_sim.waves import COMPONENTS, FREEDOMS, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 
@@ -23,6 +23,9 @@ CONSTANTS = np.dtype([
     ('sine', 'f8', (COMPONENTS, FREEDOMS)),         # -Im X
     ('yaw', 'f8'), ('cos_yaw', 'f8'), ('sin_yaw', 'f8'),    # mean heading as REP 103 yaw
     ('speed', 'f8'),
+    ('pieces', 'i8'),                               # of a recorded motion; 0: the components it is
+    ('breaks', 'f8', (recording.PIECES + 1,)),      # [s]
+    ('coefficients', 'f8', (recording.PIECES, FREEDOMS, recording.ORDER)),      # [m, rad], highest power first
 ], align=True)
 
 INPUTS = np.dtype([('t', 'f8')], align=True)        # [s]
@@ -44,18 +47,40 @@ OUTPUTS = np.dtype([
 
 
 def constants(params: ShipParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS: the seaway of the seed and the mean course."""
-    sines = waves.build(params)
+    """The record (1,) of CONSTANTS: the seaway of the seed and the mean course, or a record of both.
+
+    Raises csv_table.TableError where a file is needed and cannot be used.
+    """
     record = np.zeros(1, CONSTANTS)
+    if params.motion == 'recorded':
+        yaw = _put_recorded(record, params.recorded)
+    else:
+        yaw = math.radians(90.0 - params.heading_deg)
+        _put_components(record, waves.build(params))
+    record['yaw'], record['cos_yaw'], record['sin_yaw'] = yaw, math.cos(yaw), math.sin(yaw)
+    record['speed'] = params.speed
+    return record
+
+
+def _put_components(record, sines):
     count = len(sines.frequency)
     record['frequency'][0, :count] = sines.frequency
     record['phase'][0, :count] = sines.phase
     record['cosine'][0, :count] = sines.response.real
     record['sine'][0, :count] = -sines.response.imag
-    yaw = math.radians(90.0 - params.heading_deg)
-    record['yaw'], record['cos_yaw'], record['sin_yaw'] = yaw, math.cos(yaw), math.sin(yaw)
-    record['speed'] = params.speed
-    return record
+
+
+def _put_recorded(record, params):
+    """Put a recording into record; its mean yaw [rad]."""
+    times, freedoms = recording.read(params)
+    mean = float(np.mean(freedoms[:, YAW]))
+    freedoms[:, YAW] -= mean
+    breaks, coefficients = recording.pieces(times, freedoms)
+    count = len(coefficients)
+    record['pieces'] = count
+    record['breaks'][0, :count + 1] = breaks
+    record['coefficients'][0, :count] = coefficients
+    return mean
 
 
 @compiled
@@ -122,7 +147,10 @@ def truth(ship, t, out):
     """Fill the record out (OUTPUTS) with the ship (record CONSTANTS) at time t [s]."""
     out.status = OK if math.isfinite(t) else BAD_TIME
     x = out.freedoms
-    sum_components(ship, t, x)
+    if ship.pieces > 0 and out.status == OK:
+        recording.evaluate(ship.breaks, ship.coefficients, ship.pieces, t, x)
+    else:
+        sum_components(ship, t, x)
     p, v, a = out.position, out.velocity, out.acceleration
     p[0], p[1] = course_to_earth(ship, ship.speed * t + x[0, SURGE], x[0, SWAY])
     v[0], v[1] = course_to_earth(ship, ship.speed + x[1, SURGE], x[1, SWAY])

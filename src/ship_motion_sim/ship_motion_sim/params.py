@@ -2,9 +2,12 @@
 both hold the group `ship`, which must be the same in both (ins.step says when it is not)."""
 import dataclasses
 
-from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter
+from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
 
 SEED_MAX = 2 ** 31 - 1
+IMU_OUTPUTS = ('sample', 'increment')
+METHODS = ('model', 'classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba')
+AIDS = ('none', 'log', 'gnss')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,24 +42,45 @@ class PlainParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class RecordedParameters(Parameters):
+    """A recorded motion; columns and signs in recording.py."""
+    path: str = text('', 'CSV with columns time_s, roll_deg, pitch_deg, heading_deg (surge_m, sway_m, heave_m)')
+    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first row')
+    max_gap: float = parameter(2.0, 0.001, 60.0, 's', 'largest time between two rows')
+
+
+@dataclasses.dataclass(frozen=True)
 class ShipParameters(Parameters):
     """Sea, course and hull: everything the ship's truth depends on."""
-    motion: str = choice('waves', ('waves', 'plain'), 'waves from a spectrum, or plain sines')
+    motion: str = choice('waves', ('waves', 'plain', 'recorded'), 'waves from a spectrum, plain sines, or a CSV')
     sea_state: int = parameter(5, 0, 6, '-', '3 to 6 take height and period from the table; 0: as given below')
     significant_height: float = parameter(0.0, 0.0, 20.0, 'm', 'Hs, with sea_state 0 only')
     peak_period: float = parameter(0.0, 0.0, 25.0, 's', 'Tp, with sea_state 0 only')
+    spectrum: str = choice('jonswap', ('jonswap', 'file'), 'of the waves; file: as measured, instead of a sea state')
     gamma: float = parameter(3.3, 1.0, 10.0, '-', 'peak enhancement of JONSWAP; 1 is Bretschneider')
+    spectrum_file: str = text('', 'CSV with columns frequency_hz, density_m2_per_hz')
     wave_angle_deg: float = parameter(45.0, 0.0, 360.0, 'deg',
                                       'where the waves travel to, clockwise from the bow: 0 following, 180 head')
     spread_deg: float = parameter(15.0, 0.0, 60.0, 'deg', 'standard deviation of the direction of single waves')
-    heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'mean heading, clockwise from north')
+    heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'mean heading, clockwise from north; recorded: 0, it is '
+                                   "the record's")
     speed: float = parameter(7.0, 0.0, 25.0, 'm/s', 'along the mean heading')
     latitude_deg: float = parameter(47.0, -89.0, 89.0, 'deg', 'geodetic latitude: gravity and earth rate')
     seed: int = parameter(1, 0, SEED_MAX, '-', 'seed of the seaway')
     hull: HullParameters = group(HullParameters)
     plain: PlainParameters = group(PlainParameters)
+    recorded: RecordedParameters = group(RecordedParameters)
 
     def check(self):
+        if (self.motion == 'recorded') != bool(self.recorded.path):
+            raise ParameterError(f"recorded.path = '{self.recorded.path}': must name a CSV file with motion = "
+                                 'recorded, and be empty otherwise')
+        if self.motion == 'recorded' and self.heading_deg != 0.0:
+            raise ParameterError(f'heading_deg = {self.heading_deg:g} deg: must be 0 with motion = recorded, whose '
+                                 'heading is in the file')
+        if (self.spectrum == 'file') != bool(self.spectrum_file):
+            raise ParameterError(f"spectrum_file = '{self.spectrum_file}': must name a CSV file with spectrum = file, "
+                                 'and be empty otherwise')
         if self.sea_state in (1, 2):
             raise ParameterError(f'sea_state = {self.sea_state}: must be 3 to 6, or 0 for significant_height and '
                                  'peak_period')
@@ -79,7 +103,22 @@ class ImuParameters(Parameters):
     accelerometer_bias_y: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along y')
     accelerometer_bias_z: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along z')
     accelerometer_noise: float = parameter(1e-4, 0.0, 1.0, 'm/s/sqrt(s)', 'velocity random walk')
+    gyro_scale: float = parameter(0.0, -0.1, 0.1, '-', "error of the gyros' scale factor")
+    gyro_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each gyro axis is turned towards the next')
+    gyro_quantum: float = parameter(0.0, 0.0, 0.01, 'rad', 'smallest angle increment; 0: no quantisation')
+    accelerometer_scale: float = parameter(0.0, -0.1, 0.1, '-', "error of the accelerometers' scale factor")
+    accelerometer_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each axis is turned towards the next')
+    accelerometer_quantum: float = parameter(0.0, 0.0, 0.1, 'm/s', 'smallest velocity increment; 0: no quantisation')
+    output: str = choice('sample', IMU_OUTPUTS, 'rates at the stamp, or their means since the last sample')
     seed: int = parameter(2, 0, SEED_MAX, '-', 'seed of the noise')
+
+
+@dataclasses.dataclass(frozen=True)
+class NmeaParameters(Parameters):
+    """The true attitude as NMEA 0183 (HEHDT, PASHR) over UDP, for third-party equipment."""
+    port: int = parameter(0, 0, 65535, '-', 'UDP port the datagrams are sent to; 0: none are sent')
+    host: str = text('127.0.0.1', 'address they are sent to')
+    rate: float = parameter(10.0, 0.1, 100.0, 'Hz', "datagrams per second of the drive's time")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,11 +126,45 @@ class ShipMotionParameters(Parameters):
     """ship_motion_node."""
     ship: ShipParameters = group(ShipParameters)
     imu: ImuParameters = group(ImuParameters)
+    nmea: NmeaParameters = group(NmeaParameters)
+
+
+@dataclasses.dataclass(frozen=True)
+class AdrcParameters(Parameters):
+    """Method adrc: what reproduces paper 001's figure 4 (reference/nav.md section 1.2)."""
+    observer: float = parameter(0.3, 0.01, 20.0, 'rad/s', 'bandwidth of the extended state observer')
+    control: float = parameter(1.0, 0.01, 20.0, 'rad/s', 'bandwidth of the level control')
+    start: float = parameter(60.0, 1.0, 3600.0, 's', 'the level commands count from here on')
+
+
+@dataclasses.dataclass(frozen=True)
+class AlignmentParameters(Parameters):
+    """How an INS with gyros aligns itself, and what it is told of them and of the sea."""
+    step: float = parameter(0.02, 0.001, 1.0, 's', 'of the alignment laws; at least the period of the IMU')
+    initial_heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'taken for true at power-up; may be any')
+    aligned_sigma: float = parameter(0.0035, 1e-5, 0.5, 'rad', 'it navigates once the 1-sigma of heading is below')
+    velocity_disturbance: float = parameter(0.05, 1e-4, 10.0, 'm/s',
+                                            'rms of the velocity of sea and aid per step and axis, taken for white')
+    gyro_noise: float = parameter(1.45e-6, 1e-9, 0.01, 'rad/sqrt(s)', 'angle random walk of the gyros')
+    gyro_bias: float = parameter(4.85e-8, 0.0, 0.1, 'rad/s', '1-sigma of what the bias of a level gyro may be')
+    accelerometer_bias: float = parameter(3e-4, 0.0, 1.0, 'm/s2', 'the same of an accelerometer')
+    classical_bandwidth: float = parameter(0.025, 0.005, 0.2, 'rad/s', 'method classical: s0 of its four poles')
+    adrc: AdrcParameters = group(AdrcParameters)
+
+
+@dataclasses.dataclass(frozen=True)
+class AidParameters(Parameters):
+    """A velocity from outside, so that neither swell nor speed is taken for an error of the INS."""
+    source: str = choice('none', AIDS, 'log: in deck axes; gnss: in ENU, before alignment only with method oba')
+    noise: float = parameter(0.02, 0.0, 10.0, 'm/s', 'rms white noise of it, per axis and IMU sample')
 
 
 @dataclasses.dataclass(frozen=True)
 class InsParameters(Parameters):
-    """ins_node: how far and how late its attitude is. `ship` is the ship_motion node's."""
+    """ins_node. Method `model`: the truth with parametrised errors (roll_bias ... imu_tolerance). The others integrate
+    the IMU and align by themselves. `ship` is the ship_motion node's: of it they take the latitude, and the velocity
+    that an aid measures."""
+    method: str = choice('model', METHODS, 'parametrised errors, or how it aligns')
     roll_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of roll')
     pitch_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of pitch')
     heading_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of heading, clockwise')
@@ -105,4 +178,13 @@ class InsParameters(Parameters):
     imu_tolerance: float = parameter(0.005, 1e-6, 1.0, 'rad/s',
                                      'largest difference between the IMU and the ship as the INS knows it')
     seed: int = parameter(3, 0, SEED_MAX, '-', 'seed of the errors')
+    imu_output: str = choice('sample', IMU_OUTPUTS, "the IMU's `output`")
+    alignment: AlignmentParameters = group(AlignmentParameters)
+    aid: AidParameters = group(AidParameters)
     ship: ShipParameters = group(ShipParameters)
+
+    def check(self):
+        if self.aid.source == 'gnss' and self.method not in ('model', 'oba'):
+            raise ParameterError("aid.source = 'gnss': must be none or log unless method = oba, for its velocity is "
+                                 'of no use before the heading is known')
+

@@ -1,10 +1,11 @@
 """ROS shell of the ship: answers every tick of the drive's clock with the ship's truth and what its IMU feels."""
+import socket
 import sys
 
 import numpy as np
 
 from pedestal_common import records, shell
-from ship_motion_sim import imu, motion
+from ship_motion_sim import imu, motion, nmea
 from ship_motion_sim.params import ShipMotionParameters
 from ship_motion_sim.ship_wire import CLOCK, RAW, TRUTH, ShipMotion
 
@@ -18,6 +19,13 @@ class ShipMotionNode(shell.Shell):
         self.clock = records.only(self.unit.heard, CLOCK)
         self.says = [(self.unit.messages[name], records.only(self.unit.said, name), self.writer(name))
                      for name in (TRUTH, RAW)]
+        self.unsent = ''
+        self.next_datagram = 0
+        if self.parameters.nmea.port:
+            self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self.socket.setblocking(False)
+            # Resolves the name once; a host that does not exist is said at the start.
+            self.socket.connect((self.parameters.nmea.host, self.parameters.nmea.port))
         self.diagnose_with(self.diagnose)
         self.follow(CLOCK, self.unit.followers, self.step)
 
@@ -28,6 +36,19 @@ class ShipMotionNode(shell.Shell):
         for message, place, send in self.says:
             records.put(message, place)
             send(message)
+        if self.parameters.nmea.port and stamp >= self.next_datagram:
+            self.send_attitude(stamp)
+
+    def send_attitude(self, stamp):
+        """One datagram; equipment that is not there costs nothing but a word in the diagnostics."""
+        period = round(1e9 / self.parameters.nmea.rate)
+        self.next_datagram = stamp - stamp % period + period
+        o = self.unit.truth[0]
+        try:
+            self.socket.send(nmea.attitude(stamp * 1e-9, o['roll'], o['pitch'], o['yaw'], o['position'][2]))
+            self.unsent = ''
+        except OSError as error:
+            self.unsent = f'NMEA to {self.parameters.nmea.host}:{self.parameters.nmea.port}: {error.strerror}'
 
     def diagnose(self):
         truth = self.unit.truth[0]
@@ -37,6 +58,10 @@ class ShipMotionNode(shell.Shell):
                 return shell.ERROR, names[status], values
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
+        if self.unit.over():
+            return shell.WARN, 'the recorded motion is over, the ship lies still', values
+        if self.unsent:
+            return shell.WARN, self.unsent, values
         return shell.OK, 'under way', values
 
 

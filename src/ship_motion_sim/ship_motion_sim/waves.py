@@ -8,6 +8,7 @@ import typing
 
 import numpy as np
 
+from pedestal_common import csv_table
 from ship_motion_sim import earth
 from ship_motion_sim.params import HullParameters, ShipParameters
 
@@ -16,6 +17,9 @@ SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
 FREEDOMS = 6
 SEA_STATES = {3: (0.88, 7.5), 4: (1.88, 8.8), 5: (3.25, 9.7), 6: (5.0, 12.4)}
 """Sea state -> (Hs [m], Tp [s])."""
+
+SPECTRUM_COLUMNS = {'frequency_hz': (1e-3, 10.0), 'density_m2_per_hz': (0.0, 1e4)}
+"""Of the file of a measured spectrum, with the range of each."""
 
 _FINE = 100     # grid points per component where the spectrum is integrated
 
@@ -101,9 +105,19 @@ def transfer(hull: HullParameters, w, mu, speed, gravity):
     return w_e, rao
 
 
-def sea(params: ShipParameters):
-    """(Hs [m], Tp [s]) of the parameters."""
-    return SEA_STATES.get(params.sea_state, (params.significant_height, params.peak_period))
+def density(params: ShipParameters):
+    """(w [rad/s], S [m2 s/rad]) on COMPONENTS bins of _FINE steps each: of the sea state, or as measured.
+
+    A measured density runs in straight lines between its rows. Raises csv_table.TableError.
+    """
+    if params.spectrum == 'file':
+        frequency, measured = csv_table.read(params.spectrum_file, SPECTRUM_COLUMNS).T
+        w = 2.0 * math.pi * frequency
+        grid = np.linspace(w[0], w[-1], COMPONENTS * _FINE + 1)
+        return grid, np.interp(grid, w, measured / (2.0 * math.pi))
+    hs, tp = SEA_STATES.get(params.sea_state, (params.significant_height, params.peak_period))
+    grid = _grid(tp)
+    return grid, spectrum(grid, hs, tp, params.gamma)
 
 
 def seaway(params: ShipParameters):
@@ -112,12 +126,10 @@ def seaway(params: ShipParameters):
     One wave in each of equal bins, at a random place in its bin (equal spacing would repeat after 2 pi / dw), with
     the bin's whole energy: sum a^2/2 = Hs^2/16 for every seed.
     """
-    hs, tp = sea(params)
-    low, high = band(tp)
+    grid, S = density(params)
+    energy = _integral(grid, S)
     random = np.random.default_rng(params.seed)
-    grid = _grid(tp)
-    energy = _integral(grid, spectrum(grid, hs, tp, params.gamma))
-    w = low + (np.arange(COMPONENTS) + random.random(COMPONENTS)) * (high - low) / COMPONENTS
+    w = grid[0] + (np.arange(COMPONENTS) + random.random(COMPONENTS)) * (grid[-1] - grid[0]) / COMPONENTS
     amplitude = np.sqrt(2.0 * np.diff(energy[::_FINE]))
     phase = random.uniform(0.0, 2.0 * math.pi, COMPONENTS)
     mu = np.radians(params.wave_angle_deg + params.spread_deg * random.standard_normal(COMPONENTS))

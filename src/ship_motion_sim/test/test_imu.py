@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -22,8 +23,9 @@ def truth_at(params, t):
 
 def sample(params, t, dt=0.005, normals=NO_NOISE):
     inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
-    inputs['dt'] = dt
-    imu.step(imu.constants(params), inputs, truth_at(params, t), outputs, normals)
+    inputs['t'], inputs['dt'] = t, dt
+    imu.step(imu.initial_state(), imu.constants(params), motion.constants(params.ship), inputs, truth_at(params, t),
+             outputs, normals)
     return outputs[0]
 
 
@@ -77,12 +79,13 @@ def test_noise_is_a_density_and_bias_is_added(dt):
     errors = ImuParameters(gyro_bias_y=0.01, gyro_noise=1e-4, accelerometer_bias_x=0.2, accelerometer_noise=3e-3)
     params, ideal = (ShipMotionParameters(ShipParameters(**STILL), e) for e in (errors, IDEAL))
     normals = np.random.default_rng(4).standard_normal((3000, imu.NORMALS))
-    constants, truth = imu.constants(params), truth_at(params, 0.0)
+    state, constants, truth = imu.initial_state(), imu.constants(params), truth_at(params, 0.0)
+    ship = motion.constants(params.ship)
     inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
     inputs['dt'] = dt
     rates, forces = [], []
     for row in normals:
-        imu.step(constants, inputs, truth, outputs, row)
+        imu.step(state, constants, ship, inputs, truth, outputs, row)
         rates.append(outputs[0]['angular_velocity'].copy())
         forces.append(outputs[0]['linear_acceleration'].copy())
     rates -= sample(ideal, 0.0)['angular_velocity']
@@ -105,3 +108,45 @@ def test_truth_that_is_not_valid_is_said():
     out = sample(ShipMotionParameters(), math.nan)
     assert imu.STATUS[out['status']] == 'truth is not valid'
     assert np.isnan(out['angular_velocity']).all() and np.isnan(out['linear_acceleration']).all()
+
+
+def test_increments_are_the_integrals_of_the_rates():
+    ship = ShipParameters(sea_state=6, wave_angle_deg=60.0, heading_deg=130.0)
+    at_stamp = ShipMotionParameters(ship, IDEAL)
+    mean = ShipMotionParameters(ship, dataclasses.replace(IDEAL, output='increment'))
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    for t in (0.0, 31.0):
+        out = sample(mean, t, dt=0.02)
+        for field in ('angular_velocity', 'linear_acceleration'):
+            inside = [sample(at_stamp, t - 0.01 + 0.01 * node)[field] for node in nodes]
+            np.testing.assert_allclose(out[field], 0.5 * weights @ inside, rtol=0, atol=1e-14 * 20)
+
+
+def test_scale_and_misalignment():
+    true = sample(ShipMotionParameters(imu=IDEAL), 5.0)
+    errors = dataclasses.replace(IDEAL, gyro_scale=1e-3, gyro_misalignment=2e-3, accelerometer_scale=-3e-3,
+                                 accelerometer_misalignment=5e-4)
+    out = sample(ShipMotionParameters(imu=errors), 5.0)
+    turned = np.roll(np.eye(3), 1, axis=1)
+    for field, scale, angle in (('angular_velocity', 1e-3, 2e-3), ('linear_acceleration', -3e-3, 5e-4)):
+        np.testing.assert_allclose(out[field], ((1.0 + scale) * np.eye(3) + angle * turned) @ true[field], rtol=1e-13)
+
+
+def test_quantised_increments_are_whole_and_lose_nothing():
+    quanta = dict(gyro_quantum=1e-5, accelerometer_quantum=1e-2)
+    params = [ShipMotionParameters(imu=dataclasses.replace(IDEAL, output='increment', **more))
+              for more in ({}, quanta)]
+    states = [imu.initial_state(), imu.initial_state()]
+    ship, dt = motion.constants(params[0].ship), 0.01
+    total = np.zeros((2, 6))
+    for k in range(300):
+        for i in range(2):
+            inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
+            inputs['t'], inputs['dt'] = k * dt, dt
+            imu.step(states[i], imu.constants(params[i]), ship, inputs, truth_at(params[i], k * dt), outputs, NO_NOISE)
+            increment = dt * np.concatenate((outputs[0]['angular_velocity'], outputs[0]['linear_acceleration']))
+            total[i] += increment
+            if i == 1:
+                counts = increment / ([1e-5] * 3 + [1e-2] * 3)
+                np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
+        assert (np.abs(total[0] - total[1]) <= np.array([0.501e-5] * 3 + [0.501e-2] * 3)).all()

@@ -30,7 +30,7 @@ class Bench:
         at, dt, raw = np.zeros(1, motion.INPUTS), np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
         at['t'], dt['dt'] = 1e-9 * stamp, 0.005
         motion.step(self.ship, at, self.truth)
-        imu.step(self.imu, dt, self.truth, raw, np.zeros(imu.NORMALS))
+        imu.step(imu.initial_state(), self.imu, self.ship, dt, self.truth, raw, np.zeros(imu.NORMALS))
         self.inputs['stamp_ns'] = stamp
         for field in ('angular_velocity', 'linear_acceleration'):
             self.inputs[field] = raw[field]

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy import integrate, signal
 
+from pedestal_common import csv_table
+from pedestal_common.parameters import ParameterError
 from ship_motion_sim import waves
 from ship_motion_sim.params import HullParameters, ShipParameters
 
@@ -150,3 +152,37 @@ def test_roll_and_pitch_are_those_of_the_reference(state, angle, freedom, sigma)
         for seed in range(60)]
     drawn = np.degrees(drawn)
     assert abs(drawn.mean() - sigma) < 3.0 * drawn.std() + 0.005
+
+
+def measured(path, **changes):
+    return ShipParameters(spectrum='file', spectrum_file=str(path), **changes)
+
+
+def test_a_measured_spectrum_keeps_its_energy_where_it_was(tmp_path):
+    """Swell of 14 s beside a wind sea of 6 s; the height of all waves of a band is 4 sqrt(m0) of the band."""
+    f = np.arange(0.04, 0.5, 0.01)
+    density = 3.0 * np.exp(-0.5 * ((f - 1.0 / 14.0) / 0.01) ** 2) + 1.0 * np.exp(-0.5 * ((f - 1.0 / 6.0) / 0.02) ** 2)
+    path = tmp_path / 'buoy.csv'
+    path.write_text('frequency_hz,density_m2_per_hz\n' + ''.join(f'{x:.3f},{y:.6f}\n' for x, y in zip(f, density)))
+    w, amplitude, _, _ = waves.seaway(measured(path))
+    assert np.sum(0.5 * amplitude**2) == pytest.approx(integrate.trapezoid(density, f), rel=1e-4)
+    swell, low = w < 2.0 * math.pi * 0.11, f < 0.11
+    assert np.sum(0.5 * amplitude[swell]**2) == pytest.approx(integrate.trapezoid(density[low], f[low]), rel=0.05)
+
+
+@pytest.mark.parametrize('content, message', [
+    ('frequency_hz,density_m2_per_hz\n0.1,1\n0.05,2\n', 'line 3: frequency_hz = 0.05: -0.05 hz after the row before'),
+    ('frequency_hz,density_m2_per_hz\n0.1,-1\n0.2,1\n', 'line 2: density_m2_per_hz = -1: must be 0 to 10000'),
+    ('frequency_hz\n0.1\n', "line 1: column 'density_m2_per_hz' is missing"),
+    ('frequency_hz,density_m2_per_hz\n0.1,1\n', '1 rows, must be at least 2')])
+def test_a_broken_spectrum_is_named(tmp_path, content, message):
+    path = tmp_path / 'buoy.csv'
+    path.write_text(content)
+    with pytest.raises(csv_table.TableError, match=f'{path}: {message}'):
+        waves.build(measured(path))
+
+
+def test_a_spectrum_needs_its_file_and_a_file_its_spectrum():
+    for values in ({'spectrum': 'file'}, {'spectrum_file': 'buoy.csv'}):
+        with pytest.raises(ParameterError, match='spectrum_file'):
+            ShipParameters(**values)

@@ -226,6 +226,58 @@ def test_smoothing_step_response():
     assert out['elevation'] == pytest.approx(1e-4 * (1.0 - (1.0 - 1.0 / 20.0)**np.arange(1, 101)), abs=2e-8)
 
 
+def test_moving_average_step_response():
+    """A ramp of n samples, where the recursion is a low-pass; n - 1 over 2 of delay."""
+    bench = smoothing_bench(**{'receiver.smoothing': 'moving_average', 'target.angle.start': 1.0,
+                               'target.angle.azimuth_amplitude': 0.0, 'target.angle.elevation_amplitude': 1e-4})
+    out = bench.run(1100)[1000:]
+    assert out['elevation'] == pytest.approx(1e-4 * np.minimum(np.arange(1, 101) / 20.0, 1.0), abs=2e-8)
+
+
+def test_moving_average_over_several_steps_is_the_mean_of_their_samples():
+    """Also while it is not yet full, and once its ring has gone round."""
+    values = FIXED | {'receiver.cn0_dbhz': 60.0, 'receiver.samples_per_step': 4, 'receiver.acquire_time': 0.0}
+    steps = Bench(values).run(400, np.random.default_rng(4))
+    bench = Bench(values | {'receiver.smoothing': 'moving_average', 'receiver.smoothing_samples': 40})
+    out = bench.run(400, np.random.default_rng(4))
+    kept = out['locked'] == 1
+    expected = [errors(steps)[max(k - 9, 0):k + 1].mean(axis=0) for k in range(400)]
+    first = np.flatnonzero(kept)[0]
+    assert np.all(kept[first:]) and first < 50
+    assert errors(out)[first + 10:] == pytest.approx(np.array(expected)[first + 10:], abs=1e-15)
+    noise = Bench(values | {'receiver.smoothing': 'moving_average', 'receiver.cn0_dbhz': 55.0})
+    out = noise.run(12000, np.random.default_rng(5))[200:]
+    predicted = receiver.angle_noise(noise.params, 55.0, PERIOD)
+    assert errors(out).std(axis=0) == pytest.approx([predicted, predicted], rel=0.05)
+
+
+@pytest.mark.parametrize('samples', [1, 4])
+def test_a_held_beam_jumps_at_the_step_and_only_the_target_moves(samples):
+    """The mean of a step is the error of the target in the middle of its samples off the beam that stood."""
+    bench = Bench(QUIET | {'target.kind': 'ramp', 'target.angle.start': 1.0, 'target.angle.azimuth_rate': 0.0,
+                           'target.angle.elevation_rate': 0.02, 'receiver.beam': 'held',
+                           'receiver.samples_per_step': samples})
+    bench.run(201)
+    age = receiver.age(bench.params, PERIOD)
+    assert age == pytest.approx((samples - 1) / (2 * samples) * PERIOD)
+    for k in range(201, 207):
+        there = 0.6 + 0.02 * (k * PERIOD - 1.0)
+        beam = there + (5e-5 if k % 2 else -5e-5)
+        bench.point(0.3, beam)
+        out = bench.run(1)[0]
+        assert out['elevation'] == pytest.approx(there - 0.02 * age - beam, abs=1e-8)
+        assert out['true_elevation'] == pytest.approx(there - beam, abs=1e-9)
+
+
+@pytest.mark.parametrize('values, age', [
+    ({}, 0.0), ({'receiver.smoothing': 'recursion'}, 0.0),
+    ({'receiver.beam': 'held', 'receiver.smoothing': 'recursion'}, 0.019),
+    ({'receiver.beam': 'held', 'receiver.smoothing': 'moving_average'}, 0.0095)])
+def test_age_of_an_error(values, age):
+    params = build(TrackingReceiverParameters, {**values, 'receiver.samples_per_step': 5})
+    assert receiver.age(params, PERIOD) == pytest.approx(age)
+
+
 def test_samples_follow_the_error_between_steps():
     bench = Bench(QUIET | {'receiver.samples_per_step': 4})
     bench.run(200)
@@ -360,6 +412,7 @@ def test_latency_that_does_not_fit_the_ring_is_refused():
     ({'receiver.acquire_level_dbhz': 30.0}, 'lose_level_dbhz'),
     ({'target.leo_pass.culmination_low_deg': 80.0}, 'culmination_low_deg'),
     ({'antenna.beamwidth': math.nan}, 'beamwidth'),
+    ({'receiver.smoothing': 'moving_average', 'receiver.smoothing_samples': 257}, 'smoothing_samples = 257: .* 256'),
     ({'target.kind': 'rocket'}, 'kind')])
 def test_bad_parameters_are_refused(values, message):
     with pytest.raises(ParameterError, match=message):

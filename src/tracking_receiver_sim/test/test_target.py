@@ -7,6 +7,7 @@ import pytest
 from sgp4.io import compute_checksum
 from skyfield.api import EarthSatellite, load, wgs84
 
+from pedestal_common import csv_table
 from pedestal_common.parameters import build
 from tracking_receiver_sim import target
 from tracking_receiver_sim.params import LeoPassParameters, TargetParameters
@@ -187,14 +188,14 @@ GOOD = [(float(k), 47.4, 8.5, 600.0) for k in range(6)]
     ([], r'0 rows')])
 def test_broken_track(tmp_path, rows, message):
     path = write_track(tmp_path / 'broken.csv', rows)
-    with pytest.raises(target.TargetError, match='broken.csv: ' + message) as raised:
+    with pytest.raises(csv_table.TableError, match='broken.csv: ' + message) as raised:
         built(kind='track_file', track_file__path=path)
     assert '\n' not in str(raised.value)
 
 
 def test_broken_track_files(tmp_path):
     def message(path, **values):
-        with pytest.raises(target.TargetError) as raised:
+        with pytest.raises(ValueError) as raised:
             built(kind='track_file', track_file__path=str(path), **values)
         assert '\n' not in str(raised.value)
         return str(raised.value)

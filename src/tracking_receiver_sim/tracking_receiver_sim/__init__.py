@@ -1,6 +1,6 @@
 """Targets and the monopulse tracking receiver that sees them.
 
-receiver.py composes the column and owns `step`; below it target.py (where the target is) and
+receiver.py composes the column and owns `step`; below it target.py (where the target is), smoothing.py and
 monopulse.py (what the receiver's channels make of an error); params.py holds every number.
 
 Frames: the station's ENU frame for targets (axes fixed to the earth at the station), deck FLU and the
@@ -14,7 +14,7 @@ Symbols
     s, d        complex channel voltages of one sub-sample, unit noise power        [-]
     C/N0        carrier to noise density of the sum channel on the beam axis        [Hz] or [dB-Hz]
     tau         integration time of one sub-sample                                  [s]
-    n           samples of the smoothing recursion                                  [-]
+    n           samples of the smoothing: recursion or moving average                [-]
     beta        cross-coupling angle: rotation of the error axes                    [rad]
     phi         post-comparator phase error                                         [rad]
     dX, dE      cross-elevation and elevation of the target off the beam            [rad]

@@ -5,12 +5,13 @@ import math
 from pedestal_common.blockage import DOC as SECTORS_DOC
 from pedestal_common.blockage import sectors
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
+from tracking_receiver_sim.smoothing import SMOOTHINGS, WINDOW
 
 KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp')
 LEO_PASS, TRACK_FILE, FLYBY, SINE, STEP, RAMP = range(6)
 
-SMOOTHINGS = ('none', 'recursion')
-NO_SMOOTHING, RECURSION = range(2)
+BEAMS = ('moving', 'held')
+MOVING, HELD = range(len(BEAMS))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,8 +115,9 @@ class ReceiverParameters(Parameters):
     range_exponent: float = parameter(2.0, 0.0, 4.0, '1', 'C/N0 falls with this power of range; 0: constant')
     horizon_mask: float = parameter(0.0, -math.pi / 2, math.pi / 2, 'rad', 'no signal from below this elevation')
     samples_per_step: int = parameter(5, 1, 100, '1', 'channel samples per drive step')
+    beam: str = choice('moving', BEAMS, 'between two steps; held: an electronic beam, which jumps at the steps')
     smoothing: str = choice('none', SMOOTHINGS, "none: mean over the step; recursion: paper 002's over the samples")
-    smoothing_samples: int = parameter(20, 1, 10000, '1', 'n of the recursion')
+    smoothing_samples: int = parameter(20, 1, 10000, '1', 'n of recursion and moving average')
     full_scale: float = parameter(0.7, 0.1, 100.0, 'beamwidths', 'largest error the detector puts out')
     agc_time_constant: float = parameter(0.05, 1e-3, 10.0, 's', 'smoothing of the sum power that normalises')
     cn0_time_constant: float = parameter(0.1, 1e-3, 10.0, 's', 'smoothing of the published C/N0')
@@ -128,6 +130,8 @@ class ReceiverParameters(Parameters):
     ranging: RangingParameters = group(RangingParameters)
 
     def check(self):
+        if self.smoothing == 'moving_average' and self.smoothing_samples > WINDOW:
+            raise ParameterError(f'smoothing_samples = {self.smoothing_samples}: a moving average takes 1 to {WINDOW}')
         if self.lose_level_dbhz > self.acquire_level_dbhz:
             raise ParameterError(f'lose_level_dbhz = {self.lose_level_dbhz:g} dB-Hz: must not be above '
                                  f'acquire_level_dbhz = {self.acquire_level_dbhz:g} dB-Hz')

@@ -1,9 +1,10 @@
 """The monopulse tracking receiver: where the target is, what the channels see of it, what is published.
 
-One `step` per drive step. Between the previous step and this one the true error runs in a straight line;
-along it `samples_per_step` samples of sum and difference voltages are taken, the last one at the stamp. Each
-is turned into an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the detector's
-full scale, then smoothed: none is the mean of the step's samples, recursion is paper 002's eq. (1) over the samples.
+One `step` per drive step. Between the previous step and this one the true error runs in a straight line, along which
+`samples_per_step` samples of sum and difference voltages are taken, the last one at the stamp. Where the beam is held
+(an electronic beam jumps at the steps) the line begins at what the target of then would be off the beam of now. Each
+sample is turned into an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the detector's full
+scale, then smoothed.
 
 Where they are measured, the rate of the error at the stamp and the range come with each result, with white noise.
 
@@ -18,10 +19,11 @@ from pedestal_common import blockage
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
-from tracking_receiver_sim import target
+from tracking_receiver_sim import smoothing, target
 from tracking_receiver_sim.error_rate import error_rate
 from tracking_receiver_sim.monopulse import channels, detect, thermal_noise
-from tracking_receiver_sim.params import RECURSION, SMOOTHINGS
+from tracking_receiver_sim.params import BEAMS, HELD
+from tracking_receiver_sim.smoothing import SMOOTHINGS
 
 STATUSES = ('locked', 'no lock', 'target below the horizon', 'target outside its track', 'joint states not valid',
             'stamp not after the one before', 'target hidden by the superstructure')
@@ -35,24 +37,25 @@ POWER_FLOOR = 0.01
 """Least carrier power over noise power in one sample that the C/N0 estimate reports (-20 dB)."""
 
 STATE = np.dtype([
-    ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'),
-    ('agc_power', 'f8'), ('level_power', 'f8'), ('smooth_cross_elevation', 'f8'), ('smooth_elevation', 'f8'),
+    ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),
+    ('agc_power', 'f8'), ('level_power', 'f8'),
+    ('smooth_cross_elevation', smoothing.SMOOTHER), ('smooth_elevation', smoothing.SMOOTHER),
     ('locked', 'i8'), ('timer_ns', 'i8'),
     ('written', 'i8'), ('released', 'i8'),
     ('ring_stamp_ns', 'i8', RING), ('ring_locked', 'i8', RING),
     ('ring_cross_elevation', 'f8', RING), ('ring_elevation', 'f8', RING), ('ring_cn0_dbhz', 'f8', RING),
     ('ring_rate', 'f8', (RING, 2)), ('ring_range', 'f8', RING),
     ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3)], align=True)
-"""error_known: cross_elevation, elevation hold the true error at stamp_ns; timer_ns: time past a lock level;
-written, released: results put into the ring and taken from it since the start; antenna: its ENU position against the
-station [m], antenna_velocity: FLU [m/s]."""
+"""error_known: cross_elevation, elevation hold the true error at stamp_ns, direction the target in FLU [m];
+timer_ns: time past a lock level; written, released: results put into the ring and taken from it since the start;
+antenna: its ENU position against the station [m], antenna_velocity: FLU [m/s]."""
 
 CONSTANTS = np.dtype([
     ('target', target.TARGET),
     ('beamwidth', 'f8'), ('slope', 'f8'), ('angle_scale', 'f8'), ('full_scale', 'f8'),
     ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'),
     ('samples', 'i8'), ('tau', 'f8'), ('period_ns', 'i8'), ('agc_gain', 'f8'), ('level_gain', 'f8'),
-    ('smoothing', 'i8'), ('smoothing_gain', 'f8'),
+    ('smoothing', 'i8'), ('smoothing_gain', 'f8'), ('smoothing_samples', 'i8'), ('held', 'i8'),
     ('power', 'f8'), ('reference_range', 'f8'), ('half_exponent', 'f8'), ('horizon_mask', 'f8'),
     ('acquire_power', 'f8'), ('lose_power', 'f8'), ('acquire_ns', 'i8'), ('lose_ns', 'i8'),
     ('latency_ns', 'i8'),
@@ -97,7 +100,8 @@ def constants(params, period, built) -> np.ndarray:
     c['agc_gain'] = -math.expm1(-tau / receiver.agc_time_constant)
     c['level_gain'] = -math.expm1(-tau / receiver.cn0_time_constant)
     c['smoothing'] = SMOOTHINGS.index(receiver.smoothing)
-    c['smoothing_gain'] = 1.0 / receiver.smoothing_samples
+    c['smoothing_gain'], c['smoothing_samples'] = 1.0 / receiver.smoothing_samples, receiver.smoothing_samples
+    c['held'] = BEAMS.index(receiver.beam) == HELD
     c['power'] = _hertz(receiver.cn0_dbhz) * tau
     c['reference_range'], c['half_exponent'] = receiver.reference_range, 0.5 * receiver.range_exponent
     c['horizon_mask'] = receiver.horizon_mask
@@ -131,9 +135,19 @@ def angle_noise(params, cn0_dbhz, period):
     antenna, receiver = params.antenna, params.receiver
     tau = period / receiver.samples_per_step
     one_sample = thermal_noise(antenna.beamwidth, antenna.slope, _hertz(cn0_dbhz), tau)
-    if receiver.smoothing == 'recursion':
-        return one_sample / math.sqrt(2.0 * receiver.smoothing_samples - 1.0)
-    return one_sample / math.sqrt(receiver.samples_per_step)
+    independent = {'none': receiver.samples_per_step, 'recursion': 2.0 * receiver.smoothing_samples - 1.0,
+                   'moving_average': receiver.smoothing_samples}
+    return one_sample / math.sqrt(independent[receiver.smoothing])
+
+
+def age(params, period):
+    """How long before its stamp [s] an error was measured in the mean, off a beam that stands; 0 off one that moves,
+    where the error of the stamp and the mean of a step differ as little as the error itself does within it."""
+    receiver = params.receiver
+    if BEAMS.index(receiver.beam) != HELD:
+        return 0.0
+    return (smoothing.delay(receiver.smoothing, receiver.samples_per_step, receiver.smoothing_samples)
+            * period / receiver.samples_per_step)
 
 
 def _hertz(cn0_dbhz):
@@ -193,18 +207,17 @@ def sample(s, c, amplitude, v_x, v_e, normals, first):
 def measure(s, c, amplitude, dX, dE, normals):
     """(cross-elevation, elevation) [rad] of one step, true error running from the state's to (dX, dE)."""
     from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (dX, dE)
-    sum_x, sum_e = 0.0, 0.0
+    smooth_x, smooth_e = s.smooth_cross_elevation, s.smooth_elevation
+    smoothing.begin(smooth_x)
+    smoothing.begin(smooth_e)
     for k in range(c.samples):
         part = (k + 1.0) / c.samples
         x, e = sample(s, c, amplitude, (from_X + part * (dX - from_X)) / c.beamwidth,
                       (from_E + part * (dE - from_E)) / c.beamwidth, normals, NORMALS_PER_SAMPLE * k)
-        sum_x += x
-        sum_e += e
-        s.smooth_cross_elevation += c.smoothing_gain * (x - s.smooth_cross_elevation)
-        s.smooth_elevation += c.smoothing_gain * (e - s.smooth_elevation)
-    if c.smoothing == RECURSION:
-        return s.smooth_cross_elevation, s.smooth_elevation
-    return sum_x / c.samples, sum_e / c.samples
+        smoothing.put(smooth_x, x, c.smoothing_gain)
+        smoothing.put(smooth_e, e, c.smoothing_gain)
+    return (smoothing.smoothed(smooth_x, c.smoothing, c.samples, c.smoothing_samples),
+            smoothing.smoothed(smooth_e, c.smoothing, c.samples, c.smoothing_samples))
 
 
 @compiled
@@ -297,6 +310,10 @@ def step(state, constants, inputs, outputs, breaks, coefficients, normals):
             rate_x, rate_e, distance = rate_and_range(s, c, i, e, n, u, v_e, v_n, v_u, normals)
             e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
             x, y, z = to_deck(i.mat_ed, e, n, u)
+            if c.held and s.error_known:
+                s.cross_elevation, s.elevation = offsets(i.azimuth, i.elevation, s.direction[0], s.direction[1],
+                                                         s.direction[2])
+            s.direction[0], s.direction[1], s.direction[2] = x, y, z
             dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
             hidden = blockage.blocked(c.sectors, *angles(x, y, z))
             amplitude = carrier_amplitude(c, e, n, u, hidden)

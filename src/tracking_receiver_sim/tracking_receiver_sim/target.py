@@ -13,7 +13,6 @@ track_file: a cubic spline through the fixes. Measured on a real 1 Hz helicopter
 fixes as well as PCHIP or Akima pieces (9 m, the jitter of the fixes), with half their peak acceleration; in
 a 3 m/s^2 turn its velocity is right to 1e-4 m/s where PCHIP, flattening every extremum, is 1.3 m/s off.
 """
-import csv
 import datetime
 import math
 import typing
@@ -25,6 +24,7 @@ from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
 from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
+from pedestal_common import csv_table
 from pedestal_common.compiled import compiled
 from pedestal_common.interval import interval
 from pedestal_common.line_of_sight import earth_angles, earth_direction
@@ -302,46 +302,11 @@ def _leo_pass(params, duration):
 
 # track_file
 
-def read_track(path, max_gap) -> np.ndarray:
-    """The rows of a track file, (n, 4) in the order of COLUMNS; rows at most max_gap [s] apart."""
-    rows = []
-    try:
-        with open(path, newline='', encoding='utf-8-sig') as file:
-            reader = csv.DictReader(file)
-            missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
-            if missing:
-                raise TargetError(f'{path}: line 1: column {missing[0]!r} is missing')
-            for row in reader:
-                rows.append([_cell(path, reader.line_num, name, row[name]) for name in COLUMNS])
-                step = rows[-1][0] - rows[-2][0] if len(rows) > 1 else max_gap
-                if not 0.0 < step <= max_gap:
-                    raise TargetError(f'{path}: line {reader.line_num}: time_s = {rows[-1][0]:.10g}: {step:g} s after '
-                                      f'the row before, must be above 0 and at most max_gap = {max_gap:g} s')
-    except OSError as error:
-        raise TargetError(f'{path}: {error.strerror}') from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise TargetError(f'{path}: not a CSV text file: {error}') from None
-    if len(rows) < 4:
-        raise TargetError(f'{path}: {len(rows)} rows, must be at least 4')
-    return np.array(rows)
-
-
-def _cell(path, line, name, cell):
-    low, high = COLUMNS[name]
-    try:
-        value = float(cell)
-    except (TypeError, ValueError):
-        raise TargetError(f'{path}: line {line}: {name} = {cell!r}: must be a number') from None
-    if not low <= value <= high:
-        raise TargetError(f'{path}: line {line}: {name} = {value:g}: must be {low:g} to {high:g}')
-    return value
-
-
 def _track_file(params, duration):
     track = params.track_file
     if not track.path:
         raise TargetError('track_file.path is empty: must name a CSV file')
-    time, latitude, longitude, altitude = read_track(track.path, track.max_gap).T
+    time, latitude, longitude, altitude = csv_table.read(track.path, COLUMNS, 4, track.max_gap, 'max_gap').T
     time = time - time[0] - track.start
     if time[-1] <= 0.0:
         raise TargetError(f'{track.path}: start = {track.start:g} s: must be before the end of the track at '

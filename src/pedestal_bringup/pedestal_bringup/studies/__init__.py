@@ -8,7 +8,8 @@ others is a scenario and parameters: `pedestal run SCENARIO --param ...` takes t
 """
 import importlib
 
-NAMES = ('servo', 'backlash', 'bode', 'filters', 'manoeuvre', 'pareto', 'imm-feedforward', 'rate-measurement')
+NAMES = ('servo', 'backlash', 'bode', 'filters', 'manoeuvre', 'pareto', 'imm-feedforward', 'rate-measurement',
+         'phased-array', 'alignment')
 
 
 def study(name):

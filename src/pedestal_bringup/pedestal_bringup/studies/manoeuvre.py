@@ -10,7 +10,7 @@ import numpy as np
 
 from pedestal_bringup import monte_carlo
 from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH
-from pedestal_bringup.studies import ensemble, experiment, imm_feedforward, profiles
+from pedestal_bringup.studies import ensemble, experiment, feedforward_loop, profiles
 from pedestal_bringup.studies.experiment import Result, row
 
 RUNS = 200
@@ -24,10 +24,10 @@ REVERSALS = (4.0, 2.0, 1.0, 0.5, 0.35)
 LEAD = 5.0
 """Uniform motion before it all begins [s]."""
 
-NOISE = ensemble.Noise(imm_feedforward.SIGMA)
+NOISE = ensemble.Noise(feedforward_loop.SIGMA)
 
-FILTERS = {'cv': imm_feedforward.cv(0.1).filter, 'ca': imm_feedforward.ca(10.0).filter,
-           'imm-a': imm_feedforward.imm(40.0, False).filter, 'imm-b': imm_feedforward.imm(5.0, False).filter}
+FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
+           'imm-a': feedforward_loop.imm(40.0, False).filter, 'imm-b': feedforward_loop.imm(5.0, False).filter}
 
 COLOURS = {'cv': TRUTH, 'ca': RAW, 'imm-a': MOTOR_1, 'imm-b': FILTERED}
 

@@ -11,21 +11,21 @@ import numpy as np
 
 from pedestal_bringup import monte_carlo
 from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment, imm_feedforward
+from pedestal_bringup.studies import experiment, feedforward_loop
 from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.imm_feedforward import Source
+from pedestal_bringup.studies.feedforward_loop import Source
 
 RUNS = 50
 """Of each tuning, as many as in the paper."""
 
 AXIS = 'azimuth'
 
-REFERENCE = imm_feedforward.SOURCES['imm-predicted']
-"""IMM-A of the study imm-feedforward: the point that the rows compare with."""
+REFERENCE = feedforward_loop.imm(40.0, True)
+"""imm-predicted of the study imm-feedforward: the point that the rows compare with."""
 
 
 def _cs(a_max):
-    return Source(imm_feedforward.filter_of('current_statistical', current_statistical={
+    return Source(feedforward_loop.filter_of('current_statistical', current_statistical={
         'alpha': 0.5, 'a_max': math.radians(a_max)}))
 
 
@@ -34,11 +34,11 @@ def _logarithmic(low, high, points):
 
 
 TUNINGS = {
-    'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), imm_feedforward.cv),
-    'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), imm_feedforward.ca),
+    'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), feedforward_loop.cv),
+    'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), feedforward_loop.ca),
     'current_statistical': ('a_max [deg/s2], alpha 0.5 1/s', _logarithmic(0.5, 1000.0, 13), _cs),
-    'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10), lambda q: imm_feedforward.imm(q, True))}
-"""{filter: (what is tuned, its values, the imm_feedforward.Source of a value)}."""
+    'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10), lambda q: feedforward_loop.imm(q, True))}
+"""{filter: (what is tuned, its values, the Source of a value)}."""
 
 COLOURS = {'cv': TRUTH, 'ca': RAW, 'current_statistical': MOTOR_2, 'imm': FILTERED}
 
@@ -54,7 +54,7 @@ def cases():
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
-    found = imm_feedforward.outcomes(cases(), runs, pool or monte_carlo.Pool(1), progress)
+    found = feedforward_loop.outcomes(cases(), runs, pool or monte_carlo.Pool(1), progress)
     points = {case: measured(outcome) for case, outcome in found.items()}
     return Result(rows(points), {'miss': lambda: miss_figure(points)}, remarks(points))
 
@@ -80,8 +80,8 @@ def frontier(points, name):
 
 
 def miss_at(front, noise):
-    """Miss on a frontier at a rate noise, log-log between its points; NaN where every tuning has more noise."""
-    return math.exp(np.interp(math.log(noise), *np.log(front), left=math.nan, right=math.log(front[1, -1])))
+    """Miss on a frontier at a rate noise that it comes down to, log-log between its points."""
+    return math.exp(np.interp(math.log(noise), *np.log(front)))
 
 
 def noise_at(front, miss):
@@ -96,11 +96,13 @@ def rows(points):
              row('imm-predicted', 'rate_noise_deg_s', noise, 'deg/s')]
     for name in TUNINGS:
         front = frontier(points, name)
-        found += [row(name, 'miss_at_equal_rate_noise_deg', miss_at(front, noise), 'deg'),
-                  row(name, 'miss_ratio_at_equal_rate_noise', miss_at(front, noise) / miss, '', None,
-                      TARGET if name in ('cv', 'ca') else None),
-                  row(name, 'least_miss_deg', front[1, -1], 'deg'),
+        found += [row(name, 'least_miss_deg', front[1, -1], 'deg'),
                   row(name, 'rate_noise_at_least_miss_deg_s', front[0, -1], 'deg/s')]
+        if front[0, 0] <= noise:
+            equal = miss_at(front, noise)
+            found += [row(name, 'miss_at_equal_rate_noise_deg', equal, 'deg'),
+                      row(name, 'miss_ratio_at_equal_rate_noise', equal / miss, '', None,
+                          TARGET if name == 'cv' else None)]
         if front[1, -1] <= miss:
             found.append(row(name, 'rate_noise_at_equal_miss_deg_s', noise_at(front, miss), 'deg/s'))
     return found
@@ -110,11 +112,14 @@ def remarks(points):
     """What the rows do not say by themselves."""
     tuned = '; '.join(f'{name}: {what} {values[0]:g} to {values[-1]:g}'
                       for name, (what, values, _) in TUNINGS.items())
-    miss = points['reference', 0.0][1]
+    noise, miss = points['reference', 0.0]
+    loud = [name for name in TUNINGS if frontier(points, name)[0, 0] > noise]
     never = [name for name in TUNINGS if frontier(points, name)[1, -1] > miss]
-    found = [f'Every filter is predicted to the instant of its command; tuned are {tuned}. The rows read the curves at '
-             'the rate noise and the miss of imm-predicted (study imm-feedforward), straight between two tunings on '
-             'logarithmic scales.']
+    found = [f'Every filter is predicted to the instant of its command; tuned are {tuned}. The rows read the curves '
+             'at the rate noise and the miss of imm-predicted (study imm-feedforward), straight between two tunings '
+             'on logarithmic scales.']
+    if loud:
+        found.append(f'No tuning of {", ".join(loud)} has as little rate noise as imm-predicted.')
     if never:
         found.append(f'No tuning of {", ".join(never)} misses as little as imm-predicted, whatever its rate noise.')
     return found

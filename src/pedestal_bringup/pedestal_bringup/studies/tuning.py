@@ -25,6 +25,9 @@ RANGES = {'alpha_beta.alpha': (0.003, 0.8, 8), 'alpha_beta_gamma.alpha': (0.003,
 TOLERANCE = 0.02
 """Of the logarithms."""
 
+FAILED = 1e300
+"""Stands for the criterion where it does not work: finite, so that the simplex can tell its differences."""
+
 
 def names(params):
     """The parameters that are searched for a filter_params.Filter."""
@@ -58,7 +61,7 @@ def tuned(params, criterion, searched=None):
 
     def cost(x):
         value = criterion(at(x))
-        return value if math.isfinite(value) else math.inf
+        return value if math.isfinite(value) else FAILED
 
     start = [math.log(given[name]) for name in searched]
     if len(searched) <= 2 and set(searched) <= set(RANGES):
@@ -68,6 +71,6 @@ def tuned(params, criterion, searched=None):
     corners = np.vstack((start, np.asarray(start) + 0.7 * np.eye(len(start))))
     options = {'initial_simplex': corners, 'xatol': TOLERANCE, 'fatol': math.inf, 'maxfev': 100 * len(start)}
     found = minimize(cost, start, method='Nelder-Mead', bounds=bounds, options=options)
-    if not math.isfinite(found.fun):
+    if found.fun >= FAILED:
         raise ValueError(f'no {", ".join(searched)} gives a finite criterion')
     return at(found.x), float(found.fun)

@@ -1,0 +1,38 @@
+"""The angle loop of an electronically steered beam: the beam of the next interval from the receiver's error.
+
+type_1 is paper 002's loop (eq. 3, with the compensation of eq. 6). Its first line is read as R(k/k-1) = R + v T, and
+s(k/k-1) of eq. 6 as R(k/k-1). The receiver compares the target with the beam R(k-1/k-1), while the filter compares y
+with R(k/k-1): in the steady state error = v T, whatever alpha, delay and smoothing are. type_2 points the beam at
+R(k+1/k), so that the error itself is the innovation and a ramp is met without error.
+
+`tracked`, the third form, needs no law of its own: y = beam in force + error goes into the target's filter, and the
+beam is its prediction for the middle of the interval in which it will be in force.
+"""
+from pedestal_common.compiled import compiled
+
+FORMS = ('tracked', 'type_1', 'type_2')
+TRACKED, TYPE_1, TYPE_2 = range(len(FORMS))
+
+
+@compiled
+def type_1(R, v, error, alpha, beta, T, compensation):
+    """(beam R(k/k) [rad], its rate v [rad/s]) from those of the step before, T [s] ago.
+
+    error: of the receiver [rad]; compensation: delta V, V the rate at which a fixed target seems to move because the
+    carrier does [rad/s] (eq. 6).
+    """
+    nu = error - v * T
+    return R + v * T + alpha * nu + compensation * T, v + beta / T * nu
+
+
+@compiled
+def type_2(R, v, error, alpha, beta, T, compensation):
+    """(beam R(k+1/k) [rad], its rate v [rad/s]) from those of the step before; arguments as of type_1."""
+    v += beta / T * error
+    return R + alpha * error + v * T + compensation * T, v
+
+
+@compiled
+def coasted(R, v, T, compensation):
+    """Both without an error: the prediction stands."""
+    return R + v * T + compensation * T, v

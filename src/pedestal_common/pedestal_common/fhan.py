@@ -1,0 +1,14 @@
+"""Han's time-optimal function, the heart of a tracking differentiator and of paper 001's control law."""
+import math
+
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def fhan(x1, x2, r, h0):
+    """Time-optimal acceleration within +-r that brings x1'' = u to rest at 0, linear within h0 of it (Han 2009)."""
+    d = r * h0 * h0
+    a0 = h0 * x2
+    y = x1 + a0
+    a = a0 + y if abs(y) <= d else a0 + math.copysign(0.5 * (math.sqrt(d * (d + 8.0 * abs(y))) - d), y)
+    return -r * a / d if abs(a) <= d else -math.copysign(r, a)

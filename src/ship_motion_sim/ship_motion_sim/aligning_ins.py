@@ -1,0 +1,130 @@
+"""The INS that integrates its IMU: it aligns by itself, navigates, and knows how well. The node's methods but `model`.
+
+It hears `ship/imu/data_raw` and gives out attitude and deck rate after a latency as ins does; of the ship's parameters
+it takes the latitude, and the velocity that an aid measures, with noise.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import quaternion, rotation, to_deck
+from ship_motion_sim import earth, ins, motion, navigator
+from ship_motion_sim.ins import NEVER, RING, UNDER_WAY
+from ship_motion_sim.params import InsParameters
+
+CONSTANTS = np.dtype([
+    ('ship', motion.CONSTANTS),
+    ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
+    ('latency_ns', 'i8'),
+    ('increment', 'i8'),                    # 1: the IMU gives mean rates since its last sample, 0: rates at the stamp
+    ('aid_noise', 'f8'),                    # [m/s]
+    ('navigator', navigator.CONSTANTS),
+], align=True)
+
+STATE = np.dtype([
+    ('last_stamp_ns', 'i8'),
+    ('truth', motion.OUTPUTS),              # the ship as the aid measures it
+    *UNDER_WAY,
+    ('navigator', navigator.STATE),
+    ('imu_stamp_ns', 'i8'),                 # of the last IMU message that could be used
+    ('last_rate', 'f8', (3,)), ('last_force', 'f8', (3,)),      # in it
+    ('angle', 'f8', (3,)), ('force', 'f8', (3,)),   # increments since [rad, m/s]
+    ('aid', 'f8', (3,)),                    # velocity that the aid measures [m/s]
+    ('mat_ed', 'f8', (3, 3)),               # deck -> earth as known
+], align=True)
+
+
+def constants(params: InsParameters) -> np.ndarray:
+    """The record (1,) of CONSTANTS."""
+    record, latitude = np.zeros(1, CONSTANTS), math.radians(params.ship.latitude_deg)
+    record['ship'] = motion.constants(params.ship)
+    record['earth_rate'] = earth.rate(latitude)
+    record['latency_ns'] = round(params.latency * 1e9)
+    record['increment'], record['aid_noise'] = params.imu_output == 'increment', params.aid.noise
+    record['navigator'] = navigator.constants(params.alignment, params.method, params.aid.source, latitude)
+    return record
+
+
+def initial_state(params: InsParameters) -> np.ndarray:
+    """The record (1,) of STATE before the first sample."""
+    state = np.zeros(1, STATE)
+    state['last_stamp_ns'] = state['imu_stamp_ns'] = NEVER
+    yaw = math.radians(90.0 - params.alignment.initial_heading_deg)
+    state['navigator'] = navigator.initial_state(constants(params)['navigator'], quaternion(0.0, 0.0, yaw))
+    return state
+
+
+@compiled
+def measure_aid(c, s, stamp_ns, normals):
+    """What the aid says of the velocity at stamp_ns into s.aid."""
+    if c.navigator.aid == navigator.NO_AID:
+        return
+    motion.truth(c.ship, 1e-9 * stamp_ns, s.truth)
+    for i in range(3):
+        v = s.truth.velocity_deck[i] if c.navigator.aid == navigator.LOG else s.truth.velocity[i]
+        s.aid[i] = v + c.aid_noise * normals[i]
+
+
+@compiled
+def integrate(c, s, stamp_ns, rate, force):
+    """Take an IMU message into the navigator: mean rates are the increments, rates at the stamps make trapezes. The
+    first one ends an interval that began before power-up and is not integrated."""
+    if s.imu_stamp_ns != NEVER:
+        dt = 1e-9 * (stamp_ns - s.imu_stamp_ns)
+        for i in range(3):
+            if c.increment == 1:
+                s.angle[i], s.force[i] = dt * rate[i], dt * force[i]
+            else:
+                s.angle[i] = 0.5 * dt * (rate[i] + s.last_rate[i])
+                s.force[i] = 0.5 * dt * (force[i] + s.last_force[i])
+        navigator.step(s.navigator, c.navigator, s.angle, s.force, dt, s.aid)
+
+
+@compiled
+def measure(c, s, stamp_ns, rate, force):
+    """Put attitude and rate as the navigator knows them at stamp_ns into the ring."""
+    n = s.measured % RING
+    q, w = s.quaternion, s.angular_velocity
+    q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(s.navigator, c.navigator)
+    rotation(q[n, 0], q[n, 1], q[n, 2], q[n, 3], s.mat_ed)
+    e = c.earth_rate
+    ex, ey, ez = to_deck(s.mat_ed, e[0], e[1], e[2])
+    first = s.imu_stamp_ns == NEVER
+    for i in range(3):
+        # a mean rate is that of half an interval ago: carried on to the stamp
+        half = 0.5 * (rate[i] - s.last_rate[i]) if c.increment == 1 and not first else 0.0
+        w[n, i] = rate[i] + half - (ex if i == 0 else ey if i == 1 else ez)
+        s.last_rate[i], s.last_force[i] = rate[i], force[i]
+        s.linear_acceleration[n, i] = force[i]
+    s.variance[n, 0] = s.variance[n, 1] = s.navigator.level_sigma**2
+    s.variance[n, 2] = s.navigator.azimuth_sigma**2
+    s.stage[n] = s.navigator.stage
+    s.stamp_ns[n] = s.imu_stamp_ns = stamp_ns
+    s.measured += 1
+
+
+@compiled
+def step(state, constants, inputs, outputs, normals):
+    """One IMU message: as ins.step. Of the normals the first three are the aid's noise."""
+    s, c, i, out = state[0], constants[0], inputs[0], outputs[0]
+    out.status, out.due = ins.OK, 0
+    if i.stamp_ns <= s.last_stamp_ns:
+        out.status = ins.BAD_STAMP
+        return
+    s.last_stamp_ns = i.stamp_ns
+    for n in range(3):
+        if not (math.isfinite(i.angular_velocity[n]) and math.isfinite(i.linear_acceleration[n])):
+            out.status = ins.BAD_IMU
+    if out.status == ins.OK:
+        if s.measured - s.released == RING:
+            s.released += 1
+            out.status = ins.BUFFER_FULL
+        measure_aid(c, s, i.stamp_ns, normals)
+        integrate(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration)
+        measure(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration)
+    if s.released == 0:
+        out.stage = navigator.ALIGNING
+    for n in range(3):
+        out.velocity[n] = s.navigator.strapdown.velocity[n]
+    ins.release(c, s, i.stamp_ns, out)

@@ -1,0 +1,95 @@
+"""Paper 001, corrected: level by ADRC (TD, ESO, NLC), azimuth from the commands that keep it level.
+
+Once level, the commands only take back what the earth's rotation tilts, so (14), (15) at rest give (19):
+sin az = w_cE / w_N, cos az = 1 + w_cN / w_N. The commands are noisy; the least-squares slope of their integral since
+`start` takes the noise out (a plain mean never gets there: reference/nav.md section 1.3).
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from ship_motion_sim.alignment import extended_observer, levelling, slope, steady_state
+from ship_motion_sim.alignment.conditions import SIGMA_UNKNOWN
+
+CALM = 1.2      # surprise of a sea as expected, its own noise included [-]
+
+CONSTANTS = np.dtype([
+    ('w_o', 'f8'), ('w_c', 'f8'),           # bandwidth of observer and of level control [rad/s]
+    ('start', 'f8'),                        # the commands count from here on [s]
+    ('velocity_variance', 'f8'),            # of the settled loop [m2/s2]
+    ('innovation_variance', 'f8'),          # of its observer [m2/s2]
+    ('level', 'f8'),                        # 1 sigma once settled [rad]
+], align=True)
+
+STATE = np.dtype([
+    ('t', 'f8'),                            # since the start [s]
+    ('observer', extended_observer.STATE),
+    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
+    ('first', 'f8', (2,)), ('second', 'f8', (2,)), ('count', 'i8'),     # slope of w_cE, w_cN
+    ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
+], align=True)
+
+
+def constants(k, p, h) -> np.ndarray:
+    """The record () of CONSTANTS of an AdrcParameters; k CONDITIONS."""
+    record = np.zeros((), CONSTANTS)
+    record['w_o'], record['w_c'], record['start'] = p.observer, p.control, p.start
+    g, r = float(k['gravity']), float(k['velocity_density']) / h
+    # One channel, command in fhan's linear zone: v, x2, z1, z2, z3 under noise of the velocity and random walk.
+    F = np.array([[1.0, h, 0.5 * h * h], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
+    push = np.array([0.5 * h * h, h, 0.0])
+    law = -np.array([p.control**2, 2.0 * levelling.DAMPING * p.control, 1.0])
+    gain = np.array(extended_observer.gains(p.observer, h))
+    before = np.zeros((5, 5))
+    before[:2, :2], before[:2, 2:] = F[:2, :2], np.outer(push[:2], law)
+    before[2:, 2:] = F + np.outer(push, law)
+    innovation = before[0] - before[2]
+    A = before.copy()
+    A[2:] += np.outer(gain, innovation)
+    noise = np.concatenate(([0.0, 0.0], gain))
+    Q = np.outer(noise, noise) * r
+    Q[1, 1] += (g * float(k['gyro_noise']))**2 * h
+    P = steady_state.covariance(A, Q)
+    record['velocity_variance'] = P[0, 0]
+    record['innovation_variance'] = innovation @ P @ innovation + r
+    record['level'] = math.sqrt(P[1, 1] + float(k['accelerometer_bias'])**2) / g
+    return record
+
+
+@compiled
+def azimuth_sigma(c, k, window, surprise):
+    """1 sigma [rad] of the slope over a window [s].
+
+    Random walk under the parabola's weights: 1.2 / window. The commands' own noise is the second derivative of the
+    velocity's integral, so only the ends of the window see it: 2 x 6^2 / window^4 of the velocity's variance, to which
+    all that surprises the observer (swell) is added.
+    """
+    g, w_north = k.gravity, k.earth_rate[1]
+    variance = c.velocity_variance + max(surprise - CALM, 0.0) * c.innovation_variance
+    noise = 72.0 * variance / (g * window * window)**2
+    return min(math.sqrt(noise + 1.2 * k.gyro_noise**2 / window + k.gyro_bias**2) / w_north, SIGMA_UNKNOWN)
+
+
+@compiled
+def step(s, c, k, v_east, v_north, h):
+    """One step; records STATE, CONSTANTS, CONDITIONS."""
+    s.t += h
+    o = s.observer
+    for i in range(2):
+        s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
+    l1, l2, l3 = extended_observer.gains(c.w_o, h)
+    extended_observer.predict(o, h)
+    extended_observer.correct(o, v_east, v_north, l1, l2, l3, c.innovation_variance, h)
+    levelling.level(o, k, s.v1, s.v2, c.w_c, s.command)
+    s.azimuth_sigma, s.level_sigma = SIGMA_UNKNOWN, c.level
+    if s.t < c.start:
+        return
+    for i in range(2):
+        s.first[i], s.second[i], count = slope.added(s.first[i], s.second[i], s.count, s.command[i])
+    s.count = count
+    w_east = slope.slope(s.first[0], s.second[0], count)
+    w_north = slope.slope(s.first[1], s.second[1], count)
+    s.azimuth = math.atan2(w_east, k.earth_rate[1] + w_north)
+    s.azimuth_sigma = azimuth_sigma(c, k, count * h, o.surprise)
+    s.level_sigma = math.sqrt(max(o.surprise, 1.0)) * c.level

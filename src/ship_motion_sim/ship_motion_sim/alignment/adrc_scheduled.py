@@ -1,0 +1,39 @@
+"""Level by ADRC with an observer whose bandwidth falls as 6/t: quick at first, quiet later. Azimuth from z3."""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from ship_motion_sim.alignment import extended_observer, levelling
+
+BANDWIDTH_TIME = 6.0        # w_o t [-]
+W_O_MAX, W_C_MIN = 1.0, 0.1     # [rad/s]
+
+STATE = np.dtype([
+    ('t', 'f8'),                            # since the start [s]
+    ('observer', extended_observer.STATE),
+    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
+    ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
+], align=True)
+
+
+@compiled
+def bandwidth(t):
+    """w_o [rad/s] at t [s] > 0 since the start."""
+    return min(W_O_MAX, BANDWIDTH_TIME / t)
+
+
+@compiled
+def step(s, k, v_east, v_north, h):
+    """One step; records STATE, CONDITIONS."""
+    o, r = s.observer, k.velocity_density / h
+    s.t += h
+    w_o = bandwidth(s.t)
+    for i in range(2):
+        s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
+    l1, l2, l3 = extended_observer.gains(w_o, h)
+    extended_observer.predict(o, h)
+    extended_observer.predict_covariance(o, k, h)
+    extended_observer.correct(o, v_east, v_north, l1, l2, l3, o.p[0] + r, h)
+    extended_observer.correct_covariance(o, l1, l2, l3, r)
+    levelling.level(o, k, s.v1, s.v2, max(W_C_MIN, w_o), s.command)
+    s.azimuth = extended_observer.azimuth(o, k)
+    s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k)

@@ -1,0 +1,69 @@
+"""The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity turns the azimuth back.
+
+v' = g a - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N with K1 = K4 = 2 s0, k2 = 4 s0^2/g,
+K3 = 4 s0^4/g: all four poles at -s0 +- j s0 (reference/nav.md section 1.2). 180 deg of azimuth is an unstable
+equilibrium, left by what the first levelling kicks: the loop is closed from the start.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from ship_motion_sim.alignment import steady_state
+from ship_motion_sim.alignment.conditions import SIGMA_UNKNOWN
+
+CONSTANTS = np.dtype([
+    ('s0', 'f8'),                                       # [rad/s]
+    ('K1', 'f8'), ('k2', 'f8'), ('K3', 'f8'), ('K4', 'f8'),
+    ('azimuth', 'f8'), ('level', 'f8'), ('residual', 'f8'),     # 1 sigma once settled [rad]
+], align=True)
+
+STATE = np.dtype([
+    ('t', 'f8'),                    # since the start [s]
+    ('turning', 'f8'),              # v_N / (s + K4) [m]
+    ('residual', 'f8'),             # azimuth that the loop still turns back, smoothed [rad]
+    ('damped', 'f8', (2,)),         # what damping takes off v_E, v_N in this step [m/s]
+    ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
+], align=True)
+
+
+def constants(k, s0, h) -> np.ndarray:
+    """The record () of CONSTANTS for the bandwidth s0 [rad/s]; k CONDITIONS."""
+    record = np.zeros((), CONSTANTS)
+    g, w_north = float(k['gravity']), float(k['earth_rate'][1])
+    K1 = K4 = 2.0 * s0
+    k2, K3 = 4.0 * s0**2 / g, 4.0 * s0**4 / g
+    # north channel: v, a_x, turning, az, residual under velocity noise per step and random walk of the gyros
+    rates = np.array([[-K1, g, 0.0, 0.0, 0.0], [-k2, 0.0, 0.0, -w_north, 0.0], [1.0, 0.0, -K4, 0.0, 0.0],
+                      [0.0, 0.0, K3 / w_north, 0.0, 0.0], [0.0, 0.0, K3 / w_north, 0.0, -0.5 * s0]])
+    noise = h * rates[:, 0]
+    Q = np.outer(noise, noise) * float(k['velocity_density']) / h
+    Q += np.diag([0.0, 1.0, 0.0, 1.0, 0.0]) * float(k['gyro_noise'])**2 * h
+    P = steady_state.covariance(np.eye(5) + h * rates, Q)
+    record['residual'] = math.sqrt(P[4, 4])
+    record['s0'], record['K1'], record['k2'], record['K3'], record['K4'] = s0, K1, k2, K3, K4
+    record['azimuth'] = math.sqrt(P[3, 3] + (float(k['gyro_bias']) / w_north)**2)
+    record['level'] = math.sqrt(P[1, 1] + (float(k['accelerometer_bias']) / g)**2)
+    return record
+
+
+@compiled
+def envelope(x):
+    """What is left of 1 after x = s0 t: the slower pair of its poles."""
+    return (1.0 + x) * math.exp(-x)
+
+
+@compiled
+def step(s, c, k, v_east, v_north, h):
+    """One step; records STATE, CONSTANTS, CONDITIONS."""
+    s.t += h
+    s.turning += h * (v_north - c.K4 * s.turning)
+    s.command[0], s.command[1] = -c.k2 * v_north, c.k2 * v_east
+    s.command[2] = c.K3 / k.earth_rate[1] * s.turning
+    s.damped[0], s.damped[1] = c.K1 * h * v_east, c.K1 * h * v_north
+    # A steady az is turned back at az s0 / 2. At 180 deg it is not, which the envelope covers.
+    s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
+    left = SIGMA_UNKNOWN * envelope(c.s0 * s.t)
+    moving = max(s.residual**2 - 9.0 * c.residual**2, 0.0)      # beyond three sigma of its noise
+    s.azimuth_sigma = min(math.sqrt(c.azimuth**2 + moving + left**2), SIGMA_UNKNOWN)
+    s.level_sigma = c.level + left

@@ -1,0 +1,37 @@
+"""The level commands of an ADRC: tracking differentiator and nonlinear combination; paper 001 (7), (8), (11).
+
+(11) is u = (u0 - z3) / b0. As printed, u0 - z3 / b0, the east channel (b0 < 0) is positive feedback and ends at
+180 deg of level; the north one works with a gain g times too high (reference/nav.md section 1.1).
+"""
+from pedestal_common.compiled import compiled
+from pedestal_common.fhan import fhan
+
+DAMPING = 0.8           # c1 [-]
+ACCELERATION = 1e3      # r1 [m/s3]: fhan is linear within r1 / w_c^2
+RATE_LIMIT = 0.5        # of a command [rad/s]
+
+
+@compiled
+def differentiated(v1, v2, reference, h):
+    """(v1, v2) of the tracking differentiator one step on: r0 = 1/h^2, h0 = h, c0 = 1, so it is there in two steps."""
+    return v1 + h * v2, v2 + h * fhan(v1 - reference, v2, 1.0 / (h * h), h)
+
+
+@compiled
+def command(z1, z2, z3, v1, v2, b0, w_c):
+    """u [rad/s] that brings z1, z2 to v1, v2 with bandwidth w_c and takes z3 away, as far as it may turn n'."""
+    u0 = fhan(z1 - v1, DAMPING * (z2 - v2), ACCELERATION, 1.0 / w_c)
+    return min(max((u0 - z3) / b0, -RATE_LIMIT), RATE_LIMIT)
+
+
+@compiled
+def level(o, k, v1, v2, w_c, out):
+    """Commands of both channels of an extended_observer.STATE o into out (3,) (w_cE, w_cN, w_cU); v1, v2 (2,).
+
+    The observer is told the command as it was limited.
+    """
+    g = k.gravity
+    out[1] = command(o.z[0, 0], o.z[0, 1], o.z[0, 2], v1[0], v2[0], -g, w_c)
+    out[0] = command(o.z[1, 0], o.z[1, 1], o.z[1, 2], v1[1], v2[1], g, w_c)
+    out[2] = 0.0
+    o.push[0], o.push[1] = -g * out[1], g * out[0]

@@ -1,0 +1,133 @@
+"""Optimisation-based alignment: which rotation brings what was felt onto what gravity must have done? No loop.
+
+a = int C_b^b0 f dt (gyros only, b0 the deck at the start) is, but for the velocity, C_n0^b0 b with
+b = -int C_n^n0 g dt. The rotation b0 -> n0 that brings the vectors a onto b with least squares is the eigenvector of
+a 4 x 4 matrix (Horn 1987). The centroid of either bundle is taken off: that is the unknown velocity at the start
+(taken for zero, as is usual, the error is 15 times larger at 100 s), and what is left of swell averages out.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from ship_motion_sim import strapdown
+from ship_motion_sim.alignment import extended_observer, riccati_eso
+
+SWEEPS = 12     # of Jacobi rotations at most; 4 to 6 are enough
+
+STATE = np.dtype([
+    ('t', 'f8'),                                        # since the start [s]
+    ('observer', extended_observer.STATE),              # of a_x, a_y: its covariance is the information limit
+    ('coriolis', 'f8', (3,)),                           # int w_ie x v dt [m/s]
+    ('count', 'f8'),
+    ('sum_a', 'f8', (3,)), ('sum_b', 'f8', (3,)), ('sum_ab', 'f8', (3, 3)),
+    ('matrix', 'f8', (4, 4)), ('vectors', 'f8', (4, 4)),
+    ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
+], align=True)
+
+
+@compiled
+def gravity_integral(t, k):
+    """b [m/s] in n0 after t: the reaction to gravity, turned with the earth about w_ie / |w_ie|. Closed form."""
+    north, up = k.earth_rate[1], k.earth_rate[2]
+    w = math.sqrt(north * north + up * up)
+    n, u = north / w, up / w
+    s, c = math.sin(w * t) / w, 2.0 * math.sin(0.5 * w * t)**2 / w
+    return k.gravity * n * c, k.gravity * n * u * (t - s), k.gravity * (u * u * t + n * n * s)
+
+
+@compiled
+def step(s, k, ax, ay, az, vx, vy, vz, h):
+    """One more pair; records STATE, CONDITIONS.
+
+    (ax, ay, az): int C_b^b0 f dt less what a log says of the velocity there [m/s], whose Coriolis force is left out:
+    7 m/s tilt the level by 0.1 arcmin. (vx, vy, vz): the velocity in n that a GNSS says, 0 without one.
+    """
+    s.t += h
+    o = s.observer
+    l1, l2, l3, variance = riccati_eso.limit(o, k, h)
+    if vx == 0.0 and vy == 0.0:
+        # how far the sea is from what is expected; a GNSS takes it off b instead, and leaves nothing to judge by
+        extended_observer.predict(o, h)
+        extended_observer.correct(o, ax, ay, l1, l2, l3, variance, h)
+    s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k)
+    north, up = k.earth_rate[1], k.earth_rate[2]
+    cx, cy, cz = strapdown.cross(0.0, north, up, vx, vy, vz)
+    s.coriolis[0] += h * cx
+    s.coriolis[1] += h * cy
+    s.coriolis[2] += h * cz
+    bx, by, bz = gravity_integral(s.t, k)
+    # n turned back to n0: w_ie t is small
+    bx += vx + s.t * cx + s.coriolis[0]
+    by += vy + s.t * cy + s.coriolis[1]
+    bz += vz + s.t * cz + s.coriolis[2]
+    s.count += 1.0
+    for i in range(3):
+        a = ax if i == 0 else ay if i == 1 else az
+        s.sum_a[i] += a
+        s.sum_b[i] += bx if i == 0 else by if i == 1 else bz
+        s.sum_ab[i, 0] += a * bx
+        s.sum_ab[i, 1] += a * by
+        s.sum_ab[i, 2] += a * bz
+
+
+@compiled
+def jacobi(m, v):
+    """Bring a symmetric m (4, 4) to diagonal form; v (4, 4) gets its eigenvectors as columns."""
+    for i in range(4):
+        for j in range(4):
+            v[i, j] = 1.0 if i == j else 0.0
+    for _ in range(SWEEPS):
+        moved = False
+        for i in range(3):
+            for j in range(i + 1, 4):
+                if m[i, j] * m[i, j] > 1e-34 * abs(m[i, i] * m[j, j]):
+                    moved = True
+                    tau = (m[j, j] - m[i, i]) / (2.0 * m[i, j])
+                    t = math.copysign(1.0, tau) / (abs(tau) + math.sqrt(1.0 + tau * tau))
+                    c = 1.0 / math.sqrt(1.0 + t * t)
+                    s = t * c
+                    for n in range(4):
+                        m[n, i], m[n, j] = c * m[n, i] - s * m[n, j], s * m[n, i] + c * m[n, j]
+                    for n in range(4):
+                        m[i, n], m[j, n] = c * m[i, n] - s * m[j, n], s * m[i, n] + c * m[j, n]
+                        v[n, i], v[n, j] = c * v[n, i] - s * v[n, j], s * v[n, i] + c * v[n, j]
+        if not moved:
+            return
+
+
+@compiled
+def centred(s, i, j):
+    """sum (a_i - mean a_i)(b_j - mean b_j)."""
+    return s.sum_ab[i, j] - s.sum_a[i] * s.sum_b[j] / s.count
+
+
+@compiled
+def solve(s):
+    """Quaternion (x, y, z, w) b0 -> n0 of the pairs so far."""
+    m = s.matrix
+    xx, xy, xz = centred(s, 0, 0), centred(s, 0, 1), centred(s, 0, 2)
+    yx, yy, yz = centred(s, 1, 0), centred(s, 1, 1), centred(s, 1, 2)
+    zx, zy, zz = centred(s, 2, 0), centred(s, 2, 1), centred(s, 2, 2)
+    m[0, 0], m[1, 1], m[2, 2], m[3, 3] = xx + yy + zz, xx - yy - zz, yy - xx - zz, zz - xx - yy
+    m[0, 1], m[0, 2], m[0, 3] = yz - zy, zx - xz, xy - yx
+    m[1, 2], m[1, 3], m[2, 3] = xy + yx, zx + xz, yz + zy
+    for i in range(3):
+        for j in range(i + 1, 4):
+            m[j, i] = m[i, j]
+    jacobi(m, s.vectors)
+    best = 0
+    for i in range(1, 4):
+        if m[i, i] > m[best, best]:
+            best = i
+    v = s.vectors
+    return v[1, best], v[2, best], v[3, best], v[0, best]
+
+
+@compiled
+def attitude(s, k, qx, qy, qz, qw):
+    """Quaternion deck -> n now, of the deck -> b0 one that the gyros give (qx, qy, qz, qw)."""
+    bx, by, bz, bw = solve(s)
+    qx, qy, qz, qw = strapdown.product(bx, by, bz, bw, qx, qy, qz, qw)
+    nx, ny, nz, nw = strapdown.turn(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
+    return strapdown.product(nx, ny, nz, nw, qx, qy, qz, qw)

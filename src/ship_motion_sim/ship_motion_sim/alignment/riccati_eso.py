@@ -1,0 +1,43 @@
+"""The extended observer with Kalman gains: no better linear estimate of azimuth exists while the sea is as assumed.
+
+Its covariance is the information limit: x3 out of velocities with white noise r per step, x2 walking with q.
+"""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from ship_motion_sim.alignment import extended_observer, levelling
+
+W_C_ALIGNING, W_C_NAVIGATING = 1.0, 0.1
+"""Bandwidth of the level control [rad/s]: quick to level a deck, slow where only noise is left to follow."""
+
+STATE = np.dtype([
+    ('observer', extended_observer.STATE),
+    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
+    ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
+], align=True)
+
+
+@compiled
+def limit(o, k, h):
+    """Carry the covariance of o over one step and its measurement; (l1, l2, l3, expected innovation variance)."""
+    r = k.velocity_density / h
+    extended_observer.predict_covariance(o, k, h)
+    s = o.p[0] + r
+    l1, l2, l3 = extended_observer.kalman_gains(o.p[0], o.p[1], o.p[2], r)
+    extended_observer.correct_covariance(o, l1, l2, l3, r)
+    return l1, l2, l3, s
+
+
+@compiled
+def step(s, k, v_east, v_north, h, w_c):
+    """One step; records STATE, CONDITIONS. What control of bandwidth w_c [rad/s] does is known exactly: it does not
+    touch the estimate."""
+    o = s.observer
+    for i in range(2):
+        s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
+    extended_observer.predict(o, h)
+    l1, l2, l3, variance = limit(o, k, h)
+    extended_observer.correct(o, v_east, v_north, l1, l2, l3, variance, h)
+    levelling.level(o, k, s.v1, s.v2, w_c, s.command)
+    s.azimuth = extended_observer.azimuth(o, k)
+    s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k)

@@ -1,0 +1,36 @@
+"""Attitude as NMEA 0183 sentences for equipment that speaks nothing else: HEHDT (heading) and PASHR (attitude).
+
+Signs of PASHR: roll positive with the port side up, pitch positive with the bow up, heave positive upwards. In FLU a
+positive pitch has the bow down, so it changes its sign.
+"""
+import math
+
+DAY = 86400.0
+
+
+def sentence(body):
+    """The body between its $ and its checksum, CR LF at the end: ASCII bytes."""
+    checksum = 0
+    for byte in body.encode('ascii'):
+        checksum ^= byte
+    return f'${body}*{checksum:02X}\r\n'.encode('ascii')
+
+
+def time_of_day(t):
+    """hhmmss.sss of t [s]."""
+    milliseconds = math.floor(t % DAY * 1000.0)
+    seconds, milliseconds = divmod(milliseconds, 1000)
+    return f'{seconds // 3600:02d}{seconds // 60 % 60:02d}{seconds % 60:02d}.{milliseconds:03d}'
+
+
+def heading(yaw):
+    """Heading [deg], 0 to 359.999, of a REP 103 yaw [rad], to the three digits that are sent."""
+    return round(math.degrees(0.5 * math.pi - yaw), 3) % 360.0
+
+
+def attitude(t, roll, pitch, yaw, heave):
+    """HEHDT and PASHR at t [s] of roll, pitch, yaw [rad] (REP 103: FLU in ENU) and heave [m], as one datagram."""
+    psi = heading(yaw)
+    return sentence(f'HEHDT,{psi:.3f},T') + sentence(
+        f'PASHR,{time_of_day(t)},{psi:.3f},T,{math.degrees(roll):+.3f},{-math.degrees(pitch):+.3f},{heave:+.3f},'
+        '0.000,0.000,0.000,1,0')

@@ -1,0 +1,115 @@
+"""The INS that aligns by itself: from IMU messages to attitude, 1-sigma and `ins/state`, through the node's code."""
+import functools
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pedestal_common import parameters, records
+from ship_motion_sim import navigator
+from ship_motion_sim.ins_wire import DATA, RAW, STATE, Ins
+from ship_motion_sim.params import InsParameters, ShipMotionParameters
+from ship_motion_sim.ship_wire import CLOCK, TRUTH, ShipMotion
+
+STEP = 20_000_000
+SEA = {'ship.sea_state': 4, 'ship.heading_deg': 60.0}
+WRONG = {'alignment.initial_heading_deg': 240.0}
+
+
+def sailed(seconds, sea=SEA, **imu):
+    """(IMU messages, true attitude (n, 4), true deck rate (n, 3)) of a ship on sea state 4."""
+    unit = ShipMotion(parameters.build(ShipMotionParameters, {**sea, **{f'imu.{k}': v for k, v in imu.items()}}))
+    heard = np.zeros(round(seconds * 1e9 / STEP), unit.HEARD)
+    heard[CLOCK]['stamp'] = STEP * np.arange(len(heard))
+    said = np.zeros(len(heard), unit.SAID)
+    unit.answers(heard, said)
+    return said[RAW], said[TRUTH]['orientation'], said[TRUTH]['twist_angular']
+
+
+@functools.cache
+def ordinary(output):
+    return sailed(260.0, output=output)
+
+
+def answered(raw, **values):
+    """What an INS says to IMU messages."""
+    unit = Ins(parameters.build(InsParameters, {**SEA, 'latency': 0.0, **values}))
+    heard, said = np.zeros(len(raw), unit.HEARD), np.zeros(len(raw), unit.SAID)
+    heard[RAW] = raw
+    unit.answers(heard, said)
+    return said
+
+
+def errors(said, truth):
+    """(n, 3) about east, north, up [rad]."""
+    return (Rotation.from_quat(said[DATA]['orientation']) * Rotation.from_quat(truth).inv()).as_rotvec()
+
+
+def aligned_at(said):
+    """Step at which `aligned` is first said."""
+    return int(np.argmax(said[STATE] == navigator.NAVIGATING))
+
+
+@pytest.mark.parametrize('method, aid, output', [
+    ('riccati_eso', 'log', 'increment'), ('riccati_eso', 'log', 'sample'), ('oba', 'gnss', 'increment'),
+    ('oba', 'log', 'sample'), ('adrc_scheduled', 'log', 'increment')])
+def test_it_aligns_under_way_from_180_deg_wrong_and_knows_how_well(method, aid, output):
+    raw, truth, rate = ordinary(output)
+    said = answered(raw, method=method, imu_output=output, **WRONG, **{'aid.source': aid})
+    e, sigma, aligned = errors(said, truth), np.sqrt(said[DATA]['orientation_variance']), aligned_at(said)
+    assert abs(e[2, 2]) > 2.0 or method == 'oba'
+    assert 100.0 < aligned * STEP * 1e-9 < 250.0 and (said[STATE][:aligned] == navigator.ALIGNING).all()
+    assert (said[STATE][aligned:] == navigator.NAVIGATING).all()
+    assert (sigma[aligned:, 2] < 0.0036).all() and (sigma[:aligned - 1, 2] > 0.0035).all()
+    assert (np.abs(e[aligned:, 2]) < 3.0 * sigma[aligned:, 2]).all()
+    assert (np.abs(e[aligned:, :2]) < 4.0 * sigma[aligned:, :2] + 1e-4).all()
+    np.testing.assert_allclose(said[DATA]['angular_velocity'][aligned:], rate[aligned:], atol=2e-4)
+
+
+def test_a_ship_that_swell_moves_calls_itself_aligned_later():
+    """Without aid the velocity of sea state 6 is no white noise of 0.05 m/s: the sigma widens."""
+    raw, _, _ = sailed(260.0, {**SEA, 'ship.sea_state': 6}, output='increment')
+    said = answered(raw, method='riccati_eso', imu_output='increment', **WRONG, **{'ship.sea_state': 6})
+    aided = answered(raw, method='riccati_eso', imu_output='increment', **WRONG,
+                     **{'ship.sea_state': 6, 'aid.source': 'log'})
+    assert (said[STATE] == navigator.ALIGNING).all() and 0 < aligned_at(aided) < 8000
+
+
+def test_free_inertial_keeps_the_attitude():
+    """Aligned with a loose sigma it goes on without the sea's velocity; level and heading stay within theirs."""
+    raw, truth, _ = ordinary('increment')
+    said = answered(raw, method='oba', imu_output='increment', **WRONG, **{'alignment.aligned_sigma': 0.0045})
+    aligned = aligned_at(said)
+    assert aligned > 0
+    e = errors(said, truth)
+    assert (np.abs(e[-1] - e[aligned]) < [5e-4, 5e-4, 1e-4]).all()
+
+
+def test_the_attitude_is_late_by_the_latency_and_the_state_goes_with_it():
+    raw, _, _ = ordinary('increment')
+    prompt, late = (answered(raw, method='riccati_eso', imu_output='increment', latency=latency, **WRONG,
+                             **{'aid.source': 'log'}) for latency in (0.0, 0.04))
+    assert (late[DATA]['stamp'][:2] == records.NEVER).all()
+    np.testing.assert_array_equal(late[DATA]['orientation'][2:], prompt[DATA]['orientation'][:-2])
+    assert aligned_at(late) == aligned_at(prompt) + 2 and late[STATE][0] == navigator.ALIGNING
+
+
+def test_a_message_that_is_not_finite_is_bridged():
+    raw, truth, _ = ordinary('increment')
+    broken = raw.copy()
+    broken['angular_velocity'][3000] = math.nan
+    said = answered(broken, method='riccati_eso', imu_output='increment', **WRONG, **{'aid.source': 'log'})
+    assert said[DATA]['stamp'][3000] == records.NEVER
+    assert np.isfinite(said[DATA]['orientation']).all()
+    assert abs(errors(said, truth)[-1, 2]) < 3.0 * math.sqrt(said[DATA]['orientation_variance'][-1, 2])
+
+
+def test_the_model_says_nothing_of_alignment():
+    raw, _, _ = ordinary('sample')
+    assert (answered(raw[:100])[STATE] == -1).all()
+
+
+def test_a_gnss_is_of_no_use_before_the_heading_is_known():
+    with pytest.raises(parameters.ParameterError, match="'gnss': must be none or log unless method = oba"):
+        parameters.build(InsParameters, {'method': 'adrc', 'aid.source': 'gnss'})

@@ -1,0 +1,37 @@
+import math
+
+import pynmea2
+import pytest
+
+from ship_motion_sim import nmea
+
+
+def parsed(*attitude):
+    heading, all_of_it = nmea.attitude(*attitude).decode('ascii').splitlines()
+    return pynmea2.parse(heading, check=True), pynmea2.parse(all_of_it, check=True)
+
+
+def test_a_public_parser_reads_it_back():
+    roll, pitch, yaw = math.radians(3.2), math.radians(-1.5), math.radians(50.0)
+    heading, attitude = parsed(3723.4567, roll, pitch, yaw, -0.75)
+    assert heading.talker == 'HE' and heading.hdg_true == 'T' and float(heading.heading) == 40.0
+    assert attitude.timestamp.isoformat()[:12] == '01:02:03.456'
+    assert (attitude.true_heading, attitude.is_true_heading) == (40.0, 'T')
+    assert (attitude.roll, attitude.pitch, attitude.heave) == (3.2, 1.5, -0.75)
+
+
+@pytest.mark.parametrize('yaw_deg, heading', [(90.0, 0.0), (0.0, 90.0), (-90.0, 180.0), (180.0, 270.0),
+                                              (90.0002, 0.0), (450.0, 0.0)])
+def test_heading_is_clockwise_from_north_and_below_360(yaw_deg, heading):
+    assert parsed(0.0, 0.0, 0.0, math.radians(yaw_deg), 0.0)[1].true_heading == pytest.approx(heading, abs=1e-9)
+
+
+def test_the_day_begins_again():
+    assert nmea.time_of_day(86399.9999) == '235959.999'
+    assert nmea.time_of_day(86400.0) == '000000.000'
+
+
+def test_a_changed_byte_is_found():
+    broken = nmea.attitude(0.0, 0.1, 0.0, 0.0, 0.0).decode().splitlines()[1].replace('+5.730', '+5.731')
+    with pytest.raises(pynmea2.ChecksumError):
+        pynmea2.parse(broken, check=True)

@@ -1,0 +1,135 @@
+"""A recorded motion against the waves it was sampled from, its own differences, and what is no recording."""
+import math
+
+import numpy as np
+import pytest
+
+from pedestal_common.csv_table import TableError
+from pedestal_common.parameters import ParameterError
+from ship_motion_sim import motion, recording
+from ship_motion_sim.params import RecordedParameters, ShipParameters
+
+SAMPLED = ShipParameters(sea_state=6, wave_angle_deg=60.0, heading_deg=358.0, speed=6.0)
+PERIOD, LENGTH = 0.1, 60.0
+
+
+def truth(constants, t):
+    inputs, outputs = np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS)
+    inputs['t'] = t
+    motion.step(constants, inputs, outputs)
+    return outputs[0]
+
+
+def recorded(path, speed=6.0, **changes):
+    return motion.constants(ShipParameters(motion='recorded', speed=speed, recorded=RecordedParameters(
+        path=str(path), **changes)))
+
+
+@pytest.fixture(scope='module')
+def waves():
+    return motion.constants(SAMPLED)
+
+
+@pytest.fixture(scope='module')
+def path(waves, tmp_path_factory):
+    """A minute of the waves at 10 Hz as an instrument writes them: signs of PASHR, time of its own."""
+    path = tmp_path_factory.mktemp('recording') / 'ship.csv'
+    lines = ['time_s,note,roll_deg,pitch_deg,heading_deg,surge_m,sway_m,heave_m']
+    for t in np.arange(0.0, LENGTH + PERIOD / 2.0, PERIOD):
+        ship = truth(waves, t)
+        roll, pitch, heading = (math.degrees(value) for value in (ship['roll'], -ship['pitch'],
+                                                                  0.5 * math.pi - ship['yaw']))
+        surge, sway, heave = ship['freedoms'][0, :3]
+        lines.append(f'{1.7e9 + t:.3f},ok,{roll:.12f},{pitch:.12f},{heading % 360.0:.12f},{surge:.12f},{sway:.12f},'
+                     f'{heave:.12f}')
+    path.write_text('\n'.join(lines) + '\n')
+    return path
+
+
+@pytest.mark.parametrize('t', [5.0, 17.37, 31.0, 54.99])
+def test_a_sampled_sea_comes_back_with_its_rates_and_accelerations(waves, path, t):
+    """Cubic spline, h = 0.1 s: errors of h^4 x''''/384, of the acceleration h^2 x''''/12, motions below 2 rad/s."""
+    was, now = truth(waves, t), truth(recorded(path), t)
+    for field, tolerance in (('quaternion', 1e-6), ('angular_velocity', 1e-5), ('angular_acceleration', 1e-3)):
+        np.testing.assert_allclose(now[field], was[field], atol=tolerance, err_msg=field)
+    for row, tolerance in enumerate((1e-6, 1e-4, 1e-2)):
+        np.testing.assert_allclose(now['freedoms'][row, :3], was['freedoms'][row, :3], atol=tolerance)
+
+
+def test_the_course_is_the_mean_heading_of_the_record(waves, path):
+    yaw = [truth(waves, t)['yaw'] for t in np.arange(0.0, LENGTH + PERIOD / 2.0, PERIOD)]
+    constants = recorded(path, speed=10.0)
+    along = (truth(constants, 1000.0)['position'] - truth(constants, 900.0)['position'])[:2]
+    np.testing.assert_allclose(along, 1000.0 * np.array([math.cos(np.mean(yaw)), math.sin(np.mean(yaw))]), atol=1e-6)
+
+
+@pytest.mark.parametrize('t', [-4.0, 0.05, 33.333, LENGTH + 1.0, LENGTH + 4.9])
+def test_rates_and_accelerations_are_derivatives_of_what_is_published(path, t):
+    """In and outside the record."""
+    constants, h = recorded(path), 0.005
+
+    def difference(row):
+        x = [truth(constants, t + i * h)['freedoms'][row].copy() for i in (-2, -1, 1, 2)]
+        return (8.0 * (x[2] - x[1]) - (x[3] - x[0])) / (12.0 * h)
+
+    now = truth(constants, t)['freedoms']
+    np.testing.assert_allclose(difference(0), now[1], atol=1e-8)
+    np.testing.assert_allclose(difference(1), now[2], atol=1e-7)
+
+
+@pytest.mark.parametrize('t', [0.0, 12.3, LENGTH, -recording.HOLD, LENGTH + recording.HOLD])
+def test_the_second_derivative_has_no_jumps(path, t):
+    constants = recorded(path)
+    before, after = (truth(constants, t + e)['freedoms'].copy() for e in (-1e-7, 1e-7))
+    np.testing.assert_allclose(before, after, atol=1e-5)
+
+
+def test_the_ship_rests_where_the_record_ends(path):
+    constants = recorded(path, start=10.0)
+    for t, end in ((-10.0 - recording.HOLD, -10.0), (-1e4, -10.0), (LENGTH - 10.0 + recording.HOLD, LENGTH - 10.0),
+                   (1e6, LENGTH - 10.0)):
+        now = truth(constants, t)
+        np.testing.assert_allclose(now['freedoms'][0], truth(constants, end)['freedoms'][0], atol=1e-12)
+        np.testing.assert_allclose(now['freedoms'][1:], 0.0, atol=1e-12)
+    np.testing.assert_array_equal(truth(constants, 5.0)['quaternion'], truth(recorded(path), 15.0)['quaternion'])
+
+
+def test_signs_are_those_of_instruments_and_displacements_may_be_missing(tmp_path):
+    path = tmp_path / 'still.csv'
+    path.write_text('time_s,roll_deg,pitch_deg,heading_deg\n' + ''.join(f'{t},10,4,90\n' for t in range(5)))
+    now = truth(recorded(path, speed=0.0), 2.5)
+    np.testing.assert_allclose(now['position'], 0.0, atol=1e-15)
+    np.testing.assert_allclose(now['mat_ed'][:, 0], [math.cos(math.radians(4.0)), 0.0, math.sin(math.radians(4.0))],
+                               atol=1e-14)     # the bow points east and up
+    assert now['mat_ed'][2, 1] > 0.0           # port is up
+
+
+HEAD = 'time_s,roll_deg,pitch_deg,heading_deg\n'
+
+
+@pytest.mark.parametrize('content, changes, message', [
+    ('time_s,roll_deg,heading_deg\n', {}, "line 1: column 'pitch_deg' is missing"),
+    (HEAD + '0,1,1,1\n1,1,1,1\n1,1,1,1\n', {}, 'line 4: time_s = 1: 0 s after the row before, must be above 0 and at '
+                                               'most ship.recorded.max_gap = 2 s'),
+    (HEAD + '0,1,1,1\n5,1,1,1\n', {}, 'line 3: time_s = 5: 5 s after the row before'),
+    (HEAD + '0,nan,1,1\n', {}, 'line 2: roll_deg = nan: must be -80 to 80'),
+    (HEAD + '0,1,,1\n', {}, "line 2: pitch_deg = '': must be a number"),
+    (HEAD + '0,1,1,1\n1,1,1,1\n', {}, '2 rows, must be at least 4'),
+    (HEAD + ''.join(f'{t},1,1,1\n' for t in range(6)), {'start': 5.0},
+     'ship.recorded.start = 5 s: must be below the length of the record, 5 s'),
+    (HEAD + ''.join(f'{t},1,1,1\n' for t in range(recording.ROWS + 1)), {}, f'must be at most {recording.ROWS}'),
+])
+def test_what_is_no_recording_is_named(tmp_path, content, changes, message):
+    path = tmp_path / 'ship.csv'
+    path.write_text(content)
+    with pytest.raises(TableError) as error:
+        recorded(path, **changes)
+    assert str(error.value).startswith(f'{path}: ') and message in str(error.value)
+
+
+def test_a_recorded_motion_needs_its_file_and_has_its_own_heading():
+    for values in (dict(motion='recorded'), dict(recorded=RecordedParameters(path='ship.csv'))):
+        with pytest.raises(ParameterError, match='recorded.path = '):
+            ShipParameters(**values)
+    with pytest.raises(ParameterError, match='heading_deg = 30 deg: must be 0'):
+        ShipParameters(motion='recorded', heading_deg=30.0, recorded=RecordedParameters(path='ship.csv'))

@@ -1,0 +1,53 @@
+"""Smoothing of the receiver's angle errors, in the readings of paper 002's eq. (1).
+
+    none            the mean of the samples of one step
+    recursion       eq. (1) as printed: a first-order low-pass, x = (n - 1) / n x + 1 / n y. Its bandwidth (eq. 2) is
+                    1 / ((n - 1) T) rad/s, its mean delay n - 1 samples
+    moving_average  what the text says and eq. (1) is not: the mean of the last n samples, delay (n - 1) / 2 samples
+"""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+SMOOTHINGS = ('none', 'recursion', 'moving_average')
+NO_SMOOTHING, RECURSION, MOVING_AVERAGE = range(len(SMOOTHINGS))
+
+WINDOW = 256
+"""Longest moving average in samples."""
+
+SMOOTHER = np.dtype([('low_pass', 'f8'), ('sum', 'f8'), ('samples', 'f8', (WINDOW,)), ('count', 'i8')], align=True)
+"""Output of the recursion; sum of this step's samples; the last samples, how many there were since the start."""
+
+
+@compiled
+def begin(s):
+    """Begin a step."""
+    s.sum = 0.0
+
+
+@compiled
+def put(s, y, gain):
+    """Take one sample y; gain = 1/n of the recursion."""
+    s.sum += y
+    s.low_pass += gain * (y - s.low_pass)
+    s.samples[s.count % WINDOW] = y
+    s.count += 1
+
+
+@compiled
+def smoothed(s, kind, samples, n):
+    """What comes out at the end of a step of `samples`; n: of the moving average, which is shorter at the start."""
+    if kind == RECURSION:
+        return s.low_pass
+    if kind == NO_SMOOTHING:
+        return s.sum / samples
+    length = min(n, s.count)
+    total = 0.0
+    for k in range(s.count - length, s.count):
+        total += s.samples[k % WINDOW]
+    return total / length
+
+
+def delay(kind, samples, n):
+    """Mean delay in samples of a kind of SMOOTHINGS: how long before the newest sample the result belongs."""
+    return {'none': 0.5 * (samples - 1), 'recursion': n - 1.0, 'moving_average': 0.5 * (n - 1)}[kind]

@@ -1,0 +1,187 @@
+"""Electronic beams as real nodes in lockstep: four beams of one array on four targets, one beam on a swaying ship at
+10 ms and at 1 ms against the composed cores, and the array's node alone."""
+import itertools
+import json
+import math
+import signal
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from pedestal_bringup import bag as bags
+from pedestal_bringup import closed_loop, export, recompute, report, results, scenario
+from pedestal_bringup.verify import verify
+from pedestal_common import messages
+
+FOUR, SWAY = 'phased_array_four', 'phased_array_sway'
+BEAMS = [f'beam_{i}' for i in range(1, 5)]
+FAST = ('--param', 'acu.tracker.lock_count=20')
+LENGTH = {'four': 3.0, 'sway': 2.0, 'sway 1 ms': 1.0}
+
+
+@pytest.fixture(scope='module')
+def runs(start_run):
+    """Finished runs by name."""
+    started = {'four': start_run(FOUR, '--duration', '3', *FAST)}
+    done = started['four'].finish()
+    assert done.returncode == 0, done.stderr
+    started['sway'] = start_run(SWAY, '--duration', '2', *FAST)
+    started['sway 1 ms'] = start_run(SWAY, '--duration', '1', *FAST, '--param', 'adu.period=0.001')
+    for name in ('sway', 'sway 1 ms'):
+        done = started[name].finish()
+        assert done.returncode == 0, done.stderr
+    return started
+
+
+@pytest.fixture(scope='module')
+def views(runs):
+    return {beam: bags.read(runs['four'].bag, beam) for beam in BEAMS}
+
+
+def test_each_beam_tracks_its_own_target(views):
+    tracked = {beam: results.tracking(view) for beam, view in views.items()}
+    for run in tracked.values():
+        assert run.mode[-1] == 'autotrack' and run.tracking.any()
+        error = np.column_stack((run.cross_elevation, run.elevation_error))[run.tracking]
+        assert np.abs(error).max() < math.radians(0.06)  # a fiftieth of the beamwidth
+    for one, other in itertools.combinations(tracked.values(), 2):
+        assert math.hypot(one.azimuth[-1] - other.azimuth[-1], one.elevation[-1] - other.elevation[-1]) > 0.1
+        both = np.isfinite(one.measured[:, 1] + other.measured[:, 1])
+        noise = [(run.measured[:, 1] - run.elevation_error)[both] for run in (one, other)]
+        assert abs(np.corrcoef(*noise)[0, 1]) < 0.3  # the noise of each is its own
+
+
+def test_one_bag_holds_all_beams_and_is_complete(runs):
+    check = verify(runs['four'].bag)
+    assert check.complete, check.lines()
+    assert check.steps == 301
+    counts = {topic.name: topic.count for topic in check.topics}
+    assert {name: counts[f'{beam}/{name}'] for beam in BEAMS for name in ('joint_states', 'acu/reference')} == {
+        'joint_states': 301, 'acu/reference': 301}
+    assert counts['clock'] == 301 and 'adu/motor_states' not in counts and 'joint_states' not in counts
+    speakers = {array.status[0].name for *_, array in bags.read(runs['four'].bag).messages('diagnostics')}
+    assert speakers == {'adu', *(f'{beam}/{node}' for beam in BEAMS for node in ('acu', 'tracking_receiver'))}
+
+
+def test_the_results_are_told_by_beam(runs):
+    rows = json.loads(runs['four'].json.read_text())['rows']
+    assert {row['case'] for row in rows} == {FOUR, *(f'{FOUR}/{beam}' for beam in BEAMS)}
+    assert {row['metric'] for row in rows if row['case'] == FOUR} == {'lost_steps', 'realtime_factor', 'messages'}
+
+
+def test_the_same_run_gives_the_same_file(runs, run_process, tmp_path):
+    rerun = [sys.executable, '-m', 'pedestal_bringup.cli', 'rerun', runs['four'].bag, '--bag', tmp_path / 'again']
+    done = run_process(rerun, 90.0)
+    assert (done.returncode, done.stderr) == (0, '')
+    assert ': equal to the last byte, ' in done.stdout
+
+
+@pytest.mark.parametrize('name, beam', [('four', 'beam_1'), ('four', 'beam_4'), ('sway', ''), ('sway 1 ms', '')])
+def test_every_node_of_a_beam_recomputes_identically(runs, name, beam):
+    recording = recompute.Recording(runs[name].bag, beam=beam)
+    nodes = recompute.chosen(recording, (), None)
+    assert set(nodes) >= {'tracking_receiver', 'acu', 'adu'}
+    for node in nodes:
+        done = recompute.recompute(recording, node, recompute.parameters_of(recording, node))
+        compared = recompute.compare(recording, done.outputs, done.unit, recompute.comparison.Tolerance())
+        assert compared and all(topic.identical for topic in compared), [topic.lines() for topic in compared]
+        assert recompute.idle(recording, done) == ''
+
+
+def test_report_and_export_of_one_beam(runs, tmp_path):
+    page = report.write(runs['four'].bag, tmp_path / 'report.html', beam='beam_2').read_text()
+    assert f'Tracking run: {FOUR}/beam_2' in page and 'Not compared' not in page
+    name = 'beam_3/tracking_receiver/angle_error'
+    [(file, rows, _)] = export.export(runs['four'].bag, output=tmp_path, names=[name])
+    assert rows == 301 and file.read_text().splitlines()[0] == 't [s],stamp [ns],x [rad],y [rad],z [dB-Hz]'
+    with pytest.raises(bags.BagError, match="beam 'beam_5': must be one of beam_1, beam_2, beam_3, beam_4"):
+        bags.read(runs['four'].bag, 'beam_5')
+
+
+COLUMNS = {
+    'joint_states': [('azimuth.position', 'position', 0), ('elevation.position', 'position', 1)],
+    'tracking_receiver/angle_error': [('x', 'measured', 0), ('y', 'measured', 1)],
+    'acu/reference': [('azimuth.position', 'reference', (0, 0)), ('elevation.position', 'reference', (1, 0)),
+                      ('elevation.velocity', 'reference', (1, 1))],
+    'acu/estimate': [('azimuth.position', 'estimate', (0, 0)), ('elevation.acceleration', 'estimate', (1, 2))],
+}
+
+
+@pytest.mark.parametrize('name, scenario_name, beam, more', [
+    ('four', FOUR, 'beam_3', []), ('sway', SWAY, '', []), ('sway 1 ms', SWAY, '', ['adu.period=0.001'])])
+def test_the_composed_cores_equal_the_nodes(runs, name, scenario_name, beam, more):
+    chosen = scenario.load(scenario_name, [FAST[1], *more], duration=LENGTH[name])
+    composed = closed_loop.run(closed_loop.cores(chosen, beam))
+    recorded = bags.read(runs[name].bag, beam)
+    assert set(recorded.table('acu/mode')['data']) == {'program', 'autotrack'}
+    for topic, columns in COLUMNS.items():
+        table = recorded.table(topic)
+        assert len(table['t']) == len(composed) and np.array_equal(table['t'], np.round(composed['t'], 9))
+        for column, field, index in columns:
+            there = composed[field][(slice(None), *np.atleast_1d(index))]
+            assert np.array_equal(table[column], there, equal_nan=True), (topic, column)
+
+
+@pytest.fixture(scope='module')
+def array(start_node, connect):
+    """The array's node alone, obeying this test as its ACU."""
+    node = start_node('beam_steering', '-p', 'period:=0.01', '-p', 'transport_delay:=0.02', '-p', 'graph.beams:=1',
+                      '-p', 'command_timeout:=100')
+    client = connect(node.domain_id, 'acu')
+    client.read('joint_states')
+    client.read('diagnostics')
+    client.read('adu/state')
+    client.write('acu/reference')
+    return node, client
+
+
+def test_the_array_obeys_stays_and_tells_why(array):
+    node, client = array
+    point = messages.trajectory_point()
+    command = messages.joint_trajectory('base_link', [point])
+
+    def hear(seconds):
+        until = time.monotonic() + seconds
+        client.until(lambda: time.monotonic() > until and client.heard['joint_states'])
+
+    def newest():
+        return client.heard['joint_states'][-1]
+
+    def steer(azimuth):
+        """Command this azimuth with the stamp of the newest joint states."""
+        hear(0.1)
+        command.header.stamp = newest().header.stamp
+        point.positions[:] = azimuth, 0.5
+        client.publish('acu/reference', command)
+
+    def follows(azimuth):
+        steer(azimuth)
+        client.until(lambda: newest().position[0] == azimuth)
+
+    def stays(azimuth):
+        before = newest().position[0]
+        steer(azimuth)
+        hear(0.3)
+        assert newest().position[0] == before
+
+    follows(0.25)
+    steer(math.nan)
+    assert client.diagnosed('acu/reference holds NaN').message.endswith(': the beam stays')
+    assert newest().position[0] == 0.25
+    assert client.trigger('adu/disable') == (True, 'drive is disabled')
+    stays(0.5)
+    assert client.trigger('adu/enable') == (True, 'drive is enabled')
+    follows(0.5)
+    assert client.trigger('adu/emergency_stop') == (True, 'drive is emergency stop')
+    assert client.trigger('adu/enable') == (
+        False, 'refused: an emergency stop is latched (adu/reset_faults); drive is emergency stop')
+    stays(0.75)
+    assert client.trigger('adu/reset_faults') == (True, 'drive is enabled')
+    client.diagnosed('no new acu/reference for 1 s: the beam stays')
+    assert [message.data for message in client.heard['adu/state']] == [
+        'enabled', 'disabled', 'enabled', 'emergency stop', 'enabled']
+    node.process.send_signal(signal.SIGTERM)
+    done = node.finish()
+    assert (done.returncode, done.stderr) == (0, '')

@@ -1,0 +1,139 @@
+"""Tracking from a moving deck: the rows of the ship's scenarios, and what a run sends to equipment on board."""
+import dataclasses
+import json
+import math
+import socket
+import threading
+
+import numpy as np
+import pynmea2
+import pytest
+
+from acu_tracker import modes
+from pedestal_bringup import bag as bags
+from pedestal_bringup import closed_loop, isolation, results, scenario
+from ship_motion_sim import motion
+from tracking_receiver_sim import target
+
+
+def track(name, *overrides):
+    """(scenario, steps of its closed loop, bool: evaluated): the lockstep run to the last bit (test_lockstep)."""
+    chosen = scenario.load(name, overrides)
+    steps = closed_loop.run(closed_loop.cores(chosen))
+    automatic = steps['mode'] == modes.AUTOTRACK
+    return chosen, steps, automatic & (steps['t'] >= steps['t'][automatic][0] + results.SETTLING)
+
+
+def pointing(name, *overrides):
+    """Pointing error [deg] rms of a scenario."""
+    _, steps, on = track(name, *overrides)
+    return math.degrees(results.rms(steps['true_error'][on]))
+
+
+def isolated(name, *overrides):
+    """The isolation.Isolation of a scenario."""
+    chosen, steps, on = track(name, *overrides)
+    constants = motion.constants(chosen.node_parameters('ship_motion').ship)
+    inputs, truth = np.zeros(1, motion.INPUTS), np.zeros(on.sum(), motion.OUTPUTS)
+    t = steps['t'][on]
+    for k in range(t.size):
+        inputs['t'] = t[k]
+        motion.step(constants, inputs, truth[k:k + 1])
+    built = target.build(chosen.node_parameters('tracking_receiver').target, chosen.header.duration)
+    azimuth, elevation, distance = target.look_angles(built, t)
+    seen = np.column_stack((np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation),
+                            np.sin(elevation))) * distance[:, None] - truth['position']
+    return isolation.measure(t[1] - t[0], steps['true_error'][on], seen, truth['quaternion'],
+                             truth['angular_velocity'])
+
+
+@pytest.fixture(scope='module')
+def ashore():
+    return pointing('leo_pass')
+
+
+@pytest.mark.parametrize('name, overrides, times', [
+    ('ship_pass', (), 1.3), ('ship_pass', ('ins.latency=0.02',), 1.5), ('ship_pass_ss6', (), 1.5)])
+def test_a_ship_points_nearly_as_well_as_the_shore(ashore, name, overrides, times):
+    assert pointing(name, *overrides) <= times * ashore
+
+
+@pytest.mark.parametrize('name', ['ship_pass', 'ship_pass_ss6'])
+def test_the_ship_is_isolated_by_60_db(name):
+    found = isolated(name)
+    assert found.motion > math.radians(0.5)
+    assert found.isolation >= 60.0 and found.limit >= 60.0
+
+
+def test_without_noise_the_isolation_is_far_above_60_db():
+    """A receiver and an INS without noise; the filter is told of 5e-4 rad, or it would follow every quirk."""
+    found = isolated('ship_pass', 'tracking_receiver.receiver.cn0_dbhz=120', 'acu.tracker.receiver.sigma_floor=5e-4',
+                     *(f'ins.{name}=0' for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
+                                                    'heading_wander')))
+    assert found.isolation > 80.0
+
+
+@dataclasses.dataclass
+class Told:
+    """A short ship_pass: its bag, its rows, the datagrams it sent."""
+    bag: bags.Bag
+    rows: dict
+    datagrams: list
+
+
+@pytest.fixture(scope='module')
+def told(start_run):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
+        ear.bind(('127.0.0.1', 0))
+        ear.settimeout(1.0)
+        heard, ended = [], threading.Event()
+
+        def listen():
+            while not ended.is_set():
+                try:
+                    heard.append(ear.recv(1024))
+                except TimeoutError:
+                    pass
+        listener = threading.Thread(target=listen)
+        listener.start()
+        run = start_run('ship_pass', '--pacing', 'lockstep', '--duration', '24', '--param',
+                        f'ship_motion.nmea.port={ear.getsockname()[1]}', '--param', 'ship_motion.nmea.rate=5')
+        result = run.finish(120.0)
+        ended.set()
+        listener.join()
+    assert result.returncode == 0, result.stderr
+    rows = {row['metric']: row for row in json.loads(run.json.read_text())['rows']}
+    return Told(bags.read(run.bag), rows, heard)
+
+
+def test_datagrams_are_the_recorded_attitude_at_their_stamps(told):
+    truth = told.bag.table('ship/truth')
+    assert 0.9 * 24 * 5 < len(told.datagrams) <= 24 * 5 + 1      # UDP may lose some
+    stamps = set()
+    for datagram in told.datagrams:
+        heading, attitude = (pynmea2.parse(line, check=True) for line in datagram.decode('ascii').splitlines())
+        assert (heading.talker, heading.sentence_type, heading.hdg_true) == ('HE', 'HDT', 'T')
+        clock = attitude.timestamp
+        t = clock.hour * 3600 + clock.minute * 60 + clock.second + 1e-6 * clock.microsecond
+        stamps.add(t)
+        k = int(np.argmin(np.abs(truth['t'] - t)))
+        assert truth['t'][k] == pytest.approx(t, abs=1e-6)
+        x, y, z, w = (truth[f'orientation.{letter}'][k] for letter in 'xyzw')
+        bow_north, bow_east = 2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)
+        assert (float(heading.heading) - math.degrees(math.atan2(bow_east, bow_north)) + 180.0) % 360.0 - 180.0 == (
+            pytest.approx(0.0, abs=1e-3))
+        # The bow's height is pitch, port's is roll times cos(pitch); signs of instruments: bow up, port up.
+        pitch = math.asin(2.0 * (x * z - w * y))
+        roll = math.asin(2.0 * (y * z + w * x) / math.cos(pitch))
+        assert attitude.true_heading == float(heading.heading)
+        assert attitude.roll == pytest.approx(math.degrees(roll), abs=1e-3)
+        assert attitude.pitch == pytest.approx(math.degrees(pitch), abs=1e-3)
+        assert attitude.heave == pytest.approx(truth['position.z'][k], abs=1e-3)
+    assert len(stamps) == len(told.datagrams)
+
+
+def test_the_rows_of_a_run_say_its_isolation(told):
+    found = isolation.read(told.bag, results.tracking(told.bag))
+    assert told.rows['isolation_db']['value'] == found.isolation and told.rows['isolation_db']['target'] == '>= 60'
+    assert told.rows['isolation_limit_db']['value'] == found.limit
+    assert told.rows['loss_s']['value'] == 0.0
