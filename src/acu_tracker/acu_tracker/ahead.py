@@ -43,14 +43,16 @@ def forget(h):
 
 @compiled
 def take_attitude(h, stamp, quaternion, mean_time):
-    """Move the mean attitude by a new one (4,); of the first ones it is the plain mean."""
+    """Move the mean attitude by a new one (4,). A ship whose mean is not known yet is taken to be level."""
     if not h.latest > -math.inf:
         h.since = stamp
-        h.mean[:] = quaternion
+        heading = math.hypot(quaternion[2], quaternion[3])
+        h.mean[0] = h.mean[1] = 0.0
+        h.mean[2], h.mean[3] = quaternion[2] / heading, quaternion[3] / heading
         h.spread = 0.0
     else:
         T = stamp - h.latest
-        share = T / (min(stamp - h.since, mean_time) + T)
+        share = T / (mean_time + T)
         dot = 0.0
         for i in range(4):
             dot += h.mean[i] * quaternion[i]
@@ -63,7 +65,7 @@ def take_attitude(h, stamp, quaternion, mean_time):
         a, b = h.mean, quaternion
         x = 2.0 * (b[0] * b[2] - b[3] * b[1] - a[0] * a[2] + a[3] * a[1])
         y = 2.0 * (b[1] * b[2] + b[3] * b[0] - a[1] * a[2] - a[3] * a[0])
-        h.spread += share * (x * x + y * y - h.spread)
+        h.spread += T / (min(stamp - h.since, mean_time) + T) * (x * x + y * y - h.spread)
     h.latest = stamp
 
 

@@ -41,8 +41,7 @@ def turned(b, x, y, z):
 @compiled
 def outlook(b, times, table, t):
     """Earth (A, dA, ddA, E, dE, ddE) of the turned program at t."""
-    A, dA, ddA = program_track.interpolated(times, table, t, 0)
-    E, dE, ddE = program_track.interpolated(times, table, t, 1)
+    A, dA, ddA, E, dE, ddE = program_track.outlook(times, table, t)
     e, n, u, de, dn, du, dde, ddn, ddu = moving_direction(A, dA, ddA, E, dE, ddE)
     e, n, u = turned(b, e, n, u)
     de, dn, du = turned(b, de, dn, du)

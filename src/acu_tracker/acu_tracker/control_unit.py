@@ -230,8 +230,7 @@ def followed(s, p, c, times, angles, t):
     """(in the frame of the filter, A, dA, ddA, E, dE, ddE) at t of what program or autotrack follows: 1 for angles in
     that frame, 0 for earth angles. A silence that has a reason is bridged by the program."""
     if s.mode == modes.PROGRAM:
-        A, dA, ddA = program_track.interpolated(times, angles, t, 0)
-        E, dE, ddE = program_track.interpolated(times, angles, t, 1)
+        A, dA, ddA, E, dE, ddE = program_track.outlook(times, angles, t)
         return 0, A, dA, ddA, E, dE, ddE
     if s.bridge.there and silent(s, p) and excused(s, p) and program_track.status(times, t) == modes.NONE:
         A, dA, ddA, E, dE, ddE = bridge.outlook(s.bridge, times, angles, t)
@@ -253,8 +252,7 @@ def deck_rates(s, p, t):
 @compiled
 def program_target(s, p, times, angles, t):
     """Deck angles of the program track at t; the azimuth not yet on a turn."""
-    A, dA, ddA = program_track.interpolated(times, angles, t, 0)
-    E, dE, ddE = program_track.interpolated(times, angles, t, 1)
+    A, dA, ddA, E, dE, ddE = program_track.outlook(times, angles, t)
     return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
 
 

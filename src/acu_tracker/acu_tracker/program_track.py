@@ -3,12 +3,15 @@ import math
 
 import numpy as np
 
+from acu_tracker.deck_reference import from_lever_arm, moving_angles
 from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
 from pedestal_common.compiled import compiled
 from pedestal_common.interval import interval
 from pedestal_common.line_of_sight import earth_direction, wrap
 
 MAX_ROWS = 100_000
+STEEP = math.radians(80.0)
+"""Elevation of the rows above which directions are interpolated."""
 
 
 class ProgramTrackError(ValueError):
@@ -78,9 +81,55 @@ def interpolated(times, angles, t, axis):
 
 
 @compiled
+def _component(angles, i, axis):
+    """Component (0 east, 1 north, 2 up) of the unit vector of row i."""
+    return earth_direction(angles[i, 0], angles[i, 1])[axis]
+
+
+@compiled
+def _component_slope(times, angles, i, axis):
+    """As _slope, of a component."""
+    m = min(max(i, 1), len(times) - 2)
+    before, after = times[m] - times[m - 1], times[m + 1] - times[m]
+    middle = _component(angles, m, axis)
+    d0 = (middle - _component(angles, m - 1, axis)) / before
+    d1 = (_component(angles, m + 1, axis) - middle) / after
+    return d0 + (d1 - d0) / (before + after) * (before + 2.0 * (times[i] - times[m]))
+
+
+@compiled
+def _curve(times, angles, i, t, axis):
+    """(component, its rate, acceleration) at t between rows i and i + 1; as `interpolated`."""
+    T = times[i + 1] - times[i]
+    x = (t - times[i]) / T
+    y0 = _component(angles, i, axis)
+    d = _component(angles, i + 1, axis) - y0
+    m0, m1 = T * _component_slope(times, angles, i, axis), T * _component_slope(times, angles, i + 1, axis)
+    c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
+    return (y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
+            (2.0 * c2 + 6.0 * x * c3) / (T * T))
+
+
+@compiled
+def outlook(times, angles, t):
+    """(A, dA, ddA, E, dE, ddE) at t [s]. Between two rows above STEEP, where the azimuth may turn by any amount from
+    one to the next, the unit vector is interpolated instead of the angles."""
+    i = interval(times, t)
+    if min(angles[i, 1], angles[i + 1, 1]) < STEEP or len(times) < 3:
+        A, dA, ddA = interpolated(times, angles, t, 0)
+        E, dE, ddE = interpolated(times, angles, t, 1)
+        return A, dA, ddA, E, dE, ddE
+    e, de, dde = _curve(times, angles, i, t, 0)
+    n, dn, ddn = _curve(times, angles, i, t, 1)
+    u, du, ddu = _curve(times, angles, i, t, 2)
+    return moving_angles(*from_lever_arm(0.0, 0.0, 0.0, n, -e, u, dn, -de, du, ddn, -dde, ddu))
+
+
+@compiled
 def direction(times, angles, t):
     """ENU unit vector at t [s]."""
-    return earth_direction(interpolated(times, angles, t, 0)[0], interpolated(times, angles, t, 1)[0])
+    A, _, _, E, _, _ = outlook(times, angles, t)
+    return earth_direction(A, E)
 
 
 @compiled

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from acu_tracker import program_track
+from acu_tracker import deck_reference, program_track
 from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
 
 
@@ -81,3 +81,21 @@ def test_bad_tables_are_named(times, angles, words):
     with pytest.raises(program_track.ProgramTrackError) as error:
         program_track.checked(times, angles)
     assert words in str(error.value) and '\n' not in str(error.value)
+
+
+@pytest.mark.parametrize('E0_deg', [89.99, 88.0, 84.0])
+def test_a_pass_through_the_zenith_is_interpolated_as_a_direction(E0_deg):
+    """A great circle of 0.87 deg/s in rows of 1 s: place, rate and acceleration of its unit vector."""
+    E0, W = math.radians(E0_deg), math.radians(0.87)
+
+    def motion(t):
+        s = W * (t - 20.3)
+        u = np.array([math.sin(s), math.cos(s) * math.cos(E0), math.cos(s) * math.sin(E0)])
+        du = W * np.array([math.cos(s), -math.sin(s) * math.cos(E0), -math.sin(s) * math.sin(E0)])
+        return np.array([*u, *du])
+    times = np.arange(41.0)
+    angles = np.array([(math.atan2(u[0], u[1]), math.asin(u[2])) for u in map(motion, times)])
+    for t in np.arange(5.0, 36.0, 0.37):
+        got = deck_reference.moving_direction(*program_track.outlook(times, angles, t))
+        np.testing.assert_allclose(got[:6], motion(t), atol=4e-5)
+        np.testing.assert_allclose(program_track.direction(times, angles, t), motion(t)[:3], atol=2e-5)
