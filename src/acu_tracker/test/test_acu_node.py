@@ -8,11 +8,11 @@ from acu_tracker.acu_node import AcuNode
 
 def test_diagnostics_show_whether_the_filter_is_honest():
     outputs = np.zeros(1, control_unit.OUTPUTS)
-    outputs['gated'] = 3
+    outputs['gated'], outputs['rates_gated'], outputs['ranges_gated'] = 3, 5, 7
     outputs['innovation'], outputs['nis'] = [(np.radians(0.0123456), np.nan)], [(1.23456, np.nan)]
     node = types.SimpleNamespace(outputs=outputs, invalid=0, refused='', drive_state='enabled',
                                  steps=types.SimpleNamespace(refused=0))
     values = dict(AcuNode.diagnose(node)[2])
-    assert values['errors gated'] == '3'
+    assert [values[f'{name} gated'] for name in ('errors', 'rates', 'ranges')] == ['3', '5', '7']
     assert (values['azimuth innovation_deg'], values['azimuth nis']) == ('0.01235', '1.235')
     assert (values['elevation innovation_deg'], values['elevation nis']) == ('nan', 'nan')

@@ -145,6 +145,8 @@ def test_bad_ranges_and_directions_are_not_believed():
     before = tracked.state['cartesian']['x'].copy()
     for wrong in (30.0, -1e9, math.inf, math.nan):
         assert tracked.take(T, range_offset=wrong) == [tracker.BELIEVED]
+    # The negative one and NaN are none.
+    assert tracked.state['ranges_gated'] == 2
     assert np.abs(tracked.state['cartesian']['x'] - before)[0, :, :3].max() < 3.0
     assert tracked.take(T, offset=1.0 * DEG) == [tracker.GATED]
     outcomes = tracked.take(21 * T, offset=3.0 * DEG)
