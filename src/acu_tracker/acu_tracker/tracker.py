@@ -2,7 +2,8 @@
 
 Between believed errors the state stays at the stamp of the last one; everybody who needs it later predicts.
 The Cartesian filter begins on the first range, where the axes' filters are, and is used once it knows the rates twice
-as well. They run on beside it, and go on where it was once it does not know the range any more.
+as well. They run on beside it, and go on where it was once it does not know the range any more. Measured rates are
+theirs alone.
 """
 import math
 
