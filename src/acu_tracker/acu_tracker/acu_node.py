@@ -127,7 +127,9 @@ class AcuNode(shell.Shell):
         self.invalid = 0
         values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
                   ('coasting', str(int(outputs['coasting']))), ('drive', self.drive_state),
-                  ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated'])))]
+                  ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
+                  ('rates gated', str(int(outputs['rates_gated']))),
+                  ('ranges gated', str(int(outputs['ranges_gated'])))]
         for axis, limited in zip(messages.AXES, np.transpose([outputs[f'{kind}_limited'] for kind in
                                                               ('angle', 'rate', 'acceleration')])):
             values.append((f'{axis} limited', ' '.join(kind for kind, on in zip(('angle', 'rate', 'acceleration'),

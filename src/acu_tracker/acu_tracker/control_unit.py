@@ -68,6 +68,7 @@ OUTPUTS = np.dtype([
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
+    ('rates_gated', 'i8'), ('ranges_gated', 'i8'),
     ('coasting', 'i8'), ('locked', 'i8'), ('blocked', 'i8'), ('invalid_input', 'i8'),
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)
@@ -506,7 +507,7 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
 
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
-    o.gated = s.tracker.gated
+    o.gated, o.rates_gated, o.ranges_gated = s.tracker.gated, s.tracker.rates_gated, s.tracker.ranges_gated
     if s.tracker.running:
         read_estimate(s, p, constants[0].tracker, o)
     look_ahead(s, p, constants[0].tracker, constants[0].sectors, times, angles)

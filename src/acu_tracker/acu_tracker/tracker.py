@@ -2,7 +2,8 @@
 
 Between believed errors the state stays at the stamp of the last one; everybody who needs it later predicts.
 The Cartesian filter begins on the first range, where the axes' filters are, and is used once it knows the rates twice
-as well. They run on beside it, and go on where it was once it does not know the range any more.
+as well. They run on beside it, and go on where it was once it does not know the range any more. Measured rates are
+theirs alone.
 """
 import math
 
@@ -72,17 +73,26 @@ def adopt(t, p, c):
     if t.running:
         axis_filter.adopt(t.azimuth, c.azimuth, p.initial_rate)
         axis_filter.adopt(t.elevation, c.elevation, p.initial_rate)
-    if (t.used[0] and not c.wanted[0]) or (t.used[1] and not c.wanted[1]):
-        hand_back(t, c)
+    hand_back(t, c, t.used[0] and not c.wanted[0], t.used[1] and not c.wanted[1])
+    if not (c.wanted[0] or c.wanted[1]):
+        t.ranged = 0
 
 
 @compiled
-def hand_back(t, c):
-    """The filters of the axes go on where the Cartesian one is, which ends."""
+def hand_back(t, c, azimuth, elevation):
+    """The filters of these axes (1: of this one) go on where the Cartesian one is, which they use no more; one that is
+    nowhere any more (NaN) leaves them where they are."""
+    if not (azimuth or elevation):
+        return
     A, dA, ddA, E, dE, ddE = outlook(t, c, t.stamp)
-    axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
-    axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
-    t.ranged = t.used[0] = t.used[1] = 0
+    if azimuth:
+        if math.isfinite(A + dA + ddA):
+            axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
+        t.used[0] = 0
+    if elevation:
+        if math.isfinite(E + dE + ddE):
+            axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
+        t.used[1] = 0
 
 
 @compiled
@@ -194,6 +204,7 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
                 return GATED, nu_a, nu_e, nu_da, nu_de, nis_a, nis_e
     if outcome == STARTED:
         near = outlook(t, c, t.stamp)[0] if t.running else azimuth
+        near = near if math.isfinite(near) else azimuth
         axis_filter.start(a, c.azimuth, near + wrap(azimuth - near), R_azimuth, p.initial_rate)
         axis_filter.start(e, c.elevation, elevation, R_elevation, p.initial_rate)
         t.in_a_row = t.ranged = t.used[0] = t.used[1] = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
@@ -202,7 +213,8 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
         if unscented.range_known(x, c.range_share_2):
             use_cartesian(t, c)
         else:
-            hand_back(t, c)
+            hand_back(t, c, t.used[0], t.used[1])
+            t.ranged = 0
     elif (c.wanted[0] or c.wanted[1]) and R_range <= c.range_share_2 * range_ * range_:
         begin_cartesian(t, c, range_, R_range)
     t.in_a_row = 1 if T > p.coast_after else t.in_a_row + 1

@@ -62,6 +62,12 @@ def test_outlier_is_gated(Rig):
     rig.step(cross_elevation=0.3)
     assert rig.invalid == {'error_gated'} and rig.outputs['nis'][0, 0] > 25.0
     assert rig.outputs['gated'] == 1
+    rig.put(**{f'{axis}.filter.{name}': value for axis in ('azimuth', 'elevation')
+               for name, value in (('kind', 'imm_ukf'), ('rate_measurement', True))})
+    rig.run(0.5, range=800.0, range_variance=1.0, error_rate_sigma=1e-4)
+    rig.step(range=900.0, range_variance=1.0, error_rate=(0.5, 0.0), error_rate_sigma=1e-4)
+    assert not rig.invalid
+    assert [rig.outputs[name][0] for name in ('gated', 'rates_gated', 'ranges_gated')] == [1, 1, 1]
     assert np.abs(rig.run(0.5)[:, 2:]).max() < 1e-5
 
 

@@ -106,9 +106,12 @@ def test_no_bump_when_the_range_is_lost_or_the_kind_changes():
     tracked = Pass()
     tracked.take(20.0)
     before = tracked.now()
-    for kinds in (('imm_ukf', 'imm'), BOTH, ('ca', 'current_statistical')):
+    for kinds in (BOTH, ('imm_ukf', 'imm'), ('ca', 'current_statistical')):
         tracked.put(kinds)
         assert tracked.now()[[0, 1, 3, 4]] == pytest.approx(before[[0, 1, 3, 4]], abs=1e-12)
+        # The axis that stays goes on with it, and it ends with the last one.
+        assert tracked.state['used'].tolist() == [[kinds[0] == 'imm_ukf', kinds == ('imm_ukf', 'imm_ukf')]]
+        assert tracked.state['ranged'] == ('imm_ukf' in kinds)
     lost = Pass()
     lost.take(15.0)
     lost.take(1.0, ranged=False)
@@ -139,12 +142,39 @@ def test_a_direction_is_compared_with_what_was_told_in_the_coast():
     assert np.abs([nu_a - (A - told[0]), nu_e - (E - told[3])]).max() < 0.05 * sigma.min()
 
 
+@pytest.mark.parametrize('ranged', [True, False])
+def test_a_cartesian_filter_that_is_nowhere_does_not_take_the_axes_along(ranged):
+    tracked = Pass()
+    tracked.take(10.0)
+    for name in ('x', 'p'):
+        tracked.state['cartesian'][name] = math.nan
+    if not ranged:
+        tracked.put(('imm_ukf', 'cv'))
+        assert np.isfinite(tracked.now()[3:]).all()
+    tracked.take(5.0, ranged)
+    assert tracked.state['used'].all() == ranged
+    error = tracked.now()[[0, 3]] - tracked.truth[tracked.k - 1]
+    assert np.abs((error + math.pi) % (2.0 * math.pi) - math.pi).max() < 3.0 * SIGMA
+    assert set(tracked.take(1.0, ranged)) == {tracker.BELIEVED}
+
+
+def test_it_ends_when_both_leave_before_it_is_used():
+    tracked = Pass()
+    while not tracked.state['ranged']:
+        tracked.take(T)
+    assert not tracked.state['used'].any()
+    tracked.put(('cv', 'cv'))
+    assert not tracked.state['ranged']
+
+
 def test_bad_ranges_and_directions_are_not_believed():
     tracked = Pass()
     tracked.take(10.0)
     before = tracked.state['cartesian']['x'].copy()
     for wrong in (30.0, -1e9, math.inf, math.nan):
         assert tracked.take(T, range_offset=wrong) == [tracker.BELIEVED]
+    # The negative one and NaN are none.
+    assert tracked.state['ranges_gated'] == 2
     assert np.abs(tracked.state['cartesian']['x'] - before)[0, :, :3].max() < 3.0
     assert tracked.take(T, offset=1.0 * DEG) == [tracker.GATED]
     outcomes = tracked.take(21 * T, offset=3.0 * DEG)
