@@ -15,7 +15,7 @@ import pytest
 FIRST_PORT = 22119
 """Port of domain id 0 in the scheme of ROS's domain_coordinator; binding it reserves the id for this session."""
 
-START = 60.0
+START = 180.0
 """Seconds within which nodes have started, also on a loaded machine."""
 
 
@@ -139,7 +139,7 @@ class Run:
         assert self.process.poll() is None, self.process.communicate()
         return sum(file.stat().st_size for file in self.bag.glob('*.mcap')) > size
 
-    def finish(self, timeout=60.0):
+    def finish(self, timeout=180.0):
         return _finished(self.process, timeout)
 
     def kill(self):

@@ -67,8 +67,8 @@ class Filter(Parameters):
     """Filter of an axis: its kind, and for every kind its parameters; all may be changed while it runs."""
 
     kind: str = choice('current_statistical', KINDS, 'of the filter; may be changed while it runs')
-    rate_measurement: bool = flag(False, 'use the measured rate of the target, where there is one (paper 004); imm_ukf '
-                                  'does while it has no range')
+    rate_measurement: bool = flag(False, 'use the measured rate of the target, where there is one (paper 004); '
+                                  'imm_ukf does while it has no range')
     alpha_beta: AlphaBeta = group(AlphaBeta)
     alpha_beta_gamma: AlphaBeta = group(AlphaBeta)
     cv: Cv = group(Cv)

@@ -46,7 +46,7 @@ class ScenarioParameters(parameters.Parameters):
     beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
     beams: int = parameters.parameter(1, 1, topics.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
                                       'in a namespace beam_1 ...')
-    deadline: float = parameters.parameter(60.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
+    deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
     program: ProgramParameters = parameters.group(ProgramParameters)
 
     def check(self):

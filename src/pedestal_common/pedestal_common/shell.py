@@ -53,7 +53,7 @@ class GraphParameters(parameters.Parameters):
                                  'among them')
     beams: int = parameters.parameter(0, 0, topics.MAX_BEAMS, '', 'beams of an electronic array, each of several in '
                                       'its namespace beam_i; 0: a drive with motors')
-    deadline: float = parameters.parameter(60.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
+    deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
 
     def check(self):
         for name in self._names:
