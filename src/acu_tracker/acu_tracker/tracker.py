@@ -97,8 +97,9 @@ def hand_back(t, c, azimuth, elevation):
 
 @compiled
 def turn(t, c, A, dA, ddA, E, dE, ddE):
-    """The angles are counted in another frame, where the target is at these now; the covariance stays."""
-    hand_back(t, c)
+    """The angles are counted in another frame, where the target is at these now; the covariance stays. The Cartesian
+    filter, which lives in the old one, ends."""
+    t.ranged = t.used[0] = t.used[1] = 0
     axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
     axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
 
