@@ -36,6 +36,19 @@ def moving_angles(x, y, z, dx, dy, dz, ddx, ddy, ddz):
 
 
 @compiled
+def earth_motion(e, n, u, de, dn, du, dde, ddn, ddu):
+    """(A, dA, ddA, E, dE, ddE) of an ENU position [m], its velocity and acceleration, seen from the origin."""
+    r = math.sqrt(e * e + n * n + u * u)
+    e, n, u = e / r, n / r, u / r
+    dr = e * de + n * dn + u * du
+    de, dn, du = (de - dr * e) / r, (dn - dr * n) / r, (du - dr * u) / r
+    ddr = r * (de * de + dn * dn + du * du) + e * dde + n * ddn + u * ddu
+    return moving_angles(
+        n, -e, u, dn, -de, du, (ddn - ddr * n - 2.0 * dr * dn) / r, -(dde - ddr * e - 2.0 * dr * de) / r,
+        (ddu - ddr * u - 2.0 * dr * du) / r)
+
+
+@compiled
 def cross(ax, ay, az, bx, by, bz):
     """a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

@@ -271,23 +271,11 @@ def range_known(s, share_2):
 
 
 @compiled
-def _moving_angles(x):
-    """(A, dA, ddA, E, dE, ddE) of position, velocity and acceleration x (9,)."""
-    r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-    e, n, u = x[0] / r, x[1] / r, x[2] / r
-    dr = e * x[3] + n * x[4] + u * x[5]
-    de, dn, du = (x[3] - dr * e) / r, (x[4] - dr * n) / r, (x[5] - dr * u) / r
-    ddr = r * (de * de + dn * dn + du * du) + e * x[6] + n * x[7] + u * x[8]
-    return deck_reference.moving_angles(
-        n, -e, u, dn, -de, du, (x[7] - ddr * n - 2.0 * dr * dn) / r, -(x[6] - ddr * e - 2.0 * dr * de) / r,
-        (x[8] - ddr * u - 2.0 * dr * du) / r)
-
-
-@compiled
 def expected_angles(s):
     """(A, dA, ddA, E, dE, ddE) of what `predict` left, both modes together; A in (-pi, pi]."""
     _mixed(s.x_prior, s.p_prior, s.c, s.mean, s.covariance)
-    return _moving_angles(s.mean)
+    x = s.mean
+    return deck_reference.earth_motion(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
 
 
 @compiled

@@ -11,6 +11,7 @@ import math
 import numpy as np
 from scipy import stats
 
+from acu_tracker import deck_reference
 from pedestal_bringup import results
 from pedestal_common import line_of_sight, messages
 from pedestal_common.compiled import compiled
@@ -59,10 +60,8 @@ def _rates(relative, velocity, attitude, ship_velocity, rates):
         line_of_sight.rotation(q[0], q[1], q[2], q[3], mat_ed)
         e, n, u = relative[k, 0], relative[k, 1], relative[k, 2]
         ve, vn, vu = line_of_sight.to_earth(mat_ed, ship_velocity[k, 0], ship_velocity[k, 1], ship_velocity[k, 2])
-        ve, vn, vu = velocity[k, 0] - ve, velocity[k, 1] - vn, velocity[k, 2] - vu
-        flat = math.hypot(e, n)
-        rates[k, 0] = (n * ve - e * vn) / (flat * flat)
-        rates[k, 1] = (flat * vu - u * (e * ve + n * vn) / flat) / (flat * flat + u * u)
+        de, dn, du = velocity[k, 0] - ve, velocity[k, 1] - vn, velocity[k, 2] - vu
+        _, rates[k, 0], _, _, rates[k, 1], _ = deck_reference.earth_motion(e, n, u, de, dn, du, 0.0, 0.0, 0.0)
 
 
 def read(bag, run):

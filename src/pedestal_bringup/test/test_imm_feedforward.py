@@ -1,5 +1,6 @@
 """The study imm-feedforward: its loop against closed forms and against filterpy and scipy, its rows."""
 import math
+import weakref
 
 import control
 import filterpy.kalman
@@ -13,7 +14,6 @@ from pedestal_bringup import monte_carlo
 from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies import feedforward_loop as loop
 from pedestal_bringup.studies import imm_feedforward as study
-from pedestal_common import noise
 
 T, W, ZETA = loop.T, *loop.RATE_LOOP
 
@@ -63,12 +63,12 @@ def test_one_run_is_what_filterpy_and_scipy_make_of_it():
     q, axis = math.radians(0.3), 'elevation'
     t, target, _ = loop.motion(axis)
     ours = loop.steps_of(axis, loop.cv(0.3), 3, 1)[0]
-    normals = noise.generator(3, 'tracking_receiver').standard_normal(len(t))
+    normals = np.random.default_rng((loop.SEED, 3)).standard_normal(len(t))
     kalman = filterpy.kalman.KalmanFilter(2, 1)
     kalman.F = np.array([[1.0, T], [0.0, 1.0]])
     kalman.H, kalman.R = np.array([[1.0, 0.0]]), np.array([[loop.SIGMA**2]])
     kalman.Q = q * q * np.array([[T**3 / 3.0, T * T / 2.0], [T * T / 2.0, T]])
-    kalman.P = np.diag([loop.SIGMA**2, loop.SPEED**2])
+    kalman.P = np.diag([loop.SIGMA**2, loop.RATE**2])
     plant, x = rate_loop(), target[0].copy()
     theta, miss = [], []
     for k in range(len(t)):
@@ -132,3 +132,23 @@ def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
         experiment.save(draw, tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 10000
+
+
+def test_batches_are_added_as_they_come():
+    """However many runs: of all their sums there are never more than the last, the one before and the total."""
+    made, most = [], 0
+
+    class Pool:
+        @staticmethod
+        def map(function, items, progress):
+            nonlocal most
+            for k, _ in enumerate(items):
+                sums = np.full(3, k, loop.SUMS)
+                made.append(weakref.ref(sums))
+                most = max(most, sum(one() is not None for one in made))
+                yield sums, 1.0
+
+    runs = 12 * loop.BATCH
+    outcome = loop.outcomes({'case': ('azimuth', loop.cv(0.1))}, runs, Pool())['case']
+    assert most <= 3
+    assert outcome.miss_mean == pytest.approx(66.0 / runs) and outcome.peak == pytest.approx(12.0 / runs)

@@ -25,8 +25,8 @@ from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies import experiment, servo
 from pedestal_bringup.studies.experiment import Case, Result, row
 from pedestal_common.compiled import compiled
+from pedestal_common.messages import AXES
 
-AXES = ('azimuth', 'elevation')
 MOTORS = ('motor_1', 'motor_2')
 START = (-2.0, 0.15)
 """Where the axes start [rad]."""

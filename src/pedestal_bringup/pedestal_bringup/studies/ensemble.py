@@ -10,13 +10,14 @@ import numpy as np
 from scipy.signal import lfilter
 
 from acu_tracker import axis_filter, unscented
+from acu_tracker.params import TrackerParameters
 from pedestal_common.compiled import compiled
 
 PERIOD = 0.01
-"""Between measurements [s]."""
+"""Between measurements [s], in all studies of filters."""
 
-INITIAL_RATE = 0.1
-"""Standard deviation of the rate at the start [rad/s], as the tracker has it."""
+INITIAL_RATE = TrackerParameters().initial_rate
+"""Standard deviation of the rate at the start [rad/s]."""
 
 MOMENTS = np.dtype([('runs', 'f8'), ('angle', 'f8'), ('angle2', 'f8'), ('rate', 'f8'), ('rate2', 'f8'),
                     ('acceleration', 'f8'), ('acceleration2', 'f8'), ('raw2', 'f8'), ('variance', 'f8'),
@@ -135,8 +136,9 @@ def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, 
                 nu, S, _, _, _, _ = unscented.innovation(s, A, E, r, R, R, R_range)
                 o.nis = nu * nu / S
                 unscented.correct(s, A, E, r)
-            o.angle, o.rate, o.acceleration, _, _, _ = unscented.outlook(s, c[0], 0.0)
-            o.variance, o.covariance, o.rate_variance, _, _, _, _ = unscented.variances(s, c[0], 0.0)
+            unscented.predict(s, c[0], 0.0)
+            o.angle, o.rate, o.acceleration, _, _, _ = unscented.expected_angles(s)
+            o.variance, o.covariance, o.rate_variance, _, _, _, _ = unscented.expected_variances(s)
             for j in range(len(unscented.MODES)):
                 o.mu[unscented.MODES[j]] = s.mu[j]
             _add(sums[k], o, angle[k], rate[k], acceleration[k], A)

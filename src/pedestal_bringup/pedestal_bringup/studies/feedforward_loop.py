@@ -17,12 +17,10 @@ from scipy.linalg import expm
 from acu_tracker import axis_filter, feedforward
 from acu_tracker.filter_params import Filter
 from pedestal_bringup import monte_carlo
-from pedestal_bringup.studies import experiment, profiles
-from pedestal_common import noise
+from pedestal_bringup.studies import ensemble, experiment, profiles
+from pedestal_bringup.studies.ensemble import PERIOD as T
+from pedestal_bringup.studies.profiles import RATE, STROKE
 from pedestal_common.compiled import compiled
-
-T = 0.01
-"""Between two misses [s]."""
 
 DELAY = 4
 """Age of a miss when it comes, in T."""
@@ -36,9 +34,6 @@ K_P = 5.0
 RATE_LOOP = (2.0 * math.pi * 8.0, 0.7)
 """w [rad/s], zeta."""
 
-STROKE, SPEED = math.radians(20.0), math.radians(3.5)
-"""Between the turning points [rad], outside the reversals [rad/s]."""
-
 REVERSALS = {'azimuth': 1.0, 'elevation': 1.6}
 """Duration of a reversal [s]: 11 and 6.9 deg/s2 at its peak. The paper does not print it."""
 
@@ -48,8 +43,8 @@ PERIODS = 2
 CALM = 2.0
 """After a reversal the rate is called uniform from then on [s]."""
 
-BATCH = 25
-"""Runs of one piece of work."""
+BATCH, SEED = 25, 1
+"""Runs of one piece of work, and of their noise."""
 
 
 def feedforward_gains(w, zeta):
@@ -89,7 +84,7 @@ def _follow(target, known, f, c, lead, M, normals, out):
                 e = target[j, 0] + SIGMA * normals[i, j] - encoder[j]
                 y = encoder[j] + e
                 if j == 0:
-                    axis_filter.start(f[0], c[0], y, R, SPEED)
+                    axis_filter.start(f[0], c[0], y, R, RATE)
                 else:
                     axis_filter.predict(f[0], c[0], T)
                     axis_filter.correct(f[0], c[0], y, R, math.nan, math.nan)
@@ -145,9 +140,9 @@ def imm(q_ca, predicted):
 def motion(axis):
     """(t (n,) [s], target (n, 3), its period [s]): the S motion of an axis, half a period and PERIODS more."""
     reversal = REVERSALS[axis]
-    period = 2.0 * (STROKE / SPEED + reversal * (1.0 - 2.0 / math.pi))
+    period = 2.0 * (STROKE / RATE + reversal * (1.0 - 2.0 / math.pi))
     t = T * np.arange(round((0.5 + PERIODS) * period / T))
-    return t, np.column_stack(profiles.s_motion(t, STROKE, SPEED, reversal)), period
+    return t, np.column_stack(profiles.s_motion(t, STROKE, RATE, reversal)), period
 
 
 def steps_of(axis, source, first, count):
@@ -157,8 +152,8 @@ def steps_of(axis, source, first, count):
     known = np.zeros((0, 2))
     if source.filter is None:
         at = t + 0.5 * T if source.predicted else t - DELAY * T
-        known = np.column_stack(profiles.s_motion(at, STROKE, SPEED, REVERSALS[axis])[1:])
-    normals = np.array([noise.generator(first + i, 'tracking_receiver').standard_normal(len(t)) for i in range(count)])
+        known = np.column_stack(profiles.s_motion(at, STROKE, RATE, REVERSALS[axis])[1:])
+    [normals] = ensemble.drawn(SEED, first, count, len(t), 1)
     out = np.zeros((count, len(t)), STEP)
     _follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(source.filter or Filter()), lead,
             rate_loop_step(*RATE_LOOP), normals, out)
@@ -198,7 +193,7 @@ class Outcome:
         squares = np.square(self.miss_rms[counts])
         second = round(1.0 / T)
         windows = np.convolve(squares, np.full(second, 1.0 / second), 'valid')
-        turning = np.convolve(np.abs(target[:, 1]) < 0.999 * SPEED, np.ones(round(CALM / T)))[:len(t)] > 0.5
+        turning = np.convolve(np.abs(target[:, 1]) < 0.999 * RATE, np.ones(round(CALM / T)))[:len(t)] > 0.5
         return {'miss_rms_deg': (math.degrees(math.sqrt(squares.mean())), 'deg'),
                 'miss_worst_second_deg': (math.degrees(math.sqrt(windows.max())), 'deg'),
                 'miss_peak_deg': (math.degrees(self.peak), 'deg'),
@@ -212,12 +207,12 @@ def outcomes(cases, count, pool, progress=lambda share, text: None):
     done = pool.map(batch, items, progress)
     found = {}
     for name, (axis, _) in cases.items():
-        sums, peaks = [], 0.0
+        sums, peaks = 0.0, 0.0
         for _ in pieces:
             more, peak = next(done)
-            sums.append(more)
+            sums += more.view('f8')
             peaks += peak
-        total = {field: sum(part[field] for part in sums) / count for field in SUMS.names}
-        found[name] = Outcome(axis, total['miss'], np.sqrt(total['miss_squared']),
-                              np.sqrt(total['rate_error_squared']), peaks / count)
+        mean = (sums / count).view(SUMS)
+        found[name] = Outcome(axis, mean['miss'], np.sqrt(mean['miss_squared']),
+                              np.sqrt(mean['rate_error_squared']), peaks / count)
     return found

@@ -18,9 +18,10 @@ from acu_tracker.modes import AUTOTRACK
 from acu_tracker.motion_models import MODELS
 from pedestal_bringup import monte_carlo
 from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment, feedforward_loop
+from pedestal_bringup.studies import experiment, feedforward_loop, profiles
 from pedestal_bringup.studies.experiment import Result, row
 from pedestal_bringup.studies.feedforward_loop import REVERSALS, SIGMA, Source, T, ca, cv, filter_of, imm, outcomes
+from pedestal_common.parameters import as_dict
 
 RUNS = 50
 """Of each case, the noise drawn anew."""
@@ -53,22 +54,14 @@ def drive_case(axis, tuned):
     """A Case of reversals without a pause on an axis, tracked with a Filter."""
     w = math.pi / REVERSALS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
-                  feedforward_loop.SPEED / w if name == axis else 0.0 for name in REVERSALS}
+                  profiles.RATE / w if name == axis else 0.0 for name in REVERSALS}
     return experiment.Case(axis, 'uav_flyby', {
         'tracking_receiver.target.kind': 'sine', 'tracking_receiver.target.angle.frequency': 0.5 * w / math.pi,
         'tracking_receiver.target.angle.range': 510.0, 'tracking_receiver.target.angle.elevation': DRIVE_ELEVATION,
         **amplitudes, 'tracking_receiver.receiver.latency': feedforward_loop.DELAY * T, 'scenario.program.interval': T,
         'adu.initial_azimuth': 0.0, 'adu.initial_elevation': DRIVE_ELEVATION,
-        **{f'acu.{axis}.filter.{name}': value for name, value in named(tuned).items()
-           if value != named(Filter())[name]}}, DRIVE_SECONDS)
-
-
-def named(parameters, prefix=''):
-    """{dotted name: value} of nested parameters."""
-    found = {}
-    for name, value in vars(parameters).items():
-        found |= named(value, f'{prefix}{name}.') if dataclasses.is_dataclass(value) else {prefix + name: value}
-    return found
+        **{f'acu.{axis}.filter.{name}': value for name, value in as_dict(tuned).items()
+           if value != as_dict(Filter())[name]}}, DRIVE_SECONDS)
 
 
 DRIVE_CASES = {
@@ -149,7 +142,7 @@ def remarks(found):
     value = {(name, metric): value for name, outcome in found.items()
              for metric, (value, _) in outcome.measures().items()}
     late = (feedforward_loop.DELAY + 0.5) * T
-    steepest = math.pi * math.degrees(feedforward_loop.SPEED) / REVERSALS['azimuth']
+    steepest = math.pi * math.degrees(profiles.RATE) / REVERSALS['azimuth']
     return [
         'Not printed in the paper and chosen here: the time of a reversal, sample time, noise '
         f'({math.degrees(SIGMA):g} deg), delay, rate loop, K_p and every constant of the filters. Its "largest miss '

@@ -18,16 +18,13 @@ from acu_tracker import axis_filter
 from acu_tracker.filter_params import Filter
 from pedestal_bringup import monte_carlo
 from pedestal_bringup.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment, profiles
+from pedestal_bringup.studies import ensemble, experiment, profiles
+from pedestal_bringup.studies.ensemble import PERIOD as T
 from pedestal_bringup.studies.experiment import Result, row
-from pedestal_common import noise
 from pedestal_common.compiled import compiled
 
 RUNS = 20
 """Flybys."""
-
-T = 0.01
-"""Between measurements [s]."""
 
 SIGMA = math.radians(0.03)
 """Of a measured angle [rad]."""
@@ -58,17 +55,14 @@ PROFILE = 'flyby-60m'
 PEAK_SHARE, FLOOR = 1.2, 0.3
 """Of the flyby's filter: a_max over the largest acceleration, and the least sigma_a over that."""
 
-INITIAL_RATE = 0.1
-"""Standard deviation of the rate at the start [rad/s]."""
-
 SKIPPED = 5.0
 """Of the flyby, for the filter to settle [s]."""
 
 DIFFERENCED = {'differenced-1': 1, 'differenced-20': 20}
 """Rates made of the same measured angles: over so many T."""
 
-BATCH = 25
-"""Flybys of one piece of work."""
+BATCH, SEED = 25, 1
+"""Flybys of one piece of work, and of their noise."""
 
 
 def filter_of(a_max, floor):
@@ -160,7 +154,7 @@ def flyby():
 def flown(name, run):
     """(measured angle, measured rate (n,), ESTIMATE (n,)) of one flyby; name: of FLYBYS; run i has the noise of i."""
     t, target = flyby()
-    normals = noise.generator(run, 'tracking_receiver').standard_normal((2, len(t)))
+    normals = ensemble.drawn(SEED, run, 1, len(t))[:, 0]
     y = target[:, 0] + SIGMA * normals[0]
     if name in DIFFERENCED:
         y_rate, R_rate = differenced(y, DIFFERENCED[name])
@@ -169,7 +163,8 @@ def flown(name, run):
         y_rate, R_rate = target[:, 1] + sigma * normals[1], sigma * sigma
     c = axis_filter.constants(filter_of(PEAK_SHARE * np.abs(target[:, 2]).max(), FLOOR))
     out = np.zeros(len(t), axis_filter.ESTIMATE)
-    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), R_rate), INITIAL_RATE, out)
+    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), R_rate),
+                          ensemble.INITIAL_RATE, out)
     return y, y_rate, out
 
 
