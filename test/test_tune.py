@@ -2,6 +2,7 @@
 import math
 import pathlib
 import signal
+import types
 
 import numpy as np
 import pytest
@@ -121,6 +122,27 @@ def test_feedforward(pedestal, folder):
     assert set(written(file)) == {f'azimuth.feedforward.{name}_feedforward' for name in ('rate', 'acceleration')}
 
 
+def test_of_several_beams_the_file_is_for_pedestal_run(pedestal, folder):
+    """It hands `acu` to every beam_1/acu; a node of that name loads nothing of it."""
+    file = folder / 'beams.yaml'
+    code, output, errors = pedestal('tune', 'phased_array_four', '--filter', 'alpha_beta', '--axis', 'azimuth',
+                                    '--runs', '1', '--duration', '4', '--output', file)
+    assert (code, errors) == (0, '')
+    assert f'pedestal run ... --params-file {file}' in output and 'ros2 run' not in output
+    chosen = scenario.load('phased_array_four', scenario.file_overrides(file))
+    alpha = written(file)['azimuth.filter.alpha_beta.alpha']
+    assert [chosen.node_parameters(f'{prefix}acu').azimuth.filter.alpha_beta.alpha for prefix in chosen.prefixes] == [
+        alpha] * 4
+
+
+def test_a_best_value_at_the_end_of_its_range_is_told():
+    score = tune.Score(np.ones(2), np.ones(2), np.ones(2), {})
+    source = types.SimpleNamespace(kept='on the pieces kept apart')
+    for noise, said in ((1e3, True), (1.0, False), (1e-9, True)):
+        found = tune._remarks(source, score, score, ('azimuth',), {'azimuth.filter.cv.noise': noise})
+        assert found == said * ['azimuth.filter.cv.noise is at the end of its range: the best lies there or beyond']
+
+
 def test_a_node_loads_the_file(tuned_bag, start_node, connect):
     file, _ = tuned_bag
     client = connect(start_node('acu', '--params-file', file).domain_id)
@@ -150,6 +172,7 @@ REFUSED = {
     'neither': ((BAG,), 'one of --filter KIND and --feedforward must be given'),
     'feed-forward of a bag': ((BAG, '--feedforward'), '--feedforward: identifies the drive of a scenario'),
     'seed of a bag': ((BAG, '--filter', 'cv', '--seed', '3'), '--seed 3: is for a scenario'),
+    'seed 0 of a bag': ((BAG, '--filter', 'cv', '--seed', '0'), '--seed 0: is for a scenario'),
     'no range': ((BAG, '--filter', 'imm_ukf'), '--filter imm_ukf: needs a measured range'),
     'no tracking': (('servo_step', '--filter', 'cv'), 'scenario servo_step: never in autotrack'),
     'no scenario': (('uav_fly', '--filter', 'cv'), "did you mean 'uav_flyby'?"),

@@ -68,13 +68,15 @@ def _mean(values):
 
 
 class Recorded:
-    """A recording that any filter may be given. criterion: the negative mean log-density of the innovations."""
+    """A recording that any filter may be given. criterion: the negative mean log-density of the innovations. of_beams:
+    of several, where a node `acu` is none of the graph's (`beam_1/acu`) and pedestal alone knows that it means all."""
 
     criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the pieces kept apart'
 
     def __init__(self, path):
         self.recording = recompute.Recording(path)
         self.params = recompute.parameters_of(self.recording, 'acu')
+        self.of_beams = self.recording.bag.beam != ''
         done = recompute.recompute(self.recording, 'acu', self.params)
         self.feed = done.feed
         self.requests = {step: [service for service, _ in made] for step, made in done.requests.items()}
@@ -125,6 +127,7 @@ class Simulated:
         """load(seed) -> Scenario; seed None: as the scenario says."""
         chosen = load(seed)
         self.any_mode = any_mode
+        self.of_beams = chosen.prefixes != ('',)
         self.params = chosen.node_parameters('acu')
         self.ranged = chosen.node_parameters('tracking_receiver').receiver.ranging.measured
         first = chosen.header.seed
@@ -249,8 +252,10 @@ def main(options, command, progress):
     file.write_text(''.join(f'# {line}\n' for line in made) + yaml.safe_dump(
         {'acu': {'ros__parameters': found}}, sort_keys=False))
     values = [f'{name:48} {value}' for name, value in found.items()]
-    return [*lines, '', *values, f'written: {file}  (pedestal run ... --params-file {file}, or ros2 run acu_tracker '
-            f'acu_node --ros-args --params-file {file})']
+    hint = f'pedestal run ... --params-file {file}'
+    if not source.of_beams:
+        hint += f', or ros2 run acu_tracker acu_node --ros-args --params-file {file}'
+    return [*lines, '', *values, f'written: {file}  ({hint})']
 
 
 def _check(options, is_bag, file):
@@ -262,7 +267,7 @@ def _check(options, is_bag, file):
     if is_bag and options.feedforward:
         raise TuneError('--feedforward: identifies the drive of a scenario; a recording has none')
     for name in ('seed', 'runs', 'duration', 'param'):
-        if is_bag and getattr(options, name):
+        if is_bag and getattr(options, name) not in (None, []):
             raise TuneError(f'--{name} {getattr(options, name)}: is for a scenario; a recording is as it is')
     if options.runs is not None and options.runs < 1:
         raise TuneError(f'--runs {options.runs}: must be at least 1')
@@ -296,7 +301,7 @@ def _remarks(source, old, new, axes, found):
     for name, value in found.items():
         meta = fields[name].metadata
         if 'low' in meta and not 1.05 * meta['low'] < value < 0.95 * meta['high'] and value > 0.0:
-            said.append(f'{name} is at the end of its range: nothing here depends on it')
+            said.append(f'{name} is at the end of its range: the best lies there or beyond')
     return said
 
 
