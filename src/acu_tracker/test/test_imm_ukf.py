@@ -136,7 +136,7 @@ def test_a_direction_is_compared_with_what_was_told_in_the_coast():
     told = tracked.now(stamp)
     a11, _, _, e11, _, _ = tracker.variances(tracked.state[0], tracked.c, stamp)
     _, nu_a, nu_e, *_ = tracker.observe(tracked.state[0], tracked.p, tracked.c, stamp, A, E, 1e-9, 1e-9, math.nan,
-                                        math.nan, math.nan, math.nan, math.nan, math.nan, tracked.p.restart_gap)
+                                        math.nan, math.nan, math.nan, math.nan, math.nan, tracked.p['restart_gap'])
     sigma = np.sqrt(tracked.state['S'][0])
     assert sigma == pytest.approx(np.sqrt((a11 + 1e-9, e11 + 1e-9)), rel=0.01)
     assert np.abs([nu_a - (A - told[0]), nu_e - (E - told[3])]).max() < 0.05 * sigma.min()
