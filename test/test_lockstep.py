@@ -104,7 +104,7 @@ def test_a_run_that_tracks_has_all_numbers(runs):
     assert [row['metric'] for row in rows if row['value'] is None] == []
 
 
-@pytest.mark.parametrize('name, topics', [('first', 13), ('ship', 16)])
+@pytest.mark.parametrize('name, topics', [('first', 15), ('ship', 19)])
 def test_recording_is_complete(runs, name, topics, run_process):
     done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'verify', runs[name].bag], 60.0)
     assert done.returncode == 0, done.stdout
