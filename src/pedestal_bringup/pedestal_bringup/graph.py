@@ -55,12 +55,29 @@ class Operator(Shell):
         self.topics = topics.graph(beams)
         self.time = 0.0
         self.heard = {}
+        self._writers = {}
         self.reader('diagnostics', self._take)
 
     def send(self, tracks):
         """The program tracks {topic: message}, latched."""
+        self._open(tracks)
         for topic, message in tracks.items():
-            self.writer(topic)(message)
+            self._writers[topic](message)
+
+    def send_to(self, nodes, tracks):
+        """The same once all of the nodes that read them are there, or a short run may end before its recorder has
+        them; whether they are sent."""
+        self._open(tracks)
+        if any(self._missing(topic, publisher, topics.readers(topic, nodes))
+               for topic, publisher in self._publishers_by_topic.items()):
+            return False
+        self.send(tracks)
+        return True
+
+    def _open(self, names):
+        for name in names:
+            if name not in self._writers:
+                self._writers[name] = self.writer(name)
 
     def refuse_company(self):
         """Raise RunError when the nodes of another graph are on this domain: they would hear this one."""
@@ -278,7 +295,7 @@ def _run(graph, operator, tracks, progress):
     header = graph.scenario.header
     patience = min(header.deadline, REALTIME_SILENCE) if header.pacing == 'realtime' else 2.0 * header.deadline
     with graph:
-        operator.send(tracks)
+        sent = False
         executor = SingleThreadedExecutor()
         executor.add_node(operator)
 
@@ -286,7 +303,8 @@ def _run(graph, operator, tracks, progress):
             return operator.stuck(nodes, executor)
 
         while graph.ended().get('adu') != 0:
-            executor.spin_once(timeout_sec=0.1)
+            executor.spin_once(timeout_sec=0.1 if sent else 0.02)
+            sent = sent or operator.send_to(graph.scenario.nodes, tracks)
             progress(operator.time)
             if any(code != 0 or node not in ('adu', 'recorder') for node, code in graph.ended().items()):
                 raise graph.failure(stuck, operator.silent(header.deadline))
