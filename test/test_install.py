@@ -123,7 +123,8 @@ def test_only_nodes_know_ros(package):
 
 @pytest.mark.parametrize('package', COLUMNS)
 def test_laws_load_without_ros(package, run_process):
-    names = [f'{package}.{path.stem}' for path in modules(package)
+    root = ROOT / 'src' / package
+    names = ['.'.join(path.relative_to(root).with_suffix('').parts) for path in modules(package)
              if not path.name.endswith('_node.py') and path.stem != '__init__']
     assert names
     code = f'import sys, importlib\nsys.modules["rclpy"] = None\nfor name in {names}: importlib.import_module(name)'

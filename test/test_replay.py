@@ -18,7 +18,8 @@ from pedestal_common import messages, shell, topics
 
 CLI = [sys.executable, '-m', 'pedestal_bringup.cli']
 ANSWERS = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode')
-INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'tracking_receiver/angle_error', 'acu/program_track')
+INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'ins/state', 'tracking_receiver/angle_error',
+          'acu/program_track')
 STEPS = 401
 ENOUGH = {'lockstep': (STEPS,), 'realtime': (STEPS - 1, STEPS)}
 """Steps that are answered: in realtime the last one may wait for the message of the INS that was still on its way when

@@ -4,7 +4,7 @@
     drive_state   enable, brakes and faults: the state machine of both axes
     axis          one axis: sensors, speed loop, two current loops, plant, what it trips on
     wire          the column between its messages: what the node and a recomputation share
-    drive_shell   the shell of both nodes that own the drive's time
+    timekeeper_node   the shell of both nodes that own the drive's time
     speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    the controller's laws
     motor, thermal, brake, gear_train, friction, structure, wind                         the plant's laws
     electronic_beam, beam_wire    in the drive's place: the beam of a phased array, delay and hold; its wire

@@ -4,7 +4,7 @@ import sys
 
 from adu_drive import electronic_beam
 from adu_drive.beam_wire import Beam
-from adu_drive.drive_shell import DriveShell
+from adu_drive.timekeeper_node import DriveShell
 from adu_drive.params import BeamParameters
 from pedestal_common import messages, shell, topics
 
