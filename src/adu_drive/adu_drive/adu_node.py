@@ -4,8 +4,8 @@ import sys
 import numpy as np
 
 from adu_drive import drive_state, drive_unit, faults, thermal
-from adu_drive.timekeeper_node import DriveShell
 from adu_drive.params import AduNodeParameters
+from adu_drive.timekeeper_node import DriveShell
 from adu_drive.wire import COMMAND, SHIP, Adu
 from pedestal_common import messages, shell
 

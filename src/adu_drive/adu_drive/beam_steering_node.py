@@ -4,8 +4,8 @@ import sys
 
 from adu_drive import electronic_beam
 from adu_drive.beam_wire import Beam
-from adu_drive.timekeeper_node import DriveShell
 from adu_drive.params import BeamParameters
+from adu_drive.timekeeper_node import DriveShell
 from pedestal_common import messages, shell, topics
 
 
