@@ -255,7 +255,9 @@ class Graph:
             node for node in (unheard,) if node is not None and node not in early]
         if silent and not killed:
             mute = stuck([node for node in self.processes if node not in early])
-            silent = [node for node in silent if node in mute] or mute or silent
+            # Who waits for the recorder to take what he sent answers nobody either; the recorder waits for no one.
+            silent = [node for node in mute if node == 'recorder'] or [
+                node for node in silent if node in mute] or mute or silent
         culprit = (killed or silent or list(early))[0]
         if culprit in killed:
             reason = f'died by signal {signal.Signals(-early[culprit]).name}'
