@@ -105,3 +105,13 @@ def levelled(s, framed, A, dA, ddA, E, dE, ddE):
         s.mat_fd[:] = s.ahead.level
     A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA, E, dE, ddE)
     return A, dA, ddA
+
+
+@compiled
+def deck_rates(s, p, t):
+    """(azimuth, elevation) rate at which a fixed target where the beam is seems to move because the deck does; 0 where
+    nobody compensates for it."""
+    wanted = p.azimuth.beam.rate_compensation != 0.0 or p.elevation.beam.rate_compensation != 0.0
+    if wanted and s.stabilised and attitude_at(s, p, t):
+        return deck_reference.fixed_rates(s.w[0], s.w[1], s.w[2], s.azimuth.position, s.elevation.position)
+    return 0.0, 0.0

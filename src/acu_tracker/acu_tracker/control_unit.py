@@ -18,19 +18,19 @@ from acu_tracker import (
     program_track,
     tracker,
 )
-from acu_tracker.attitude import attitude_at, estimate_from_deck, levelled, seen_from_deck, take_attitude
+from acu_tracker.attitude import (
+    attitude_at,
+    deck_rates,
+    estimate_from_deck,
+    levelled,
+    seen_from_deck,
+    take_attitude,
+)
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common import blockage
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import (
-    ASHORE,
-    displaced,
-    displaced_motion,
-    earth_angles,
-    earth_direction,
-    to_earth,
-)
+from pedestal_common.line_of_sight import ASHORE, displaced, displaced_motion, earth_angles, earth_direction, to_earth
 from pedestal_common.parameters import record, record_type
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
@@ -238,16 +238,6 @@ def followed(s, p, c, times, angles, t):
         return 0, A, dA, ddA, E, dE, ddE
     A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
     return 1, A, dA, ddA, E, dE, ddE
-
-
-@compiled
-def deck_rates(s, p, t):
-    """(azimuth, elevation) rate at which a fixed target where the beam is seems to move because the deck does; 0 where
-    nobody compensates for it."""
-    wanted = p.azimuth.beam.rate_compensation != 0.0 or p.elevation.beam.rate_compensation != 0.0
-    if wanted and s.stabilised and attitude_at(s, p, t):
-        return deck_reference.fixed_rates(s.w[0], s.w[1], s.w[2], s.azimuth.position, s.elevation.position)
-    return 0.0, 0.0
 
 
 @compiled
@@ -490,16 +480,10 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
             if i == 0:
                 A, dA, ddA = B, dB, ddB
         autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
-        if p.azimuth.controller == position_loop.BEAM:
-            position_loop.steer(s.azimuth, p.azimuth, A, dA, ddA, s.error[0], V_A, autotrack, dt, o, 0)
-        else:
-            position_loop.step(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
-                               u.velocity[0], dt, o, 0)
-        if p.elevation.controller == position_loop.BEAM:
-            position_loop.steer(s.elevation, p.elevation, E, dE, ddE, s.error[1], V_E, autotrack, dt, o, 1)
-        else:
-            position_loop.step(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m,
-                               u.position[1], u.velocity[1], dt, o, 1)
+        position_loop.follow(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
+                             u.velocity[0], s.error[0], V_A, autotrack, dt, o, 0)
+        position_loop.follow(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
+                             u.velocity[1], s.error[1], V_E, autotrack, dt, o, 1)
         s.entered = 0
         explain(s, p, constants[0], times, angles)
         o.blocked = s.blocked

@@ -9,6 +9,7 @@ from acu_tracker.modes import MODES
 from acu_tracker.position_loop import CONTROLLERS
 from pedestal_common.blockage import DOC as SECTORS_DOC
 from pedestal_common.blockage import sectors
+from pedestal_common.lever_arm import LeverArm
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 
@@ -168,15 +169,6 @@ class Elevation(AxisParameters):
     feedforward: Feedforward = group(Feedforward, inertia=288.0, friction=45.0)
     shaper: Shaper = group(Shaper, rate=1.4, acceleration=20.0)
     limits: Limits = group(Limits, low=-0.09, high=1.66, rate=1.57)
-
-
-@dataclasses.dataclass(frozen=True)
-class LeverArm(Parameters):
-    """Where the antenna stands on the deck, FLU from the INS. Used where the range is measured."""
-
-    x: float = parameter(0.0, -500.0, 500.0, 'm', 'forward')
-    y: float = parameter(0.0, -500.0, 500.0, 'm', 'to port')
-    z: float = parameter(0.0, -500.0, 500.0, 'm', 'up')
 
 
 @dataclasses.dataclass(frozen=True)

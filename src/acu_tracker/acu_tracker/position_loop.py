@@ -241,3 +241,12 @@ def step(axis, p, notch_constants, A, dA, ddA, t_k, t_m, y, dy, dt, o, index):
         axis.integral = integral
     o.rate_limited[index] |= rate_limited
     o.acceleration_limited[index] |= acceleration_limited
+
+
+@compiled
+def follow(axis, p, notch_constants, A, dA, ddA, t_k, t_m, y, dy, error, V, autotrack, dt, o, index):
+    """`steer` of an electronic beam, `step` of an axis with motors; arguments as of these."""
+    if p.controller == BEAM:
+        steer(axis, p, A, dA, ddA, error, V, autotrack, dt, o, index)
+    else:
+        step(axis, p, notch_constants, A, dA, ddA, t_k, t_m, y, dy, dt, o, index)

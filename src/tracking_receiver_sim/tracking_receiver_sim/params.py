@@ -4,6 +4,7 @@ import math
 
 from pedestal_common.blockage import DOC as SECTORS_DOC
 from pedestal_common.blockage import sectors
+from pedestal_common.lever_arm import LeverArm
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 from tracking_receiver_sim.smoothing import SMOOTHINGS, WINDOW
 
@@ -135,14 +136,6 @@ class ReceiverParameters(Parameters):
         if self.lose_level_dbhz > self.acquire_level_dbhz:
             raise ParameterError(f'lose_level_dbhz = {self.lose_level_dbhz:g} dB-Hz: must not be above '
                                  f'acquire_level_dbhz = {self.acquire_level_dbhz:g} dB-Hz')
-
-
-@dataclasses.dataclass(frozen=True)
-class LeverArm(Parameters):
-    """Where the antenna stands on the deck, FLU from base_link, which is the INS."""
-    x: float = parameter(0.0, -500.0, 500.0, 'm', 'forward')
-    y: float = parameter(0.0, -500.0, 500.0, 'm', 'to port')
-    z: float = parameter(0.0, -500.0, 500.0, 'm', 'up')
 
 
 @dataclasses.dataclass(frozen=True)
