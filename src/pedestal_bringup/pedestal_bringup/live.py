@@ -42,10 +42,11 @@ class Feeder(Operator):
         """The nodes the process waits for, which read what it says; the recorder keeps it in `answers`."""
         self.answers = {name: [] for name in said}
         made = []
+        written = [topic for topic in topics.TOPICS if self.node in topic.writers]
         for reader in nodes:
             if reader not in (self.node, self.name):
                 made.append(rclpy.create_node(reader))
-                for topic in map(topics.BY_NAME.get, (*said, 'diagnostics')):
+                for topic in written:
                     if reader in topics.readers(topic, nodes):
                         kept = reader == 'recorder' and topic.name in said
                         made[-1].create_subscription(
