@@ -9,7 +9,7 @@ import functools
 import math
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from acu_tracker import deck_reference
 from pedestal_bringup import results
@@ -107,9 +107,14 @@ def independent(values):
     return float(n / max(2.0 * pairs[:stop].sum() - 1.0, 1.0))
 
 
+def bounds(freedoms):
+    """(low, high) that hold a chi-square value with this many degrees of freedom, a number or an array, with PART."""
+    return special.chdtri(freedoms, 0.5 + 0.5 * PART), special.chdtri(freedoms, 0.5 - 0.5 * PART)
+
+
 def band(freedoms, count):
     """The two bounds that hold the mean of `count` chi-square values with this many degrees of freedom with PART."""
-    return tuple((stats.chi2.ppf((0.5 - 0.5 * PART, 0.5 + 0.5 * PART), freedoms * count) / count).tolist())
+    return tuple(float(bound / count) for bound in bounds(freedoms * count))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,14 +156,14 @@ def axis(found, i) -> Axis:
     on = found.tracking
     nis, freedoms, nees = found.nis[on, i], found.freedoms[on, i], found.nees[on, i]
     freedoms, nis, nees = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)], nees[np.isfinite(nees)]
-    inside, count, bounds = math.nan, math.nan, (math.nan, math.nan)
+    inside, count, nees_band = math.nan, math.nan, (math.nan, math.nan)
     if nis.size:
-        low, high = (stats.chi2.ppf(part, freedoms) for part in (0.5 - 0.5 * PART, 0.5 + 0.5 * PART))
+        low, high = bounds(freedoms)
         inside = float(np.mean((nis >= low) & (nis <= high)))
     if nees.size:
         count = independent(nees)
-        bounds = band(FREEDOMS, count)
-    return Axis(_mean(nis), _mean(freedoms), inside, _mean(nees), bounds, count,
+        nees_band = band(FREEDOMS, count)
+    return Axis(_mean(nis), _mean(freedoms), inside, _mean(nees), nees_band, count,
                 *(results.rms(values[on, i]) for values in (found.error, found.rate_error, found.sigma,
                                                             found.rate_sigma)))
 

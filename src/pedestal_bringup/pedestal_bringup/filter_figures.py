@@ -1,8 +1,7 @@
 """The figures of a report about the target filter: its errors beside what it states, innovations, probabilities."""
 import numpy as np
-from scipy import stats
 
-from pedestal_bringup.consistency import PART
+from pedestal_bringup.consistency import PART, bounds
 from pedestal_bringup.figures import FILTERED, INK, RAW, TRUTH, Spec, draw_line, new_panels, outside_legend
 from pedestal_common import messages
 
@@ -64,7 +63,7 @@ def _averaged(t, nis, freedoms):
     with np.errstate(invalid='ignore', divide='ignore'):
         mean = np.bincount(part, np.where(known, nis, 0.0)) / count
         total = np.bincount(part, np.where(known, freedoms, 0.0))
-        low, high = (stats.chi2.ppf(share, total) / count for share in (0.5 - 0.5 * PART, 0.5 + 0.5 * PART))
+        low, high = (bound / count for bound in bounds(total))
         return t[0] + SPAN * (np.arange(count.size) + 0.5), mean, total / count, low, high
 
 

@@ -203,23 +203,28 @@ class Graph:
 
     def __exit__(self, *_):
         with uninterrupted():
-            self._stop_all()
+            self.stop()
 
-    def _stop_all(self):
-        for node in sorted(self.processes, key=lambda name: name == 'recorder'):
-            self.stop(node)
+    def stop(self):
+        """Ask the nodes that still run to end, the recorder after all others; whether each ends with exit code 0."""
+        others = [process for node, process in self.processes.items() if node != 'recorder']
+        recorder = [process for node, process in self.processes.items() if node == 'recorder']
+        return not any(self._stop(others) + self._stop(recorder))
 
-    def stop(self, node):
-        """Ask a node to end and wait; kill it when it does not listen. Returns its exit code."""
-        process = self.processes[node]
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-            process.send_signal(signal.SIGCONT)
-        try:
-            return process.wait(timeout=STOP_TIME)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            return process.wait()
+    @staticmethod
+    def _stop(processes):
+        """Their exit codes; who does not listen is killed."""
+        for process in processes:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+                process.send_signal(signal.SIGCONT)
+        deadline = time.monotonic() + STOP_TIME
+        for process in processes:
+            try:
+                process.wait(max(deadline - time.monotonic(), 0.0))
+            except subprocess.TimeoutExpired:
+                process.kill()
+        return [process.wait() for process in processes]
 
     def _log_of(self, node):
         return self.log / f'{node.replace("/", ".")}.log'
@@ -314,10 +319,7 @@ def _run(graph, operator, tracks, progress):
             if mute:
                 raise graph.failure(stuck, mute)
         progress(header.duration)
-        for node in graph.processes:
-            if node not in ('adu', 'recorder') and graph.stop(node) != 0:
-                raise graph.failure(stuck)
-        if graph.stop('recorder') != 0:
+        if not graph.stop():
             raise graph.failure(stuck)
         return Outcome(graph.result('adu'), graph.result('recorder'))
 

@@ -14,7 +14,6 @@ the ship comes to rest within HOLD in the attitude of the nearest end: a quintic
 to the same value at rest.
 """
 import numpy as np
-from scipy.interpolate import BPoly, CubicSpline, PPoly
 
 from pedestal_common import csv_table
 from pedestal_common.compiled import compiled
@@ -51,6 +50,7 @@ def read(params):
 
 def pieces(times, freedoms):
     """(breaks (n + 2,), coefficients (n + 1, 6, ORDER)) of freedoms (n, 6) at times (n,), holds included."""
+    from scipy.interpolate import BPoly, CubicSpline, PPoly  # slow to import, and most ships move by themselves
     spline = CubicSpline(times, freedoms)
     first, last = times[0], times[-1]
     at_first, at_last = ([spline(time, order) for order in range(3)] for time in (first, last))
