@@ -10,7 +10,7 @@ import numpy as np
 
 from acu_tracker import bridge, deck_reference, keyhole, program_track
 from pedestal_common.blockage import blocked
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import assign, compiled
 from pedestal_common.line_of_sight import angles, rotation, to_deck, wrap
 
 ROWS = 1025
@@ -120,7 +120,7 @@ def look(h, b, p, sectors, t0, turn, times, table, from_program, e, n, u, de, dn
         keyhole.copy(h.tried, h.plan)
         h.plan.culmination, h.plan.highest, h.plan.needed = h.tried.culmination, h.tried.highest, h.tried.needed
         h.plan.other_cost = h.tried.other_cost
-        h.level[:] = h.next_level
+        assign(h.level, h.next_level)
         h.motion = math.sqrt(h.spread)
         h.what = KEYHOLE
         h.number += 1

@@ -6,7 +6,7 @@ import math
 
 from acu_tracker import ahead, deck_reference, estimate_frame
 from acu_tracker.history import bracket, push
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import assign, compiled
 from pedestal_common.line_of_sight import ASHORE, rotation
 
 
@@ -102,7 +102,7 @@ def levelled(s, framed, A, dA, ddA, E, dE, ddE):
     if framed:
         estimate_frame.from_deck(s.frame, s.ahead.level, s.mat_fd)
     else:
-        s.mat_fd[:] = s.ahead.level
+        assign(s.mat_fd, s.ahead.level)
     A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA, E, dE, ddE)
     return A, dA, ddA
 

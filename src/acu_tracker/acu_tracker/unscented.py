@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from acu_tracker import deck_reference, imm, motion_models
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import assign, compiled
 from pedestal_common.line_of_sight import earth_angles, wrap
 
 N = 9
@@ -81,8 +81,8 @@ def start(s, c, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, r, R_range
     x = s.x[1]
     x[0], x[1], x[2], x[3], x[4], x[5] = r * e, r * n, r * u, r * de, r * dn, r * du
     x[6], x[7], x[8] = r * (dde + turn * e), r * (ddn + turn * n), r * (ddu + turn * u)
-    s.x[0, :6] = x[:6]
-    s.x[0, 6:] = 0.0
+    for i in range(N):
+        s.x[0, i] = x[i] if i < 6 else 0.0
     p = s.p[0]
     p[:, :] = 0.0
     rcA, rsA, sE, cE = r * math.cos(A), r * math.sin(A), math.sin(E), math.cos(E)
@@ -91,7 +91,7 @@ def start(s, c, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, r, R_range
             (-cE * rsA * dA - sE * rcA * dE, -cE * rcA * dA + sE * rsA * dE, 0.0), a11, a12, a22)
     _spread(p, (-sE * rsA, -sE * rcA, r * cE),
             (-sE * rcA * dA - cE * rsA * dE, sE * rsA * dA - cE * rcA * dE, -r * sE * dE), e11, e12, e22)
-    s.p[1, :, :] = p
+    assign(s.p[1], p)
     for i in range(6, N):
         s.p[1, i, i] = c.initial_acceleration * c.initial_acceleration
     s.mu[0], s.mu[1] = 0.0, 1.0
