@@ -5,6 +5,7 @@ import sys
 import numpy as np
 
 from pedestal_common import records, shell
+from pedestal_common.parameters import ParameterError
 from ship_motion_sim import imu, motion, nmea
 from ship_motion_sim.params import ShipMotionParameters
 from ship_motion_sim.ship_wire import CLOCK, RAW, TRUTH, ShipMotion
@@ -24,10 +25,17 @@ class ShipMotionNode(shell.Shell):
         if self.parameters.nmea.port:
             self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self.socket.setblocking(False)
-            # Resolves the name once; a host that does not exist is said at the start.
-            self.socket.connect((self.parameters.nmea.host, self.parameters.nmea.port))
+            self.connect(self.parameters.nmea)
         self.diagnose_with(self.diagnose)
         self.follow(CLOCK, self.unit.followers, self.step)
+
+    def connect(self, equipment):
+        """Look the host up, once; what cannot be reached from here is said at the start."""
+        try:
+            self.socket.connect((equipment.host, equipment.port))
+        except OSError as error:
+            raise ParameterError(f"nmea.host = '{equipment.host}': must be the name or IPv4 address of one host: "
+                                 f'{error.strerror}') from None
 
     def step(self, stamp, _clock, _followers):
         self.clock.stamp[0] = stamp
@@ -45,7 +53,7 @@ class ShipMotionNode(shell.Shell):
         self.next_datagram = stamp - stamp % period + period
         o = self.unit.truth[0]
         try:
-            self.socket.send(nmea.attitude(stamp * 1e-9, o['roll'], o['pitch'], o['yaw'], o['position'][2]))
+            self.socket.send(nmea.attitude(stamp, o['roll'], o['pitch'], o['yaw'], o['position'][2]))
             self.unsent = ''
         except OSError as error:
             self.unsent = f'NMEA to {self.parameters.nmea.host}:{self.parameters.nmea.port}: {error.strerror}'
@@ -59,7 +67,7 @@ class ShipMotionNode(shell.Shell):
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
         if self.unit.over():
-            return shell.WARN, 'the recorded motion is over, the ship lies still', values
+            return shell.WARN, 'the recorded motion is over, the deck is at rest', values
         if self.unsent:
             return shell.WARN, self.unsent, values
         return shell.OK, 'under way', values
