@@ -25,12 +25,12 @@ AHEAD = np.dtype([
     ('looked', 'f8'), ('what', 'i8'), ('number', 'i8'), ('motion', 'f8'),
     ('plan', keyhole.PLAN), ('tried', keyhole.PLAN), ('trial', keyhole.PLAN), ('level', 'f8', (3, 3)),
     ('next_level', 'f8', (3, 3)), ('path', 'f8', (ROWS, 6)),
-    ('hidden', 'f8', (2,)), ('hidden_number', 'i8'),
+    ('hidden', 'f8', (2,)), ('hidden_number', 'i8'), ('program', 'f8', (7,)),
 ], align=True)
 """mean, spread: mean attitude and mean square [rad2] of the deck's tilt from it, `latest` the stamp of the last;
 looked: when the path was last laid out; what: one of WHATS; number: of the plan, counted; plan: while `what` is
 KEYHOLE; level: levelled deck -> earth of the plan; hidden: from when until when [s] a sector will hide the target,
-NaN none; hidden_number: counted."""
+NaN none; hidden_number: counted; program: what `another_program` knows the table by."""
 
 
 @compiled
@@ -39,6 +39,20 @@ def forget(h):
     h.what = NONE
     h.looked = -math.inf
     h.hidden[:] = math.nan
+
+
+@compiled
+def another_program(h, times, table):
+    """Whether the table is another one than at the call before: by its number of rows and by its first and last."""
+    last = len(times) - 1
+    same = h.program[0] == last
+    h.program[0] = last
+    for i in range(6 if last >= 0 else 0):
+        row = 0 if i < 3 else last
+        value = times[row] if i % 3 == 0 else table[row, i % 3 - 1]
+        same = same and h.program[1 + i] == value
+        h.program[1 + i] = value
+    return not same
 
 
 @compiled

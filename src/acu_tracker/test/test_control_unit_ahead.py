@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acu_tracker import ahead, announcement
-from acu_tracker.modes import AUTOTRACK, PRESET, PROGRAM, STOW
+from acu_tracker.modes import AUTOTRACK, PRESET, PROGRAM, STANDBY, STOW
 from pedestal_common import line_of_sight
 
 BEAMWIDTH = 0.0175
@@ -64,6 +64,37 @@ def test_through_the_keyhole(Rig, mode, with_program):
     assert f'expected loss {plan["loss"]:.1f} s' in said and 'clockwise' in said
 
 
+def slewing(Rig, **parameters):
+    """A rig in the middle of its slew."""
+    rig = Rig(overhead(math.radians(88.0)), at=overhead(math.radians(88.0))(0.0), initial_mode='program', **SLOW,
+              **{'tracker.handover': False}, **parameters)
+    rig.program(start=-2.0, rows=90)
+    while not rig.state['off'][0] > 0.5 * BEAMWIDTH:
+        rig.run(0.1)
+        assert rig.k * rig.T < CULMINATION
+    return rig
+
+
+def test_a_slew_that_is_ended_leaves_no_error_unbelieved(Rig):
+    rig = slewing(Rig)
+    assert rig.mode == 'program' and np.isnan(rig.step()['innovation']).all()
+    rig.ask(STANDBY)
+    rig.step()
+    rig.angle = rig.deck(rig.k * rig.T)
+    assert rig.mode == 'standby' and np.isfinite(rig.step()['innovation']).all()
+
+
+def test_another_program_ends_what_was_planned_for_the_last(Rig):
+    rig = slewing(Rig)
+    A = rig.angle[0] - 0.5
+    rig.target = lambda t: (A, 0.5)
+    rig.program(start=-2.0, rows=90)
+    rig.run(0.02)
+    assert ahead.WHATS[rig.state['ahead']['what'][0]] == 'none'
+    rig.run(6.0)
+    np.testing.assert_allclose(rig.angle, [A, 0.5], atol=1e-4)
+
+
 def test_a_mast_hides_the_target(Rig):
     """Autotrack coasts behind the mast for longer than coast_time, says why, and goes on after it."""
     sector = (0.62, 0.82)
@@ -98,9 +129,11 @@ def test_a_program_that_fits_no_turn_is_told(Rig):
 
 
 def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
+    wrong = line_of_sight.quaternion(0.0, 0.0, -1.5)
     rig = Rig(stabilised=True, at=(0.4, 0.5))
     rig.program()
-    rig.run(0.5, aligning=1)
+    rig.run(0.4, aligning=1, quaternion=wrong)
+    rig.run(0.1, aligning=1)
     for mode in (PROGRAM, AUTOTRACK):
         assert not rig.ask(mode) and (rig.mode, rig.reason) == ('standby', 'INS aligning')
     for mode in (STOW, PRESET):
@@ -112,6 +145,7 @@ def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     rig.run(0.1, aligning=0)
     rig.run(0.1, aligning=1)
     assert (rig.mode, rig.reason) == ('standby', 'INS aligning')
+    np.testing.assert_allclose(rig.state['ahead']['mean'][0], line_of_sight.ASHORE, atol=1e-9)
     ashore = Rig()
     ashore.program()
     ashore.step(aligning=1)
