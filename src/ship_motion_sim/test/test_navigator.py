@@ -67,6 +67,19 @@ def test_it_aligns_under_way_from_180_deg_wrong_and_knows_how_well(method, aid, 
     np.testing.assert_allclose(said[DATA]['angular_velocity'][aligned:], rate[aligned:], atol=2e-4)
 
 
+@pytest.mark.parametrize('method', ['adrc', 'adrc_scheduled', 'riccati_eso', 'oba'])
+def test_the_level_is_as_good_as_it_says_while_it_is_still_being_levelled(method):
+    """Power-up on a deck that is taken for level; 1 s later and until the end."""
+    raw, truth, _ = ordinary('increment')
+    said = answered(raw, method=method, imu_output='increment', **WRONG, **{'aid.source': 'log'})
+    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
+    assert np.abs(e[0, :2]).max() > 2e-3 or method == 'oba'
+    for first, last in ((1.0, 5.0), (5.0, 20.0), (20.0, 60.0), (60.0, 260.0)):
+        part = slice(round(first * 1e9 / STEP), round(last * 1e9 / STEP))
+        off = np.sqrt(np.mean(e[part, :2]**2, axis=1))
+        assert np.sqrt(np.mean(off**2)) < 2.0 * np.sqrt(np.mean(sigma[part, 0]**2))
+
+
 def test_a_ship_that_swell_moves_calls_itself_aligned_later():
     """Without aid the velocity of sea state 6 is no white noise of 0.05 m/s: the sigma widens."""
     raw, _, _ = sailed(260.0, {**SEA, 'ship.sea_state': 6}, output='increment')
