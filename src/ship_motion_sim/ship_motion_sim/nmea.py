@@ -28,7 +28,7 @@ def heading(yaw):
 
 
 def attitude(stamp, roll, pitch, yaw, heave):
-    """HEHDT and PASHR at a stamp [ns] of roll, pitch, yaw [rad] (REP 103: FLU in ENU) and heave [m], as one datagram."""
+    """HEHDT and PASHR at a stamp [ns], one datagram, of roll, pitch, yaw [rad] (REP 103: FLU in ENU) and heave [m]."""
     psi = heading(yaw)
     return sentence(f'HEHDT,{psi:.3f},T') + sentence(
         f'PASHR,{time_of_day(stamp)},{psi:.3f},T,{math.degrees(roll):+.3f},{-math.degrees(pitch):+.3f},{heave:+.3f},'

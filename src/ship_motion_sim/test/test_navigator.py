@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pedestal_common import parameters, records
-from ship_motion_sim import navigator
+from ship_motion_sim import ins, navigator
 from ship_motion_sim.ins_wire import DATA, RAW, STATE, Ins
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
 from ship_motion_sim.ship_wire import CLOCK, TRUTH, ShipMotion
@@ -116,6 +116,32 @@ def test_a_message_that_is_not_finite_is_bridged():
     assert said[DATA]['stamp'][3000] == records.NEVER
     assert np.isfinite(said[DATA]['orientation']).all()
     assert abs(errors(said, truth)[-1, 2]) < 3.0 * math.sqrt(said[DATA]['orientation_variance'][-1, 2])
+
+
+@pytest.mark.parametrize('how', ['missing', 'not finite'])
+def test_after_a_long_silence_of_the_imu_it_aligns_anew(how):
+    """4 s of a rolling deck that nobody measured: what it knew before is worth nothing, and it says so."""
+    raw, truth, _ = sailed(400.0, output='increment')
+    there = np.ones(len(raw), bool)
+    there[9000:9200] = False
+    if how == 'missing':
+        raw, truth = raw[there], truth[there]
+    else:
+        raw['linear_acceleration'][~there] = math.nan
+    unit = Ins(parameters.build(InsParameters, {**SEA, **WRONG, 'latency': 0.0, 'method': 'riccati_eso',
+                                                'imu_output': 'increment', 'aid.source': 'log'}))
+    heard, said, statuses = np.zeros(1, unit.HEARD), np.zeros(len(raw), unit.SAID), []
+    for k in range(len(raw)):
+        heard[RAW] = raw[k]
+        unit.answers(heard, said[k:k + 1])
+        statuses.append(ins.STATUS[unit.outputs[0]['status']])
+    back = statuses.index('IMU was silent for too long, the attitude is lost: it aligns anew')
+    assert back == (9000 if how == 'missing' else 9200)
+    assert said[STATE][back - 1 if how == 'missing' else 8999] == navigator.NAVIGATING
+    assert (said[STATE][back:back + 5000] == navigator.ALIGNING).all()
+    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
+    assert sigma[back, 2] > 1.0 and said[STATE][-1] == navigator.NAVIGATING
+    assert abs(e[-1, 2]) < 3.0 * sigma[-1, 2] < 0.01
 
 
 def test_the_model_says_nothing_of_alignment():
