@@ -9,6 +9,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import quaternion, rotation, to_deck
+from pedestal_common.parameters import ParameterError
 from ship_motion_sim import earth, ins, motion, navigator
 from ship_motion_sim.ins import NEVER, RING, UNDER_WAY
 from ship_motion_sim.params import InsParameters
@@ -41,13 +42,18 @@ STATE = np.dtype([
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS."""
+    """The record (1,) of CONSTANTS. Raises ParameterError where it could never call itself aligned."""
     record, latitude = np.zeros(1, CONSTANTS), math.radians(params.ship.latitude_deg)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(latitude)
     record['latency_ns'] = round(params.latency * 1e9)
     record['increment'], record['aid_noise'] = params.imu_output == 'increment', params.aid.noise
     record['navigator'] = navigator.constants(params.alignment, params.method, params.aid.source, latitude)
+    wanted, least = params.alignment.aligned_sigma, navigator.least_azimuth_sigma(record['navigator'][0])
+    if wanted <= least:
+        raise ParameterError(f'alignment.aligned_sigma = {wanted:g} rad: must be above {least:.3g} rad, the best that '
+                             f'method {params.method} reaches at latitude {params.ship.latitude_deg:g} deg with '
+                             f'alignment.gyro_bias = {params.alignment.gyro_bias:g} rad/s')
     yaw = math.radians(90.0 - params.alignment.initial_heading_deg)
     record['power_up'] = navigator.initial_state(record['navigator'], quaternion(0.0, 0.0, yaw))
     return record

@@ -1,4 +1,5 @@
 """ROS shell of the INS: hears the IMU, publishes attitude and deck rate as the INS knows them."""
+import math
 import sys
 
 from pedestal_common import messages, records, shell
@@ -48,7 +49,9 @@ class InsNode(shell.Shell):
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
         if self.announced == navigator.ALIGNING:
-            return shell.WARN, navigator.STAGES[self.announced], values
+            sigma, wanted = outputs['variance'][2]**0.5, self.parameters.alignment.aligned_sigma
+            return shell.WARN, (f'aligning: heading known to {math.degrees(sigma):.2g} deg (1 sigma), navigates from '
+                                f'{math.degrees(wanted):.2g} deg on'), values
         return shell.OK, 'navigating', values
 
 

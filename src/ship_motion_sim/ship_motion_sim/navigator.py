@@ -59,6 +59,14 @@ def constants(p, method, aid, latitude) -> np.ndarray:
     return record
 
 
+def least_azimuth_sigma(c):
+    """1 sigma [rad] of azimuth after any time; c CONSTANTS."""
+    if c['method'] == CLASSICAL:
+        return float(c['classical']['azimuth'])
+    k = c['conditions']
+    return float(k['gyro_bias'] / k['earth_rate'][1])
+
+
 def initial_state(constants, quaternion) -> np.ndarray:
     """The record (1,) of STATE at power-up; quaternion (x, y, z, w) deck -> n' as it is taken for true."""
     state = np.zeros(1, STATE)
