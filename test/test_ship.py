@@ -159,6 +159,13 @@ def test_the_chain_from_power_up_to_autotrack(told):
                for status in array.status if status.name == 'acu' for value in status.values if value.key == 'reason']
     assert {reason for t, reason in reasons if 1.0 <= t < aligned} == {'INS aligning'}
     assert told.rows['aligned_s']['value'] == aligned
+    progress = [(log / 1e9, status.level, status.message, {value.key for value in status.values})
+                for _, log, _, array in told.bag.messages('diagnostics')
+                for status in array.status if status.name == 'ins']
+    assert progress[0][2] == 'aligning: heading not known yet, navigates from 0.69 deg on'
+    for t, level, message, keys in progress[1:]:
+        assert (level == 1 and message.startswith('aligning: heading known to ')) == (t < aligned)
+        assert ('velocity_east' in keys) == (t >= aligned)
     heading = told.rows['heading_at_alignment_deg']['value']
     assert told.rows['heading_sigma_at_alignment_deg']['value'] <= math.degrees(SIGMA)
     assert abs(heading) < 3.0 * told.rows['heading_sigma_at_alignment_deg']['value']
