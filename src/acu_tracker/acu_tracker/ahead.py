@@ -147,7 +147,7 @@ def look(h, b, p, sectors, t0, turn, times, table, from_program, e, n, u, de, dn
 
 @compiled
 def look_for_sectors(h, sectors, path, t0, step):
-    """The first time that a path is hidden, announced when there was none before."""
+    """The first time that a path is hidden; announced when it begins after the last one has ended."""
     first = last = -1
     for i in range(len(path)):
         A, E = angles(path[i, 0], path[i, 1], path[i, 2])
@@ -159,9 +159,10 @@ def look_for_sectors(h, sectors, path, t0, step):
     if first < 0:
         h.hidden[:] = math.nan
     else:
-        if not h.hidden[0] == h.hidden[0]:
+        begin = t0 + first * step
+        if not begin <= h.hidden[1]:        # NaN: there was none
             h.hidden_number += 1
-        h.hidden[0], h.hidden[1] = t0 + first * step, t0 + last * step
+        h.hidden[0], h.hidden[1] = begin, t0 + last * step
 
 
 @compiled

@@ -119,6 +119,21 @@ def test_a_mast_hides_the_target(Rig):
     assert rig.mode == 'standby'
 
 
+def test_every_sector_on_the_way_is_announced(Rig):
+    """Two masts close together: the second is in sight before the target is past the first."""
+    rig = Rig(lambda t: (0.5 + 0.03 * t, 0.5), at=(0.5, 0.5), initial_mode='program',
+              **{'blockage': '0.65 0.7 0.8; 0.76 0.85 0.8', 'tracker.handover': False})
+    rig.program(rows=60)
+    told = []
+    for _ in range(12):
+        rig.run(1.0)
+        h = rig.state[0]['ahead']
+        if h['hidden_number'] > len(told):
+            told.append(h['hidden'].tolist())
+    np.testing.assert_allclose(told, [[5.0, 20.0 / 3.0], [26.0 / 3.0, 35.0 / 3.0]], atol=0.07)
+    assert h['hidden_number'] == 2
+
+
 def test_a_program_that_fits_no_turn_is_told(Rig):
     for travel, cramped in ((4.0, 0), (9.6, 1)):
         rig = Rig(lambda t, travel=travel: (travel * t / 50.0, 0.6), at=(0.0, 0.6), initial_mode='program',
