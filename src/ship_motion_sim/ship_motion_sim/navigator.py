@@ -87,13 +87,15 @@ def begin(s, c, qx, qy, qz, qw):
 
 @compiled
 def aided_velocity(s, c, aid):
-    """(E, N) in n' of what the aid (3,) says; a GNSS is only asked once n' is n but for s.azimuth."""
+    """(E, N) in n' of what the aid (3,) says; a GNSS is only asked once n' is n within what alignment left.
+
+    That is not turned by the azimuth found since: 7 m/s that turn with it would come back as an azimuth, larger.
+    """
     if c.aid == LOG:
         east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
         return east, north
     if c.aid == GNSS:
-        cos, sin = math.cos(s.azimuth), math.sin(s.azimuth)
-        return cos * aid[0] + sin * aid[1], cos * aid[1] - sin * aid[0]
+        return aid[0], aid[1]
     return 0.0, 0.0
 
 

@@ -99,6 +99,17 @@ def test_free_inertial_keeps_the_attitude():
     assert (np.abs(e[-1] - e[aligned]) < [5e-4, 5e-4, 1e-4]).all()
 
 
+@pytest.mark.parametrize('heading', [90.0, 270.0])
+def test_with_a_gnss_it_navigates_on_any_course(heading):
+    """A velocity turned by the azimuth that it is to improve runs away on westerly courses."""
+    sea = {'ship.sea_state': 5, 'ship.heading_deg': heading, 'ship.speed': 10.0}
+    raw, truth, _ = sailed(400.0, sea, output='increment')
+    said = answered(raw, method='oba', imu_output='increment', **sea, **WRONG, **{'aid.source': 'gnss'})
+    aligned = aligned_at(said)
+    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
+    assert aligned > 0 and (np.abs(e[aligned:, 2]) < 3.0 * sigma[aligned:, 2]).all()
+
+
 def test_the_attitude_is_late_by_the_latency_and_the_state_goes_with_it():
     raw, _, _ = ordinary('increment')
     prompt, late = (answered(raw, method='riccati_eso', imu_output='increment', latency=latency, **WRONG,
