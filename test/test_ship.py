@@ -4,6 +4,7 @@ import json
 import math
 import socket
 import threading
+import time
 import types
 
 import numpy as np
@@ -92,6 +93,28 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 10.0
     assert math.degrees(results.rms(off[t > plan['t2'] + 3.0])) < 0.02
     assert abs(steps['rate'][first:, 0]).max() <= chosen.node_parameters('acu').azimuth.limits.rate + 1e-12
+
+
+def test_equipment_that_is_not_there_is_told_in_every_diagnosis(start_node, connect):
+    """Where nobody listens the system refuses every other datagram only, 10 of them a second."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as gone:
+        gone.bind(('127.0.0.1', 0))
+        port = gone.getsockname()[1]
+    node = start_node('ship_motion', '-p', f'nmea.port:={port}')
+    client = connect(node.domain_id)
+    client.write('clock')
+    client.read('diagnostics')
+    told = client.heard['diagnostics']
+    k = 0
+
+    def goes_on():
+        nonlocal k
+        k += 1
+        client.publish('clock', messages.Clock(clock=messages.Time(sec=k // 10, nanosec=k % 10 * 100_000_000)))
+        time.sleep(0.05)
+        return len(told) >= 4
+    client.until(goes_on)
+    assert [array.status[0].message for array in told[1:]] == 3 * [f'NMEA to 127.0.0.1:{port}: Connection refused']
 
 
 def test_announced_losses_are_counted_once():

@@ -48,18 +48,19 @@ class ShipMotionNode(shell.Shell):
             self.send_attitude(stamp)
 
     def send_attitude(self, stamp):
-        """One datagram; equipment that is not there costs nothing but a word in the diagnostics."""
+        """One datagram; equipment that is not there costs nothing but a word in the next diagnostics. The system tells
+        of a datagram that nobody took when the next is sent, which then is not, so that every other one succeeds."""
         period = round(1e9 / self.parameters.nmea.rate)
         self.next_datagram = stamp - stamp % period + period
         o = self.unit.truth[0]
         try:
             self.socket.send(nmea.attitude(stamp, o['roll'], o['pitch'], o['yaw'], o['position'][2]))
-            self.unsent = ''
         except OSError as error:
             self.unsent = f'NMEA to {self.parameters.nmea.host}:{self.parameters.nmea.port}: {error.strerror}'
 
     def diagnose(self):
         truth = self.unit.truth[0]
+        unsent, self.unsent = self.unsent, ''
         values = [(f'{name}_deg', f'{np.degrees(truth[name]):.3f}') for name in ('roll', 'pitch')]
         for status, names in ((truth['status'], motion.STATUS), (self.unit.felt[0]['status'], imu.STATUS)):
             if status:
@@ -68,8 +69,8 @@ class ShipMotionNode(shell.Shell):
             return shell.WARN, self.steps.refusal, values
         if self.unit.over():
             return shell.WARN, 'the recorded motion is over, the deck is at rest', values
-        if self.unsent:
-            return shell.WARN, self.unsent, values
+        if unsent:
+            return shell.WARN, unsent, values
         return shell.OK, 'under way', values
 
 
