@@ -122,9 +122,11 @@ def test_announced_losses_are_counted_once():
         return messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
             level=0, name='acu', message='', hardware_id='', values=[
                 messages.KeyValue(key=key, value=value) for key, value in values])])
-    said = [array(('mode', 'program')), *2 * [array(('keyhole_begins_s', '45.8'), ('keyhole_loss_s', '12.6'))],
-            array(('keyhole_begins_s', '900.1'), ('keyhole_loss_s', '0.4'))]
+    first = array(('keyhole_begins_s', '45.8'), ('keyhole_ends_s', '63.1'), ('keyhole_loss_s', '12.6'))
+    second = array(('keyhole_begins_s', '900.1'), ('keyhole_ends_s', '905.5'), ('keyhole_loss_s', '0.4'))
+    said = [array(('mode', 'program')), first, first, second]
     bag = types.SimpleNamespace(topics={'diagnostics': ''}, messages=lambda topic: ((topic, 0, 0, m) for m in said))
+    assert results.keyholes(bag) == [(45.8, 63.1, 12.6), (900.1, 905.5, 0.4)]
     assert results.announced_losses(bag) == {'keyhole_loss_predicted_s': (pytest.approx(13.0), 's')}
     del said[1:]
     assert results.announced_losses(bag) == {}
