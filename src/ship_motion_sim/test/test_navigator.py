@@ -89,6 +89,20 @@ def test_a_ship_that_swell_moves_calls_itself_aligned_later():
     assert (said[STATE] == navigator.ALIGNING).all() and 0 < aligned_at(aided) < 8000
 
 
+def test_a_gyrocompass_that_dwells_at_180_deg_is_not_aligned():
+    """An unstable equilibrium: this heading, on a deck without motion, with sensors without errors, stays there."""
+    still = {'ship.motion': 'plain', 'ship.plain.roll_amplitude_deg': 0.0, 'ship.speed': 0.0}
+    errorless = {f'{sensor}_{name}': 0.0 for sensor in ('gyro', 'accelerometer')
+                 for name in ('bias_x', 'bias_y', 'bias_z', 'noise')}
+    raw, truth, _ = sailed(420.0, still, output='increment', **errorless)
+    for heading, dwells in ((179.84, True), (2.0, False)):
+        said = answered(raw, **still, method='classical', imu_output='increment',
+                        **{'alignment.initial_heading_deg': heading, 'alignment.aligned_sigma': 0.006})
+        off, stage = abs(errors(said, truth)[-1, 2]), said[STATE][-1]
+        assert stage == (navigator.ALIGNING if dwells else navigator.NAVIGATING)
+        assert off > 3.1 if dwells else off < 1e-3
+
+
 def test_free_inertial_keeps_the_attitude():
     """Aligned with a loose sigma it goes on without the sea's velocity; level and heading stay within theirs."""
     raw, truth, _ = ordinary('increment')
