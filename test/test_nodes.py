@@ -44,6 +44,10 @@ REFUSED = {
     'type': ('ins', ['-p', 'latency:=soon'], 'latency'),
     'choice': ('ship_motion', ['-p', 'ship.kind:=jump'], 'ship.kind'),
     'cross-check': ('acu', ['-p', 'azimuth.limits.low:=3.0', '-p', 'azimuth.limits.high:=2.0'], 'azimuth.limits'),
+    'no recording': ('ship_motion', ['-p', 'ship.motion:=recorded', '-p', 'ship.recorded.path:=/nowhere/ship.csv'],
+                     '/nowhere/ship.csv: No such file or directory'),
+    'NMEA host': ('ship_motion', ['-p', 'nmea.port:=10110', '-p', 'nmea.host:=::1'], "nmea.host = '::1': must be"),
+    'never aligned': ('ins', ['-p', 'method:=oba', '-p', 'ship.latitude_deg:=89.0'], 'alignment.aligned_sigma = '),
     'pacing': ('adu', ['-p', 'graph.pacing:=sometimes'], 'must be one of lockstep, realtime'),
 }
 

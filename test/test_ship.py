@@ -4,6 +4,7 @@ import json
 import math
 import socket
 import threading
+import time
 import types
 
 import numpy as np
@@ -94,14 +95,38 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     assert abs(steps['rate'][first:, 0]).max() <= chosen.node_parameters('acu').azimuth.limits.rate + 1e-12
 
 
+def test_equipment_that_is_not_there_is_told_in_every_diagnosis(start_node, connect):
+    """Where nobody listens the system refuses every other datagram only, 10 of them a second."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as gone:
+        gone.bind(('127.0.0.1', 0))
+        port = gone.getsockname()[1]
+    node = start_node('ship_motion', '-p', f'nmea.port:={port}')
+    client = connect(node.domain_id)
+    client.write('clock')
+    client.read('diagnostics')
+    told = client.heard['diagnostics']
+    k = 0
+
+    def goes_on():
+        nonlocal k
+        k += 1
+        client.publish('clock', messages.Clock(clock=messages.Time(sec=k // 10, nanosec=k % 10 * 100_000_000)))
+        time.sleep(0.05)
+        return len(told) >= 4
+    client.until(goes_on)
+    assert [array.status[0].message for array in told[1:]] == 3 * [f'NMEA to 127.0.0.1:{port}: Connection refused']
+
+
 def test_announced_losses_are_counted_once():
     def array(*values):
         return messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
             level=0, name='acu', message='', hardware_id='', values=[
                 messages.KeyValue(key=key, value=value) for key, value in values])])
-    said = [array(('mode', 'program')), *2 * [array(('keyhole_begins_s', '45.8'), ('keyhole_loss_s', '12.6'))],
-            array(('keyhole_begins_s', '900.1'), ('keyhole_loss_s', '0.4'))]
+    first = array(('keyhole_begins_s', '45.8'), ('keyhole_ends_s', '63.1'), ('keyhole_loss_s', '12.6'))
+    second = array(('keyhole_begins_s', '900.1'), ('keyhole_ends_s', '905.5'), ('keyhole_loss_s', '0.4'))
+    said = [array(('mode', 'program')), first, first, second]
     bag = types.SimpleNamespace(topics={'diagnostics': ''}, messages=lambda topic: ((topic, 0, 0, m) for m in said))
+    assert results.keyholes(bag) == [(45.8, 63.1, 12.6), (900.1, 905.5, 0.4)]
     assert results.announced_losses(bag) == {'keyhole_loss_predicted_s': (pytest.approx(13.0), 's')}
     del said[1:]
     assert results.announced_losses(bag) == {}
@@ -159,6 +184,13 @@ def test_the_chain_from_power_up_to_autotrack(told):
                for status in array.status if status.name == 'acu' for value in status.values if value.key == 'reason']
     assert {reason for t, reason in reasons if 1.0 <= t < aligned} == {'INS aligning'}
     assert told.rows['aligned_s']['value'] == aligned
+    progress = [(log / 1e9, status.level, status.message, {value.key for value in status.values})
+                for _, log, _, array in told.bag.messages('diagnostics')
+                for status in array.status if status.name == 'ins']
+    assert progress[0][2] == 'aligning: heading not known yet, navigates from 0.69 deg on'
+    for t, level, message, keys in progress[1:]:
+        assert (level == 1 and message.startswith('aligning: heading known to ')) == (t < aligned)
+        assert ('velocity_east' in keys) == (t >= aligned)
     heading = told.rows['heading_at_alignment_deg']['value']
     assert told.rows['heading_sigma_at_alignment_deg']['value'] <= math.degrees(SIGMA)
     assert abs(heading) < 3.0 * told.rows['heading_sigma_at_alignment_deg']['value']

@@ -25,12 +25,12 @@ AHEAD = np.dtype([
     ('looked', 'f8'), ('what', 'i8'), ('number', 'i8'), ('motion', 'f8'),
     ('plan', keyhole.PLAN), ('tried', keyhole.PLAN), ('trial', keyhole.PLAN), ('level', 'f8', (3, 3)),
     ('next_level', 'f8', (3, 3)), ('path', 'f8', (ROWS, 6)),
-    ('hidden', 'f8', (2,)), ('hidden_number', 'i8'),
+    ('hidden', 'f8', (2,)), ('hidden_number', 'i8'), ('program', 'f8', (7,)),
 ], align=True)
 """mean, spread: mean attitude and mean square [rad2] of the deck's tilt from it, `latest` the stamp of the last;
 looked: when the path was last laid out; what: one of WHATS; number: of the plan, counted; plan: while `what` is
 KEYHOLE; level: levelled deck -> earth of the plan; hidden: from when until when [s] a sector will hide the target,
-NaN none; hidden_number: counted."""
+NaN none; hidden_number: counted; program: what `another_program` knows the table by."""
 
 
 @compiled
@@ -39,6 +39,20 @@ def forget(h):
     h.what = NONE
     h.looked = -math.inf
     h.hidden[:] = math.nan
+
+
+@compiled
+def another_program(h, times, table):
+    """Whether the table is another one than at the call before: by its number of rows and by its first and last."""
+    last = len(times) - 1
+    same = h.program[0] == last
+    h.program[0] = last
+    for i in range(6 if last >= 0 else 0):
+        row = 0 if i < 3 else last
+        value = times[row] if i % 3 == 0 else table[row, i % 3 - 1]
+        same = same and h.program[1 + i] == value
+        h.program[1 + i] = value
+    return not same
 
 
 @compiled
@@ -133,7 +147,7 @@ def look(h, b, p, sectors, t0, turn, times, table, from_program, e, n, u, de, dn
 
 @compiled
 def look_for_sectors(h, sectors, path, t0, step):
-    """The first time that a path is hidden, announced when there was none before."""
+    """The first time that a path is hidden; announced when it begins after the last one has ended."""
     first = last = -1
     for i in range(len(path)):
         A, E = angles(path[i, 0], path[i, 1], path[i, 2])
@@ -145,9 +159,10 @@ def look_for_sectors(h, sectors, path, t0, step):
     if first < 0:
         h.hidden[:] = math.nan
     else:
-        if not h.hidden[0] == h.hidden[0]:
+        begin = t0 + first * step
+        if not begin <= h.hidden[1]:        # NaN: there was none
             h.hidden_number += 1
-        h.hidden[0], h.hidden[1] = t0 + first * step, t0 + last * step
+        h.hidden[0], h.hidden[1] = begin, t0 + last * step
 
 
 @compiled

@@ -35,6 +35,9 @@ def take_attitude(s, p, u):
         if T <= p.attitude_timeout:
             h.sample[row, 7 + i] = deck_reference.smoothed_acceleration(
                 h.sample[last, 7 + i], w[i], h.sample[last, 4 + i], T, p.attitude_smoothing)
+    if s.aligning:
+        # Its heading is still being looked for: the mean begins with the one that is found.
+        s.ahead.latest = -math.inf
     ahead.take_attitude(s.ahead, u.attitude_stamp, h.sample[row, :4], p.keyhole.mean_time)
     return True
 

@@ -8,8 +8,9 @@ import math
 import numpy as np
 
 from acu_tracker import program_track
-from acu_tracker.deck_reference import cross, moving_angles, moving_direction
+from acu_tracker.deck_reference import moving_angles, moving_direction
 from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import cross
 
 BRIDGE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('there', 'i8')], align=True)
 """axis: ENU, of the length of the rotation's sine; cos: of its angle; there: 0 where there is none."""

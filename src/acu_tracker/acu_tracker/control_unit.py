@@ -18,14 +18,7 @@ from acu_tracker import (
     program_track,
     tracker,
 )
-from acu_tracker.attitude import (
-    attitude_at,
-    deck_rates,
-    estimate_from_deck,
-    levelled,
-    seen_from_deck,
-    take_attitude,
-)
+from acu_tracker.attitude import attitude_at, deck_rates, estimate_from_deck, levelled, seen_from_deck, take_attitude
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.params import AcuParameters
 from pedestal_common import blockage
@@ -326,8 +319,12 @@ def look_ahead(s, p, c, sectors, times, angles):
     h = s.ahead
     if s.mode != modes.PROGRAM and s.mode != modes.AUTOTRACK:
         ahead.forget(h)
-        s.cramped = 0
+        s.cramped, s.off = 0, 0.0
         return
+    if ahead.another_program(h, times, angles):
+        # What was planned for the last one means nothing; this one begins as a mode does.
+        ahead.forget(h)
+        s.bridge.there, s.entered = 0, 1
     if s.stamp - h.looked < ahead.INTERVAL or (h.what == ahead.KEYHOLE and s.stamp <= h.plan.t2):
         return
     known, e, n, u, de, dn, du = True, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

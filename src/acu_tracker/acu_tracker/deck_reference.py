@@ -6,7 +6,7 @@ Exact: the unit vector is differentiated twice, u_d = M' u, u_d' = M' u' - w x u
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import direction, to_deck, to_earth, wrap
+from pedestal_common.line_of_sight import cross, direction, to_deck, to_earth, wrap
 
 
 @compiled
@@ -46,12 +46,6 @@ def earth_motion(e, n, u, de, dn, du, dde, ddn, ddu):
     return moving_angles(
         n, -e, u, dn, -de, du, (ddn - ddr * n - 2.0 * dr * dn) / r, -(dde - ddr * e - 2.0 * dr * de) / r,
         (ddu - ddr * u - 2.0 * dr * du) / r)
-
-
-@compiled
-def cross(ax, ay, az, bx, by, bz):
-    """a x b."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @compiled

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
-from acu_tracker.deck_reference import cross, moving_angles, moving_direction
+from acu_tracker.deck_reference import moving_angles, moving_direction
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import earth_direction, to_deck, to_earth
+from pedestal_common.line_of_sight import cross, earth_direction, to_deck, to_earth
 
 RAISE, LOWER = math.radians(75.0), math.radians(70.0)
 """Elevation in the earth's frame [rad] above which the frame is tilted, below which it is not any more."""

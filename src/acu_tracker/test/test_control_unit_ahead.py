@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acu_tracker import ahead, announcement
-from acu_tracker.modes import AUTOTRACK, PRESET, PROGRAM, STOW
+from acu_tracker.modes import AUTOTRACK, PRESET, PROGRAM, STANDBY, STOW
 from pedestal_common import line_of_sight
 
 BEAMWIDTH = 0.0175
@@ -64,6 +64,37 @@ def test_through_the_keyhole(Rig, mode, with_program):
     assert f'expected loss {plan["loss"]:.1f} s' in said and 'clockwise' in said
 
 
+def slewing(Rig, **parameters):
+    """A rig in the middle of its slew."""
+    rig = Rig(overhead(math.radians(88.0)), at=overhead(math.radians(88.0))(0.0), initial_mode='program', **SLOW,
+              **{'tracker.handover': False}, **parameters)
+    rig.program(start=-2.0, rows=90)
+    while not rig.state['off'][0] > 0.5 * BEAMWIDTH:
+        rig.run(0.1)
+        assert rig.k * rig.T < CULMINATION
+    return rig
+
+
+def test_a_slew_that_is_ended_leaves_no_error_unbelieved(Rig):
+    rig = slewing(Rig)
+    assert rig.mode == 'program' and np.isnan(rig.step()['innovation']).all()
+    rig.ask(STANDBY)
+    rig.step()
+    rig.angle = rig.deck(rig.k * rig.T)
+    assert rig.mode == 'standby' and np.isfinite(rig.step()['innovation']).all()
+
+
+def test_another_program_ends_what_was_planned_for_the_last(Rig):
+    rig = slewing(Rig)
+    A = rig.angle[0] - 0.5
+    rig.target = lambda t: (A, 0.5)
+    rig.program(start=-2.0, rows=90)
+    rig.run(0.02)
+    assert ahead.WHATS[rig.state['ahead']['what'][0]] == 'none'
+    rig.run(6.0)
+    np.testing.assert_allclose(rig.angle, [A, 0.5], atol=1e-4)
+
+
 def test_a_mast_hides_the_target(Rig):
     """Autotrack coasts behind the mast for longer than coast_time, says why, and goes on after it."""
     sector = (0.62, 0.82)
@@ -88,6 +119,21 @@ def test_a_mast_hides_the_target(Rig):
     assert rig.mode == 'standby'
 
 
+def test_every_sector_on_the_way_is_announced(Rig):
+    """Two masts close together: the second is in sight before the target is past the first."""
+    rig = Rig(lambda t: (0.5 + 0.03 * t, 0.5), at=(0.5, 0.5), initial_mode='program',
+              **{'blockage': '0.65 0.7 0.8; 0.76 0.85 0.8', 'tracker.handover': False})
+    rig.program(rows=60)
+    told = []
+    for _ in range(12):
+        rig.run(1.0)
+        h = rig.state[0]['ahead']
+        if h['hidden_number'] > len(told):
+            told.append(h['hidden'].tolist())
+    np.testing.assert_allclose(told, [[5.0, 20.0 / 3.0], [26.0 / 3.0, 35.0 / 3.0]], atol=0.07)
+    assert h['hidden_number'] == 2
+
+
 def test_a_program_that_fits_no_turn_is_told(Rig):
     for travel, cramped in ((4.0, 0), (9.6, 1)):
         rig = Rig(lambda t, travel=travel: (travel * t / 50.0, 0.6), at=(0.0, 0.6), initial_mode='program',
@@ -98,9 +144,11 @@ def test_a_program_that_fits_no_turn_is_told(Rig):
 
 
 def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
+    wrong = line_of_sight.quaternion(0.0, 0.0, -1.5)
     rig = Rig(stabilised=True, at=(0.4, 0.5))
     rig.program()
-    rig.run(0.5, aligning=1)
+    rig.run(0.4, aligning=1, quaternion=wrong)
+    rig.run(0.1, aligning=1)
     for mode in (PROGRAM, AUTOTRACK):
         assert not rig.ask(mode) and (rig.mode, rig.reason) == ('standby', 'INS aligning')
     for mode in (STOW, PRESET):
@@ -112,6 +160,7 @@ def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     rig.run(0.1, aligning=0)
     rig.run(0.1, aligning=1)
     assert (rig.mode, rig.reason) == ('standby', 'INS aligning')
+    np.testing.assert_allclose(rig.state['ahead']['mean'][0], line_of_sight.ASHORE, atol=1e-9)
     ashore = Rig()
     ashore.program()
     ashore.step(aligning=1)

@@ -1,8 +1,8 @@
 """How much of the ship's rotation is left in the pointing error of a recorded run.
 
 isolation = 20 log10(motion / coherent), over the evaluated part of the run (results.Tracking.tracking) as far as the
-target was within half a beamwidth, from the recorded truth; each rms is per axis and sample, cross-elevation and
-elevation together.
+target was within half a beamwidth and no slew through a keyhole under way, from the recorded truth; each rms is per
+axis and sample, cross-elevation and elevation together.
 
 motion    how far the direction to the target moves on the deck because the ship turns about its mean attitude: the
           angle between that direction and the one the deck would see in its mean attitude.
@@ -110,6 +110,8 @@ def read(bag, run):
     on = run.tracking & np.isfinite(np.column_stack((ship, target, error))).all(axis=1)
     if math.isfinite(run.beamwidth):
         on &= np.hypot(*error.T) <= 0.5 * run.beamwidth
+    for begin, end, _ in results.keyholes(bag):
+        on &= (run.t < begin) | (run.t > end + results.SETTLING)
     dt = float(np.median(np.diff(run.t)))
     if np.sum(on) * dt < LEAST:
         return None

@@ -229,13 +229,20 @@ def _loss(run):
 def announced_losses(bag) -> dict:
     """{'keyhole_loss_predicted_s': (value, unit)}: what the ACU said beforehand in its diagnostics that it would lose
     in keyholes, each counted once; nothing where it said nothing of the kind."""
+    found = keyholes(bag)
+    return {'keyhole_loss_predicted_s': (sum(loss for _, _, loss in found), 's')} if found else {}
+
+
+def keyholes(bag):
+    """[(begin, end, loss)] [s] of the slews that the ACU said in its diagnostics it would make."""
     found = {}
     for _, _, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
         for status in array.status:
             said = {value.key: value.value for value in status.values}
             if 'keyhole_loss_s' in said:
-                found[said['keyhole_begins_s']] = float(said['keyhole_loss_s'])
-    return {'keyhole_loss_predicted_s': (sum(found.values()), 's')} if found else {}
+                found[said['keyhole_begins_s']] = tuple(float(said[f'keyhole_{name}_s']) for name in (
+                    'begins', 'ends', 'loss'))
+    return list(found.values())
 
 
 def _max(values):

@@ -13,6 +13,12 @@ def wrap(angle):
 
 
 @compiled
+def cross(ax, ay, az, bx, by, bz):
+    """a x b."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@compiled
 def direction(azimuth, elevation):
     """Unit vector (FLU, or north-west-up for earth angles) of an azimuth that turns clockwise."""
     cos_el = math.cos(elevation)

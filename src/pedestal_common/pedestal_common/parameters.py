@@ -134,7 +134,7 @@ def _replace(instance, values, prefix):
     try:
         return dataclasses.replace(instance, **changes)
     except ParameterError as error:
-        raise error if '.' in str(error).split(' = ')[0] else ParameterError(f'{prefix}{error}') from None
+        raise ParameterError(f'{prefix}{error}') from None
 
 
 def record_type(cls) -> np.dtype:

@@ -9,9 +9,14 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import quaternion, rotation, to_deck
+from pedestal_common.parameters import ParameterError
 from ship_motion_sim import earth, ins, motion, navigator
 from ship_motion_sim.ins import NEVER, RING, UNDER_WAY
 from ship_motion_sim.params import InsParameters
+
+LONGEST_GAP = 0.1
+"""Time without a usable IMU message [s] over which its rates may be taken for steady: a deck's angular acceleration of
+0.1 rad/s2 makes that wrong by 0.5 mrad."""
 
 CONSTANTS = np.dtype([
     ('ship', motion.CONSTANTS),
@@ -20,6 +25,7 @@ CONSTANTS = np.dtype([
     ('increment', 'i8'),                    # 1: the IMU gives mean rates since its last sample, 0: rates at the stamp
     ('aid_noise', 'f8'),                    # [m/s]
     ('navigator', navigator.CONSTANTS),
+    ('power_up', navigator.STATE),
 ], align=True)
 
 STATE = np.dtype([
@@ -36,22 +42,28 @@ STATE = np.dtype([
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS."""
+    """The record (1,) of CONSTANTS. Raises ParameterError where it could never call itself aligned."""
     record, latitude = np.zeros(1, CONSTANTS), math.radians(params.ship.latitude_deg)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(latitude)
     record['latency_ns'] = round(params.latency * 1e9)
     record['increment'], record['aid_noise'] = params.imu_output == 'increment', params.aid.noise
     record['navigator'] = navigator.constants(params.alignment, params.method, params.aid.source, latitude)
+    wanted, least = params.alignment.aligned_sigma, navigator.least_azimuth_sigma(record['navigator'][0])
+    if wanted <= least:
+        raise ParameterError(f'alignment.aligned_sigma = {wanted:g} rad: must be above {least:.3g} rad, the best that '
+                             f'method {params.method} reaches at latitude {params.ship.latitude_deg:g} deg with '
+                             f'alignment.gyro_bias = {params.alignment.gyro_bias:g} rad/s')
+    yaw = math.radians(90.0 - params.alignment.initial_heading_deg)
+    record['power_up'] = navigator.initial_state(record['navigator'], quaternion(0.0, 0.0, yaw))
     return record
 
 
-def initial_state(params: InsParameters) -> np.ndarray:
-    """The record (1,) of STATE before the first sample."""
+def initial_state(constants) -> np.ndarray:
+    """The record (1,) of STATE before the first sample; constants: CONSTANTS (1,)."""
     state = np.zeros(1, STATE)
     state['last_stamp_ns'] = state['imu_stamp_ns'] = NEVER
-    yaw = math.radians(90.0 - params.alignment.initial_heading_deg)
-    state['navigator'] = navigator.initial_state(constants(params)['navigator'], quaternion(0.0, 0.0, yaw))
+    state['navigator'] = constants['power_up']
     return state
 
 
@@ -69,9 +81,13 @@ def measure_aid(c, s, stamp_ns, normals):
 @compiled
 def integrate(c, s, stamp_ns, rate, force):
     """Take an IMU message into the navigator: mean rates are the increments, rates at the stamps make trapezes. The
-    first one ends an interval that began before power-up and is not integrated."""
-    if s.imu_stamp_ns != NEVER:
-        dt = 1e-9 * (stamp_ns - s.imu_stamp_ns)
+    first one ends an interval that began before power-up and is not integrated, nor is one after a gap, which is a
+    new power-up. False after a gap."""
+    dt = 1e-9 * (stamp_ns - s.imu_stamp_ns) if s.imu_stamp_ns != NEVER else 0.0
+    if dt > LONGEST_GAP:
+        s.navigator, s.imu_stamp_ns = c.power_up, NEVER
+        return False
+    if dt > 0.0:
         for i in range(3):
             if c.increment == 1:
                 s.angle[i], s.force[i] = dt * rate[i], dt * force[i]
@@ -79,6 +95,7 @@ def integrate(c, s, stamp_ns, rate, force):
                 s.angle[i] = 0.5 * dt * (rate[i] + s.last_rate[i])
                 s.force[i] = 0.5 * dt * (force[i] + s.last_force[i])
         navigator.step(s.navigator, c.navigator, s.angle, s.force, dt, s.aid)
+    return True
 
 
 @compiled
@@ -121,7 +138,8 @@ def step(state, constants, inputs, outputs, normals):
             s.released += 1
             out.status = ins.BUFFER_FULL
         measure_aid(c, s, i.stamp_ns, normals)
-        integrate(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration)
+        if not integrate(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration):
+            out.status = ins.ATTITUDE_LOST
         measure(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration)
     if s.released == 0:
         out.stage = navigator.ALIGNING

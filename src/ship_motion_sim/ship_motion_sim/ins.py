@@ -16,8 +16,9 @@ from ship_motion_sim.params import InsParameters
 
 NORMALS = 9     # standard normals a step takes: three wander, three attitude, three rate
 STATUS = ('ok', 'stamp does not advance', 'IMU data are not finite',
-          'IMU disagrees with the ship parameters of the INS', 'more samples than the latency buffer holds')
-OK, BAD_STAMP, BAD_IMU, IMU_DISAGREES, BUFFER_FULL = range(len(STATUS))
+          'IMU disagrees with the ship parameters of the INS', 'more samples than the latency buffer holds',
+          'IMU was silent for too long, the attitude is lost: it aligns anew')
+OK, BAD_STAMP, BAD_IMU, IMU_DISAGREES, BUFFER_FULL, ATTITUDE_LOST = range(len(STATUS))
 
 RING = 256      # samples under way: latency / step, the largest latency at 1 kHz
 NEVER = -2 ** 63

@@ -1,4 +1,5 @@
 """ROS shell of the INS: hears the IMU, publishes attitude and deck rate as the INS knows them."""
+import math
 import sys
 
 from pedestal_common import messages, records, shell
@@ -35,20 +36,27 @@ class InsNode(shell.Shell):
 
     def diagnose(self):
         status, self.worst = self.worst, 0
-        outputs = self.unit.outputs[0]
-        values = [('latency_s', f'{self.parameters.latency:g}'),
-                  ('heading_error_rms_rad', f'{outputs["variance"][2]**0.5:g}')]
-        if self.announced != ins.NO_STAGE:
-            values += [('method', self.parameters.method), ('state', navigator.STAGES[self.announced]),
-                       ('level_error_rms_rad', f'{outputs["variance"][0]**0.5:g}'),
-                       *((f'velocity_{axis}', f'{v:.3f}') for axis, v in zip(('east', 'north', 'up'),
-                                                                             outputs['velocity']))]
+        outputs, stage = self.unit.outputs[0], int(self.unit.outputs[0]['stage'])
+        sigma = outputs['variance']**0.5
+        values = [('latency_s', f'{self.parameters.latency:g}')]
+        known = self.unit.state[0]['released'] > 0
+        if known:
+            values.append(('heading_error_rms_rad', f'{sigma[2]:g}'))
+        if stage != ins.NO_STAGE:
+            values += [('method', self.parameters.method), ('state', navigator.STAGES[stage])]
+            if known:
+                values.append(('level_error_rms_rad', f'{sigma[0]:g}'))
+        if stage == navigator.NAVIGATING:
+            values += [(f'velocity_{axis}', f'{v:.3f}') for axis, v in zip(('east', 'north', 'up'),
+                                                                           outputs['velocity'])]
         if status:
             return shell.ERROR, ins.STATUS[status], values
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
-        if self.announced == navigator.ALIGNING:
-            return shell.WARN, navigator.STAGES[self.announced], values
+        if stage == navigator.ALIGNING:
+            heading, wanted = (math.degrees(x) for x in (sigma[2], self.parameters.alignment.aligned_sigma))
+            so_far = f'heading known to {heading:.2g} deg (1 sigma)' if known else 'heading not known yet'
+            return shell.WARN, f'aligning: {so_far}, navigates from {wanted:.2g} deg on', values
         return shell.OK, 'navigating', values
 
 

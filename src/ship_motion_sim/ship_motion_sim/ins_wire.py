@@ -26,7 +26,7 @@ class Ins:
             self._answers, self.constants, self.state = model_answers, ins.constants(params), ins.initial_state()
         else:
             self._answers, self.constants = aligning_answers, aligning_ins.constants(params)
-            self.state = aligning_ins.initial_state(params)
+            self.state = aligning_ins.initial_state(self.constants)
         self.inputs, self.outputs = np.zeros(1, ins.INPUTS), np.zeros(1, ins.OUTPUTS)
         self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
         self.rng = noise.generator(params.seed, 'ins')

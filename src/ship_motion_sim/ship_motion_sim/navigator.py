@@ -38,6 +38,7 @@ STATE = np.dtype([
     ('free', 'f8'),                             # since navigation began [s]
     ('strapdown', strapdown.STATE),
     ('command', 'f8', (3,)),                    # w_c [rad/s]
+    ('levelling', 'f8'),                        # w_cN of the gyrocompass, smoothed [rad/s]
     ('azimuth', 'f8'),                          # of n', known so far [rad]
     ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),         # [rad]
     ('aligned_azimuth_sigma', 'f8'), ('aligned_level_sigma', 'f8'),     # when navigation began
@@ -57,6 +58,14 @@ def constants(p, method, aid, latitude) -> np.ndarray:
     record['classical'] = classical.constants(k, p.classical_bandwidth, p.step)
     record['adrc'] = adrc.constants(k, p.adrc, p.step)
     return record
+
+
+def least_azimuth_sigma(c):
+    """1 sigma [rad] of azimuth after any time; c CONSTANTS."""
+    if c['method'] == CLASSICAL:
+        return float(c['classical']['azimuth'])
+    k = c['conditions']
+    return float(k['gyro_bias'] / k['earth_rate'][1])
 
 
 def initial_state(constants, quaternion) -> np.ndarray:
@@ -79,13 +88,15 @@ def begin(s, c, qx, qy, qz, qw):
 
 @compiled
 def aided_velocity(s, c, aid):
-    """(E, N) in n' of what the aid (3,) says; a GNSS is only asked once n' is n but for s.azimuth."""
+    """(E, N) in n' of what the aid (3,) says; a GNSS is only asked once n' is n within what alignment left.
+
+    That is not turned by the azimuth found since: 7 m/s that turn with it would come back as an azimuth, larger.
+    """
     if c.aid == LOG:
         east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
         return east, north
     if c.aid == GNSS:
-        cos, sin = math.cos(s.azimuth), math.sin(s.azimuth)
-        return cos * aid[0] + sin * aid[1], cos * aid[1] - sin * aid[0]
+        return aid[0], aid[1]
     return 0.0, 0.0
 
 
@@ -111,6 +122,15 @@ def align_in_inertial_space(s, c, aid, h):
 
 
 @compiled
+def doubt_the_opposite(s, c, h):
+    """The gyrocompass turns nothing back at 180 deg of azimuth either, but there the level command to the north takes
+    back twice the earth's rate: (19) of paper 001, cos az = 1 + w_cN / w_N. Beyond 60 deg its azimuth is not known."""
+    s.levelling += c.classical.s0 * h * (s.command[1] - s.levelling)
+    if 1.0 + s.levelling / c.conditions.earth_rate[1] < 0.5:
+        s.azimuth_sigma = SIGMA_UNKNOWN
+
+
+@compiled
 def follow(s, c, method, aid, h):
     """One step of a method that commands n'."""
     v, k = s.strapdown.velocity, c.conditions
@@ -124,6 +144,7 @@ def follow(s, c, method, aid, h):
         v[0] -= s.classical.damped[0]
         v[1] -= s.classical.damped[1]
         take(s, s.classical)
+        doubt_the_opposite(s, c, h)
     elif method == ADRC:
         adrc.step(s.adrc, c.adrc, k, v_east, v_north, h)
         take(s, s.adrc)

@@ -5,7 +5,7 @@ positive pitch has the bow down, so it changes its sign.
 """
 import math
 
-DAY = 86400.0
+DAY = 86_400_000        # [ms]
 
 
 def sentence(body):
@@ -16,10 +16,9 @@ def sentence(body):
     return f'${body}*{checksum:02X}\r\n'.encode('ascii')
 
 
-def time_of_day(t):
-    """hhmmss.sss of t [s]."""
-    milliseconds = math.floor(t % DAY * 1000.0)
-    seconds, milliseconds = divmod(milliseconds, 1000)
+def time_of_day(stamp):
+    """hhmmss.sss of a stamp [ns]: whole numbers, for 0.57 s as a float is 569.99 ms."""
+    seconds, milliseconds = divmod(stamp // 1_000_000 % DAY, 1000)
     return f'{seconds // 3600:02d}{seconds // 60 % 60:02d}{seconds % 60:02d}.{milliseconds:03d}'
 
 
@@ -28,9 +27,9 @@ def heading(yaw):
     return round(math.degrees(0.5 * math.pi - yaw), 3) % 360.0
 
 
-def attitude(t, roll, pitch, yaw, heave):
-    """HEHDT and PASHR at t [s] of roll, pitch, yaw [rad] (REP 103: FLU in ENU) and heave [m], as one datagram."""
+def attitude(stamp, roll, pitch, yaw, heave):
+    """HEHDT and PASHR at a stamp [ns], one datagram, of roll, pitch, yaw [rad] (REP 103: FLU in ENU) and heave [m]."""
     psi = heading(yaw)
     return sentence(f'HEHDT,{psi:.3f},T') + sentence(
-        f'PASHR,{time_of_day(t)},{psi:.3f},T,{math.degrees(roll):+.3f},{-math.degrees(pitch):+.3f},{heave:+.3f},'
+        f'PASHR,{time_of_day(stamp)},{psi:.3f},T,{math.degrees(roll):+.3f},{-math.degrees(pitch):+.3f},{heave:+.3f},'
         '0.000,0.000,0.000,1,0')

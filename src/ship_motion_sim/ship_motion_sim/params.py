@@ -151,6 +151,11 @@ class AlignmentParameters(Parameters):
     classical_bandwidth: float = parameter(0.025, 0.005, 0.2, 'rad/s', 'method classical: s0 of its four poles')
     adrc: AdrcParameters = group(AdrcParameters)
 
+    def check(self):
+        if self.adrc.control * self.step > 1.0:
+            raise ParameterError(f'adrc.control = {self.adrc.control:g} rad/s: must be at most 1 / step = '
+                                 f'{1.0 / self.step:g} rad/s, or the loop is unstable')
+
 
 @dataclasses.dataclass(frozen=True)
 class AidParameters(Parameters):

@@ -17,6 +17,7 @@ import numpy as np
 
 from pedestal_common import csv_table
 from pedestal_common.compiled import compiled
+from pedestal_common.interval import interval
 
 ROWS = 16384
 """Most rows of a recording."""
@@ -69,18 +70,12 @@ def pieces(times, freedoms):
 def evaluate(breaks, coefficients, count, t, freedoms):
     """freedoms (3, 6) = the first `count` pieces at t and their first and second derivative; outside, the ends'."""
     t = min(max(t, breaks[0]), breaks[count])
-    low, high = 0, count
-    while high - low > 1:
-        middle = (low + high) // 2
-        if breaks[middle] <= t:
-            low = middle
-        else:
-            high = middle
-    s = t - breaks[low]
+    piece = interval(breaks[:count + 1], t)
+    s = t - breaks[piece]
     for d in range(freedoms.shape[1]):
         x = dx = half_ddx = 0.0
         for i in range(ORDER):
             half_ddx = half_ddx * s + dx
             dx = dx * s + x
-            x = x * s + coefficients[low, d, i]
+            x = x * s + coefficients[piece, d, i]
         freedoms[0, d], freedoms[1, d], freedoms[2, d] = x, dx, 2.0 * half_ddx

@@ -5,6 +5,7 @@ import sys
 import numpy as np
 
 from pedestal_common import records, shell
+from pedestal_common.parameters import ParameterError
 from ship_motion_sim import imu, motion, nmea
 from ship_motion_sim.params import ShipMotionParameters
 from ship_motion_sim.ship_wire import CLOCK, RAW, TRUTH, ShipMotion
@@ -24,10 +25,17 @@ class ShipMotionNode(shell.Shell):
         if self.parameters.nmea.port:
             self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self.socket.setblocking(False)
-            # Resolves the name once; a host that does not exist is said at the start.
-            self.socket.connect((self.parameters.nmea.host, self.parameters.nmea.port))
+            self.connect(self.parameters.nmea)
         self.diagnose_with(self.diagnose)
         self.follow(CLOCK, self.unit.followers, self.step)
+
+    def connect(self, equipment):
+        """Look the host up, once; what cannot be reached from here is said at the start."""
+        try:
+            self.socket.connect((equipment.host, equipment.port))
+        except OSError as error:
+            raise ParameterError(f"nmea.host = '{equipment.host}': must be the name or IPv4 address of one host: "
+                                 f'{error.strerror}') from None
 
     def step(self, stamp, _clock, _followers):
         self.clock.stamp[0] = stamp
@@ -40,18 +48,19 @@ class ShipMotionNode(shell.Shell):
             self.send_attitude(stamp)
 
     def send_attitude(self, stamp):
-        """One datagram; equipment that is not there costs nothing but a word in the diagnostics."""
+        """One datagram; equipment that is not there costs nothing but a word in the next diagnostics. The system tells
+        of a datagram that nobody took when the next is sent, which then is not, so that every other one succeeds."""
         period = round(1e9 / self.parameters.nmea.rate)
         self.next_datagram = stamp - stamp % period + period
         o = self.unit.truth[0]
         try:
-            self.socket.send(nmea.attitude(stamp * 1e-9, o['roll'], o['pitch'], o['yaw'], o['position'][2]))
-            self.unsent = ''
+            self.socket.send(nmea.attitude(stamp, o['roll'], o['pitch'], o['yaw'], o['position'][2]))
         except OSError as error:
             self.unsent = f'NMEA to {self.parameters.nmea.host}:{self.parameters.nmea.port}: {error.strerror}'
 
     def diagnose(self):
         truth = self.unit.truth[0]
+        unsent, self.unsent = self.unsent, ''
         values = [(f'{name}_deg', f'{np.degrees(truth[name]):.3f}') for name in ('roll', 'pitch')]
         for status, names in ((truth['status'], motion.STATUS), (self.unit.felt[0]['status'], imu.STATUS)):
             if status:
@@ -59,9 +68,9 @@ class ShipMotionNode(shell.Shell):
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values
         if self.unit.over():
-            return shell.WARN, 'the recorded motion is over, the ship lies still', values
-        if self.unsent:
-            return shell.WARN, self.unsent, values
+            return shell.WARN, 'the recorded motion is over, the deck is at rest', values
+        if unsent:
+            return shell.WARN, unsent, values
         return shell.OK, 'under way', values
 
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import rotation, to_earth
+from pedestal_common.line_of_sight import cross, rotation, to_earth
 
 STATE = np.dtype([
     ('quaternion', 'f8', (4,)),         # x, y, z, w, deck -> n'
@@ -21,12 +21,6 @@ STATE = np.dtype([
     ('last_angle', 'f8', (3,)),         # the increments before, for coning and sculling
     ('last_force', 'f8', (3,)),
 ], align=True)
-
-
-@compiled
-def cross(ax, ay, az, bx, by, bz):
-    """a x b."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @compiled

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pedestal_common import parameters, records
-from ship_motion_sim import navigator
+from ship_motion_sim import ins, navigator
 from ship_motion_sim.ins_wire import DATA, RAW, STATE, Ins
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
 from ship_motion_sim.ship_wire import CLOCK, TRUTH, ShipMotion
@@ -67,6 +67,19 @@ def test_it_aligns_under_way_from_180_deg_wrong_and_knows_how_well(method, aid, 
     np.testing.assert_allclose(said[DATA]['angular_velocity'][aligned:], rate[aligned:], atol=2e-4)
 
 
+@pytest.mark.parametrize('method', ['adrc', 'adrc_scheduled', 'riccati_eso', 'oba'])
+def test_the_level_is_as_good_as_it_says_while_it_is_still_being_levelled(method):
+    """Power-up on a deck that is taken for level; 1 s later and until the end."""
+    raw, truth, _ = ordinary('increment')
+    said = answered(raw, method=method, imu_output='increment', **WRONG, **{'aid.source': 'log'})
+    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
+    assert np.abs(e[0, :2]).max() > 2e-3 or method == 'oba'
+    for first, last in ((1.0, 5.0), (5.0, 20.0), (20.0, 60.0), (60.0, 260.0)):
+        part = slice(round(first * 1e9 / STEP), round(last * 1e9 / STEP))
+        off = np.sqrt(np.mean(e[part, :2]**2, axis=1))
+        assert np.sqrt(np.mean(off**2)) < 2.0 * np.sqrt(np.mean(sigma[part, 0]**2))
+
+
 def test_a_ship_that_swell_moves_calls_itself_aligned_later():
     """Without aid the velocity of sea state 6 is no white noise of 0.05 m/s: the sigma widens."""
     raw, _, _ = sailed(260.0, {**SEA, 'ship.sea_state': 6}, output='increment')
@@ -74,6 +87,20 @@ def test_a_ship_that_swell_moves_calls_itself_aligned_later():
     aided = answered(raw, method='riccati_eso', imu_output='increment', **WRONG,
                      **{'ship.sea_state': 6, 'aid.source': 'log'})
     assert (said[STATE] == navigator.ALIGNING).all() and 0 < aligned_at(aided) < 8000
+
+
+def test_a_gyrocompass_that_dwells_at_180_deg_is_not_aligned():
+    """An unstable equilibrium: this heading, on a deck without motion, with sensors without errors, stays there."""
+    still = {'ship.motion': 'plain', 'ship.plain.roll_amplitude_deg': 0.0, 'ship.speed': 0.0}
+    errorless = {f'{sensor}_{name}': 0.0 for sensor in ('gyro', 'accelerometer')
+                 for name in ('bias_x', 'bias_y', 'bias_z', 'noise')}
+    raw, truth, _ = sailed(420.0, still, output='increment', **errorless)
+    for heading, dwells in ((179.84, True), (2.0, False)):
+        said = answered(raw, **still, method='classical', imu_output='increment',
+                        **{'alignment.initial_heading_deg': heading, 'alignment.aligned_sigma': 0.006})
+        off, stage = abs(errors(said, truth)[-1, 2]), said[STATE][-1]
+        assert stage == (navigator.ALIGNING if dwells else navigator.NAVIGATING)
+        assert off > 3.1 if dwells else off < 1e-3
 
 
 def test_free_inertial_keeps_the_attitude():
@@ -84,6 +111,17 @@ def test_free_inertial_keeps_the_attitude():
     assert aligned > 0
     e = errors(said, truth)
     assert (np.abs(e[-1] - e[aligned]) < [5e-4, 5e-4, 1e-4]).all()
+
+
+@pytest.mark.parametrize('heading', [90.0, 270.0])
+def test_with_a_gnss_it_navigates_on_any_course(heading):
+    """A velocity turned by the azimuth that it is to improve runs away on westerly courses."""
+    sea = {'ship.sea_state': 5, 'ship.heading_deg': heading, 'ship.speed': 10.0}
+    raw, truth, _ = sailed(400.0, sea, output='increment')
+    said = answered(raw, method='oba', imu_output='increment', **sea, **WRONG, **{'aid.source': 'gnss'})
+    aligned = aligned_at(said)
+    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
+    assert aligned > 0 and (np.abs(e[aligned:, 2]) < 3.0 * sigma[aligned:, 2]).all()
 
 
 def test_the_attitude_is_late_by_the_latency_and_the_state_goes_with_it():
@@ -103,6 +141,32 @@ def test_a_message_that_is_not_finite_is_bridged():
     assert said[DATA]['stamp'][3000] == records.NEVER
     assert np.isfinite(said[DATA]['orientation']).all()
     assert abs(errors(said, truth)[-1, 2]) < 3.0 * math.sqrt(said[DATA]['orientation_variance'][-1, 2])
+
+
+@pytest.mark.parametrize('how', ['missing', 'not finite'])
+def test_after_a_long_silence_of_the_imu_it_aligns_anew(how):
+    """4 s of a rolling deck that nobody measured: what it knew before is worth nothing, and it says so."""
+    raw, truth, _ = sailed(400.0, output='increment')
+    there = np.ones(len(raw), bool)
+    there[9000:9200] = False
+    if how == 'missing':
+        raw, truth = raw[there], truth[there]
+    else:
+        raw['linear_acceleration'][~there] = math.nan
+    unit = Ins(parameters.build(InsParameters, {**SEA, **WRONG, 'latency': 0.0, 'method': 'riccati_eso',
+                                                'imu_output': 'increment', 'aid.source': 'log'}))
+    heard, said, statuses = np.zeros(1, unit.HEARD), np.zeros(len(raw), unit.SAID), []
+    for k in range(len(raw)):
+        heard[RAW] = raw[k]
+        unit.answers(heard, said[k:k + 1])
+        statuses.append(ins.STATUS[unit.outputs[0]['status']])
+    back = statuses.index('IMU was silent for too long, the attitude is lost: it aligns anew')
+    assert back == (9000 if how == 'missing' else 9200)
+    assert said[STATE][back - 1 if how == 'missing' else 8999] == navigator.NAVIGATING
+    assert (said[STATE][back:back + 5000] == navigator.ALIGNING).all()
+    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
+    assert sigma[back, 2] > 1.0 and said[STATE][-1] == navigator.NAVIGATING
+    assert abs(e[-1, 2]) < 3.0 * sigma[-1, 2] < 0.01
 
 
 def test_the_model_says_nothing_of_alignment():

@@ -13,7 +13,7 @@ def parsed(*attitude):
 
 def test_a_public_parser_reads_it_back():
     roll, pitch, yaw = math.radians(3.2), math.radians(-1.5), math.radians(50.0)
-    heading, attitude = parsed(3723.4567, roll, pitch, yaw, -0.75)
+    heading, attitude = parsed(3_723_456_700_000, roll, pitch, yaw, -0.75)
     assert heading.talker == 'HE' and heading.hdg_true == 'T' and float(heading.heading) == 40.0
     assert attitude.timestamp.isoformat()[:12] == '01:02:03.456'
     assert (attitude.true_heading, attitude.is_true_heading) == (40.0, 'T')
@@ -23,15 +23,20 @@ def test_a_public_parser_reads_it_back():
 @pytest.mark.parametrize('yaw_deg, heading', [(90.0, 0.0), (0.0, 90.0), (-90.0, 180.0), (180.0, 270.0),
                                               (90.0002, 0.0), (450.0, 0.0)])
 def test_heading_is_clockwise_from_north_and_below_360(yaw_deg, heading):
-    assert parsed(0.0, 0.0, 0.0, math.radians(yaw_deg), 0.0)[1].true_heading == pytest.approx(heading, abs=1e-9)
+    assert parsed(0, 0.0, 0.0, math.radians(yaw_deg), 0.0)[1].true_heading == pytest.approx(heading, abs=1e-9)
 
 
 def test_the_day_begins_again():
-    assert nmea.time_of_day(86399.9999) == '235959.999'
-    assert nmea.time_of_day(86400.0) == '000000.000'
+    assert nmea.time_of_day(86_399_999_900_000) == '235959.999'
+    assert nmea.time_of_day(86_400_000_000_000) == '000000.000'
+
+
+def test_every_millisecond_is_told_as_it_is():
+    for k in range(2000):
+        assert nmea.time_of_day(61_000_000_000 + 1_000_000 * k) == f'0001{1 + k // 1000:02d}.{k % 1000:03d}'
 
 
 def test_a_changed_byte_is_found():
-    broken = nmea.attitude(0.0, 0.1, 0.0, 0.0, 0.0).decode().splitlines()[1].replace('+5.730', '+5.731')
+    broken = nmea.attitude(0, 0.1, 0.0, 0.0, 0.0).decode().splitlines()[1].replace('+5.730', '+5.731')
     with pytest.raises(pynmea2.ChecksumError):
         pynmea2.parse(broken, check=True)

@@ -72,6 +72,15 @@ def azimuth_sigma(c, k, window, surprise):
 
 
 @compiled
+def level_sigma(c, k, o, t):
+    """1 sigma [rad]: of the settled loop, wider where the sea surprises, or what is known to be left if that is more;
+    and what the observer, all poles at w_o, has not seen yet of the level at power-up."""
+    x = c.w_o * t
+    unseen = extended_observer.LEVEL_SIGMA * (1.0 + x + 0.5 * x * x) * math.exp(-x)
+    return math.hypot(max(math.sqrt(max(o.surprise, 1.0)) * c.level, extended_observer.tilt(o, k)), unseen)
+
+
+@compiled
 def step(s, c, k, v_east, v_north, h):
     """One step; records STATE, CONSTANTS, CONDITIONS."""
     s.t += h
@@ -82,7 +91,7 @@ def step(s, c, k, v_east, v_north, h):
     extended_observer.predict(o, h)
     extended_observer.correct(o, v_east, v_north, l1, l2, l3, c.innovation_variance, h)
     levelling.level(o, k, s.v1, s.v2, c.w_c, s.command)
-    s.azimuth_sigma, s.level_sigma = SIGMA_UNKNOWN, c.level
+    s.azimuth_sigma, s.level_sigma = SIGMA_UNKNOWN, level_sigma(c, k, o, s.t)
     if s.t < c.start:
         return
     for i in range(2):
@@ -92,4 +101,3 @@ def step(s, c, k, v_east, v_north, h):
     w_north = slope.slope(s.first[1], s.second[1], count)
     s.azimuth = math.atan2(w_east, k.earth_rate[1] + w_north)
     s.azimuth_sigma = azimuth_sigma(c, k, count * h, o.surprise)
-    s.level_sigma = math.sqrt(max(o.surprise, 1.0)) * c.level

@@ -126,6 +126,12 @@ def azimuth(o, k):
 
 
 @compiled
+def tilt(o, k):
+    """Level of n' [rad], rms of both axes, that is known to be wrong and that the commands have not taken away yet."""
+    return math.hypot(o.z[0, 1], o.z[1, 1]) / (math.sqrt(2.0) * k.gravity)
+
+
+@compiled
 def sigmas(o, k):
     """(azimuth, level) 1 sigma [rad]: covariance, wider where the sea surprises, and the sensors' biases."""
     wider = max(o.surprise, 1.0)

@@ -2,6 +2,8 @@
 
 Its covariance is the information limit: x3 out of velocities with white noise r per step, x2 walking with q.
 """
+import math
+
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -40,4 +42,5 @@ def step(s, k, v_east, v_north, h, w_c):
     extended_observer.correct(o, v_east, v_north, l1, l2, l3, variance, h)
     levelling.level(o, k, s.v1, s.v2, w_c, s.command)
     s.azimuth = extended_observer.azimuth(o, k)
-    s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k)
+    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k)
+    s.level_sigma = math.hypot(level_sigma, extended_observer.tilt(o, k))
