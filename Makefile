@@ -22,7 +22,7 @@ demo: install
 
 test: install
 	.venv/bin/ruff check .
-	.venv/bin/python -m pytest
+	.venv/bin/python -m pytest --numprocesses 2 --dist loadfile
 
 update-references: install
 	.venv/bin/python bags/reference/update.py
@@ -44,7 +44,7 @@ clean:
 
 .venv/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv/bin/pip
 	@echo 'Installing into .venv (the first time this takes some minutes) ...'
-	.venv/bin/python $(PIP) $(ROS) ruff $(foreach package,$(PACKAGES),--editable 'src/$(package)[test]')
+	.venv/bin/python $(PIP) $(ROS) ruff pytest-xdist $(foreach package,$(PACKAGES),--editable 'src/$(package)[test]')
 	@touch $@
 
 .venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip
