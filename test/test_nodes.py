@@ -1,6 +1,8 @@
 """Each executable alone: it starts, and ends without a word when told to; the parameter doors of a node."""
 import importlib.resources
 import signal
+import sys
+import time
 
 import pytest
 
@@ -34,6 +36,21 @@ def ended(start_node, connect, scenario_file):
 def test_a_node_ends_in_silence_when_told_to(ended, node, number):
     result = ended[node, number]
     assert (result.returncode, result.stderr) == (0, '')
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_a_node_that_compiles_ends_at_once(start_process, reserve_domain, tmp_path, number):
+    """Nothing is compiled yet: it would take the control unit half a minute to come to its end."""
+    process = start_process([sys.executable, '-m', 'acu_tracker.acu_node'], XDG_CACHE_HOME=str(tmp_path / 'cache'),
+                            ROS_DOMAIN_ID=str(reserve_domain()))
+    deadline = time.monotonic() + 60.0
+    while not any((tmp_path / 'cache').rglob('*.nbi')):
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline, 'it compiles nothing'
+        time.sleep(0.1)
+    process.send_signal(number)
+    assert process.communicate(timeout=15.0) == ('', '')
+    assert process.returncode == 0
 
 
 REFUSED = {

@@ -16,7 +16,7 @@ class AcuNode(shell.Shell):
     def __init__(self):
         super().__init__('acu', AcuParameters, live=('tracker', 'azimuth', 'elevation'))
         self.unit = Acu(self.parameters, 'ins' in self.graph.members)
-        self.unit.prepare()
+        self.prepare(self.unit)
         self.outputs = self.unit.outputs
         self.joints = records.only(self.unit.heard, JOINTS)
         self.follower_places = [(name, records.only(self.unit.heard, name)) for name in self.unit.followers]

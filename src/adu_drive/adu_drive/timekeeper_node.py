@@ -55,7 +55,7 @@ class DriveShell(shell.Shell):
         self.parts = [Part(prefix, unit) for prefix, unit in self.units()]
         self.first = self.parts[0].unit
         for part in self.parts:
-            part.unit.prepare()
+            self.prepare(part.unit)
         self.period_ns = round(p.period * shell.SECOND)
         self.steps_to_go = round(p.duration / p.period) if p.duration > 0.0 else None
         self.k = 0

@@ -75,8 +75,9 @@ class GraphParameters(parameters.Parameters):
         return self.pacing == 'lockstep'
 
 
-class Stopped(Exception):  # noqa: N818  no error: the node was told to stop
-    """SIGINT or SIGTERM came while a node was waiting."""
+class Stopped(BaseException):  # noqa: N818  no error: the node was told to stop
+    """SIGINT or SIGTERM came while a node was waiting or compiling. Like KeyboardInterrupt it is no Exception, which
+    numba would take for an error of the law it compiles."""
 
 
 EXPECTED = (parameters.ParameterError, GraphError, ValueError, OSError, InvalidParameterTypeException,
@@ -85,6 +86,15 @@ EXPECTED = (parameters.ParameterError, GraphError, ValueError, OSError, InvalidP
 
 _stop = []
 """Not empty once SIGINT or SIGTERM has come to this process."""
+
+_compiling = []
+"""Not empty while it compiles, which can be cut short."""
+
+
+def _on_signal(*_):
+    _stop.append(True)
+    if _compiling:
+        raise Stopped
 
 
 def message_class(type_name):
@@ -282,6 +292,16 @@ class Shell(Node):
             self._next_second = (stamp // SECOND + 1) * SECOND
             self._publish_diagnostics()
 
+    def prepare(self, unit):
+        """Compile the laws of a unit, cold half a minute and more, unless told to stop."""
+        _compiling.append(True)
+        try:
+            if _stop:
+                raise Stopped
+            unit.prepare()
+        finally:
+            _compiling.clear()
+
     def await_acknowledged(self):
         """Wait until every reader has received all that this node published. Raises GraphError after the deadline: in
         lockstep it is the recorder that is silent, for everyone else has answered the step before."""
@@ -360,7 +380,7 @@ def make_executor():
 def main(node_class, args=None) -> int:
     """Run a node until it is finished or told to stop; exit code 0, or 1 with one line on stderr."""
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: _stop.append(True))
+        signal.signal(number, _on_signal)
     set_middleware_defaults()
     node = None
     name = os.path.basename(sys.argv[0])

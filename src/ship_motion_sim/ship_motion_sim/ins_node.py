@@ -13,7 +13,7 @@ class InsNode(shell.Shell):
     def __init__(self):
         super().__init__('ins', InsParameters)
         self.unit = Ins(self.parameters)
-        self.unit.prepare()
+        self.prepare(self.unit)
         self.worst = 0
         self.raw, self.data = records.only(self.unit.heard, RAW), records.only(self.unit.said, DATA)
         self.send, self.send_state = self.writer(DATA), self.writer(STATE)

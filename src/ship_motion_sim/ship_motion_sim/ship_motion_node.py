@@ -16,7 +16,7 @@ class ShipMotionNode(shell.Shell):
     def __init__(self):
         super().__init__('ship_motion', ShipMotionParameters)
         self.unit = ShipMotion(self.parameters)
-        self.unit.prepare()
+        self.prepare(self.unit)
         self.clock = records.only(self.unit.heard, CLOCK)
         self.says = [(self.unit.messages[name], records.only(self.unit.said, name), self.writer(name))
                      for name in (TRUTH, RAW)]

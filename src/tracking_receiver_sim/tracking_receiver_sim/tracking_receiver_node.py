@@ -17,7 +17,7 @@ class TrackingReceiverNode(shell.Shell):
         super().__init__('tracking_receiver', TrackingReceiverNodeParameters)
         self.on_ship = 'ship_motion' in self.graph.members
         self.unit = TrackingReceiver(self.parameters, self.on_ship)
-        self.unit.prepare()
+        self.prepare(self.unit)
         self.outputs = self.unit.outputs
         self.fault = receiver.LOCKED
         self.joints, self.ship = (records.only(self.unit.heard, name) for name in (JOINTS, SHIP))

@@ -27,8 +27,9 @@ from ship_motion_sim.params import (
     ShipParameters,
 )
 
-RUNS = 50
-"""Of the cases without a suffix and of swell; a quarter of them for each quadrant."""
+RUNS = 400
+"""Of the cases without a suffix and of swell; a quarter of them for each quadrant. With 50 an rms is known to 10 %
+only, which is more than the best methods are apart."""
 
 BATCH = 5
 """Runs that one worker makes at a time."""
