@@ -141,8 +141,8 @@ def follow(s, c, method, aid, h):
     v_east, v_north = v[0] - east, v[1] - north
     if method == CLASSICAL:
         classical.step(s.classical, c.classical, k, v_east, v_north, h)
-        v[0] -= s.classical.damped[0]
-        v[1] -= s.classical.damped[1]
+        v[0] -= s.classical.taken[0]
+        v[1] -= s.classical.taken[1]
         take(s, s.classical)
         doubt_the_opposite(s, c, h)
     elif method == ADRC:

@@ -3,10 +3,10 @@ import math
 
 import numpy as np
 import pytest
-from scipy import linalg
+from scipy import integrate, linalg
 from scipy.spatial.transform import Rotation
 
-from ship_motion_sim import strapdown
+from ship_motion_sim import navigator, strapdown
 from ship_motion_sim.alignment import (
     adrc_scheduled,
     classical,
@@ -121,6 +121,40 @@ def test_classical_poles():
     A = np.array([[-c['K1'], g, 0.0, 0.0], [-c['k2'], 0.0, 0.0, -w], [1.0, 0.0, -c['K4'], 0.0],
                   [0.0, 0.0, c['K3'] / w, 0.0]])
     np.testing.assert_allclose(np.poly(A), np.polymul([1, 2 * s0, 2 * s0**2], [1, 2 * s0, 2 * s0**2]), rtol=1e-9)
+
+
+def test_classical_from_180_deg_against_its_equations():
+    """The navigator, noise-free on a deck at rest that lies along ENU, against solve_ivp: error of azimuth [rad]."""
+    dt = 0.0025         # the steps are those of Euler: at 0.02 s they are 2.2 deg off
+    constants = navigator.constants(AlignmentParameters(step=dt), 'classical', 'none', LATITUDE)
+    start = Rotation.from_euler('zxy', -np.radians([180.0, 3.0, 3.0]))
+    state, k = navigator.initial_state(constants, start.as_quat()), constants[0]['conditions']
+    earth_rate, gravity = np.array(k['earth_rate']), float(k['gravity'])
+    angle, force, found = earth_rate * dt, np.array([0.0, 0.0, gravity * dt]), []
+    for _ in range(20):
+        for _ in range(round(10.0 / dt)):
+            navigator.step(state[0], constants[0], angle, force, dt, np.zeros(3))
+        found.append(Rotation.from_quat(navigator.attitude(state[0], constants[0])).as_matrix())
+    c = constants[0]['classical']
+
+    def slope_of(_, y):
+        turned, east, north, turning = Rotation.from_quat(y[:4]), y[4], y[5], y[6]
+        command = np.array([-c['k2'] * north, c['k2'] * east,
+                            np.clip(c['K3'] / earth_rate[1] * turning, -classical.RATE_LIMIT, classical.RATE_LIMIT)])
+        rate = turned.apply(earth_rate) - earth_rate - command      # of n' against n, in n'
+        x, y_, z, w = y[:4]
+        wx, wy, wz = rate
+        f = turned.apply([0.0, 0.0, gravity]) - np.cross(2.0 * earth_rate, [east, north, 0.0])
+        return np.array([w * wx + wy * z - wz * y_, w * wy + wz * x - wx * z, w * wz + wx * y_ - wy * x,
+                         -wx * x - wy * y_ - wz * z, 0.0, 0.0, 0.0]) * 0.5 + np.array(
+            [0.0, 0.0, 0.0, 0.0, f[0] - c['K1'] * east, f[1] - c['K1'] * north, north - c['K4'] * turning])
+
+    exact = integrate.solve_ivp(slope_of, (0.0, 200.0), [*start.as_quat(), 0.0, 0.0, 0.0], rtol=1e-8, atol=1e-10,
+                                max_step=0.5, t_eval=10.0 * np.arange(1, 21))
+    azimuth = [math.atan2(-m[1, 0], m[1, 1]) for m in found]
+    expected = [math.atan2(-m[1, 0], m[1, 1]) for m in Rotation.from_quat(exact.y[:4].T).as_matrix()]
+    off = np.array(azimuth) - expected
+    assert np.abs(np.arctan2(np.sin(off), np.cos(off))).max() < math.radians(1.0)
 
 
 def test_gravity_in_the_frame_of_the_start_against_a_sum():

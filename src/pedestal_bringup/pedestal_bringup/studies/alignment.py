@@ -267,7 +267,8 @@ def remarks(runs):
     return [
         f'{runs} runs: an rms is known to {100.0 / math.sqrt(2.0 * runs):.0f} %, the last crossing of 12 arcmin to '
         'tens of seconds where the rms flattens out just below. What kicks the classical loop off 180 deg turns it by '
-        '1.7 turns, so its time hangs on details: bandwidths of 0.024 to 0.028 rad/s give 456 to 495 s in no order.',
+        'more than a turn, so its time hangs on details: bandwidths of 0.024 to 0.028 rad/s give 414 to 494 s in no '
+        'order, the other signs of the tilts at the start 425 to 542 s.',
         'level_rms_arcmin is over 300 to 600 s; step_us is one step of 0.02 s with its two of the strapdown.']
 
 

@@ -1,8 +1,9 @@
 """The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity turns the azimuth back.
 
-v' = g a - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N with K1 = K4 = 2 s0, k2 = 4 s0^2/g,
+v' = f - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N with K1 = K4 = 2 s0, k2 = 4 s0^2/g,
 K3 = 4 s0^4/g: all four poles at -s0 +- j s0 (reference/nav.md section 1.2). 180 deg of azimuth is an unstable
-equilibrium, left by what the first levelling kicks: the loop is closed from the start.
+equilibrium, left by what the first levelling kicks: the loop is closed from the start. Its velocities are those of a
+gyrocompass, integrals of what two accelerometers feel: that they turn with w_cU the axes they stand on do not know.
 """
 import math
 
@@ -11,6 +12,9 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import steady_state
 from ship_motion_sim.alignment.conditions import SIGMA_UNKNOWN
+
+RATE_LIMIT = 0.1
+"""Of the command of the azimuth [rad/s], which the first levelling would drive to 0.2."""
 
 CONSTANTS = np.dtype([
     ('s0', 'f8'),                                       # [rad/s]
@@ -22,7 +26,7 @@ STATE = np.dtype([
     ('t', 'f8'),                    # since the start [s]
     ('turning', 'f8'),              # v_N / (s + K4) [m]
     ('residual', 'f8'),             # azimuth that the loop still turns back, smoothed [rad]
-    ('damped', 'f8', (2,)),         # what damping takes off v_E, v_N in this step [m/s]
+    ('taken', 'f8', (2,)),          # what this step takes off v_E, v_N [m/s]
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
 
@@ -58,9 +62,11 @@ def step(s, c, k, v_east, v_north, h):
     """One step; records STATE, CONSTANTS, CONDITIONS."""
     s.t += h
     s.turning += h * (v_north - c.K4 * s.turning)
+    # The damping, and what the strapdown has just made of w_c x v.
+    s.taken[0] = h * (c.K1 * v_east + s.command[2] * v_north)
+    s.taken[1] = h * (c.K1 * v_north - s.command[2] * v_east)
     s.command[0], s.command[1] = -c.k2 * v_north, c.k2 * v_east
-    s.command[2] = c.K3 / k.earth_rate[1] * s.turning
-    s.damped[0], s.damped[1] = c.K1 * h * v_east, c.K1 * h * v_north
+    s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.turning, -RATE_LIMIT), RATE_LIMIT)
     # A steady az is turned back at az s0 / 2. At 180 deg it is not, which the envelope covers.
     s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
     left = SIGMA_UNKNOWN * envelope(c.s0 * s.t)
