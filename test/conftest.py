@@ -264,7 +264,7 @@ class Client:
         response = self.call(name, Trigger, Trigger.Request())
         return response.success, response.message
 
-    def diagnosed(self, text, timeout=10.0):
+    def diagnosed(self, text, timeout=30.0):
         """Wait for a diagnostic that comes from now on and whose message holds the text; its DiagnosticStatus."""
         heard = self.heard['diagnostics']
         first = len(heard)

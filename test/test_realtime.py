@@ -14,6 +14,13 @@ PAUSE = 1.6
 """Drive time [s] for which the ACU of the run stands still: longer than a second, so a diagnostic falls in it."""
 
 
+SOON = 30.0
+"""Seconds in which a drive does what it is told, also on a machine that is busy with other tests."""
+
+TIMEOUT = 40
+"""Periods until a command is stale: a busy machine may hold the commander up for longer than the 10 of the default."""
+
+
 @pytest.fixture(scope='module')
 def run(start_run, connect):
     """A realtime run whose ACU is stopped for a while on the way to the target: run.stopped, run.resumed [s]."""
@@ -102,14 +109,19 @@ class Commander:
         self.moves_at(0.0, 0.0)
 
     def moves_at(self, azimuth, elevation):
-        self.client.until(lambda: np.allclose(self.last.velocity, (azimuth, elevation), atol=5e-3), 10.0)
+        try:
+            self.client.until(lambda: np.allclose(self.last.velocity, (azimuth, elevation), atol=5e-3), SOON)
+        except AssertionError:
+            said = [status.message for array in self.client.heard['diagnostics'][-5:] for status in array.status]
+            pytest.fail(f'asked for {self.rates}, moves at {list(self.last.velocity)}: {self.state}; said: {said}')
 
 
 @pytest.fixture(scope='module')
 def drive(start_node, connect):
     """A drive alone, with brakes so weak that a stop takes a second, under a commander."""
     node = start_node('adu', '-p', 'initial_elevation:=0.8', '-p', 'azimuth.limits.deceleration:=0.2',
-                      '-p', 'azimuth.faults.overspeed:=0.4', '-p', 'brakes.stop_time:=10.0')
+                      '-p', 'azimuth.faults.overspeed:=0.4', '-p', 'brakes.stop_time:=10.0',
+                      '-p', f'command_timeout:={TIMEOUT}')
     commander = Commander(connect(node.domain_id))
     yield commander
     node.process.send_signal(signal.SIGINT)
@@ -147,22 +159,20 @@ def test_a_command_that_is_no_number_is_named(drive, value):
     drive.rates = 0.1, 0.0
     drive.moves_at(0.1, 0.0)
     drive.rates = value, 0.0
-    seen = len(drive.client.heard['joint_states'])
-    drive.client.until(lambda: len(drive.client.heard['joint_states']) > seen + 5)
-    drive.rates = 0.1, 0.0
     assert drive.client.diagnosed('acu/rate_command holds NaN or infinity').level == 2
+    drive.rates = 0.1, 0.0
     drive.moves_at(0.1, 0.0)
 
 
 def test_silence_stops_the_axes_with_a_diagnostic(drive):
     drive.rates = 0.2, 0.0
     drive.moves_at(0.2, 0.0)
-    start = drive.last.position[0]
+    start, late = drive.last.position[0], TIMEOUT * 0.005
     drive.rates = None
-    assert drive.client.diagnosed('no new acu/rate_command for 0.05 s: stopping').level == 2
+    assert drive.client.diagnosed(f'no new acu/rate_command for {late:g} s: stopping').level == 2
     drive.moves_at(0.0, 0.0)
-    # Controlled: the way of a stop at 0.2 rad/s2 from 0.2 rad/s, and of the 10 periods before it.
-    assert drive.last.position[0] - start == pytest.approx(0.1 + 0.2 * 0.05, rel=0.3)
+    # Controlled: the way of a stop at 0.2 rad/s2 from 0.2 rad/s, and of the time before it.
+    assert drive.last.position[0] - start == pytest.approx(0.1 + 0.2 * late, rel=0.3)
 
 
 def test_emergency_stop_and_reset(drive):
@@ -200,7 +210,7 @@ def test_disable_and_enable(drive):
     drive.moves_at(0.1, 0.0)
     assert drive.client.trigger('adu/disable') == (True, 'drive is stopping')
     drive.moves_at(0.0, 0.0)
-    drive.client.until(lambda: drive.state == 'disabled', 10.0)
+    drive.client.until(lambda: drive.state == 'disabled', SOON)
     assert drive.client.trigger('adu/enable') == (True, 'drive is releasing brakes')
     drive.moves_at(0.1, 0.0)
     assert drive.state == 'enabled'

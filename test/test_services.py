@@ -49,7 +49,7 @@ class Plant:
 
     def enters(self, mode):
         self.step()
-        self.client.until(lambda: self.mode == mode, 10.0)
+        self.client.until(lambda: self.mode == mode)
 
     def program(self, rows, start=0.0):
         """A program track of (time, azimuth, elevation) rows."""
@@ -89,7 +89,7 @@ def test_accepted_after_read_back(plant, mode):
 def test_program_and_autotrack(plant):
     now = plant.stamp * 1e-9
     plant.client.publish('acu/program_track', plant.program([(0.0, 0.1, 0.5), (100.0, 0.1, 0.5)], now))
-    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/program')[0], 10.0)
+    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/program')[0])
     plant.enters('program')
     plant.step(150)
     assert plant.client.trigger('acu/autotrack') == (True, 'mode is autotrack')
@@ -160,7 +160,7 @@ def test_an_invalid_encoder_ends_a_mode(plant):
     assert plant.client.trigger('acu/stow')[0]
     plant.enters('stow')
     plant.step(position=(math.nan, 0.5))
-    plant.client.until(lambda: plant.mode == 'standby', 10.0)
+    plant.client.until(lambda: plant.mode == 'standby')
     assert (plant.client.heard['acu/rate_command'][-1].velocity == 0.0).all()
 
 
@@ -177,8 +177,7 @@ def test_controllers_while_it_tracks(plant):
     plant.step()
     start = plant.stamp * 1e-9
     plant.client.publish('acu/program_track', plant.program([(0.0, 0.1, 0.5), (40.0, 2.1, 0.5)], start))
-    plant.client.until(lambda: plant.step(error=(math.nan, math.nan, 10.0)) or plant.client.trigger('acu/program')[0],
-                       10.0)
+    plant.client.until(lambda: plant.step(error=(math.nan, math.nan, 10.0)) or plant.client.trigger('acu/program')[0])
     azimuth, rates = 0.1, []
 
     def track(steps):
@@ -239,17 +238,17 @@ def test_a_drive_that_does_not_follow(plant):
     plant.client.write('adu/state')
     plant.client.publish('adu/state', messages.String(data='emergency stop'))
     plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow') == (
-        False, 'refused: drive not ready; mode is standby'), 10.0)
+        False, 'refused: drive not ready; mode is standby'))
     values = {value.key: value.value for value in plant.client.diagnosed('').values}
     assert values['drive'] == 'emergency stop'
     plant.client.publish('adu/state', messages.String(data='enabled'))
-    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow')[0], 10.0)
+    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow')[0])
     plant.enters('stow')
     plant.client.publish('adu/state', messages.String(data='fault: azimuth overspeed'))
-    plant.client.until(lambda: plant.step() or plant.mode == 'standby', 10.0)
+    plant.client.until(lambda: plant.step() or plant.mode == 'standby')
     assert (plant.client.heard['acu/rate_command'][-1].velocity == 0.0).all()
     plant.client.publish('adu/state', messages.String(data='enabled'))
-    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow')[0], 10.0)
+    plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow')[0])
     assert plant.client.trigger('acu/standby')[0]
 
 
