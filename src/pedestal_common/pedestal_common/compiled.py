@@ -6,6 +6,8 @@ node and a recomputed bag agree exactly, and NaN keeps its meaning on the topics
 Numba's cache does not see that a callee in another file changed (numba documentation, "Notes on
 Caching"), so the cache lives in a folder named after all sources of the product.
 """
+import contextlib
+import fcntl
 import functools
 import hashlib
 import importlib.util
@@ -47,6 +49,21 @@ def _cache_folder(package) -> str | None:
     except OSError:
         return None
     return str(folder) if os.access(folder, os.W_OK) else None
+
+
+@contextlib.contextmanager
+def compiled_once(unit):
+    """Around the first call of the laws of a unit: of the processes that start with a cold cache one compiles them,
+    the others wait for it and find them there. Four beams start as fast as one."""
+    folder = _cache_folder(type(unit).__module__.partition('.')[0])
+    done = pathlib.Path(folder or '') / f'{type(unit).__name__}.done'
+    if folder is None or done.exists():
+        yield
+        return
+    with done.with_suffix('.lock').open('w') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+        done.touch()
 
 
 def compiled(law):

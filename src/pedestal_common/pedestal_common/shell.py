@@ -27,6 +27,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.signals import SignalHandlerOptions
 
 from pedestal_common import messages, parameters, topics
+from pedestal_common.compiled import compiled_once
 from pedestal_common.steps import SECOND, GraphError, Steps
 
 QOS = {
@@ -298,7 +299,8 @@ class Shell(Node):
         try:
             if _stop:
                 raise Stopped
-            unit.prepare()
+            with compiled_once(unit):
+                unit.prepare()
         finally:
             _compiling.clear()
 
