@@ -42,6 +42,8 @@ class Pool:
         self._stack = contextlib.ExitStack()
 
     def __enter__(self):
+        # joblib complains of work that is wasted when a study is stopped, at any time after that
+        warnings.filterwarnings('ignore', '.*tasks (which were|have been)', UserWarning, r'joblib\.parallel')
         if self.scheduler is None:
             if self.workers > 1:
                 self._stack.callback(_end_local)
@@ -63,7 +65,7 @@ class Pool:
                                                          'backend': 'loky'}
         with _ctrl_c_held_back() if options['n_jobs'] > 1 else contextlib.nullcontext():
             results = joblib.Parallel(return_as='generator', **options)(map(joblib.delayed(function), items))
-        self._stack.callback(_close, results)
+            self._stack.callback(results.close)
         for done, result in enumerate(results, 1):
             progress(done / len(items), f'{done} of {len(items)} batches')
             yield result
@@ -73,22 +75,21 @@ class Pool:
 def _ctrl_c_held_back():
     """Ctrl-C reaches every process of a terminal; those started now never hear it: this one does, and ends them.
 
-    The trackers that go with the first worker let it through when they start, so they are started before.
+    The trackers that go with the first worker let it through when they start, so they are started before. A thread of
+    numpy may hear it for this one, which must not be torn out of starting the workers: that is told afterwards.
     """
     multiprocessing.resource_tracker.ensure_running()
     loky.backend.resource_tracker.ensure_running()
+    heard = []
+    handler = signal.signal(signal.SIGINT, lambda *_: heard.append(True))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _close(results):
-    """End what is still under way, if anything; joblib would warn that it was wasted."""
-    with warnings.catch_warnings():
-        warnings.simplefilter('ignore')
-        results.close()
+        signal.signal(signal.SIGINT, handler)
+    if heard:
+        raise KeyboardInterrupt
 
 
 def _end_local():
