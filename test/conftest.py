@@ -240,11 +240,11 @@ class Client:
         from pedestal_common import messages
         self.publishers[name].publish(messages.serialize(message))
 
-    def until(self, condition, timeout=START):
-        """Spin until condition() is true and return what it gave; fails the test after timeout [s]."""
+    def until(self, condition, timeout=START, told=lambda: ''):
+        """Spin until condition() is true and return what it gave; fails the test after timeout [s], with told()."""
         deadline = time.monotonic() + timeout
         while not (value := condition()):
-            assert time.monotonic() < deadline, f'nothing within {timeout:g} s'
+            assert time.monotonic() < deadline, f'nothing within {timeout:g} s; {told()}'
             self.executor.spin_once(timeout_sec=0.05)
         return value
 
@@ -271,11 +271,11 @@ class Client:
 
         def found():
             return [status for array in heard[first:] for status in array.status if text in status.message]
-        try:
-            return self.until(found, timeout)[0]
-        except AssertionError:
-            said = [status.message for array in heard[first:] for status in array.status]
-            pytest.fail(f'no diagnostic says {text!r}; said: {said}')
+        return self.until(found, timeout, lambda: f'no diagnostic says {text!r}; said: {self.said(first)}')[0]
+
+    def said(self, first):
+        """The messages of the diagnostics from the first-th on."""
+        return [status.message for array in self.heard['diagnostics'][first:] for status in array.status]
 
     def close(self):
         self.executor.shutdown()

@@ -109,11 +109,10 @@ class Commander:
         self.moves_at(0.0, 0.0)
 
     def moves_at(self, azimuth, elevation):
-        try:
-            self.client.until(lambda: np.allclose(self.last.velocity, (azimuth, elevation), atol=5e-3), SOON)
-        except AssertionError:
-            said = [status.message for array in self.client.heard['diagnostics'][-5:] for status in array.status]
-            pytest.fail(f'asked for {self.rates}, moves at {list(self.last.velocity)}: {self.state}; said: {said}')
+        self.client.until(
+            lambda: np.allclose(self.last.velocity, (azimuth, elevation), atol=5e-3), SOON,
+            lambda: f'asked for {self.rates}, moves at {list(self.last.velocity)}; {self.state}; '
+                    f'said: {self.client.said(-5)}')
 
 
 @pytest.fixture(scope='module')

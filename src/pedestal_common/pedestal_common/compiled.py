@@ -56,8 +56,8 @@ def compiled_once(unit):
     """Around the first call of the laws of a unit: of the processes that start with a cold cache one compiles them,
     the others wait for it and find them there. Four beams start as fast as one."""
     folder = _cache_folder(type(unit).__module__.partition('.')[0])
-    done = pathlib.Path(folder or '') / f'{type(unit).__name__}.done'
-    if folder is None or done.exists():
+    done = folder and pathlib.Path(folder, f'{type(unit).__name__}.done')
+    if not folder or done.exists():
         yield
         return
     with done.with_suffix('.lock').open('w') as lock:
