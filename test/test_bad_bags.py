@@ -6,8 +6,8 @@ import sqlite3
 import pytest
 from mcap.writer import Writer as McapWriter
 
-from pedestal_bringup import bag as bags
 from pedestal_bringup import cli
+from pedestal_bringup.bags import bag as bags
 from pedestal_common import messages, topics
 
 RECORDED = topics.read_by('recorder', ('tracking_receiver', 'acu', 'adu', 'recorder'))

@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from pedestal_bringup import bag as bags
 from pedestal_bringup import cli
-from pedestal_bringup.verify import verify
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.verify import verify
 from pedestal_common import messages
 
 TRACK_PATH = 'tracking_receiver.target.track_file.path'

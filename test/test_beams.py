@@ -10,9 +10,13 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup import bag as bags
-from pedestal_bringup import closed_loop, export, recompute, report, results, scenario
-from pedestal_bringup.verify import verify
+from pedestal_bringup.again import recompute
+from pedestal_bringup.analysis import results
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags import export
+from pedestal_bringup.bags.verify import verify
+from pedestal_bringup.report import report
+from pedestal_bringup.run import closed_loop, scenario
 from pedestal_common import messages
 
 FOUR, SWAY = 'phased_array_four', 'phased_array_sway'

@@ -2,7 +2,8 @@
 import json
 import sys
 
-SHORT = ('import json; from pedestal_bringup import bench; bench.BAG_SECONDS = 2.0; bench.DISK_BYTES = 10_000_000; '
+SHORT = ('import json; from pedestal_bringup.bench import bench; '
+         'bench.BAG_SECONDS = 2.0; bench.DISK_BYTES = 10_000_000; '
          'rows = bench.bench_bag(); print(json.dumps(rows))')
 
 

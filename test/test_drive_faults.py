@@ -2,9 +2,9 @@
 import numpy as np
 import pytest
 
-from pedestal_bringup import bag as bags
-from pedestal_bringup import closed_loop, scenario
-from pedestal_bringup.verify import verify
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.verify import verify
+from pedestal_bringup.run import closed_loop, scenario
 
 TRIP = ['adu.azimuth.faults.overspeed=1.5']
 """The sine of 0.87 rad at 0.4 Hz wants 2.2 rad/s."""

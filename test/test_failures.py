@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup import bag as bags
-from pedestal_bringup.verify import verify
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.verify import verify
 
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 DEADLINE = 3

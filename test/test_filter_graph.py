@@ -7,9 +7,12 @@ import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
-from pedestal_bringup import bag as bags
-from pedestal_bringup import cli, closed_loop, consistency, export, results, scenario
-from pedestal_bringup.verify import verify
+from pedestal_bringup import cli
+from pedestal_bringup.analysis import consistency, results
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags import export
+from pedestal_bringup.bags.verify import verify
+from pedestal_bringup.run import closed_loop, scenario
 from pedestal_common import messages
 
 SECONDS = 5.0

@@ -11,9 +11,9 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from pedestal_bringup import bag as bags
-from pedestal_bringup import closed_loop, scenario
-from pedestal_bringup.verify import verify
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.verify import verify
+from pedestal_bringup.run import closed_loop, scenario
 from pedestal_common import parameters
 
 PARAM = 'acu.tracker.lock_count=20'

@@ -8,8 +8,10 @@ import sys
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from pedestal_bringup import bag as bags
-from pedestal_bringup import cli, comparison, recompute, recompute_verb, results
+from pedestal_bringup import cli
+from pedestal_bringup.again import comparison, recompute, recompute_report
+from pedestal_bringup.analysis import results
+from pedestal_bringup.bags import bag as bags
 from pedestal_common import messages, topics
 
 REFERENCES = pathlib.Path(__file__).parent.parent / 'bags' / 'reference'
@@ -208,7 +210,7 @@ def test_a_changed_parameter_is_reported_old_against_new(runs, pedestal, tmp_pat
 
 def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     """Those of the recording are what its run said; the recorded estimate, delayed by 20 ms, lags 20 ms more."""
-    from pedestal_bringup import what_if
+    from pedestal_bringup.again import what_if
     recording = recompute.Recording(runs['leo'].bag)
     old = {name: recording.output(name) for name in OUTPUTS}
     late = comparison.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
@@ -310,7 +312,7 @@ def requested(runs, tmp_path, request):
     done = recompute.recompute(recording, node, recompute.parameters_of(recording, node),
                                {step: [service] for step, service in requests.items()})
     assert done.requests == {step: [(service, True)] for step, service in requests.items()}
-    recompute_verb.write(tmp_path / 'requested', recording, done.outputs, done.unit.messages, {})
+    recompute_report.write(tmp_path / 'requested', recording, done.outputs, done.unit.messages, {})
     return node, tmp_path / 'requested'
 
 

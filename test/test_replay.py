@@ -13,7 +13,7 @@ import time
 
 import pytest
 
-from pedestal_bringup import bag as bags
+from pedestal_bringup.bags import bag as bags
 from pedestal_common import messages, shell, topics
 
 CLI = [sys.executable, '-m', 'pedestal_bringup.cli']

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup import closed_loop, scenario
+from pedestal_bringup.run import closed_loop, scenario
 
 DURATION = 6.0
 

@@ -7,7 +7,7 @@ import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
-from pedestal_bringup.program import program_message
+from pedestal_bringup.run.program import program_message
 from pedestal_common import messages
 
 PERIOD = 5_000_000

@@ -4,7 +4,7 @@ import json
 import numpy as np
 import pytest
 
-from pedestal_bringup import bag as bags
+from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.studies import servo
 from pedestal_bringup.studies.experiment import Case
 

@@ -12,8 +12,10 @@ import pynmea2
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup import bag as bags
-from pedestal_bringup import closed_loop, comparison, isolation, known_attitude, recompute, results, scenario
+from pedestal_bringup.again import comparison, recompute
+from pedestal_bringup.analysis import isolation, known_attitude, results
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.run import closed_loop, scenario
 from pedestal_common import messages
 from ship_motion_sim import motion
 from tracking_receiver_sim import target

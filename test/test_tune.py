@@ -9,8 +9,11 @@ import pytest
 import yaml
 from rcl_interfaces.srv import GetParameters
 
-from pedestal_bringup import bag as bags
-from pedestal_bringup import cli, recompute, scenario, tune
+from pedestal_bringup import cli
+from pedestal_bringup.again import recompute
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.run import scenario
+from pedestal_bringup.trials import tune
 from pedestal_common import parameters, topics
 
 BAG = pathlib.Path(__file__).parent.parent / 'bags' / 'reference' / 'uav_flyby'

@@ -7,7 +7,7 @@ from std_srvs.srv import Trigger
 
 from acu_tracker import announcement, control_unit, modes
 from acu_tracker.params import AcuParameters
-from acu_tracker.wire import DRIVE, INS, JOINTS, MODE, PROGRAM, Acu
+from acu_tracker.unit import DRIVE, INS, JOINTS, MODE, PROGRAM, Acu
 from pedestal_common import messages, records, shell
 
 

@@ -1,7 +1,7 @@
 """What the operator is told of what lies ahead, and its numbers for the diagnostics. `h`: an `ahead.AHEAD` record."""
 import math
 
-from acu_tracker import ahead
+from acu_tracker.lookahead import ahead
 
 
 def keyhole(h, beamwidth):

@@ -6,21 +6,22 @@ import math
 
 import numpy as np
 
-from acu_tracker import (
-    ahead,
-    bridge,
-    deck_reference,
-    estimate_frame,
-    lever_arm,
-    modes,
-    notch,
-    position_loop,
-    program_track,
-    tracker,
+from acu_tracker import modes
+from acu_tracker.estimation import tracker
+from acu_tracker.geometry import deck_reference, estimate_frame, lever_arm
+from acu_tracker.geometry.attitude import (
+    attitude_at,
+    deck_rates,
+    estimate_from_deck,
+    levelled,
+    seen_from_deck,
+    take_attitude,
 )
-from acu_tracker.attitude import attitude_at, deck_rates, estimate_from_deck, levelled, seen_from_deck, take_attitude
 from acu_tracker.history import bracket, history_type, push
+from acu_tracker.lookahead import ahead
 from acu_tracker.params import AcuParameters
+from acu_tracker.program import bridge, program_track
+from acu_tracker.servo import notch, position_loop
 from pedestal_common import blockage
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import ASHORE, displaced, displaced_motion, earth_angles, earth_direction, to_earth

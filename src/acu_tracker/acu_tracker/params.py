@@ -2,11 +2,11 @@
 import dataclasses
 import math
 
-from acu_tracker.beam_loop import FORMS
-from acu_tracker.filter_params import Filter, Ukf
+from acu_tracker.estimation.params import Filter, Ukf
 from acu_tracker.history import LENGTH
 from acu_tracker.modes import MODES
-from acu_tracker.position_loop import CONTROLLERS
+from acu_tracker.servo.beam_loop import FORMS
+from acu_tracker.servo.position_loop import CONTROLLERS
 from pedestal_common.blockage import DOC as SECTORS_DOC
 from pedestal_common.blockage import sectors
 from pedestal_common.lever_arm import LeverArm

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker import adrc
+from acu_tracker.servo import adrc
 
 
 @pytest.mark.parametrize('w_o, w_s, h', [(100.0, 176.0, 0.005), (60.0, 176.0, 0.002), (300.0, 50.0, 0.002),

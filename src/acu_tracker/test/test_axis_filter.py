@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 
-from acu_tracker import alpha_beta, axis_filter
-from acu_tracker.axis_filter import KINDS
-from acu_tracker.filter_params import Filter
+from acu_tracker.estimation import alpha_beta, axis_filter
+from acu_tracker.estimation.axis_filter import KINDS
+from acu_tracker.estimation.params import Filter
 from pedestal_common.parameters import ParameterError, build
 
 DEG = math.pi / 180

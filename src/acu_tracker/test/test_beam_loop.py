@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker import alpha_beta, beam_loop, deck_reference
+from acu_tracker.estimation import alpha_beta
+from acu_tracker.geometry import deck_reference
+from acu_tracker.servo import beam_loop
 from pedestal_common import line_of_sight
 
 T = 0.01

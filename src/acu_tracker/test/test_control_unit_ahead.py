@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker import ahead, announcement
+from acu_tracker import announcement
+from acu_tracker.lookahead import ahead
 from acu_tracker.modes import AUTOTRACK, PRESET, PROGRAM, STANDBY, STOW
 from pedestal_common import line_of_sight
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker import deck_reference
+from acu_tracker.geometry import deck_reference
 
 LOW, HIGH = -1.5 * math.pi, 1.5 * math.pi
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker import bridge, deck_reference, estimate_frame, program_track
+from acu_tracker.geometry import deck_reference, estimate_frame
+from acu_tracker.program import bridge, program_track
 
 
 def tilted():

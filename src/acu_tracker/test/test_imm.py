@@ -5,8 +5,8 @@ import pytest
 from filterpy.kalman import IMMEstimator, KalmanFilter
 from scipy.linalg import expm
 
-from acu_tracker import axis_filter, imm
-from acu_tracker.filter_params import Filter
+from acu_tracker.estimation import axis_filter, imm
+from acu_tracker.estimation.params import Filter
 from pedestal_common.parameters import build
 
 T, SIGMA, RATE_SIGMA = 0.01, 5e-4, 2e-3

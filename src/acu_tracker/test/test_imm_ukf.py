@@ -4,8 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker import tracker
-from acu_tracker.filter_params import Filter, Ukf
+from acu_tracker.estimation import tracker
+from acu_tracker.estimation.params import Filter, Ukf
 from acu_tracker.params import TrackerParameters
 from pedestal_common.parameters import record
 

@@ -1,7 +1,7 @@
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
-from acu_tracker import kalman, motion_models
+from acu_tracker.estimation import kalman, motion_models
 
 T, ALPHA, R, R_RATE = 0.01, 0.5, 2.5e-7, 4e-6
 F13, F23, F33 = motion_models.fading(ALPHA, T)

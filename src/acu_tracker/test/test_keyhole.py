@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from acu_tracker import keyhole
+from acu_tracker.lookahead import keyhole
 
 W, RATE, ACCELERATION, HALF_BEAM = math.radians(0.87), math.radians(10.0), math.radians(20.0), math.radians(0.5)
 LIMIT, HIGHEST, CENTRE, ROWS, SPAN = 1.5 * math.pi, 1.66, 30.0, 2049, 60.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker import notch
+from acu_tracker.servo import notch
 
 T = 0.002
 

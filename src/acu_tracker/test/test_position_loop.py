@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker import control_unit, feedforward, notch, position_loop
+from acu_tracker import control_unit
 from acu_tracker.params import AxisParameters, Feedforward
+from acu_tracker.servo import feedforward, notch, position_loop
 from pedestal_common.parameters import build, record
 
 T = 0.005

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from acu_tracker import deck_reference, program_track
+from acu_tracker.geometry import deck_reference
 from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
+from acu_tracker.program import program_track
 
 
 def table(n=40, seed=2):

@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from acu_tracker import shaper
+from acu_tracker.servo import shaper
 
 RATE, ACCELERATION, JERK, H0, T = 2.3, 30.0, 4000.0, 0.01, 0.005
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from acu_tracker import axis_filter, tracker
-from acu_tracker.axis_filter import KINDS
-from acu_tracker.filter_params import Filter
+from acu_tracker.estimation import axis_filter, tracker
+from acu_tracker.estimation.axis_filter import KINDS
+from acu_tracker.estimation.params import Filter
 from acu_tracker.params import TrackerParameters
 from pedestal_common.parameters import build, record
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from filterpy.kalman import IMMEstimator, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from acu_tracker import unscented
-from acu_tracker.filter_params import Ukf
+from acu_tracker.estimation import unscented
+from acu_tracker.estimation.params import Ukf
 
 DEG = math.pi / 180.0
 T = 0.02

@@ -6,7 +6,7 @@ import numpy as np
 from adu_drive import drive_state, drive_unit, faults, thermal
 from adu_drive.params import AduNodeParameters
 from adu_drive.timekeeper_node import DriveShell
-from adu_drive.wire import COMMAND, SHIP, Adu
+from adu_drive.unit import COMMAND, SHIP, Adu
 from pedestal_common import messages, shell
 
 

@@ -3,7 +3,7 @@ import math
 import sys
 
 from adu_drive import electronic_beam
-from adu_drive.beam_wire import Beam
+from adu_drive.beam_unit import Beam
 from adu_drive.params import BeamParameters
 from adu_drive.timekeeper_node import DriveShell
 from pedestal_common import messages, shell, topics

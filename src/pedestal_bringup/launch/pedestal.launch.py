@@ -9,7 +9,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchDescription
-from pedestal_bringup import graph, scenario
+from pedestal_bringup.run import graph, scenario
 from pedestal_common import topics
 
 

@@ -17,7 +17,7 @@ import time
 
 import numpy as np
 
-from pedestal_bringup import bag
+from pedestal_bringup.bags import bag
 from pedestal_common import messages
 
 _spec = importlib.util.spec_from_file_location('bag_test_messages', pathlib.Path(__file__).with_name('test_bag.py'))

@@ -4,9 +4,10 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_bringup import closed_loop, results, scenario
+from pedestal_bringup.analysis import results
+from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.studies import phased_array
-from pedestal_bringup.studies.angle_loop import Paper
+from pedestal_bringup.studies.rigs.angle_loop import Paper
 
 SWAY, FOUR = 'phased_array_sway', 'phased_array_four'
 

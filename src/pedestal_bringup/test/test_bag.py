@@ -9,8 +9,8 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from pedestal_bringup import bag, columns
-from pedestal_bringup.verify import verify
+from pedestal_bringup.bags import bag, columns
+from pedestal_bringup.bags.verify import verify
 from pedestal_common import messages, topics
 
 T = 5_000_000

@@ -2,7 +2,7 @@ import subprocess
 
 import pytest
 
-from pedestal_bringup import configuration
+from pedestal_bringup.bags import configuration
 
 
 def git(folder, *arguments):

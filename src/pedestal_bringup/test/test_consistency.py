@@ -6,9 +6,9 @@ import pytest
 from scipy import signal, stats
 from scipy.spatial.transform import Rotation
 
-from acu_tracker import motion_models, tracker
+from acu_tracker.estimation import motion_models, tracker
 from acu_tracker.params import ReceiverLaw
-from pedestal_bringup import consistency
+from pedestal_bringup.analysis import consistency
 from pedestal_common import line_of_sight, messages
 from pedestal_common.parameters import build
 from tracking_receiver_sim import receiver, target

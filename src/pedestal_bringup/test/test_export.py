@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from pedestal_bringup import bag, cli
+from pedestal_bringup import cli
+from pedestal_bringup.bags import bag
 from pedestal_common import messages, topics
 
 T = 5_000_000

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from acu_tracker import axis_filter
-from acu_tracker.filter_params import Filter
+from acu_tracker.estimation import axis_filter
+from acu_tracker.estimation.params import Filter
 from pedestal_bringup import cli
-from pedestal_bringup.studies import ensemble, experiment, filters, manoeuvre, pareto, tuning
-from pedestal_bringup.studies.ensemble import Noise
+from pedestal_bringup.studies import experiment, filters, manoeuvre, pareto
+from pedestal_bringup.studies.rigs import ensemble
+from pedestal_bringup.studies.rigs.ensemble import Noise
+from pedestal_bringup.trials import tuning
 from pedestal_common.parameters import as_dict
 
 RUNS = 6

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from pedestal_bringup import closed_loop, identification, scenario
+from pedestal_bringup.analysis import identification
+from pedestal_bringup.run import closed_loop, scenario
 
 W = 2.0 * math.pi * identification.FREQUENCIES
 

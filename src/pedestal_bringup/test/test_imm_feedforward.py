@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
-from acu_tracker import axis_filter
-from acu_tracker.filter_params import Filter
-from pedestal_bringup import monte_carlo
+from acu_tracker.estimation import axis_filter
+from acu_tracker.estimation.params import Filter
 from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies import feedforward_loop as loop
 from pedestal_bringup.studies import imm_feedforward as study
+from pedestal_bringup.studies.rigs import feedforward_loop as loop
+from pedestal_bringup.trials import monte_carlo
 
 T, W, ZETA = loop.T, *loop.RATE_LOOP
 

@@ -6,7 +6,7 @@ import pytest
 from scipy import signal
 from scipy.spatial.transform import Rotation
 
-from pedestal_bringup import isolation
+from pedestal_bringup.analysis import isolation
 from pedestal_common import line_of_sight
 
 DT, N = 0.02, 6000

@@ -9,8 +9,8 @@ import distributed
 import numpy as np
 import pytest
 
-from pedestal_bringup import monte_carlo
 from pedestal_bringup.studies import manoeuvre
+from pedestal_bringup.trials import monte_carlo
 
 
 def test_batches_hold_every_run_once():

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from acu_tracker.alpha_beta import benedict_bordner
+from acu_tracker.estimation.alpha_beta import benedict_bordner
 from pedestal_bringup.studies import experiment, phased_array
-from pedestal_bringup.studies.angle_loop import GRID, LENGTH, Better, Paper, received
 from pedestal_bringup.studies.phased_array import instants, settled
+from pedestal_bringup.studies.rigs.angle_loop import GRID, LENGTH, Better, Paper, received
 from tracking_receiver_sim import monopulse
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from pedestal_bringup.studies import profiles
+from pedestal_bringup.studies.rigs import profiles
 
 T = np.arange(0.0, profiles.DURATION, 1e-3)
 

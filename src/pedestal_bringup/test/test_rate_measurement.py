@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
-from acu_tracker import axis_filter
+from acu_tracker.estimation import axis_filter
 from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies import rate_measurement as study
 

@@ -17,8 +17,8 @@ rclpy = pytest.importorskip('rclpy')
 from rclpy.duration import Duration  # noqa: E402
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
-from pedestal_bringup import bag  # noqa: E402
-from pedestal_bringup.verify import verify  # noqa: E402
+from pedestal_bringup.bags import bag  # noqa: E402
+from pedestal_bringup.bags.verify import verify  # noqa: E402
 from pedestal_common import messages, topics  # noqa: E402
 from pedestal_common.shell import message_class  # noqa: E402
 

@@ -10,9 +10,9 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
 
-from pedestal_bringup import bag
-from pedestal_bringup.recover import recover
-from pedestal_bringup.verify import verify
+from pedestal_bringup.bags import bag
+from pedestal_bringup.bags.recover import recover
+from pedestal_bringup.bags.verify import verify
 
 _spec = importlib.util.spec_from_file_location('killed_writer', pathlib.Path(__file__).with_name('killed_writer.py'))
 killed_writer = importlib.util.module_from_spec(_spec)

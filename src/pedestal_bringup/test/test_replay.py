@@ -4,7 +4,9 @@ import io
 import pytest
 
 pytest.importorskip('rclpy')
-from pedestal_bringup import bag, cli, playlist  # noqa: E402
+from pedestal_bringup import cli
+from pedestal_bringup.again import playlist
+from pedestal_bringup.bags import bag
 from pedestal_common import messages, topics  # noqa: E402
 
 T = 5_000_000

@@ -7,8 +7,9 @@ import shutil
 import numpy as np
 import pytest
 
-from pedestal_bringup import bag as bags
-from pedestal_bringup import consistency, figures, filter_figures, report, results
+from pedestal_bringup.analysis import consistency, results
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.report import figures, filter_figures, report
 from pedestal_common import messages, topics
 
 T = 5_000_000

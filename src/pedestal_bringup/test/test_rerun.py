@@ -4,7 +4,9 @@ import dataclasses
 import pytest
 import yaml
 
-from pedestal_bringup import bag, configuration, rerun, scenario
+from pedestal_bringup.again import rerun
+from pedestal_bringup.bags import bag, configuration
+from pedestal_bringup.run import scenario
 from pedestal_common import messages, topics
 
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')

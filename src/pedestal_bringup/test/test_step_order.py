@@ -2,8 +2,8 @@ import random
 
 import pytest
 
-from pedestal_bringup import step_order
-from pedestal_bringup.step_order import OrderError, StepOrder
+from pedestal_bringup.bags import step_order
+from pedestal_bringup.bags.step_order import OrderError, StepOrder
 from pedestal_common import topics
 
 T = 5_000_000

@@ -23,7 +23,7 @@ def made(topic):
 @pytest.mark.parametrize('topic', TOPICS)
 def test_what_is_put_into_a_message_has_the_names_of_a_bags_columns(topic):
     """Through the bytes of the message and the definition of its type: another route than `take`."""
-    columns = pytest.importorskip('pedestal_bringup.columns')
+    columns = pytest.importorskip('pedestal_bringup.bags.columns')
     record = np.zeros(1, records.of('clock', topic))
     place = records.only(record, topic)
     place.stamp[0] = 3_000_000_007

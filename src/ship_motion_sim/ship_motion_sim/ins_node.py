@@ -4,7 +4,7 @@ import sys
 
 from pedestal_common import messages, records, shell
 from ship_motion_sim import ins, navigator
-from ship_motion_sim.ins_wire import DATA, RAW, STATE, Ins
+from ship_motion_sim.ins_unit import DATA, RAW, STATE, Ins
 from ship_motion_sim.params import InsParameters
 
 

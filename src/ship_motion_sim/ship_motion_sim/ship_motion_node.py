@@ -8,7 +8,7 @@ from pedestal_common import records, shell
 from pedestal_common.parameters import ParameterError
 from ship_motion_sim import imu, motion, nmea
 from ship_motion_sim.params import ShipMotionParameters
-from ship_motion_sim.ship_wire import CLOCK, RAW, TRUTH, ShipMotion
+from ship_motion_sim.ship_unit import CLOCK, RAW, TRUTH, ShipMotion
 
 
 class ShipMotionNode(shell.Shell):

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from pedestal_common import parameters, records
 from ship_motion_sim import ins, navigator
-from ship_motion_sim.ins_wire import DATA, RAW, STATE, Ins
+from ship_motion_sim.ins_unit import DATA, RAW, STATE, Ins
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
-from ship_motion_sim.ship_wire import CLOCK, TRUTH, ShipMotion
+from ship_motion_sim.ship_unit import CLOCK, TRUTH, ShipMotion
 
 STEP = 20_000_000
 SEA = {'ship.sea_state': 4, 'ship.heading_deg': 60.0}

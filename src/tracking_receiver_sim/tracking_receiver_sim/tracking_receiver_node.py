@@ -6,7 +6,7 @@ import numpy as np
 from pedestal_common import records, shell
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
-from tracking_receiver_sim.wire import JOINTS, SHIP, TrackingReceiver
+from tracking_receiver_sim.unit import JOINTS, SHIP, TrackingReceiver
 
 FAULTS = (receiver.NO_TARGET, receiver.NO_JOINTS, receiver.STAMP_ORDER)
 

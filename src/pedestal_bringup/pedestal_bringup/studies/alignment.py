@@ -11,10 +11,10 @@ import time
 
 import numpy as np
 
-from pedestal_bringup import monte_carlo
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Result, row
+from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import to_deck
 from ship_motion_sim import imu, motion, navigator, strapdown

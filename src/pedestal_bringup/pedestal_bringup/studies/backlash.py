@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from pedestal_bringup.figures import FILTERED, INK, RAW, TRUTH
+from pedestal_bringup.report.figures import FILTERED, INK, RAW, TRUTH
 from pedestal_bringup.studies import experiment, servo
 from pedestal_bringup.studies.experiment import Case, Result, row
 

@@ -20,8 +20,8 @@ import numpy as np
 from acu_tracker.params import AcuParameters
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
-from pedestal_bringup import closed_loop
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.run import closed_loop
 from pedestal_bringup.studies import experiment, servo
 from pedestal_bringup.studies.experiment import Case, Result, row
 from pedestal_common.compiled import compiled

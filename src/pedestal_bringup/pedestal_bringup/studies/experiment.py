@@ -7,7 +7,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from pedestal_bringup import closed_loop, figures, scenario
+from pedestal_bringup.report import figures
+from pedestal_bringup.run import closed_loop, scenario
 
 SIZE = (7.4, 4.6)
 """Of a figure [inch]."""

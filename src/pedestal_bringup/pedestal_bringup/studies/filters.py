@@ -9,14 +9,15 @@ import math
 
 import numpy as np
 
-from acu_tracker.axis_filter import KINDS
-from acu_tracker.filter_params import Filter, Ukf
-from acu_tracker.motion_models import MODELS
-from pedestal_bringup import monte_carlo
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import ensemble, experiment, profiles, tuning
-from pedestal_bringup.studies.ensemble import Noise
+from acu_tracker.estimation.axis_filter import KINDS
+from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.estimation.params import Filter, Ukf
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Result, row
+from pedestal_bringup.studies.rigs import ensemble, profiles
+from pedestal_bringup.studies.rigs.ensemble import Noise
+from pedestal_bringup.trials import monte_carlo, tuning
 
 RUNS = 200
 """Of each case."""

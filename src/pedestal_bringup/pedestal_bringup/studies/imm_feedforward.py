@@ -13,14 +13,25 @@ import math
 
 import numpy as np
 
-from acu_tracker.filter_params import Filter
+from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.estimation.params import Filter
 from acu_tracker.modes import AUTOTRACK
-from acu_tracker.motion_models import MODELS
-from pedestal_bringup import monte_carlo
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment, feedforward_loop, profiles
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.feedforward_loop import REVERSALS, SIGMA, Source, T, ca, cv, filter_of, imm, outcomes
+from pedestal_bringup.studies.rigs import feedforward_loop, profiles
+from pedestal_bringup.studies.rigs.feedforward_loop import (
+    REVERSALS,
+    SIGMA,
+    Source,
+    T,
+    ca,
+    cv,
+    filter_of,
+    imm,
+    outcomes,
+)
+from pedestal_bringup.trials import monte_carlo
 from pedestal_common.parameters import as_dict
 
 RUNS = 50

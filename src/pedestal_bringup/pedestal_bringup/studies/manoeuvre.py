@@ -8,10 +8,11 @@ import math
 
 import numpy as np
 
-from pedestal_bringup import monte_carlo
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH
-from pedestal_bringup.studies import ensemble, experiment, feedforward_loop, profiles
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH
+from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Result, row
+from pedestal_bringup.studies.rigs import ensemble, feedforward_loop, profiles
+from pedestal_bringup.trials import monte_carlo
 
 RUNS = 200
 """Of the motion; the paper has 50."""

@@ -9,11 +9,12 @@ import math
 
 import numpy as np
 
-from pedestal_bringup import monte_carlo
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment, feedforward_loop
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.feedforward_loop import Source
+from pedestal_bringup.studies.rigs import feedforward_loop
+from pedestal_bringup.studies.rigs.feedforward_loop import Source
+from pedestal_bringup.trials import monte_carlo
 
 RUNS = 50
 """Of each tuning, as many as in the paper."""

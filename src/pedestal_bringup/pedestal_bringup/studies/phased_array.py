@@ -11,10 +11,18 @@ import math
 
 import numpy as np
 
-from pedestal_bringup import results
+from pedestal_bringup.analysis import results
 from pedestal_bringup.studies import phased_array_figures as figures
-from pedestal_bringup.studies.angle_loop import GRID, LENGTH, SMOOTHINGS, Better, Paper, delay_limit, spectral_radius
 from pedestal_bringup.studies.experiment import Case, Result, overshoot_percent, peak, rms, row
+from pedestal_bringup.studies.rigs.angle_loop import (
+    GRID,
+    LENGTH,
+    SMOOTHINGS,
+    Better,
+    Paper,
+    delay_limit,
+    spectral_radius,
+)
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 

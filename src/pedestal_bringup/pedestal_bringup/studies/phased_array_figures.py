@@ -1,9 +1,9 @@
 """Figures of the study phased-array: what paper 002 drew, with S0, S1 and S2 side by side, and the better loop."""
 import numpy as np
 
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.angle_loop import GRID
+from pedestal_bringup.studies.rigs.angle_loop import GRID
 
 COLOURS = (FILTERED, TRUTH, MOTOR_2, MOTOR_1, INK)
 SMOOTHED = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, moving average'}

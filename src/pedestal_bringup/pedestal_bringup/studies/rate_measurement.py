@@ -14,13 +14,14 @@ import math
 
 import numpy as np
 
-from acu_tracker import axis_filter
-from acu_tracker.filter_params import Filter
-from pedestal_bringup import monte_carlo
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import ensemble, experiment, profiles
-from pedestal_bringup.studies.ensemble import PERIOD as T
+from acu_tracker.estimation import axis_filter
+from acu_tracker.estimation.params import Filter
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Result, row
+from pedestal_bringup.studies.rigs import ensemble, profiles
+from pedestal_bringup.studies.rigs.ensemble import PERIOD as T
+from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 
 RUNS = 20

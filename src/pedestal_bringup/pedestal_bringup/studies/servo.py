@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from pedestal_bringup.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Case, Result, row
 

@@ -1,0 +1,327 @@
+"""IMM of two unscented filters of the target's position: Cartesian CV and CA; azimuth, elevation and range measured.
+
+X = (east north up, velocity, acceleration) [m, m/s, m/s2] of each mode, relative to the antenna; CV keeps its
+acceleration at zero. Without a range the two angles are taken alone, and the range grows uncertain.
+
+The unscented filter in general (Merwe's points; Wan and Van der Merwe 2000), and what is special about this one:
+the motion is linear, so that the transform of the prediction is F P F' + Q exactly; the points of the measurement are
+drawn from the predicted P, after Q. With P = L L' (L lower triangular) they are X +- sqrt(n + lambda) L_k, and only
+k = 1, 2, 3 move the position, which is all that is measured: 7 of the 19 points say everything, the other 12 count
+with the one in the middle. Angles are taken relative to that one, so that the azimuth may wrap.
+With alpha = 1, kappa = 3 - n, beta = 2 no weight of the seven is negative, and S is positive whatever the geometry.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.estimation import imm, motion_models
+from acu_tracker.geometry import deck_reference
+from pedestal_common.compiled import assign, compiled
+from pedestal_common.line_of_sight import earth_angles, wrap
+
+N = 9
+MODES = motion_models.CV, motion_models.CA
+ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N
+LAMBDA = ALPHA**2 * (N + KAPPA) - N
+SCALE = math.sqrt(N + LAMBDA)
+WEIGHT = 0.5 / (N + LAMBDA)
+"""Of each of the six moving points."""
+MIDDLE = 1.0 - 6.0 * WEIGHT + 1.0 - ALPHA**2 + BETA
+"""Of the point in the middle and the twelve that measure as it does, in a covariance."""
+
+STATE = np.dtype([
+    ('x', 'f8', (2, N)), ('p', 'f8', (2, N, N)), ('mu', 'f8', (2,)),
+    ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('c', 'f8', (2,)),
+    ('z', 'f8', (2, 3)), ('s', 'f8', (2, 3, 3)), ('g', 'f8', (2, N, 3)), ('points', 'f8', (2, 3, 3)),
+    ('weights', 'f8', (2,)), ('mean', 'f8', (N,)), ('covariance', 'f8', (N, N))], align=True)
+"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, c: the
+same, predicted to the next one; z, s: what `innovation` expects to be measured, its covariance; g: that with X. The
+rest is room to work in.
+"""
+
+CONSTANTS = np.dtype([('models', motion_models.MODEL, (2,)), ('dwell', 'f8'), ('initial_speed', 'f8'),
+                      ('initial_acceleration', 'f8')], align=True)
+
+
+def constants(params) -> np.ndarray:
+    """Constants (1,) of a filter_params.Ukf."""
+    c = np.zeros(1, CONSTANTS)
+    c['models']['kind'] = MODES
+    c['models']['noise'] = params.cv_noise, params.ca_noise
+    c['dwell'] = params.dwell
+    c['initial_speed'], c['initial_acceleration'] = params.initial_speed, params.initial_acceleration
+    return c
+
+
+@compiled
+def _spread(p, along, onward, s11, s12, s22):
+    """Add to p what is not known of one coordinate and its rate: variances s11, s22, covariance s12.
+
+    A unit of it moves the position by along (3,) and the velocity by onward (3,), a unit of its rate the velocity by
+    along.
+    """
+    for i in range(3):
+        for j in range(3):
+            p[i, j] += s11 * along[i] * along[j]
+            p[i, j + 3] += along[i] * (s11 * onward[j] + s12 * along[j])
+            p[i + 3, j] += (s11 * onward[i] + s12 * along[i]) * along[j]
+            p[i + 3, j + 3] += (s11 * onward[i] * onward[j] + s12 * (onward[i] * along[j] + along[i] * onward[j])
+                                + s22 * along[i] * along[j])
+
+
+@compiled
+def start(s, c, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, r, R_range):
+    """Begin where angles, rates, their variances (as `variances` gives them) and a first range r lead.
+
+    `outlook` goes on where they were: in CA, with the acceleration of a target at a constant range; CV begins without.
+
+    The radial speed is 0 to within c.initial_speed, the acceleration known to within c.initial_acceleration.
+    """
+    e, n, u, de, dn, du, dde, ddn, ddu = deck_reference.moving_direction(A, dA, ddA, E, dE, ddE)
+    turn = de * de + dn * dn + du * du
+    x = s.x[1]
+    x[0], x[1], x[2], x[3], x[4], x[5] = r * e, r * n, r * u, r * de, r * dn, r * du
+    x[6], x[7], x[8] = r * (dde + turn * e), r * (ddn + turn * n), r * (ddu + turn * u)
+    for i in range(N):
+        s.x[0, i] = x[i] if i < 6 else 0.0
+    p = s.p[0]
+    p[:, :] = 0.0
+    rcA, rsA, sE, cE = r * math.cos(A), r * math.sin(A), math.sin(E), math.cos(E)
+    _spread(p, (e, n, u), (de, dn, du), R_range, 0.0, c.initial_speed * c.initial_speed)
+    _spread(p, (cE * rcA, -cE * rsA, 0.0),
+            (-cE * rsA * dA - sE * rcA * dE, -cE * rcA * dA + sE * rsA * dE, 0.0), a11, a12, a22)
+    _spread(p, (-sE * rsA, -sE * rcA, r * cE),
+            (-sE * rcA * dA - cE * rsA * dE, sE * rsA * dA - cE * rcA * dE, -r * sE * dE), e11, e12, e22)
+    assign(s.p[1], p)
+    for i in range(6, N):
+        s.p[1, i, i] = c.initial_acceleration * c.initial_acceleration
+    s.mu[0], s.mu[1] = 0.0, 1.0
+
+
+@compiled
+def _mixed(x, p, w, x_out, p_out):
+    """Mean and covariance of two modes with weights w (2,) into x_out, p_out."""
+    for a in range(N):
+        x_out[a] = w[0] * x[0, a] + w[1] * x[1, a]
+        for b in range(a, N):
+            spread = (x[0, a] - x[1, a]) * (x[0, b] - x[1, b])
+            p_out[a, b] = p_out[b, a] = w[0] * p[0, a, b] + w[1] * p[1, a, b] + w[0] * w[1] * spread
+
+
+@compiled
+def _moved(x, p, m, T):
+    """x = F x and p = F p F' + Q of a model in place; the motion is the same in the three directions."""
+    f13, f23, f33 = motion_models.transition(m, T)
+    q11, q12, q13, q22, q23, q33 = motion_models.process_noise(m, 0.0, T)
+    for i in range(3):
+        x[i] += T * x[i + 3] + f13 * x[i + 6]
+        x[i + 3] += f23 * x[i + 6]
+        x[i + 6] *= f33
+        for j in range(i, 3):
+            for b in range(0, N, 3):
+                p[i, j + b] += T * p[i + 3, j + b] + f13 * p[i + 6, j + b]
+                p[i + 3, j + b] += f23 * p[i + 6, j + b]
+                p[i + 6, j + b] *= f33
+            for a in range(0, N, 3):
+                p[i + a, j] += T * p[i + a, j + 3] + f13 * p[i + a, j + 6]
+                p[i + a, j + 3] += f23 * p[i + a, j + 6]
+                p[i + a, j + 6] *= f33
+            for a in range(0, N, 3):
+                for b in range(0, N, 3):
+                    p[j + b, i + a] = p[i + a, j + b]
+        p[i, i] += q11
+        p[i + 3, i + 3] += q22
+        p[i + 6, i + 6] += q33
+        p[i, i + 3] += q12
+        p[i, i + 6] += q13
+        p[i + 3, i + 6] += q23
+        p[i + 3, i], p[i + 6, i], p[i + 6, i + 3] = p[i, i + 3], p[i, i + 6], p[i + 3, i + 6]
+
+
+@compiled
+def predict(s, c, T):
+    """Mix the modes and predict them by T [s] into the prior fields; what was estimated stays as it is."""
+    stay, switch = imm.switching(T, c.dwell, 2)
+    for j in range(2):
+        s.c[j] = imm.mix(s.mu, 2, stay, switch, j, s.weights)
+        _mixed(s.x, s.p, s.weights, s.x_prior[j], s.p_prior[j])
+        _moved(s.x_prior[j], s.p_prior[j], c.models[j], T)
+
+
+@compiled
+def _measured(east, north, up):
+    """(azimuth, elevation, range) of a position."""
+    azimuth, elevation = earth_angles(east, north, up)
+    return azimuth, elevation, math.sqrt(east * east + north * north + up * up)
+
+
+@compiled
+def _transformed(x, p, z, s, g, d):
+    """Unscented transform of the prediction x, p to the measurement: mean z (3,), covariance s (3, 3) without R, and
+    that with X, g (9, 3). d (2, 3, 3): how the points at +L_k and -L_k measure, against the one in the middle."""
+    A, E, r = _measured(x[0], x[1], x[2])
+    z[0] = z[1] = z[2] = 0.0
+    s[:, :] = 0.0
+    for k in range(3):
+        # Column k of L into g, scaled to the offset of the points; the columns before it are in g already.
+        for i in range(k, N):
+            rest = p[i, k]
+            for m in range(k):
+                rest -= g[i, m] * g[k, m] / (SCALE * SCALE)
+            g[i, k] = rest
+        root = SCALE / math.sqrt(g[k, k])
+        for i in range(N):
+            g[i, k] = root * g[i, k] if i >= k else 0.0
+    for k in range(3):
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            a, e, q = _measured(x[0] + sign * g[0, k], x[1] + sign * g[1, k], x[2] + sign * g[2, k])
+            d[side, k, 0], d[side, k, 1], d[side, k, 2] = wrap(a - A), e - E, q - r
+            for m in range(3):
+                z[m] += WEIGHT * d[side, k, m]
+    for a in range(3):
+        for b in range(a, 3):
+            total = MIDDLE * z[a] * z[b]
+            for k in range(3):
+                for side in range(2):
+                    total += WEIGHT * (d[side, k, a] - z[a]) * (d[side, k, b] - z[b])
+            s[a, b] = s[b, a] = total
+    for i in range(N):
+        g0, g1, g2 = WEIGHT * g[i, 0], WEIGHT * g[i, 1], WEIGHT * g[i, 2]
+        for m in range(3):
+            g[i, m] = (g0 * (d[0, 0, m] - d[1, 0, m]) + g1 * (d[0, 1, m] - d[1, 1, m])
+                       + g2 * (d[0, 2, m] - d[1, 2, m]))
+    z[0] += A
+    z[1] += E
+    z[2] += r
+
+
+@compiled
+def innovation(s, azimuth, elevation, range_, R_azimuth, R_elevation, R_range):
+    """(nu, S of azimuth, of elevation, of range) against the prediction of both modes together; variances R.
+
+    A range that is NaN was not measured; S is then that of a perfect one.
+    """
+    for j in range(2):
+        _transformed(s.x_prior[j], s.p_prior[j], s.z[j], s.s[j], s.g[j], s.points)
+        s.s[j, 0, 0] += R_azimuth
+        s.s[j, 1, 1] += R_elevation
+        if range_ == range_:
+            s.s[j, 2, 2] += R_range
+    a, e, r = wrap(s.z[1, 0] - s.z[0, 0]), s.z[1, 1] - s.z[0, 1], s.z[1, 2] - s.z[0, 2]
+    c, both = s.c[1], s.c[0] * s.c[1]
+    return (wrap(azimuth - s.z[0, 0] - c * a), s.c[0] * s.s[0, 0, 0] + c * s.s[1, 0, 0] + both * a * a,
+            elevation - s.z[0, 1] - c * e, s.c[0] * s.s[0, 1, 1] + c * s.s[1, 1, 1] + both * e * e,
+            range_ - s.z[0, 2] - c * r, s.c[0] * s.s[0, 2, 2] + c * s.s[1, 2, 2] + both * r * r)
+
+
+@compiled
+def _corrected(s, j, azimuth, elevation, range_):
+    """Take the measurement into mode j; its log-likelihood, less what all modes have alike.
+
+    S = G G'; G^-1 nu are the standardised innovations n, the gain times G is w: X += w n, P -= w w'.
+    """
+    S, g = s.s[j], s.g[j]
+    G00 = math.sqrt(S[0, 0])
+    G10 = S[1, 0] / G00
+    G11 = math.sqrt(S[1, 1] - G10 * G10)
+    n0 = wrap(azimuth - s.z[j, 0]) / G00
+    n1 = (elevation - s.z[j, 1] - G10 * n0) / G11
+    G20 = G21 = n2 = per_G22 = 0.0
+    likelihood = -0.5 * (n0 * n0 + n1 * n1) - math.log(G00 * G11)
+    if range_ == range_:
+        G20 = S[2, 0] / G00
+        G21 = (S[2, 1] - G20 * G10) / G11
+        per_G22 = 1.0 / math.sqrt(S[2, 2] - G20 * G20 - G21 * G21)
+        n2 = (range_ - s.z[j, 2] - G20 * n0 - G21 * n1) * per_G22
+        likelihood += math.log(per_G22) - 0.5 * n2 * n2
+    for i in range(N):
+        w0 = g[i, 0] / G00
+        w1 = (g[i, 1] - G10 * w0) / G11
+        w2 = (g[i, 2] - G20 * w0 - G21 * w1) * per_G22
+        g[i, 0], g[i, 1], g[i, 2] = w0, w1, w2
+        s.x[j, i] = s.x_prior[j, i] + w0 * n0 + w1 * n1 + w2 * n2
+    for a in range(N):
+        for b in range(a, N):
+            s.p[j, a, b] = s.p[j, b, a] = s.p_prior[j, a, b] - (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1]
+                                                                + g[a, 2] * g[b, 2])
+    return likelihood
+
+
+@compiled
+def correct(s, azimuth, elevation, range_):
+    """Take the measurement that `innovation` was told of; range NaN: the angles alone."""
+    for j in range(2):
+        s.weights[j] = _corrected(s, j, azimuth, elevation, range_)
+    imm.weigh(s.c, s.weights, 2, s.mu)
+
+
+@compiled
+def range_known(s, share_2):
+    """Whether the standard deviation of the range is at most a share (its square) of the range in both modes."""
+    for j in range(2):
+        x, p = s.x[j], s.p[j]
+        spread = 0.0
+        for a in range(3):
+            for b in range(3):
+                spread += x[a] * x[b] * p[a, b]
+        r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
+        if not spread <= share_2 * r2 * r2:
+            return False
+    return True
+
+
+@compiled
+def expected_angles(s):
+    """(A, dA, ddA, E, dE, ddE) of what `predict` left, both modes together; A in (-pi, pi]."""
+    _mixed(s.x_prior, s.p_prior, s.c, s.mean, s.covariance)
+    x = s.mean
+    return deck_reference.earth_motion(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
+
+
+@compiled
+def outlook(s, c, T):
+    """The same T [s] >= 0 after the last measurement. Writes the prior fields."""
+    predict(s, c, T)
+    return expected_angles(s)
+
+
+@compiled
+def _projected(p, g, h, v):
+    """(var g, cov, var h) of two numbers linear in position and velocity: g x and h x + v dx, each (3,) a tuple."""
+    gg = gh = hh = 0.0
+    for a in range(3):
+        for b in range(3):
+            gg += g[a] * g[b] * p[a, b]
+            gh += g[a] * (h[b] * p[a, b] + v[b] * p[a, b + 3])
+            hh += h[a] * h[b] * p[a, b] + 2.0 * h[a] * v[b] * p[a, b + 3] + v[a] * v[b] * p[a + 3, b + 3]
+    return gg, gh, hh
+
+
+@compiled
+def variances(s, c, T):
+    """`expected_variances` T [s] >= 0 after the last measurement. Writes the prior fields."""
+    predict(s, c, T)
+    return expected_variances(s)
+
+
+@compiled
+def expected_variances(s):
+    """Variances (angle, angle and rate, rate) of the azimuth, the same of the elevation, and of the range, of what
+    `predict` left: both modes with their spread, linearised."""
+    _mixed(s.x_prior, s.p_prior, s.c, s.mean, s.covariance)
+    x, p = s.mean, s.covariance
+    e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]
+    rho2 = max(e * e + n * n, 1e-12 * u * u)
+    rho, r2 = math.sqrt(rho2), rho2 + u * u
+    drho = (e * de + n * dn) / rho
+    dA, dE = (n * de - e * dn) / rho2, (rho * du - u * drho) / r2
+    A = (n / rho2, -e / rho2, 0.0)
+    A_rate = ((-dn - 2.0 * e * dA) / rho2, (de - 2.0 * n * dA) / rho2, 0.0)
+    E = (-u * e / (rho * r2), -u * n / (rho * r2), rho / r2)
+    k = (du + u * drho / rho) / rho - 2.0 * dE
+    E_rate = ((k * e - u * de / rho) / r2, (k * n - u * dn / rho) / r2, (-drho - 2.0 * u * dE) / r2)
+    R = (e / math.sqrt(r2), n / math.sqrt(r2), u / math.sqrt(r2))
+    a11, a12, a22 = _projected(p, A, A_rate, A)
+    e11, e12, e22 = _projected(p, E, E_rate, E)
+    return a11, a12, a22, e11, e12, e22, _projected(p, R, R, R)[0]

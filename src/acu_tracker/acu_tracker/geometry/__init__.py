@@ -1,0 +1,1 @@
+"""Directions and their rates between earth, deck and the frame of the filter."""

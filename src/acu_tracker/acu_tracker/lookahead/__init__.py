@@ -1,0 +1,1 @@
+"""What lies ahead of the deck: keyholes, hidden sectors."""

@@ -1,0 +1,1 @@
+"""The program track: a table of times and angles, and where it leads."""

@@ -1,0 +1,1 @@
+"""The position loop of an axis and the laws it is made of."""

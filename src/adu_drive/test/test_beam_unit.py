@@ -1,0 +1,88 @@
+"""A beam between its messages, against a delayed and held copy of the commands; its states."""
+import math
+
+import numpy as np
+import pytest
+
+from adu_drive.beam_unit import COMMAND, JOINTS, STATE, Beam
+from adu_drive.params import BeamParameters
+from pedestal_common import records
+
+T = 10_000_000
+P = BeamParameters(period=0.01, transport_delay=0.03, initial_azimuth=0.3, initial_elevation=0.6)
+
+
+class Rig:
+    """A Beam fed step by step."""
+
+    def __init__(self, params=P):
+        self.unit, self.k = Beam(params), 0
+        self.now, self.command = (records.only(self.unit.heard, name) for name in (JOINTS, COMMAND))
+
+    def step(self, azimuth=None, elevation=0.5, late=0):
+        """The beam at t_k and adu/state; then t_k is answered with a command `late` steps old, None: with none."""
+        self.now.stamp[0] = self.k * T
+        self.unit.say()
+        said = self.unit.said[0]
+        self.command.stamp[0] = records.NEVER if azimuth is None else (self.k - late) * T
+        if azimuth is not None:
+            self.command.numbers[:2] = azimuth, elevation
+        self.stale = self.unit.advance()
+        self.k += 1
+        return said[JOINTS]['position'].copy(), self.unit.WORDS[STATE](int(said[STATE]))
+
+
+def test_the_beam_is_the_command_of_one_delay_and_one_step_before():
+    rig, commands = Rig(), np.random.default_rng(1).uniform(-1.0, 1.0, 40)
+    beams = np.array([rig.step(command)[0] for command in commands])
+    assert np.array_equal(beams[:4], np.tile((0.3, 0.6), (4, 1)))
+    assert np.array_equal(beams[4:, 0], commands[:-4])
+    assert (beams[4:, 1] == 0.5).all()
+
+
+def test_many_steps_at_once_are_the_same():
+    commands = np.random.default_rng(2).uniform(-1.0, 1.0, 40)
+    one, unit = Rig(), Beam(P)
+    beams = np.array([one.step(command)[0] for command in commands])
+    heard, said = np.zeros(40, unit.HEARD), np.zeros(40, unit.SAID)
+    heard[JOINTS]['stamp'] = heard[COMMAND]['stamp'] = np.arange(40) * T
+    heard[COMMAND]['position'][:, 0], heard[COMMAND]['position'][:, 1] = commands, 0.5
+    unit.answers(heard, said)
+    assert np.array_equal(said[JOINTS]['position'], beams)
+    assert not said[JOINTS]['velocity'].any() and not said[JOINTS]['effort'].any()
+
+
+@pytest.mark.parametrize('wrong', [math.nan, math.inf, -1e9])
+def test_no_angle_leaves_the_beam_and_says_so(wrong):
+    rig = Rig()
+    for _ in range(6):
+        rig.step(0.1)
+    rig.step(wrong)
+    assert rig.unit.outputs[0]['invalid_command']
+    for _ in range(6):
+        beam, state = rig.step()
+        assert tuple(beam) == (0.1, 0.5) and state == 'enabled'
+    assert not rig.stale
+    for _ in range(6):
+        rig.step()
+    assert rig.stale
+    rig.step(0.2)
+    assert not rig.stale
+
+
+@pytest.mark.parametrize('stop, go, text', [('adu/disable', 'adu/enable', 'disabled'),
+                                            ('adu/emergency_stop', 'adu/reset_faults', 'emergency stop')])
+def test_a_beam_that_is_stopped_stays_and_forgets_what_is_on_its_way(stop, go, text):
+    rig = Rig()
+    for k in range(10):
+        rig.step(0.1 * k)
+    before, _ = rig.step(9.0)
+    assert rig.unit.request(stop) and rig.unit.condition() == text
+    where = {tuple(rig.step(5.0)[0]) for _ in range(10)}
+    assert len(where) == 1 and where.pop()[0] == pytest.approx(before[0] + 0.1)
+    assert rig.unit.services_to('enabled')[-1] == 'adu/enable'
+    if text == 'emergency stop':
+        assert rig.unit.refusal('adu/enable')
+    assert rig.unit.request(go)
+    beams = [rig.step(0.7)[0][0] for _ in range(6)]
+    assert beams[-1] == 0.7 and 5.0 not in beams and 9.0 not in beams

@@ -1,0 +1,193 @@
+"""`pedestal recompute --live`: the recorded inputs of a node into its real process, in lockstep over DDS."""
+import collections
+import os
+import pathlib
+import signal
+import subprocess
+import tempfile
+import time
+
+import numpy as np
+import rclpy
+import yaml
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+from pedestal_bringup.again import comparison, recompute
+from pedestal_bringup.run import scenario
+from pedestal_bringup.run.graph import Operator, RunError, command_line, sole_run
+from pedestal_common import parameters, records, topics
+from pedestal_common.shell import QOS, message_class, set_middleware_defaults
+from pedestal_common.steps import SECOND
+
+START = 300.0
+"""Seconds within which the node has started; it may be compiling its laws for the first time."""
+PATIENCE = 20.0
+"""Seconds within which it answers a step."""
+STOP = 10.0
+
+
+class Feeder(Operator):
+    """Stands for everything around the node: writes what it hears, reads what it says."""
+
+    def __init__(self, node, heard):
+        super().__init__()
+        self.node = node
+        self.publishers_of = {name: self.create_publisher(message_class(topics.BY_NAME[name].type), name,
+                                                          QOS[topics.BY_NAME[name].qos]) for name in heard}
+        self.answers = {}
+
+    def readers(self, said, nodes):
+        """The nodes the process waits for, which read what it says; the recorder keeps it in `answers`."""
+        self.answers = {name: [] for name in said}
+        made = []
+        written = [topic for topic in topics.TOPICS if self.node in topic.writers]
+        for reader in nodes:
+            if reader not in (self.node, self.name):
+                made.append(rclpy.create_node(reader))
+                for topic in written:
+                    if reader in topics.readers(topic, nodes):
+                        kept = reader == 'recorder' and topic.name in said
+                        made[-1].create_subscription(
+                            message_class(topic.type), topic.name,
+                            self.answers[topic.name].append if kept else lambda data: None, QOS[topic.qos], raw=True)
+        return made
+
+    def announce_now(self, name, data):
+        """Publish a message that no step waits for, and wait until it has arrived."""
+        publisher = self.publishers_of[name]
+        publisher.publish(data)
+        if not publisher.wait_for_all_acked(Duration(seconds=PATIENCE)):
+            raise RunError(f'{self.node} did not take {name} within {PATIENCE:g} s')
+
+
+class Live:
+    """The node's process and the feeder, spun until what is waited for has come."""
+
+    def __init__(self, feeder, readers, process, log):
+        self.feeder, self.process, self.log = feeder, process, log
+        self.executor = SingleThreadedExecutor()
+        for node in (feeder, *readers):
+            self.executor.add_node(node)
+
+    def until(self, condition, limit, what):
+        deadline = time.monotonic() + limit
+        while not condition():
+            if self.process.poll() not in (None, 0):
+                raise RunError(f'{self.feeder.node} ended with exit code {self.process.returncode}: '
+                               f'{" ".join(self.log.read_text(errors="replace").split())}')
+            if time.monotonic() > deadline:
+                raise RunError(f'{self.feeder.node}: no {what()} within {limit:g} s')
+            self.executor.spin_once(timeout_sec=0.1)
+
+    def ask(self, service):
+        client = self.feeder.create_client(Trigger, service)
+        self.until(client.service_is_ready, PATIENCE, lambda: f'service {service}')
+        future = client.call_async(Trigger.Request())
+        self.until(future.done, PATIENCE, lambda: f'answer of {service}')
+        self.feeder.destroy_client(client)
+
+
+def outputs(recording, done, params):
+    """{topic: Output} of the process of a node fed with the inputs of a Recomputed, whose answers say how many
+    messages are due at each step. Raises RunError when they do not come."""
+    if not recording.lockstep:
+        raise recompute.RecomputeError('--live feeds in lockstep: a realtime recording, whose steps may lack inputs, '
+                                       'is recomputed without it')
+    nodes = _graph(recording, done)
+    set_middleware_defaults()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            return _run(recording, done, params, nodes, pathlib.Path(folder))
+    finally:
+        rclpy.try_shutdown()
+
+
+def _graph(recording, done):
+    """Names of the nodes the process is told of: itself, who records it, and whoever changes what it reads."""
+    around = {'acu': (('ins', 'ship/imu/data'), ('operator', 'acu/program_track')),
+              'adu': (('ship_motion', 'ship/truth'),), 'tracking_receiver': (('ship_motion', 'ship/truth'),)}
+    return (done.node, 'recorder', *(name for name, topic in around.get(done.node, ()) if recording.has(topic)))
+
+
+def _run(recording, done, params, nodes, folder):
+    file, log = folder / 'parameters.yaml', folder / 'log'
+    beams = recording.bag.beams
+    values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(nodes),
+              'graph.beams': beams}
+    file.write_text(yaml.safe_dump({done.node: {'ros__parameters': values}}))
+    heard = [name for name in (*done.feed.rows, *{name for _, name, _ in done.feed.events})
+             if done.node not in topics.BY_NAME[name].writers]
+    feeder = Feeder(done.node, heard)
+    with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:
+        feeder.refuse_company()
+        readers = feeder.readers(list(done.outputs), nodes)
+        process = subprocess.Popen(command_line(done.node, scenario.kind(done.node, beams > 0), file),
+                                   stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+                                   env={**os.environ, 'ROS_LOG_DIR': str(folder)})
+        try:
+            live = Live(feeder, readers, process, log)
+            live.until(lambda: all(publisher.get_subscription_count() for publisher in feeder.publishers_of.values())
+                       and feeder.count_publishers('diagnostics'), START, lambda: 'reader of its inputs')
+            time.sleep(0.5)  # the other side of the discovery
+            steps = _feed(recording, done, live)
+        finally:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(STOP)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+    return {name: _output(name, data, done, steps[name]) for name, data in feeder.answers.items()}
+
+
+def _feed(recording, done, live):
+    """Feed every step; {topic: step at which each of its messages came}."""
+    feed, feeder = done.feed, live.feeder
+    events = collections.defaultdict(list)
+    for step, name, row in feed.events:
+        events[step].append((name, row))
+    due = {name: _due(done, name) for name in done.outputs}
+    steps = {name: [] for name in done.outputs}
+
+    def answered(step):
+        for name, answers in feeder.answers.items():
+            steps[name] += [step] * (len(answers) - len(steps[name]))
+        return all(len(feeder.answers[name]) >= count[step] for name, count in due.items())
+
+    def missing(step):
+        names = [name for name, count in due.items() if len(feeder.answers[name]) < count[step]]
+        return f'{", ".join(names)} for step {feed.stamps[step] / SECOND:.6f} s'
+
+    own = recompute.kind_of(recording, done.node).trigger not in feeder.publishers_of
+    for step in range(len(feed.stamps)):
+        for name, row in events[step]:
+            feeder.announce_now(name, recording.data(name)[row])
+        if own:
+            live.until(lambda step=step: answered(step), START if step == 0 else PATIENCE,
+                       lambda step=step: missing(step))
+        # What is asked for before the answer to a step: the drive answers before it is fed.
+        for service, _ in done.requests.get(step + own, ()):
+            live.ask(service)
+        for name, rows in feed.rows.items():
+            if rows[step] >= 0 and name in feeder.publishers_of:
+                feeder.publishers_of[name].publish(recording.data(name)[rows[step]])
+        if not own:
+            live.until(lambda step=step: answered(step), START if step == 0 else PATIENCE,
+                       lambda step=step: missing(step))
+    return steps
+
+
+def _due(done, name):
+    """How many messages of a topic must have come by each step (n,)."""
+    if name in done.unit.WORDS:
+        return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
+    return np.cumsum(records.slot(done.said, name).stamp != records.NEVER)
+
+
+def _output(name, data, done, steps):
+    log = done.feed.stamps[np.array(steps[:len(data)], np.int64)]
+    return comparison.recorded([bytes(message) for message in data[:len(log)]], log, name)

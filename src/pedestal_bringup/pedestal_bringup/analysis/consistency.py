@@ -1,0 +1,181 @@
+"""Whether the target filter of a recorded run is honest: NIS of its innovations, NEES of its errors against truth.
+
+Both are squared errors in units of the covariance the filter states (Bar-Shalom, Li, Kirubarajan 2001, section 5.4):
+NIS against the measurements, chi-square with as many degrees of freedom as were measured; NEES of angle and rate
+against the truth, two degrees of freedom. A filter that is too sure of itself has more, one that is too careful less.
+"""
+import dataclasses
+import functools
+import math
+
+import numpy as np
+from scipy import special
+
+from acu_tracker.geometry import deck_reference
+from pedestal_bringup.analysis import results
+from pedestal_common import line_of_sight, messages
+from pedestal_common.compiled import compiled
+
+FREEDOMS = 2
+"""Of the NEES: angle and rate."""
+PART = 0.95
+"""Share of honest filters inside a band."""
+
+NAMES = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
+
+
+@dataclasses.dataclass
+class Consistency:
+    """What acu/filter told, on the steps of a results.Tracking: arrays (n, 2) of azimuth and elevation, NaN: none.
+
+    innovation, rate_innovation, nis; sigma, rate_sigma, correlation of the estimate; probability (n, 2, 4) of
+    messages.MODELS; error, rate_error: estimate less truth [rad, rad/s]; nees of the two; tracking (n,) bool.
+    """
+    t: np.ndarray
+    innovation: np.ndarray
+    rate_innovation: np.ndarray
+    nis: np.ndarray
+    sigma: np.ndarray
+    rate_sigma: np.ndarray
+    correlation: np.ndarray
+    probability: np.ndarray
+    error: np.ndarray
+    rate_error: np.ndarray
+    nees: np.ndarray
+    tracking: np.ndarray
+
+    @property
+    def freedoms(self):
+        """Degrees of freedom (n, 2) of the NIS."""
+        return 1.0 + np.isfinite(self.rate_innovation)
+
+
+@compiled
+def _rates(relative, velocity, attitude, ship_velocity, rates):
+    """Fill the rates (n, 2) of earth azimuth and elevation of a target at `relative` [m], moving with `velocity`
+    [m/s], from a ship that moves with `ship_velocity` in its own frame."""
+    mat_ed = np.empty((3, 3))
+    for k in range(len(relative)):
+        q = attitude[k]
+        line_of_sight.rotation(q[0], q[1], q[2], q[3], mat_ed)
+        e, n, u = relative[k, 0], relative[k, 1], relative[k, 2]
+        ve, vn, vu = line_of_sight.to_earth(mat_ed, ship_velocity[k, 0], ship_velocity[k, 1], ship_velocity[k, 2])
+        de, dn, du = velocity[k, 0] - ve, velocity[k, 1] - vn, velocity[k, 2] - vu
+        _, rates[k, 0], _, _, rates[k, 1], _ = deck_reference.earth_motion(e, n, u, de, dn, du, 0.0, 0.0, 0.0)
+
+
+def read(bag, run):
+    """The Consistency of a bag (bag.Bag) whose results.Tracking is `run`; None when it has no acu/filter."""
+    if 'acu/filter' not in bag.topics or not bag.rows('acu/filter').size:
+        return None
+    t = run.t
+    at_steps = functools.partial(results.on_grid, bag, t)
+    told = at_steps('acu/filter', [f'{axis}_{name}.position' for name in NAMES for axis in messages.AXES])
+    probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in messages.AXES
+                                         for model in messages.MODELS]).reshape(t.size, 2, -1)
+    estimate = at_steps('acu/estimate', [f'{axis}.{field}' for field in ('position', 'velocity')
+                                        for axis in messages.AXES])
+    place, twist = ('position.x', 'position.y', 'position.z'), ('twist.linear.x', 'twist.linear.y', 'twist.linear.z')
+    relative, velocity = at_steps('target/truth', place), at_steps('target/truth', twist)
+    attitude, ship_velocity = np.tile(line_of_sight.ASHORE, (t.size, 1)), np.zeros((t.size, 3))
+    if 'ship/truth' in bag.topics:
+        relative = relative - at_steps('ship/truth', place)
+        attitude = at_steps('ship/truth', [f'orientation.{letter}' for letter in 'xyzw'])
+        ship_velocity = at_steps('ship/truth', twist)
+    true_rate = np.empty((t.size, 2))
+    _rates(relative, velocity, attitude, ship_velocity, true_rate)
+    error = (estimate[:, :2] - run.target_earth + math.pi) % (2.0 * math.pi) - math.pi
+    rate_error = estimate[:, 2:] - true_rate
+    innovation, rate_innovation, nis, sigma, rate_sigma, correlation = np.split(told, len(NAMES), axis=1)
+    a, b = error / sigma, rate_error / rate_sigma
+    nees = (a * a - 2.0 * correlation * a * b + b * b) / (1.0 - correlation * correlation)
+    return Consistency(t, innovation, rate_innovation, nis, sigma, rate_sigma, correlation, probability, error,
+                       rate_error, nees, run.tracking)
+
+
+def independent(values):
+    """How many independent samples a correlated series (n,) is worth for its mean: n / (1 + 2 sum of its
+    autocorrelations), summed while two neighbours together are positive (Geyer 1992, initial positive sequence)."""
+    n = values.size
+    off = values - values.mean()
+    if n < 4 or not off.any():
+        return float(n)
+    spectrum = np.fft.rfft(off, 2 * n)
+    correlation = np.fft.irfft(spectrum * spectrum.conj())[:n]
+    pairs = (correlation[:n - n % 2] / correlation[0]).reshape(-1, 2).sum(axis=1)
+    stop = np.argmax(pairs <= 0.0) if (pairs <= 0.0).any() else pairs.size
+    return float(n / max(2.0 * pairs[:stop].sum() - 1.0, 1.0))
+
+
+def bounds(freedoms):
+    """(low, high) that hold a chi-square value with this many degrees of freedom, a number or an array, with PART."""
+    return special.chdtri(freedoms, 0.5 + 0.5 * PART), special.chdtri(freedoms, 0.5 - 0.5 * PART)
+
+
+def band(freedoms, count):
+    """The two bounds that hold the mean of `count` chi-square values with this many degrees of freedom with PART."""
+    return tuple(float(bound / count) for bound in bounds(freedoms * count))
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """One axis over the evaluated part; NaN where nothing was measured.
+
+    nis: mean, nis_expected: degrees of freedom, nis_inside: share of single values inside their band; nees: mean,
+    nees_band: of the mean, count: independent errors it is over; error, rate_error: rms [rad, rad/s]; sigma,
+    rate_sigma: rms of what the filter states.
+    """
+    nis: float
+    nis_expected: float
+    nis_inside: float
+    nees: float
+    nees_band: tuple
+    count: float
+    error: float
+    rate_error: float
+    sigma: float
+    rate_sigma: float
+
+    @property
+    def verdict(self):
+        """A plain sentence."""
+        if not math.isfinite(self.nees):
+            return 'nothing was evaluated'
+        low, high = self.nees_band
+        times = math.sqrt(self.nees / FREEDOMS)
+        where = f'mean NEES {self.nees:.3g}, {100.0 * PART:g} % of honest filters have {low:.3g} to {high:.3g}'
+        if self.nees > high:
+            return f'too sure of itself: its errors are {times:.2g} times what it states ({where})'
+        if self.nees < low:
+            return f'too careful: its errors are only {times:.2g} times what it states ({where})'
+        return f'honest: its errors are what it states ({where})'
+
+
+def axis(found, i) -> Axis:
+    """The Axis i of a Consistency."""
+    on = found.tracking
+    nis, freedoms, nees = found.nis[on, i], found.freedoms[on, i], found.nees[on, i]
+    freedoms, nis, nees = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)], nees[np.isfinite(nees)]
+    inside, count, nees_band = math.nan, math.nan, (math.nan, math.nan)
+    if nis.size:
+        low, high = bounds(freedoms)
+        inside = float(np.mean((nis >= low) & (nis <= high)))
+    if nees.size:
+        count = independent(nees)
+        nees_band = band(FREEDOMS, count)
+    return Axis(_mean(nis), _mean(freedoms), inside, _mean(nees), nees_band, count,
+                *(results.rms(values[on, i]) for values in (found.error, found.rate_error, found.sigma,
+                                                            found.rate_sigma)))
+
+
+def _mean(values):
+    return float(np.mean(values)) if values.size else math.nan
+
+
+def summary(found) -> dict:
+    """{metric: (value, unit)}, of nothing where `found` is None."""
+    values = {}
+    for i, name in enumerate(messages.AXES if found is not None else ()):
+        judged = axis(found, i)
+        values[f'{name}_nis_mean'], values[f'{name}_nees_mean'] = (judged.nis, ''), (judged.nees, '')
+    return values

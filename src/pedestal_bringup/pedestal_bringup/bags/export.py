@@ -1,0 +1,177 @@
+"""`pedestal export`: a recording as one table per topic, for MATLAB, pandas and whoever else reads CSV or Parquet.
+
+A row is a message, a column a number of it (columns.table), after its stamp in seconds and in integer nanoseconds.
+Where that would leave something out, the rows are finer: one per point of a trajectory of several points, one per
+status of a diagnostics message.
+"""
+import contextlib
+import csv
+import os
+import pathlib
+
+import numpy as np
+
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags import columns
+from pedestal_common import messages, topics
+
+FORMATS = ('csv', 'parquet')
+STAMP, NANOSECONDS = 't [s]', 'stamp [ns]'
+
+_MOTION = {'position': 'rad', 'velocity': 'rad/s', 'acceleration': 'rad/s2', 'effort': 'Nm', 'time_from_start': 's'}
+_UNITS = {
+    'sensor_msgs/msg/JointState': _MOTION,
+    'trajectory_msgs/msg/JointTrajectory': _MOTION,
+    'sensor_msgs/msg/Imu': {'angular_velocity': 'rad/s', 'linear_acceleration': 'm/s2',
+                            'orientation_variance': 'rad2'},
+    'nav_msgs/msg/Odometry': {'position': 'm', 'linear': 'm/s', 'angular': 'rad/s'},
+}
+"""Units of the topics in the table of topics: {type: {part of the column's name: unit}}."""
+_FILTER = {'innovation': 'rad', 'innovation_sigma': 'rad', 'sigma': 'rad', 'rate_innovation': 'rad/s',
+           'rate_sigma': 'rad/s'}
+_OWN = {
+    'tracking_receiver/angle_error': {'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'},
+    'tracking_receiver/angle_rate': {'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'},
+    'tracking_receiver/range': {'range': 'm', 'variance': 'm2', 'min_range': 'm', 'max_range': 'm',
+                                'field_of_view': 'rad'},
+    'acu/filter': {f'{axis}_{name}.position': unit for axis in messages.AXES for name, unit in _FILTER.items()},
+}
+"""Units of topics whose type does not tell: {topic: {column: unit}}."""
+
+
+def export(path, file_format='csv', output=None, names=(), overwrite=False):
+    """Write the topics of a bag as tables; iterator of (file, rows, columns), or (None, why, topic) of one left out.
+
+    names: topics to write, all when empty; one that cannot be read is then an error, else it is left out.
+    output: folder, default `export` in the bag (beside a bare .mcap). A file is `acu.rate_command.csv` and so on.
+    Raises bag.BagError, or FileExistsError before anything is written when a file is there and may not be replaced.
+    """
+    write = _parquet_writer() if file_format == 'parquet' else _write_csv
+    bag = bags.read(path)
+    chosen = bags.chosen_topics(bag, names) if names else list(bag.topics)
+    folder = pathlib.Path(output) if output is not None else bag.file.parent / 'export'
+    files = {name: folder / f'{name.replace("/", ".")}.{file_format}' for name in chosen}
+    there = [file for file in files.values() if file.exists()]
+    if there and not overwrite:
+        raise FileExistsError(f'{there[0]} exists already{_and_more(there)}; --overwrite replaces')
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, file in files.items():
+        if bag.topics[name] not in messages.TYPESTORE.fielddefs:
+            reason = f'{name} is of type {bag.topics[name]}, which is not known here'
+            if names:
+                raise bags.BagError(f'{path}: {reason}')
+            yield None, reason, name
+            continue
+        content = table(bag, name)
+        with _whole(file) as part:
+            write(part, content, {'topic': name, 'type': bag.topics[name], **bag.metadata})
+        yield file, len(content[NANOSECONDS]), len(content)
+
+
+def _and_more(there):
+    return f' and {len(there) - 1} more' if len(there) > 1 else ''
+
+
+@contextlib.contextmanager
+def _whole(file):
+    """The path of a file that becomes `file` once it is whole, and nothing otherwise."""
+    part = file.with_name(file.name + '.part')
+    try:
+        yield part
+        os.replace(part, file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def table(bag, name):
+    """{header: array or list} of a topic: `t [s]`, `stamp [ns]`, then its columns, each with its unit."""
+    type_name = bag.topics[name]
+    rows = bag.rows(name)
+    stamps = columns.stamps([data[:12] for _, _, _, data in bag.raw(name)], type_name, rows.log)
+    if type_name == 'diagnostic_msgs/msg/DiagnosticArray':
+        return _diagnostics(bag, name, stamps)
+    if type_name == 'trajectory_msgs/msg/JointTrajectory' and _has_tracks(bag, name):
+        return _tracks(bag, name, stamps)
+    numbers = bag.table(name)
+    del numbers['t']
+    return {**_times(stamps), **{_header(name, type_name, column): values for column, values in numbers.items()}}
+
+
+def _times(stamps):
+    return {STAMP: stamps / 1e9, NANOSECONDS: stamps}
+
+
+def _header(name, type_name, column):
+    unit = None
+    if topics.plain(name) in _OWN:
+        unit = _OWN[topics.plain(name)].get(column)
+    elif topics.plain(name) in topics.BY_NAME:
+        units = _UNITS.get(type_name, {})
+        unit = next((units[part] for part in reversed(column.split('.')) if part in units), None)
+    return f'{column} [{unit}]' if unit else column
+
+
+def _has_tracks(bag, name):
+    """Whether a message has other than one point; messages of one length are taken to be alike."""
+    of_length = {len(data): data for _, _, _, data in bag.raw(name)}
+    try:
+        return any(len(messages.deserialize(data, bag.topics[name]).points) != 1 for data in of_length.values())
+    except ValueError:
+        return False
+
+
+def _tracks(bag, name, stamps):
+    """Trajectories of several points: a row is a point, at its time after the stamp of its message."""
+    type_name = bag.topics[name]
+    points = []
+    for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name)):
+        for point in message.points:
+            row = {'time_from_start': point.time_from_start.sec + point.time_from_start.nanosec * 1e-9}
+            for field, values in (('position', point.positions), ('velocity', point.velocities),
+                                  ('acceleration', point.accelerations), ('effort', point.effort)):
+                row.update({f'{joint}.{field}': value for joint, value in zip(message.joint_names, values)})
+            points.append((stamp, row))
+    found = dict.fromkeys(column for _, row in points for column in row)
+    return {**_times(np.array([stamp for stamp, _ in points], np.int64)),
+            **{_header(name, type_name, column): np.array([row.get(column, np.nan) for _, row in points], float)
+               for column in found}}
+
+
+def _diagnostics(bag, name, stamps):
+    """Diagnostics: a row is a status; its values are one text, key=value, separated by '; '."""
+    statuses = [(stamp, status) for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name))
+                for status in message.status]
+    return {**_times(np.array([stamp for stamp, _ in statuses], np.int64)),
+            'level': np.array([status.level for _, status in statuses], np.int64),
+            'name': [status.name for _, status in statuses], 'message': [status.message for _, status in statuses],
+            'values': ['; '.join(f'{value.key}={value.value}' for value in status.values) for _, status in statuses]}
+
+
+def _write_csv(file, content, _description):
+    """Numbers as the shortest text that reads back as the same float, NaN as NaN, texts quoted where needed."""
+    with open(file, 'w', newline='', encoding='utf-8') as stream:
+        writer = csv.writer(stream, lineterminator='\n')
+        writer.writerow(content)
+        writer.writerows(zip(*(_texts(values) for values in content.values())))
+
+
+def _texts(values):
+    if isinstance(values, list) or values.dtype.kind == 'i':
+        return values
+    return ['NaN' if value != value else repr(value) for value in values.tolist()]
+
+
+def _parquet_writer():
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise ValueError("Parquet is written by pyarrow, which is not installed: pip install pyarrow, or the extra "
+                         "'pedestal_bringup[parquet]'") from None
+
+    def write(file, content, description):
+        made = pyarrow.table({
+            header: pyarrow.array(values, pyarrow.string()) if isinstance(values, list) else values
+            for header, values in content.items()})
+        pyarrow.parquet.write_table(made.replace_schema_metadata(description), file, compression='zstd')
+    return write

@@ -1,0 +1,217 @@
+"""Is a recording complete? Every step of every topic there, once, in order; counts and sequence numbers agree."""
+import dataclasses
+
+import numpy as np
+import yaml
+
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags import columns, configuration
+from pedestal_common import messages, topics
+
+MAX_LATENCY = 1_000_000_000
+"""A topic may end this much [ns] before the last step: the next messages were still on their way (latency)."""
+
+SHOWN = 10
+
+
+@dataclasses.dataclass
+class TopicCheck:
+    """One topic: count, first and last stamp [s] (NaN when empty), what is wrong with it."""
+    name: str
+    count: int
+    first: float
+    last: float
+    problems: list
+
+
+@dataclasses.dataclass
+class Report:
+    """What verify found. steps: how many the run has; period [s], NaN when there are fewer than two; made: how the bag
+    was made, a line."""
+    path: str
+    topics: list
+    problems: list
+    steps: int
+    period: float
+    made: str
+
+    @property
+    def complete(self):
+        return not self.problems and not any(check.problems for check in self.topics)
+
+    def lines(self):
+        """The report as text: a row per topic, the gaps under it, the verdict last."""
+        width = max([len(check.name) for check in self.topics], default=5)
+        lines = [f'{"topic":{width}} {"messages":>9} {"first s":>14} {"last s":>14}']
+        for check in self.topics:
+            lines.append(f'{check.name:{width}} {check.count:9} {check.first:14.6f} {check.last:14.6f}')
+            lines += [f'  {problem}' for problem in check.problems]
+        lines += [*self.problems, self.made]
+        total = sum(check.count for check in self.topics)
+        count = len(self.problems) + sum(len(check.problems) for check in self.topics)
+        steps = f'{self.steps} steps of {self.period * 1e3:g} ms'
+        verdict = 'complete' if self.complete else f'NOT complete, {count} problem{"s" if count > 1 else ""}'
+        return [*lines, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
+
+
+def verify(path) -> Report:
+    """Judge a bag. The steps are the stamps of joint_states (else of the first step topic that has any).
+
+    Raises bag.BagError when there is nothing to judge: missing, empty or foreign file.
+    """
+    bag = bags.load(path)
+    rows = {name: bag.rows(name) for name in bag.topics}
+    stamps = {name: columns.stamps([data for _, _, _, data in bag.raw(name)], bag.topics[name], rows[name].log)
+              for name in bag.topics}
+    graph = bag.graph
+    rates = {name: graph[name].rate if name in graph else '' for name in bag.topics}
+    first, last, period = _grid(stamps, rates)
+    ours = 'pacing' in bag.metadata
+    checks = []
+    for name, stamp in stamps.items():
+        problems = _order(stamp) if rates[name] and len(graph[name].writers) == 1 else []
+        if rates[name] == 'step':
+            problems += _steps(stamp, 'adu' in graph[name].writers, first, last, period)
+            if ours and not np.array_equal(stamp, rows[name].log):
+                problems.append(f'{np.sum(stamp != rows[name].log)} messages logged at a time that is not their stamp')
+        elif rates[name] == 'once' and stamp.size != 1:
+            problems.append(f'{stamp.size} messages where one is due')
+        elif rates[name] == 'second' and bag.metadata.get('pacing') == 'lockstep' and period:
+            problems += _seconds(bag, name, stamp, first, last, period)
+        if name in graph and bag.topics[name] != graph[name].type:
+            problems.append(f'of type {bag.topics[name]}, where the graph has {graph[name].type}')
+        if ours:
+            problems += _sequence(rows[name].sequence)
+        checks.append(TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,
+                                 stamp[-1] / 1e9 if stamp.size else np.nan, problems))
+    problems = [bag.damage] if bag.damage else []
+    if not any(rate == 'step' and stamps[name].size for name, rate in rates.items()):
+        problems.append("no topic of the drive's steps has a message")
+    counts = {check.name: check.count for check in checks}
+    if bag.statistics is not None and bag.statistics != counts:
+        problems.append(f'the summary counts {_differences(bag.statistics, counts)}')
+    if bag.path.is_dir():
+        problems += _metadata_file(bag, counts)
+    return Report(str(path), checks, problems, (last - first) // period + 1 if period else 0,
+                  period / 1e9 if period else np.nan, configuration.line(bag))
+
+
+def _differences(said, counts):
+    return ', '.join(f'{said.get(name, 0)} of {name} where {counts.get(name, 0)} are'
+                     for name in dict.fromkeys((*said, *counts)) if said.get(name, 0) != counts.get(name, 0))
+
+
+def _grid(stamps, rates):
+    """First and last step and their period [ns]; period 0 when there is no telling."""
+    steps = {name: stamp for name, stamp in stamps.items() if rates[name] == 'step' and stamp.size}
+    if not steps:
+        return 0, 0, 0
+    grid = np.unique(next((stamp for name, stamp in steps.items() if topics.plain(name) == 'joint_states'),
+                          next(iter(steps.values()))))
+    period = int(np.median(np.diff(grid))) if grid.size > 1 else 0
+    return int(grid[0]), int(max(grid[-1], *(stamp.max() for stamp in steps.values()))), period
+
+
+def _order(stamp):
+    """Stamps that do not go on."""
+    problems = []
+    back = np.flatnonzero(np.diff(stamp) < 0)
+    if back.size:
+        problems.append(f'{back.size} stamps go back, the first from {stamp[back[0]] / 1e9:.6f} '
+                        f'to {stamp[back[0] + 1] / 1e9:.6f} s')
+    return problems
+
+
+def _ranges(numbers):
+    """[(first, last)] of the runs in ascending whole numbers."""
+    if not numbers.size:
+        return []
+    cuts = np.flatnonzero(np.diff(numbers) > 1)
+    return list(zip(numbers[np.r_[0, cuts + 1]].tolist(), numbers[np.r_[cuts, numbers.size - 1]].tolist()))
+
+
+def _steps(stamp, of_drive, first, last, period):
+    """Steps that are missing, doubled or none; of_drive: written by the drive, which makes them."""
+    if not stamp.size:
+        return ['no message']
+    problems = []
+    unique, count = np.unique(stamp, return_counts=True)
+    doubled = unique[count > 1]
+    if doubled.size:
+        problems.append(f'{np.sum(count[count > 1] - 1)} doubled, the first at {doubled[0] / 1e9:.6f} s')
+    if not period:
+        return problems
+    off = np.sum((unique - first) % period != 0)
+    if off:
+        problems.append(f'{off} stamps are no step')
+    expected = np.arange((last - first) // period + 1)
+    missing = _ranges(np.setdiff1d(expected, (unique - first) // period))
+    if not of_drive and missing and missing[-1][1] == expected[-1] \
+            and (missing[-1][1] - missing[-1][0] + 1) * period <= MAX_LATENCY:
+        missing.pop()
+    for start, stop in missing[:SHOWN]:
+        at, to = (first + start * period) / 1e9, (first + stop * period) / 1e9
+        problems.append(f'missing 1 step at {at:.6f} s' if start == stop else
+                        f'missing {stop - start + 1} steps from {at:.6f} to {to:.6f} s')
+    if len(missing) > SHOWN:
+        steps = sum(stop - start + 1 for start, stop in missing[SHOWN:])
+        problems.append(f'and {steps} more missing steps in {len(missing) - SHOWN} gaps')
+    return problems
+
+
+def _seconds(bag, name, stamp, first, last, period):
+    """Diagnostics of every node whose topics are in the bag, at the first step of every second."""
+    seconds = np.arange(-(-first // 1_000_000_000), last // 1_000_000_000 + 1) * 1_000_000_000
+    expected = first - (first - seconds) // period * period
+    expected = expected[expected <= last]
+    heard = {}
+    for at, (_, _, _, data) in zip(stamp, bag.raw(name)):
+        try:
+            status = messages.deserialize(data, bag.topics[name]).status
+        except ValueError as error:
+            return [f'unreadable at {at / 1e9:.6f} s: {error}']
+        heard.setdefault(status[0].name if status else '', []).append(at)
+    nodes = [node for node in bag.graph[name].writers
+             if any(topic.name in bag.topics for topic in bag.graph.values() if topic.writers == (node,))]
+    problems = []
+    for node in nodes:
+        missing = np.setdiff1d(expected, heard.get(node, []))
+        if missing.size:
+            problems.append(f'{missing.size} of {expected.size} of {node} missing, '
+                            f'the first at {missing[0] / 1e9:.6f} s')
+        if len(heard.get(node, [])) > expected.size:
+            problems.append(f'{len(heard[node]) - expected.size} too many of {node}')
+    return problems
+
+
+def _sequence(sequence):
+    """The recorder numbers from 1 and leaves a gap for what was lost on the way."""
+    if not sequence.size:
+        return []
+    steps = np.diff(sequence, prepend=0)
+    lost = int(np.sum(steps[steps > 1] - 1))
+    problems = [f'sequence numbers say that {lost} were lost'] if lost else []
+    if np.any(steps <= 0):
+        problems.append(f'{np.sum(steps <= 0)} sequence numbers go back or repeat')
+    return problems
+
+
+def _metadata_file(bag, counts):
+    file = bag.path / 'metadata.yaml'
+    try:
+        information = yaml.safe_load(file.read_text())['rosbag2_bagfile_information']
+        said = {row['topic_metadata']['name'].lstrip('/'): row['message_count']
+                for row in information['topics_with_message_count']}
+        files, total = information['relative_file_paths'], information['message_count']
+    except FileNotFoundError:
+        return ['metadata.yaml is missing']
+    except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+        return [f'metadata.yaml cannot be read: {type(error).__name__} {str(error).splitlines()[0]}']
+    problems = []
+    if files != [bag.file.name]:
+        problems.append(f'metadata.yaml names the files {", ".join(files)}')
+    if said != counts:
+        problems.append(f'metadata.yaml counts {_differences(said, counts)}')
+    if total != sum(counts.values()):
+        problems.append(f'metadata.yaml counts {total} messages where {sum(counts.values())} are')
+    return problems

@@ -1,0 +1,1 @@
+"""What this machine makes of the graph and of the compiled core."""

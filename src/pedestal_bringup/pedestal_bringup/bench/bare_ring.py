@@ -1,0 +1,91 @@
+"""The floor of `pedestal bench graph`: bare rclpy nodes that pass the graph's messages and compute nothing.
+
+python -m pedestal_bringup.bench.bare_ring ROLE STEPS, one process per role; the role `adu` prints the time of a lap.
+Same topics, types, QoS and executor as the graph, messages made once and published by rclpy itself.
+"""
+import json
+import sys
+import time
+
+from rclpy.node import Node
+
+from pedestal_common import messages, shell, topics
+
+ROLES = ('tracking_receiver', 'acu', 'adu', 'recorder')
+TRIGGERS = {'tracking_receiver': 'joint_states', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
+WARM_UP = 300
+"""Laps before the clock starts."""
+
+
+def _filled(topic):
+    """An rclpy message with as many values as the graph's."""
+    type_name = topic.type
+    message = shell.message_class(type_name)()
+    if topic.name == 'acu/filter':
+        message.name, message.position = list(messages.FILTER), [0.0] * len(messages.FILTER)
+    elif type_name.endswith('JointState'):
+        message.name = ['azimuth', 'elevation']
+        message.position, message.velocity, message.effort = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+    elif type_name.endswith('JointTrajectory'):
+        from trajectory_msgs.msg import JointTrajectoryPoint
+        message.joint_names = ['azimuth', 'elevation']
+        message.points = [JointTrajectoryPoint(positions=[0.0, 0.0], velocities=[0.0, 0.0], accelerations=[0.0, 0.0])]
+    return message
+
+
+class Ring(Node):
+
+    def __init__(self, role, steps):
+        super().__init__(role)
+        self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
+        step_topics = [topic for topic in topics.TOPICS if topic.rate == 'step' and not topic.flag]
+        self.writers = [(self.create_publisher(shell.message_class(topic.type), topic.name, shell.QOS['step']),
+                         _filled(topic), len(topics.readers(topic, ROLES)))
+                        for topic in step_topics if role in topic.writers]
+        for topic in step_topics:
+            if role == 'recorder' and topic.writers[0] in ROLES:
+                self.create_subscription(shell.message_class(topic.type), topic.name, self.ignore, shell.QOS['step'],
+                                         raw=True)
+            elif role in topic.readers and topic.writers[0] in ROLES:
+                take = self.pass_on if TRIGGERS[role] == topic.name else self.ignore
+                self.create_subscription(shell.message_class(topic.type), topic.name, take, shell.QOS['step'])
+        if role == 'adu':
+            self.start_timer = self.create_timer(0.01, self.start)
+
+    def start(self):
+        if all(publisher.get_subscription_count() >= readers for publisher, _, readers in self.writers):
+            self.start_timer.cancel()
+            time.sleep(1.0)
+            self.send()
+
+    def ignore(self, _message):
+        pass
+
+    def draining(self):
+        return False
+
+    def close(self):
+        pass
+
+    def pass_on(self, _message):
+        self.lap += 1
+        if self.lap == WARM_UP:
+            self.begun = time.perf_counter()
+        if self.lap == self.steps + WARM_UP and self.get_name() == 'adu':
+            print(json.dumps({'lap_us': (time.perf_counter() - self.begun) / self.steps * 1e6}), flush=True)
+            self.finished = True
+            return
+        self.send()
+
+    def send(self):
+        for publisher, message, _ in self.writers:
+            publisher.publish(message)
+
+
+def main(args=None) -> int:
+    role, steps = (args or sys.argv[1:])[:2]
+    return shell.main(lambda: Ring(role, int(steps)), args=[])
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,101 @@
+"""What the verbs show on a terminal and write as JSON: progress, tables of results, rows."""
+import contextlib
+import json
+import math
+import pathlib
+import sys
+
+EXIT_STOPPED = 130
+EXIT_WRONG_COMMAND = 2
+
+TABLE_WIDTH = 120
+"""Columns that a table of results may take on any terminal, so that a row stays one line."""
+
+
+@contextlib.contextmanager
+def progress_of_run(duration):
+    """A function progress(seconds of the run): a bar on a terminal, nothing in a pipe. duration [s]."""
+    if not sys.stderr.isatty():
+        yield lambda seconds: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    columns = (TextColumn('{task.description}'), BarColumn(), TextColumn('{task.completed:.0f} / {task.total:.0f} s'),
+               TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task('starting nodes (the first start compiles the laws)', total=duration)
+
+        def advance(seconds):
+            bar.update(task, completed=seconds, description='running' if seconds > 0.0 else None)
+        yield advance
+
+
+@contextlib.contextmanager
+def progress_of_share():
+    """A function progress(share done 0 to 1, what comes next): a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda share, text: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    with Progress(BarColumn(), TextColumn('{task.description}'), TimeElapsedColumn(),
+                  console=Console(stderr=True)) as bar:
+        task = bar.add_task('compiling the laws (the first time)', total=1.0)
+        yield lambda share, text: bar.update(task, completed=share, description=text)
+
+
+def add_json(parser):
+    """The option --json FILE of a verb that measures."""
+    parser.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
+
+
+def check_json(path):
+    """Raises ValueError where --json cannot be written."""
+    if path and (path.is_dir() or not path.parent.is_dir()):
+        raise ValueError(f'--json {path}: must be a file in a directory that exists')
+
+
+def write_json(path, content):
+    """Write what --json asks for; nothing where path is None."""
+    if path:
+        path.write_text(json.dumps(content, indent=1) + '\n')
+
+
+def show_results(title, columns, results, whole):
+    """A table of metrics. columns: heads, '' for a single one; results: {metric: (value, unit)} of each column; whole:
+    the same of what belongs to the run."""
+    from rich.console import Console
+    from rich.table import Table
+    table = Table(title=title, title_justify='left')
+    table.add_column('metric')
+    for column in columns:
+        table.add_column(column or 'value', justify='right')
+    table.add_column('unit')
+    for metric, (_, unit) in results[0].items():
+        table.add_row(metric, *(_measured(values[metric][0]) for values in results), unit)
+    for metric, (value, unit) in whole.items():
+        table.add_row(metric, _measured(value), *[''] * (len(columns) - 1), unit)
+    Console(width=max(Console().width, TABLE_WIDTH) if len(columns) > 1 else None).print(table)
+
+
+def _measured(value):
+    return f'{value:.6g}' if math.isfinite(value) else 'not measured'
+
+
+def show_study(title, rows, missed):
+    """The table of a study; missed(row) -> whether its target is not met."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    def number(value):
+        return '-' if value is None else f'{value:.4g}'
+
+    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    for name, justify in (('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'),
+                          ('target', 'left'), ('unit', 'left'), ('', 'left')):
+        table.add_column(name, justify=justify, no_wrap=True)
+    for row in rows:
+        table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), row['target'] or '',
+                      row['unit'], 'MISSED' if missed(row) else '')
+    Console(width=max(Console().width, TABLE_WIDTH)).print(table)

@@ -1,0 +1,1 @@
+"""Pictures, and the report of a recording as one HTML file."""

@@ -1,0 +1,104 @@
+"""The figures of a report about the target filter: its errors beside what it states, innovations, probabilities."""
+import numpy as np
+
+from pedestal_bringup.analysis.consistency import PART, bounds
+from pedestal_bringup.report.figures import (
+    FILTERED,
+    INK,
+    RAW,
+    TRUTH,
+    Spec,
+    draw_line,
+    new_panels,
+    outside_legend,
+)
+from pedestal_common import messages
+
+MODELS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current_statistical': '#e57a00'}
+SPAN = 1.0
+"""Seconds over which the NIS is averaged for its figure."""
+
+
+def estimate(recording):
+    found = recording.filter
+    figure, panels = new_panels(2, 2, sharex=True)
+    for row, axis, i in zip(panels, messages.AXES, range(2)):
+        for axes, error, sigma, unit in ((row[0], found.error, found.sigma, 'deg'),
+                                         (row[1], found.rate_error, found.rate_sigma, 'deg/s')):
+            error, sigma = np.degrees(error[:, i]), np.degrees(sigma[:, i])
+            for sign in (-2.0, 2.0):
+                draw_line(axes, found.t, sign * sigma, color=FILTERED, linewidth=1.0,
+                          label='2 sigma, as the filter states' if sign > 0.0 else None)
+            draw_line(axes, found.t, error, color=TRUTH, linewidth=0.8, label='estimate less truth')
+            shown = np.abs(np.concatenate((error[found.tracking], 2.0 * sigma[found.tracking])))
+            shown = shown[np.isfinite(shown)]
+            if shown.size and shown.max() > 0.0:
+                axes.set_ylim(-1.25 * shown.max(), 1.25 * shown.max())
+            axes.set_ylabel(f'[{unit}]')
+        row[0].set_title(f'{axis}: angle')
+        row[1].set_title(f'{axis}: rate')
+    for axes in panels[1]:
+        axes.set_xlabel('time [s]')
+    outside_legend(figure, panels[0, 0])
+    return figure
+
+
+def innovations(recording):
+    found = recording.filter
+    figure, panels = new_panels(2, 2, sharex=True)
+    for row, axis, i in zip(panels, messages.AXES, range(2)):
+        draw_line(row[0], found.t, np.degrees(found.innovation[:, i]), color=RAW, linewidth=0.7)
+        row[0].set_ylabel('[deg]')
+        row[0].set_title(f'{axis}: innovation')
+        t, nis, expected, low, high = _averaged(found.t, found.nis[:, i], found.freedoms[:, i])
+        row[1].fill_between(t, low, high, color=FILTERED, alpha=0.2, linewidth=0.0,
+                            label=f'{100.0 * PART:g} % of an honest filter')
+        draw_line(row[1], t, expected, color=INK, linewidth=0.8, linestyle='--', label='expected')
+        draw_line(row[1], t, nis, color=FILTERED, label=f'mean NIS of {SPAN:g} s')
+        row[1].set_title(f'{axis}: NIS')
+        row[1].set_ylim(0.0, None)
+    for axes in panels[1]:
+        axes.set_xlabel('time [s]')
+    outside_legend(figure, panels[0, 1])
+    return figure
+
+
+def _averaged(t, nis, freedoms):
+    """(times, mean NIS, its expectation, its band) over stretches of SPAN; NaN where hardly anything was measured."""
+    part = np.floor((t - t[0]) / SPAN).astype(int)
+    known = np.isfinite(nis)
+    count = np.bincount(part, known)
+    count[count < 0.5 * count.max()] = np.nan
+    with np.errstate(invalid='ignore', divide='ignore'):
+        mean = np.bincount(part, np.where(known, nis, 0.0)) / count
+        total = np.bincount(part, np.where(known, freedoms, 0.0))
+        low, high = (bound / count for bound in bounds(total))
+        return t[0] + SPAN * (np.arange(count.size) + 0.5), mean, total / count, low, high
+
+
+def probabilities(recording):
+    found = recording.filter
+    figure, panels = new_panels(2, sharex=True)
+    for axes, axis, i in zip(panels[:, 0], messages.AXES, range(2)):
+        for number, model in enumerate(messages.MODELS):
+            values = found.probability[:, i, number]
+            if np.isfinite(values).any():
+                draw_line(axes, found.t, values, color=MODELS[model], label=model.replace('_', ' '))
+        axes.set_ylim(-0.02, 1.02)
+        axes.set_ylabel('probability')
+        axes.set_title(axis)
+    panels[1, 0].set_xlabel('time [s]')
+    outside_legend(figure, panels[0, 0])
+    return figure
+
+
+FIGURES = (
+    Spec('estimate', 'What the filter states of its error', 'Estimate less truth (orange) and twice the standard '
+         'deviation the filter states (blue): about 95 % should lie between the lines. On a ship the attitude error '
+         'of the INS is in the error, and the filter does not know it.', ('truth', 'filter'), estimate),
+    Spec('innovations', 'Innovations', 'What each measurement was off its prediction, and the mean of its square in '
+         f'units of what the filter expected, over {SPAN:g} s; above the band the filter is too sure of itself or the '
+         'target does what no model knows, below it the filter is too careful.', ('filter',), innovations),
+    Spec('probabilities', 'Motion models', 'Probability of each model of the bank; one alone has probability 1.',
+         ('filter', 'bank'), probabilities),
+)

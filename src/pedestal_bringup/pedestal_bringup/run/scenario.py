@@ -1,0 +1,389 @@
+"""Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
+
+`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged, but for an array of
+several beams: its nodes are `/beam_1/acu` and so on, which the section `acu` does not match. They take the file that
+`pedestal run` leaves beside the bag, parameters.yaml.
+"""
+import contextlib
+import dataclasses
+import difflib
+import importlib.resources
+import json
+import pathlib
+import re
+import typing
+
+import numpy as np
+import yaml
+
+from acu_tracker.params import AcuParameters
+from adu_drive.params import AduNodeParameters, BeamParameters
+from pedestal_bringup.run.recorder_params import RecorderParameters
+from pedestal_common import parameters, topics
+from ship_motion_sim.params import InsParameters, ShipMotionParameters
+from tracking_receiver_sim import receiver
+from tracking_receiver_sim.params import TrackingReceiverNodeParameters
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgramParameters(parameters.Parameters):
+    """The program track the operator sends the ACU before the run: the target as predicted, with its error."""
+    source: str = parameters.choice('target', ('target', 'none'), 'what the table is made of')
+    interval: float = parameters.parameter(1.0, 0.002, 60.0, 's', 'time between two points')
+    time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
+    azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
+    elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
+
+
+@dataclasses.dataclass(frozen=True)
+class ScenarioParameters(parameters.Parameters):
+    """The header of a scenario."""
+    title: str = parameters.text('', 'one line for people')
+    duration: float = parameters.parameter(60.0, 0.1, 86400.0, 's', "length of the run in the drive's time")
+    pacing: str = parameters.choice('lockstep', ('lockstep', 'realtime'), 'who waits for whom')
+    seed: int = parameters.parameter(1, 0, 2**31 - 1, '', 'seed of every noise stream')
+    ship: bool = parameters.flag(False, 'the pedestal stands on a ship: ship_motion and ins take part')
+    beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
+    beams: int = parameters.parameter(1, 1, topics.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
+                                      'in a namespace beam_1 ...')
+    deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
+    program: ProgramParameters = parameters.group(ProgramParameters)
+
+    def check(self):
+        if self.beams > 1 and not self.beam:
+            raise parameters.ParameterError(f'beams = {self.beams}: must be 1 unless beam = true')
+
+    @property
+    def graph_beams(self):
+        """Beams of the graph as topics.graph counts them."""
+        return self.beams if self.beam else 0
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML's plain values, but a date and `on`, `off`, `yes`, `no` stay the texts they were written as."""
+
+
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers
+            if tag not in ('tag:yaml.org,2002:timestamp', 'tag:yaml.org,2002:bool')]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+_Loader.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^(?:true|True|TRUE|false|False|FALSE)$'),
+                              list('tTfF'))
+
+
+class NodeKind(typing.NamedTuple):
+    module: str
+    parameters: type
+
+
+NODE_KINDS = {
+    'ship_motion': NodeKind('ship_motion_sim.ship_motion_node', ShipMotionParameters),
+    'ins': NodeKind('ship_motion_sim.ins_node', InsParameters),
+    'tracking_receiver': NodeKind('tracking_receiver_sim.tracking_receiver_node', TrackingReceiverNodeParameters),
+    'acu': NodeKind('acu_tracker.acu_node', AcuParameters),
+    'adu': NodeKind('adu_drive.adu_node', AduNodeParameters),
+    'recorder': NodeKind('pedestal_bringup.recorder_node', RecorderParameters),
+}
+
+ARRAY = NodeKind('adu_drive.beam_steering_node', BeamParameters)
+"""What `adu` is in a scenario with `beam: true`."""
+
+
+KNOWN = (
+    ('adu', 'period', 'acu', 'tracker.receiver.integration'),
+    ('adu', 'transport_delay', 'acu', 'command_delay'),
+    ('tracking_receiver', 'receiver.latency', 'acu', 'receiver_latency'),
+    ('tracking_receiver', 'antenna.beamwidth', 'acu', 'tracker.receiver.beamwidth'),
+    ('tracking_receiver', 'antenna.slope', 'acu', 'tracker.receiver.slope'),
+    ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
+    ('ins', 'latency', 'acu', 'attitude_latency'),
+    ('ship_motion', 'imu.output', 'ins', 'imu_output'),
+    *(('tracking_receiver', f'lever_arm.{axis}', 'acu', f'lever_arm.{axis}') for axis in 'xyz'),
+    ('tracking_receiver', 'blockage', 'acu', 'blockage'),
+)
+"""(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
+
+
+MEASURED = (('receiver.rate.measured', 'receiver_rate'), ('receiver.ranging.measured', 'receiver_range'))
+"""(parameter of the receiver, what its readers are told): whether one of its topics is there at all."""
+
+
+class ScenarioError(ValueError):
+    """A scenario is unknown or says something that is not allowed; one line naming file, node, key and value."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    """A checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
+
+    Of several beams the values of `acu` hold for each `beam_2/acu`, whose own come on top.
+    """
+    name: str
+    header: ScenarioParameters
+    values: dict
+
+    @property
+    def nodes(self):
+        """Nodes that take part, in the order of topics.NODES and of the beams; the operator where there is a program
+        track."""
+        ship = ('ship_motion', 'ins') if self.header.ship else ()
+        operator = ('operator',) if self.header.program.source != 'none' else ()
+        return topics.members((*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator),
+                              self.header.graph_beams)
+
+    @property
+    def prefixes(self):
+        """What the names of each beam's nodes begin with; ('',) of a single one."""
+        return topics.prefixes(self.header.graph_beams)
+
+    def kind(self, node):
+        return kind(node, self.header.beam)
+
+    def given(self, node):
+        """{dotted name: value} of what this scenario says of a node."""
+        return _whole(self.values, node)
+
+    def node_parameters(self, node):
+        """The parameter dataclass of one node as this scenario sets it."""
+        return parameters.build(self.kind(node).parameters, self.given(node))
+
+    def as_yaml(self):
+        """The scenario as a ROS 2 parameter file."""
+        sections = {'scenario': parameters.as_dict(self.header), **self.values}
+        return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()}, sort_keys=True)
+
+
+def _folder():
+    return importlib.resources.files('pedestal_bringup') / 'scenarios'
+
+
+def available():
+    """{name: title} of the scenarios that come with the product."""
+    found = {}
+    for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
+        if entry.name.endswith('.yaml'):
+            sections = yaml.safe_load(entry.read_text())
+            found[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
+    return found
+
+
+def _text(name_or_path):
+    path = pathlib.Path(name_or_path)
+    if path.suffix in ('.yaml', '.yml'):
+        try:
+            return path.stem, path.read_text()
+        except OSError as error:
+            raise ScenarioError(f'scenario file {path}: {error.strerror}') from None
+        except UnicodeDecodeError as error:
+            raise ScenarioError(f'scenario file {path}: no valid UTF-8 text at byte {error.start}') from None
+    entry = _folder() / f'{name_or_path}.yaml'
+    if not entry.is_file():
+        names = list(available())
+        near = difflib.get_close_matches(name_or_path, names, n=1)
+        hint = f'did you mean {near[0]!r}? ' if near else ''
+        raise ScenarioError(f'unknown scenario {name_or_path!r}; {hint}there are {", ".join(names)} '
+                            '(or give a path that ends in .yaml)')
+    return name_or_path, entry.read_text()
+
+
+def dotted(tree, prefix=''):
+    flat = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            flat.update(dotted(value, f'{prefix}{key}.'))
+        else:
+            flat[f'{prefix}{key}'] = value
+    return flat
+
+
+def kind(node, beam=False):
+    """The NodeKind of a node, 'beam_2/acu' as well as 'acu'; beam: of a graph whose drive is an array."""
+    return ARRAY if beam and node == 'adu' else NODE_KINDS[topics.plain(node)]
+
+
+def _whole(sections, node):
+    """The values of a node, what holds for every beam first."""
+    return {**sections.get(topics.plain(node), {}), **sections.get(node, {})}
+
+
+def _is_node(name):
+    return topics.plain(name) in (topics.BEAM_NODES if topics.beam_of(name) else NODE_KINDS)
+
+
+def _sections(name, content):
+    try:
+        tree = yaml.load(content, Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise ScenarioError(f'scenario {name}: no valid YAML: {" ".join(str(error).split())}') from None
+    if not isinstance(tree, dict) or 'scenario' not in tree:
+        raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
+    sections = {}
+    for section, body in tree.items():
+        if section != 'scenario' and not _is_node(section):
+            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(NODE_KINDS)}')
+        whole = isinstance(body, dict) and list(body) == ['ros__parameters']
+        values = body['ros__parameters'] or {} if whole else None
+        if not isinstance(values, dict):
+            raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
+        sections[section] = dotted(values)
+    return sections
+
+
+def parameters_of(node):
+    """The parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`; ScenarioError for
+    any other name."""
+    if node in ('scenario', 'beam_steering'):
+        return ScenarioParameters if node == 'scenario' else ARRAY.parameters
+    if not _is_node(node):
+        raise ScenarioError(f'{node!r} is no node; there are {", ".join(NODE_KINDS)}, beam_steering, scenario')
+    return kind(node).parameters
+
+
+def parse_override(text):
+    """'node.key=value' -> (node, key, value); the value is read as YAML."""
+    left, equals, right = text.partition('=')
+    node, dot, key = left.partition('.')
+    if not (equals and dot and key):
+        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.feedforward.bandwidth=20')
+    parameters_of(node)
+    try:
+        return node, key, yaml.load(right, Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise ScenarioError(f'--param {text!r}: no valid YAML value: {" ".join(str(error).split())}') from None
+
+
+def file_overrides(path):
+    """Texts 'node.key=value' of a ROS 2 parameter file."""
+    try:
+        tree = yaml.load(path.read_text(), Loader=_Loader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ScenarioError(f'--params-file {path}: {" ".join(str(error).split())}') from None
+    if not isinstance(tree, dict) or not tree:
+        raise ScenarioError(f'--params-file {path}: must hold a section for a node')
+    texts = []
+    for node, body in tree.items():
+        if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
+            raise ScenarioError(f'--params-file {path}: section {node} must hold ros__parameters')
+        texts += [f'{node}.{key}={json.dumps(value)}' for key, value in dotted(body['ros__parameters']).items()]
+    return texts
+
+
+def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
+    """A Scenario from a name or a YAML path; see parse."""
+    return parse(*_text(name_or_path), overrides, seed, duration, pacing)
+
+
+def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
+    """A Scenario from its YAML text; parse(name, Scenario.as_yaml()) gives the same again.
+
+    overrides: texts 'node.key=value'. seed, duration and pacing replace the header's where given.
+    Raises ScenarioError for anything unknown or out of range.
+    """
+    sections = _sections(name, content)
+    for override in overrides:
+        node, key, value = parse_override(override)
+        sections.setdefault(node, {})[key] = value
+    header_values = sections.pop('scenario')
+    for key, value in (('seed', seed), ('duration', duration), ('pacing', pacing)):
+        if value is not None:
+            header_values[key] = value
+    header = _checked(name, 'scenario', ScenarioParameters, header_values)
+    of_beams = [name for name in topics.members(topics.BEAM_NODES, header.graph_beams) if topics.beam_of(name)]
+    for node in sections:
+        if topics.beam_of(node) and node not in of_beams:
+            raise ScenarioError(f'scenario {name}: section {node!r}: the scenario has beams = {header.beams}')
+    if header.beam:
+        for axis in ('azimuth', 'elevation'):
+            sections.setdefault('acu', {}).setdefault(f'{axis}.controller', 'beam')
+    for node in (*NODE_KINDS, *of_beams):
+        sections.setdefault(node, {})
+        _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
+    _spread(name, sections, header, seed)
+    for node in of_beams:
+        _spread_to_beam(name, node, sections, header, seed)
+    for node, values in sections.items():
+        checked = _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
+        if topics.plain(node) == 'acu':
+            with _named(name, node):
+                checked.check_drive(header.beam)
+        typed = parameters.as_dict(checked)
+        sections[node] = {key: typed[key] for key in values}
+    return Scenario(name, header, sections)
+
+
+def _spread(name, sections, header, seed):
+    """What several nodes must agree on, said once: length and period of the run, seeds, ship, latencies, beam.
+
+    Raises ScenarioError where a node was told something else.
+    """
+    def tell(node, key, value):
+        sections[node].setdefault(key, value)
+        for section in [section for section in sections if topics.plain(section) == node]:
+            told = sections[section].get(key, value)
+            if told != value:
+                raise ScenarioError(f'scenario {name}, {section}: {key} = {told}: must be {value}, as is said '
+                                    'elsewhere; leave it out here')
+
+    for node in ('adu', 'recorder', 'tracking_receiver'):
+        tell(node, 'duration', header.duration)
+    tell('recorder', 'scenario', name)
+    tell('recorder', 'seed', header.seed)
+    for node, key in (('ship_motion', 'ship.seed'), ('ship_motion', 'imu.seed'), ('ins', 'seed'),
+                      ('tracking_receiver', 'seed')):
+        if seed is not None or key not in sections[node]:
+            sections[node][key] = header.seed
+    for key, value in sections['ship_motion'].items():
+        if key.startswith('ship.'):
+            tell('ins', key, value)
+    for node in ('acu', 'tracking_receiver'):
+        tell(node, 'period', sections['adu'].get(
+            'period', parameters.defaults(kind('adu', header.beam).parameters)['period']))
+    for key, told in MEASURED:
+        measured = sections['tracking_receiver'].get(key, False)
+        for node in ('acu', 'recorder'):
+            if measured or any(told in values for section, values in sections.items()
+                               if topics.plain(section) == node):
+                tell(node, told, measured)
+    for owner, key, node, told in KNOWN:
+        if key in sections[owner]:
+            sections[node].setdefault(told, sections[owner][key])
+    if header.beam:
+        sections['tracking_receiver'].setdefault('receiver.beam', 'held')
+        for prefix in topics.prefixes(header.graph_beams):
+            tracking = _checked(name, f'{prefix}tracking_receiver', TrackingReceiverNodeParameters,
+                                _whole(sections, f'{prefix}tracking_receiver'))
+            for key, value in (('age', receiver.age(tracking, tracking.period)),
+                               ('beam_age', receiver.beam_age(tracking, tracking.period))):
+                if f'tracker.receiver.{key}' not in sections['acu']:
+                    sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
+
+
+def _spread_to_beam(name, node, sections, header, seed):
+    """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
+    values, beam = sections[node], topics.beam_of(node)
+    own_receiver = f'{beam}/tracking_receiver'
+    if node == own_receiver and (seed is not None or 'seed' not in values):
+        spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
+        values['seed'] = int(spread.generate_state(1)[0] >> 1)
+    for owner, key, other, told in KNOWN:
+        own = sections.get(f'{beam}/{owner}', {})
+        if topics.plain(node) == other and key in own:
+            values.setdefault(told, own[key])
+    for key, _ in MEASURED:
+        if key in sections[own_receiver]:
+            raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: is the same for every beam; say it in '
+                                'tracking_receiver')
+
+
+def _checked(name, section, parameters_type, values):
+    with _named(name, section):
+        return parameters.build(parameters_type, values)
+
+
+@contextlib.contextmanager
+def _named(name, section):
+    """A ParameterError becomes a ScenarioError that names the section."""
+    try:
+        yield
+    except parameters.ParameterError as error:
+        raise ScenarioError(f'scenario {name}, {section}: {error}') from None

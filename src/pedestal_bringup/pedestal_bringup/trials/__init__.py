@@ -1,0 +1,1 @@
+"""Many runs at once, and the search for parameters that they serve."""

@@ -1,0 +1,1 @@
+"""The verbs of `pedestal`, one a file: its arguments and its main."""

@@ -1,0 +1,17 @@
+"""write a recording as one HTML file with its figures"""
+import pathlib
+
+from pedestal_bringup.verbs import arguments
+
+
+def add_arguments(parser):
+    parser.add_argument('bag', type=pathlib.Path)
+    parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
+    arguments.add_beam(parser)
+    parser.add_argument('--png', type=pathlib.Path, metavar='DIR', help='also write each figure as PNG')
+
+
+def main(options):
+    from pedestal_bringup.report import report
+    print(report.write(options.bag, options.output, options.png, options.beam))
+    return 0

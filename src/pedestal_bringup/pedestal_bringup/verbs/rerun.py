@@ -1,0 +1,24 @@
+"""make a recorded run again and compare; exit code 1 when a message differs"""
+import pathlib
+
+from pedestal_bringup import console
+from pedestal_bringup.verbs import arguments
+
+
+def add_arguments(parser):
+    parser.add_argument('recording', type=pathlib.Path)
+    arguments.add_new_bag(parser)
+
+
+def main(options):
+    from pedestal_bringup.again import rerun
+    from pedestal_bringup.bags import bag
+    from pedestal_bringup.run import graph
+    recording = bag.read(options.recording)
+    chosen = rerun.configured(recording)
+    path = arguments.new_bag(options.bag, chosen.name)
+    with console.progress_of_run(chosen.header.duration) as progress:
+        graph.run(chosen, path, progress)
+    comparison = rerun.compare(recording, bag.read(path))
+    print('\n'.join(comparison.lines()))
+    return 0 if comparison.equal else 1

@@ -1,0 +1,52 @@
+"""run a scenario as separate nodes and record it"""
+import pathlib
+import sys
+
+from pedestal_bringup import console
+from pedestal_bringup.verbs import arguments
+
+
+def add_arguments(parser):
+    parser.add_argument('scenario', help='name (see `pedestal scenarios`) or path of a .yaml')
+    parser.add_argument('--pacing', choices=('lockstep', 'realtime'), help='default: what the scenario says')
+    parser.add_argument('--duration', type=float, metavar='S', help="length of the run in the drive's time")
+    parser.add_argument('--seed', type=int, metavar='N', help='seed of every noise stream')
+    arguments.add_new_bag(parser)
+    console.add_json(parser)
+    arguments.add_param(parser)
+    parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
+                        help='ROS 2 parameter file whose values replace those of the scenario, as `pedestal tune` '
+                        'writes')
+
+
+def main(options):
+    from pedestal_bringup.analysis import results, summary
+    from pedestal_bringup.bags.bag import read
+    from pedestal_bringup.bags.verify import verify
+    from pedestal_bringup.run import graph, scenario
+    changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
+    chosen = scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
+    bag = arguments.new_bag(options.bag, chosen.name)
+    console.check_json(options.json)
+    with console.progress_of_run(chosen.header.duration) as progress:
+        try:
+            outcome = graph.run(chosen, bag, progress)
+        except KeyboardInterrupt:
+            print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+            return console.EXIT_STOPPED
+    recording = read(bag)
+    beams = [prefix[:-1] for prefix in chosen.prefixes]
+    of_beams = [summary.of_beam(recording.view(beam)) for beam in beams]
+    whole = {'lost_steps': (float(outcome.drive['lost_steps']), ''),
+             'realtime_factor': (outcome.drive['realtime_factor'], ''),
+             'messages': (float(outcome.recorder['messages']), '')}
+    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams, whole)
+    print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
+    rows = [row for beam, values in zip(beams, of_beams)
+            for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
+    console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
+                                      'mcap_sha256': outcome.recorder['sha256']})
+    check = verify(bag)
+    if not check.complete:
+        raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
+    return 0

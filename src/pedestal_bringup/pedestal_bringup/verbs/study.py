@@ -1,0 +1,62 @@
+"""measure the compiled closed loop against the papers: rows and figures"""
+import contextlib
+import inspect
+import pathlib
+import sys
+
+from pedestal_bringup import console
+
+
+def add_arguments(parser):
+    parser.add_argument('name', nargs='?', metavar='NAME', help='without one: list the studies')
+    console.add_json(parser)
+    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
+    parser.add_argument('--runs', type=int, metavar='N', help='of each case; default: what the study says')
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument('--workers', type=int, metavar='N', help='processes for the runs; default: one per core')
+    workers.add_argument('--scheduler', metavar='ADDRESS', help="Dask cluster for the runs, as tcp://host:8786; needs "
+                         "pip install 'pedestal_bringup[cluster]' here and the pedestal packages there")
+
+
+def main(options):
+    from pedestal_bringup import studies
+    if options.name not in studies.NAMES:
+        problem = f'unknown study {options.name!r}' if options.name else 'no study named'
+        print(f'pedestal: error: {problem}, there are', file=sys.stderr)
+        for name, line in studies.descriptions().items():
+            print(f'  {name:10} {line}', file=sys.stderr)
+        return console.EXIT_WRONG_COMMAND
+    from pedestal_bringup.studies import experiment
+    output = options.output or pathlib.Path('studies', options.name)
+    console.check_json(options.json)
+    study = studies.study(options.name)
+    with contextlib.ExitStack() as stack:
+        many = _many_runs(options, study, stack)
+        output.mkdir(parents=True, exist_ok=True)
+        progress = stack.enter_context(console.progress_of_share())
+        result = study.run(progress, **many)
+        for name, draw in result.figures.items():
+            progress(None, f'drawing {name}')
+            experiment.save(draw, output / f'{name}.png')
+    console.show_study(f'study {options.name}', result.rows if result.shown is None else result.shown,
+                       experiment.missed)
+    for remark in result.remarks:
+        print(remark)
+    print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')
+    console.write_json(options.json, {'name': options.name, 'rows': result.rows})
+    return 0
+
+
+def _many_runs(options, study, stack):
+    """Keyword arguments of a study of many runs beside its progress; the pool is closed with the stack."""
+    asked = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
+    if 'runs' not in inspect.signature(study.run).parameters:
+        for name, value in asked.items():
+            if value is not None:
+                raise ValueError(f'--{name} {value}: study {options.name} has one run of each case')
+        return {}
+    if asked['runs'] is not None and asked['runs'] < 1:
+        raise ValueError(f'--runs {options.runs}: must be at least 1')
+    from pedestal_bringup.trials import monte_carlo
+    return {'runs': options.runs or study.RUNS,
+            'pool': stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))}

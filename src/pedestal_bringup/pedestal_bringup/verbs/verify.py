@@ -1,0 +1,13 @@
+"""prove that a recording is complete; exit code 1 with the gaps if not"""
+import pathlib
+
+
+def add_arguments(parser):
+    parser.add_argument('bag', type=pathlib.Path)
+
+
+def main(options):
+    from pedestal_bringup.bags.verify import verify
+    check = verify(options.bag)
+    print('\n'.join(check.lines()))
+    return 0 if check.complete else 1
