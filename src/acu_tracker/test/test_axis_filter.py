@@ -6,7 +6,7 @@ from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_ly
 
 from acu_tracker.estimation import alpha_beta, axis_filter
 from acu_tracker.estimation.axis_filter import KINDS
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import ParameterError, build
 
 DEG = math.pi / 180
@@ -21,7 +21,7 @@ PARAMS = {'cv.noise': 0.02, 'ca.noise': 0.03, 'singer.sigma': 0.05, 'singer.alph
 def run(t, y, rate=None, initial_rate=0.1, **params):
     """Estimates of the filter over angles y of SIGMA, and rates of RATE_SIGMA where given."""
     out, ones = np.zeros(len(t), axis_filter.ESTIMATE), np.ones(len(t))
-    params = build(Filter, {'rate_measurement': rate is not None, **params})
+    params = build(FilterParameters, {'rate_measurement': rate is not None, **params})
     axis_filter.estimates(axis_filter.constants(params), t, y, SIGMA**2 * ones,
                           math.nan * ones if rate is None else rate, RATE_SIGMA**2 * ones, initial_rate, out)
     return out
@@ -48,7 +48,7 @@ def van_loan(kind, T):
 def test_parameters_of_the_bank_are_checked():
     for models in ('cv', 'cv cv', 'cv constant', ''):
         with pytest.raises(ParameterError, match=f"imm.models = '{models}': must be two or more of cv, ca, singer"):
-            build(Filter, {'imm.models': models})
+            build(FilterParameters, {'imm.models': models})
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -239,7 +239,7 @@ def test_quadratic_motion_is_followed_without_bias():
 @pytest.mark.parametrize('kind, alpha', [('singer', 0.5), ('current_statistical', 0.0)])
 def test_outlook_coasts_as_the_model_moves(kind, alpha):
     """The acceleration of singer fades, that of current_statistical has itself for its mean and stays."""
-    c = axis_filter.constants(build(Filter, {'kind': kind, f'{kind}.alpha': 0.5}))[0]
+    c = axis_filter.constants(build(FilterParameters, {'kind': kind, f'{kind}.alpha': 0.5}))[0]
     f = np.zeros(1, axis_filter.FILTER)[0]
     f['count'], f['mu'][0], f['x'][0] = 1, 1.0, (0.1, 0.2, 0.3)
     t = np.linspace(0, 3, 30001)
@@ -253,7 +253,7 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
     """A million targets, each of a model drawn by its probability, in a state drawn by its covariance; then the model
     that moves it on is drawn, as the chain says, that one or the other."""
     dwell, ahead = 1.5, 0.7
-    c = axis_filter.constants(build(Filter, {'kind': 'imm', 'imm.models': 'cv ca', 'imm.cv.noise': 1e-2,
+    c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', 'imm.models': 'cv ca', 'imm.cv.noise': 1e-2,
                                              'imm.ca.noise': 3e-2, 'imm.dwell': dwell}))[0]
     f, rng = np.zeros(1, axis_filter.FILTER)[0], np.random.default_rng(9)
     f['count'], f['mu'][:2] = 2, (0.3, 0.7)
@@ -280,7 +280,7 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_outlook_now_is_the_estimate_even_if_a_model_is_ruled_out(kind):
-    c = axis_filter.constants(build(Filter, {'kind': kind}))[0]
+    c = axis_filter.constants(build(FilterParameters, {'kind': kind}))[0]
     f = np.zeros(1, axis_filter.FILTER)[0]
     axis_filter.start(f, c, 0.1, SIGMA**2, 0.1)
     f['mu'] = 0.0

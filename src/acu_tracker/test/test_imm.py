@@ -6,7 +6,7 @@ from filterpy.kalman import IMMEstimator, KalmanFilter
 from scipy.linalg import expm
 
 from acu_tracker.estimation import axis_filter, imm
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import build
 
 T, SIGMA, RATE_SIGMA = 0.01, 5e-4, 2e-3
@@ -50,8 +50,8 @@ def test_against_filterpy(with_rate):
     y = np.cumsum(rate) * T + SIGMA * rng.standard_normal(len(t))
     y_rate = rate + RATE_SIGMA * rng.standard_normal(len(t)) if with_rate else np.full(len(t), math.nan)
     out = np.zeros(len(t), axis_filter.ESTIMATE)
-    axis_filter.estimates(axis_filter.constants(build(Filter, {'kind': 'imm', 'rate_measurement': True, **MODELS})), t,
-                          y, np.full(len(t), SIGMA**2), y_rate, np.full(len(t), RATE_SIGMA**2), 0.1, out)
+    c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', 'rate_measurement': True, **MODELS}))
+    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA**2), y_rate, np.full(len(t), RATE_SIGMA**2), 0.1, out)
     oracle = filterpys(y[0], with_rate)
     for k in range(1, len(t)):
         oracle.predict()
@@ -80,7 +80,7 @@ def test_a_far_measurement_keeps_its_evidence(distance):
 
     The oracle is a ratio of densities: log mu_i - log mu_j = log(cbar_i / cbar_j) + (nu_j^2/S_j - nu_i^2/S_i)/2 + ...
     """
-    c = axis_filter.constants(build(Filter, {'kind': 'imm', **MODELS}))[0]
+    c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', **MODELS}))[0]
     f = np.zeros(1, axis_filter.FILTER)[0]
     axis_filter.start(f, c, 0.0, SIGMA**2, 0.1)
     for _ in range(300):

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from acu_tracker.estimation import tracker
-from acu_tracker.estimation.params import Filter, Ukf
-from acu_tracker.params import TrackerParameters
+from acu_tracker.estimation.params import FilterParameters, TrackerParameters, UkfParameters
 from pedestal_common.parameters import record
 
 DEG = math.pi / 180.0
@@ -31,7 +30,7 @@ class Pass:
         self.put(kinds)
 
     def put(self, kinds):
-        self.c = tracker.constants(self.params, *(Filter(kind=kind) for kind in kinds))[0]
+        self.c = tracker.constants(self.params, *(FilterParameters(kind=kind) for kind in kinds))[0]
         tracker.adopt(self.state[0], self.p, self.c)
 
     def now(self, stamp=None):
@@ -116,7 +115,7 @@ def test_no_bump_when_the_range_is_lost_or_the_kind_changes():
     lost.take(15.0)
     lost.take(1.0, ranged=False)
     assert lost.state['used'].all()
-    lost.params = TrackerParameters(ukf=Ukf(range_share=1e-4))
+    lost.params = TrackerParameters(ukf=UkfParameters(range_share=1e-4))
     lost.put(BOTH)
     lost.take(0.2, ranged=False)
     assert not lost.state['used'].any() and not lost.state['ranged'].any()

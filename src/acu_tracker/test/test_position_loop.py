@@ -5,8 +5,9 @@ import pytest
 from scipy import signal
 
 from acu_tracker import control_unit
-from acu_tracker.params import AxisParameters, Feedforward
+from acu_tracker.params import AxisParameters
 from acu_tracker.servo import feedforward, notch, position_loop
+from acu_tracker.servo.params import FeedforwardParameters
 from pedestal_common.parameters import build, record
 
 T = 0.005
@@ -126,7 +127,7 @@ def test_raw_target_beyond_the_travel_is_held_at_its_end():
 
 
 def test_torque_is_what_inertia_and_friction_take():
-    c = record(Feedforward(inertia=280.0, friction=60.0, friction_rate=0.002))[0]
+    c = record(FeedforwardParameters(inertia=280.0, friction=60.0, friction_rate=0.002))[0]
     assert feedforward.torque(0.1, 0.5, c) == pytest.approx(200.0)
     assert feedforward.torque(-0.1, 0.0, c) == pytest.approx(-60.0)
     assert feedforward.torque(0.002, 0.0, c) == pytest.approx(60.0 * math.tanh(1.0))

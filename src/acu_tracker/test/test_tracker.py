@@ -6,8 +6,7 @@ from scipy.stats import chi2
 
 from acu_tracker.estimation import axis_filter, tracker
 from acu_tracker.estimation.axis_filter import KINDS
-from acu_tracker.estimation.params import Filter
-from acu_tracker.params import TrackerParameters
+from acu_tracker.estimation.params import FilterParameters, TrackerParameters
 from pedestal_common.parameters import build, record
 
 DEG = math.pi / 180
@@ -26,7 +25,7 @@ class Target:
         self.put(**filter_params)
 
     def put(self, **filter_params):
-        params = build(Filter, {'current_statistical.a_max': 0.02, **filter_params})
+        params = build(FilterParameters, {'current_statistical.a_max': 0.02, **filter_params})
         self.c = tracker.constants(self.params, params, params)[0]
         tracker.adopt(self.state[0], self.p, self.c)
 
@@ -90,7 +89,7 @@ def test_only_refusals_in_a_row_restart():
 
 @pytest.mark.parametrize('gate', [1.0, 9.0, 25.0, 600.0, 1e6])
 def test_gate_of_a_rate_is_as_rarely_exceeded(gate):
-    limit = tracker.constants(TrackerParameters(gate=gate), Filter(), Filter())['gates'][0, 1]
+    limit = tracker.constants(TrackerParameters(gate=gate), FilterParameters(), FilterParameters())['gates'][0, 1]
     assert 0.0 < limit < gate
     if gate <= 600.0:
         assert chi2.logsf(limit, 1) == pytest.approx(-gate / 2, rel=1e-9)

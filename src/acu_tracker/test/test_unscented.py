@@ -9,7 +9,7 @@ import pytest
 from filterpy.kalman import IMMEstimator, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
 from acu_tracker.estimation import unscented
-from acu_tracker.estimation.params import Ukf
+from acu_tracker.estimation.params import UkfParameters
 
 DEG = math.pi / 180.0
 T = 0.02
@@ -106,7 +106,7 @@ def filterpy_imm(params, x, P):
 @pytest.mark.parametrize('dropped', [slice(0, 0), slice(30, 70)])
 def test_equals_filterpy(dropped):
     """A pass through south, where the azimuth wraps, with and without a gap in the range."""
-    params = Ukf(cv_noise=0.3, ca_noise=3.0, dwell=2.0)
+    params = UkfParameters(cv_noise=0.3, ca_noise=3.0, dwell=2.0)
     t, p = flyby(distance=-60.0, seconds=3.0)
     y = noisy(seen(p), 1)
     y[:, 0] = wrapped(y[:, 0])
@@ -137,7 +137,7 @@ def test_rates_and_accelerations_are_derivatives_of_the_angles():
     s['x'] = [[-30.0, -52.0, 21.0, 14.0, -3.0, 2.0, 0.0, 0.0, 0.0],
               [-30.3, -52.1, 21.1, 14.4, -3.2, 2.1, 1.5, -2.0, 0.7]]
     s['mu'] = 0.3, 0.7
-    c = unscented.constants(Ukf())
+    c = unscented.constants(UkfParameters())
     c['dwell'] = 1e9
     h = 1e-3
     before, now, after = (np.array(unscented.outlook(s[0], c[0], 1.0 + k * h)) for k in (-1, 0, 1))
@@ -154,10 +154,10 @@ def test_variances_are_those_of_many_targets():
     s['mu'] = 0.3, 0.7
     root = rng.normal(size=(2, 9, 9)) * np.repeat([0.02, 0.05, 0.1], 3)[:, np.newaxis]
     s['p'] = root @ np.swapaxes(root, 1, 2)
-    c = unscented.constants(Ukf(cv_noise=1e-6, ca_noise=1e-6))
+    c = unscented.constants(UkfParameters(cv_noise=1e-6, ca_noise=1e-6))
     found = unscented.variances(s[0], c[0], 0.5)
     # Of the targets that were of mode i some are of mode j by then, which moved them.
-    stay, samples = 0.5 * (1.0 + math.exp(-2.0 * 0.5 / Ukf().dwell)), []
+    stay, samples = 0.5 * (1.0 + math.exp(-2.0 * 0.5 / UkfParameters().dwell)), []
     for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
         count = round(50000 * s['mu'][0, i] * (stay if i == j else 1.0 - stay))
         x = rng.multivariate_normal(s['x'][0, i], s['p'][0, i], count)
@@ -170,7 +170,7 @@ def test_variances_are_those_of_many_targets():
 
 
 def test_starts_where_the_angles_were():
-    s, c = np.zeros(1, unscented.STATE), unscented.constants(Ukf())
+    s, c = np.zeros(1, unscented.STATE), unscented.constants(UkfParameters())
     before = 2.0, 0.11, -0.03, 0.7, -0.05, 0.02
     known = 1e-6, 2e-7, 1e-6, 2e-6, -3e-7, 2e-6
     unscented.start(s[0], c[0], *before, *known, 800.0, 4.0)
@@ -196,10 +196,10 @@ def test_rate_on_the_near_flyby():
     """
     _, p = flyby()
     cv, ca = unscented.MODES
-    rms = {'cv': rates_rms(p, Ukf(cv_noise=0.3, ca_noise=0.3), range(3), (cv, cv)),
-           'imm': rates_rms(p, Ukf(cv_noise=0.3), range(3)),
-           'ca': rates_rms(p, Ukf(cv_noise=1.0, ca_noise=1.0), range(3), (ca, ca)),
-           'default': rates_rms(p, Ukf(), range(3))}
+    rms = {'cv': rates_rms(p, UkfParameters(cv_noise=0.3, ca_noise=0.3), range(3), (cv, cv)),
+           'imm': rates_rms(p, UkfParameters(cv_noise=0.3), range(3)),
+           'ca': rates_rms(p, UkfParameters(cv_noise=1.0, ca_noise=1.0), range(3), (ca, ca)),
+           'default': rates_rms(p, UkfParameters(), range(3))}
     print({name: round(value, 4) for name, value in rms.items()})
     assert rms['cv'] < 0.035 and rms['imm'] < 0.035 and rms['ca'] < 0.06
     assert rms['default'] < 0.02
@@ -209,7 +209,7 @@ def test_goes_on_without_a_range_and_says_how_sure_it_is():
     t, p = flyby(distance=500.0, height=100.0, heading=0.4)
     y = noisy(seen(p), 7)
     y[1500:2000, 2] = math.nan
-    out, variances, _, _ = run(y, unscented.constants(Ukf()))
+    out, variances, _, _ = run(y, unscented.constants(UkfParameters()))
     true = seen(p)
     sigma = np.sqrt(variances[:, [0, 2, 3, 5, 6]])
     assert (sigma[1999] > sigma[1499])[4] and sigma[1999, 4] > 3.0 * sigma[1499, 4]
@@ -225,7 +225,7 @@ def test_a_turn_is_noticed():
     heading = np.cumsum(np.where((t > 12.0) & (t < 16.0), 3.0 / 15.0, 0.0) * T)
     v = 15.0 * np.column_stack((np.cos(heading), np.sin(heading), np.zeros_like(t)))
     p = np.array([-150.0, 200.0, 60.0]) + np.cumsum(v, axis=0) * T
-    _, _, mu, _ = run(noisy(seen(p), 3), unscented.constants(Ukf()))
+    _, _, mu, _ = run(noisy(seen(p), 3), unscented.constants(UkfParameters()))
     assert mu[400:590, 1].mean() < 0.3 and mu[650:800, 1].mean() > 0.6
-    straight = dataclasses.replace(Ukf(), ca_noise=1e-6, initial_acceleration=1e-6)
-    assert rates_rms(p, Ukf(), (3,)) < 0.7 * rates_rms(p, straight, (3,))
+    straight = dataclasses.replace(UkfParameters(), ca_noise=1e-6, initial_acceleration=1e-6)
+    assert rates_rms(p, UkfParameters(), (3,)) < 0.7 * rates_rms(p, straight, (3,))

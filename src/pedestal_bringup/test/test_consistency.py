@@ -7,7 +7,7 @@ from scipy import signal, stats
 from scipy.spatial.transform import Rotation
 
 from acu_tracker.estimation import motion_models, tracker
-from acu_tracker.params import ReceiverLaw
+from acu_tracker.estimation.params import ReceiverModelParameters
 from pedestal_bringup.analysis import consistency
 from pedestal_common import line_of_sight, messages
 from pedestal_common.parameters import build
@@ -129,7 +129,7 @@ def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_d
     inputs['mat_ed'], inputs['valid'] = line_of_sight.ashore_matrix(), 1
     inputs['azimuth'], inputs['elevation'] = 0.3, 0.6
     normals = np.random.default_rng(2).standard_normal((40_400, receiver.normals_per_step(params)))
-    errors, expected, law = [], [], ReceiverLaw()
+    errors, expected, law = [], [], ReceiverModelParameters()
     for k, row in enumerate(normals):
         inputs['stamp_ns'] = 5_000_000 * k
         receiver.step(state, constants, inputs, outputs, built.breaks, built.coefficients, row)

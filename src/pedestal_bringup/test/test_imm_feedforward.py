@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
 from acu_tracker.estimation import axis_filter
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies import imm_feedforward as study
 from pedestal_bringup.studies.rigs import feedforward_loop as loop
@@ -45,7 +45,7 @@ def followed(angle, late):
     target = np.column_stack([angle.deriv(i)(t) if i else angle(t) for i in range(3)])
     known = np.column_stack([angle.deriv(i)(t + 0.5 * T - late) for i in (1, 2)])
     out = np.zeros((1, len(t)), loop.STEP)
-    loop._follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(Filter()), 0.0,
+    loop._follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(FilterParameters()), 0.0,
                   loop.rate_loop_step(W, ZETA), np.zeros((1, len(t))), out)
     return out['miss'][0, -1]
 

@@ -48,7 +48,7 @@ def named_models(names) -> tuple:
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of a filter_params.Filter."""
+    """Constants (1,) of FilterParameters."""
     c = np.zeros(1, CONSTANTS)
     source, kind = params, params.kind
     if kind == 'alpha_beta':

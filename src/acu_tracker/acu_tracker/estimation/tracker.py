@@ -50,7 +50,7 @@ def gate_of_one(gate):
 
 
 def constants(params, azimuth, elevation) -> np.ndarray:
-    """Constants (1,) of a TrackerParameters and the Filter parameters of both axes."""
+    """Constants (1,) of TrackerParameters and the FilterParameters of both axes."""
     c = np.zeros(1, CONSTANTS)
     c['azimuth'], c['elevation'] = axis_filter.constants(azimuth), axis_filter.constants(elevation)
     c['gates'] = params.gate, gate_of_one(params.gate)

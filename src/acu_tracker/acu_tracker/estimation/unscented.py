@@ -44,7 +44,7 @@ CONSTANTS = np.dtype([('models', motion_models.MODEL, (2,)), ('dwell', 'f8'), ('
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of a filter_params.Ukf."""
+    """Constants (1,) of UkfParameters."""
     c = np.zeros(1, CONSTANTS)
     c['models']['kind'] = MODES
     c['models']['noise'] = params.cv_noise, params.ca_noise

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from acu_tracker.estimation import axis_filter, unscented
-from acu_tracker.estimation.params import Filter, Ukf
+from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup.again import recompute, replay
@@ -135,7 +135,7 @@ FILTER_PERIOD = 0.01
 
 def filter_step(kind):
     """Time [us] of one prediction and correction of an axis_filter kind on a noisy ramp."""
-    constants = axis_filter.constants(build(Filter, {'kind': kind}))
+    constants = axis_filter.constants(build(FilterParameters, {'kind': kind}))
     t = FILTER_PERIOD * np.arange(FILTER_STEPS)
     y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
     variance, state = np.full(FILTER_STEPS, 2.5e-7), np.zeros(1, axis_filter.FILTER)
@@ -154,7 +154,7 @@ def _filter_steps(state, constants, t, y, R):
 
 def unscented_step():
     """Time [us] of one prediction and correction of both Cartesian filters, azimuth, elevation and range measured."""
-    state, constants = np.zeros(1, unscented.STATE), unscented.constants(Ukf())
+    state, constants = np.zeros(1, unscented.STATE), unscented.constants(UkfParameters())
     noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
     measured = noise + np.outer(FILTER_PERIOD * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
     _unscented_steps(state, constants, measured)

@@ -11,7 +11,7 @@ import numpy as np
 
 from acu_tracker.estimation.axis_filter import KINDS
 from acu_tracker.estimation.motion_models import MODELS
-from acu_tracker.estimation.params import Filter, Ukf
+from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Result, row
@@ -37,8 +37,8 @@ NOISES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
 RATES = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
 """Filters with a rate measurement, its standard deviation [rad/s]."""
 
-FILTERS = {**{kind: Filter(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
-           **{name: Filter(kind='current_statistical') for name in RATES}}
+FILTERS = {**{kind: FilterParameters(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
+           **{name: FilterParameters(kind='current_statistical') for name in RATES}}
 
 FIXED = ('imm', 'imm_ukf')
 """Filters that keep their default parameters."""
@@ -117,8 +117,8 @@ def batch(item):
         found[name] = settled(sums), sums[::THINNED].copy()
     if profile == RANGED[0]:
         t = times()
-        sums = ensemble.unscented_moments(Ukf(), t, profiles.truth(profile, t), profiles.distance(profile, t),
-                                          NOISES[noise], RANGED[1], SEED, first, count)
+        sums = ensemble.unscented_moments(UkfParameters(), t, profiles.truth(profile, t),
+                                          profiles.distance(profile, t), NOISES[noise], RANGED[1], SEED, first, count)
         found['imm_ukf'] = settled(sums), sums[::THINNED].copy()
     return found
 

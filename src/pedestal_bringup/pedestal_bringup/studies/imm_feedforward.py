@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.motion_models import MODELS
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.modes import AUTOTRACK
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies import experiment
@@ -62,7 +62,7 @@ CASES |= {cv_name(axis, q): (axis, cv(q)) for axis in REVERSALS for q in CV}
 
 
 def drive_case(axis, tuned):
-    """A Case of reversals without a pause on an axis, tracked with a Filter."""
+    """A Case of reversals without a pause on an axis, tracked with a filter (FilterParameters)."""
     w = math.pi / REVERSALS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
                   profiles.RATE / w if name == axis else 0.0 for name in REVERSALS}
@@ -72,7 +72,7 @@ def drive_case(axis, tuned):
         **amplitudes, 'tracking_receiver.receiver.latency': feedforward_loop.DELAY * T, 'scenario.program.interval': T,
         'adu.initial_azimuth': 0.0, 'adu.initial_elevation': DRIVE_ELEVATION,
         **{f'acu.{axis}.filter.{name}': value for name, value in as_dict(tuned).items()
-           if value != as_dict(Filter())[name]}}, DRIVE_SECONDS)
+           if value != as_dict(FilterParameters())[name]}}, DRIVE_SECONDS)
 
 
 DRIVE_CASES = {

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import axis_filter
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.experiment import Result, row
@@ -67,9 +67,9 @@ BATCH, SEED = 25, 1
 
 
 def filter_of(a_max, floor):
-    """A 'current' statistical Filter that takes the measured rate; a_max in rad/s2."""
-    model = dataclasses.replace(Filter().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
-    return Filter(kind='current_statistical', rate_measurement=True, current_statistical=model)
+    """A 'current' statistical filter (FilterParameters) that takes the measured rate; a_max in rad/s2."""
+    model = dataclasses.replace(FilterParameters().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
+    return FilterParameters(kind='current_statistical', rate_measurement=True, current_statistical=model)
 
 
 @compiled

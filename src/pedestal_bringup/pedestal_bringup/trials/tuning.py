@@ -30,7 +30,7 @@ FAILED = 1e300
 
 
 def names(params):
-    """The parameters that are searched for a filter_params.Filter."""
+    """The parameters that are searched for FilterParameters."""
     if params.kind.startswith('imm'):
         models = [MODELS[code] for code in named_models(params.imm.models)]
         return ('imm.dwell', *(f'imm.{name}' for model in models for name in _of_kind(model)))
@@ -42,7 +42,7 @@ def _of_kind(kind):
 
 
 def tuned(params, criterion, searched=None):
-    """(parameters with the least criterion found, that criterion), from a filter_params.Filter or Ukf.
+    """(parameters with the least criterion found, that criterion), from FilterParameters or UkfParameters.
 
     criterion: function of them, infinite or NaN where it does not work. searched: names, None: those of `names`.
     Raises ValueError where it works nowhere.

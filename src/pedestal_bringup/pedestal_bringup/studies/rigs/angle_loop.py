@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import alpha_beta, axis_filter
-from acu_tracker.estimation.params import Ca, Filter
+from acu_tracker.estimation.params import CaParameters, FilterParameters
 from acu_tracker.geometry import deck_reference
 from acu_tracker.servo import beam_loop
 from adu_drive import electronic_beam
@@ -84,7 +84,7 @@ class Better:
         n = len(target)
         nothing, beam, seen = np.zeros(n), np.zeros(n), np.zeros(n)
         late = np.maximum(np.arange(n) - self.late, 0)
-        constants = axis_filter.constants(Filter(kind='ca', ca=Ca(noise=self.jerk)))
+        constants = axis_filter.constants(FilterParameters(kind='ca', ca=CaParameters(noise=self.jerk)))
         _better(constants, self.sigma**2 / self.period, self.period, self.hold,
                 GRID * (self.delay if self.known is None else self.known), self.tau, np.asarray(target),
                 nothing if noise is None else noise, attitude[late] if self.ins else nothing,

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from acu_tracker.estimation import axis_filter, unscented
-from acu_tracker.params import TrackerParameters
+from acu_tracker.estimation.params import TrackerParameters
 from pedestal_common.compiled import compiled
 
 PERIOD = 0.01
@@ -61,7 +61,7 @@ def records(truth, noise, seed, first, count):
 
 
 def moments(params, t, truth, noise, measured):
-    """MOMENTS (n,) of a filter (filter_params.Filter) over measured records as of `records`.
+    """MOMENTS (n,) of a filter (FilterParameters) over measured records as of `records`.
 
     The filter is told sigma and rate_sigma, and takes both for white.
     """
@@ -102,7 +102,7 @@ def _add(s, o, angle, rate, acceleration, y):
 
 
 def unscented_moments(params, t, truth, distance, noise, range_sigma, seed, first, count):
-    """MOMENTS (n,) of the azimuth of the IMM of unscented filters (params: filter_params.Ukf).
+    """MOMENTS (n,) of the azimuth of the IMM of unscented filters (params: UkfParameters).
 
     The target is at elevation 0, `distance` (n,) [m] away, measured with range_sigma [m], white; both angles as
     `noise` says, the azimuth with the same draws as in `records`.

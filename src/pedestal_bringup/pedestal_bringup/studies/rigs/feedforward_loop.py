@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from acu_tracker.estimation import axis_filter
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.servo import feedforward
 from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies.rigs import ensemble, profiles
@@ -107,13 +107,13 @@ def _follow(target, known, f, c, lead, M, normals, out):
 class Source:
     """Where rate and acceleration come from: a filter, or None for the truth; `predicted` to the instant of the
     command, or as they were when the miss was measured."""
-    filter: Filter | None
+    filter: FilterParameters | None
     predicted: bool = False
 
 
 def filter_of(kind, **groups):
-    """A filter_params.Filter of a kind with groups of its parameters changed: cv=dict(noise=...)."""
-    return Filter(kind=kind, **{name: dataclasses.replace(getattr(Filter(), name), **values)
+    """FilterParameters of a kind with groups of its parameters changed: cv=dict(noise=...)."""
+    return FilterParameters(kind=kind, **{name: dataclasses.replace(getattr(FilterParameters(), name), **values)
                                 for name, values in groups.items()})
 
 
@@ -129,7 +129,7 @@ def ca(q):
 
 def imm(q_ca, predicted):
     """A quiet cv, a ca of q_ca [deg/s3/sqrt(Hz)], a lively current_statistical; each holds for 5 s."""
-    default = Filter().imm
+    default = FilterParameters().imm
     bank = {
         'models': 'cv ca current_statistical', 'dwell': 5.0,
         'cv': dataclasses.replace(default.cv, noise=math.radians(0.003)),
@@ -157,8 +157,8 @@ def steps_of(axis, source, first, count):
         known = np.column_stack(profiles.s_motion(at, STROKE, RATE, REVERSALS[axis])[1:])
     [normals] = ensemble.drawn(SEED, first, count, len(t), 1)
     out = np.zeros((count, len(t)), STEP)
-    _follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(source.filter or Filter()), lead,
-            rate_loop_step(*RATE_LOOP), normals, out)
+    c = axis_filter.constants(source.filter or FilterParameters())
+    _follow(target, known, np.zeros(1, axis_filter.FILTER), c, lead, rate_loop_step(*RATE_LOOP), normals, out)
     return out
 
 
