@@ -86,7 +86,7 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     steps = closed_loop.run(cores)
     automatic = steps['mode'] == modes.AUTOTRACK
     first = np.argmax(automatic)
-    plan = cores.acu[0]['ahead']['plan'][0]
+    plan = cores.acu[0]['lookahead']['slew'][0]
     assert automatic[first:].all() and plan['needed'] > math.radians(100.0)
     off = np.hypot(*steps['true_error'].T)
     t = steps['t']

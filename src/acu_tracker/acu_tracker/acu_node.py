@@ -22,7 +22,7 @@ class AcuNode(shell.Shell):
         self.follower_places = [(name, records.only(self.unit.heard, name)) for name in self.unit.followers]
         self.announced = None
         self.state = self.unit.state[0]
-        self.ahead = self.state['ahead']
+        self.lookahead = self.state['lookahead']
         self.told = (0, 0)
         self.refused = ''
         self.drive_state = 'unknown'
@@ -82,7 +82,7 @@ class AcuNode(shell.Shell):
         self.begin_step(stamp)
         if outputs['mode'] != self.announced:
             self.announce_mode()
-        if self.ahead['number'] != self.told[0] or self.ahead['hidden_number'] != self.told[1]:
+        if self.lookahead['forecasts'] != self.told[0] or self.lookahead['blockages'] != self.told[1]:
             self.announce_ahead()
         for message, place, send in self.says:
             records.put(message, place)
@@ -95,12 +95,12 @@ class AcuNode(shell.Shell):
     def announce_ahead(self):
         """Say what is new of a keyhole or a hidden sector; it stands until there is another."""
         keyholes, hidden = self.told
-        self.told = int(self.ahead['number']), int(self.ahead['hidden_number'])
+        self.told = int(self.lookahead['forecasts']), int(self.lookahead['blockages'])
         if self.told[0] != keyholes:
-            text = announcement.keyhole(self.ahead, self.parameters.tracker.receiver.beamwidth)
+            text = announcement.keyhole(self.lookahead, self.parameters.tracker.receiver.beamwidth)
             self.announce(self.send_keyhole, messages.String(data=text))
         if self.told[1] != hidden:
-            self.announce(self.send_hidden, messages.String(data=announcement.hidden(self.ahead)))
+            self.announce(self.send_hidden, messages.String(data=announcement.hidden(self.lookahead)))
 
     def service(self, mode):
         """The callback of a mode's service: asks the mode machine at once and answers with what it reads back."""
@@ -136,10 +136,10 @@ class AcuNode(shell.Shell):
                                                                                  limited) if on)))
         for axis, innovation, nis in zip(messages.AXES, outputs['innovation'], outputs['nis']):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
-        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(self.ahead)]
+        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(self.lookahead)]
         if self.refused:
             return shell.WARN, self.refused, values
-        if self.state['cramped']:
+        if self.state['overtravel']:
             return shell.WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit', values
         if self.steps.refused:
             return shell.WARN, self.steps.refusal, values

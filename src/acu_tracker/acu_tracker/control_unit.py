@@ -3,28 +3,24 @@
 The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`.
 """
 import math
+import typing
 
 import numpy as np
 
 from acu_tracker import modes
 from acu_tracker.estimation import tracker
-from acu_tracker.geometry import deck_reference, estimate_frame, lever_arm
-from acu_tracker.geometry.attitude import (
-    attitude_at,
-    deck_rates,
-    estimate_from_deck,
-    levelled,
-    seen_from_deck,
-    take_attitude,
-)
+from acu_tracker.geometry import attitude, azimuth_wrap, deck_reference, estimate_frame, lever_arm
+from acu_tracker.geometry.deck_reference import STILL, Attitude
+from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, earth_angles, line_of_sight
+from acu_tracker.geometry.vector import Vector, rotated, vector
 from acu_tracker.history import bracket, history_type, push
-from acu_tracker.lookahead import ahead
+from acu_tracker.lookahead import levelled_deck, planner
 from acu_tracker.params import AcuParameters
 from acu_tracker.program import bridge, program_track
 from acu_tracker.servo import notch, position_loop
 from pedestal_common import blockage
+from pedestal_common import line_of_sight as pointing
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import ASHORE, displaced, displaced_motion, earth_angles, earth_direction, to_earth
 from pedestal_common.parameters import record, record_type
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
@@ -48,7 +44,6 @@ INPUTS = np.dtype([
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
     ('aligning', 'i8'),                                                         # 1: the INS does not know it yet
     ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
-    ('program_count', 'i8'),                                                    # rows of the table in use
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
 ], align=True)
 
@@ -68,34 +63,32 @@ OUTPUTS = np.dtype([
 ], align=True)
 
 STATE = np.dtype([
-    ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'), ('stabilised', 'i8'),
+    ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'),
     ('encoder', history_type(4)),                                               # azimuth, elevation, their rates
-    ('attitude', history_type(10)),                                             # quaternion, w, dw
-    ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
+    ('attitude', attitude.ATTITUDE), ('tracker', tracker.TRACKER),
+    ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
     ('turn', 'f8'), ('seen', 'f8', (2,)),         # raw azimuth last followed; deck angles of the target then
     ('preset', 'f8', (2,)),
     ('error', 'f8', (2,)),                                                      # of this step, azimuth, elevation
-    ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
-    ('frame', estimate_frame.FRAME), ('mat_fd', 'f8', (3, 3)),                 # of the filter; deck -> it
-    ('ahead', ahead.AHEAD), ('aligning', 'i8'), ('blocked', 'i8'),
-    ('cramped', 'i8'),                                          # 1: no turn of the azimuth held the whole program
+    ('frame', estimate_frame.FRAME), ('lever_arm', lever_arm.LEVER_ARM),
+    ('lookahead', planner.PLANNER), ('aligning', 'i8'), ('blocked', 'i8'),
+    ('overtravel', 'i8'),                                       # 1: no azimuth wrap held the whole program
     ('off', 'f8'), ('excused', 'f8'),                           # beam meant to be off by [rad]; last such stamp [s]
     ('bridge', bridge.BRIDGE),                                  # program where the target was last seen
-    ('arm', 'f8', (3,)), ('range', 'f8'),                       # lever arm over range [-]; from the INS [m], 0: none
 ], align=True)
 
-CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('ahead', 'f8'),
-                      ('notch', 'f8', (2, 5)), ('sectors', 'f8', (blockage.MOST, 3))], align=True)
+CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('lead', 'f8'),
+                      ('notch', 'f8', (2, 5)), ('lookahead', planner.CONSTANTS)], align=True)
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of an AcuParameters: the parameters, those of the target filter, `ahead` = t_m - t_k [s], the
-    notches' coefficients, hidden sectors."""
+    """Constants (1,) of AcuParameters: the parameters, those of the target filter, lead = t_m - t_k [s], the notches'
+    coefficients, those of the look-ahead."""
     c = np.zeros(1, CONSTANTS)
     c['p'] = record(params, AcuParameters)
     c['tracker'] = tracker.constants(params.tracker, params.azimuth.filter, params.elevation.filter)
-    c['sectors'] = blockage.sectors(params.blockage)
-    c['ahead'] = params.command_delay + 0.5 * params.period
+    c['lookahead'] = planner.constants(params)
+    c['lead'] = params.command_delay + 0.5 * params.period
     for i, axis in enumerate((params.azimuth, params.elevation)):
         c['notch'][0, i] = notch.coefficients(axis.notch.frequency, axis.notch.width, axis.notch.depth, params.period)
     return c
@@ -107,9 +100,8 @@ def initial_state(params) -> np.ndarray:
     s['stamp'] = -math.inf
     s['pending'] = modes.MODES.index(params.initial_mode)
     s['preset'] = params.azimuth.preset, params.elevation.preset
-    s['excused'] = s['ahead']['looked'] = s['ahead']['latest'] = -math.inf
-    s['ahead']['hidden'] = math.nan
-    s['ahead']['mean'] = ASHORE
+    s['excused'] = -math.inf
+    planner.initialise(s['lookahead'])
     s['frame']['mat'] = np.eye(3)
     return s
 
@@ -126,6 +118,20 @@ def take_encoder(s, u):
 
 
 @compiled
+def take_attitude(s, p, u):
+    """Take the attitude of this step, and into the mean of the look-ahead; False where it is unusable."""
+    if not u.attitude_valid:
+        return False
+    outcome = attitude.take(s.attitude, p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate)
+    if outcome == attitude.NEW:
+        if s.aligning:
+            # Its heading is still being looked for: the mean begins with the one that is found.
+            levelled_deck.restart(s.lookahead.deck)
+        levelled_deck.take(s.lookahead.deck, u.attitude_stamp, attitude.quaternion(s.attitude), p.keyhole.mean_time)
+    return outcome != attitude.INVALID
+
+
+@compiled
 def met(s, i, j, f, index):
     """Column `index` of the encoder's history, a share f between two rows."""
     a, b = s.encoder.sample[i, index], s.encoder.sample[j, index]
@@ -134,17 +140,16 @@ def met(s, i, j, f, index):
 
 @compiled
 def target_rates(s, u, A, E, dA, dE):
-    """Rates (azimuth, elevation) of the target: those of the antenna at A, E and of the error, turned into the frame
-    of the filter by the attitude `s` was last asked for."""
-    x, y, z, dx, dy, dz = displaced_motion(A, E, dA, dE, u.cross_elevation, u.elevation, u.error_rate[0],
-                                           u.error_rate[1])
-    if s.stabilised or s.frame.tilted:
-        estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
-        x, y, z, dx, dy, dz, _, _, _ = deck_reference.from_lever_arm(-s.arm[0], -s.arm[1], -s.arm[2], x, y, z, dx, dy,
-                                                                    dz, 0.0, 0.0, 0.0)
-        return deck_reference.earth_rates(s.mat_fd, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
-    _, dA, _, _, dE, _ = deck_reference.moving_angles(x, y, z, dx, dy, dz, 0.0, 0.0, 0.0)
-    return dA, dE
+    """Rates (azimuth, elevation) [rad/s] of the target in the frame of the filter: those of the antenna at A, E and of
+    the error; the attitude is the one last found."""
+    n = pointing.displaced_motion(A, E, dA, dE, u.cross_elevation, u.elevation, u.error_rate[0], u.error_rate[1])
+    v, dv = Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5])
+    if s.attitude.stabilised or s.frame.tilted:
+        framed = estimate_frame.of_deck(s.frame, attitude.found(s.attitude))
+        v, dv = lever_arm.to_ins(s.lever_arm, v, dv)
+        return deck_reference.earth_rates(framed, v, dv)
+    motion = angles(LineOfSight(v, dv, STILL))
+    return motion.azimuth.rate, motion.elevation.rate
 
 
 @compiled
@@ -168,16 +173,18 @@ def take_error(s, p, c, u, o):
     if i < 0:
         return _ERROR_STAMP
     A, E = met(s, i, j, f, 0), met(s, i, j, f, 1)
-    azimuth, elevation = displaced(A, E, u.cross_elevation, u.elevation)
+    azimuth, elevation = pointing.displaced(A, E, u.cross_elevation, u.elevation)
     s.error[0], s.error[1] = azimuth - A, elevation - E
-    if s.stabilised or s.frame.tilted:
-        if not attitude_at(s, p, t):
+    if s.attitude.stabilised or s.frame.tilted:
+        if not attitude.at(s.attitude, p, t):
             return _ATTITUDE
-        # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
-        y, x, z = earth_direction(azimuth, elevation)
-        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, *lever_arm.from_ins(s, p.lever_arm, u.range, x, -y, z)))
+        x, y, z = pointing.direction(azimuth, elevation)
+        v = lever_arm.from_ins(s.lever_arm, p.lever_arm, u.range if s.attitude.stabilised else math.nan,
+                               s.tracker.running, Vector(x, y, z))
+        v = rotated(s.attitude.mat_ed, v)
+        azimuth, elevation = pointing.earth_angles(v.x, v.y, v.z)
         if s.frame.tilted:
-            azimuth, elevation = estimate_frame.measured(s.frame, azimuth, elevation)
+            azimuth, elevation = estimate_frame.direction_to_frame(s.frame, azimuth, elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
         azimuth_rate, elevation_rate = target_rates(s, u, A, E, met(s, i, j, f, 2), met(s, i, j, f, 3))
@@ -201,17 +208,17 @@ def take_error(s, p, c, u, o):
 def reframe(s, c):
     """Let the filter go on in the frame that suits the elevation of the target."""
     t, f = s.tracker, s.frame
-    A, dA, ddA, E, dE, ddE = tracker.outlook(t, c, t.stamp)
-    if not (f.tilted or E > estimate_frame.RAISE):
+    motion = tracker.outlook(t, c, t.stamp)
+    if not (f.tilted or motion.elevation.angle > estimate_frame.RAISE):
         return
-    e, n, u, de, dn, du, dde, ddn, ddu = estimate_frame.moving_in_earth(f, A, dA, ddA, E, dE, ddE)
-    if f.tilted and u >= math.sin(estimate_frame.LOWER):
+    sight = estimate_frame.to_earth(f, motion)
+    if f.tilted and sight.u.z >= math.sin(estimate_frame.LOWER):
         return
     if f.tilted:
         estimate_frame.level(f)
     else:
-        estimate_frame.tilt(f, e, n, u, de, dn, du)
-    tracker.turn(t, c, *estimate_frame.moving_in_frame(f, e, n, u, de, dn, du, dde, ddn, ddu))
+        estimate_frame.tilt(f, sight.u, sight.du)
+    tracker.turn(t, c, estimate_frame.to_frame(f, sight))
 
 
 @compiled
@@ -220,25 +227,52 @@ def excused(s, p):
     return s.stamp - s.excused <= p.tracker.coast_time
 
 
+class Followed(typing.NamedTuple):
+    """What program or autotrack follows: a Motion in the frame of the filter (framed 1) or in earth angles (0)."""
+    framed: int
+    motion: Motion
+
+
 @compiled
-def followed(s, p, c, times, angles, t):
-    """(in the frame of the filter, A, dA, ddA, E, dE, ddE) at t of what program or autotrack follows: 1 for angles in
-    that frame, 0 for earth angles. A silence that has a reason is bridged by the program."""
+def followed(s, p, c, program, t):
+    """The Followed at t [s]. An outage that has a reason is bridged by the program."""
     if s.mode == modes.PROGRAM:
-        A, dA, ddA, E, dE, ddE = program_track.outlook(times, angles, t)
-        return 0, A, dA, ddA, E, dE, ddE
-    if s.bridge.there and silent(s, p) and excused(s, p) and program_track.status(times, t) == modes.NONE:
-        A, dA, ddA, E, dE, ddE = bridge.outlook(s.bridge, times, angles, t)
-        return 0, A, dA, ddA, E, dE, ddE
-    A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
-    return 1, A, dA, ddA, E, dE, ddE
+        return Followed(0, program_track.motion_at(program, t))
+    if s.bridge.valid and silent(s, p) and excused(s, p) and program_track.status(program, t) == modes.NONE:
+        return Followed(0, bridge.motion_at(s.bridge, program, t))
+    return Followed(1, tracker.outlook(s.tracker, c, t))
 
 
 @compiled
-def program_target(s, p, times, angles, t):
-    """Deck angles of the program track at t; the azimuth not yet on a turn."""
-    A, dA, ddA, E, dE, ddE = program_track.outlook(times, angles, t)
-    return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
+def deck_motion(s, p, t, target):
+    """Motion on the deck at t [s] of a Followed."""
+    f, a = s.frame, s.attitude
+    if target.framed and (f.tilted or s.lever_arm.range != 0.0):
+        attitude.at(a, p, t)
+        sight = deck_reference.on_deck(estimate_frame.of_deck(f, attitude.found(a)), line_of_sight(target.motion))
+        return angles(lever_arm.to_antenna(s.lever_arm, sight))
+    if a.stabilised and attitude.at(a, p, t):
+        return angles(deck_reference.on_deck(attitude.found(a), line_of_sight(target.motion)))
+    return target.motion
+
+
+@compiled
+def levelled(s, target):
+    """AxisMotion of the azimuth of a Followed on the levelled deck of a slew."""
+    level = Attitude(s.lookahead.level, STILL, STILL)
+    if target.framed:
+        level = estimate_frame.of_deck(s.frame, level)
+    return angles(deck_reference.on_deck(level, line_of_sight(target.motion))).azimuth
+
+
+@compiled
+def deck_rates(s, p, t):
+    """(azimuth, elevation) rate [rad/s] at which a fixed target where the beam is seems to move because the deck does;
+    0 where nobody compensates for it."""
+    wanted = p.azimuth.beam.rate_compensation != 0.0 or p.elevation.beam.rate_compensation != 0.0
+    if wanted and s.attitude.stabilised and attitude.at(s.attitude, p, t):
+        return deck_reference.fixed_rates(vector(s.attitude.w), s.azimuth.position, s.elevation.position)
+    return 0.0, 0.0
 
 
 @compiled
@@ -256,28 +290,29 @@ def overdue(s, p):
 
 
 @compiled
-def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
+def change_mode(s, p, o, drive_ready, program, t_m, request):
     """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
     flags = 0
     encoder_ok = s.encoder.count > 0 and s.encoder.stamp[s.encoder.newest] == s.stamp
-    attitude = modes.NONE
-    if s.stabilised:
+    unstable = modes.NONE
+    if s.attitude.stabilised:
         # Before the first attitude it is not determined whether the INS has said how it is.
-        attitude = (modes.INS_ALIGNING if s.aligning and s.attitude.count > 0 else
-                    modes.NONE if attitude_at(s, p, t_m) else modes.ATTITUDE_INVALID)
+        unstable = (modes.INS_ALIGNING if s.aligning and s.attitude.history.count > 0 else
+                    modes.NONE if attitude.at(s.attitude, p, t_m) else modes.ATTITUDE_INVALID)
     lost = not s.tracker.running or (overdue(s, p) > p.tracker.coast_time and not excused(s, p))
-    program = program_track.status(times, s.stamp)
+    obstacle = program_track.status(program, s.stamp)
     wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)
-    if program == modes.NONE and attitude == modes.NONE and wanted:
-        A, _, _, E, _, _ = program_target(s, p, times, angles, t_m)
+    if obstacle == modes.NONE and unstable == modes.NONE and wanted:
+        target = deck_motion(s, p, t_m, Followed(0, program_track.motion_at(program, t_m)))
+        A, E = target.azimuth.angle, target.elevation.angle
         if not math.isfinite(A + E):
-            program, flags = modes.NO_PROGRAM, _PROGRAM
+            obstacle, flags = modes.NO_PROGRAM, _PROGRAM
         else:
             low, high = p.azimuth.limits.low, p.azimuth.limits.high
-            program = outside(deck_reference.nearest_turn(A, s.turn, low, high, 0.0, 0.0), E, p)
+            obstacle = outside(azimuth_wrap.nearest(A, s.turn, low, high, azimuth_wrap.Travel(0.0, 0.0)), E, p)
     o.locked = tracker.locked(s.tracker, p.tracker, overdue(s, p))
     mode, reason, result = modes.next_mode(
-        s.mode, request, encoder_ok, drive_ready, attitude, program, outside(p.azimuth.stow, p.elevation.stow, p),
+        s.mode, request, encoder_ok, drive_ready, unstable, obstacle, outside(p.azimuth.stow, p.elevation.stow, p),
         outside(s.preset[0], s.preset[1], p), o.locked, lost, p.tracker.handover)
     if result == modes.ACCEPTED:
         s.pending = modes.NO_REQUEST
@@ -293,15 +328,13 @@ def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
 
 
 @compiled
-def request(state, constants, inputs, outputs, mode, program_times, program_angles):
+def request(state, constants, inputs, outputs, program, mode):
     """Ask for a mode between two steps; True when granted. outputs.mode and .reason tell what is now.
 
     It is decided on what the last step knew, and takes effect on the command of the next step.
     """
     s, o = state[0], outputs[0]
-    rows = max(inputs[0].program_count, 0)
-    result, _ = change_mode(s, constants[0].p, o, inputs[0].drive_ready, program_times[:rows], program_angles[:rows],
-                            s.stamp + constants[0].ahead, mode)
+    result, _ = change_mode(s, constants[0].p, o, inputs[0].drive_ready, program, s.stamp + constants[0].lead, mode)
     o.mode, o.reason = s.mode, s.reason
     return result == modes.ACCEPTED
 
@@ -315,28 +348,30 @@ def seat(s, p, u):
 
 
 @compiled
-def look_ahead(s, p, c, sectors, times, angles):
+def look_ahead(s, p, c, program):
     """Now and then: what the target will ask of the axes."""
-    h = s.ahead
+    h = s.lookahead
     if s.mode != modes.PROGRAM and s.mode != modes.AUTOTRACK:
-        ahead.forget(h)
-        s.cramped, s.off = 0, 0.0
+        planner.forget(h)
+        s.overtravel, s.off = 0, 0.0
         return
-    if ahead.another_program(h, times, angles):
+    if planner.another_program(h, program):
         # What was planned for the last one means nothing; this one begins as a mode does.
-        ahead.forget(h)
-        s.bridge.there, s.entered = 0, 1
-    if s.stamp - h.looked < ahead.INTERVAL or (h.what == ahead.KEYHOLE and s.stamp <= h.plan.t2):
+        planner.forget(h)
+        s.bridge.valid, s.entered = 0, 1
+    if not planner.due(h, s.stamp):
         return
-    known, e, n, u, de, dn, du = True, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if s.mode == modes.PROGRAM:
-        s.bridge.there = 0
+        s.bridge.valid = 0
+        planner.look_along_program(h, c.lookahead, s.stamp, s.turn, program, s.bridge)
+        return
+    sight = estimate_frame.to_earth(s.frame, tracker.outlook(s.tracker, c.tracker, s.stamp))
+    if not silent(s, p):
+        bridge.begin(s.bridge, program, s.stamp, sight.u)
+    if s.bridge.valid and program_track.status(program, s.stamp) == modes.NONE:
+        planner.look_along_program(h, c.lookahead, s.stamp, s.turn, program, s.bridge)
     else:
-        e, n, u, de, dn, du, _, _, _ = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c, s.stamp))
-        if not silent(s, p):
-            bridge.begin(s.bridge, times, angles, s.stamp, e, n, u)
-        known = s.bridge.there != 0 and program_track.status(times, s.stamp) == modes.NONE
-    ahead.look(h, s.bridge, p, sectors, s.stamp, s.turn, times, angles, known, e, n, u, de, dn, du)
+        planner.look_along_great_circle(h, c.lookahead, s.stamp, s.turn, sight.u, sight.du)
 
 
 @compiled
@@ -346,17 +381,17 @@ def silent(s, p):
 
 
 @compiled
-def explain(s, p, c, times, angles):
+def explain(s, p, c, program):
     """Note why the receiver hears nothing: the target is hidden, or the beam on its way through the keyhole."""
     follows = s.mode == modes.PROGRAM or s.mode == modes.AUTOTRACK
-    s.blocked = follows and blockage.blocked(c.sectors, s.seen[0], s.seen[1])
+    s.blocked = follows and blockage.blocked(c.lookahead.sectors, s.seen[0], s.seen[1])
     why = (modes.BLOCKED if s.blocked else
-           modes.KEYHOLE if follows and ahead.slewing(s.ahead, s.stamp) else modes.NONE)
+           modes.KEYHOLE if follows and planner.slewing(s.lookahead, s.stamp) else modes.NONE)
     if why != modes.NONE:
         s.excused, s.reason = s.stamp, why
         if s.mode == modes.AUTOTRACK and not silent(s, p):
-            motion = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c.tracker, s.stamp))
-            bridge.begin(s.bridge, times, angles, s.stamp, motion[0], motion[1], motion[2])
+            sight = estimate_frame.to_earth(s.frame, tracker.outlook(s.tracker, c.tracker, s.stamp))
+            bridge.begin(s.bridge, program, s.stamp, sight.u)
     elif s.reason == modes.BLOCKED or s.reason == modes.KEYHOLE:
         s.reason = modes.NONE
 
@@ -365,40 +400,51 @@ def explain(s, p, c, times, angles):
 def read_estimate(s, p, c, o):
     """What is known of the target now, in earth angles of the antenna."""
     tracker.read(s.tracker, c, s.stamp, o)
+    x, v = o.estimate, o.covariance
+    framed = Motion(AxisMotion(x[0, 0], x[0, 1], x[0, 2]), AxisMotion(x[1, 0], x[1, 1], x[1, 2]))
+    motion = framed
     if s.frame.tilted:
-        estimate_frame.put_in_earth(s.frame, o.estimate, o.covariance)
-    if s.range > 0.0 and attitude_at(s, p, s.stamp):
-        lever_arm.to_antenna(s, o.estimate)
+        motion = earth_angles(estimate_frame.to_earth(s.frame, framed))
+        for i in range(3):
+            v[0, i], v[1, i] = estimate_frame.earth_variances(s.frame, framed, motion, v[0, i], v[1, i])
+    if s.lever_arm.range > 0.0 and attitude.at(s.attitude, p, s.stamp):
+        motion = lever_arm.earth_angles_to_antenna(s.lever_arm, s.attitude.mat_ed, motion)
+    for i in range(2):
+        x[i, 0], x[i, 1], x[i, 2] = motion[i]
 
 
 @compiled
-def raw_target(s, p, c, times, angles, t):
-    """Deck (A, dA, ddA, E, dE, ddE) at t of what the mode follows, the azimuth on the turn that fits."""
+def fixed(s, azimuth, elevation):
+    """Motion of axes that are to stand at deck angles [rad]."""
+    s.turn = s.azimuth.position
+    return Motion(AxisMotion(azimuth, 0.0, 0.0), AxisMotion(elevation, 0.0, 0.0))
+
+
+@compiled
+def raw_target(s, p, c, program, t):
+    """Motion on the deck at t [s] of what the mode follows, the azimuth on the wrap that fits."""
     if s.mode == modes.STOW:
-        s.turn = s.azimuth.position
-        return p.azimuth.stow, 0.0, 0.0, p.elevation.stow, 0.0, 0.0
+        return fixed(s, p.azimuth.stow, p.elevation.stow)
     if s.mode == modes.PRESET:
-        s.turn = s.azimuth.position
-        return s.preset[0], 0.0, 0.0, s.preset[1], 0.0, 0.0
-    framed, B, dB, ddB, F, dF, ddF = followed(s, p, c, times, angles, t)
-    if framed:
-        A, dA, ddA, E, dE, ddE = estimate_from_deck(s, p, t, B, dB, ddB, F, dF, ddF)
-    else:
-        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, B, dB, ddB, F, dF, ddF)
-    s.seen[0], s.seen[1] = A, E
+        return fixed(s, s.preset[0], s.preset[1])
+    source = followed(s, p, c.tracker, program, t)
+    target = deck_motion(s, p, t, source)
+    s.seen[0], s.seen[1] = target.azimuth.angle, target.elevation.angle
     s.off = 0.0
-    if ahead.slewing(s.ahead, t):
-        B, dB, ddB = levelled(s, framed, B, dB, ddB, F, dF, ddF) if s.stabilised else (A, dA, ddA)
-        s.turn, dA, ddA, E, dE, ddE, s.off = ahead.through(s.ahead, t, A, dA, ddA, E, dE, ddE, B, dB, ddB,
-                                                           p.elevation.limits.high - p.keyhole.elevation_margin)
-        return s.turn, dA, ddA, E, dE, ddE
-    below = above = 0.0
-    if s.entered and s.mode == modes.PROGRAM:
-        below, above = program_track.azimuth_travel(times, angles, t)
-    s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
-    if s.entered and s.mode == modes.PROGRAM:
-        s.cramped = s.turn + below < p.azimuth.limits.low or s.turn + above > p.azimuth.limits.high
-    return s.turn, dA, ddA, E, dE, ddE
+    if planner.slewing(s.lookahead, t):
+        level = levelled(s, source) if s.attitude.stabilised else target.azimuth
+        motion, s.off = planner.motion_at(s.lookahead, c.lookahead, t, target, level)
+        s.turn = motion.azimuth.angle
+        return motion
+    begins = s.entered and s.mode == modes.PROGRAM
+    travel = azimuth_wrap.Travel(0.0, 0.0)
+    if begins:
+        travel = program_track.azimuth_travel(program, t)
+    low, high = p.azimuth.limits.low, p.azimuth.limits.high
+    s.turn = azimuth_wrap.nearest(target.azimuth.angle, s.turn, low, high, travel)
+    if begins:
+        s.overtravel = s.turn + travel.below < low or s.turn + travel.above > high
+    return Motion(AxisMotion(s.turn, target.azimuth.rate, target.azimuth.acceleration), target.elevation)
 
 
 @compiled
@@ -420,8 +466,8 @@ def clear(o):
 
 
 @compiled
-def step(state, constants, inputs, outputs, program_times, program_angles):
-    """One drive step; arrays (1,) of STATE, CONSTANTS, INPUTS, OUTPUTS, the table (n,) [s] and (n, 2) [rad] earth.
+def step(state, constants, inputs, outputs, program):
+    """One drive step; arrays (1,) of STATE, CONSTANTS, INPUTS, OUTPUTS and a ProgramTrack.
 
     A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
     """
@@ -434,8 +480,6 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         return
     clear(o)
     tracker.adopt(s.tracker, p.tracker, constants[0].tracker)
-    rows = max(u.program_count, 0)
-    times, angles = program_times[:rows], program_angles[:rows]
     jumped = dt > p.step_gap
     flags = _STEP_GAP if jumped and math.isfinite(s.stamp) else 0
     dt = p.period if jumped else dt
@@ -445,9 +489,9 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     if not encoder_ok:
         flags |= _ENCODER
     s.error[0] = s.error[1] = math.nan
-    if u.stabilised != s.stabilised:
-        s.stabilised, s.tracker.running = u.stabilised, 0
-        ahead.forget(s.ahead)
+    if u.stabilised != s.attitude.stabilised:
+        s.attitude.stabilised, s.tracker.running = u.stabilised, 0
+        planner.forget(s.lookahead)
     if u.stabilised and not take_attitude(s, p, u):
         flags |= _ATTITUDE
     if u.error_valid:
@@ -458,9 +502,9 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         else:
             flags |= _PRESET
 
-    t_m = u.stamp + constants[0].ahead
+    t_m = u.stamp + constants[0].lead
     rested = s.mode == modes.STANDBY
-    _, program_flags = change_mode(s, p, o, u.drive_ready, times, angles, t_m,
+    _, program_flags = change_mode(s, p, o, u.drive_ready, program, t_m,
                                    s.pending if rested else modes.NO_REQUEST)
     if encoder_ok and (rested or jumped):
         seat(s, p, u)
@@ -471,19 +515,18 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         # The azimuth wants its target at one instant, the elevation perhaps at another.
         t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
         t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
-        A = dA = ddA = E = dE = ddE = 0.0
-        for i in range(1 if t_elevation == t_azimuth else 2):
-            B, dB, ddB, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles,
-                                                t_azimuth if i == 0 else t_elevation)
-            if i == 0:
-                A, dA, ddA = B, dB, ddB
+        target = raw_target(s, p, constants[0], program, t_azimuth)
+        if t_elevation != t_azimuth:
+            target = Motion(target.azimuth, raw_target(s, p, constants[0], program, t_elevation).elevation)
+        A, dA, ddA = target.azimuth
+        E, dE, ddE = target.elevation
         autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
         position_loop.follow(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
                              u.velocity[0], s.error[0], V_A, autotrack, dt, o, 0)
         position_loop.follow(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
                              u.velocity[1], s.error[1], V_E, autotrack, dt, o, 1)
         s.entered = 0
-        explain(s, p, constants[0], times, angles)
+        explain(s, p, constants[0], program)
         o.blocked = s.blocked
         o.coasting = s.mode == modes.AUTOTRACK and silent(s, p)
 
@@ -492,4 +535,4 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     o.gated, o.rates_gated, o.ranges_gated = s.tracker.gated, s.tracker.rates_gated, s.tracker.ranges_gated
     if s.tracker.running:
         read_estimate(s, p, constants[0].tracker, o)
-    look_ahead(s, p, constants[0].tracker, constants[0].sectors, times, angles)
+    look_ahead(s, p, constants[0], program)

@@ -35,7 +35,7 @@ class Acu:
         self.inputs[0]['stabilised'], self.inputs[0]['drive_ready'] = on_ship, 1
         self.outputs[0]['mode'] = modes.STANDBY
         control_unit.clear(self.outputs[0])
-        self.times, self.angles = np.zeros(0), np.zeros((0, 2))
+        self.program = program_track.NO_TRACK
         self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
         for name in HEARD.names:
             self.heard[name]['stamp'] = NEVER
@@ -62,8 +62,7 @@ class Acu:
             self.inputs[0]['preset'], self.inputs[0]['preset_valid'] = angles[0], 1
         else:
             start = messages.nanoseconds(message.header.stamp) * 1e-9
-            self.times, self.angles = program_track.checked(times + start, angles)
-            self.inputs[0]['program_count'] = len(self.times)
+            self.program = program_track.checked(times + start, angles)
 
     def take_drive_state(self, message):
         """A drive that never says how it is counts as ready."""
@@ -76,8 +75,8 @@ class Acu:
     def prepare(self):
         """Compile `answers` and `request`."""
         state, inputs, outputs = self.state.copy(), self.inputs.copy(), self.outputs.copy()
-        answers(state, self.constants, inputs, outputs, self.times, self.angles, self.heard, self.said.copy())
-        control_unit.request(state, self.constants, inputs, outputs, modes.STANDBY, self.times, self.angles)
+        answers(state, self.constants, inputs, outputs, self.program, self.heard, self.said.copy())
+        control_unit.request(state, self.constants, inputs, outputs, self.program, modes.STANDBY)
 
     def request(self, service):
         """Ask for a mode by the name of its service between two steps; True when granted."""
@@ -89,8 +88,7 @@ class Acu:
 
     def ask(self, mode):
         """Ask for a mode (its code) between two steps; True when granted."""
-        return bool(control_unit.request(self.state, self.constants, self.inputs, self.outputs, mode, self.times,
-                                         self.angles))
+        return bool(control_unit.request(self.state, self.constants, self.inputs, self.outputs, self.program, mode))
 
     def answer(self):
         """Answer `heard` with `said`."""
@@ -98,7 +96,7 @@ class Acu:
 
     def answers(self, heard, said):
         """The same for many steps, records (n,)."""
-        answers(self.state, self.constants, self.inputs, self.outputs, self.times, self.angles, heard, said)
+        answers(self.state, self.constants, self.inputs, self.outputs, self.program, heard, said)
 
 
 @compiled
@@ -149,12 +147,12 @@ def say(o, stamp, command, estimate, reference, filtered):
 
 
 @compiled
-def answers(state, constants, inputs, outputs, times, angles, heard, said):
+def answers(state, constants, inputs, outputs, program, heard, said):
     """Step by step: said[k] answers heard[k]."""
     for k in range(len(heard)):
         h, y = heard[k], said[k]
         hear(inputs[0], h[JOINTS], h[ERROR], h[RATE], h[RANGE], h[ATTITUDE])
-        control_unit.step(state, constants, inputs, outputs, times, angles)
+        control_unit.step(state, constants, inputs, outputs, program)
         inputs[0].preset_valid = 0
         say(outputs[0], h[JOINTS].stamp, y[COMMAND], y[ESTIMATE], y[REFERENCE], y[FILTER])
         y[MODE] = outputs[0].mode

@@ -12,7 +12,7 @@ def test_diagnostics_show_whether_the_filter_is_honest():
     outputs['gated'], outputs['rates_gated'], outputs['ranges_gated'] = 3, 5, 7
     outputs['innovation'], outputs['nis'] = [(np.radians(0.0123456), np.nan)], [(1.23456, np.nan)]
     state = control_unit.initial_state(AcuParameters())[0]
-    node = types.SimpleNamespace(outputs=outputs, state=state, ahead=state['ahead'], invalid=0, refused='',
+    node = types.SimpleNamespace(outputs=outputs, state=state, lookahead=state['lookahead'], invalid=0, refused='',
                                  drive_state='enabled', steps=types.SimpleNamespace(refused=0))
     values = dict(AcuNode.diagnose(node)[2])
     assert [values[f'{name} gated'] for name in ('errors', 'rates', 'ranges')] == ['3', '5', '7']

@@ -34,7 +34,7 @@ class Pass:
         tracker.adopt(self.state[0], self.p, self.c)
 
     def now(self, stamp=None):
-        return np.array(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
+        return np.ravel(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
 
     def take(self, seconds, ranged=True, offset=0.0, range_offset=0.0):
         """Take the errors of the next seconds; the outcomes."""

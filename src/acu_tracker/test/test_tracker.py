@@ -36,7 +36,7 @@ class Target:
                                self.p['restart_gap'])
 
     def outlook(self, stamp):
-        return np.array(tracker.outlook(self.state[0], self.c, stamp))
+        return np.ravel(tracker.outlook(self.state[0], self.c, stamp))
 
     def variances(self, T=0.0):
         return axis_filter.variances(self.state[0]['azimuth'], self.c['azimuth'], T)

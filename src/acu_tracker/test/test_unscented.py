@@ -10,6 +10,7 @@ from filterpy.kalman import IMMEstimator, MerweScaledSigmaPoints, UnscentedKalma
 
 from acu_tracker.estimation import unscented
 from acu_tracker.estimation.params import UkfParameters
+from acu_tracker.geometry.motion import AxisMotion, Motion
 
 DEG = math.pi / 180.0
 T = 0.02
@@ -24,12 +25,14 @@ def filtered(s, c, y, R, T, out, variances, mu):
         A, E, r = y[k]
         R_A = R[0] / math.cos(E)**2
         if s[0].mu[0] + s[0].mu[1] == 0.0:
-            unscented.start(s[0], c[0], A, 0.0, 0.0, E, 0.0, 0.0, R_A, 0.0, 0.1, R[1], 0.0, 0.1, r, R[2])
+            motion = Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0))
+            unscented.start(s[0], c[0], motion, R_A, 0.0, 0.1, R[1], 0.0, 0.1, r, R[2])
         else:
             unscented.predict(s[0], c[0], T)
             unscented.innovation(s[0], A, E, r, R_A, R[1], R[2])
             unscented.correct(s[0], A, E, r)
-        out[k] = unscented.outlook(s[0], c[0], 0.0)
+        for i, axis in enumerate(unscented.outlook(s[0], c[0], 0.0)):
+            out[k, 3 * i:3 * i + 3] = axis
         variances[k] = unscented.variances(s[0], c[0], 0.0)
         mu[k] = s[0].mu
 
@@ -140,7 +143,7 @@ def test_rates_and_accelerations_are_derivatives_of_the_angles():
     c = unscented.constants(UkfParameters())
     c['dwell'] = 1e9
     h = 1e-3
-    before, now, after = (np.array(unscented.outlook(s[0], c[0], 1.0 + k * h)) for k in (-1, 0, 1))
+    before, now, after = (np.ravel(unscented.outlook(s[0], c[0], 1.0 + k * h)) for k in (-1, 0, 1))
     for angle in (0, 3):
         assert now[angle + 1] == pytest.approx((after[angle] - before[angle]) / (2 * h), rel=1e-5)
         assert now[angle + 2] == pytest.approx((after[angle] - 2 * now[angle] + before[angle]) / h**2, rel=1e-4)
@@ -171,10 +174,10 @@ def test_variances_are_those_of_many_targets():
 
 def test_starts_where_the_angles_were():
     s, c = np.zeros(1, unscented.STATE), unscented.constants(UkfParameters())
-    before = 2.0, 0.11, -0.03, 0.7, -0.05, 0.02
+    before = Motion(AxisMotion(2.0, 0.11, -0.03), AxisMotion(0.7, -0.05, 0.02))
     known = 1e-6, 2e-7, 1e-6, 2e-6, -3e-7, 2e-6
-    unscented.start(s[0], c[0], *before, *known, 800.0, 4.0)
-    assert unscented.outlook(s[0], c[0], 0.0) == pytest.approx(before, rel=1e-12)
+    unscented.start(s[0], c[0], before, *known, 800.0, 4.0)
+    assert np.ravel(unscented.outlook(s[0], c[0], 0.0)) == pytest.approx(np.ravel(before), rel=1e-12)
     assert unscented.variances(s[0], c[0], 0.0)[:6] == pytest.approx(known, rel=1e-3)
     assert unscented.variances(s[0], c[0], 0.0)[6] == pytest.approx(4.0)
 

@@ -114,14 +114,15 @@ def _open_acceleration(f, c, rate_sigma):
 
 
 @compiled
-def move(f, c, angle, rate, acceleration):
-    """Shift the models so that together they estimate this, as far as they have an acceleration; the rest stays."""
+def move(f, c, motion):
+    """Shift the models so that together they estimate this AxisMotion, as far as they have an acceleration; their
+    covariances stay."""
     x1, x2, x3 = outlook(f, c, 0.0)
     for j in range(c.count):
-        f.x[j, 0] += angle - x1
-        f.x[j, 1] += rate - x2
+        f.x[j, 0] += motion.angle - x1
+        f.x[j, 1] += motion.rate - x2
         if c.models[j].kind != motion_models.CV:
-            f.x[j, 2] += acceleration - x3
+            f.x[j, 2] += motion.acceleration - x3
 
 
 @compiled

@@ -11,6 +11,7 @@ import numpy as np
 
 from acu_tracker.estimation import axis_filter, unscented
 from acu_tracker.estimation.motion_models import CA, CV
+from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import wrap
 
@@ -84,33 +85,33 @@ def hand_back(t, c, azimuth, elevation):
     nowhere any more (NaN) leaves them where they are."""
     if not (azimuth or elevation):
         return
-    A, dA, ddA, E, dE, ddE = outlook(t, c, t.stamp)
+    motion = outlook(t, c, t.stamp)
     if azimuth:
-        if math.isfinite(A + dA + ddA):
-            axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
+        if math.isfinite(motion.azimuth.angle + motion.azimuth.rate + motion.azimuth.acceleration):
+            axis_filter.move(t.azimuth, c.azimuth, motion.azimuth)
         t.used[0] = 0
     if elevation:
-        if math.isfinite(E + dE + ddE):
-            axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
+        if math.isfinite(motion.elevation.angle + motion.elevation.rate + motion.elevation.acceleration):
+            axis_filter.move(t.elevation, c.elevation, motion.elevation)
         t.used[1] = 0
 
 
 @compiled
-def turn(t, c, A, dA, ddA, E, dE, ddE):
+def turn(t, c, motion):
     """The angles are counted in another frame, where the target is at these now; the covariance stays. The Cartesian
     filter, which lives in the old one, ends."""
     t.ranged = t.used[0] = t.used[1] = 0
-    axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
-    axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
+    axis_filter.move(t.azimuth, c.azimuth, motion.azimuth)
+    axis_filter.move(t.elevation, c.elevation, motion.elevation)
 
 
 @compiled
 def begin_cartesian(t, c, range_, R_range):
     """The Cartesian filter starts where the filters of the axes are, at a first range [m]."""
     predict(t, c, t.stamp)
-    A, dA, ddA, E, dE, ddE = expected(t)
+    motion = expected(t)
     a11, a12, a22, e11, e12, e22 = expected_variances(t)
-    unscented.start(t.cartesian, c.cartesian, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, range_, R_range)
+    unscented.start(t.cartesian, c.cartesian, motion, a11, a12, a22, e11, e12, e22, range_, R_range)
     t.ranged = 1
 
 
@@ -204,7 +205,7 @@ def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_
                 t.in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
                 return GATED, nu_a, nu_e, nu_da, nu_de, nis_a, nis_e
     if outcome == STARTED:
-        near = outlook(t, c, t.stamp)[0] if t.running else azimuth
+        near = outlook(t, c, t.stamp).azimuth.angle if t.running else azimuth
         near = near if math.isfinite(near) else azimuth
         axis_filter.start(a, c.azimuth, near + wrap(azimuth - near), R_azimuth, p.initial_rate)
         axis_filter.start(e, c.elevation, elevation, R_elevation, p.initial_rate)
@@ -249,12 +250,13 @@ def expected(t):
     A, dA, ddA, _, _, _, _, _, _ = axis_filter.expected(t.azimuth)
     E, dE, ddE, _, _, _, _, _, _ = axis_filter.expected(t.elevation)
     if t.used[0] or t.used[1]:
-        B, dB, ddB, F, dF, ddF = unscented.expected_angles(t.cartesian)
+        cartesian = unscented.expected_angles(t.cartesian)
         if t.used[0]:
-            A, dA, ddA = A + wrap(B - A), dB, ddB
+            B, dA, ddA = cartesian.azimuth
+            A = A + wrap(B - A)
         if t.used[1]:
-            E, dE, ddE = F, dF, ddF
-    return A, dA, ddA, E, dE, ddE
+            E, dE, ddE = cartesian.elevation
+    return Motion(AxisMotion(A, dA, ddA), AxisMotion(E, dE, ddE))
 
 
 @compiled
@@ -290,7 +292,9 @@ def read(t, c, stamp, o):
     """What is known of the target at a stamp, into o.estimate, .covariance, .probability (2, ...)."""
     x, p = o.estimate, o.covariance
     predict(t, c, stamp)
-    x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = expected(t)
+    motion = expected(t)
+    for i in range(2):
+        x[i, 0], x[i, 1], x[i, 2] = motion[i]
     p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2] = expected_variances(t)
     axis_filter.probabilities(t.azimuth, c.azimuth, o.probability[0])
     axis_filter.probabilities(t.elevation, c.elevation, o.probability[1])

@@ -15,7 +15,8 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import imm, motion_models
-from acu_tracker.geometry import deck_reference
+from acu_tracker.geometry.motion import line_of_sight, motion_of_position
+from acu_tracker.geometry.vector import Vector
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.line_of_sight import earth_angles, wrap
 
@@ -70,14 +71,19 @@ def _spread(p, along, onward, s11, s12, s22):
 
 
 @compiled
-def start(s, c, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, r, R_range):
-    """Begin where angles, rates, their variances (as `variances` gives them) and a first range r lead.
+def start(s, c, motion, a11, a12, a22, e11, e12, e22, r, R_range):
+    """Begin where a Motion, its variances (as `variances` gives them) and a first range r lead.
 
     `outlook` goes on where they were: in CA, with the acceleration of a target at a constant range; CV begins without.
 
     The radial speed is 0 to within c.initial_speed, the acceleration known to within c.initial_acceleration.
     """
-    e, n, u, de, dn, du, dde, ddn, ddu = deck_reference.moving_direction(A, dA, ddA, E, dE, ddE)
+    A, dA, _ = motion.azimuth
+    E, dE, _ = motion.elevation
+    sight = line_of_sight(motion)
+    e, n, u = sight.u
+    de, dn, du = sight.du
+    dde, ddn, ddu = sight.ddu
     turn = de * de + dn * dn + du * du
     x = s.x[1]
     x[0], x[1], x[2], x[3], x[4], x[5] = r * e, r * n, r * u, r * de, r * dn, r * du
@@ -273,10 +279,10 @@ def range_known(s, share_2):
 
 @compiled
 def expected_angles(s):
-    """(A, dA, ddA, E, dE, ddE) of what `predict` left, both modes together; A in (-pi, pi]."""
+    """Motion in earth angles of what `predict` left, both modes together; the azimuth in (-pi, pi]."""
     _mixed(s.x_prior, s.p_prior, s.c, s.mean, s.covariance)
     x = s.mean
-    return deck_reference.earth_motion(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
+    return motion_of_position(Vector(x[0], x[1], x[2]), Vector(x[3], x[4], x[5]), Vector(x[6], x[7], x[8]))
 
 
 @compiled

@@ -18,6 +18,7 @@ from rich.table import Table
 
 from acu_tracker.estimation import axis_filter, unscented
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
+from acu_tracker.geometry.motion import AxisMotion, Motion
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup.again import recompute, replay
@@ -165,7 +166,8 @@ def unscented_step():
 def _unscented_steps(state, constants, measured):
     s, c = state[0], constants[0]
     R = 2.5e-7
-    unscented.start(s, c, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0, R, 0.0, 0.01, R, 0.0, 0.01, 500.0, 1.0)
+    motion = Motion(AxisMotion(0.0, 0.0, 0.0), AxisMotion(0.3, 0.0, 0.0))
+    unscented.start(s, c, motion, R, 0.0, 0.01, R, 0.0, 0.01, 500.0, 1.0)
     for k in range(len(measured)):
         A, E, r = measured[k]
         unscented.predict(s, c, FILTER_PERIOD)

@@ -37,7 +37,7 @@ class Cores:
     acu: tuple
     adu: tuple
     target: target.Target
-    program: tuple
+    program: program_track.ProgramTrack
     streams: tuple
     period_ns: int
     steps: int
@@ -60,13 +60,12 @@ def cores(scenario, beam='') -> Cores:
         adu_core = (drive_unit.initial_state(adu), drive_unit.constants(adu), np.zeros(1, drive_unit.INPUTS),
                     np.zeros(1, drive_unit.OUTPUTS))
         drive_unit.read(adu_core[0], adu_core[1], adu_core[3])
-    program = (np.zeros(0), np.zeros((0, 2)))
+    program = program_track.NO_TRACK
     if scenario.header.program.source != 'none':
         program = program_track.checked(*program_table(scenario, prefix))
     acu_inputs = np.zeros(1, control_unit.INPUTS)
     acu_inputs['stabilised'] = scenario.header.ship
     acu_inputs['encoder_valid'] = 1
-    acu_inputs['program_count'] = len(program[0])
     receiver_inputs = np.zeros(1, receiver.INPUTS)
     receiver_inputs['mat_ed'] = line_of_sight.ashore_matrix()
     receiver_inputs['valid'] = 1
@@ -130,7 +129,7 @@ def _hand_over_error(acu_inputs, constants, error):
 
 
 @compiled
-def _answer(k, stamp_ns, period, on_ship, ship, navigation, tracking, acu, breaks, coefficients, times, angles,
+def _answer(k, stamp_ns, period, on_ship, ship, navigation, tracking, acu, breaks, coefficients, program,
             imu_normals, ins_normals, receiver_normals):
     """Ship, INS, receiver and control unit at step k; the inputs of the latter hold where the antenna points."""
     receiver_state, receiver_constants, seen, error = tracking
@@ -152,11 +151,11 @@ def _answer(k, stamp_ns, period, on_ship, ship, navigation, tracking, acu, break
     receiver.step(receiver_state, receiver_constants, seen, error, breaks, coefficients, receiver_normals[k])
     _hand_over_error(acu_inputs, receiver_constants[0], error)
     acu_inputs[0].stamp = stamp_ns * 1e-9
-    control_unit.step(acu_state, acu_constants, acu_inputs, acu_outputs, times, angles)
+    control_unit.step(acu_state, acu_constants, acu_inputs, acu_outputs, program)
 
 
 @compiled
-def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, adu, breaks, coefficients, times, angles,
+def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, adu, breaks, coefficients, program,
            imu_normals, ins_normals, receiver_normals, deck_rate, injected, result):
     """Steps first ... first + count - 1 into result[:count]."""
     acu_inputs, acu_outputs = acu[2], acu[3]
@@ -169,7 +168,7 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
         acu_inputs[0].drive_ready = axes[0].following
         acu_inputs[0].position[0], acu_inputs[0].position[1] = azimuth.position, elevation.position
         acu_inputs[0].velocity[0], acu_inputs[0].velocity[1] = azimuth.velocity, elevation.velocity
-        _answer(k, stamp_ns, period, on_ship, ship, navigation, tracking, acu, breaks, coefficients, times, angles,
+        _answer(k, stamp_ns, period, on_ship, ship, navigation, tracking, acu, breaks, coefficients, program,
                 imu_normals, ins_normals, receiver_normals)
         _record(result[k], acu_inputs[0], acu_outputs[0], tracking[3][0])
         _record_axis(result[k], azimuth, 0)
@@ -187,8 +186,8 @@ def _steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, ad
 
 
 @compiled
-def _beam_steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, adu, breaks, coefficients, times,
-                angles, imu_normals, ins_normals, receiver_normals, injected, result):
+def _beam_steps(first, count, period_ns, on_ship, ship, navigation, tracking, acu, adu, breaks, coefficients, program,
+                imu_normals, ins_normals, receiver_normals, injected, result):
     """The same with an electronic beam in the drive's place."""
     acu_inputs, acu_outputs = acu[2], acu[3]
     beam_state, beam_constants, command, beam = adu
@@ -196,8 +195,8 @@ def _beam_steps(first, count, period_ns, on_ship, ship, navigation, tracking, ac
     for k in range(count):
         stamp_ns = (first + k) * period_ns
         acu_inputs[0].position[0], acu_inputs[0].position[1] = beam[0].position[0], beam[0].position[1]
-        _answer(k, stamp_ns, period_ns * 1e-9, on_ship, ship, navigation, tracking, acu, breaks, coefficients, times,
-                angles, imu_normals, ins_normals, receiver_normals)
+        _answer(k, stamp_ns, period_ns * 1e-9, on_ship, ship, navigation, tracking, acu, breaks, coefficients, program,
+                imu_normals, ins_normals, receiver_normals)
         _record(result[k], acu_inputs[0], acu_outputs[0], tracking[3][0])
         command[0].stamp_ns = command[0].command_stamp_ns = stamp_ns
         command[0].due = 1
@@ -250,7 +249,7 @@ def run(loop: Cores, injected=None) -> np.ndarray:
         normals = [stream.standard_normal((count if loop.on_ship or i == 2 else 0, width))
                    for i, (stream, width) in enumerate(loop.streams)]
         inputs = (first, count, loop.period_ns, loop.on_ship, loop.ship, loop.ins, loop.receiver, loop.acu, loop.adu,
-                  loop.target.breaks, loop.target.coefficients, *loop.program, *normals)
+                  loop.target.breaks, loop.target.coefficients, loop.program, *normals)
         if loop.beam:
             _beam_steps(*inputs, injected[first:first + count], result[first:first + count])
         else:

@@ -12,7 +12,7 @@ import numpy as np
 
 from acu_tracker.estimation import alpha_beta, axis_filter
 from acu_tracker.estimation.params import CaParameters, FilterParameters
-from acu_tracker.geometry import deck_reference
+from acu_tracker.geometry import attitude as attitudes
 from acu_tracker.servo import beam_loop
 from adu_drive import electronic_beam
 from pedestal_common.compiled import compiled
@@ -151,7 +151,7 @@ def _better(constants_of_filter, variance, period, hold, delay, tau, target, noi
         # The carrier turns the target by the attitude: what is left is where the earth has it.
         smoothing.put(s, beam[i] + (target[i] - beam[i] + noise[i]) - attitude[i], 0.0)
         if i > 0 and tau > 0.0:
-            acceleration = deck_reference.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID, tau)
+            acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID, tau)
         if (i + 1) % period == 0:
             y = smoothing.smoothed(s, smoothing.NO_SMOOTHING, period, period)
             if running:
@@ -165,7 +165,7 @@ def _better(constants_of_filter, variance, period, hold, delay, tau, target, noi
         if running and i % hold == 0:
             ahead = delay + 0.5 * hold * GRID                  # from the stamp to the middle of the interval in force
             earth, _, _ = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + ahead)
-            aimed = earth + attitude[i] + deck_reference.turn(rate[i], acceleration, 0.5 * GRID + ahead)
+            aimed = earth + attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID + ahead)
         command(inputs[0], i, running and i % hold == 0, aimed)
         electronic_beam.step(state, constants, inputs, outputs)
 

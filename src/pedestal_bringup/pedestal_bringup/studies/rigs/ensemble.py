@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from acu_tracker.estimation import axis_filter, unscented
 from acu_tracker.estimation.params import TrackerParameters
+from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
 PERIOD = 0.01
@@ -129,15 +130,15 @@ def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, 
             A, E, r = azimuth[run, k], elevation[run, k], ranges[run, k]
             o.nis = math.nan
             if k == 0:
-                unscented.start(s, c[0], A, 0.0, 0.0, E, 0.0, 0.0, R, 0.0, rate_variance, R, 0.0, rate_variance, r,
-                                R_range)
+                motion = Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0))
+                unscented.start(s, c[0], motion, R, 0.0, rate_variance, R, 0.0, rate_variance, r, R_range)
             else:
                 unscented.predict(s, c[0], T)
                 nu, S, _, _, _, _ = unscented.innovation(s, A, E, r, R, R, R_range)
                 o.nis = nu * nu / S
                 unscented.correct(s, A, E, r)
             unscented.predict(s, c[0], 0.0)
-            o.angle, o.rate, o.acceleration, _, _, _ = unscented.expected_angles(s)
+            o.angle, o.rate, o.acceleration = unscented.expected_angles(s).azimuth
             o.variance, o.covariance, o.rate_variance, _, _, _, _ = unscented.expected_variances(s)
             for j in range(len(unscented.MODES)):
                 o.mu[unscented.MODES[j]] = s.mu[j]
