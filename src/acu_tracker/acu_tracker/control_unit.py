@@ -3,23 +3,21 @@
 The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`.
 """
 import math
-import typing
 
 import numpy as np
 
 from acu_tracker import modes
-from acu_tracker.estimation import tracker
-from acu_tracker.geometry import attitude, azimuth_wrap, deck_reference, estimate_frame, lever_arm
-from acu_tracker.geometry.deck_reference import STILL, Attitude
-from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, earth_angles, line_of_sight
-from acu_tracker.geometry.vector import Vector, rotated, vector
+from acu_tracker.estimation import measurement, target, target_filter, tracker
+from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.geometry import attitude, azimuth_wrap, deck_reference
+from acu_tracker.geometry.motion import AxisMotion, Motion
+from acu_tracker.geometry.vector import vector
 from acu_tracker.history import bracket, history_type, push
 from acu_tracker.lookahead import levelled_deck, planner
 from acu_tracker.params import AcuParameters
 from acu_tracker.program import bridge, program_track
 from acu_tracker.servo import notch, position_loop
-from pedestal_common import blockage
-from pedestal_common import line_of_sight as pointing
+from pedestal_common import blockage, line_of_sight
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import record, record_type
 
@@ -53,7 +51,8 @@ OUTPUTS = np.dtype([
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
     ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
                                                                                 # of a beam at t_m: the command
-    ('covariance', 'f8', (2, 3)), ('probability', 'f8', (2, 4)),                # p11, p12, p22 at t_k; of MODELS
+    ('covariance', 'f8', (2, 3)),                                              # p11, p12, p22 at t_k
+    ('probability', 'f8', (2, len(MODELS))),                                   # of MODELS
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
@@ -65,12 +64,11 @@ OUTPUTS = np.dtype([
 STATE = np.dtype([
     ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'),
     ('encoder', history_type(4)),                                               # azimuth, elevation, their rates
-    ('attitude', attitude.ATTITUDE), ('tracker', tracker.TRACKER),
+    ('attitude', attitude.ATTITUDE), ('target', target.TARGET),
     ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
     ('turn', 'f8'), ('seen', 'f8', (2,)),         # raw azimuth last followed; deck angles of the target then
     ('preset', 'f8', (2,)),
     ('error', 'f8', (2,)),                                                      # of this step, azimuth, elevation
-    ('frame', estimate_frame.FRAME), ('lever_arm', lever_arm.LEVER_ARM),
     ('lookahead', planner.PLANNER), ('aligning', 'i8'), ('blocked', 'i8'),
     ('overtravel', 'i8'),                                       # 1: no azimuth wrap held the whole program
     ('off', 'f8'), ('excused', 'f8'),                           # beam meant to be off by [rad]; last such stamp [s]
@@ -86,7 +84,7 @@ def constants(params) -> np.ndarray:
     coefficients, those of the look-ahead."""
     c = np.zeros(1, CONSTANTS)
     c['p'] = record(params, AcuParameters)
-    c['tracker'] = tracker.constants(params.tracker, params.azimuth.filter, params.elevation.filter)
+    c['tracker'] = tracker.constants(params.tracker, (params.azimuth.filter, params.elevation.filter))
     c['lookahead'] = planner.constants(params)
     c['lead'] = params.command_delay + 0.5 * params.period
     for i, axis in enumerate((params.azimuth, params.elevation)):
@@ -102,7 +100,7 @@ def initial_state(params) -> np.ndarray:
     s['preset'] = params.azimuth.preset, params.elevation.preset
     s['excused'] = -math.inf
     planner.initialise(s['lookahead'])
-    s['frame']['mat'] = np.eye(3)
+    target.initialise(s['target'])
     return s
 
 
@@ -139,20 +137,6 @@ def met(s, i, j, f, index):
 
 
 @compiled
-def target_rates(s, u, A, E, dA, dE):
-    """Rates (azimuth, elevation) [rad/s] of the target in the frame of the filter: those of the antenna at A, E and of
-    the error; the attitude is the one last found."""
-    n = pointing.displaced_motion(A, E, dA, dE, u.cross_elevation, u.elevation, u.error_rate[0], u.error_rate[1])
-    v, dv = Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5])
-    if s.attitude.stabilised or s.frame.tilted:
-        framed = estimate_frame.of_deck(s.frame, attitude.found(s.attitude))
-        v, dv = lever_arm.to_ins(s.lever_arm, v, dv)
-        return deck_reference.earth_rates(framed, v, dv)
-    motion = angles(LineOfSight(v, dv, STILL))
-    return motion.azimuth.rate, motion.elevation.rate
-
-
-@compiled
 def take_error(s, p, c, u, o):
     """Filter y = encoder at the instant of the error, displaced by the error, in the angles of the estimate.
 
@@ -166,59 +150,25 @@ def take_error(s, p, c, u, o):
         return _ERROR
     if s.off > BELIEVED * e.beamwidth:
         return 0
-    if not s.tracker.running:
-        estimate_frame.level(s.frame)
-    t = u.error_stamp - e.age
     i, j, f = bracket(s.encoder, u.error_stamp - e.beam_age)
     if i < 0:
         return _ERROR_STAMP
-    A, E = met(s, i, j, f, 0), met(s, i, j, f, 1)
-    azimuth, elevation = pointing.displaced(A, E, u.cross_elevation, u.elevation)
-    s.error[0], s.error[1] = azimuth - A, elevation - E
-    if s.attitude.stabilised or s.frame.tilted:
-        if not attitude.at(s.attitude, p, t):
-            return _ATTITUDE
-        x, y, z = pointing.direction(azimuth, elevation)
-        v = lever_arm.from_ins(s.lever_arm, p.lever_arm, u.range if s.attitude.stabilised else math.nan,
-                               s.tracker.running, Vector(x, y, z))
-        v = rotated(s.attitude.mat_ed, v)
-        azimuth, elevation = pointing.earth_angles(v.x, v.y, v.z)
-        if s.frame.tilted:
-            azimuth, elevation = estimate_frame.direction_to_frame(s.frame, azimuth, elevation)
-    azimuth_rate, elevation_rate = math.nan, math.nan
-    if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
-        azimuth_rate, elevation_rate = target_rates(s, u, A, E, met(s, i, j, f, 2), met(s, i, j, f, 3))
-    R = tracker.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e.beamwidth, e.slope, e.integration,
-                               e.sigma_floor)
-    R_rate = u.error_rate_sigma * u.error_rate_sigma
-    cos_el = max(math.cos(elevation), 0.01)
-    (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
-     o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, t, azimuth, elevation, R / (cos_el * cos_el), R,
-                                 azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate, u.range,
-                                 u.range_variance, math.inf if excused(s, p) else p.tracker.restart_gap)
-    if outcome == tracker.STALE:
+    at = target.Pointing(met(s, i, j, f, 0), met(s, i, j, f, 1), met(s, i, j, f, 2), met(s, i, j, f, 3))
+    azimuth, elevation = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
+    s.error[0], s.error[1] = azimuth - at.A, elevation - at.E
+    outcome, innovation = target.take(s.target, p, c, s.attitude, u, at,
+                                      math.inf if excused(s, p) else p.tracker.restart_gap)
+    if outcome == target.NO_ATTITUDE:
+        return _ATTITUDE
+    if outcome == target.STALE:
         return _ERROR_STAMP
-    reframe(s, c)
+    for k in range(2):
+        one = innovation.axis[k]
+        o.innovation[k], o.rate_innovation[k], o.nis[k] = one.nu, one.rate, measurement.nis(one)
     if o.nis[0] == o.nis[0]:
-        o.innovation_sigma[0], o.innovation_sigma[1] = math.sqrt(s.tracker.S[0]), math.sqrt(s.tracker.S[1])
-    return _ERROR_GATED if outcome == tracker.GATED else 0
-
-
-@compiled
-def reframe(s, c):
-    """Let the filter go on in the frame that suits the elevation of the target."""
-    t, f = s.tracker, s.frame
-    motion = tracker.outlook(t, c, t.stamp)
-    if not (f.tilted or motion.elevation.angle > estimate_frame.RAISE):
-        return
-    sight = estimate_frame.to_earth(f, motion)
-    if f.tilted and sight.u.z >= math.sin(estimate_frame.LOWER):
-        return
-    if f.tilted:
-        estimate_frame.level(f)
-    else:
-        estimate_frame.tilt(f, sight.u, sight.du)
-    tracker.turn(t, c, estimate_frame.to_frame(f, sight))
+        for k in range(2):
+            o.innovation_sigma[k] = math.sqrt(innovation.axis[k].S)
+    return _ERROR_GATED if outcome == target.GATED else 0
 
 
 @compiled
@@ -227,42 +177,14 @@ def excused(s, p):
     return s.stamp - s.excused <= p.tracker.coast_time
 
 
-class Followed(typing.NamedTuple):
-    """What program or autotrack follows: a Motion in the frame of the filter (framed 1) or in earth angles (0)."""
-    framed: int
-    motion: Motion
-
-
 @compiled
 def followed(s, p, c, program, t):
     """The Followed at t [s]. An outage that has a reason is bridged by the program."""
     if s.mode == modes.PROGRAM:
-        return Followed(0, program_track.motion_at(program, t))
+        return target.Followed(0, program_track.motion_at(program, t))
     if s.bridge.valid and silent(s, p) and excused(s, p) and program_track.status(program, t) == modes.NONE:
-        return Followed(0, bridge.motion_at(s.bridge, program, t))
-    return Followed(1, tracker.outlook(s.tracker, c, t))
-
-
-@compiled
-def deck_motion(s, p, t, target):
-    """Motion on the deck at t [s] of a Followed."""
-    f, a = s.frame, s.attitude
-    if target.framed and (f.tilted or s.lever_arm.range != 0.0):
-        attitude.at(a, p, t)
-        sight = deck_reference.on_deck(estimate_frame.of_deck(f, attitude.found(a)), line_of_sight(target.motion))
-        return angles(lever_arm.to_antenna(s.lever_arm, sight))
-    if a.stabilised and attitude.at(a, p, t):
-        return angles(deck_reference.on_deck(attitude.found(a), line_of_sight(target.motion)))
-    return target.motion
-
-
-@compiled
-def levelled(s, target):
-    """AxisMotion of the azimuth of a Followed on the levelled deck of a slew."""
-    level = Attitude(s.lookahead.level, STILL, STILL)
-    if target.framed:
-        level = estimate_frame.of_deck(s.frame, level)
-    return angles(deck_reference.on_deck(level, line_of_sight(target.motion))).azimuth
+        return target.Followed(0, bridge.motion_at(s.bridge, program, t))
+    return target.outlook(s.target, c, t)
 
 
 @compiled
@@ -286,7 +208,7 @@ def outside(azimuth, elevation, p):
 @compiled
 def overdue(s, p):
     """How long [s] no error was believed, beyond the receiver's latency and the age of its errors."""
-    return s.stamp - s.tracker.stamp - p.receiver_latency - p.tracker.receiver.age
+    return s.stamp - s.target.tracker.stamp - p.receiver_latency - p.tracker.receiver.age
 
 
 @compiled
@@ -299,29 +221,30 @@ def change_mode(s, p, o, drive_ready, program, t_m, request):
         # Before the first attitude it is not determined whether the INS has said how it is.
         unstable = (modes.INS_ALIGNING if s.aligning and s.attitude.history.count > 0 else
                     modes.NONE if attitude.at(s.attitude, p, t_m) else modes.ATTITUDE_INVALID)
-    lost = not s.tracker.running or (overdue(s, p) > p.tracker.coast_time and not excused(s, p))
+    lost = not s.target.tracker.running or (overdue(s, p) > p.tracker.coast_time and not excused(s, p))
     obstacle = program_track.status(program, s.stamp)
     wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)
     if obstacle == modes.NONE and unstable == modes.NONE and wanted:
-        target = deck_motion(s, p, t_m, Followed(0, program_track.motion_at(program, t_m)))
-        A, E = target.azimuth.angle, target.elevation.angle
+        source = target.Followed(0, program_track.motion_at(program, t_m))
+        motion = target.on_deck(s.target, p, s.attitude, t_m, source)
+        A, E = motion.azimuth.angle, motion.elevation.angle
         if not math.isfinite(A + E):
             obstacle, flags = modes.NO_PROGRAM, _PROGRAM
         else:
             low, high = p.azimuth.limits.low, p.azimuth.limits.high
             obstacle = outside(azimuth_wrap.nearest(A, s.turn, low, high, azimuth_wrap.Travel(0.0, 0.0)), E, p)
-    o.locked = tracker.locked(s.tracker, p.tracker, overdue(s, p))
+    o.locked = tracker.locked(s.target.tracker, p.tracker, overdue(s, p))
     mode, reason, result = modes.next_mode(
         s.mode, request, encoder_ok, drive_ready, unstable, obstacle, outside(p.azimuth.stow, p.elevation.stow, p),
         outside(s.preset[0], s.preset[1], p), o.locked, lost, p.tracker.handover)
     if result == modes.ACCEPTED:
         s.pending = modes.NO_REQUEST
         if mode == modes.PROGRAM:
-            s.tracker.in_a_row = 0
+            s.target.tracker.accepted_in_a_row = 0
     if reason != modes.NONE:
         s.reason = reason
     if s.mode == modes.AUTOTRACK and lost:
-        s.tracker.running = 0
+        s.target.tracker.running = 0
     if mode != s.mode:
         s.mode, s.entered = mode, 1
     return result, flags
@@ -365,7 +288,7 @@ def look_ahead(s, p, c, program):
         s.bridge.valid = 0
         planner.look_along_program(h, c.lookahead, s.stamp, s.turn, program, s.bridge)
         return
-    sight = estimate_frame.to_earth(s.frame, tracker.outlook(s.tracker, c.tracker, s.stamp))
+    sight = target.earth_outlook(s.target, c.tracker, s.stamp)
     if not silent(s, p):
         bridge.begin(s.bridge, program, s.stamp, sight.u)
     if s.bridge.valid and program_track.status(program, s.stamp) == modes.NONE:
@@ -390,7 +313,7 @@ def explain(s, p, c, program):
     if why != modes.NONE:
         s.excused, s.reason = s.stamp, why
         if s.mode == modes.AUTOTRACK and not silent(s, p):
-            sight = estimate_frame.to_earth(s.frame, tracker.outlook(s.tracker, c.tracker, s.stamp))
+            sight = target.earth_outlook(s.target, c.tracker, s.stamp)
             bridge.begin(s.bridge, program, s.stamp, sight.u)
     elif s.reason == modes.BLOCKED or s.reason == modes.KEYHOLE:
         s.reason = modes.NONE
@@ -399,18 +322,11 @@ def explain(s, p, c, program):
 @compiled
 def read_estimate(s, p, c, o):
     """What is known of the target now, in earth angles of the antenna."""
-    tracker.read(s.tracker, c, s.stamp, o)
-    x, v = o.estimate, o.covariance
-    framed = Motion(AxisMotion(x[0, 0], x[0, 1], x[0, 2]), AxisMotion(x[1, 0], x[1, 1], x[1, 2]))
-    motion = framed
-    if s.frame.tilted:
-        motion = earth_angles(estimate_frame.to_earth(s.frame, framed))
-        for i in range(3):
-            v[0, i], v[1, i] = estimate_frame.earth_variances(s.frame, framed, motion, v[0, i], v[1, i])
-    if s.lever_arm.range > 0.0 and attitude.at(s.attitude, p, s.stamp):
-        motion = lever_arm.earth_angles_to_antenna(s.lever_arm, s.attitude.mat_ed, motion)
+    estimate = target.read(s.target, p, c, s.attitude, s.stamp)
     for i in range(2):
-        x[i, 0], x[i, 1], x[i, 2] = motion[i]
+        o.estimate[i, 0], o.estimate[i, 1], o.estimate[i, 2] = estimate.motion[i]
+        o.covariance[i, 0], o.covariance[i, 1], o.covariance[i, 2] = estimate.variances[i]
+    target_filter.probabilities(s.target.tracker.filter, c.filter, o.probability)
 
 
 @compiled
@@ -428,23 +344,25 @@ def raw_target(s, p, c, program, t):
     if s.mode == modes.PRESET:
         return fixed(s, s.preset[0], s.preset[1])
     source = followed(s, p, c.tracker, program, t)
-    target = deck_motion(s, p, t, source)
-    s.seen[0], s.seen[1] = target.azimuth.angle, target.elevation.angle
+    motion = target.on_deck(s.target, p, s.attitude, t, source)
+    s.seen[0], s.seen[1] = motion.azimuth.angle, motion.elevation.angle
     s.off = 0.0
     if planner.slewing(s.lookahead, t):
-        level = levelled(s, source) if s.attitude.stabilised else target.azimuth
-        motion, s.off = planner.motion_at(s.lookahead, c.lookahead, t, target, level)
-        s.turn = motion.azimuth.angle
-        return motion
+        level = motion.azimuth
+        if s.attitude.stabilised:
+            level = target.levelled_azimuth(s.target, s.lookahead.level, source)
+        slew, s.off = planner.motion_at(s.lookahead, c.lookahead, t, motion, level)
+        s.turn = slew.azimuth.angle
+        return slew
     begins = s.entered and s.mode == modes.PROGRAM
     travel = azimuth_wrap.Travel(0.0, 0.0)
     if begins:
         travel = program_track.azimuth_travel(program, t)
     low, high = p.azimuth.limits.low, p.azimuth.limits.high
-    s.turn = azimuth_wrap.nearest(target.azimuth.angle, s.turn, low, high, travel)
+    s.turn = azimuth_wrap.nearest(motion.azimuth.angle, s.turn, low, high, travel)
     if begins:
         s.overtravel = s.turn + travel.below < low or s.turn + travel.above > high
-    return Motion(AxisMotion(s.turn, target.azimuth.rate, target.azimuth.acceleration), target.elevation)
+    return Motion(AxisMotion(s.turn, motion.azimuth.rate, motion.azimuth.acceleration), motion.elevation)
 
 
 @compiled
@@ -479,7 +397,7 @@ def step(state, constants, inputs, outputs, program):
         o.reason = modes.BAD_STAMP
         return
     clear(o)
-    tracker.adopt(s.tracker, p.tracker, constants[0].tracker)
+    tracker.transfer(s.target.tracker, p.tracker, constants[0].tracker)
     jumped = dt > p.step_gap
     flags = _STEP_GAP if jumped and math.isfinite(s.stamp) else 0
     dt = p.period if jumped else dt
@@ -490,7 +408,7 @@ def step(state, constants, inputs, outputs, program):
         flags |= _ENCODER
     s.error[0] = s.error[1] = math.nan
     if u.stabilised != s.attitude.stabilised:
-        s.attitude.stabilised, s.tracker.running = u.stabilised, 0
+        s.attitude.stabilised, s.target.tracker.running = u.stabilised, 0
         planner.forget(s.lookahead)
     if u.stabilised and not take_attitude(s, p, u):
         flags |= _ATTITUDE
@@ -515,11 +433,11 @@ def step(state, constants, inputs, outputs, program):
         # The azimuth wants its target at one instant, the elevation perhaps at another.
         t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
         t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
-        target = raw_target(s, p, constants[0], program, t_azimuth)
+        motion = raw_target(s, p, constants[0], program, t_azimuth)
         if t_elevation != t_azimuth:
-            target = Motion(target.azimuth, raw_target(s, p, constants[0], program, t_elevation).elevation)
-        A, dA, ddA = target.azimuth
-        E, dE, ddE = target.elevation
+            motion = Motion(motion.azimuth, raw_target(s, p, constants[0], program, t_elevation).elevation)
+        A, dA, ddA = motion.azimuth
+        E, dE, ddE = motion.elevation
         autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
         position_loop.follow(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
                              u.velocity[0], s.error[0], V_A, autotrack, dt, o, 0)
@@ -532,7 +450,8 @@ def step(state, constants, inputs, outputs, program):
 
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
-    o.gated, o.rates_gated, o.ranges_gated = s.tracker.gated, s.tracker.rates_gated, s.tracker.ranges_gated
-    if s.tracker.running:
+    t = s.target.tracker
+    o.gated, o.rates_gated, o.ranges_gated = t.gated, t.rates_gated, t.ranges_gated
+    if t.running:
         read_estimate(s, p, constants[0].tracker, o)
     look_ahead(s, p, constants[0], program)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from acu_tracker import control_unit, modes
+from acu_tracker.estimation.motion_models import MODELS
 from acu_tracker.program import program_track
 from pedestal_common import messages, records
 from pedestal_common.compiled import compiled
@@ -17,6 +18,7 @@ RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 COMMAND, ESTIMATE, REFERENCE, MODE = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode'
 FILTER, PROGRAM, DRIVE, INS = 'acu/filter', 'acu/program_track', 'adu/state', 'ins/state'
 HEARD = records.of(JOINTS, ERROR, RATE, RANGE, ATTITUDE)
+NUMBERS = len(messages.FILTER) // len(messages.AXES)
 SAID = records.of(COMMAND, ESTIMATE, REFERENCE, FILTER, more=(MODE,))
 
 
@@ -137,12 +139,12 @@ def say(o, stamp, command, estimate, reference, filtered):
         estimate.velocity[i], reference.velocity[i] = o.estimate[i, 1], o.reference[i, 1]
         estimate.acceleration[i], reference.acceleration[i] = o.estimate[i, 2], o.reference[i, 2]
         # In the order of messages.FILTER.
-        numbers = filtered.position[11 * i:]
+        numbers = filtered.position[NUMBERS * i:]
         numbers[0], numbers[1], numbers[2] = o.innovation[i], o.rate_innovation[i], o.nis[i]
         numbers[3], numbers[4] = math.sqrt(o.covariance[i, 0]), math.sqrt(o.covariance[i, 2])
         numbers[5] = o.covariance[i, 1] / (numbers[3] * numbers[4])
         numbers[6] = o.innovation_sigma[i]
-        for model in range(4):
+        for model in range(len(MODELS)):
             numbers[7 + model] = o.probability[i, model]
 
 

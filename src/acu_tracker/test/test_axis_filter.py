@@ -5,7 +5,8 @@ import pytest
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 
 from acu_tracker.estimation import alpha_beta, axis_filter
-from acu_tracker.estimation.axis_filter import KINDS
+from acu_tracker.estimation.kinds import KINDS
+from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import ParameterError, build
 
@@ -29,6 +30,12 @@ def run(t, y, rate=None, initial_rate=0.1, **params):
 
 def noisy(angle, seed=2):
     return angle + SIGMA * np.random.default_rng(seed).standard_normal(len(angle))
+
+
+def variances(f, c, T):
+    """(p11, p12, p22) T after the last measurement."""
+    axis_filter.predict(f, c, T)
+    return axis_filter.variances(axis_filter.expected(f))
 
 
 def rms(values):
@@ -183,7 +190,7 @@ def test_what_is_missing_or_does_not_advance_is_not_taken(kind):
         np.testing.assert_array_equal(out[taken][name], alone[name])
 
 
-def test_consistency_of_angle_and_rate_is_that_of_both_at_once():
+def test_innovation_of_angle_and_rate_is_that_of_both_at_once():
     f, rng = np.zeros(1, axis_filter.FILTER)[0], np.random.default_rng(1)
     for _ in range(20):
         root = rng.normal(size=(3, 3))
@@ -191,12 +198,12 @@ def test_consistency_of_angle_and_rate_is_that_of_both_at_once():
         f['count'], f['mu_prior'][0] = 1, 1.0
         f['x_prior'][0], f['p_prior'][0] = rng.normal(size=3), P[np.triu_indices(3)]
         y, R = rng.normal(size=2), rng.uniform(0.1, 1.0, 2)
-        nu, nu_rate, nis, more = axis_filter.consistency(f, y[0], R[0], y[1], R[1])
+        i = axis_filter.innovation(f, AxisMeasurement(y[0], R[0], y[1], R[1]))
         both = y - f['x_prior'][0, :2]
-        np.testing.assert_allclose((nu, nu_rate), both, rtol=1e-12)
-        assert nis == pytest.approx(both[0]**2 / (P[0, 0] + R[0]))
-        assert nis + more == pytest.approx(both @ np.linalg.solve(P[:2, :2] + np.diag(R), both))
-        assert np.isnan(axis_filter.consistency(f, y[0], R[0], math.nan, R[1])[3])
+        np.testing.assert_allclose((i.nu, i.rate), both, rtol=1e-12)
+        assert i.S == pytest.approx(P[0, 0] + R[0]) and i.chi_square == pytest.approx(both[0]**2 / i.S)
+        assert i.chi_square + i.rate_chi_square == pytest.approx(both @ np.linalg.solve(P[:2, :2] + np.diag(R), both))
+        assert np.isnan(axis_filter.innovation(f, AxisMeasurement(y[0], R[0], math.nan, R[1])).rate_chi_square)
 
 
 def flyby(distance, speed=15.0, seconds=60.0):
@@ -275,7 +282,7 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
         X[holds == j] = moved + rng.multivariate_normal(np.zeros(3), phi @ block[:3, 3:], len(moved))
     np.testing.assert_allclose(axis_filter.outlook(f, c, ahead), X.mean(axis=0), atol=3e-5)
     C = np.cov(X[:, :2].T)
-    np.testing.assert_allclose(axis_filter.variances(f, c, ahead), (C[0, 0], C[0, 1], C[1, 1]), rtol=5e-3)
+    np.testing.assert_allclose(variances(f, c, ahead), (C[0, 0], C[0, 1], C[1, 1]), rtol=5e-3)
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -286,4 +293,4 @@ def test_outlook_now_is_the_estimate_even_if_a_model_is_ruled_out(kind):
     f['mu'] = 0.0
     f['mu'][0] = 1.0
     assert axis_filter.outlook(f, c, 0.0) == (0.1, 0.0, 0.0)
-    np.testing.assert_allclose(axis_filter.variances(f, c, 0.0), (SIGMA**2, 0.0, 0.01), rtol=1e-14)
+    np.testing.assert_allclose(variances(f, c, 0.0), (SIGMA**2, 0.0, 0.01), rtol=1e-14)

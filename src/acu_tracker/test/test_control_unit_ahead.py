@@ -189,7 +189,8 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
         if k > 1400:
             worst = max(worst, off)
             estimate = rig.outputs['estimate'][0]
-            swing.append((*(estimate[:, 0] - seen(t)), rig.state['tracker']['azimuth']['x'][0, 0, 1]))
+            azimuth = rig.state[0]['target']['tracker']['filter']['axis'][0]
+            swing.append((*(estimate[:, 0] - seen(t)), azimuth['x'][0, 1]))
     swing = np.array(swing)
     print(f'range measured {ranged}: off {worst:.2e} rad, filtered rate {np.ptp(swing[:, 2]):.2e} rad/s')
     assert rig.mode == 'autotrack'

@@ -6,6 +6,7 @@ from filterpy.kalman import IMMEstimator, KalmanFilter
 from scipy.linalg import expm
 
 from acu_tracker.estimation import axis_filter, imm
+from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import build
 
@@ -85,11 +86,11 @@ def test_a_far_measurement_keeps_its_evidence(distance):
     axis_filter.start(f, c, 0.0, SIGMA**2, 0.1)
     for _ in range(300):
         axis_filter.predict(f, c, T)
-        axis_filter.correct(f, c, 0.0, SIGMA**2, math.nan, math.nan)
+        axis_filter.correct(f, c, AxisMeasurement(0.0, SIGMA**2, math.nan, math.nan))
     axis_filter.predict(f, c, T)
     S = f['p_prior'][:3, 0] + SIGMA**2
     nu = distance - f['x_prior'][:3, 0]
-    axis_filter.correct(f, c, distance, SIGMA**2, math.nan, math.nan)
+    axis_filter.correct(f, c, AxisMeasurement(distance, SIGMA**2, math.nan, math.nan))
     expected = np.log(f['mu_prior'][:3] / np.sqrt(S)) - 0.5 * nu**2 / S
     mu = f['mu'][:3]
     assert mu.sum() == pytest.approx(1.0) and np.argmax(mu) == np.argmax(expected)
@@ -99,7 +100,7 @@ def test_a_far_measurement_keeps_its_evidence(distance):
     # And the next measurements bring the others back.
     for _ in range(2000):
         axis_filter.predict(f, c, T)
-        axis_filter.correct(f, c, distance, SIGMA**2, math.nan, math.nan)
+        axis_filter.correct(f, c, AxisMeasurement(distance, SIGMA**2, math.nan, math.nan))
     assert f['mu'][0] > 0.5
     estimate = axis_filter.outlook(f, c, 0.0)
     np.testing.assert_allclose(estimate[:2], (distance, 0.0), atol=1e-2 * distance)

@@ -9,6 +9,7 @@ import pytest
 from filterpy.kalman import IMMEstimator, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
 from acu_tracker.estimation import unscented
+from acu_tracker.estimation.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import UkfParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
 
@@ -25,15 +26,19 @@ def filtered(s, c, y, R, T, out, variances, mu):
         A, E, r = y[k]
         R_A = R[0] / math.cos(E)**2
         if s[0].mu[0] + s[0].mu[1] == 0.0:
-            motion = Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0))
-            unscented.start(s[0], c[0], motion, R_A, 0.0, 0.1, R[1], 0.0, 0.1, r, R[2])
+            known = AxisVariances(R_A, 0.0, 0.1), AxisVariances(R[1], 0.0, 0.1)
+            first = Estimate(Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0)), known)
+            unscented.start(s[0], c[0], first, r, R[2])
         else:
             unscented.predict(s[0], c[0], T)
-            unscented.innovation(s[0], A, E, r, R_A, R[1], R[2])
-            unscented.correct(s[0], A, E, r)
-        for i, axis in enumerate(unscented.outlook(s[0], c[0], 0.0)):
-            out[k, 3 * i:3 * i + 3] = axis
-        variances[k] = unscented.variances(s[0], c[0], 0.0)
+            m = Measurement(0.0, (AxisMeasurement(A, R_A, math.nan, math.nan),
+                                  AxisMeasurement(E, R[1], math.nan, math.nan)), r, R[2])
+            unscented.innovation(s[0], m)
+            unscented.correct(s[0], m)
+        unscented.predict(s[0], c[0], 0.0)
+        axes, variances[k, 6] = unscented.variances(s[0])
+        for i, axis in enumerate(unscented.expected(s[0])):
+            out[k, 3 * i:3 * i + 3], variances[k, 3 * i:3 * i + 3] = axis, axes[i]
         mu[k] = s[0].mu
 
 
@@ -43,6 +48,13 @@ def run(y, constants, state=None):
     out, variances, mu = np.empty((len(y), 6)), np.empty((len(y), 7)), np.empty((len(y), 2))
     filtered(s, constants, y, R, T, out, variances, mu)
     return out, variances, mu, s[0]
+
+
+def told(s, c, T):
+    """(angles, rates, accelerations (6,), variances (7,)) T after the last measurement."""
+    unscented.predict(s, c, T)
+    axes, variance = unscented.variances(s)
+    return np.ravel(unscented.expected(s)), np.append(axes, variance)
 
 
 def seen(p):
@@ -143,7 +155,7 @@ def test_rates_and_accelerations_are_derivatives_of_the_angles():
     c = unscented.constants(UkfParameters())
     c['dwell'] = 1e9
     h = 1e-3
-    before, now, after = (np.ravel(unscented.outlook(s[0], c[0], 1.0 + k * h)) for k in (-1, 0, 1))
+    before, now, after = (told(s[0], c[0], 1.0 + k * h)[0] for k in (-1, 0, 1))
     for angle in (0, 3):
         assert now[angle + 1] == pytest.approx((after[angle] - before[angle]) / (2 * h), rel=1e-5)
         assert now[angle + 2] == pytest.approx((after[angle] - 2 * now[angle] + before[angle]) / h**2, rel=1e-4)
@@ -158,7 +170,7 @@ def test_variances_are_those_of_many_targets():
     root = rng.normal(size=(2, 9, 9)) * np.repeat([0.02, 0.05, 0.1], 3)[:, np.newaxis]
     s['p'] = root @ np.swapaxes(root, 1, 2)
     c = unscented.constants(UkfParameters(cv_noise=1e-6, ca_noise=1e-6))
-    found = unscented.variances(s[0], c[0], 0.5)
+    _, found = told(s[0], c[0], 0.5)
     # Of the targets that were of mode i some are of mode j by then, which moved them.
     stay, samples = 0.5 * (1.0 + math.exp(-2.0 * 0.5 / UkfParameters().dwell)), []
     for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
@@ -175,11 +187,12 @@ def test_variances_are_those_of_many_targets():
 def test_starts_where_the_angles_were():
     s, c = np.zeros(1, unscented.STATE), unscented.constants(UkfParameters())
     before = Motion(AxisMotion(2.0, 0.11, -0.03), AxisMotion(0.7, -0.05, 0.02))
-    known = 1e-6, 2e-7, 1e-6, 2e-6, -3e-7, 2e-6
-    unscented.start(s[0], c[0], before, *known, 800.0, 4.0)
-    assert np.ravel(unscented.outlook(s[0], c[0], 0.0)) == pytest.approx(np.ravel(before), rel=1e-12)
-    assert unscented.variances(s[0], c[0], 0.0)[:6] == pytest.approx(known, rel=1e-3)
-    assert unscented.variances(s[0], c[0], 0.0)[6] == pytest.approx(4.0)
+    known = AxisVariances(1e-6, 2e-7, 1e-6), AxisVariances(2e-6, -3e-7, 2e-6)
+    unscented.start(s[0], c[0], Estimate(before, known), 800.0, 4.0)
+    motion, variances = told(s[0], c[0], 0.0)
+    assert motion == pytest.approx(np.ravel(before), rel=1e-12)
+    assert variances[:6] == pytest.approx(np.ravel(known), rel=1e-3)
+    assert variances[6] == pytest.approx(4.0)
 
 
 def rates_rms(p, params, seeds, kinds=unscented.MODES):

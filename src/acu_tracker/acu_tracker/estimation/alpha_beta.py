@@ -4,6 +4,7 @@ One number, alpha, sets each; a relation gives the others.
 """
 import math
 
+from acu_tracker.estimation.kalman import Gain
 from pedestal_common.compiled import compiled
 
 
@@ -23,5 +24,5 @@ def kalata(alpha):
 
 @compiled
 def gain(alpha, beta, gamma, T):
-    """(k1, k2, k3) of the gains over T [s]."""
-    return alpha, beta / T, gamma / (2.0 * T * T)
+    """The Gain over T [s]."""
+    return Gain(alpha, beta / T, gamma / (2.0 * T * T))

@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from acu_tracker.estimation import axis_filter, unscented
+from acu_tracker.estimation.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from adu_drive import axis, drive_unit
@@ -150,7 +151,7 @@ def _filter_steps(state, constants, t, y, R):
     axis_filter.start(f, c, y[0], R[0], 0.1)
     for k in range(1, len(y)):
         axis_filter.predict(f, c, t[k] - t[k - 1])
-        axis_filter.correct(f, c, y[k], R[k], math.nan, math.nan)
+        axis_filter.correct(f, c, AxisMeasurement(y[k], R[k], math.nan, math.nan))
 
 
 def unscented_step():
@@ -166,13 +167,16 @@ def unscented_step():
 def _unscented_steps(state, constants, measured):
     s, c = state[0], constants[0]
     R = 2.5e-7
-    motion = Motion(AxisMotion(0.0, 0.0, 0.0), AxisMotion(0.3, 0.0, 0.0))
-    unscented.start(s, c, motion, R, 0.0, 0.01, R, 0.0, 0.01, 500.0, 1.0)
+    known = AxisVariances(R, 0.0, 0.01)
+    first = Estimate(Motion(AxisMotion(0.0, 0.0, 0.0), AxisMotion(0.3, 0.0, 0.0)), (known, known))
+    unscented.start(s, c, first, 500.0, 1.0)
     for k in range(len(measured)):
         A, E, r = measured[k]
         unscented.predict(s, c, FILTER_PERIOD)
-        unscented.innovation(s, A, E, r, R, R, 1.0)
-        unscented.correct(s, A, E, r)
+        m = Measurement(0.0, (AxisMeasurement(A, R, math.nan, math.nan), AxisMeasurement(E, R, math.nan, math.nan)),
+                        r, 1.0)
+        unscented.innovation(s, m)
+        unscented.correct(s, m)
 
 
 def filterpy_unscented():

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation.axis_filter import KINDS
+from acu_tracker.estimation.kinds import KINDS
 from acu_tracker.estimation.motion_models import MODELS
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH

@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import axis_filter
+from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies import experiment
@@ -78,13 +79,13 @@ def _settle(f, c, rate, R_rate, steps):
     axis_filter.start(f[0], c[0], 0.0, SIGMA * SIGMA, 1.0)
     for _ in range(steps):
         axis_filter.predict(f[0], c[0], T)
-        axis_filter.correct(f[0], c[0], 0.0, SIGMA * SIGMA, rate, R_rate)
+        axis_filter.correct(f[0], c[0], AxisMeasurement(0.0, SIGMA * SIGMA, rate, R_rate))
 
 
 @compiled
 def _step(f, c, y, y_rate, R_rate):
     axis_filter.predict(f[0], c[0], T)
-    axis_filter.correct(f[0], c[0], y, SIGMA * SIGMA, y_rate, R_rate)
+    axis_filter.correct(f[0], c[0], AxisMeasurement(y, SIGMA * SIGMA, y_rate, R_rate))
 
 
 def settled(sigma_a, rate_sigma):

@@ -12,8 +12,7 @@ import math
 import numpy as np
 from scipy.optimize import minimize
 
-from acu_tracker.estimation.axis_filter import named_models
-from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.estimation.kinds import named_models
 from pedestal_common import parameters
 
 RANGES = {'alpha_beta.alpha': (0.003, 0.8, 8), 'alpha_beta_gamma.alpha': (0.003, 0.8, 8),
@@ -32,8 +31,7 @@ FAILED = 1e300
 def names(params):
     """The parameters that are searched for FilterParameters."""
     if params.kind.startswith('imm'):
-        models = [MODELS[code] for code in named_models(params.imm.models)]
-        return ('imm.dwell', *(f'imm.{name}' for model in models for name in _of_kind(model)))
+        return ('imm.dwell', *(f'imm.{name}' for model in named_models(params.imm.models) for name in _of_kind(model)))
     return _of_kind(params.kind)
 
 

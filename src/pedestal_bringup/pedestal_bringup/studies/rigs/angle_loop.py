@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import alpha_beta, axis_filter
+from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import CaParameters, FilterParameters
 from acu_tracker.geometry import attitude as attitudes
 from acu_tracker.servo import beam_loop
@@ -155,16 +156,17 @@ def _better(constants_of_filter, variance, period, hold, delay, tau, target, noi
         if (i + 1) % period == 0:
             y = smoothing.smoothed(s, smoothing.NO_SMOOTHING, period, period)
             if running:
+                m = AxisMeasurement(y, variance, math.nan, 0.0)
                 axis_filter.predict(f, c, period * GRID)
-                seen[i], _, _, _ = axis_filter.consistency(f, y, variance, math.nan, 0.0)
-                axis_filter.correct(f, c, y, variance, math.nan, 0.0)
+                seen[i] = axis_filter.innovation(f, m).nu
+                axis_filter.correct(f, c, m)
             else:
                 axis_filter.start(f, c, y, variance, 1.0)
             running = True
             block = i
         if running and i % hold == 0:
             ahead = delay + 0.5 * hold * GRID                  # from the stamp to the middle of the interval in force
-            earth, _, _ = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + ahead)
+            earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + ahead).angle
             aimed = earth + attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID + ahead)
         command(inputs[0], i, running and i % hold == 0, aimed)
         electronic_beam.step(state, constants, inputs, outputs)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from acu_tracker.estimation import axis_filter, unscented
+from acu_tracker.estimation.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import TrackerParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
@@ -122,7 +123,6 @@ def unscented_moments(params, t, truth, distance, noise, range_sigma, seed, firs
 def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, ranges, R_range, rate_variance, sums):
     out = np.zeros(1, axis_filter.ESTIMATE)
     o = out[0]
-    o.mu[:] = math.nan
     for run in range(len(azimuth)):
         state = np.zeros(1, unscented.STATE)
         s = state[0]
@@ -130,18 +130,20 @@ def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, 
             A, E, r = azimuth[run, k], elevation[run, k], ranges[run, k]
             o.nis = math.nan
             if k == 0:
-                motion = Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0))
-                unscented.start(s, c[0], motion, R, 0.0, rate_variance, R, 0.0, rate_variance, r, R_range)
+                known = AxisVariances(R, 0.0, rate_variance)
+                first = Estimate(Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0)), (known, known))
+                unscented.start(s, c[0], first, r, R_range)
             else:
                 unscented.predict(s, c[0], T)
-                nu, S, _, _, _, _ = unscented.innovation(s, A, E, r, R, R, R_range)
-                o.nis = nu * nu / S
-                unscented.correct(s, A, E, r)
+                m = Measurement(0.0, (AxisMeasurement(A, R, math.nan, math.nan),
+                                      AxisMeasurement(E, R, math.nan, math.nan)), r, R_range)
+                o.nis = unscented.innovation(s, m).axis[0].chi_square
+                unscented.correct(s, m)
             unscented.predict(s, c[0], 0.0)
-            o.angle, o.rate, o.acceleration = unscented.expected_angles(s).azimuth
-            o.variance, o.covariance, o.rate_variance, _, _, _, _ = unscented.expected_variances(s)
-            for j in range(len(unscented.MODES)):
-                o.mu[unscented.MODES[j]] = s.mu[j]
+            o.angle, o.rate, o.acceleration = unscented.expected(s).azimuth
+            axes, _ = unscented.variances(s)
+            o.variance, o.covariance, o.rate_variance = axes[0]
+            unscented.probabilities(s, o.mu)
             _add(sums[k], o, angle[k], rate[k], acceleration[k], A)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from acu_tracker.estimation import axis_filter
+from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.servo import feedforward
 from pedestal_bringup.studies import experiment
@@ -89,7 +90,7 @@ def _follow(target, known, f, c, lead, M, normals, out):
                     axis_filter.start(f[0], c[0], y, R, RATE)
                 else:
                     axis_filter.predict(f[0], c[0], T)
-                    axis_filter.correct(f[0], c[0], y, R, math.nan, math.nan)
+                    axis_filter.correct(f[0], c[0], AxisMeasurement(y, R, math.nan, math.nan))
                 _, v, a = axis_filter.outlook(f[0], c[0], lead)
             if len(known) > 0:
                 v, a = known[k]
