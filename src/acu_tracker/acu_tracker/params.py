@@ -62,8 +62,8 @@ class ElevationParameters(AxisParameters):
 
 
 @dataclasses.dataclass(frozen=True)
-class AcuParameters(Parameters):
-    """The antenna control unit."""
+class SharedParameters(Parameters):
+    """What belongs to no axis alone."""
 
     period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')
     step_gap: float = parameter(0.05, 1e-3, 10.0, 's', 'gap between drive steps after which targets := actual')
@@ -79,6 +79,12 @@ class AcuParameters(Parameters):
     blockage: str = text('', SECTORS_DOC)
     keyhole: KeyholeParameters = group(KeyholeParameters)
     tracker: TrackerParameters = group(TrackerParameters)
+
+
+@dataclasses.dataclass(frozen=True)
+class AcuParameters(SharedParameters):
+    """The antenna control unit."""
+
     azimuth: AxisParameters = group(AxisParameters)
     elevation: ElevationParameters = group(ElevationParameters)
 

@@ -71,7 +71,7 @@ def slewing(Rig, **parameters):
     rig = Rig(overhead(math.radians(88.0)), at=overhead(math.radians(88.0))(0.0), initial_mode='program', **SLOW,
               **{'tracker.handover': False}, **parameters)
     rig.program(start=-2.0, rows=90)
-    while not rig.state['off'][0] > 0.5 * BEAMWIDTH:
+    while not rig.state['pointing_offset'][0] > 0.5 * BEAMWIDTH:
         rig.run(0.1)
         assert rig.k * rig.T < CULMINATION
     return rig

@@ -31,14 +31,6 @@ GATED, STALE, NO_ATTITUDE = tracker.GATED, tracker.STALE, tracker.STALE + 1
 """What `take` makes of an error: what the tracker does, or NO_ATTITUDE."""
 
 
-class Pointing(typing.NamedTuple):
-    """Deck angles of the antenna [rad] and their rates [rad/s]."""
-    A: float
-    E: float
-    dA: float
-    dE: float
-
-
 class Followed(typing.NamedTuple):
     """A Motion to be pointed at: in the frame of the estimate (framed 1) or in earth angles (framed 0)."""
     framed: int

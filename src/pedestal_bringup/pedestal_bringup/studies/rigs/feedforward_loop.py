@@ -94,7 +94,7 @@ def _follow(target, known, f, c, lead, M, normals, out):
                 _, v, a = axis_filter.outlook(f[0], c[0], lead)
             if len(known) > 0:
                 v, a = known[k]
-            u = feedforward.rate(e, 0.0, feedforward.ahead(v, a, K_V, K_A), K_P)
+            u = feedforward.rate(e, 0.0, feedforward.fed(v, a, K_V, K_A), K_P)
             step = out[i, k]
             step.miss, step.rate, step.acceleration = target[k, 0] - theta, v, a
             axis_filter.probabilities(f[0], c[0], step.mu)
