@@ -134,7 +134,8 @@ def _take_attitude(s, c, u):
         if s.aligning:
             # Its heading is still being looked for: the mean begins with the one that is found.
             levelled_deck.restart(deck)
-        levelled_deck.take(deck, u.attitude_stamp, attitude.quaternion(s.attitude), c.p.keyhole.mean_time)
+        h = s.attitude.history
+        levelled_deck.take(deck, u.attitude_stamp, h.sample[h.newest], c.p.keyhole.mean_time)
     return _ATTITUDE if outcome == attitude.INVALID else 0
 
 
@@ -158,10 +159,10 @@ def _take_error(s, c, u, o):
     known, at = encoders.at(s.encoders, u.error_stamp - receiver.beam_age)
     if not known:
         return _ERROR_STAMP
-    azimuth, elevation = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
-    s.error[0], s.error[1] = azimuth - at.A, elevation - at.E
+    seen = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
+    s.error[0], s.error[1] = seen[0] - at.A, seen[1] - at.E
     restart_gap = math.inf if _outage_permitted(s, c) else c.p.tracker.restart_gap
-    outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, restart_gap)
+    outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, seen, restart_gap)
     for i in range(2):
         one = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)

@@ -1,5 +1,6 @@
 """The mode machine: which target the antenna follows, and why. One pure transition function over one table."""
 import typing
+from collections import namedtuple
 
 from pedestal_common.compiled import compiled
 
@@ -38,18 +39,12 @@ REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'att
 NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 
 
-class Situation(typing.NamedTuple):
-    """What decides.
+Situation = namedtuple('Situation', 'encoder_valid drive_ready attitude obstacle end')
+"""What decides.
 
-    drive_ready: the drive follows commands; a mode that runs ends with it, and none begins without it. attitude: NONE
-    or why it is not known; obstacle: for each mode NONE or what stands against entering it; end: for each mode NONE or
-    why it cannot go on.
-    """
-    encoder_valid: bool
-    drive_ready: bool
-    attitude: int
-    obstacle: tuple
-    end: tuple
+drive_ready: the drive follows commands; a mode that runs ends with it, and none begins without it. attitude: NONE
+or why it is not known; obstacle: for each mode NONE or what stands against entering it; end: for each mode NONE or
+why it cannot go on."""
 
 
 @compiled
@@ -66,11 +61,8 @@ def situation(encoder_valid, drive_ready, attitude, stow, preset, program, locke
                      (NONE, NONE, NONE, ends, SIGNAL_LOST if lost else NONE))
 
 
-class Decision(typing.NamedTuple):
-    """The mode from now on; reason: NONE where nothing happened; result: NO_REQUEST, REFUSED or ACCEPTED."""
-    mode: int
-    reason: int
-    result: int
+Decision = namedtuple('Decision', 'mode reason result')
+"""The mode from now on; reason: NONE where nothing happened; result: NO_REQUEST, REFUSED or ACCEPTED."""
 
 
 @compiled

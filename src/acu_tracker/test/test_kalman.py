@@ -2,7 +2,7 @@ import numpy as np
 from filterpy.kalman import KalmanFilter
 
 from acu_tracker.estimation import kalman, motion_models
-from acu_tracker.estimation.kalman import Gain, Gaussian, Symmetric
+from acu_tracker.estimation.kalman import Gaussian, Symmetric
 from acu_tracker.geometry.motion import AxisMotion
 
 T, ALPHA, R, R_RATE = 0.01, 0.5, 2.5e-7, 4e-6
@@ -50,7 +50,7 @@ def test_angle_and_rate_one_after_the_other_against_both_at_once():
 def test_covariance_of_any_gain_is_the_sum_of_what_is_left_and_what_is_let_in():
     P, K = Symmetric(3e-7, 2e-6, 1e-6, 5e-4, 3e-4, 2e-2), np.array([[0.3], [2.0], [5.0]])
     left = np.eye(3) - K @ np.array([[1.0, 0.0, 0.0]])
-    updated = kalman.update_with_gain(Gaussian(AxisMotion(0.1, 0.2, 0.3), P), 1e-3, R, Gain(*K[:, 0]))
+    updated = kalman.update_with_gain(Gaussian(AxisMotion(0.1, 0.2, 0.3), P), 1e-3, R, tuple(K[:, 0]))
     np.testing.assert_allclose(full(updated.P), left @ full(P) @ left.T + R * K @ K.T, rtol=1e-12)
     np.testing.assert_allclose(updated.x, np.array([0.1, 0.2, 0.3]) + 1e-3 * K[:, 0], rtol=1e-15)
 

@@ -4,7 +4,6 @@ One number, alpha, sets each; a relation gives the others.
 """
 import math
 
-from acu_tracker.estimation.kalman import Gain
 from pedestal_common.compiled import compiled
 
 
@@ -24,5 +23,5 @@ def kalata(alpha):
 
 @compiled
 def gain(alpha, beta, gamma, T):
-    """The Gain over T [s]."""
-    return Gain(alpha, beta / T, gamma / (2.0 * T * T))
+    """(k1 [-], k2 [1/s], k3 [1/s2]) over T [s]."""
+    return (alpha, beta / T, gamma / (2.0 * T * T))

@@ -2,7 +2,7 @@
 import math
 
 from acu_tracker.estimation import axis_filter
-from acu_tracker.estimation.measurement import Innovation
+from acu_tracker.estimation.measurement import Estimate, Innovation
 from acu_tracker.geometry.motion import Motion
 from pedestal_common.compiled import compiled
 
@@ -36,12 +36,7 @@ def correct(f, c, m):
 
 
 @compiled
-def expected(f):
-    """Motion of what `predict` left."""
-    return Motion(axis_filter.expected(f[0]).x, axis_filter.expected(f[1]).x)
-
-
-@compiled
-def variances(f):
-    """AxisVariances of both axes of what `predict` left."""
-    return axis_filter.variances(axis_filter.expected(f[0])), axis_filter.variances(axis_filter.expected(f[1]))
+def read(f):
+    """Estimate of what `predict` left."""
+    azimuth, elevation = axis_filter.expected(f[0]), axis_filter.expected(f[1])
+    return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(azimuth), axis_filter.variances(elevation)))

@@ -5,40 +5,20 @@ multiplied out. Two measurements of one instant are taken one after the other, w
 independent.
 """
 import math
-import typing
+from collections import namedtuple
 
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 
+Symmetric = namedtuple('Symmetric', 'p11 p12 p13 p22 p23 p33')
+"""Upper triangle of a symmetric 3 x 3 matrix, a covariance of angle, rate and acceleration."""
 
-class Symmetric(typing.NamedTuple):
-    """Upper triangle of a symmetric 3 x 3 matrix, a covariance of angle, rate and acceleration."""
-    p11: float
-    p12: float
-    p13: float
-    p22: float
-    p23: float
-    p33: float
+Gaussian = namedtuple('Gaussian', 'x P')
+"""What is known of one axis: its mean x = (x1, x2, x3) [rad, rad/s, rad/s2] and covariance P."""
 
+Transition = namedtuple('Transition', 'f13 f23 f33')
+"""Third column of F = [[1, T, f13], [0, 1, f23], [0, 0, f33]]."""
 
-class Gaussian(typing.NamedTuple):
-    """What is known of one axis: its mean x = (x1, x2, x3) [rad, rad/s, rad/s2] and covariance P."""
-    x: AxisMotion
-    P: Symmetric
-
-
-class Transition(typing.NamedTuple):
-    """Third column of F = [[1, T, f13], [0, 1, f23], [0, 0, f33]]."""
-    f13: float
-    f23: float
-    f33: float
-
-
-class Gain(typing.NamedTuple):
-    """K = (k1, k2, k3)' on the innovation of the angle [-, 1/s, 1/s2]."""
-    k1: float
-    k2: float
-    k3: float
 
 
 @compiled
@@ -89,8 +69,8 @@ def update_rate(g, nu, R):
 
 @compiled
 def update_with_gain(g, nu, R, K):
-    """The Gaussian after an innovation nu of the angle, with any gain K: P = (1 - K H) P (1 - K H)' + K R K' (Joseph),
-    multiplied out."""
+    """The Gaussian after an innovation nu of the angle, with any gain K = (k1, k2, k3) [-, 1/s, 1/s2]:
+    P = (1 - K H) P (1 - K H)' + K R K' (Joseph), multiplied out."""
     P, S = g.P, g.P.p11 + R
     k1, k2, k3 = K
     return Gaussian(_corrected(g.x, k1, k2, k3, nu),

@@ -1,58 +1,29 @@
 """What a target filter takes and gives: measurement, innovation, estimate. Index 0 is azimuth, 1 elevation."""
 import math
-import typing
+from collections import namedtuple
 
-from acu_tracker.geometry.motion import Motion
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import wrap
 
+AxisMeasurement = namedtuple('AxisMeasurement', 'angle variance rate rate_variance')
+"""Measured angle [rad] and rate [rad/s] of one axis with their variances; a rate that is NaN was not measured."""
 
-class AxisMeasurement(typing.NamedTuple):
-    """Measured angle [rad] and rate [rad/s] of one axis with their variances; a rate that is NaN was not measured."""
-    angle: float
-    variance: float
-    rate: float
-    rate_variance: float
+Measurement = namedtuple('Measurement', 'stamp axis range range_variance')
+"""stamp [s]; axis: the AxisMeasurement of both; range [m] and its variance, NaN where it was not measured."""
 
+AxisInnovation = namedtuple('AxisInnovation', 'nu S chi_square rate rate_chi_square')
+"""Innovation nu of the angle [rad] and its variance S, chi_square = nu^2 / S; rate [rad/s]: that of the rate, NaN
+where none was used; rate_chi_square: what the rate, given the angle, adds to nu' S^-1 nu of both. Each of the two
+is chi-square of one degree of freedom."""
 
-class Measurement(typing.NamedTuple):
-    """stamp [s]; axis: the AxisMeasurement of both; range [m] and its variance, NaN where it was not measured."""
-    stamp: float
-    axis: tuple
-    range: float
-    range_variance: float
+Innovation = namedtuple('Innovation', 'axis range_nu range_S')
+"""axis: the AxisInnovation of both; range_nu [m] and its variance range_S; NaN where nothing was compared."""
 
+AxisVariances = namedtuple('AxisVariances', 'p11 p12 p22')
+"""p11, p12, p22: variance of the angle [rad2], its covariance with the rate, variance of the rate [rad2/s2]."""
 
-class AxisInnovation(typing.NamedTuple):
-    """Innovation nu of the angle [rad] and its variance S, chi_square = nu^2 / S; rate [rad/s]: that of the rate, NaN
-    where none was used; rate_chi_square: what the rate, given the angle, adds to nu' S^-1 nu of both. Each of the two
-    is chi-square of one degree of freedom."""
-    nu: float
-    S: float
-    chi_square: float
-    rate: float
-    rate_chi_square: float
-
-
-class Innovation(typing.NamedTuple):
-    """axis: the AxisInnovation of both; range_nu [m] and its variance range_S; NaN where nothing was compared."""
-    axis: tuple
-    range_nu: float
-    range_S: float
-
-
-class AxisVariances(typing.NamedTuple):
-    """p11, p12, p22: variance of the angle [rad2], its covariance with the rate, variance of the rate [rad2/s2]."""
-    p11: float
-    p12: float
-    p22: float
-
-
-class Estimate(typing.NamedTuple):
-    """Motion of a target, and the AxisVariances of both axes."""
-    motion: Motion
-    variances: tuple
-
+Estimate = namedtuple('Estimate', 'motion variances')
+"""Motion of a target, and the AxisVariances of both axes."""
 
 _NONE = AxisInnovation(math.nan, math.nan, math.nan, math.nan, math.nan)
 NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)

@@ -13,6 +13,7 @@ below SERIES_BELOW the power series is used:
 """
 import math
 import typing
+from collections import namedtuple
 
 import numpy as np
 
@@ -53,11 +54,8 @@ def constants(name, params, **changes) -> np.ndarray:
     return m
 
 
-class Discrete(typing.NamedTuple):
-    """A model over T: mean: the Transition of the mean of X, F: that of its covariance, Q: its process noise."""
-    mean: Transition
-    F: Transition
-    Q: Symmetric
+Discrete = namedtuple('Discrete', 'mean F Q')
+"""A model over T: mean: the Transition of the mean of X, F: that of its covariance, Q: its process noise."""
 
 
 SERIES_BELOW = 0.5

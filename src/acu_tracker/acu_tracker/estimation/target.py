@@ -4,7 +4,7 @@ With a measured range the estimate is the line of sight of the INS, otherwise th
 angles are those of the earth, near the zenith those of a tilted frame (`estimate_frame`).
 """
 import math
-import typing
+from collections import namedtuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from acu_tracker.estimation.measurement import (
 )
 from acu_tracker.geometry import attitude, deck_reference, estimate_frame, lever_arm
 from acu_tracker.geometry.deck_reference import STILL, Attitude
-from acu_tracker.geometry.motion import LineOfSight, Motion, angles, earth_angles, line_of_sight
+from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Vector, rotated
 from pedestal_common import line_of_sight as pointing
 from pedestal_common.compiled import compiled
@@ -30,11 +30,8 @@ TARGET = np.dtype([('tracker', tracker.TRACKER), ('frame', estimate_frame.FRAME)
 GATED, STALE, NO_ATTITUDE = tracker.GATED, tracker.STALE, tracker.STALE + 1
 """What `take` makes of an error: what the tracker does, or NO_ATTITUDE."""
 
-
-class Followed(typing.NamedTuple):
-    """A Motion to be pointed at: in the frame of the estimate (framed 1) or in earth angles (framed 0)."""
-    framed: int
-    motion: Motion
+Followed = namedtuple('Followed', 'framed motion')
+"""A Motion to be pointed at: in the frame of the estimate (framed 1) or in earth angles (framed 0)."""
 
 
 def initialise(g):
@@ -71,17 +68,18 @@ def _measured_rates(g, deck, u, at):
 
 
 @compiled
-def take(g, p, c, deck, u, at, restart_gap):
+def take(g, p, c, deck, u, at, seen, restart_gap):
     """Filter the receiver's error of INPUTS u: (STARTED, ACCEPTED, GATED, STALE or NO_ATTITUDE; its Innovation).
 
-    p, c: records of the unit's parameters and of tracker.CONSTANTS; deck: ATTITUDE; at: Pointing of the antenna when
-    the error was measured; restart_gap: as in tracker.observe.
+    p, c: records of SharedParameters and of tracker.CONSTANTS; deck: ATTITUDE; at: Pointing of the antenna when the
+    error was measured; seen: deck angles (azimuth, elevation) of the target [rad], the antenna displaced by the error;
+    restart_gap: as in tracker.observe.
     """
     e = p.tracker.receiver
     t = u.error_stamp - e.age
     if not g.tracker.running:
         estimate_frame.level(g.frame)
-    azimuth, elevation = pointing.displaced(at.A, at.E, u.cross_elevation, u.elevation)
+    azimuth, elevation = seen
     if deck.stabilised or g.frame.tilted:
         if not attitude.at(deck, p, t):
             return NO_ATTITUDE, NO_INNOVATION

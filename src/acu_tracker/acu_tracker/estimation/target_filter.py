@@ -20,8 +20,9 @@ CONSTANTS = np.dtype([('axis', axis_filter.CONSTANTS, (2,)), ('cartesian', unsce
 """range_share_2: square of ukf.range_share; wanted: 1 for an axis of a kind that uses the Cartesian filter."""
 
 FILTER = np.dtype([('axis', axis_filter.FILTER, (2,)), ('cartesian', unscented.STATE), ('running', 'i8'),
-                   ('used', 'i8', (2,))], align=True)
-"""running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate."""
+                   ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
+"""running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate; predicted: by how long [s]
+the prior fields are ahead of what stands now, NaN where they are not of it."""
 
 
 def constants(ukf, axes) -> np.ndarray:
@@ -37,12 +38,16 @@ def constants(ukf, axes) -> np.ndarray:
 def start(f, c, m, rate_sigma):
     """Begin at a Measurement, the rates unknown to rate_sigma [rad/s]."""
     axes_filter.start(f.axis, c.axis, m, rate_sigma)
-    end_cartesian(f)
+    f.running = f.used[0] = f.used[1] = 0
+    f.predicted = math.nan
 
 
 @compiled
 def predict(f, c, T):
-    """Predict by T [s] >= 0 from the last measurement, for what follows."""
+    """Predict by T [s] >= 0 from the last measurement, for what follows; a second time costs nothing."""
+    if f.predicted == T:
+        return
+    f.predicted = T
     axes_filter.predict(f.axis, c.axis, T)
     if f.running:
         unscented.predict(f.cartesian, c.cartesian, T)
@@ -61,12 +66,13 @@ def innovation(f, m):
     if not f.running:
         return axes
     cartesian = unscented.innovation(f.cartesian, m)
-    return Innovation((_chosen(f.used[0], axes.axis[0], cartesian.axis[0]),
-                       _chosen(f.used[1], axes.axis[1], cartesian.axis[1])), cartesian.range_nu, cartesian.range_S)
+    azimuth = _chosen_innovation(f.used[0], axes.axis[0], cartesian.axis[0])
+    elevation = _chosen_innovation(f.used[1], axes.axis[1], cartesian.axis[1])
+    return Innovation((azimuth, elevation), cartesian.range_nu, cartesian.range_S)
 
 
 @compiled
-def _chosen(used, own, cartesian):
+def _chosen_innovation(used, own, cartesian):
     if not used:
         return own
     return AxisInnovation(cartesian.nu, cartesian.S, cartesian.chi_square, math.nan, own.rate_chi_square)
@@ -78,31 +84,30 @@ def correct(f, c, m):
     axes_filter.correct(f.axis, c.axis, m)
     if f.running:
         unscented.correct(f.cartesian, m)
+    f.predicted = math.nan
 
 
 @compiled
 def expected(f):
     """Motion of what `predict` left; the azimuth on the turn of the axis's filter."""
-    motion = axes_filter.expected(f.axis)
+    axes = axes_filter.read(f.axis).motion
     if not (f.used[0] or f.used[1]):
-        return motion
-    cartesian = unscented.expected(f.cartesian)
-    azimuth = motion.azimuth
+        return axes
+    cartesian, azimuth = unscented.expected(f.cartesian), axes.azimuth
     if f.used[0]:
-        A = azimuth.angle
-        azimuth = AxisMotion(A + wrap(cartesian.azimuth.angle - A), cartesian.azimuth.rate,
-                             cartesian.azimuth.acceleration)
-    return Motion(azimuth, cartesian.elevation if f.used[1] else motion.elevation)
+        _, dA, ddA = cartesian.azimuth
+        azimuth = AxisMotion(azimuth.angle + wrap(cartesian.azimuth.angle - azimuth.angle), dA, ddA)
+    return Motion(azimuth, cartesian.elevation if f.used[1] else axes.elevation)
 
 
 @compiled
-def variances(f):
-    """AxisVariances of both axes of what `predict` left."""
-    axes = axes_filter.variances(f.axis)
+def read(f):
+    """Estimate of what `predict` left."""
+    axes = axes_filter.read(f.axis)
     if not (f.used[0] or f.used[1]):
         return axes
-    cartesian, _ = unscented.variances(f.cartesian)
-    return cartesian[0] if f.used[0] else axes[0], cartesian[1] if f.used[1] else axes[1]
+    own, (cartesian, _) = axes.variances, unscented.variances(f.cartesian)
+    return Estimate(expected(f), (cartesian[0] if f.used[0] else own[0], cartesian[1] if f.used[1] else own[1]))
 
 
 @compiled
@@ -134,9 +139,8 @@ def select(f, c, m):
             f.running = 0
     elif (c.wanted[0] or c.wanted[1]) and m.range_variance <= c.range_share_2 * m.range * m.range:
         axes_filter.predict(f.axis, c.axis, 0.0)
-        axes = Estimate(axes_filter.expected(f.axis), axes_filter.variances(f.axis))
-        unscented.start(f.cartesian, c.cartesian, axes, m.range, m.range_variance)
-        f.running = 1
+        unscented.start(f.cartesian, c.cartesian, axes_filter.read(f.axis), m.range, m.range_variance)
+        f.running, f.predicted = 1, math.nan
 
 
 @compiled
@@ -145,7 +149,7 @@ def _use_cartesian(f, c):
     if (f.used[0] or not c.wanted[0]) and (f.used[1] or not c.wanted[1]):
         return
     predict(f, c, 0.0)
-    axes, (cartesian, _) = axes_filter.variances(f.axis), unscented.variances(f.cartesian)
+    axes, (cartesian, _) = axes_filter.read(f.axis).variances, unscented.variances(f.cartesian)
     for i in range(2):
         if c.wanted[i] and cartesian[i].p22 <= 0.25 * axes[i].p22:
             f.used[i] = 1
@@ -164,12 +168,7 @@ def _leave_cartesian(f, c, azimuth, elevation):
             if math.isfinite(motion[i].angle + motion[i].rate + motion[i].acceleration):
                 axis_filter.move(f.axis[i], c.axis[i], motion[i])
             f.used[i] = 0
-
-
-@compiled
-def end_cartesian(f):
-    """The Cartesian filter ends; the axes' filters are where they are."""
-    f.running = f.used[0] = f.used[1] = 0
+    f.predicted = math.nan
 
 
 @compiled
@@ -178,6 +177,7 @@ def transfer(f, c, rate_sigma, running):
 
     running: whether there is an estimate; rate_sigma: as in `start`.
     """
+    f.predicted = math.nan
     if running:
         for i in range(2):
             axis_filter.transfer(f.axis[i], c.axis[i], rate_sigma)
@@ -190,6 +190,7 @@ def transfer(f, c, rate_sigma, running):
 def move(f, c, motion):
     """The angles are counted in another frame, where the target has this Motion now; the covariances stay. The
     Cartesian filter, which lives in the old one, ends."""
-    end_cartesian(f)
+    f.running = f.used[0] = f.used[1] = 0
     for i in range(2):
         axis_filter.move(f.axis[i], c.axis[i], motion[i])
+    f.predicted = math.nan

@@ -9,7 +9,6 @@ import numpy as np
 from acu_tracker.estimation import target_filter
 from acu_tracker.estimation.measurement import (
     NO_INNOVATION,
-    Estimate,
     Measurement,
     with_azimuth_near,
     with_rate,
@@ -145,7 +144,7 @@ def _converged(f, k, m, initial_rate):
     variance grows as 1/cos2 of the elevation does.
     """
     target_filter.predict(f, k, 0.0)
-    azimuth, elevation = target_filter.variances(f)
+    azimuth, elevation = target_filter.read(f).variances
     known = (0.25 * initial_rate)**2
     return azimuth.p22 * m.axis[1].variance < known * m.axis[0].variance and elevation.p22 < known
 
@@ -169,5 +168,5 @@ def outlook(t, c, stamp):
 @compiled
 def read(t, c, stamp):
     """Estimate at a stamp [s], as `outlook`."""
-    motion = outlook(t, c, stamp)
-    return Estimate(motion, target_filter.variances(t.filter))
+    target_filter.predict(t.filter, c.filter, max(stamp - t.stamp, 0.0))
+    return target_filter.read(t.filter)

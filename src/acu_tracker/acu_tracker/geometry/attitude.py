@@ -74,12 +74,6 @@ def take(s, p, t_k, stamp, q, w):
 
 
 @compiled
-def quaternion(s):
-    """The quaternion (4,) taken last."""
-    return s.history.sample[s.history.newest, :4]
-
-
-@compiled
 def at(s, p, t):
     """Whether there is an attitude at t [s], between two samples or predicted from the last; `found` gives it."""
     if not s.stabilised:

@@ -1,15 +1,12 @@
 """Which of the azimuths that are whole turns apart the axis takes: its travel is more than one turn."""
 import math
-import typing
+from collections import namedtuple
 
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import wrap
 
-
-class Travel(typing.NamedTuple):
-    """How far the azimuth of a target still goes below (<= 0) and above (>= 0) where it is now [rad]."""
-    below: float
-    above: float
+Travel = namedtuple('Travel', 'below above')
+"""How far the azimuth of a target still goes below (<= 0) and above (>= 0) where it is now [rad]."""
 
 
 @compiled

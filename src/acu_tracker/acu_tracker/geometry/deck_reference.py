@@ -3,9 +3,7 @@
 Exact: the unit vector is differentiated twice, with M'_dot = -[w x] M',
 u_d = M' u,    u_d' = M' u' - w x u_d,    u_d'' = M' u'' - w x (2 M' u' - w x u_d) - dw x u_d.
 """
-import typing
-
-import numpy as np
+from collections import namedtuple
 
 from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles
 from acu_tracker.geometry.vector import Vector, cross, minus, rotated, rotated_back, times
@@ -15,12 +13,9 @@ from pedestal_common.compiled import compiled
 STILL = Vector(0.0, 0.0, 0.0)
 
 
-class Attitude(typing.NamedTuple):
-    """Rotation (3, 3) from the deck to the frame the target is given in; rate w [rad/s] and angular acceleration dw
-    [rad/s2] of the deck, FLU."""
-    mat: np.ndarray
-    w: Vector
-    dw: Vector
+Attitude = namedtuple('Attitude', 'mat w dw')
+"""Rotation (3, 3) from the deck to the frame the target is given in; rate w [rad/s] and angular acceleration dw
+[rad/s2] of the deck, FLU."""
 
 
 @compiled

@@ -1,6 +1,6 @@
 """The encoders of both axes in the last steps, and where the antenna pointed at any instant among them."""
 import math
-import typing
+from collections import namedtuple
 
 from acu_tracker.history import bracket, history_type, interpolated, push
 from pedestal_common.compiled import compiled
@@ -8,13 +8,8 @@ from pedestal_common.compiled import compiled
 ENCODERS = history_type(4)
 """Azimuth, elevation [rad], their rates [rad/s], deck angles."""
 
-
-class Pointing(typing.NamedTuple):
-    """Deck angles of the antenna [rad] and their rates [rad/s]."""
-    A: float
-    E: float
-    dA: float
-    dE: float
+Pointing = namedtuple('Pointing', 'A E dA dE')
+"""Deck angles of the antenna [rad] and their rates [rad/s]."""
 
 
 @compiled

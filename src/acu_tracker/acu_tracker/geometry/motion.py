@@ -4,30 +4,19 @@ Azimuth is clockwise, from north in the earth's frame and from the bow on the de
 a vector in north-west-up and of one in FLU. Elsewhere earth vectors are ENU; `north_west_up` leads from there.
 """
 import math
-import typing
+from collections import namedtuple
 
 from acu_tracker.geometry.vector import Vector, dot, minus, times
 from pedestal_common.compiled import compiled
 
+AxisMotion = namedtuple('AxisMotion', 'angle rate acceleration')
+"""Angle [rad], rate [rad/s] and acceleration [rad/s2] of one axis."""
 
-class AxisMotion(typing.NamedTuple):
-    """Angle [rad], rate [rad/s] and acceleration [rad/s2] of one axis."""
-    angle: float
-    rate: float
-    acceleration: float
+Motion = namedtuple('Motion', 'azimuth elevation')
+"""Both axes; motion[0] is azimuth, motion[1] elevation."""
 
-
-class Motion(typing.NamedTuple):
-    """Both axes; motion[0] is azimuth, motion[1] elevation."""
-    azimuth: AxisMotion
-    elevation: AxisMotion
-
-
-class LineOfSight(typing.NamedTuple):
-    """Unit vector u [-] towards the target, its first [1/s] and second [1/s2] derivative."""
-    u: Vector
-    du: Vector
-    ddu: Vector
+LineOfSight = namedtuple('LineOfSight', 'u du ddu')
+"""Unit vector u [-] towards the target, its first [1/s] and second [1/s2] derivative."""
 
 
 @compiled

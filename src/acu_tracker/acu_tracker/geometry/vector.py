@@ -1,15 +1,11 @@
 """Vectors of three numbers, as the laws of the geometry write them."""
-import typing
+from collections import namedtuple
 
 from pedestal_common import line_of_sight
 from pedestal_common.compiled import compiled
 
-
-class Vector(typing.NamedTuple):
-    """Components along the axes of a frame that the docstring of its user names."""
-    x: float
-    y: float
-    z: float
+Vector = namedtuple('Vector', 'x y z')
+"""Components along the axes of a frame that the docstring of its user names."""
 
 
 @compiled

@@ -4,7 +4,7 @@ The axis leaves the target at t1, turns as fast as it may, and meets it again at
 round t1 is chosen so that least signal is lost; t2 follows from it.
 """
 import math
-import typing
+from collections import namedtuple
 
 import numpy as np
 
@@ -24,19 +24,12 @@ NOTHING, PLANNED, NO_WRAP, BEYOND = range(4)
 """What `plan` comes to: no keyhole, one that is planned for, one that no azimuth wrap lets through, one whose end lies
 beyond the path."""
 
+Passage = namedtuple('Passage', 'path azimuth limits after tilt')
+"""A keyhole to be slewed through.
 
-class Passage(typing.NamedTuple):
-    """A keyhole to be slewed through.
-
-    path: a completed Path; azimuth: of the axis at its first row [rad]; limits: record of LIMITS; after: when
-    following is possible again [s]; tilt: of the deck [rad rms about one axis], normally distributed, which a slew
-    cannot follow.
-    """
-    path: paths.Path
-    azimuth: float
-    limits: np.void
-    after: float
-    tilt: float
+path: a completed Path; azimuth: of the axis at its first row [rad]; limits: record of LIMITS; after: when
+following is possible again [s]; tilt: of the deck [rad rms about one axis], normally distributed, which a slew
+cannot follow."""
 
 
 @compiled

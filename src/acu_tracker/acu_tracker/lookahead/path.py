@@ -1,8 +1,6 @@
 """The path of the target on the levelled deck, from now on: along the program track, or on its great circle."""
 import math
-import typing
-
-import numpy as np
+from collections import namedtuple
 
 from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back
 from acu_tracker.program import bridge as program_bridge
@@ -13,12 +11,9 @@ from pedestal_common.line_of_sight import wrap
 ROWS, COLUMNS = 1025, 6
 
 
-class Path(typing.NamedTuple):
-    """rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), and set by `complete`
-    the azimuth counted through all turns, the least and the largest azimuth from there to the end [rad]."""
-    rows: np.ndarray
-    t0: float
-    h: float
+Path = namedtuple('Path', 'rows t0 h')
+"""rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), and set by `complete`
+the azimuth counted through all turns, the least and the largest azimuth from there to the end [rad]."""
 
 
 @compiled

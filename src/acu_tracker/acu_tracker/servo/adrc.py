@@ -12,16 +12,8 @@ NLC (11)    u0 = v3 + w_c^2 (v1 - z1) + 2 w_c (v2 - z2): fhan (h1 = 1/w_c) in it
             leaves; u = (u0 - known part - z3) / b0, where the paper prints u0 - z3 / b0
 """
 import math
-import typing
 
 from pedestal_common.compiled import compiled
-
-
-class Observed(typing.NamedTuple):
-    """What the observer knows: angle z1 [rad], rate z2 [rad/s], disturbance z3 [rad/s2]."""
-    z1: float
-    z2: float
-    z3: float
 
 
 @compiled
@@ -43,19 +35,19 @@ def observer_gains(w_o, w_s, h):
 
 @compiled
 def observed(z, y, u, v3, w_o, w_s, h):
-    """Observed at the encoder angle y [rad], h [s] after z; u [rad/s] and v3 [rad/s2] were in force since."""
-    z1, z2, z3 = z
+    """z = (z1, z2, z3) at the encoder angle y [rad], h [s] after z (3,); u [rad/s], v3 [rad/s2] were in force since."""
+    z1, z2, z3 = z[0], z[1], z[2]
     g = -math.expm1(-w_s * h) / w_s
     settled = u + (v3 + z3) / w_s
     z1 += h * settled + g * (z2 - settled)
     z2 += w_s * g * (settled - z2)
     l1, l2, l3 = observer_gains(w_o, w_s, h)
     e = y - z1
-    return Observed(z1 + l1 * e, z2 + l2 * e, z3 + l3 * e)
+    return z1 + l1 * e, z2 + l2 * e, z3 + l3 * e
 
 
 @compiled
 def rate(z, v1, v2, v2_m, w_c, w_s):
-    """Rate command [rad/s]: v1 [rad], v2 [rad/s] at t_k are to be met, v2_m at t_m is fed forward."""
-    u0 = w_c * w_c * (v1 - z.z1) + 2.0 * w_c * (v2 - z.z2)
-    return v2_m + (z.z2 - v2) + (u0 - z.z3) / w_s
+    """Rate command [rad/s] of z (3,): v1 [rad], v2 [rad/s] at t_k are to be met, v2_m at t_m is fed forward."""
+    u0 = w_c * w_c * (v1 - z[0]) + 2.0 * w_c * (v2 - z[1])
+    return v2_m + (z[1] - v2) + (u0 - z[2]) / w_s

@@ -5,14 +5,13 @@ feed the one of t_m forward.
 `beam` steers an electronic beam, there is nothing to control: the command is the raw target at t_m or, in autotrack of
 the forms type_1 and type_2, what paper 002's loop makes of the receiver's error.
 """
-import typing
+from collections import namedtuple
 
 import numpy as np
 
 from acu_tracker.estimation import alpha_beta
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import adrc, beam_loop, feedforward, notch, pid, reference
-from acu_tracker.servo.adrc import Observed
 from pedestal_common.compiled import compiled
 
 CONTROLLERS = ('pid', 'feedforward', 'adrc', 'beam')
@@ -27,36 +26,19 @@ AXIS = np.dtype([
 ], align=True)
 
 
-class Instants(typing.NamedTuple):
-    """t_k: stamp of the drive step, t_m: middle of the interval in which its command is in force; dt since the step
-    before [s]."""
-    t_k: float
-    t_m: float
-    dt: float
+Instants = namedtuple('Instants', 't_k t_m dt')
+"""t_k: stamp of the drive step, t_m: middle of the interval in which its command is in force; dt since the step
+before [s]."""
 
+Feedback = namedtuple('Feedback', 'y dy error V closed')
+"""Of one axis at t_k: encoder angle y [rad] and rate dy [rad/s].
 
-class Feedback(typing.NamedTuple):
-    """Of one axis at t_k: encoder angle y [rad] and rate dy [rad/s].
+error: of the receiver in this angle [rad], NaN where none came; V: rate at which a fixed target seems to move
+because the deck does [rad/s]; closed: whether a beam closes its own loop on both."""
 
-    error: of the receiver in this angle [rad], NaN where none came; V: rate at which a fixed target seems to move
-    because the deck does [rad/s]; closed: whether a beam closes its own loop on both.
-    """
-    y: float
-    dy: float
-    error: float
-    V: float
-    closed: bool
-
-
-class Command(typing.NamedTuple):
-    """rate [rad/s] and load torque [Nm]; reference: the AxisMotion that is compared with the encoder at t_k, of a beam
-    the command; what was limited."""
-    rate: float
-    torque: float
-    reference: AxisMotion
-    angle_limited: bool
-    rate_limited: bool
-    acceleration_limited: bool
+Command = namedtuple('Command', 'rate torque reference angle_limited rate_limited acceleration_limited')
+"""rate [rad/s] and load torque [Nm]; reference: the AxisMotion that is compared with the encoder at t_k, of a beam
+the command; what was limited."""
 
 
 @compiled
@@ -182,11 +164,6 @@ def _held_inside(target, low, high):
 
 
 @compiled
-def _observed(axis):
-    return Observed(axis.z[0], axis.z[1], axis.z[2])
-
-
-@compiled
 def _control_law(axis, p, e, v):
     """(rate command before notch and limits, what of it is fed forward) [rad/s]; e = v.angle - encoder, v at t_k."""
     if p.controller == PID:
@@ -197,7 +174,7 @@ def _control_law(axis, p, e, v):
         fed = feedforward.fed(r.rate, r.acceleration, k.rate_feedforward, k.acceleration_feedforward)
         return feedforward.rate(e, axis.integral, fed, k.bandwidth), fed
     k = p.adrc
-    return adrc.rate(_observed(axis), v.angle, v.rate, r.rate, k.bandwidth, k.rate_bandwidth), r.rate
+    return adrc.rate(axis.z, v.angle, v.rate, r.rate, k.bandwidth, k.rate_bandwidth), r.rate
 
 
 @compiled
@@ -222,7 +199,7 @@ def _update(axis, p, e, y, now):
         if h > 0.0:
             # The command and the acceleration that were in force since the observer was last there.
             u, v3 = reference.in_force(axis.reference, now.t_k - 0.5 * h)
-            axis.z[0], axis.z[1], axis.z[2] = adrc.observed(_observed(axis), y, u, v3, p.adrc.observer_bandwidth,
+            axis.z[0], axis.z[1], axis.z[2] = adrc.observed(axis.z, y, u, v3, p.adrc.observer_bandwidth,
                                                             p.adrc.rate_bandwidth, h)
             axis.observed = now.t_k
     else:
