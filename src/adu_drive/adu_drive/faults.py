@@ -5,6 +5,7 @@ from pedestal_common.compiled import compiled
 KINDS = ('overcurrent', 'overspeed', 'encoder disagreement', 'following error', 'overtemperature')
 """Bit i of a fault word stands for KINDS[i]."""
 OVERCURRENT, OVERSPEED, DISAGREEMENT, FOLLOWING, OVERTEMPERATURE = (1 << i for i in range(len(KINDS)))
+ALL = (1 << len(KINDS)) - 1
 
 
 def names(bits):
