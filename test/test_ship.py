@@ -39,11 +39,10 @@ def isolated(name, *overrides):
     """The isolation.Isolation of a scenario."""
     chosen, run, on = track(name, *overrides)
     constants = motion.constants(chosen.node_parameters('ship_motion').ship)
-    inputs, truth = np.zeros(1, motion.INPUTS), np.zeros(on.sum(), motion.OUTPUTS)
+    truth = np.zeros(on.sum(), motion.OUTPUTS)
     t = run.t[on]
     for k in range(t.size):
-        inputs['t'] = t[k]
-        motion.step(constants, inputs, truth[k:k + 1])
+        motion.truth(constants[0], t[k], truth[k])
     built = target.build(chosen.node_parameters('tracking_receiver').target, chosen.header.duration)
     azimuth, elevation, distance = target.look_angles(built, t)
     seen = np.column_stack((np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation),
@@ -85,7 +84,7 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     run = closed_loop.Loop(chosen).run()
     automatic = run['acu/mode'] == modes.AUTOTRACK
     first = np.argmax(automatic)
-    plan = run.units['acu'].memory.state[0]['ahead']['plan']
+    plan = run.units['acu'].parts['state']['ahead']['plan']
     assert automatic[first:].all() and plan['needed'] > math.radians(100.0)
     off = np.hypot(*run.truth['error'].T)
     t = run.t

@@ -9,7 +9,7 @@ from acu_tracker.program import program_track
 from pedestal_common import messages, nodes, topics
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
 
 JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
@@ -25,16 +25,16 @@ ALIGNING = topics.BY_NAME[INS].texts.index('aligning')
 """Codes of what they tell; one that never tells anything, topics.SILENT, counts as ready and as aligned."""
 
 
+RECORD = np.dtype([('state', control_unit.STATE), ('constants', control_unit.CONSTANTS),
+                   ('inputs', control_unit.INPUTS), ('outputs', control_unit.OUTPUTS), ('invalid', 'i8')], align=True)
+"""invalid: the bits of control_unit.INVALID_INPUTS that were set since the last diagnosis."""
+
+
 class Memory(typing.NamedTuple):
-    """All the control unit works on: records (1,), the program track; invalid (1,): the bits of
-    control_unit.INVALID_INPUTS that were set since the last diagnosis."""
-    state: np.ndarray
-    constants: np.ndarray
-    inputs: np.ndarray
-    outputs: np.ndarray
+    """All the control unit works on: the program track, times (n,) [s] and earth angles (n, 2) [rad]."""
+    record: np.ndarray
     times: np.ndarray
     angles: np.ndarray
-    invalid: np.ndarray
 
 
 @compiled
@@ -92,12 +92,12 @@ def encode(o, ahead, stamp, outputs):
 @compiled
 def law(memory, stamp, inputs, outputs):
     """Step k."""
-    m, u, o = memory, memory.inputs[0], memory.outputs[0]
-    decode(u, stamp, inputs)
-    control_unit.step(m.state, m.constants, m.inputs, m.outputs, m.times, m.angles)
-    u.preset_valid = 0
-    m.invalid[0] |= o.invalid_input
-    encode(o, m.state[0].ahead, stamp, outputs)
+    m = memory.record[0]
+    decode(m.inputs, stamp, inputs)
+    control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.times, memory.angles)
+    m.inputs.preset_valid = 0
+    m.invalid |= m.outputs.invalid_input
+    encode(m.outputs, m.state.ahead, stamp, outputs)
 
 
 @compiled
@@ -116,12 +116,11 @@ class Acu(Unit):
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
-        inputs, outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
-        inputs['stabilised'], inputs['drive_ready'] = ATTITUDE in self.reads, 1
-        outputs['mode'] = modes.STANDBY
-        control_unit.clear(outputs[0])
-        self.memory = Memory(control_unit.initial_state(parameters), control_unit.constants(parameters), inputs,
-                             outputs, np.zeros(0), np.zeros((0, 2)), np.zeros(1, np.int64))
+        self.memory = Memory(joined(RECORD, state=control_unit.initial_state(parameters),
+                                    constants=control_unit.constants(parameters)), np.zeros(0), np.zeros((0, 2)))
+        self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE in self.reads, 1
+        self.parts['outputs']['mode'] = modes.STANDBY
+        control_unit.clear(self.parts['outputs'])
         self.drive_state = 'unknown'
 
     def latency(self, topic):
@@ -129,18 +128,18 @@ class Acu(Unit):
 
     def configure(self, parameters):
         super().configure(parameters)
-        self.memory = self.memory._replace(constants=control_unit.constants(parameters))
+        self.memory.record['constants'] = control_unit.constants(parameters)
 
     def decode(self, topic, message):
         """A program track: two or more points in earth angles; or a preset: one point in deck angles. Raises
         ValueError."""
         times, angles = rows(message)
         if len(angles) == 1:
-            self.memory.inputs['preset'], self.memory.inputs['preset_valid'] = angles[0], 1
+            self.parts['inputs']['preset'], self.parts['inputs']['preset_valid'] = angles[0], 1
         else:
             start = messages.nanoseconds(message.header.stamp) * 1e-9
             times, angles = program_track.checked(times + start, angles)
-            self.memory.inputs['program_count'] = len(times)
+            self.parts['inputs']['program_count'] = len(times)
             self.memory = self.memory._replace(times=times, angles=angles)
 
     def take_text(self, topic, text):
@@ -149,7 +148,7 @@ class Acu(Unit):
             self.drive_state = text
 
     def encode(self, topic, code):
-        ahead = self.memory.state[0]['ahead']
+        ahead = self.parts['state']['ahead']
         if topic == KEYHOLE:
             return announcement.keyhole(ahead, self.parameters.tracker.receiver.beamwidth)
         return announcement.hidden(ahead) if topic == BLOCKAGE else modes.MODES[code]
@@ -158,21 +157,21 @@ class Acu(Unit):
         mode = name.removeprefix('acu/')
         if mode == 'reset_faults':
             return Reply(True, 'cleared')
-        m = self.memory
-        m.inputs['drive_ready'] = self.inputs[DRIVE] <= READY
-        granted = control_unit.request(m.state, m.constants, m.inputs, m.outputs, modes.MODES.index(mode), m.times,
-                                       m.angles)
-        refusal = '' if granted else f'refused: {modes.REASONS[m.outputs[0]["reason"]]}; '
-        return Reply(bool(granted), f'{refusal}mode is {modes.MODES[m.outputs[0]["mode"]]}')
+        m, outputs = self.parts, self.parts['outputs']
+        m['inputs']['drive_ready'] = self.inputs[0][DRIVE] <= READY
+        granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, modes.MODES.index(mode),
+                                       self.memory.times, self.memory.angles)
+        refusal = '' if granted else f'refused: {modes.REASONS[outputs["reason"]]}; '
+        return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
 
     def requests_for(self, topic, text):
         return [f'acu/{text}'] if topic == MODE and text in modes.MODES else []
 
     def diagnose(self):
-        state, outputs = self.memory.state[0], self.memory.outputs[0]
+        state, outputs = self.parts['state'], self.parts['outputs']
         mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
-        invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.memory.invalid[0] >> i & 1]
-        self.memory.invalid[0] = 0
+        invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
+        self.parts['invalid'] = 0
         values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
                   ('coasting', str(int(outputs['coasting']))), ('drive', self.drive_state),
                   ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),

@@ -9,7 +9,7 @@ from pedestal_common import messages, records
 
 def test_diagnostics_show_whether_the_filter_is_honest():
     unit = Acu(AcuParameters(), ())
-    outputs = unit.memory.outputs
+    outputs = unit.memory.record['outputs']
     outputs['gated'], outputs['rates_gated'], outputs['ranges_gated'] = 3, 5, 7
     outputs['innovation'], outputs['nis'] = [(np.radians(0.0123456), np.nan)], [(1.23456, np.nan)]
     values = dict(unit.diagnose().values)

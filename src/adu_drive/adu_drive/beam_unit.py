@@ -8,7 +8,7 @@ from adu_drive import electronic_beam
 from pedestal_common import nodes, topics
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
 
 COMMAND, JOINTS, CLOCK, STATE = 'acu/reference', 'joint_states', 'clock', 'adu/state'
 
@@ -21,13 +21,14 @@ SWITCHES = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('i
 invalid: 1 when a command held no angle since the last diagnosis."""
 
 
+RECORD = np.dtype([('state', electronic_beam.STATE), ('constants', electronic_beam.CONSTANTS),
+                   ('inputs', electronic_beam.INPUTS), ('outputs', electronic_beam.OUTPUTS), ('switches', SWITCHES)],
+                  align=True)
+
+
 class Memory(typing.NamedTuple):
-    """All a beam works on, records (1,)."""
-    state: np.ndarray
-    constants: np.ndarray
-    inputs: np.ndarray
-    outputs: np.ndarray
-    switches: np.ndarray
+    """All a beam works on."""
+    record: np.ndarray
 
 
 @compiled
@@ -60,15 +61,15 @@ def encode(y, m, stamp, said):
 def law(memory, stamp, inputs, outputs):
     """Step k: from t_k-1 to t_k by the command of step k - 1. While it is not enabled it hears nothing, and what is on
     its way to it is lost."""
-    m = memory.switches[0]
-    if m.stamp != NEVER:
-        decode(memory.inputs[0], m, inputs[COMMAND])
-        if condition(m) != ENABLED:
-            memory.state[0].released = memory.state[0].written
-        electronic_beam.step(memory.state, memory.constants, memory.inputs, memory.outputs)
-        m.invalid |= memory.outputs[0].invalid_command
-    m.stamp = stamp
-    encode(memory.outputs[0], m, stamp, outputs)
+    m = memory.record[0]
+    if m.switches.stamp != NEVER:
+        decode(m.inputs, m.switches, inputs[COMMAND])
+        if condition(m.switches) != ENABLED:
+            m.state.released = m.state.written
+        electronic_beam.step(m.state, m.constants, m.inputs, m.outputs)
+        m.switches.invalid |= m.outputs.invalid_command
+    m.switches.stamp = stamp
+    encode(m.outputs, m.switches, stamp, outputs)
 
 
 @compiled
@@ -86,13 +87,12 @@ class Beam(Unit):
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         p = parameters
-        state = electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)
-        switches, outputs = np.zeros(1, SWITCHES), np.zeros(1, electronic_beam.OUTPUTS)
+        switches = np.zeros(1, SWITCHES)
         switches['wanted'], switches['stamp'] = 1, NEVER
-        electronic_beam.read(state, outputs)
-        self.memory = Memory(state, electronic_beam.constants(p.period, p.transport_delay,
-                                                              p.command_timeout * p.period),
-                             np.zeros(1, electronic_beam.INPUTS), outputs, switches)
+        constants = electronic_beam.constants(p.period, p.transport_delay, p.command_timeout * p.period)
+        self.memory = Memory(joined(RECORD, constants=constants, switches=switches,
+                                    state=electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)))
+        electronic_beam.read(self.parts['state'], self.parts['outputs'])
 
     def latency(self, topic):
         return self.parameters.period
@@ -103,10 +103,10 @@ class Beam(Unit):
     @property
     def condition(self):
         """The text of adu/state as it is now, also between two steps."""
-        return CONDITIONS[condition(self.memory.switches[0])]
+        return CONDITIONS[condition(self.parts['switches'])]
 
     def request(self, name):
-        m = self.memory.switches[0]
+        m = self.parts['switches']
         if name == 'adu/enable' and m['emergency']:
             return Reply(False, 'refused: an emergency stop is latched (adu/reset_faults); '
                          f'drive is {self.condition}')
@@ -119,11 +119,11 @@ class Beam(Unit):
     def requests_for(self, topic, text):
         if text == CONDITIONS[EMERGENCY_STOP]:
             return ['adu/emergency_stop']
-        latched = self.memory.switches[0]['emergency']
+        latched = self.parts['switches']['emergency']
         return [*(['adu/reset_faults'] if latched else []), 'adu/enable' if text == 'enabled' else 'adu/disable']
 
     def diagnose(self):
-        outputs, switches = self.memory.outputs[0], self.memory.switches[0]
+        outputs, switches = self.parts['outputs'], self.parts['switches']
         invalid, switches['invalid'] = switches['invalid'], 0
         values = [*((f'{axis}_deg', f'{math.degrees(angle):.4f}')
                     for axis, angle in zip(topics.AXES, outputs['position'])), ('state', self.condition)]

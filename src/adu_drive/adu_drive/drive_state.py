@@ -104,13 +104,12 @@ def advance(s, c):
 
 
 @compiled
-def request(state, constants, what):
+def request(s, c, what):
     """Ask something of the drive between two periods: GRANTED, or why not. It acts in the next period.
 
     Faults and emergency stop can be reset when both axes stand and no cause is present; the drive is then enabled
     again by itself if it was before.
     """
-    s, c = state[0], constants[0]
     if what == DISABLE:
         s.wanted = 0
     elif what == EMERGENCY_STOP:

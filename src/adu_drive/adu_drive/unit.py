@@ -8,7 +8,7 @@ from adu_drive import drive_state, drive_unit, faults, thermal
 from pedestal_common import nodes, topics
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
 
 CLOCK, COMMAND, SHIP, JOINTS, MOTORS = 'clock', 'acu/rate_command', 'ship/truth', 'joint_states', 'adu/motor_states'
 STATE = 'adu/state'
@@ -22,13 +22,13 @@ LINK = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8')
 which a command is stale; stale: 1 while it is; invalid: of INVALID, since the last diagnosis."""
 
 
+RECORD = np.dtype([('state', drive_unit.STATE), ('constants', drive_unit.CONSTANTS), ('inputs', drive_unit.INPUTS),
+                   ('outputs', drive_unit.OUTPUTS), ('link', LINK)], align=True)
+
+
 class Memory(typing.NamedTuple):
-    """All the drive works on, records (1,)."""
-    state: np.ndarray
-    constants: np.ndarray
-    inputs: np.ndarray
-    outputs: np.ndarray
-    link: np.ndarray
+    """All the drive works on."""
+    record: np.ndarray
 
 
 @compiled
@@ -83,14 +83,14 @@ def encode(y, stamp, outputs):
 @compiled
 def law(memory, stamp, inputs, outputs):
     """Step k: from t_k-1 to t_k, obeying what was said of step k - 1."""
-    m = memory.link[0]
-    if m.stamp != NEVER:
-        decode(memory.inputs[0], m, inputs[COMMAND], inputs[SHIP])
-        drive_unit.step(memory.state, memory.constants, memory.inputs, memory.outputs)
-        if memory.outputs[0].invalid_command:
-            note_invalid(memory.inputs[0], m)
-    m.stamp = stamp
-    encode(memory.outputs[0], stamp, outputs)
+    m = memory.record[0]
+    if m.link.stamp != NEVER:
+        decode(m.inputs, m.link, inputs[COMMAND], inputs[SHIP])
+        drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
+        if m.outputs.invalid_command:
+            note_invalid(m.inputs, m.link)
+    m.link.stamp = stamp
+    encode(m.outputs, stamp, outputs)
 
 
 @compiled
@@ -107,12 +107,12 @@ class Adu(Unit):
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
-        link, outputs = np.zeros(1, LINK), np.zeros(1, drive_unit.OUTPUTS)
+        link = np.zeros(1, LINK)
         link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NEVER
         link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
-        self.memory = Memory(drive_unit.initial_state(parameters), drive_unit.constants(parameters),
-                             np.zeros(1, drive_unit.INPUTS), outputs, link)
-        drive_unit.read(self.memory.state, self.memory.constants, outputs)
+        self.memory = Memory(joined(RECORD, state=drive_unit.initial_state(parameters),
+                                    constants=drive_unit.constants(parameters), link=link))
+        drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
 
     def latency(self, topic):
         return self.parameters.period
@@ -123,17 +123,17 @@ class Adu(Unit):
     @property
     def condition(self):
         """The text of adu/state as it is now, also between two steps."""
-        return drive_state.described(int(self.memory.outputs[0]['condition']))
+        return drive_state.described(int(self.parts['outputs']['condition']))
 
     def request(self, name):
-        answer = drive_unit.request(self.memory.state, self.memory.constants, self.memory.outputs,
-                                    drive_state.REQUESTS[name])
+        m = self.parts
+        answer = drive_unit.request(m['state'], m['constants'], m['outputs'], drive_state.REQUESTS[name])
         granted = answer == drive_state.GRANTED
         refusal = '' if granted else f'refused: {drive_state.REFUSALS[answer]}; '
         return Reply(granted, f'{refusal}drive is {self.condition}')
 
     def requests_for(self, topic, text):
-        o = self.memory.outputs[0]
+        o = self.parts['outputs']
         tripped, stopped = 'fault' in text, 'emergency stop' in text
         latched = o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults']
         wanted = {'adu/emergency_stop': stopped and not o['emergency'],
@@ -143,7 +143,7 @@ class Adu(Unit):
         return [service for service, due in wanted.items() if due]
 
     def diagnose(self):
-        outputs, link = self.memory.outputs[0], self.memory.link[0]
+        outputs, link = self.parts['outputs'], self.parts['link']
         invalid, link['invalid'] = INVALID[link['invalid']], 0
         axes = {axis: outputs[axis] for axis in topics.AXES}
         values = [(f'{name} {mark}', '1' if axis[mark] else '0') for name, axis in axes.items()

@@ -30,7 +30,7 @@ class Rig:
 
     @property
     def outputs(self):
-        return self.unit.memory.outputs[0]
+        return self.unit.parts['outputs']
 
 
 def test_the_beam_is_the_command_of_one_delay_and_one_step_before():

@@ -23,7 +23,7 @@ def phases(d):
 
 
 def request(d, what):
-    return drive_state.request(d.state, d.constants, getattr(drive_state, what))
+    return drive_state.request(d.state[0], d.constants[0], getattr(drive_state, what))
 
 
 CAUSES = {

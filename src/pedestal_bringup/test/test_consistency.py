@@ -132,7 +132,7 @@ def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_d
     errors, expected, law = [], [], ReceiverLaw()
     for k, row in enumerate(normals):
         inputs['stamp_ns'] = 5_000_000 * k
-        receiver.step(state, constants, inputs, outputs, built.breaks, built.coefficients, row)
+        receiver.step(state[0], constants[0], inputs[0], outputs[0], built.breaks, built.coefficients, row)
         if k >= 400:
             x, e, level = (float(outputs[name][0]) for name in ('cross_elevation', 'elevation', 'cn0_dbhz'))
             errors += [[x, e]]

@@ -29,6 +29,14 @@ class Reply(typing.NamedTuple):
     text: str
 
 
+def joined(record_type, **parts) -> np.ndarray:
+    """A record (1,) of these parts, arrays (1,)."""
+    record = np.zeros(1, record_type)
+    for name, part in parts.items():
+        record[name] = part
+    return record
+
+
 class Unit(typing.Protocol):
     """What a unit is. A subclass adds its memory and its compiled law
 
@@ -47,7 +55,8 @@ class Unit(typing.Protocol):
 
     parameters   an instance of the parameter class of NODE
     reads        topics that it hears in its graph, a part of NODE.reads
-    memory       a named tuple of arrays: all that a step reads or changes beside its records
+    memory       a named tuple of arrays, all that a step reads or changes beside its records: `record` (1,) with the
+                 records of its law, then what is no record (noise, a track)
     inputs, outputs     records (1,) of one step in a node
     messages     {topic: message} of the stamped topics it writes, of which only the numbers change
     """
@@ -89,6 +98,11 @@ class Unit(typing.Protocol):
     def latency(self, topic) -> float:
         """How much older than the step [s] a topic is; overridden where one is."""
         return 0.0
+
+    @property
+    def parts(self):
+        """The records of its law by name, views: self.parts['outputs']['status']."""
+        return self.memory.record[0]
 
     def block(self, steps) -> tuple:
         """The memory with which the next `steps` (at most BLOCK) are made; overridden where they need noise."""
@@ -138,12 +152,13 @@ class Unit(typing.Protocol):
 
     def prepare(self):
         """Compile all that a node calls; nothing is changed by it."""
-        before = [array.copy() for array in (*self.memory, self.inputs, self.outputs)]
+        arrays = self.memory.record, self.inputs, self.outputs
+        before = [array.copy() for array in arrays]
         _, law_of_many = self.LAWS[type(self.memory)]
         law_of_many(self.memory, np.zeros(1, np.int64), self.inputs, self.outputs)
         for name in self.REQUESTS[:1]:
             self.request(name)
-        for array, values in zip((*self.memory, self.inputs, self.outputs), before):
+        for array, values in zip(arrays, before):
             array[...] = values
 
 

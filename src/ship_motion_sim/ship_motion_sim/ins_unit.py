@@ -10,34 +10,33 @@ import numpy as np
 from pedestal_common import nodes, noise
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
 from ship_motion_sim import aligning_ins, ins, navigator
 
 RAW, DATA, STATE = 'ship/imu/data_raw', 'ship/imu/data', 'ins/state'
 
 
+def _record_of(state, constants):
+    """The record of an INS. row: of the noise that the next step takes; worst: the highest status since the last
+    diagnosis."""
+    return np.dtype([('state', state), ('constants', constants), ('inputs', ins.INPUTS), ('outputs', ins.OUTPUTS),
+                     ('row', 'i8'), ('worst', 'i8')], align=True)
+
+
+MODEL_RECORD = _record_of(ins.STATE, ins.CONSTANTS)
+ALIGNING_RECORD = _record_of(aligning_ins.STATE, aligning_ins.CONSTANTS)
+
+
 class ModelMemory(typing.NamedTuple):
-    """All the INS of method `model` works on: records (1,), the noise of the next steps; worst (1,): the highest
-    status since the last diagnosis."""
-    state: np.ndarray
-    constants: np.ndarray
-    inputs: np.ndarray
-    outputs: np.ndarray
+    """All the INS of method `model` works on: the noise of the next steps."""
+    record: np.ndarray
     normals: np.ndarray
-    row: np.ndarray
-    worst: np.ndarray
 
 
 class AligningMemory(typing.NamedTuple):
-    """All an INS that aligns works on; fields as of ModelMemory. A type of its own, so that a run with the model does
-    not compile the alignment."""
-    state: np.ndarray
-    constants: np.ndarray
-    inputs: np.ndarray
-    outputs: np.ndarray
+    """All an INS that aligns works on. A type of its own, so that a run with the model does not compile it."""
+    record: np.ndarray
     normals: np.ndarray
-    row: np.ndarray
-    worst: np.ndarray
 
 
 @compiled
@@ -64,23 +63,23 @@ def encode(o, outputs):
 @compiled
 def model_law(memory, stamp, inputs, outputs):
     """Step k of method `model`."""
-    m = memory
-    decode(m.inputs[0], inputs[RAW])
-    ins.step(m.state, m.constants, m.inputs, m.outputs, m.normals[m.row[0]])
-    m.row[0] += 1
-    m.worst[0] = max(m.worst[0], m.outputs[0].status)
-    encode(m.outputs[0], outputs)
+    m = memory.record[0]
+    decode(m.inputs, inputs[RAW])
+    ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
+    m.row += 1
+    m.worst = max(m.worst, m.outputs.status)
+    encode(m.outputs, outputs)
 
 
 @compiled
 def aligning_law(memory, stamp, inputs, outputs):
     """Step k of an INS that aligns."""
-    m = memory
-    decode(m.inputs[0], inputs[RAW])
-    aligning_ins.step(m.state, m.constants, m.inputs, m.outputs, m.normals[m.row[0]])
-    m.row[0] += 1
-    m.worst[0] = max(m.worst[0], m.outputs[0].status)
-    encode(m.outputs[0], outputs)
+    m = memory.record[0]
+    decode(m.inputs, inputs[RAW])
+    aligning_ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
+    m.row += 1
+    m.worst = max(m.worst, m.outputs.status)
+    encode(m.outputs, outputs)
 
 
 @compiled
@@ -105,28 +104,28 @@ class Ins(Unit):
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         self._noise = noise.generator(parameters.seed, self.NODE.name)
+        normals = np.zeros((1, ins.NORMALS))
         model = parameters.method == 'model'
         if model:
-            constants, state = ins.constants(parameters), ins.initial_state()
+            self.memory = ModelMemory(joined(MODEL_RECORD, state=ins.initial_state(),
+                                             constants=ins.constants(parameters)), normals)
         else:
             constants = aligning_ins.constants(parameters)
-            state = aligning_ins.initial_state(constants)
-        self.memory = (ModelMemory if model else AligningMemory)(
-            state, constants, np.zeros(1, ins.INPUTS), np.zeros(1, ins.OUTPUTS), np.zeros((1, ins.NORMALS)),
-            np.zeros(1, np.int64), np.zeros(1, np.int64))
+            self.memory = AligningMemory(joined(ALIGNING_RECORD, state=aligning_ins.initial_state(constants),
+                                                constants=constants), normals)
         rate_noise = parameters.rate_noise if model else 0.0     # zeros: unknown
         self.messages[DATA].angular_velocity_covariance = (np.eye(3) * rate_noise**2).ravel()
 
     def block(self, steps):
-        self.memory.row[0] = 0
+        self.parts['row'] = 0
         return self.memory._replace(normals=self._noise.standard_normal((steps, ins.NORMALS)))
 
     def diagnose(self):
-        outputs, status = self.memory.outputs[0], int(self.memory.worst[0])
-        self.memory.worst[0] = 0
+        outputs, status = self.parts['outputs'], int(self.parts['worst'])
+        self.parts['worst'] = 0
         stage, sigma, p = int(outputs['stage']), outputs['variance']**0.5, self.parameters
         values = [('latency_s', f'{p.latency:g}')]
-        known = self.memory.state[0]['released'] > 0
+        known = self.parts['state']['released'] > 0
         if known:
             values.append(('heading_error_rms_rad', f'{sigma[2]:g}'))
         if stage != ins.NO_STAGE:

@@ -37,7 +37,7 @@ class ShipMotionNode(unit_node.UnitNode):
         of a datagram that nobody took when the next is sent, which then is not, so that every other one succeeds."""
         period = round(1e9 / self.parameters.nmea.rate)
         self.next_datagram = stamp - stamp % period + period
-        truth = self.unit.memory.truth[0]
+        truth = self.unit.parts['truth']
         try:
             self.socket.send(nmea.attitude(stamp, truth['roll'], truth['pitch'], truth['yaw'], truth['position'][2]))
         except OSError as error:

@@ -6,7 +6,7 @@ import numpy as np
 from pedestal_common import nodes, noise
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
 from ship_motion_sim import imu, motion
 
 TRUTH, RAW = 'ship/truth', 'ship/imu/data_raw'
@@ -15,18 +15,16 @@ NOMINAL_PERIOD = 5e-3
 """What the IMU takes for the length of its first sample [s]."""
 
 
+RECORD = np.dtype([('ship', motion.CONSTANTS), ('truth', motion.OUTPUTS), ('imu_state', imu.STATE),
+                   ('imu', imu.CONSTANTS), ('imu_inputs', imu.INPUTS), ('felt', imu.OUTPUTS), ('last', 'i8'),
+                   ('row', 'i8')], align=True)
+"""last: stamp of the last step [ns]; row: of the noise that the next step takes."""
+
+
 class Memory(typing.NamedTuple):
-    """All the ship works on: records (1,), the stamp of the last step [ns] (1,), the noise of the next steps."""
-    ship: np.ndarray
-    inputs: np.ndarray
-    truth: np.ndarray
-    imu_state: np.ndarray
-    imu: np.ndarray
-    imu_inputs: np.ndarray
-    felt: np.ndarray
-    last: np.ndarray
+    """All the ship works on: the noise of the next steps."""
+    record: np.ndarray
     normals: np.ndarray
-    row: np.ndarray
 
 
 @compiled
@@ -46,14 +44,14 @@ def encode(truth, felt, stamp, outputs):
 @compiled
 def law(memory, stamp, inputs, outputs):
     """Step k."""
-    m = memory
-    m.inputs[0].t = m.imu_inputs[0].t = stamp * 1e-9
-    m.imu_inputs[0].dt = (stamp - m.last[0]) * 1e-9 if m.last[0] != NEVER else NOMINAL_PERIOD
-    m.last[0] = stamp
-    motion.step(m.ship, m.inputs, m.truth)
-    imu.step(m.imu_state, m.imu, m.ship, m.imu_inputs, m.truth, m.felt, m.normals[m.row[0]])
-    m.row[0] += 1
-    encode(m.truth[0], m.felt[0], stamp, outputs)
+    m = memory.record[0]
+    m.imu_inputs.t = stamp * 1e-9
+    m.imu_inputs.dt = (stamp - m.last) * 1e-9 if m.last != NEVER else NOMINAL_PERIOD
+    m.last = stamp
+    motion.truth(m.ship, m.imu_inputs.t, m.truth)
+    imu.step(m.imu_state, m.imu, m.ship, m.imu_inputs, m.truth, m.felt, memory.normals[m.row])
+    m.row += 1
+    encode(m.truth, m.felt, stamp, outputs)
 
 
 @compiled
@@ -70,23 +68,21 @@ class ShipMotion(Unit):
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         self._noise = noise.generator(parameters.imu.seed, self.NODE.name)
-        self.memory = Memory(motion.constants(parameters.ship), np.zeros(1, motion.INPUTS),
-                             np.zeros(1, motion.OUTPUTS), imu.initial_state(), imu.constants(parameters),
-                             np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS), np.full(1, NEVER),
-                             np.zeros((1, imu.NORMALS)), np.zeros(1, np.int64))
+        self.memory = Memory(joined(RECORD, ship=motion.constants(parameters.ship), imu_state=imu.initial_state(),
+                                    imu=imu.constants(parameters), last=NEVER), np.zeros((1, imu.NORMALS)))
 
     def block(self, steps):
-        self.memory.row[0] = 0
+        self.parts['row'] = 0
         return self.memory._replace(normals=self._noise.standard_normal((steps, imu.NORMALS)))
 
     @property
     def over(self):
         """Whether the last step lies past the end of a recorded motion."""
-        ship = self.memory.ship[0]
-        return ship['pieces'] > 0 and self.memory.last[0] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
+        ship = self.parts['ship']
+        return ship['pieces'] > 0 and self.parts['last'] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
 
     def diagnose(self):
-        truth, felt = self.memory.truth[0], self.memory.felt[0]
+        truth, felt = self.parts['truth'], self.parts['felt']
         values = [(f'{name}_deg', f'{np.degrees(truth[name]):.3f}') for name in ('roll', 'pitch')]
         for status, names in ((truth['status'], motion.STATUS), (felt['status'], imu.STATUS)):
             if status:

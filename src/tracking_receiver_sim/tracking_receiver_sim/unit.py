@@ -7,7 +7,7 @@ import numpy as np
 from pedestal_common import line_of_sight, nodes, noise
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
 from tracking_receiver_sim import receiver, target
 
 JOINTS, SHIP, ERRORS, TARGET = 'joint_states', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
@@ -17,18 +17,17 @@ FAULTS = (receiver.NO_TARGET, receiver.NO_JOINTS, receiver.STAMP_ORDER)
 """Statuses that are kept for the next diagnosis."""
 
 
+RECORD = np.dtype([('state', receiver.STATE), ('constants', receiver.CONSTANTS), ('inputs', receiver.INPUTS),
+                   ('outputs', receiver.OUTPUTS), ('row', 'i8'), ('fault', 'i8')], align=True)
+"""row: of the noise that the next step takes; fault: the last of FAULTS since the last diagnosis, else LOCKED."""
+
+
 class Memory(typing.NamedTuple):
-    """All the receiver works on: records (1,), breaks and coefficients of the target's track, the noise of the next
-    steps; fault (1,): the last of FAULTS since the last diagnosis, else LOCKED."""
-    state: np.ndarray
-    constants: np.ndarray
-    inputs: np.ndarray
-    outputs: np.ndarray
+    """All the receiver works on: breaks and coefficients of the target's track, the noise of the next steps."""
+    record: np.ndarray
     breaks: np.ndarray
     coefficients: np.ndarray
     normals: np.ndarray
-    row: np.ndarray
-    fault: np.ndarray
 
 
 @compiled
@@ -65,13 +64,14 @@ def encode(o, c, stamp, outputs):
 @compiled
 def law(memory, stamp, inputs, outputs):
     """Step k."""
-    m, o = memory, memory.outputs[0]
-    decode(m.inputs[0], stamp, inputs[JOINTS], inputs[SHIP])
-    receiver.step(m.state, m.constants, m.inputs, m.outputs, m.breaks, m.coefficients, m.normals[m.row[0]])
-    m.row[0] += 1
-    if o.status in FAULTS:
-        m.fault[0] = o.status
-    encode(o, m.constants[0], stamp, outputs)
+    m = memory.record[0]
+    decode(m.inputs, stamp, inputs[JOINTS], inputs[SHIP])
+    receiver.step(m.state, m.constants, m.inputs, m.outputs, memory.breaks, memory.coefficients,
+                  memory.normals[m.row])
+    m.row += 1
+    if m.outputs.status in FAULTS:
+        m.fault = m.outputs.status
+    encode(m.outputs, m.constants, stamp, outputs)
 
 
 @compiled
@@ -89,11 +89,11 @@ class TrackingReceiver(Unit):
         super().__init__(parameters, reads)
         self.target = target.build(parameters.target, parameters.duration)
         self._noise = noise.generator(parameters.seed, self.NODE.name)
-        inputs, fault = np.zeros(1, receiver.INPUTS), np.full(1, receiver.LOCKED)
-        inputs['mat_ed'] = line_of_sight.ashore_matrix()
-        self.memory = Memory(receiver.initial_state(), receiver.constants(parameters, parameters.period, self.target),
-                             inputs, np.zeros(1, receiver.OUTPUTS), self.target.breaks, self.target.coefficients,
-                             np.zeros((1, receiver.normals_per_step(parameters))), np.zeros(1, np.int64), fault)
+        constants = receiver.constants(parameters, parameters.period, self.target)
+        record = joined(RECORD, state=receiver.initial_state(), constants=constants, fault=receiver.LOCKED)
+        record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
+        self.memory = Memory(record, self.target.breaks, self.target.coefficients,
+                             np.zeros((1, receiver.normals_per_step(parameters))))
         self.messages[RANGE].field_of_view = parameters.antenna.beamwidth
         for topic, measured in ((RATE, parameters.receiver.rate.measured),
                                 (RANGE, parameters.receiver.ranging.measured)):
@@ -101,13 +101,12 @@ class TrackingReceiver(Unit):
                 del self.messages[topic]
 
     def block(self, steps):
-        normals = self._noise.standard_normal((steps, self.memory.normals.shape[1]))
-        self.memory.row[0] = 0
-        return self.memory._replace(normals=normals)
+        self.parts['row'] = 0
+        return self.memory._replace(normals=self._noise.standard_normal((steps, self.memory.normals.shape[1])))
 
     def diagnose(self):
-        outputs, fault = self.memory.outputs[0], int(self.memory.fault[0])
-        self.memory.fault[0] = receiver.LOCKED
+        outputs, fault = self.parts['outputs'], int(self.parts['fault'])
+        self.parts['fault'] = receiver.LOCKED
         status, p = int(outputs['status']), self.parameters
         sigma = receiver.angle_noise(p, float(outputs['cn0_dbhz']), p.period)
         values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),

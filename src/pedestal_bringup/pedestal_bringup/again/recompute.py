@@ -233,12 +233,11 @@ def compute(recording, unit, fed, states=None, requests=None):
         if step in requests:
             made[step] = ask(requests[step], step)
         elif step in states:
-            before = [array.copy() for array in unit.memory]
+            before = unit.memory.record.copy()
             advance(step, step + 1)
             last = step + 1
             if unit.encode(state, int(outputs[step][state])) != states[step]:
-                for array, values in zip(unit.memory, before):
-                    array[...] = values
+                unit.memory.record[...] = before
                 made[step] = ask(unit.requests_for(state, states[step]), step)
                 last = step
     return outputs, {step: done for step, done in made.items() if done}

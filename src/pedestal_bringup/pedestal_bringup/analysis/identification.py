@@ -82,7 +82,7 @@ def _drive(state, constants, inputs, outputs, rate, acceleration, c_azimuth, c_e
         if torque:
             u.azimuth.torque = feedforward.torque(rate[k, 0], acceleration[k, 0], c_azimuth)
             u.elevation.torque = feedforward.torque(rate[k, 1], acceleration[k, 1], c_elevation)
-        drive_unit.step(state, constants, inputs, outputs)
+        drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 def identify(scenario, torque=True) -> dict:
@@ -110,7 +110,7 @@ def identify(scenario, torque=True) -> dict:
     state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
     inputs, outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
     inputs['enable'] = 1
-    drive_unit.read(state, constants, outputs)
+    drive_unit.read(state[0], constants[0], outputs[0])
     position = np.empty_like(rate)
     believed = [record(getattr(acu, name).feedforward)[0] for name in topics.AXES]
     _drive(state, constants, inputs, outputs, rate, acceleration, *believed, torque, position)

@@ -125,7 +125,7 @@ SOLVE_IVP_TICKS = 100
 @compiled
 def _drive_steps(state, constants, inputs, outputs, count):
     for _ in range(count):
-        drive_unit.step(state, constants, inputs, outputs)
+        drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 FILTER_STEPS = 20_000

@@ -52,12 +52,12 @@ def true_load(drive, truth):
 @overload(true_load)
 def _true_load(drive, truth):
     def of_axes(drive, truth):
-        y = drive.outputs[0]
+        y = drive.record[0].outputs
         truth.load_position[0], truth.load_position[1] = y.azimuth.load_position, y.elevation.load_position
         truth.bias[0], truth.bias[1] = y.azimuth.bias, y.elevation.bias
 
     def of_beam(drive, truth):
-        position = drive.outputs[0].position
+        position = drive.record[0].outputs.position
         truth.load_position[0], truth.load_position[1] = position[0], position[1]
     return {drive_unit.Memory: of_axes, beam_unit.Memory: of_beam}[drive.instance_class]
 
@@ -78,8 +78,8 @@ def loop(units, first, period_ns, before, injected, steps, truth):
         step(receiver, stamp, steps[k], steps[k])
         step(acu, stamp, steps[k], steps[k])
         true_load(drive, truth[k])
-        truth[k].error[0], truth[k].error[1] = (receiver.outputs[0].true_cross_elevation,
-                                                receiver.outputs[0].true_elevation)
+        true = receiver.record[0].outputs
+        truth[k].error[0], truth[k].error[1] = true.true_cross_elevation, true.true_elevation
         before[0] = steps[k]
         for i in range(2):
             before[0][COMMAND].velocity[i] += injected[k, i]
