@@ -6,7 +6,7 @@ The drive wants to be enabled while it is asked to be, no fault and no emergency
 control, lets the brakes grip while the motors still hold, and only then takes their torque away. Overcurrent, and a
 stop that takes too long, take the torque away at once and let the brakes fall in.
 """
-from adu_drive.faults import ALL, KINDS, OVERCURRENT, names
+from adu_drive.faults import ALL, FAULTS, OVERCURRENT, names
 from pedestal_common.compiled import compiled
 
 PHASES = ('enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brakes')
@@ -27,7 +27,7 @@ REFUSALS = {
 
 PHASE, PREVENTED, EMERGENCY = 7, 8, 16
 AZIMUTH_FAULTS = 5
-ELEVATION_FAULTS = AZIMUTH_FAULTS + len(KINDS)
+ELEVATION_FAULTS = AZIMUTH_FAULTS + len(FAULTS)
 """Bits of the code of adu/state: phase, whether following is not permitted, emergency stop, fault words."""
 
 STANDSTILL = 1e-3

@@ -48,7 +48,7 @@ bias              T_b [Nm]
 torque_limited, voltage_limited                 1 when it happened within the period
 end_stop          1 when the end of travel cut the rate command within the period
 stopping          1 when not enabled within the period: ramped to standstill, then held there
-faults            latched fault word, see faults.KINDS
+faults            latched fault word, see faults.FAULTS
 thermal_load      of motor 1 and 2; 1 after rated torque for ever
 load_position, load_velocity, true_torque       the truth, for tests and studies; never published: where the beam
                   points (the dish, where the structure is flexible), and K_t i_q of motor 1 and 2
