@@ -264,13 +264,12 @@ def _change_mode(s, c, o, drive_ready, program, request):
 
 
 @compiled
-def request(state, constants, inputs, outputs, program, mode):
+def request(s, c, u, o, program, mode):
     """Ask for a mode (its code) between two steps; True when granted. outputs.mode and .reason tell what is now.
 
     It is decided on what the last step knew, and takes effect on the command of the next step. Arguments as of `step`.
     """
-    s, o = state[0], outputs[0]
-    result, _ = _change_mode(s, constants[0], o, inputs[0].drive_ready, program, mode)
+    result, _ = _change_mode(s, c, o, u.drive_ready, program, mode)
     o.mode, o.reason = s.mode, s.reason
     return result == modes.ACCEPTED
 
@@ -437,12 +436,11 @@ def clear(o):
 
 
 @compiled
-def step(state, constants, inputs, outputs, program):
-    """One drive step; arrays (1,) of STATE, CONSTANTS, INPUTS, OUTPUTS and a ProgramTrack.
+def step(s, c, u, o, program):
+    """One drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and a ProgramTrack.
 
     A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
     """
-    s, c, u, o = state[0], constants[0], inputs[0], outputs[0]
     dt = u.stamp - s.stamp
     if not (dt > 0.0 and math.isfinite(u.stamp)):
         o.invalid_input = _STAMP

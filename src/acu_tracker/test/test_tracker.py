@@ -45,7 +45,7 @@ class Target:
         """(p11, p12, p22) of the azimuth T after the last measurement."""
         f = self.state[0]['filter']
         target_filter.predict(f, self.c['filter'], T)
-        return target_filter.variances(f)[0]
+        return target_filter.read(f).variances[0]
 
     def locked(self, since_accepted=0.0):
         return bool(tracker.locked(self.state[0], self.p, since_accepted))

@@ -35,7 +35,7 @@ def observer_gains(w_o, w_s, h):
 
 @compiled
 def observed(z, y, u, v3, w_o, w_s, h):
-    """z = (z1, z2, z3) at the encoder angle y [rad], h [s] after z (3,); u [rad/s], v3 [rad/s2] were in force since."""
+    """z = (z1, z2, z3) at the encoder angle y [rad], h [s] after z (3,) with u [rad/s] and v3 [rad/s2] in force."""
     z1, z2, z3 = z[0], z[1], z[2]
     g = -math.expm1(-w_s * h) / w_s
     settled = u + (v3 + z3) / w_s

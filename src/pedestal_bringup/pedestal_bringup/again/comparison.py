@@ -6,15 +6,13 @@ import math
 import numpy as np
 
 from pedestal_bringup.bags import columns
-from pedestal_common import messages, records, topics
+from pedestal_common import layouts, messages, topics
 
 REST = 'names, frames and the rest'
 """The field that stands for everything in a message that is neither its stamp nor one of its numbers."""
 
-ABSOLUTE = {'position': 1e-9, 'velocity': 1e-8, 'acceleration': 1e-6, 'effort': 1e-6, 'orientation': 1e-9,
-            'angular_velocity': 1e-9, 'linear_acceleration': 1e-9, 'twist': 1e-9}
-"""Absolute tolerance by the kind of number, in its own unit; 1e-9 for what is not named."""
 RELATIVE = 1e-9
+"""Relative difference that is let pass; the absolute one is of the column (layouts)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,9 +24,8 @@ class Tolerance:
     ignored: tuple = ()
 
     def of(self, column):
-        """(absolute, relative) of a column."""
-        kind = next((part for part in column.split('.') if part in ABSOLUTE), '')
-        return (ABSOLUTE.get(kind, 1e-9) if self.absolute is None else self.absolute,
+        """(absolute, relative) of a layouts.Column."""
+        return (column.tolerance if self.absolute is None else self.absolute,
                 RELATIVE if self.relative is None else self.relative)
 
     def ignores(self, name):
@@ -94,7 +91,8 @@ class Output:
         """As columns.table would give it."""
         if self.texts is not None:
             return {'t': self.stamps / 1e9, 'data': self.texts}
-        return {'t': self.stamps / 1e9, **dict(zip(records.columns(topic), self.values.T))}
+        return {'t': self.stamps / 1e9,
+                **{column.name: values for column, values in zip(layouts.columns(topic), self.values.T)}}
 
 
 def recorded(data, log, topic) -> Output:
@@ -104,9 +102,9 @@ def recorded(data, log, topic) -> Output:
     if type_name == 'std_msgs/msg/String':
         return Output(log, np.zeros((len(data), 0)), columns.table(data, type_name, log)['data'])
     table = columns.table(data, type_name, log)
-    values = np.full((len(data), len(records.columns(topic))), math.nan)
-    for number, name in enumerate(records.columns(topic)):
-        values[:, number] = table.get(name, math.nan)
+    values = np.full((len(data), len(layouts.columns(topic))), math.nan)
+    for number, column in enumerate(layouts.columns(topic)):
+        values[:, number] = table.get(column.name, math.nan)
     return Output(columns.stamps(data, type_name, log), values)
 
 
@@ -122,17 +120,18 @@ def compare(topic, old: Output, new: Output, tolerance=Tolerance(), data=None, t
         wrong = np.array([old.texts[i] != new.texts[j] for i, j in zip(here, there)], bool)
         _add(result, tolerance, 'data', stamps, wrong, wrong, np.full(wrong.size, math.inf))
         return result
-    for number, column in enumerate(records.columns(topic)):
+    for number, column in enumerate(layouts.columns(topic)):
         a, b = old.values[here, number], new.values[there, number]
         absolute, relative = tolerance.of(column)
         different = ~((a == b) | (np.isnan(a) & np.isnan(b)))
         with np.errstate(invalid='ignore'):
             size = np.abs(b - a)
             beyond = different & ~(size <= absolute + relative * np.abs(a))
-        _add(result, tolerance, column, stamps, different, beyond, np.where(np.isfinite(size), size, math.inf))
+        _add(result, tolerance, column.name, stamps, different, beyond, np.where(np.isfinite(size), size, math.inf))
     if template is not None:
         type_name = topics.BY_NAME[topic].type
-        wrong = ~columns.alike(data, type_name, messages.serialize(template), records.columns(topic))
+        names = {column.name for column in layouts.columns(topic)}
+        wrong = ~columns.alike(data, type_name, messages.serialize(template), names)
         _add(result, tolerance, REST, old.stamps, wrong, wrong, np.full(wrong.size, math.inf))
     return result
 

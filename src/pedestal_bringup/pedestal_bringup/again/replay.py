@@ -15,19 +15,19 @@ from rclpy.signals import SignalHandlerOptions
 from pedestal_bringup.again.playlist import Playlist, latched, reads, select, writes
 from pedestal_bringup.again.terminal import RIGHT, Keyboard, StatusLine
 from pedestal_bringup.bags import bag as bags
-from pedestal_common import shell, topics
-from pedestal_common.shell import SECOND, GraphError
+from pedestal_common import middleware, nodes, shell
+from pedestal_common.steps import SECOND, GraphError
 
-ANSWERS = {'ship_motion': ('clock', 'ship/truth'), 'tracking_receiver': ('joint_states', 'target/truth'),
-           'acu': ('joint_states', 'acu/rate_command'), 'adu': (None, 'joint_states')}
+ANSWERS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
+           for node in nodes.NODES if node.answer}
 """{node: (topic, what the node answers it with in every step, stamped alike)}: what lockstep waits for. The drive
 asks: it says the step, and takes the answer. The INS answers late, by its latency: there is no waiting for it."""
 
 
 def answer_of(node, graph):
     """ANSWERS of a node by its name in a graph; an array of several beams is asked by its first."""
-    return tuple(name if name is None or name in graph else f'{topics.beam_of(node) or "beam_1"}/{name}'
-                 for name in ANSWERS[topics.plain(node)])
+    return tuple(name if name is None or name in graph else f'{nodes.beam_of(node) or "beam_1"}/{name}'
+                 for name in ANSWERS[nodes.plain(node)])
 
 
 HELP = 'space: pause, go on   n or right arrow: one step   q: quit'
@@ -89,25 +89,25 @@ class Outcome:
 class Player(Node):
     """Publishes a Playlist.
 
-    nodes: the nodes under test; every topic must have them as readers, or anyone when there are none. rate None:
+    under_test: the nodes under test; every topic must have them as readers, or anyone when there are none. rate None:
     lockstep. companion: a topic that goes along where nobody else writes it, read or not. stopped() -> True when it
     shall end.
     """
 
-    def __init__(self, playlist, companion, nodes, rate, paused, deadline, keyboard, stopped):
-        super().__init__(topics.STAND_IN)
-        self.playlist, self.nodes, self.rate, self.paused = playlist, nodes, rate, paused
+    def __init__(self, playlist, companion, under_test, rate, paused, deadline, keyboard, stopped):
+        super().__init__(nodes.STAND_IN)
+        self.playlist, self.nodes, self.rate, self.paused = playlist, under_test, rate, paused
         self.deadline, self.keyboard, self.stopped = deadline, keyboard, stopped
         self.companion = companion
         self.channels = {name: Channel(self._publisher(name, playlist.bag.topics[name])) for name in playlist.names}
         self.graph = playlist.bag.graph
-        self.answers = {node: answer_of(node, self.graph) for node in nodes if topics.plain(node) in ANSWERS}
+        self.answers = {node: answer_of(node, self.graph) for node in under_test if nodes.plain(node) in ANSWERS}
         self.asked, self.asked_steps, self.answered = {}, {}, dict.fromkeys(self.answers, -1)
         self.answer_count = dict.fromkeys(self.answers, 0)
         for topic in self.graph.values():
-            if any(node in topic.writers for node in nodes):
+            if any(node in topic.writers for node in under_test):
                 self._listen(topic)
-        self.spinner = shell.make_executor()
+        self.spinner = middleware.make_executor()
         self.spinner.add_node(self)
         self.quit = False
         self.single = 0
@@ -121,11 +121,11 @@ class Player(Node):
         if topic is not None and topic.type != type_name:
             raise bags.BagError(f'{self.playlist.bag.path}: {name} is a {type_name}; must be a {topic.type}')
         try:
-            kind = shell.message_class(type_name)
+            kind = middleware.message_class(type_name)
         except (ImportError, AttributeError, ValueError):
             raise bags.BagError(f'{self.playlist.bag.path}: {name} is of type {type_name}, which is not installed '
                                 'here; choose others with --topics') from None
-        return self.create_publisher(kind, name, shell.QOS[topic.qos if topic is not None else 'step'])
+        return self.create_publisher(kind, name, middleware.qos(topic.rate if topic is not None else 'step'))
 
     def _listen(self, topic):
         """Read what a node under test writes, in the place of the nodes that are not there."""
@@ -138,7 +138,7 @@ class Player(Node):
                 answered[node] = max(answered[node], seconds * SECOND + nanoseconds)
                 count[node] += 1
         profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)
-        self.create_subscription(shell.message_class(topic.type), topic.name, take, profile, raw=True)
+        self.create_subscription(middleware.message_class(topic.type), topic.name, take, profile, raw=True)
 
     def _spin(self, seconds):
         self.spinner.spin_once(timeout_sec=seconds)
@@ -357,11 +357,12 @@ def _stop_by_signal():
         signal.signal(signal.SIGINT, before)
 
 
-def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, deadline=60.0,
+def replay(path, under_test, names, rate, start=0.0, duration=None, paused=False, deadline=60.0,
            ready=lambda: None) -> Outcome:
     """Publish a bag into the live graph of this ROS domain.
 
-    nodes: what these read, or names: these topics, or neither: all. rate: times real time; None: lockstep with nodes.
+    under_test: what these nodes read, or names: these topics, or neither: all. rate: times real time; None: lockstep
+    with them.
     start, duration, deadline [s]. ready() is called before the first message.
     Raises BagError, ValueError for an option, GraphError for what the graph is not.
     """
@@ -371,10 +372,10 @@ def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, dea
     if not 0.0 <= start < math.inf:
         raise ValueError(f'--start {start:g} s: must be 0 or more')
     bag = bags.read(path)
-    chosen = select(bag, nodes, names)
+    chosen = select(bag, under_test, names)
     if rate is None:
-        _check_lockstep(nodes, chosen, bag.graph)
-    of_node = any(writes(bag.graph, node, 'clock') for node in nodes)
+        _check_lockstep(under_test, chosen, bag.graph)
+    of_node = any(writes(bag.graph, node, 'clock') for node in under_test)
     companion = 'clock' if 'clock' in bag.topics and not of_node else None
     if companion in chosen:
         companion = None
@@ -382,11 +383,11 @@ def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, dea
     keyboard = Keyboard()
     if paused and not keyboard.there:
         raise ValueError('--paused: standard input is no terminal, no key could end the pause')
-    shell.set_middleware_defaults()
+    middleware.set_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         with _stop_by_signal() as stopped, keyboard:
-            player = Player(playlist, companion, nodes, rate, paused, deadline, keyboard, stopped)
+            player = Player(playlist, companion, under_test, rate, paused, deadline, keyboard, stopped)
             try:
                 begun = time.monotonic()
                 if player.connect():
@@ -408,10 +409,11 @@ def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, dea
         rclpy.try_shutdown()
 
 
-def _check_lockstep(nodes, chosen, graph):
-    answering = [node for node in nodes if topics.plain(node) in ANSWERS]
+def _check_lockstep(under_test, chosen, graph):
+    answering = [node for node in under_test if nodes.plain(node) in ANSWERS]
     if not answering:
-        why = f'{", ".join(nodes)} answers no step at its stamp' if nodes else 'say with --node who answers the steps'
+        why = (f'{", ".join(under_test)} answers no step at its stamp' if under_test else
+               'say with --node who answers the steps')
         raise ValueError(f'--lockstep: {why}; there are {", ".join(ANSWERS)}')
     for node in answering:
         asked, _ = answer_of(node, graph)

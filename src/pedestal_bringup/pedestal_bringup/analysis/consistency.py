@@ -14,7 +14,7 @@ from scipy import special
 from acu_tracker.geometry.motion import motion_of_position
 from acu_tracker.geometry.vector import Vector, minus, rotated, vector
 from pedestal_bringup.analysis import results
-from pedestal_common import line_of_sight, messages
+from pedestal_common import line_of_sight, topics
 from pedestal_common.compiled import compiled
 
 FREEDOMS = 2
@@ -30,7 +30,7 @@ class Consistency:
     """What acu/filter told, on the steps of a results.Tracking: arrays (n, 2) of azimuth and elevation, NaN: none.
 
     innovation, rate_innovation, nis; sigma, rate_sigma, correlation of the estimate; probability (n, 2, 4) of
-    messages.MODELS; error, rate_error: estimate less truth [rad, rad/s]; nees of the two; tracking (n,) bool.
+    topics.MOTION_MODELS; error, rate_error: estimate less truth [rad, rad/s]; nees of the two; tracking (n,) bool.
     """
     t: np.ndarray
     innovation: np.ndarray
@@ -70,11 +70,11 @@ def read(bag, run):
         return None
     t = run.t
     at_steps = functools.partial(results.on_grid, bag, t)
-    told = at_steps('acu/filter', [f'{axis}_{name}.position' for name in NAMES for axis in messages.AXES])
-    probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in messages.AXES
-                                         for model in messages.MODELS]).reshape(t.size, 2, -1)
+    told = at_steps('acu/filter', [f'{axis}_{name}.position' for name in NAMES for axis in topics.AXES])
+    probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in topics.AXES
+                                         for model in topics.MOTION_MODELS]).reshape(t.size, 2, -1)
     estimate = at_steps('acu/estimate', [f'{axis}.{field}' for field in ('position', 'velocity')
-                                        for axis in messages.AXES])
+                                        for axis in topics.AXES])
     place, twist = ('position.x', 'position.y', 'position.z'), ('twist.linear.x', 'twist.linear.y', 'twist.linear.z')
     relative, velocity = at_steps('target/truth', place), at_steps('target/truth', twist)
     attitude, ship_velocity = np.tile(line_of_sight.ASHORE, (t.size, 1)), np.zeros((t.size, 3))
@@ -175,7 +175,7 @@ def _mean(values):
 def summary(found) -> dict:
     """{metric: (value, unit)}, of nothing where `found` is None."""
     values = {}
-    for i, name in enumerate(messages.AXES if found is not None else ()):
+    for i, name in enumerate(topics.AXES if found is not None else ()):
         judged = axis(found, i)
         values[f'{name}_nis_mean'], values[f'{name}_nees_mean'] = (judged.nis, ''), (judged.nees, '')
     return values

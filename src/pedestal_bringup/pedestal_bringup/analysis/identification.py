@@ -14,7 +14,7 @@ import numpy as np
 from acu_tracker.servo import feedforward
 from adu_drive import drive_unit
 from adu_drive.params import WindParameters
-from pedestal_common import messages
+from pedestal_common import topics
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import record
 
@@ -82,22 +82,22 @@ def _drive(state, constants, inputs, outputs, rate, acceleration, c_azimuth, c_e
         if torque:
             u.azimuth.torque = feedforward.torque(rate[k, 0], acceleration[k, 0], c_azimuth)
             u.elevation.torque = feedforward.torque(rate[k, 1], acceleration[k, 1], c_elevation)
-        drive_unit.step(state, constants, inputs, outputs)
+        drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 def identify(scenario, torque=True) -> dict:
     """{axis: RateLoop} of a scenario's drive in still air; torque: with the ACU's torque feed-forward, or without."""
     acu, drive = scenario.node_parameters('acu'), scenario.node_parameters('adu')
-    axes = [getattr(drive, name) for name in messages.AXES]
+    axes = [getattr(drive, name) for name in topics.AXES]
     duration = (DROPPED + KEPT) * PERIOD
     start = {f'initial_{name}': 0.5 * (axis.limits.lower + axis.limits.upper - rate * duration)
-             for name, axis, rate in zip(messages.AXES, axes, RATE)}
+             for name, axis, rate in zip(topics.AXES, axes, RATE)}
     drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True, **start)
     w = 2.0 * math.pi * FREQUENCIES
     steps = round(PERIOD / drive.period)
     if abs(steps * drive.period - PERIOD) > 1e-9:
         raise ValueError(f'adu.period = {drive.period:g} s: must divide the {PERIOD:g} s it is identified over')
-    for name, axis, rate in zip(messages.AXES, axes, RATE):
+    for name, axis, rate in zip(topics.AXES, axes, RATE):
         if axis.limits.upper - axis.limits.lower < 1.1 * rate * duration:
             raise ValueError(f'adu.{name}.limits: travel must be at least '
                              f'{1.1 * rate * duration:g} rad to identify the drive')
@@ -110,13 +110,13 @@ def identify(scenario, torque=True) -> dict:
     state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
     inputs, outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
     inputs['enable'] = 1
-    drive_unit.read(state, constants, outputs)
+    drive_unit.read(state[0], constants[0], outputs[0])
     position = np.empty_like(rate)
-    believed = [record(getattr(acu, name).feedforward)[0] for name in messages.AXES]
+    believed = [record(getattr(acu, name).feedforward)[0] for name in topics.AXES]
     _drive(state, constants, inputs, outputs, rate, acceleration, *believed, torque, position)
     kept = slice(DROPPED * steps, None)
     found = {}
-    for i, name in enumerate(messages.AXES):
+    for i, name in enumerate(topics.AXES):
         W = response(rate[kept, i], position[kept, i], drive.period, drive.transport_delay, w)
         found[name] = RateLoop(w, W, series(w, W))
     return found

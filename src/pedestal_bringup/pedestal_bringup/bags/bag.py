@@ -16,8 +16,7 @@ from mcap.stream_reader import get_chunk_data_stream
 
 from pedestal_bringup.bags import columns
 from pedestal_bringup.bags.container import MAGIC, MESSAGE, BagError, Container, compressed, reason
-from pedestal_common import messages
-from pedestal_common import topics as tables
+from pedestal_common import messages, nodes, topics
 
 CHUNK_SIZE = 1_000_000
 CHUNK_SPAN = 1_000_000_000
@@ -26,13 +25,13 @@ CHUNK_SPAN = 1_000_000_000
 SQLITE = b'SQLite format 3'
 _RECORD = struct.Struct('<BQ')
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
-_HISTORY = {'step': ('keep_all', 0, 'volatile'), 'state': ('keep_last', 1, 'transient_local'),
-            'event': ('keep_last', 10, 'volatile')}
 
 
-def _qos(name):
-    history, depth, durability = _HISTORY[name]
-    return [{'history': history, 'depth': depth, 'reliability': 'reliable', 'durability': durability,
+def _qos(rate):
+    """The offered_qos_profiles of a topic of a rate."""
+    depth, latched = topics.QOS[rate]
+    return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
+             'durability': 'transient_local' if latched else 'volatile',
              'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',
              'liveliness_lease_duration': dict(_INFINITE), 'avoid_ros_namespace_conventions': False}]
 
@@ -40,22 +39,22 @@ def _qos(name):
 class Writer:
     """Writes a bag.
 
-    directory: must not exist. topics: rows of topics.TOPICS; a message names its topic by the index in them.
+    directory: must not exist. rows: of topics.TOPICS, or nodes.Links; a message names its topic by the index in them.
     metadata: {text: text} of the run, kept as the MCAP metadata record `pedestal` and custom_data of metadata.yaml.
     more: {name: {text: text}} of further metadata records.
     Raises BagError, naming the file, when the disk does not take a chunk. What was written by then stays readable;
     nothing is written after it but the summary, so that a bag has no hole.
     """
 
-    def __init__(self, directory, topics, metadata, more=()):
+    def __init__(self, directory, rows, metadata, more=()):
         self._container = Container(directory)
         self.path, self.file = self._container.path, self._container.file
         self._chunk = bytearray()
         self._chunk_start = 0
-        self._index = [[] for _ in topics]
-        self._sequences = [0] * len(topics)
+        self._index = [[] for _ in rows]
+        self._sequences = [0] * len(rows)
         schema_ids = {}
-        for topic in topics:
+        for topic in rows:
             schema_ids.setdefault(topic.type, len(schema_ids) + 1)
         self._container.add(
             *(records.Schema(id=number, name=name, encoding='ros2msg',
@@ -63,9 +62,9 @@ class Writer:
               for name, number in schema_ids.items()),
             *(records.Channel(id=number, topic='/' + topic.name, message_encoding='cdr',
                               schema_id=schema_ids[topic.type],
-                              metadata={'offered_qos_profiles': yaml.safe_dump(_qos(topic.qos), sort_keys=False),
+                              metadata={'offered_qos_profiles': yaml.safe_dump(_qos(topic.rate), sort_keys=False),
                                         'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)})
-              for number, topic in enumerate(topics, 1)),
+              for number, topic in enumerate(rows, 1)),
             *(records.Metadata(name=name, metadata={str(key): str(value) for key, value in content.items()})
               for name, content in (('pedestal', metadata), *dict(more).items())))
 
@@ -279,18 +278,18 @@ class Bag:
     @property
     def beams(self):
         """Beams of the array that was recorded; 0: a drive with motors."""
-        several = sum(1 for name in self.topics if tables.plain(name) == 'joint_states' != name)
+        several = sum(1 for name in self.topics if nodes.plain(name) == 'joint_states' != name)
         return several or int(self.metadata.get('beams', 0))
 
     @property
     def graph(self):
         """{name: Topic} of the graph that was recorded."""
-        return tables.graph(self.beams)
+        return nodes.links(self.beams)
 
     def view(self, beam=''):
         """The Bag as one beam of several sees it, '' for the first: what is its own under the plain names, what is
         shared, and nothing of the others. A Bag of one beam is its own view. Raises BagError for no beam of it."""
-        known = tables.prefixes(self.beams)
+        known = nodes.prefixes(self.beams)
         if known == ('',) and beam:
             raise BagError(f'{self.path}: beam {beam!r}: there is only one in it')
         prefix = f'{beam}/' if beam else known[0]
@@ -302,11 +301,11 @@ class Bag:
         seen.beam = prefix
 
         def own(content):
-            return {tables.plain(name): value for name, value in content.items()
-                    if tables.beam_of(name) in ('', prefix[:-1])}
+            return {nodes.plain(name): value for name, value in content.items()
+                    if nodes.beam_of(name) in ('', prefix[:-1])}
         seen.topics = own(self.topics)
-        seen._channels = {channel: tables.plain(name) for channel, name in self._channels.items()
-                          if tables.beam_of(name) in ('', prefix[:-1])}
+        seen._channels = {channel: nodes.plain(name) for channel, name in self._channels.items()
+                          if nodes.beam_of(name) in ('', prefix[:-1])}
         seen.index = self.index[np.isin(self.index.channel, list(seen._channels))]
         seen.statistics = None if self.statistics is None else own(self.statistics)
         seen.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}

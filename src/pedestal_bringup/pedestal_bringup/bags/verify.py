@@ -6,7 +6,7 @@ import yaml
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import columns, configuration
-from pedestal_common import messages, topics
+from pedestal_common import messages, nodes
 
 MAX_LATENCY = 1_000_000_000
 """A topic may end this much [ns] before the last step: the next messages were still on their way (latency)."""
@@ -106,7 +106,7 @@ def _grid(stamps, rates):
     steps = {name: stamp for name, stamp in stamps.items() if rates[name] == 'step' and stamp.size}
     if not steps:
         return 0, 0, 0
-    grid = np.unique(next((stamp for name, stamp in steps.items() if topics.plain(name) == 'joint_states'),
+    grid = np.unique(next((stamp for name, stamp in steps.items() if nodes.plain(name) == 'joint_states'),
                           next(iter(steps.values()))))
     period = int(np.median(np.diff(grid))) if grid.size > 1 else 0
     return int(grid[0]), int(max(grid[-1], *(stamp.max() for stamp in steps.values()))), period

@@ -12,7 +12,7 @@ from pedestal_bringup.report.figures import (
     new_panels,
     outside_legend,
 )
-from pedestal_common import messages
+from pedestal_common import topics
 
 MODELS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current_statistical': '#e57a00'}
 SPAN = 1.0
@@ -22,7 +22,7 @@ SPAN = 1.0
 def estimate(recording):
     found = recording.filter
     figure, panels = new_panels(2, 2, sharex=True)
-    for row, axis, i in zip(panels, messages.AXES, range(2)):
+    for row, axis, i in zip(panels, topics.AXES, range(2)):
         for axes, error, sigma, unit in ((row[0], found.error, found.sigma, 'deg'),
                                          (row[1], found.rate_error, found.rate_sigma, 'deg/s')):
             error, sigma = np.degrees(error[:, i]), np.degrees(sigma[:, i])
@@ -46,7 +46,7 @@ def estimate(recording):
 def innovations(recording):
     found = recording.filter
     figure, panels = new_panels(2, 2, sharex=True)
-    for row, axis, i in zip(panels, messages.AXES, range(2)):
+    for row, axis, i in zip(panels, topics.AXES, range(2)):
         draw_line(row[0], found.t, np.degrees(found.innovation[:, i]), color=RAW, linewidth=0.7)
         row[0].set_ylabel('[deg]')
         row[0].set_title(f'{axis}: innovation')
@@ -79,8 +79,8 @@ def _averaged(t, nis, freedoms):
 def probabilities(recording):
     found = recording.filter
     figure, panels = new_panels(2, sharex=True)
-    for axes, axis, i in zip(panels[:, 0], messages.AXES, range(2)):
-        for number, model in enumerate(messages.MODELS):
+    for axes, axis, i in zip(panels[:, 0], topics.AXES, range(2)):
+        for number, model in enumerate(topics.MOTION_MODELS):
             values = found.probability[:, i, number]
             if np.isfinite(values).any():
                 draw_line(axes, found.t, values, color=MODELS[model], label=model.replace('_', ' '))
