@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 from acu_tracker.estimation import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup import cli
-from pedestal_bringup.studies import experiment, filters, manoeuvre, pareto
-from pedestal_bringup.studies.rigs import ensemble
+from pedestal_bringup.studies import filters, manoeuvre, pareto
+from pedestal_bringup.studies.rigs import drawing, ensemble
 from pedestal_bringup.studies.rigs.ensemble import Noise
 from pedestal_bringup.trials import tuning
 from pedestal_common.parameters import as_dict
@@ -82,7 +82,7 @@ def test_rows_with_a_target_are_printed_and_doubts_are_said(filters_result):
 def test_figures_of_filters(filters_result, tmp_path):
     assert set(filters_result.figures) == {'errors', 'rates', 'rms', 'nis', 'probabilities', 'noise'}
     for name, draw in filters_result.figures.items():
-        experiment.save(draw, tmp_path / f'{name}.png')
+        drawing.save(draw, tmp_path / f'{name}.png')
 
 
 def test_tuning_saw_other_noise():

@@ -18,10 +18,9 @@ from acu_tracker.estimation import axis_filter
 from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.rigs import ensemble, profiles
+from pedestal_bringup.studies.rigs import drawing, ensemble, profiles
 from pedestal_bringup.studies.rigs.ensemble import PERIOD as T
+from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 
@@ -234,7 +233,7 @@ def figures():
 
 def bode_figure():
     """Responses of angle and rate with and without the rate, and the error they leave."""
-    figure, axes = experiment.panels(2, 2, size=(7.4, 5.6), sharex=True)
+    figure, axes = drawing.panels(2, 2, size=(7.4, 5.6), sharex=True)
     for name, colour in COLOURS.items():
         angle, rate = responses(*settled(MAIN, RATE_SIGMA[name]), BAND)
         for column, G in enumerate((angle, rate)):
@@ -255,7 +254,7 @@ def bode_figure():
 
 def sigma_a_figure():
     """What the rate adds to the band of the rate and takes from the dynamic error, over sigma_a."""
-    figure, axes = experiment.panels(1, 2, size=(7.4, 3.4), sharex=True)
+    figure, axes = drawing.panels(1, 2, size=(7.4, 3.4), sharex=True)
     sigma_a = np.geomspace(SIGMA_A[0], SIGMA_A[-1], 13)
     for name, colour in COLOURS.items():
         values = [measures(s, RATE_SIGMA[name]) for s in sigma_a]
@@ -270,7 +269,7 @@ def sigma_a_figure():
 
 def flyby_figure():
     """The paper's figures 1 to 8 on the flyby: rate, error of angle and rate, acceleration."""
-    figure, axes = experiment.panels(4, size=(7.4, 8.6), sharex=True)
+    figure, axes = drawing.panels(4, size=(7.4, 8.6), sharex=True)
     t, target = flyby()
     y, y_rate, _ = flown('position-rate', 0)
     near = np.abs(t - 0.5 * profiles.DURATION) <= 0.2 * profiles.DURATION

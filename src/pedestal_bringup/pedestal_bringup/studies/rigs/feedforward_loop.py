@@ -18,8 +18,7 @@ from acu_tracker.estimation import axis_filter
 from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.servo import feedforward
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.rigs import ensemble, profiles
+from pedestal_bringup.studies.rigs import ensemble, metrics, profiles
 from pedestal_bringup.studies.rigs.ensemble import PERIOD as T
 from pedestal_bringup.studies.rigs.profiles import RATE, STROKE
 from pedestal_bringup.trials import monte_carlo
@@ -200,7 +199,7 @@ class Outcome:
         return {'miss_rms_deg': (math.degrees(math.sqrt(squares.mean())), 'deg'),
                 'miss_worst_second_deg': (math.degrees(math.sqrt(windows.max())), 'deg'),
                 'miss_peak_deg': (math.degrees(self.peak), 'deg'),
-                'rate_noise_deg_s': (math.degrees(experiment.rms(self.rate_rms[counts & ~turning])), 'deg/s')}
+                'rate_noise_deg_s': (math.degrees(metrics.rms(self.rate_rms[counts & ~turning])), 'deg/s')}
 
 
 def outcomes(cases, count, pool, progress=lambda share, text: None):
