@@ -1,7 +1,7 @@
 """`pedestal recompute`: recorded inputs of a node through its step function, its outputs against the recorded ones.
 
 Inputs are matched to steps by the code the nodes use (pedestal_common.steps), turned into numbers and back by theirs
-(each column's wire module). What is exact, and what is not:
+(each package's unit module). What is exact, and what is not:
 
 lockstep   inputs belong to steps by their stamps, so the same version on the same machine gives the same bits
 realtime   a step gets what had been sent (in a foreign recording: recorded) when the next one began. That is what the
