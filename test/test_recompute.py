@@ -12,6 +12,7 @@ from pedestal_bringup import cli
 from pedestal_bringup.again import comparison, recompute, recompute_report
 from pedestal_bringup.analysis import results
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.writer import Writer as BagWriter
 from pedestal_common import messages, topics
 
 REFERENCES = pathlib.Path(__file__).parent.parent / 'bags' / 'reference'
@@ -53,7 +54,7 @@ def rewrite(tmp_path):
         named = [topic for topic in topics.TOPICS if topic.name in bag.topics]
         index = {topic.name: number for number, topic in enumerate(named)}
         path = tmp_path / f'changed-{len(list(tmp_path.iterdir()))}'
-        writer = bags.Writer(path, named, {**bag.metadata, **({'pacing': pacing} if pacing else {})},
+        writer = BagWriter(path, named, {**bag.metadata, **({'pacing': pacing} if pacing else {})},
                              {name: content for name, content in bag.metadata_records.items() if name != 'pedestal'})
         for topic, log, publish, data in change(list(bag.raw())):
             writer.write(index[topic], log, publish, data)

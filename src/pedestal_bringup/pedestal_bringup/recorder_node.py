@@ -10,9 +10,10 @@ import time
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from pedestal_bringup.bags import configuration
-from pedestal_bringup.bags.bag import BagError, Writer
+from pedestal_bringup.bags.bag import BagError
 from pedestal_bringup.bags.columns import STAMPED
 from pedestal_bringup.bags.step_order import OrderError, StepOrder
+from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run.recorder_params import RecorderParameters
 from pedestal_common import messages, parameters, topics
 from pedestal_common.shell import ERROR, OK, SECOND, WARN, GraphError, Shell, message_class

@@ -9,6 +9,7 @@ import pytest
 
 from pedestal_bringup.analysis import consistency, results
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.report import figures, filter_figures, report
 from pedestal_common import messages, topics
 
@@ -61,7 +62,7 @@ def status(k, node, level, text):
 def make_bag(path, names=ASHORE, steps=STEPS, locked=True, skip=(), effort=True, **metadata):
     """A bag of a short run with some of the topics."""
     kept = [topics.BY_NAME[name] for name in names]
-    writer = bags.Writer(path, kept, {'scenario': 'short <run>', 'pacing': 'lockstep', 'seed': 3, **metadata})
+    writer = Writer(path, kept, {'scenario': 'short <run>', 'pacing': 'lockstep', 'seed': 3, **metadata})
     rng = np.random.default_rng(1)
 
     def put(name, k, message, late=0):

@@ -6,6 +6,7 @@ import yaml
 
 from pedestal_bringup.again import rerun
 from pedestal_bringup.bags import bag, configuration
+from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run import scenario
 from pedestal_common import messages, topics
 
@@ -38,7 +39,7 @@ def rows(steps=20, **changed):
 
 
 def write(path, made, more=(), **metadata):
-    writer = bag.Writer(path, RECORDED, {'scenario': 'leo_pass', 'pacing': 'lockstep', 'git': 'abc', **metadata}, more)
+    writer = Writer(path, RECORDED, {'scenario': 'leo_pass', 'pacing': 'lockstep', 'git': 'abc', **metadata}, more)
     for name, stamp, message in made:
         writer.write(NAMES.index(name), stamp, stamp, messages.serialize(message))
     writer.close()

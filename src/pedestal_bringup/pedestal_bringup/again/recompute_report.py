@@ -4,7 +4,7 @@ import math
 import numpy as np
 
 from pedestal_bringup.again import comparison, recompute, what_if
-from pedestal_bringup.bags.bag import Writer
+from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages, records, topics
 from pedestal_common.steps import SECOND
 

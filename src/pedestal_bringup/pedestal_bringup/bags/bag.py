@@ -1,4 +1,4 @@
-"""Bags: a rosbag2 directory (metadata.yaml version 9) with one MCAP file, written and read. No ROS here."""
+"""Reads a bag: a rosbag2 directory with one MCAP file, or the file. No ROS here."""
 import copy
 import difflib
 import fcntl
@@ -13,101 +13,25 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.stream_reader import get_chunk_data_stream
+from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from pedestal_bringup.bags import columns
-from pedestal_bringup.bags.container import MAGIC, MESSAGE, BagError, Container, compressed, reason
 from pedestal_common import messages
 from pedestal_common import topics as tables
 
-CHUNK_SIZE = 1_000_000
-CHUNK_SPAN = 1_000_000_000
-"""A chunk ends after this many bytes or ns of log time, so that a crash loses at most the last second."""
-
 SQLITE = b'SQLite format 3'
 _RECORD = struct.Struct('<BQ')
-_INFINITE = {'sec': 9223372036, 'nsec': 854775807}
-_HISTORY = {'step': ('keep_all', 0, 'volatile'), 'state': ('keep_last', 1, 'transient_local'),
-            'event': ('keep_last', 10, 'volatile')}
+MESSAGE = struct.Struct('<xQHIQQ')
+"""Length, channel, sequence, log and publish time: the head of a message record after its opcode."""
 
 
-def _qos(name):
-    history, depth, durability = _HISTORY[name]
-    return [{'history': history, 'depth': depth, 'reliability': 'reliable', 'durability': durability,
-             'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',
-             'liveliness_lease_duration': dict(_INFINITE), 'avoid_ros_namespace_conventions': False}]
+class BagError(ValueError):
+    """A bag cannot be written or read; one line that names the file and what is wrong with it."""
 
 
-class Writer:
-    """Writes a bag.
-
-    directory: must not exist. topics: rows of topics.TOPICS; a message names its topic by the index in them.
-    metadata: {text: text} of the run, kept as the MCAP metadata record `pedestal` and custom_data of metadata.yaml.
-    more: {name: {text: text}} of further metadata records.
-    Raises BagError, naming the file, when the disk does not take a chunk. What was written by then stays readable;
-    nothing is written after it but the summary, so that a bag has no hole.
-    """
-
-    def __init__(self, directory, topics, metadata, more=()):
-        self._container = Container(directory)
-        self.path, self.file = self._container.path, self._container.file
-        self._chunk = bytearray()
-        self._chunk_start = 0
-        self._index = [[] for _ in topics]
-        self._sequences = [0] * len(topics)
-        schema_ids = {}
-        for topic in topics:
-            schema_ids.setdefault(topic.type, len(schema_ids) + 1)
-        self._container.add(
-            *(records.Schema(id=number, name=name, encoding='ros2msg',
-                             data=messages.TYPESTORE.generate_msgdef(name, ros_version=2)[0].encode())
-              for name, number in schema_ids.items()),
-            *(records.Channel(id=number, topic='/' + topic.name, message_encoding='cdr',
-                              schema_id=schema_ids[topic.type],
-                              metadata={'offered_qos_profiles': yaml.safe_dump(_qos(topic.qos), sort_keys=False),
-                                        'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)})
-              for number, topic in enumerate(topics, 1)),
-            *(records.Metadata(name=name, metadata={str(key): str(value) for key, value in content.items()})
-              for name, content in (('pedestal', metadata), *dict(more).items())))
-
-    def write(self, topic, log_time, publish_time, data):
-        """Add one message: index of its topic, times [ns], CDR bytes."""
-        chunk = self._chunk
-        if not chunk:
-            self._chunk_start = log_time
-        elif log_time - self._chunk_start >= CHUNK_SPAN or len(chunk) >= CHUNK_SIZE:
-            self.flush()
-            chunk = self._chunk
-            self._chunk_start = log_time
-        self._sequences[topic] = sequence = self._sequences[topic] + 1
-        self._index[topic] += (log_time, len(chunk))
-        chunk += MESSAGE.pack(5, 22 + len(data), topic + 1, sequence & 0xffffffff, log_time, publish_time)
-        chunk += data
-
-    def skip(self, topic, count):
-        """Leave a gap in the topic's sequence numbers: messages that were lost before they came here."""
-        self._sequences[topic] += count
-
-    def flush(self):
-        """End the chunk: everything written is in the file when this returns."""
-        if not self._chunk:
-            return
-        raw, self._chunk = bytes(self._chunk), bytearray()
-        index = {channel: places for channel, places in enumerate(self._index, 1) if places}
-        self._index = [[] for _ in self._index]
-        times = [time for places in index.values() for time in places[::2]]
-        self._container.add_chunk(compressed(raw, min(times), max(times)), index)
-
-    @property
-    def messages(self):
-        """How many messages were written."""
-        return self._container.counts.total() + sum(map(len, self._index)) // 2
-
-    def close(self):
-        """Write what is left, the summary and metadata.yaml; on a full disk whatever of it fits, then BagError."""
-        try:
-            self.flush()
-        finally:
-            self._container.close()
+def reason(error):
+    """What an OSError says, without the path."""
+    return error.strerror or str(error)
 
 
 def read(path, beam=None):
@@ -238,8 +162,8 @@ class Bag:
         unpack, add = MESSAGE.unpack_from, rows.append
         while at < end:
             if data[at] == Opcode.MESSAGE:
-                _, length, channel, sequence, log, publish = unpack(data, at)
-                add((channel, sequence, log, publish, chunk, at + 31, at + 9 + length))
+                length, channel, sequence, log, publish = unpack(data, at)
+                add((channel, sequence, log, publish, chunk, at + MESSAGE.size, at + 9 + length))
             else:
                 opcode, length = _RECORD.unpack_from(data, at)
                 self._declare(opcode, data[at + 9:at + 9 + length])
