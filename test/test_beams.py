@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup.again import recompute
+from pedestal_bringup.again import difference, recompute
 from pedestal_bringup.analysis import results
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import export
@@ -93,7 +93,7 @@ def test_every_node_of_a_beam_recomputes_identically(runs, name, beam):
     assert set(nodes) >= {'tracking_receiver', 'acu', 'adu'}
     for node in nodes:
         done = recompute.recompute(recording, node, recompute.parameters_of(recording, node))
-        compared = recompute.compare(recording, done.outputs, done.unit, recompute.comparison.Tolerance())
+        compared = recompute.compare(recording, done.outputs, done.unit, difference.Tolerance())
         assert compared and all(topic.identical for topic in compared), [topic.lines() for topic in compared]
         assert recompute.idle(recording, done) == ''
 

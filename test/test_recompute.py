@@ -9,7 +9,7 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from pedestal_bringup import cli
-from pedestal_bringup.again import comparison, recompute, recompute_report
+from pedestal_bringup.again import difference, recompute, recompute_report
 from pedestal_bringup.analysis import results
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.writer import Writer as BagWriter
@@ -147,7 +147,7 @@ def test_a_wrong_frame_is_named(runs, rewrite, pedestal):
         message.header.frame_id = 'mars'
     code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(ESTIMATE, 7, change)), '--node', 'acu')
     assert code == 1
-    assert lines_of(said, ESTIMATE)[1].split() == [*comparison.REST.split(), '1', '1', 'other', '0.035000']
+    assert lines_of(said, ESTIMATE)[1].split() == [*difference.REST.split(), '1', '1', 'other', '0.035000']
 
 
 def test_a_wrong_mode_is_named(runs, rewrite, pedestal):
@@ -214,7 +214,7 @@ def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     from pedestal_bringup.again import what_if
     recording = recompute.Recording(runs['leo'].bag)
     old = {name: recording.output(name) for name in OUTPUTS}
-    late = comparison.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
+    late = difference.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
     numbers = what_if.numbers(recording.bag, [old, {**old, ESTIMATE: late}])
     summary = results.summary(results.tracking(recording.bag))
     for name, theirs in (('noise_reduction', 'noise_reduction'), ('recorded_pointing_rms_deg', 'pointing_rms_deg')):

@@ -12,7 +12,7 @@ import pynmea2
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup.again import comparison, recompute
+from pedestal_bringup.again import difference, recompute
 from pedestal_bringup.analysis import isolation, known_attitude, results
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import closed_loop, scenario
@@ -211,7 +211,7 @@ def test_the_chain_is_recomputed_from_its_recording(told):
     for node in ('ins', 'acu'):
         done = recompute.recompute(recording, node, recompute.parameters_of(recording, node))
         assert not done.requests and not done.feed.problem
-        for topic in recompute.compare(recording, done.outputs, done.unit, comparison.Tolerance()):
+        for topic in recompute.compare(recording, done.outputs, done.unit, difference.Tolerance()):
             assert topic.identical, topic.lines()
 
 

@@ -15,7 +15,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from pedestal_bringup.again import comparison, recompute
+from pedestal_bringup.again import difference as comparison
+from pedestal_bringup.again import recompute
 from pedestal_bringup.run import scenario
 from pedestal_bringup.run.graph import Operator, RunError, command_line, sole_run
 from pedestal_common import parameters, records, topics

@@ -21,7 +21,7 @@ import yaml
 from acu_tracker.unit import Acu
 from adu_drive.beam_unit import Beam
 from adu_drive.unit import Adu
-from pedestal_bringup.again import comparison
+from pedestal_bringup.again import difference as comparison
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import scenario
 from pedestal_common import messages, parameters, records, topics

@@ -63,7 +63,7 @@ class Channel:
 
 
 @dataclasses.dataclass
-class Outcome:
+class ReplayResult:
     """What was sent {topic: count}, over which stamps [s], in which wall time [s]; what was answered {node: count}.
     ended: 'whole', 'quit' (by key) or 'stopped' (by a signal)."""
     bag: str
@@ -358,7 +358,7 @@ def _stop_by_signal():
 
 
 def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, deadline=60.0,
-           ready=lambda: None) -> Outcome:
+           ready=lambda: None) -> ReplayResult:
     """Publish a bag into the live graph of this ROS domain.
 
     nodes: what these read, or names: these topics, or neither: all. rate: times real time; None: lockstep with nodes.
@@ -398,7 +398,7 @@ def replay(path, nodes, names, rate, start=0.0, duration=None, paused=False, dea
                 player.finish()
             finally:
                 player.close()
-            return Outcome(
+            return ReplayResult(
                 str(path), {name: channel.sent for name, channel in player.channels.items()},
                 playlist.first / SECOND, player.position / SECOND, wall,
                 {node: player.asked_steps.get(node, 0) for node, (asked, _) in player.answers.items() if asked},
