@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pedestal_bringup.again import difference, recompute
-from pedestal_bringup.analysis import results
+from pedestal_bringup.analysis import tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import export
 from pedestal_bringup.bags.verify import verify
@@ -49,7 +49,7 @@ def views(runs):
 
 
 def test_each_beam_tracks_its_own_target(views):
-    tracked = {beam: results.tracking(view) for beam, view in views.items()}
+    tracked = {beam: tracking.read(view) for beam, view in views.items()}
     for run in tracked.values():
         assert run.mode[-1] == 'autotrack' and run.tracking.any()
         error = np.column_stack((run.cross_elevation, run.elevation_error))[run.tracking]

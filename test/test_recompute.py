@@ -10,7 +10,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from pedestal_bringup import cli
 from pedestal_bringup.again import difference, recompute, recompute_report
-from pedestal_bringup.analysis import results
+from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.writer import Writer as BagWriter
 from pedestal_common import messages, topics
@@ -216,7 +216,7 @@ def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     old = {name: recording.output(name) for name in OUTPUTS}
     late = difference.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
     numbers = what_if.numbers(recording.bag, [old, {**old, ESTIMATE: late}])
-    summary = results.summary(results.tracking(recording.bag))
+    summary = results.measured(results.of_tracking(tracking.read(recording.bag)))
     for name, theirs in (('noise_reduction', 'noise_reduction'), ('recorded_pointing_rms_deg', 'pointing_rms_deg')):
         assert numbers[name][0][0] == pytest.approx(summary[theirs][0], rel=1e-9)
     (before, after), unit = numbers['estimate_lag_s']

@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from pedestal_bringup.analysis import consistency, results
+from pedestal_bringup.analysis import consistency, results, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.report import figures, filter_figures, report
@@ -162,7 +162,8 @@ def test_file_needs_nothing_else(page):
 
 
 def test_numbers_are_those_of_the_summary(page, whole):
-    values = {key: value for key, (value, _) in results.summary(results.tracking(bags.read(whole))).items()}
+    parts = results.of_tracking(tracking.read(bags.read(whole)))
+    values = {key: value for key, (value, _) in results.measured(parts).items()}
     rows = page[0].rows
 
     def read(name):
@@ -190,7 +191,7 @@ def test_numbers_are_those_of_the_summary(page, whole):
 
 
 def test_the_filter_is_judged(page, whole):
-    found = consistency.read(bags.read(whole), results.tracking(bags.read(whole)))
+    found = consistency.read(bags.read(whole), tracking.read(bags.read(whole)))
     for axis, i in (('azimuth', 0), ('elevation', 1)):
         judged = consistency.axis(found, i)
         assert f'{axis.capitalize()}: {judged.verdict}.' in page[0].text

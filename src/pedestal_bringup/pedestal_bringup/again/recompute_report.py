@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from pedestal_bringup.again import difference, recompute, what_if
+from pedestal_bringup.analysis.results import row
 from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages, records, topics
 from pedestal_common.steps import SECOND
@@ -104,11 +105,6 @@ def _requests_of_step(done, step, made):
             for service, granted in made]
 
 
-def _row(node, metric, value, unit=''):
-    return {'case': node, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
-            'paper': None, 'target': None}
-
-
 def _against_recorded(recording, outputs, done, tolerance):
     """The NodeReport of outputs {topic: Output} against those that were recorded."""
     compared = recompute.compare(recording, outputs, done.unit, tolerance)
@@ -116,16 +112,16 @@ def _against_recorded(recording, outputs, done, tolerance):
         return _new_numbers(recording, outputs, done)
     rows = []
     for topic in compared:
-        rows += [_row(done.node, f'{topic.name} recorded', topic.was),
-                 _row(done.node, f'{topic.name} recomputed', topic.now),
-                 _row(done.node, f'{topic.name} problems', len(topic.problems)),
-                 _row(done.node, f'{topic.name} differences', sum(field.different for field in topic.fields))]
+        rows += [row(done.node, f'{topic.name} recorded', topic.was),
+                 row(done.node, f'{topic.name} recomputed', topic.now),
+                 row(done.node, f'{topic.name} problems', len(topic.problems)),
+                 row(done.node, f'{topic.name} differences', sum(field.different for field in topic.fields))]
         for field in topic.fields:
             name = f'{topic.name} {field.name}'
-            rows += [_row(done.node, f'{name} different', field.different),
-                     _row(done.node, f'{name} beyond tolerance', field.beyond),
-                     _row(done.node, f'{name} largest', field.largest),
-                     _row(done.node, f'{name} first', field.first, 's')]
+            rows += [row(done.node, f'{name} different', field.different),
+                     row(done.node, f'{name} beyond tolerance', field.beyond),
+                     row(done.node, f'{name} largest', field.largest),
+                     row(done.node, f'{name} first', field.first, 's')]
     equal = all(topic.equal for topic in compared)
     verdict = 'identical' if all(topic.identical for topic in compared) else \
         'equal within tolerance' if equal else 'DIFFERS'
@@ -137,11 +133,11 @@ def _new_numbers(recording, outputs, done):
     """The NodeReport where no output was recorded."""
     lines = [f'{done.node}: none of its outputs is in the recording: nothing to compare']
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
-    rows = [_row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
+    rows = [row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
     if done.node == 'acu' and len(done.feed.stamps):
         numbers = what_if.numbers(recording.bag, [done.outputs])
         lines += [f'{name:42} {_text(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
-        rows += [_row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
+        rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
     return NodeReport(lines, rows, outputs, not done.feed.problem)
 
 
@@ -161,7 +157,7 @@ def _old_against_new(recording, old, new, tolerance, changes):
         for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
             ratio = f'{b / a:9.4g}' if a and math.isfinite(b / a) else f'{"":9}'
             lines.append(f'{name:42} {_text(a):>12} {_text(b):>12} {ratio} {unit}'.rstrip())
-            rows += [_row(new.node, f'{name} old', a, unit), _row(new.node, f'{name} new', b, unit)]
+            rows += [row(new.node, f'{name} old', a, unit), row(new.node, f'{name} new', b, unit)]
     lines += difference.lines([difference.compare(name, before[name], output, tolerance)
                                for name, output in new.outputs.items() if not tolerance.ignores(name)])
     return NodeReport(lines, rows, new.outputs)

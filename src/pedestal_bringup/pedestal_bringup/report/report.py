@@ -7,7 +7,7 @@ import pathlib
 
 import numpy as np
 
-from pedestal_bringup.analysis import consistency, isolation, known_attitude, results
+from pedestal_bringup.analysis import consistency, isolation, known_attitude, results, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.report import attitude_figures, figures, filter_figures
@@ -93,7 +93,7 @@ def _tracking(bag):
     if bag.rows('joint_states').size < 2:
         return None, 'fewer than two steps'
     try:
-        return results.tracking(bag), ''
+        return tracking.read(bag), ''
     except KeyError as error:
         return None, f'no number {error.args[0]} where the graph would have one'
 
@@ -108,7 +108,7 @@ def _recording(bag):
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status
                 ] if _table(bag, 'diagnostics') else []
     return figures.Recording(run, no_truth, raw, motors, _table(bag, 'tracking_receiver/angle_error'), _modes(bag),
-                             statuses, results.beamwidth(bag), _filter(bag, run), _attitude(bag))
+                             statuses, tracking.beamwidth(bag), _filter(bag, run), _attitude(bag))
 
 
 def _filter(bag, run):
@@ -173,37 +173,23 @@ def _pointing(bag, recording, values):
                 'noise_reduction', unit='')]
     joints = _table(bag, 'joint_states')
     rows.append(['load torque, rms of the run',
-                 *(_number(results.rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm')
+                 *(_number(tracking.rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm')
                    for axis in ('azimuth', 'elevation')), ''])
     return rows + _torques(recording)
 
 
 def _torques(recording):
     return [[f'torque of motor {i}, rms of the run',
-             *(_number(results.rms(recording.motors[f'{axis}_motor_{i}.effort']), 'Nm')
+             *(_number(tracking.rms(recording.motors[f'{axis}_motor_{i}.effort']), 'Nm')
                for axis in ('azimuth', 'elevation')),
              ''] for i in (1, 2)] if recording.motors else []
 
 
-def _deck(found):
-    values = known_attitude.summary(found)
-    return [[label, _number(*values[key])] for label, key in (
-        ('INS aligned at', 'aligned_s'), ('heading error then', 'heading_at_alignment_deg'),
-        ('1 sigma of heading then, as the INS says', 'heading_sigma_at_alignment_deg'),
-        ('heading error from then on, rms', 'heading_error_rms_deg'),
-        ('level error from then on, rms per axis', 'level_error_rms_deg'))]
-
-
-def _isolation(bag, recording):
-    """Rows on what the ship's rotation leaves in the pointing error; none where too little was tracked."""
-    found = isolation.read(bag, recording.run) if recording.run is not None else None
-    if found is None:
-        return []
-    degrees = math.degrees(1.0)
-    return [["line of sight moved by the ship's rotation, rms per axis", _number(found.motion * degrees, 'deg')],
-            ['pointing error that follows it, rms per axis', _number(found.coherent * degrees, 'deg')],
-            ['isolation', _number(found.isolation, 'dB')],
-            ['isolation that noise alone would show', _number(found.limit, 'dB')]]
+def _labelled(parts, *names):
+    """Rows [label, number] of the results of some parts: those named, else all that have a label."""
+    values = results.measured(parts)
+    return [[results.BY_NAME[name].label, _number(*values[name])] for name in names or values
+            if results.BY_NAME[name].label]
 
 
 def _honesty(found):
@@ -244,7 +230,7 @@ def _loop(bag, check):
             late = np.percentile(np.abs(jitter), 99.0)
             rows += [['loop rate achieved (wall time)', _number((t.size - 1) / (wall[-1] - wall[0]) * 1e9, 'Hz')],
                      ['jitter of the step, wall time',
-                      f'{results.rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
+                      f'{tracking.rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
                      f'largest {np.abs(jitter).max():.3g} ms']]
     lost = max([check.steps - topic.count for topic in check.topics
                 if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],
@@ -304,19 +290,17 @@ def _page(bag, recording):
         if recording.motors:
             parts.append(_rows(['', 'azimuth', 'elevation', ''], _torques(recording), 'n'))
     else:
-        values = results.summary(recording.run)
+        values = results.measured(results.of_tracking(recording.run))
         if not recording.run.tracking.any():
             parts.append('<p class="bad">The run was never in autotrack for longer than the settling time, so nothing '
                          'was evaluated.</p>')
         parts.append(_rows(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
                            _pointing(bag, recording, values), 'n'))
         parts.append('<p class="soft">Pointing and noise over the evaluated part: autotrack, from '
-                     f'{results.SETTLING:g} s after its start. Both axes: all samples of both, per axis.'
+                     f'{tracking.SETTLING:g} s after its start. Both axes: all samples of both, per axis.'
                      '</p>')
-        run_rows = [[label, _number(values[key][0], unit)] for label, key, unit in (
-            ("receiver's single-sample noise", 'single_sample_noise_deg', 'deg'), ('first lock', 'lock_time_s', 's'),
-            ('time in autotrack', 'autotrack_time_s', 's'), ('time evaluated', 'evaluated_time_s', 's'),
-            ('time further than half a beamwidth off, once tracking', 'loss_s', 's'))]
+        run_rows = _labelled(results.of_tracking(recording.run), 'single_sample_noise_deg', 'lock_time_s',
+                             'autotrack_time_s', 'evaluated_time_s', 'loss_s')
     parts.append(_rows(None, run_rows + _loop(bag, check), 'n'))
     if not check.complete:
         parts.append('<h2 id="gaps">What the recording lacks</h2><ul>' + ''.join(
@@ -334,7 +318,8 @@ def _page(bag, recording):
     parts += [_figure(spec, recording) for spec in filter_figures.FIGURES]
     if recording.attitude is not None:
         parts.append('<h2 id="attitude">The deck</h2>')
-        parts.append(_rows(None, _deck(recording.attitude) + _isolation(bag, recording), 'n'))
+        ship = isolation.read(bag, recording.run) if recording.run is not None else None
+        parts.append(_rows(None, _labelled({'attitude': recording.attitude}) + _labelled({'isolation': ship}), 'n'))
         parts += [_figure(spec, recording) for spec in attitude_figures.FIGURES]
     parts.append('<h2 id="diagnostics">Diagnostics that were not OK</h2>')
     rows = _diagnostics(recording.statuses)

@@ -24,7 +24,8 @@ from acu_tracker.modes import AUTOTRACK, STANDBY
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import FILTER, RANGE, Acu
 from pedestal_bringup.again import recompute, what_if
-from pedestal_bringup.analysis import identification, results
+from pedestal_bringup.analysis import identification
+from pedestal_bringup.analysis.tracking import SETTLING
 from pedestal_bringup.bags import configuration
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.trials import tuning
@@ -138,7 +139,7 @@ class Simulated:
         self._scenarios = {seed: load(seed) for seed in (*self.seeds, *self.kept_seeds)}
         if not np.isfinite(self.criterion(self.params)).all():
             mode = 'out of standby' if any_mode else 'in autotrack'
-            raise TuneError(f'scenario {chosen.name}: never {mode} for more than {results.SETTLING:g} s')
+            raise TuneError(f'scenario {chosen.name}: never {mode} for more than {SETTLING:g} s')
 
     def runs(self, params, seeds):
         """RESULT records of the settled part of each run."""
@@ -148,7 +149,7 @@ class Simulated:
             loop.acu = control_unit.initial_state(params), control_unit.constants(params), *loop.acu[2:]
             run = closed_loop.run(loop)
             on = run['mode'] != STANDBY if self.any_mode else run['mode'] == AUTOTRACK
-            start = run['t'][on][0] + results.SETTLING if on.any() else math.inf
+            start = run['t'][on][0] + SETTLING if on.any() else math.inf
             found.append(run[on & (run['t'] >= start)])
         return np.concatenate(found)
 
