@@ -35,7 +35,7 @@ def reason(error):
 
 
 def read(path, beam=None):
-    """The Bag in a directory or an .mcap file; beam: as that beam of an array sees it, '' for the first.
+    """The Bag in a directory or an .mcap file; of several beams the view of one, '' for the first; None: all.
 
     Raises BagError when it is missing, empty, damaged or foreign, or has no such beam.
     """
@@ -46,7 +46,10 @@ def read(path, beam=None):
 
 
 def chosen_topics(bag, names):
-    """The topics of these names, without the leading '/', each once; BagError with the nearest for one it has not."""
+    """The topics of a Bag with these names, without the leading '/', each once.
+
+    Raises BagError, with the most similar name, for a topic that is not in it.
+    """
     chosen = list(dict.fromkeys(name.lstrip('/') for name in names))
     for name in chosen:
         if name not in bag.topics:
@@ -57,7 +60,8 @@ def chosen_topics(bag, names):
 
 
 def load(path):
-    """The Bag as far as it can be read; its `damage` says in one line where and why it ends, '' if it is whole."""
+    """The Bag in a directory or an .mcap file as far as it can be read: `damage` is a line on where and why it ends,
+    '' if it is whole. Raises BagError when there is nothing to read."""
     file = locate(path)
     try:
         return Bag(pathlib.Path(path), file, file.read_bytes())
@@ -93,6 +97,7 @@ def locate(path):
 
 
 def foreign_encoding(file, channel):
+    """The BagError for a channel that is not encoded as ROS 2 messages are."""
     return BagError(f'{file}: {channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
 
 
@@ -107,9 +112,9 @@ class Bag:
     """A recording.
 
     topics: {name without the leading '/': type}; metadata_records: {name: {text: text}};
-    index: record array in the order of the file, one row per message: channel, sequence, log, publish [ns], chunk,
-    start, stop (where its bytes are); statistics: {name: count} as the file's summary says, None without one;
-    beam: the prefix of the beam of several that it is a view of, ''.
+    index: record array (n,) in the order of the file, one row per message: channel, sequence, log, publish [ns],
+    chunk, start, stop (where its bytes are); statistics: {name: count} in the file's summary, None without one;
+    damage: why it ends before its end, ''; beam: the prefix of the beam that it is a view of, ''.
     """
 
     def __init__(self, path, file, data):
@@ -212,40 +217,41 @@ class Bag:
         return tables.graph(self.beams)
 
     def view(self, beam=''):
-        """The Bag as one beam of several sees it, '' for the first: what is its own under the plain names, what is
-        shared, and nothing of the others. A Bag of one beam is its own view. Raises BagError for no beam of it."""
-        known = tables.prefixes(self.beams)
-        if known == ('',) and beam:
+        """The Bag of one beam of several, '' for the first: the beam's own topics under their plain names and those
+        that all beams share. A Bag of one beam is its own view. Raises BagError for a beam that is not in it."""
+        prefixes = tables.prefixes(self.beams)
+        if prefixes == ('',) and beam:
             raise BagError(f'{self.path}: beam {beam!r}: there is only one in it')
-        prefix = f'{beam}/' if beam else known[0]
-        if prefix not in known:
-            raise BagError(f'{self.path}: beam {beam!r}: must be one of {", ".join(name[:-1] for name in known)}')
+        prefix = f'{beam}/' if beam else prefixes[0]
+        if prefix not in prefixes:
+            raise BagError(f'{self.path}: beam {beam!r}: must be one of {", ".join(name[:-1] for name in prefixes)}')
         if not prefix:
             return self
-        seen = copy.copy(self)
-        seen.beam = prefix
 
         def own(content):
             return {tables.plain(name): value for name, value in content.items()
                     if tables.beam_of(name) in ('', prefix[:-1])}
-        seen.topics = own(self.topics)
-        seen._channels = {channel: tables.plain(name) for channel, name in self._channels.items()
+
+        view = copy.copy(self)
+        view.beam = prefix
+        view.topics = own(self.topics)
+        view._channels = {channel: tables.plain(name) for channel, name in self._channels.items()
                           if tables.beam_of(name) in ('', prefix[:-1])}
-        seen.index = self.index[np.isin(self.index.channel, list(seen._channels))]
-        seen.statistics = None if self.statistics is None else own(self.statistics)
-        seen.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}
+        view.index = self.index[np.isin(self.index.channel, list(view._channels))]
+        view.statistics = None if self.statistics is None else own(self.statistics)
+        view.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}
         if 'parameters' in self.metadata_records:
-            seen.metadata_records['parameters'] = own(self.metadata_records['parameters'])
-        seen.__dict__.pop('configuration', None)
-        tracking = seen.configuration['parameters'].get('tracking_receiver', {})
-        if 'antenna.beamwidth' in tracking:
-            seen.metadata['beamwidth'] = str(tracking['antenna.beamwidth'])
-        return seen
+            view.metadata_records['parameters'] = own(self.metadata_records['parameters'])
+        view.__dict__.pop('configuration', None)
+        receiver = view.configuration['parameters'].get('tracking_receiver', {})
+        if 'antenna.beamwidth' in receiver:
+            view.metadata['beamwidth'] = str(receiver['antenna.beamwidth'])
+        return view
 
     @functools.cached_property
     def configuration(self):
         """How the run was made: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}; '' and {} in a bag
-        that does not say."""
+        without a configuration. Raises BagError where that is no YAML."""
         try:
             return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''),
                     'parameters': {node: yaml.safe_load(text)
@@ -255,7 +261,7 @@ class Bag:
             raise BagError(f'{self.file}: its record `parameters` is no YAML: {reason}') from None
 
     def where(self, topic):
-        """Where in `index` the rows of one topic are."""
+        """Where in `index` the rows (m,) of one topic are. Raises BagError for a topic that is not in the bag."""
         name = topic.lstrip('/')
         if name not in self.topics:
             raise BagError(f'{self.path}: no topic {name} in it; there are {", ".join(self.topics)}')
@@ -271,14 +277,18 @@ class Bag:
         return self.take(self.index if topic is None else self.rows(topic))
 
     def take(self, rows):
-        """The same of any rows of `index`, in their order."""
+        """Iterator of (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
         names = self._channels
-        for channel, _, log, publish, chunk, start, stop in rows.tolist():
+        heads, places = rows[['channel', 'log', 'publish']].tolist(), rows[['chunk', 'start', 'stop']].tolist()
+        for (channel, log, publish), (chunk, start, stop) in zip(heads, places):
             data = self._data if chunk < 0 else self._chunk(chunk)
             yield names[channel], log, publish, data[start:stop]
 
     def messages(self, topic=None):
-        """Iterator of (topic, log time, publish time [ns], message) in the order of the file."""
+        """Iterator of (topic, log time, publish time [ns], message) in the order of the file.
+
+        Raises BagError for bytes that are no message of the topic's type.
+        """
         for name, log, publish, data in self.raw(topic):
             try:
                 message = messages.deserialize(data, self.topics[name])
@@ -287,7 +297,10 @@ class Bag:
             yield name, log, publish, message
 
     def table(self, topic):
-        """{column: array (n,)} of a topic, one row per message; see columns.table for their names."""
+        """{column: array (n,)} of a topic, one row per message; columns.table says their names.
+
+        Raises BagError for bytes that are no message of the topic's type.
+        """
         rows = self.rows(topic)
         try:
             return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log)

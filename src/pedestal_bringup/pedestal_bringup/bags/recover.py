@@ -37,7 +37,8 @@ _FOOTER = 9 + 20 + len(MAGIC)
 
 @dataclasses.dataclass
 class Gap:
-    """Bytes [start, stop) of the file that cannot be used, why, and the log times [ns] around (None where none)."""
+    """Bytes [start, stop) of the file that cannot be used, why, and the log times [ns] before and after them; None
+    where no message is there."""
     start: int
     stop: int
     why: str
@@ -45,18 +46,19 @@ class Gap:
     after: int | None = None
 
     def line(self):
-        said = f'bytes {self.start} to {self.stop} unused ({self.why})'
-        said += f', after {self.before / 1e9:.6f} s' if self.before is not None else ''
-        return said + (f', before {self.after / 1e9:.6f} s' if self.after is not None else '')
+        """The gap as text."""
+        return (f'bytes {self.start} to {self.stop} unused ({self.why})'
+                + (f', after {self.before / 1e9:.6f} s' if self.before is not None else '')
+                + (f', before {self.after / 1e9:.6f} s' if self.after is not None else ''))
 
 
 @dataclasses.dataclass
 class Recovered:
-    """What was recovered, and what is missing.
+    """What was recovered into the bag at `path`, and what is missing.
 
     counts: {topic: messages}; first, last: log times [ns]; ended: whether the recorder came to its end; duration: how
-    long the run was to be [s], None when the bag does not say; lost: {topic: messages missing between those that are
-    there, by the recorder's sequence numbers}.
+    long the run was to be [s], None when the bag does not say; gaps: [Gap]; lost: {topic: messages missing between
+    those that are there, by the recorder's sequence numbers}.
     """
     path: pathlib.Path
     counts: dict
@@ -156,8 +158,8 @@ def _read(opcode, content):
 
 def _next_chunk(data, start):
     """Where the next chunk begins whose checksum holds; the end of the data when there is none."""
-    for found in _COMPRESSION.finditer(data, start):
-        at = found.start() - _BEFORE_COMPRESSION
+    for name in _COMPRESSION.finditer(data, start):
+        at = name.start() - _BEFORE_COMPRESSION
         try:
             if at >= start and data[at] == Opcode.CHUNK:
                 opcode, stop = _frame(data, at)
@@ -169,7 +171,8 @@ def _next_chunk(data, start):
 
 
 def _pieces(data):
-    """(opcode, start, stop, record or why not) of each record of the data section; opcode 0: not to be used.
+    """Iterator of (opcode, start, stop, record) of the records of the data section; of bytes that cannot be used
+    (0, start, stop, why).
 
     After a broken record comes the one behind it if there is one, else the next whole chunk behind everything that
     was good.
@@ -180,7 +183,7 @@ def _pieces(data):
         try:
             opcode, stop = _frame(data, at)
             record = _read(opcode, data[at + 9:stop])
-        except Exception as error:  # as above
+        except Exception as error:  # whatever a decoder makes of broken bytes
             if stop is None or not _follows(data, stop):
                 stop = _next_chunk(data, good)
             if stop > at:
@@ -210,11 +213,11 @@ def _summary(data):
 
 
 class _Salvage:
-    """Adds what is good of a file to a new bag; what is not is in `gaps`.
+    """Adds the messages of a damaged file to a new BagFile and keeps count of what cannot be used.
 
-    schemas, channels: {number in the file: number in the bag}; names: {channel in the file: topic}; counts: {topic:
-    messages added}; first, last: their log times [ns]; sequence: {channel: number of its last message}; unsure:
-    channels without a message since the last gap.
+    _schemas, _channels: {number in the file: number in the bag}; _names: {channel in the file: topic}; _counts:
+    {topic: messages added}; _first, _last: their log times [ns]; _sequence: {channel: number of its last message};
+    _unsure: channels without a message since the last gap.
     """
 
     def __init__(self, file, bag):

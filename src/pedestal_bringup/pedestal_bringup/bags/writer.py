@@ -45,13 +45,16 @@ class _Disk:
         self._size, self._pending = size, bytearray()
 
     def write(self, data):
+        """Keep bytes for the next flush."""
         self._pending += data
 
     def tell(self):
+        """Where in the file the next byte comes."""
         return self.end + len(self._pending)
 
     def flush(self):
-        """Raises BagError when the disk does not take it; the file is then as it was."""
+        """Put what was kept into the file. Raises BagError when the disk does not take it; the file is then as it was.
+        """
         data, self._pending = bytes(self._pending), bytearray()
         if self.end >= self._size:
             view = memoryview(data)
