@@ -256,9 +256,9 @@ def recorded(path, again, rate):
                                      '-p', f'recorder:bag:={again}'], stdout=log, stderr=subprocess.STDOUT)
         begun = []
         try:
-            outcome = replay.replay(path, [], [], rate, ready=lambda: begun.extend((time.perf_counter(), _cpu_time(
-                recorder.pid))))
-            if outcome.ended != 'whole':
+            result = replay.replay(path, replay.ReplayOptions(rate=rate), lambda: begun.extend(
+                (time.perf_counter(), _cpu_time(recorder.pid))))
+            if result.ended != 'whole':
                 raise KeyboardInterrupt
             _, status, used = os.wait4(recorder.pid, 0)
             wall = time.perf_counter() - begun[0]
