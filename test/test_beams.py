@@ -15,7 +15,7 @@ from pedestal_bringup.analysis import tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import export
 from pedestal_bringup.bags.verify import verify
-from pedestal_bringup.report import report
+from pedestal_bringup.report.page import write as write_report
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_common import messages
 
@@ -99,7 +99,7 @@ def test_every_node_of_a_beam_recomputes_identically(runs, name, beam):
 
 
 def test_report_and_export_of_one_beam(runs, tmp_path):
-    page = report.write(runs['four'].bag, tmp_path / 'report.html', beam='beam_2').read_text()
+    page = write_report(runs['four'].bag, tmp_path / 'report.html', beam='beam_2').read_text()
     assert f'Tracking run: {FOUR}/beam_2' in page and 'Not compared' not in page
     name = 'beam_3/tracking_receiver/angle_error'
     [(file, rows, _)] = export.export(runs['four'].bag, output=tmp_path, names=[name])
