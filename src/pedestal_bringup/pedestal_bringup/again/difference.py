@@ -7,7 +7,6 @@ import dataclasses
 import fnmatch
 import itertools
 import math
-import typing
 
 import numpy as np
 
@@ -43,15 +42,6 @@ class Tolerance:
 
 
 @dataclasses.dataclass
-class TopicDifference:
-    """A topic: how many messages were recorded and are there now, what is wrong with their count and order (texts)."""
-    name: str
-    was: int
-    now: int
-    problems: list
-
-
-@dataclasses.dataclass
 class FieldDifference:
     """One field of a topic: in how many messages it differs, in how many beyond its tolerance, the largest difference
     (inf: a number against NaN, or no number), the stamp of the first [s]."""
@@ -63,8 +53,13 @@ class FieldDifference:
 
 
 @dataclasses.dataclass
-class NumberDifference(TopicDifference):
-    """A topic whose messages were paired by their stamps; fields: [FieldDifference] of those that differ."""
+class TopicDifference:
+    """A topic whose messages were paired by their stamps: how many were recorded and are there now, what is wrong with
+    their count and order (texts), the fields that differ, [FieldDifference]."""
+    name: str
+    was: int
+    now: int
+    problems: list
     fields: list
 
     @property
@@ -88,7 +83,7 @@ class NumberDifference(TopicDifference):
 
 
 def lines(differences) -> list:
-    """NumberDifferences as a table of text."""
+    """TopicDifferences as a table of text."""
     text = [f'{"topic":34} {"computed":>9} {"recorded":>9}']
     if any(topic.fields for topic in differences):
         text.append(f'  {"field":32} {"differ":>9} {"beyond":>9} {"largest":>11} {"first s":>14}')
@@ -123,12 +118,12 @@ def recorded(data, log, topic) -> Output:
     return Output(columns.stamps(data, type_name, log), values)
 
 
-def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, template=None) -> NumberDifference:
+def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, template=None) -> TopicDifference:
     """Compare the recorded messages of a topic with the recomputed ones.
 
     data, template: the recorded CDR messages and a message as the node makes it, for what is no number in them.
     """
-    difference = NumberDifference(topic, len(was.stamps), len(now.stamps), _order(was.stamps, now.stamps), [])
+    difference = TopicDifference(topic, len(was.stamps), len(now.stamps), _order(was.stamps, now.stamps), [])
     _, here, there = np.intersect1d(was.stamps, now.stamps, return_indices=True)
     stamps = was.stamps[here]
 
@@ -174,74 +169,53 @@ def _order(was, now):
     return problems
 
 
-class Change(typing.NamedTuple):
-    """A value that was another; None where there was or is none."""
-    name: str
-    was: typing.Any
-    now: typing.Any
-
-
 @dataclasses.dataclass
-class MessageDifference(TopicDifference):
-    """A topic whose messages were paired by their place: how many pairs differ, the log time of the first [ns], and
-    the changes of its fields, [Change]."""
+class MessageDifference:
+    """A topic whose messages were paired by their place: how many were recorded and are there now, how many pairs
+    differ, the log time of the first [ns] and what differs in it, texts."""
+    name: str
+    was: int
+    now: int
     different: int
     first: int
-    changes: list = dataclasses.field(default_factory=list)
-
-
-class _Message(typing.NamedTuple):
-    log: int
-    data: bytes
+    changes: list
 
 
 def compare_messages(name, was, now):
     """The MessageDifference of a topic in two bags (bag.Bag); None when its messages are equal to the last byte."""
     kinds = was.topics.get(name, 'none'), now.topics.get(name, 'none')
-    old, new = ([_Message(log, data) for _, log, _, data in bag.raw(name)] if name in bag.topics else []
+    old, new = ([(log, data) for _, log, _, data in bag.raw(name)] if name in bag.topics else []
                 for bag in (was, now))
     pairs = [(a, b) for a, b in itertools.zip_longest(old, new) if a != b]
     if pairs:
         a, b = pairs[0]
-        difference = MessageDifference(name, len(old), len(new), [], len(pairs), (a or b).log)
-        _describe(difference, a, b, kinds)
-        return difference
+        return MessageDifference(name, len(old), len(new), len(pairs), (a or b)[0], _changes(a, b, kinds))
     if kinds[0] != kinds[1]:
-        return MessageDifference(name, len(old), len(new), [f'type {kinds[0]} -> {kinds[1]}'], 0, 0)
+        return MessageDifference(name, len(old), len(new), 0, 0, [f'type {kinds[0]} -> {kinds[1]}'])
     return None
-
-
-def _describe(difference, was, now, kinds):
-    """Say how two _Messages of these types differ; None is one that is not there."""
-    if was is None or now is None:
-        difference.problems.append('not recorded' if was is None else 'not there any more')
-    elif was.log != now.log:
-        difference.problems.append(f'log time {was.log / 1e9:.6f} -> {now.log / 1e9:.6f}')
-    else:
-        try:
-            difference.changes += changes(*(dict(_leaves(messages.deserialize(message.data, kind)))
-                                            for message, kind in zip((was, now), kinds)))
-        except ValueError as error:
-            difference.problems.append(str(error))
-        if not difference.problems and not difference.changes:
-            difference.problems.append('bytes that are in no field')
-
-
-def changes(was, now):
-    """[Change] of two {name: value}; NaN equals NaN, and 0 differs from -0."""
-    return [Change(name, was.get(name), now.get(name)) for name in dict.fromkeys((*was, *now))
-            if repr(was.get(name)) != repr(now.get(name))]
 
 
 def compare_order(was, now):
-    """The MessageDifference at the first place where two bags differ whose topics are equal one by one; None when
-    there is none."""
+    """The MessageDifference at the first place where two bags differ whose topics are equal one by one, or None."""
     for old, new in zip(was.raw(), now.raw()):
         if old != new:
-            return MessageDifference(
-                old[0], was.rows(old[0]).size, now.rows(old[0]).size,
-                [f'its place in the file, now {new[0]} at {new[1] / 1e9:.6f} s comes there'], 0, old[1])
+            change = f'its place in the file, now {new[0]} at {new[1] / 1e9:.6f} s comes there'
+            return MessageDifference(old[0], was.rows(old[0]).size, now.rows(old[0]).size, 0, old[1], [change])
     return None
+
+
+def _changes(was, now, kinds):
+    """What differs between two messages (log time, bytes) of these types, None for one that is not there; texts."""
+    if was is None or now is None:
+        return ['not recorded' if was is None else 'not there any more']
+    if was[0] != now[0]:
+        return [f'log time {was[0] / 1e9:.6f} -> {now[0] / 1e9:.6f}']
+    try:
+        old, new = (dict(_leaves(messages.deserialize(data, kind))) for (_, data), kind in zip((was, now), kinds))
+    except ValueError as error:
+        return [str(error)]
+    return [f'{key} {old.get(key)!r} -> {new.get(key)!r}' for key in dict.fromkeys((*old, *new))
+            if repr(old.get(key)) != repr(new.get(key))] or ['bytes that are in no field']
 
 
 def _leaves(message, prefix=''):

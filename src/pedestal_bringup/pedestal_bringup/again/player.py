@@ -49,58 +49,26 @@ def answer_of(node, graph):
                  for name in ANSWERS[topics.plain(node)])
 
 
-class Answers:
-    """What the nodes under test were asked and have answered: stamps [ns] of the last, and counts, {node: count} of
-    the nodes that are asked by a topic."""
+@dataclasses.dataclass
+class NodeUnderTest:
+    """A node that answers every step: the topic that asks it (None: it asks), the one it answers on; stamps [ns] of
+    the last step it was asked and of its last answer; how many of both."""
+    name: str
+    trigger: str | None
+    answer: str
+    asked: int = -1
+    answered: int = -1
+    steps: int = 0
+    answers: int = 0
 
-    def __init__(self, nodes, graph):
-        self._topics = {node: answer_of(node, graph) for node in nodes if topics.plain(node) in ANSWERS}
-        self._asked, self._answered = {}, dict.fromkeys(self._topics, -1)
-        self._steps, self._counts = dict.fromkeys(self._topics, 0), dict.fromkeys(self._topics, 0)
+    def owes(self, stamp=-1):
+        """Whether it must answer before the messages of this stamp may go out."""
+        return self.answered < (stamp if self.trigger is None else self.asked)
 
-    @property
-    def steps(self):
-        """How many steps each node was asked."""
-        return {node: self._steps[node] for node, (trigger, _) in self._topics.items() if trigger}
-
-    @property
-    def counts(self):
-        """How many answers each node gave."""
-        return {node: self._counts[node] for node, (trigger, _) in self._topics.items() if trigger}
-
-    @property
-    def total(self):
-        """How many answers came of all nodes."""
-        return sum(self._counts.values())
-
-    def node_of(self, name):
-        """The node that answers on a topic; None where nobody does."""
-        return next((node for node, (_, answer) in self._topics.items() if answer == name), None)
-
-    def ask(self, name, stamp):
-        """A message of a topic was sent."""
-        for node, (trigger, _) in self._topics.items():
-            if name == trigger:
-                self._asked[node] = stamp
-                self._steps[node] += 1
-
-    def take(self, node, stamp):
-        """An answer of a node has come."""
-        self._answered[node] = max(self._answered[node], stamp)
-        self._counts[node] += 1
-
-    def missing(self, stamp=-1):
-        """The node that must answer before the messages of this stamp may go out; None when all have."""
-        for node, (trigger, _) in self._topics.items():
-            if self._answered[node] < (stamp if trigger is None else self._asked.get(node, -1)):
-                return node
-        return None
-
-    def silence(self, node, stamp, deadline):
-        """The GraphError of a node that did not answer within the deadline [s]."""
-        _, answer = self._topics[node]
-        return GraphError(f'no {answer} for step {self._asked.get(node, stamp) / SECOND:.6f} s after '
-                          f'{deadline:g} s; silent: {node}')
+    def silence(self, stamp, deadline):
+        """The GraphError when it did not answer within the deadline [s]."""
+        step = stamp if self.trigger is None else self.asked
+        return GraphError(f'no {self.answer} for step {step / SECOND:.6f} s after {deadline:g} s; silent: {self.name}')
 
 
 class Pace:
@@ -156,12 +124,13 @@ class Player(Node):
 
     def __init__(self, playlist, companion, options, keyboard, stopped):
         super().__init__(topics.STAND_IN)
-        self.playlist, self.companion, self.nodes, self.deadline = (playlist, companion, options.nodes,
-                                                                    options.deadline)
+        self.playlist, self.companion = playlist, companion
+        self.nodes, self.deadline = options.nodes, options.deadline
         self.keyboard, self.stopped, self.status = keyboard, stopped, StatusLine()
         self.graph = playlist.bag.graph
         self.channels = {name: Channel(self._publisher(name, playlist.bag.topics[name])) for name in playlist.names}
-        self.answers = Answers(self.nodes, self.graph)
+        self.under_test = [NodeUnderTest(node, *answer_of(node, self.graph)) for node in self.nodes
+                           if topics.plain(node) in ANSWERS]
         self.pace = Pace(options.rate, options.paused)
         for topic in self.graph.values():
             if any(node in topic.writers for node in self.nodes):
@@ -184,12 +153,13 @@ class Player(Node):
 
     def _listen(self, topic):
         """Read what a node under test writes, in the place of the nodes that are not there."""
-        node = self.answers.node_of(topic.name)
+        node = next((node for node in self.under_test if node.answer == topic.name), None)
 
         def take(data):
             if node is not None:
                 seconds, nanoseconds = _stamp_of(data, 4)
-                self.answers.take(node, seconds * SECOND + nanoseconds)
+                node.answered = max(node.answered, seconds * SECOND + nanoseconds)
+                node.answers += 1
         profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)
         self.create_subscription(shell.message_class(topic.type), topic.name, take, profile, raw=True)
 
@@ -273,7 +243,9 @@ class Player(Node):
             self._await_arrival(name, self.deadline)
         channel.publisher.publish(data)
         channel.sent += 1
-        self.answers.ask(name, stamp)
+        for node in self.under_test:
+            if name == node.trigger:
+                node.asked, node.steps = stamp, node.steps + 1
 
     def _await_arrival(self, name, limit):
         channel = self.channels[name]
@@ -311,12 +283,15 @@ class Player(Node):
 
     def _wait(self, stamp, now, since):
         """Seconds until the messages of a stamp go out, which are waited for since then; as far as one can tell."""
-        missing = self.answers.missing(stamp) if self.pace.rate is None else None
-        if missing is None:
+        late = self._late(stamp) if self.pace.rate is None else None
+        if late is None:
             return self.pace.wait(stamp, now)
         if now - since > self.deadline:
-            raise self.answers.silence(missing, stamp, self.deadline)
+            raise late.silence(stamp, self.deadline)
         return KEY_LOOK
+
+    def _late(self, stamp=-1):
+        return next((node for node in self.under_test if node.owes(stamp)), None)
 
     def _look(self, now):
         if now >= self._next_look:
@@ -342,14 +317,14 @@ class Player(Node):
         for name in self.channels:
             self._await_arrival(name, self.deadline)
         limit = self.deadline if self.pace.rate is None else QUIET
-        total, since = -1, 0.0
-        while self.answers.missing() and not self._ended():
-            now = time.monotonic()
-            if self.answers.total != total:
-                total, since = self.answers.total, now
+        count, since = -1, 0.0
+        while self._late() and not self._ended():
+            now, answers = time.monotonic(), sum(node.answers for node in self.under_test)
+            if answers != count:
+                count, since = answers, now
             elif now - since > limit:
                 if self.pace.rate is None:
-                    raise self.answers.silence(self.answers.missing(), -1, self.deadline)
+                    raise self._late().silence(-1, self.deadline)
                 return
             self._spin(KEY_LOOK)
 

@@ -13,11 +13,12 @@ from pedestal_common.steps import SECOND
 
 @dataclasses.dataclass
 class NodeReport:
-    """One node: lines to print, rows of --json, the outputs {topic: Output} it has now, whether they are as they must
-    be."""
+    """One node: lines to print, rows of --json, the outputs {topic: Output} it has now, a message of each as the node
+    makes it {topic: message}, whether they are as they must be."""
     lines: list
     rows: list
     outputs: dict
+    templates: dict
     well: bool = True
 
 
@@ -43,7 +44,8 @@ def main(options):
         lines += [*([''] if lines else []), *report.lines]
     if options.output:
         outputs = {topic: output for report in reports for topic, output in report.outputs.items()}
-        write(options.output, recording, outputs, _templates(recording, nodes, given), changes)
+        templates = {topic: message for report in reports for topic, message in report.templates.items()}
+        write(options.output, recording, outputs, templates, changes)
         lines.append(f'written: {options.output}')
     return lines, [row for report in reports for row in report.rows], all(report.well for report in reports)
 
@@ -125,7 +127,7 @@ def _against_recorded(recording, outputs, done, tolerance):
     equal = all(topic.equal for topic in compared)
     verdict = 'identical' if all(topic.identical for topic in compared) else \
         'equal within tolerance' if equal else 'DIFFERS'
-    return NodeReport([*difference.lines(compared), f'{done.node}: {verdict}'], rows, outputs,
+    return NodeReport([*difference.lines(compared), f'{done.node}: {verdict}'], rows, outputs, done.unit.messages,
                       equal and not done.feed.problem)
 
 
@@ -138,7 +140,7 @@ def _new_numbers(recording, outputs, done):
         numbers = what_if.numbers(recording.bag, [done.outputs])
         lines += [f'{name:42} {_text(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
         rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
-    return NodeReport(lines, rows, outputs, not done.feed.problem)
+    return NodeReport(lines, rows, outputs, done.unit.messages, not done.feed.problem)
 
 
 def _text(value):
@@ -160,17 +162,7 @@ def _old_against_new(recording, old, new, tolerance, changes):
             rows += [row(new.node, f'{name} old', a, unit), row(new.node, f'{name} new', b, unit)]
     lines += difference.lines([difference.compare(name, before[name], output, tolerance)
                                for name, output in new.outputs.items() if not tolerance.ignores(name)])
-    return NodeReport(lines, rows, new.outputs)
-
-
-def _templates(recording, nodes, given):
-    """{topic: message} as the nodes make them, to be filled with numbers."""
-    templates = {}
-    for node in nodes:
-        kind = recompute.kind_of(recording, node)
-        params = recompute.parameters_of(recording, node, given)
-        templates.update(kind.unit(params, recording.has(kind.ship)).messages)
-    return templates
+    return NodeReport(lines, rows, new.outputs, new.unit.messages)
 
 
 def write(path, recording, outputs, templates, changes):

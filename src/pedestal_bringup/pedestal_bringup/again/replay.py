@@ -43,15 +43,13 @@ class ReplayOptions:
 
 @dataclasses.dataclass
 class ReplayResult:
-    """What was sent {topic: count}, from the first to the last stamp [s], in which wall time [s]; the steps that each
-    node under test was asked and its answers {node: count}. ended: 'whole', 'quit' (by key) or 'stopped' (by a
-    signal)."""
+    """What was sent {topic: count}, from the first to the last stamp [s], in which wall time [s]; {node: (its answers,
+    the steps it was asked)}. ended: 'whole', 'quit' (by key) or 'stopped' (by a signal)."""
     bag: str
     sent: dict
     first: float
     last: float
     wall: float
-    steps: dict
     answers: dict
     ended: str
 
@@ -59,7 +57,7 @@ class ReplayResult:
         """The result as text."""
         width = max(map(len, self.sent))
         lines = [f'{name:{width}} {count:9}' for name, count in self.sent.items()]
-        lines += [f'{node} answered {count} of {self.steps[node]} steps' for node, count in self.answers.items()]
+        lines += [f'{node} answered {count} of {steps} steps' for node, (count, steps) in self.answers.items()]
         span = self.last - self.first
         factor = f' ({span / self.wall:.3g} x real time)' if self.ended == 'whole' and span > 0.0 else ''
         return [*lines, f'{self.bag}: {sum(self.sent.values())} messages sent, from {self.first:.6f} to '
@@ -110,10 +108,11 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
                 player.finish()
             finally:
                 player.close()
-            ended = 'stopped' if stopped() else 'quit' if player.pace.quit else 'whole'
-            return ReplayResult(str(path), {name: channel.sent for name, channel in player.channels.items()},
-                                playlist.first / SECOND, player.position / SECOND, wall, player.answers.steps,
-                                player.answers.counts, ended)
+            return ReplayResult(
+                str(path), {name: channel.sent for name, channel in player.channels.items()},
+                playlist.first / SECOND, player.position / SECOND, wall,
+                {node.name: (node.answers, node.steps) for node in player.under_test if node.trigger},
+                'stopped' if stopped() else 'quit' if player.pace.quit else 'whole')
     finally:
         rclpy.try_shutdown()
 

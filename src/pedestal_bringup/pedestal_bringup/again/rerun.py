@@ -14,9 +14,9 @@ SHOWN = 4
 
 @dataclasses.dataclass
 class RerunResult:
-    """A recording against the one made again. topics: [difference.MessageDifference], the earliest first; metadata:
-    {record: [difference.Change]}; end: last log time of the recording [ns]; sha256: of the new file; same: whether the
-    files are equal to the last byte."""
+    """A recording against the one made again, which is at path. topics: [difference.MessageDifference], the earliest
+    first; metadata: {record: {key: (was, now)}} of what differs; end: last log time of the recording [ns]; sha256: of
+    the new file; same: whether the files are equal to the last byte."""
     path: pathlib.Path
     topics: list
     metadata: dict
@@ -37,14 +37,13 @@ class RerunResult:
     @property
     def other_version(self):
         """Whether another version of this software made the recording."""
-        return any(change.name == 'git' or change.name.startswith('version.')
-                   for change in self.metadata.get('pedestal', ()))
+        return any(key == 'git' or key.startswith('version.') for key in self.metadata.get('pedestal', ()))
 
     def lines(self):
         """The comparison as text, the verdict last."""
         lines = [] if self.cut else list(map(_line, self.topics))
-        lines += [f'{record}.{change.name}: {_short(change.was)} -> {_short(change.now)}'
-                  for record, changes in self.metadata.items() for change in changes]
+        lines += [f'{record}.{key}: {_short(was)} -> {_short(now)}'
+                  for record, changes in self.metadata.items() for key, (was, now) in changes.items()]
         if self.same:
             verdict = f'equal to the last byte, sha256 {self.sha256}'
         elif not self.equal:
@@ -59,10 +58,9 @@ class RerunResult:
 
 def _line(topic):
     counts = f'{topic.was} messages' if topic.was == topic.now else f'{topic.was} messages, now {topic.now}'
-    fields = topic.problems + [f'{name} {was!r} -> {now!r}' for name, was, now in topic.changes]
-    more = f' and {len(fields) - SHOWN} more fields' if len(fields) > SHOWN else ''
+    more = f' and {len(topic.changes) - SHOWN} more fields' if len(topic.changes) > SHOWN else ''
     return (f'{topic.name}: {counts}, {topic.different} differ, the first at {topic.first / 1e9:.6f} s: '
-            f'{", ".join(fields[:SHOWN])}{more}')
+            f'{", ".join(topic.changes[:SHOWN])}{more}')
 
 
 def _short(text):
@@ -101,12 +99,15 @@ def configured(bag):
 
 def result(was, now) -> RerunResult:
     """Compare a recording with the one made again; both bag.Bag."""
-    metadata = {record: difference.changes(*(bag.metadata_records.get(record, {}) for bag in (was, now)))
-                for record in dict.fromkeys((*was.metadata_records, *now.metadata_records))}
+    metadata = {}
+    for record in dict.fromkeys((*was.metadata_records, *now.metadata_records)):
+        old, new = (bag.metadata_records.get(record, {}) for bag in (was, now))
+        metadata[record] = {key: (old.get(key), new.get(key)) for key in dict.fromkeys((*old, *new))
+                            if old.get(key) != new.get(key)}
     topics = [difference.compare_messages(name, was, now) for name in dict.fromkeys((*was.topics, *now.topics))]
-    topics = sorted(filter(None, topics), key=lambda topic: topic.first)
     before, sha256 = (hashlib.sha256(bag.file.read_bytes()).hexdigest() for bag in (was, now))
-    if not topics and before != sha256:
-        topics = list(filter(None, [difference.compare_order(was, now)]))
-    return RerunResult(now.path, topics, {record: changes for record, changes in metadata.items() if changes},
+    if not any(topics) and before != sha256:
+        topics = [difference.compare_order(was, now)]
+    return RerunResult(now.path, sorted(filter(None, topics), key=lambda topic: topic.first),
+                       {record: changes for record, changes in metadata.items() if changes},
                        int(was.index.log.max(initial=0)), sha256, before == sha256)

@@ -12,14 +12,14 @@ import numpy as np
 
 from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.analysis.results import Result
-from pedestal_bringup.analysis.tracking import DEGREES, rms
+from pedestal_bringup.analysis.tracking import DEGREES, largest, rms
+from pedestal_common.messages import AXES
 
 RIPPLE = 0.25
 """What is faster than a moving mean of this length [s] counts as noise of a command."""
 
 NOTE = ('the recorded antenna does not move with the recomputed command: compared are the estimate against the '
         'recorded truth and the noise of estimate and command; for the pointing, run the scenario anew')
-AXES = ('azimuth', 'elevation')
 
 
 class Overlay:
@@ -85,11 +85,6 @@ class AgainstTruth:
         """Rms [rad] of the receiver's error less the true one."""
         return rms(self.run.measured[self.judged] - self.true)
 
-    @property
-    def largest_error(self):
-        """[rad]"""
-        return float(np.nanmax(np.abs(self.error))) if self.error.size else math.nan
-
     @functools.cached_property
     def motion(self):
         """(lag [s], rms of the rate error [rad/s]) of the estimate behind the true direction, in earth angles.
@@ -127,7 +122,7 @@ NUMBERS = (
            'Rms of estimate less truth in cross-elevation.'),
     Result('estimate_error_elevation_rms_deg', 'deg', 'truth', lambda acu: rms(acu.error[:, 1]) * DEGREES,
            'Rms of estimate less truth in elevation.'),
-    Result('estimate_error_max_deg', 'deg', 'truth', lambda acu: acu.largest_error * DEGREES,
+    Result('estimate_error_max_deg', 'deg', 'truth', lambda acu: largest(acu.error) * DEGREES,
            'Largest of estimate less truth on either axis.'),
     Result('single_sample_noise_deg', 'deg', 'truth', lambda acu: acu.noise * DEGREES,
            "Rms of the receiver's error less the true one."),

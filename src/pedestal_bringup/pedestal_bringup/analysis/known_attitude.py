@@ -40,14 +40,10 @@ class KnownAttitude:
         return self.t >= self.aligned
 
     @property
-    def heading_at_alignment(self):
-        """Heading error [rad] when it was aligned; NaN when it never was."""
-        return float(self.heading[np.argmax(self.after)]) if self.after.any() else math.nan
-
-    @property
-    def heading_sigma_at_alignment(self):
-        """Standard deviation [rad] stated for the heading when it was aligned; NaN when it never was."""
-        return float(self.sigma[np.argmax(self.after), 1]) if self.after.any() else math.nan
+    def at_alignment(self):
+        """(heading error, its stated standard deviation) [rad] when it was aligned; NaN when it never was."""
+        first = np.argmax(self.after)
+        return (float(self.heading[first]), float(self.sigma[first, 1])) if self.after.any() else (math.nan, math.nan)
 
 
 def read(bag):

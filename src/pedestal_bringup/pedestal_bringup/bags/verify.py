@@ -78,7 +78,9 @@ def verify(path) -> Report:
     rows = {name: bag.rows(name) for name in bag.topics}
     stamps = {name: columns.stamps([data for _, _, _, data in bag.raw(name)], bag.topics[name], rows[name].log)
               for name in bag.topics}
-    of_steps = {name: stamp for name, stamp in stamps.items() if _rate(bag, name) == 'step' and stamp.size}
+    graph = bag.graph
+    of_steps = {name: stamp for name, stamp in stamps.items()
+                if name in graph and graph[name].rate == 'step' and stamp.size}
     grid = _grid(of_steps)
     checks = [TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,
                          stamp[-1] / 1e9 if stamp.size else np.nan, _problems(bag, rows[name], name, stamp, grid))
@@ -95,15 +97,11 @@ def verify(path) -> Report:
                   configuration.line(bag))
 
 
-def _rate(bag, name):
-    """The rate of a topic of the graph that was recorded, '' of another."""
-    return bag.graph[name].rate if name in bag.graph else ''
-
-
 def _problems(bag, rows, name, stamp, grid):
     """What is wrong with a topic, its rows of the index (n,) and its stamps (n,) [ns] given."""
-    topic, rate, ours = bag.graph.get(name), _rate(bag, name), 'pacing' in bag.metadata
-    problems = _order(stamp) if topic is not None and len(topic.writers) == 1 else []
+    topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
+    rate = topic.rate if topic else ''
+    problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
         if ours and not np.array_equal(stamp, rows.log):
@@ -112,7 +110,7 @@ def _problems(bag, rows, name, stamp, grid):
         problems.append(f'{stamp.size} messages where one is due')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
         problems += _seconds(bag, name, stamp, grid)
-    if topic is not None and bag.topics[name] != topic.type:
+    if topic and bag.topics[name] != topic.type:
         problems.append(f'of type {bag.topics[name]}, where the graph has {topic.type}')
     if ours:
         problems += _sequence(rows.sequence)

@@ -1,21 +1,21 @@
 """The page that `pedestal report` writes: a recording as one HTML file that needs nothing else, its figures as PNG."""
-import dataclasses
 import hashlib
 import html
 import io
+import itertools
 import math
 import pathlib
 
 import numpy as np
 
 from pedestal_bringup.analysis import consistency, isolation, results, tracking
+from pedestal_bringup.analysis.tracking import DEGREES
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.report import attitude_figures, figures, filter_figures, run_data, run_figures
 from pedestal_common import topics
+from pedestal_common.messages import AXES
 
-AXES = ('azimuth', 'elevation')
-DEGREES = math.degrees(1.0)
 SHOWN = 200
 """Rows of the table of diagnostics at the most."""
 
@@ -227,38 +227,22 @@ def _deck(bag, data):
             *(_figure(spec, data) for spec in attitude_figures.FIGURES)]
 
 
-@dataclasses.dataclass
-class _Repeated:
-    """A status that a node repeated count times from start to stop [s]."""
-    node: str
-    level: int
-    message: str
-    start: float
-    stop: float
-    count: int = 1
-
-    def row(self):
-        when = f'{self.start:.1f}' if self.count == 1 else f'{self.start:.1f} to {self.stop:.1f}'
-        return [when, self.node, run_figures.LEVELS[min(self.level, 3)][0], self.message]
-
-
 def _diagnostics(statuses):
     """The section of what was not OK: a status that a node repeats is one row."""
     title = '<h2 id="diagnostics">Diagnostics that were not OK</h2>'
-    repeated, last = [], {}
-    for stamp, node, level, message in statuses:
-        status = last.get(node)
-        if status is not None and (status.level, status.message) == (level, message):
-            status.stop, status.count = stamp, status.count + 1
-            continue
-        last[node] = _Repeated(node, level, message, stamp, stamp)
-        if level:
-            repeated.append(last[node])
-    if not repeated:
+    rows = {}
+    for node in dict.fromkeys(node for _, node, _, _ in statuses):
+        own = [(place, status) for place, status in enumerate(statuses) if status[1] == node]
+        for (level, message), group in itertools.groupby(own, lambda row: row[1][2:]):
+            places, stamps = zip(*((place, stamp) for place, (stamp, *_) in group))
+            if level:
+                when = f'{stamps[0]:.1f}' if len(stamps) == 1 else f'{stamps[0]:.1f} to {stamps[-1]:.1f}'
+                rows[places[0]] = [when, node, run_figures.LEVELS[min(level, 3)][0], message]
+    if not rows:
         return [title, '<p>None.</p>' if statuses else '<p class="soft">No diagnostics in the bag.</p>']
-    more = [f'<p class="soft">and {len(repeated) - SHOWN} more.</p>'] if len(repeated) > SHOWN else []
-    rows = [status.row() for status in repeated[:SHOWN]]
-    return [title, _rows(['time [s]', 'node', 'level', 'message'], rows), *more]
+    more = [f'<p class="soft">and {len(rows) - SHOWN} more.</p>'] if len(rows) > SHOWN else []
+    return [title, _rows(['time [s]', 'node', 'level', 'message'], [rows[place] for place in sorted(rows)][:SHOWN]),
+            *more]
 
 
 def _made(bag):

@@ -36,16 +36,9 @@ class RunData:
         reasons = [_NEEDS[need](self) for need in needs]
         return '; '.join(dict.fromkeys(filter(None, reasons)))
 
-    def _lacks_receiver(self):
-        return '' if self.receiver else 'no message of tracking_receiver/angle_error'
 
-    def _lacks_lock(self):
-        return self._lacks_receiver() or (
-            '' if np.isfinite(self.receiver['x']).any() else 'the receiver never locked')
-
-    def _lacks_bank(self):
-        return '' if self.filter is None or np.isfinite(self.filter.probability).sum(axis=2).max() > 1 else \
-            'one model of motion alone'
+def _no_receiver(data):
+    return '' if data.receiver else 'no message of tracking_receiver/angle_error'
 
 
 _NEEDS = {
@@ -54,8 +47,13 @@ _NEEDS = {
     'modes': lambda data: '' if data.modes or data.statuses else 'no message of acu/mode or diagnostics',
     'filter': lambda data: '' if data.filter is not None else 'no message of acu/filter',
     'attitude': lambda data: '' if data.attitude is not None else 'no INS in the run',
-    'bank': RunData._lacks_bank, 'receiver': RunData._lacks_receiver, 'lock': RunData._lacks_lock,
+    'bank': lambda data: '' if data.filter is None or np.isfinite(data.filter.probability).sum(axis=2).max() > 1 else
+    'one model of motion alone',
+    'receiver': _no_receiver,
+    'lock': lambda data: _no_receiver(data) or (
+        '' if np.isfinite(data.receiver['x']).any() else 'the receiver never locked'),
 }
+"""{need of a figure: function of RunData -> why it is not met, ''}."""
 
 
 def read(bag) -> RunData:
