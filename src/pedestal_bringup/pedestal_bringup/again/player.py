@@ -16,15 +16,15 @@ from pedestal_common.shell import SECOND, GraphError
 
 ANSWERS = {'ship_motion': ('clock', 'ship/truth'), 'tracking_receiver': ('joint_states', 'target/truth'),
            'acu': ('joint_states', 'acu/rate_command'), 'adu': (None, 'joint_states')}
-"""{node: (topic, what the node answers it with in every step, stamped alike)}: what lockstep waits for. The drive
-asks: it says the step, and takes the answer. The INS answers late, by its latency: there is no waiting for it."""
+"""{node: (topic, the topic on which the node answers it in every step, with the same stamp)}: what lockstep waits for.
+The drive begins the steps: it answers nothing (None). The INS answers late, by its latency, and is not waited for."""
 
 HELP = 'space: pause, go on   n or right arrow: one step   q: quit'
 WINDOW = 1000
 """Messages of a topic that may be unacknowledged: Fast DDS keeps 5000 and refuses more."""
 
 SETTLING = 0.5
-"""Seconds from the last reader's coming to the first message: others are still finding each other."""
+"""Seconds from the coming of the last reader to the first message, in which other nodes still find each other."""
 
 UNKNOWN = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
 """What rmw calls the node of a writer it has found before it has found the node."""
@@ -33,8 +33,8 @@ LOOK, READERS_LOOK, KEY_LOOK = 0.1, 0.5, 0.05
 """Seconds between two looks at the position shown, at who still reads, at the keyboard while waiting."""
 
 LEAVE = 5.0
-"""A reader that ends says so at once; for one that was killed Fast DDS waits 20 s and then forgets what it did not
-take. Seconds after which it was the latter."""
+"""Seconds that tell a reader that ended, which is known at once, from one that was killed: Fast DDS waits 20 s for it
+and then forgets what it did not take."""
 
 QUIET, PARTING = 0.5, 1.0
 """Seconds without another answer after which the node under test has answered all; seconds a stopped replay waits

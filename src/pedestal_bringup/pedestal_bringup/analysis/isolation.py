@@ -12,11 +12,11 @@ coherent  the part of the true pointing error that a linear law of the ship's ro
           velocity stands between turn and acceleration, so leads and lags are in it; and in the axes of the beam,
           because there a wrong attitude, a delay or friction acts while the target moves across the deck.
 
-Noise that knows nothing of the ship fits nine series a little as well, by chance. `floor` is what that is expected
-to be: noise with the power spectrum of what the regression leaves over, smoothed over SMOOTHED, in random phases.
-`limit`, 20 log10(motion / floor), is therefore the isolation that a run of this length and noise can show: one near
-the limit (or above, by chance) says that the ship is not to be seen in the error, and no more. A run with less noise
-shows more (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
+Noise that is independent of the ship fits nine series a little as well, by chance. `floor` is the rms of that fit
+which is expected of noise with the power spectrum of what the regression leaves over, smoothed over SMOOTHED, in
+random phases. `limit`, 20 log10(motion / floor), is therefore the isolation that a run of this length and noise can
+show: where the isolation is near the limit (or above, by chance), the ship cannot be told from noise in the error, and
+a run with less noise shows more (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
 """
 import dataclasses
 import math

@@ -34,7 +34,7 @@ def _filled(topic):
 
 
 class Ring(Node):
-    """A node of the ring: what it hears of its trigger it passes on, everything else it drops."""
+    """A node of the ring: it passes on what comes on its trigger and drops everything else."""
 
     def __init__(self, role, steps):
         super().__init__(role)
