@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 FIRST_PORT = 22119
@@ -215,17 +216,17 @@ class Client:
 
     def write(self, *names):
         """Make publishers of these topics and wait until someone reads each."""
-        from pedestal_common import shell, topics
+        from pedestal_common import middleware, topics
         for name in names:
             topic = topics.BY_NAME[name]
-            self.publishers[name] = self.node.create_publisher(shell.message_class(topic.type), name,
-                                                               shell.QOS[topic.qos])
+            self.publishers[name] = self.node.create_publisher(middleware.message_class(topic.type), name,
+                                                               middleware.qos(topic.rate))
         self.until(lambda: all(publisher.get_subscription_count() for publisher in self.publishers.values()))
         time.sleep(0.3)  # the readers' side of the discovery
 
     def read(self, name, take=None):
         """Hear a topic: messages go to self.heard[name] and to take; waits until someone writes it."""
-        from pedestal_common import messages, shell, topics
+        from pedestal_common import messages, middleware, topics
         topic = topics.BY_NAME[name]
         heard = self.heard[name] = []
 
@@ -233,7 +234,8 @@ class Client:
             heard.append(messages.deserialize(data, topic.type))
             if take is not None:
                 take(heard[-1])
-        self.node.create_subscription(shell.message_class(topic.type), name, on_bytes, shell.QOS[topic.qos], raw=True)
+        self.node.create_subscription(middleware.message_class(topic.type), name, on_bytes,
+                                      middleware.qos(topic.rate), raw=True)
         self.until(lambda: self.node.count_publishers(name))
 
     def publish(self, name, message):
@@ -286,10 +288,10 @@ class Client:
 @pytest.fixture(scope='module')
 def connect():
     """connect(domain_id, name='client') -> Client; by its name it can stand for a node of the graph."""
-    from pedestal_common import shell
     clients = []
     before = dict(os.environ)
-    shell.set_middleware_defaults()
+    from pedestal_common import middleware
+    middleware.set_defaults()
 
     def open_client(domain_id, name='client'):
         clients.append(Client(domain_id, name))
@@ -311,3 +313,28 @@ def one_line():
         assert len(lines) == 1, errors
         return lines[0]
     return check
+
+
+@pytest.fixture(scope='session')
+def differences():
+    """A function (Run of the closed loop, Bag) -> {topic column: largest difference} of every message of every topic,
+    which the bag holds up to its last complete step."""
+    def of(run, bag):
+        unequal = {}
+        for topic in run.topics:
+            ours, theirs = run.table(topic), bag.table(topic)
+            count = len(theirs['t'])
+            if not (len(ours['t']) - 1 <= count <= len(ours['t'])
+                    and np.array_equal(np.round(ours['t'][:count] * 1e9), np.round(theirs['t'] * 1e9))):
+                unequal[f'{topic} t'] = len(ours['t']) - count
+                continue
+            for column in ours:
+                a, b = ours[column][:count], theirs[column]
+                if column == 'data':
+                    if list(a) != list(b):
+                        unequal[topic] = b
+                elif column != 't' and not np.array_equal(a, b, equal_nan=True):
+                    unequal[f'{topic} {column}'] = float(np.nanmax(np.abs(a - b)))
+        assert set(run.topics) >= {'joint_states', 'acu/mode', 'acu/rate_command'}
+        return unequal
+    return of

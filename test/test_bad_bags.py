@@ -8,23 +8,14 @@ from mcap.writer import Writer as McapWriter
 
 from pedestal_bringup import cli
 from pedestal_bringup.bags.writer import Writer
-from pedestal_common import messages, topics
+from pedestal_common import messages, nodes, topics
 
-RECORDED = topics.read_by('recorder', ('tracking_receiver', 'acu', 'adu', 'recorder'))
+RECORDED = nodes.recorded(('tracking_receiver', 'acu', 'adu', 'recorder'))
 
 
 def message(topic, stamp):
-    if topic.name == 'clock':
-        made = messages.Clock(clock=messages.Time(sec=0, nanosec=0))
-        messages.put_stamp(made.clock, stamp)
-        return made
-    kind = topic.type.rpartition('/')[2]
-    made = {'JointState': lambda: messages.joint_state(messages.AXES),
-            'JointTrajectory': lambda: messages.joint_trajectory('earth', [messages.trajectory_point()]),
-            'Odometry': lambda: messages.odometry('earth', 'target'),
-            'Vector3Stamped': lambda: messages.Vector3Stamped(header=messages.header('beam'),
-                                                              vector=messages.vector3())}[kind]()
-    messages.put_stamp(made.header.stamp, stamp)
+    made = messages.template(topic.name)
+    messages.put_stamp(made.clock if topic.name == 'clock' else made.header.stamp, stamp)
     return made
 
 

@@ -185,7 +185,7 @@ def test_the_first_graph_goes_on_to_its_end(graphs):
 
 
 def joints(stamp_ms, position=(0.1, 0.5)):
-    message = messages.joint_state(messages.AXES)
+    message = messages.template('joint_states')
     messages.put_stamp(message.header.stamp, stamp_ms * 1_000_000)
     message.position[:] = position
     return message

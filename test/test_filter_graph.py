@@ -13,7 +13,7 @@ from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import export
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import messages
+from pedestal_common import layouts, topics
 
 SECONDS = 5.0
 PARAMS = ['acu.tracker.lock_count=20', 'tracking_receiver.receiver.rate.measured=true',
@@ -29,7 +29,7 @@ def switched(run, connect):
     client.until(lambda: any(message.data == 'autotrack' for message in client.heard['acu/mode']))
     imm = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value='imm')
     request = SetParameters.Request(parameters=[Parameter(name=f'{axis}.filter.kind', value=imm)
-                                                for axis in messages.AXES])
+                                                for axis in topics.AXES])
     return [result.successful for result in client.call('acu/set_parameters', SetParameters, request).results]
 
 
@@ -73,15 +73,12 @@ def test_recomputed_to_the_last_bit(runs, capsys, monkeypatch):
     assert 'acu/filter' in said
 
 
-def test_composed_cores_equal_the_run(told):
-    composed = closed_loop.run(closed_loop.cores(scenario.load('ship_pass', PARAMS, duration=SECONDS)))
-    bag, found = told
-    estimate = bag.table('acu/estimate')
-    for i, axis in enumerate(messages.AXES):
-        assert np.array_equal(estimate[f'{axis}.velocity'], composed['estimate'][:, i, 1], equal_nan=True)
-        for name in ('innovation', 'rate_innovation', 'nis', 'probability'):
-            assert np.array_equal(getattr(found, name)[:, i], composed[name][:, i], equal_nan=True), name
-        assert np.array_equal(found.sigma[:, i], np.sqrt(composed['covariance'][:, i, 0]), equal_nan=True)
+def test_the_closed_loop_equals_the_run(told, differences):
+    run = closed_loop.Loop(scenario.load('ship_pass', PARAMS, duration=SECONDS)).run()
+    bag, consistency_of_it = told
+    assert differences(run, bag) == {}
+    for name in ('innovation', 'rate_innovation', 'nis', 'sigma'):
+        assert np.array_equal(getattr(consistency_of_it, name), layouts.of_filter(run.steps, name), equal_nan=True)
 
 
 def test_what_the_filter_tells(told):
@@ -95,7 +92,7 @@ def test_what_the_filter_tells(told):
         assert consistency.axis(found, i).nis == pytest.approx(freedoms, rel=0.2)
     probability = found.probability[on]
     assert np.nansum(probability, axis=2) == pytest.approx(1.0)
-    assert [[name for name, there in zip(messages.MODELS, np.isfinite(probability[:, i]).all(axis=0)) if there]
+    assert [[name for name, there in zip(topics.MOTION_MODELS, np.isfinite(probability[:, i]).all(axis=0)) if there]
             for i in range(2)] == [['cv', 'ca', 'current_statistical'], ['cv', 'ca']]
     assert np.all(np.abs(found.correlation[on]) <= 1.0) and np.all(found.sigma[on] > 0.0)
     header = list(export.table(bag, 'acu/filter'))
@@ -106,7 +103,7 @@ def test_what_the_filter_tells(told):
 def test_rows_and_report(runs, told, run_process):
     run = runs['measured']
     values = {row['metric']: row['value'] for row in json.loads(run.json.read_text())['rows']}
-    for i, axis in enumerate(messages.AXES):
+    for i, axis in enumerate(topics.AXES):
         judged = consistency.axis(told[1], i)
         assert (values[f'{axis}_nis_mean'], values[f'{axis}_nees_mean']) == (judged.nis, judged.nees)
     assert cli.main(['report', str(run.bag)]) == 0
@@ -118,11 +115,11 @@ def test_rows_and_report(runs, told, run_process):
 def test_a_filter_changed_while_it_tracks_makes_no_bump(runs):
     bag = bags.read(runs['switched'].bag)
     found = consistency.read(bag, tracking.read(bag))
-    changed = np.flatnonzero(np.isfinite(found.probability[:, 0, messages.MODELS.index('cv')]))[0]
+    changed = np.flatnonzero(np.isfinite(found.probability[:, 0, topics.MOTION_MODELS.index('cv')]))[0]
     assert bag.table('acu/mode')['data'] == ['program', 'autotrack']
     assert np.all(tracking.modes(bag, found.t)[changed - 1:] == 'autotrack')
     change = np.abs(np.diff(np.column_stack([bag.table('acu/rate_command')[f'{axis}.velocity']
-                                             for axis in messages.AXES]), axis=0))
+                                             for axis in topics.AXES]), axis=0))
     # 0.05 s: what comes later is what the new models make of the measurements
     before, after = slice(changed - 50, changed - 1), slice(changed - 1, changed + 10)
     assert np.all(change[after].max(axis=0) < 5.0 * change[before].max(axis=0))

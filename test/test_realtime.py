@@ -84,7 +84,7 @@ class Commander:
             self.send(messages.nanoseconds(joints.header.stamp), self.rates)
 
     def send(self, stamp, rates):
-        command = messages.joint_state(messages.AXES)
+        command = messages.template('joint_states')
         messages.put_stamp(command.header.stamp, stamp)
         command.velocity[:] = rates
         self.client.publish('acu/rate_command', command)

@@ -14,6 +14,7 @@ from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.writer import Writer as BagWriter
 from pedestal_common import messages, topics
+from pedestal_common import nodes as graph
 
 REFERENCES = pathlib.Path(__file__).parent.parent / 'bags' / 'reference'
 SHORT = ('--pacing', 'lockstep', '--param', 'acu.tracker.lock_count=20')
@@ -101,8 +102,8 @@ def test_a_lockstep_recording_comes_out_the_same_to_the_last_bit(runs, name, nod
     values = {(row['case'], row['metric']): row['value'] for row in json.loads(rows.read_text())['rows']}
     assert {case for case, _ in values} == set(nodes)
     recording = recompute.Recording(runs[name].bag)
-    written = {topic.name for topic in topics.TOPICS
-               if set(topic.writers) & set(nodes) and topic.rate != 'second' and recording.has(topic.name)}
+    written = {name for name, link in graph.links().items()
+               if set(link.writers) & set(nodes) and link.rate != 'second' and recording.has(name)}
     assert {metric.split()[0] for _, metric in values} == written
     assert all(value == 0 for (_, metric), value in values.items() if metric.endswith(('differences', 'problems')))
     steps = round({'leo': 5.0, 'ship': 3.0}[name] / 0.005) + 1
@@ -361,7 +362,7 @@ def test_locked_but_never_tracked_fails(runs, rewrite, pedestal):
 
 def test_a_drive_that_was_never_told_to_move_fails(runs, rewrite, pedestal):
     def change(rows):
-        still = messages.joint_state(messages.AXES)
+        still = messages.template('joint_states')
         for place, (topic, log, publish, _) in enumerate(rows):
             if topic == 'acu/rate_command':
                 messages.put_stamp(still.header.stamp, log)

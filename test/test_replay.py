@@ -14,7 +14,7 @@ import time
 import pytest
 
 from pedestal_bringup.bags import bag as bags
-from pedestal_common import messages, shell, topics
+from pedestal_common import messages, middleware, topics
 
 CLI = [sys.executable, '-m', 'pedestal_bringup.cli']
 ANSWERS = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode')
@@ -221,7 +221,7 @@ def test_a_signal_ends_it_cleanly(number, run, connect, terminal, domain):
 def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_line, domain):
     client = connect(domain)
     topic = topics.BY_NAME['joint_states']
-    client.node.create_publisher(shell.message_class(topic.type), topic.name, shell.QOS[topic.qos])
+    client.node.create_publisher(middleware.message_class(topic.type), topic.name, middleware.qos(topic.rate))
     done = run_process([*CLI, 'replay', run.bag, '--node', 'acu'], 60.0, ROS_DOMAIN_ID=str(domain))
     assert done.returncode == 1 and done.stdout == ''
     assert one_line(done.stderr) == ('pedestal: error: joint_states already has a writer, client: its messages would '

@@ -25,10 +25,10 @@ def test_a_scenario_tracks(name, tmp_path):
         file.write_text('time_s,latitude_deg,longitude_deg,altitude_m\n' + '\n'.join(rows) + '\n')
         overrides = [f'tracking_receiver.target.track_file.path={file}']
     chosen = scenario.load(name, overrides, duration=DURATION)
-    result = closed_loop.run(closed_loop.cores(chosen))
-    assert len(result) == round(DURATION / chosen.node_parameters('adu').period) + 1
-    assert result['mode'][-1] == modes.AUTOTRACK
-    error = result['true_error'][result['t'] > DURATION - 0.5]
+    run = closed_loop.Loop(chosen).run()
+    assert len(run.steps) == round(DURATION / chosen.node_parameters('adu').period) + 1
+    assert run['acu/mode'][-1] == modes.AUTOTRACK
+    error = run.truth['error'][run.t > DURATION - 0.5]
     assert np.isfinite(error).all()
     half_beam = 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
     assert np.abs(error).max() < 0.5 * half_beam

@@ -29,7 +29,7 @@ class Plant:
         self.stamp += jump
         for _ in range(count):
             self.stamp += PERIOD
-            joints = messages.joint_state(messages.AXES)
+            joints = messages.template('joint_states')
             messages.put_stamp(joints.header.stamp, self.stamp)
             joints.position[:] = position
             self.client.publish(JOINTS, joints)
@@ -278,7 +278,7 @@ def test_parameters_while_it_runs(plant):
 
 def test_stamps_that_go_back_are_named(plant):
     plant.step()
-    joints = messages.joint_state(messages.AXES)
+    joints = messages.template('joint_states')
     plant.client.publish(JOINTS, joints)
     status = plant.client.diagnosed('joint_states stamp went back from ')
     assert status.level == 1

@@ -22,33 +22,32 @@ from tracking_receiver_sim import target
 
 
 def track(name, *overrides):
-    """(scenario, steps of its closed loop, bool: evaluated): the lockstep run to the last bit (test_lockstep)."""
+    """(scenario, Run of its closed loop, bool: evaluated): the lockstep run to the last bit (test_lockstep)."""
     chosen = scenario.load(name, overrides)
-    steps = closed_loop.run(closed_loop.cores(chosen))
-    automatic = steps['mode'] == modes.AUTOTRACK
-    return chosen, steps, automatic & (steps['t'] >= steps['t'][automatic][0] + tracking.SETTLING)
+    run = closed_loop.Loop(chosen).run()
+    automatic = run['acu/mode'] == modes.AUTOTRACK
+    return chosen, run, automatic & (run.t >= run.t[automatic][0] + tracking.SETTLING)
 
 
 def pointing(name, *overrides):
     """Pointing error [deg] rms of a scenario."""
-    _, steps, on = track(name, *overrides)
-    return math.degrees(tracking.rms(steps['true_error'][on]))
+    _, run, on = track(name, *overrides)
+    return math.degrees(tracking.rms(run.truth['error'][on]))
 
 
 def isolated(name, *overrides):
     """The isolation.Isolation of a scenario."""
-    chosen, steps, on = track(name, *overrides)
+    chosen, run, on = track(name, *overrides)
     constants = motion.constants(chosen.node_parameters('ship_motion').ship)
-    inputs, truth = np.zeros(1, motion.INPUTS), np.zeros(on.sum(), motion.OUTPUTS)
-    t = steps['t'][on]
+    truth = np.zeros(on.sum(), motion.OUTPUTS)
+    t = run.t[on]
     for k in range(t.size):
-        inputs['t'] = t[k]
-        motion.step(constants, inputs, truth[k:k + 1])
+        motion.truth(constants[0], t[k], truth[k])
     built = target.build(chosen.node_parameters('tracking_receiver').target, chosen.header.duration)
     azimuth, elevation, distance = target.look_angles(built, t)
     seen = np.column_stack((np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation),
                             np.sin(elevation))) * distance[:, None] - truth['position']
-    return isolation.measure(t[1] - t[0], steps['true_error'][on], seen, truth['quaternion'],
+    return isolation.measure(t[1] - t[0], run.truth['error'][on], seen, truth['quaternion'],
                              truth['angular_velocity'])
 
 
@@ -82,19 +81,19 @@ def test_without_noise_the_isolation_is_far_above_60_db():
 def test_the_loss_overhead_is_announced_beforehand(seed):
     """Following would take over 100 deg/s where the azimuth has 12; autotrack is kept all the same."""
     chosen = scenario.load('ship_overhead', seed=seed)
-    cores = closed_loop.cores(chosen)
-    steps = closed_loop.run(cores)
-    automatic = steps['mode'] == modes.AUTOTRACK
+    run = closed_loop.Loop(chosen).run()
+    automatic = run['acu/mode'] == modes.AUTOTRACK
     first = np.argmax(automatic)
-    plan = cores.acu[0]['ahead']['plan'][0]
+    plan = run.units['acu'].parts['state']['ahead']['plan']
     assert automatic[first:].all() and plan['needed'] > math.radians(100.0)
-    off = np.hypot(*steps['true_error'].T)
-    t = steps['t']
+    off = np.hypot(*run.truth['error'].T)
+    t = run.t
     lost = off > 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
     loss = np.sum(lost[first:] & (t[first:] > t[first] + tracking.SETTLING)) * 0.005
     assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 10.0
     assert math.degrees(tracking.rms(off[t > plan['t2'] + 3.0])) < 0.02
-    assert abs(steps['rate'][first:, 0]).max() <= chosen.node_parameters('acu').azimuth.limits.rate + 1e-12
+    rate = run['acu/rate_command']['velocity'][first:, 0]
+    assert abs(rate).max() <= chosen.node_parameters('acu').azimuth.limits.rate + 1e-12
 
 
 def test_equipment_that_is_not_there_is_told_in_every_diagnosis(start_node, connect):

@@ -293,15 +293,14 @@ def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
 
 
 @compiled
-def request(state, constants, inputs, outputs, mode, program_times, program_angles):
+def request(s, c, u, o, mode, program_times, program_angles):
     """Ask for a mode between two steps; True when granted. outputs.mode and .reason tell what is now.
 
     It is decided on what the last step knew, and takes effect on the command of the next step.
     """
-    s, o = state[0], outputs[0]
-    rows = max(inputs[0].program_count, 0)
-    result, _ = change_mode(s, constants[0].p, o, inputs[0].drive_ready, program_times[:rows], program_angles[:rows],
-                            s.stamp + constants[0].ahead, mode)
+    rows = max(u.program_count, 0)
+    result, _ = change_mode(s, c.p, o, u.drive_ready, program_times[:rows], program_angles[:rows], s.stamp + c.ahead,
+                            mode)
     o.mode, o.reason = s.mode, s.reason
     return result == modes.ACCEPTED
 
@@ -420,20 +419,19 @@ def clear(o):
 
 
 @compiled
-def step(state, constants, inputs, outputs, program_times, program_angles):
-    """One drive step; arrays (1,) of STATE, CONSTANTS, INPUTS, OUTPUTS, the table (n,) [s] and (n, 2) [rad] earth.
+def step(s, c, u, o, program_times, program_angles):
+    """One drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS, the table (n,) [s] and (n, 2) [rad] earth.
 
     A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
     """
-    s, u, o = state[0], inputs[0], outputs[0]
-    p = constants[0].p
+    p = c.p
     dt = u.stamp - s.stamp
     if not (dt > 0.0 and math.isfinite(u.stamp)):
         o.invalid_input = _STAMP
         o.reason = modes.BAD_STAMP
         return
     clear(o)
-    tracker.adopt(s.tracker, p.tracker, constants[0].tracker)
+    tracker.adopt(s.tracker, p.tracker, c.tracker)
     rows = max(u.program_count, 0)
     times, angles = program_times[:rows], program_angles[:rows]
     jumped = dt > p.step_gap
@@ -451,14 +449,14 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     if u.stabilised and not take_attitude(s, p, u):
         flags |= _ATTITUDE
     if u.error_valid:
-        flags |= take_error(s, p, constants[0].tracker, u, o)
+        flags |= take_error(s, p, c.tracker, u, o)
     if u.preset_valid:
         if math.isfinite(u.preset[0] + u.preset[1]):
             s.preset[0], s.preset[1] = u.preset[0], u.preset[1]
         else:
             flags |= _PRESET
 
-    t_m = u.stamp + constants[0].ahead
+    t_m = u.stamp + c.ahead
     rested = s.mode == modes.STANDBY
     _, program_flags = change_mode(s, p, o, u.drive_ready, times, angles, t_m,
                                    s.pending if rested else modes.NO_REQUEST)
@@ -473,17 +471,17 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
         t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
         A = dA = ddA = E = dE = ddE = 0.0
         for i in range(1 if t_elevation == t_azimuth else 2):
-            B, dB, ddB, E, dE, ddE = raw_target(s, p, constants[0].tracker, times, angles,
+            B, dB, ddB, E, dE, ddE = raw_target(s, p, c.tracker, times, angles,
                                                 t_azimuth if i == 0 else t_elevation)
             if i == 0:
                 A, dA, ddA = B, dB, ddB
         autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
-        position_loop.follow(s.azimuth, p.azimuth, constants[0].notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
+        position_loop.follow(s.azimuth, p.azimuth, c.notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
                              u.velocity[0], s.error[0], V_A, autotrack, dt, o, 0)
-        position_loop.follow(s.elevation, p.elevation, constants[0].notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
+        position_loop.follow(s.elevation, p.elevation, c.notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
                              u.velocity[1], s.error[1], V_E, autotrack, dt, o, 1)
         s.entered = 0
-        explain(s, p, constants[0], times, angles)
+        explain(s, p, c, times, angles)
         o.blocked = s.blocked
         o.coasting = s.mode == modes.AUTOTRACK and silent(s, p)
 
@@ -491,5 +489,5 @@ def step(state, constants, inputs, outputs, program_times, program_angles):
     o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
     o.gated, o.rates_gated, o.ranges_gated = s.tracker.gated, s.tracker.rates_gated, s.tracker.ranges_gated
     if s.tracker.running:
-        read_estimate(s, p, constants[0].tracker, o)
-    look_ahead(s, p, constants[0].tracker, constants[0].sectors, times, angles)
+        read_estimate(s, p, c.tracker, o)
+    look_ahead(s, p, c.tracker, c.sectors, times, angles)

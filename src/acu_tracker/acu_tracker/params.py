@@ -203,8 +203,9 @@ class AcuParameters(Parameters):
     azimuth: AxisParameters = group(AxisParameters)
     elevation: Elevation = group(Elevation)
 
-    def check_drive(self, array):
-        """Raises ParameterError unless both controllers steer a beam where the drive is an array, else none."""
+    def check_graph(self, beams):
+        """Both controllers steer a beam where the drive is an array, else none."""
+        array = beams > 0
         for axis in ('azimuth', 'elevation'):
             controller = getattr(self, axis).controller
             if (controller == 'beam') != array:

@@ -1,111 +1,49 @@
-"""The control unit between its messages: what it makes of those it hears, and what it puts into those it says.
-
-The node answers one step at a time, a recomputed bag all of them at once, through the same `answers`.
-"""
+"""The unit of the control unit: encoders, receiver and attitude in, rate command, estimate and mode out."""
 import math
+import typing
 
 import numpy as np
 
-from acu_tracker import control_unit, modes
+from acu_tracker import announcement, control_unit, modes
 from acu_tracker.program import program_track
-from pedestal_common import messages, records
+from pedestal_common import messages, nodes, topics
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
 
-JOINTS, ERROR, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
+JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
-COMMAND, ESTIMATE, REFERENCE, MODE = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode'
-FILTER, PROGRAM, DRIVE, INS = 'acu/filter', 'acu/program_track', 'adu/state', 'ins/state'
-HEARD = records.of(JOINTS, ERROR, RATE, RANGE, ATTITUDE)
-SAID = records.of(COMMAND, ESTIMATE, REFERENCE, FILTER, more=(MODE,))
+COMMAND, ESTIMATE, REFERENCE, FILTER = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/filter'
+MODE, KEYHOLE, BLOCKAGE = 'acu/mode', 'acu/keyhole', 'acu/blockage'
+PROGRAM, DRIVE, INS = 'acu/program_track', 'adu/state', 'ins/state'
+
+FILTER_SIZE, MODELS = len(topics.FILTER), len(topics.MOTION_MODELS)
+"""Numbers that acu/filter tells of an axis; the last of them are the probabilities of the motion models."""
+
+READY = topics.BY_NAME[DRIVE].texts.index('enabled')
+ALIGNING = topics.BY_NAME[INS].texts.index('aligning')
+"""Codes of what they tell; one that never tells anything, topics.SILENT, counts as ready and as aligned."""
 
 
-class Acu:
-    """The control unit of an AcuParameters; on_ship: its deck moves, and an attitude is heard.
+RECORD = np.dtype([('state', control_unit.STATE), ('constants', control_unit.CONSTANTS),
+                   ('inputs', control_unit.INPUTS), ('outputs', control_unit.OUTPUTS), ('invalid', 'i8')], align=True)
+"""invalid: the bits of control_unit.INVALID_INPUTS that were set since the last diagnosis."""
 
-    heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
-    a step waits for; events: {topic: function(message)} it hears besides; WORDS: {topic: function from its
-    code in `said` to its text}.
-    """
-    HEARD, SAID, WORDS = HEARD, SAID, {MODE: modes.MODES.__getitem__}
 
-    def __init__(self, params, on_ship):
-        self.state = control_unit.initial_state(params)
-        self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
-        self.inputs[0]['stabilised'], self.inputs[0]['drive_ready'] = on_ship, 1
-        self.outputs[0]['mode'] = modes.STANDBY
-        control_unit.clear(self.outputs[0])
-        self.times, self.angles = np.zeros(0), np.zeros((0, 2))
-        self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
-        for name in HEARD.names:
-            self.heard[name]['stamp'] = NEVER
-        self.remembers = self.state, self.inputs, self.outputs
-        self.messages = {COMMAND: messages.joint_state(messages.AXES),
-                         ESTIMATE: messages.joint_trajectory('earth', [messages.trajectory_point()]),
-                         REFERENCE: messages.joint_trajectory('base_link', [messages.trajectory_point()]),
-                         FILTER: messages.named_numbers(messages.FILTER, 'earth')}
-        self.followers = {ERROR: params.receiver_latency,
-                          **({RATE: params.receiver_latency} if params.receiver_rate else {}),
-                          **({RANGE: params.receiver_latency} if params.receiver_range else {}),
-                          **({ATTITUDE: params.attitude_latency} if on_ship else {})}
-        self.events = {PROGRAM: self.take_program, DRIVE: self.take_drive_state,
-                       **({INS: self.take_ins_state} if on_ship else {})}
-        self.configure(params)
-
-    def configure(self, params):
-        self.constants = control_unit.constants(params)
-
-    def take_program(self, message):
-        """Two or more points are a program track in earth angles, one a preset in deck angles. Raises ValueError."""
-        times, angles = rows(message)
-        if len(angles) == 1:
-            self.inputs[0]['preset'], self.inputs[0]['preset_valid'] = angles[0], 1
-        else:
-            start = messages.nanoseconds(message.header.stamp) * 1e-9
-            self.times, self.angles = program_track.checked(times + start, angles)
-            self.inputs[0]['program_count'] = len(self.times)
-
-    def take_drive_state(self, message):
-        """A drive that never says how it is counts as ready."""
-        self.inputs[0]['drive_ready'] = message.data == 'enabled'
-
-    def take_ins_state(self, message):
-        """An INS that never says how it is counts as aligned."""
-        self.inputs[0]['aligning'] = message.data == 'aligning'
-
-    def prepare(self):
-        """Compile `answers` and `request`."""
-        state, inputs, outputs = self.state.copy(), self.inputs.copy(), self.outputs.copy()
-        answers(state, self.constants, inputs, outputs, self.times, self.angles, self.heard, self.said.copy())
-        control_unit.request(state, self.constants, inputs, outputs, modes.STANDBY, self.times, self.angles)
-
-    def request(self, service):
-        """Ask for a mode by the name of its service between two steps; True when granted."""
-        return self.ask(modes.MODES.index(service.removeprefix('acu/')))
-
-    def services_to(self, mode):
-        """The services that bring acu/mode to a mode."""
-        return [f'acu/{mode}'] if mode in modes.MODES else []
-
-    def ask(self, mode):
-        """Ask for a mode (its code) between two steps; True when granted."""
-        return bool(control_unit.request(self.state, self.constants, self.inputs, self.outputs, mode, self.times,
-                                         self.angles))
-
-    def answer(self):
-        """Answer `heard` with `said`."""
-        self.answers(self.heard, self.said)
-
-    def answers(self, heard, said):
-        """The same for many steps, records (n,)."""
-        answers(self.state, self.constants, self.inputs, self.outputs, self.times, self.angles, heard, said)
+class Memory(typing.NamedTuple):
+    """All the control unit works on: the program track, times (n,) [s] and earth angles (n, 2) [rad]."""
+    record: np.ndarray
+    times: np.ndarray
+    angles: np.ndarray
 
 
 @compiled
-def hear(u, joints, error, rate, distance, attitude):
+def decode(u, stamp, inputs):
     """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next. A rate or a
     range belongs to the error that was measured with it, or to none."""
-    u.stamp = joints.stamp * 1e-9
+    joints, error, attitude = inputs[JOINTS], inputs[ERRORS], inputs[ATTITUDE]
+    rate, distance = inputs[RATE], inputs[RANGE]
+    u.stamp = stamp * 1e-9
     for i in range(2):
         u.position[i], u.velocity[i] = joints.position[i], joints.velocity[i]
     u.encoder_valid = 1
@@ -127,44 +65,145 @@ def hear(u, joints, error, rate, distance, attitude):
             u.quaternion[i] = attitude.orientation[i]
         for i in range(3):
             u.deck_rate[i] = attitude.angular_velocity[i]
+    u.drive_ready, u.aligning = inputs[DRIVE] <= READY, inputs[INS] == ALIGNING
 
 
 @compiled
-def say(o, stamp, command, estimate, reference, filtered):
-    """Outputs of the control unit -> records of its messages."""
-    command.stamp = estimate.stamp = reference.stamp = filtered.stamp = stamp
+def encode(o, ahead, stamp, outputs):
+    """Outputs of the control unit, and what lies ahead -> records of its messages."""
+    command, estimate, reference = outputs[COMMAND], outputs[ESTIMATE], outputs[REFERENCE]
+    command.stamp = estimate.stamp = reference.stamp = outputs[FILTER].stamp = stamp
     for i in range(2):
         command.velocity[i], command.effort[i] = o.rate[i], o.torque[i]
         estimate.position[i], reference.position[i] = o.estimate[i, 0], o.reference[i, 0]
         estimate.velocity[i], reference.velocity[i] = o.estimate[i, 1], o.reference[i, 1]
         estimate.acceleration[i], reference.acceleration[i] = o.estimate[i, 2], o.reference[i, 2]
-        # In the order of messages.FILTER.
-        numbers = filtered.position[11 * i:]
+        # In the order of topics.FILTER.
+        numbers = outputs[FILTER].position[i * FILTER_SIZE:]
         numbers[0], numbers[1], numbers[2] = o.innovation[i], o.rate_innovation[i], o.nis[i]
         numbers[3], numbers[4] = math.sqrt(o.covariance[i, 0]), math.sqrt(o.covariance[i, 2])
         numbers[5] = o.covariance[i, 1] / (numbers[3] * numbers[4])
         numbers[6] = o.innovation_sigma[i]
-        for model in range(4):
-            numbers[7 + model] = o.probability[i, model]
+        for model in range(MODELS):
+            numbers[FILTER_SIZE - MODELS + model] = o.probability[i, model]
+    outputs[MODE], outputs[KEYHOLE], outputs[BLOCKAGE] = o.mode, ahead.number - 1, ahead.hidden_number - 1
 
 
 @compiled
-def answers(state, constants, inputs, outputs, times, angles, heard, said):
-    """Step by step: said[k] answers heard[k]."""
-    for k in range(len(heard)):
-        h, y = heard[k], said[k]
-        hear(inputs[0], h[JOINTS], h[ERROR], h[RATE], h[RANGE], h[ATTITUDE])
-        control_unit.step(state, constants, inputs, outputs, times, angles)
-        inputs[0].preset_valid = 0
-        say(outputs[0], h[JOINTS].stamp, y[COMMAND], y[ESTIMATE], y[REFERENCE], y[FILTER])
-        y[MODE] = outputs[0].mode
+def law(memory, stamp, inputs, outputs):
+    """Step k."""
+    m = memory.record[0]
+    decode(m.inputs, stamp, inputs)
+    control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.times, memory.angles)
+    m.inputs.preset_valid = 0
+    m.invalid |= m.outputs.invalid_input
+    encode(m.outputs, m.state.ahead, stamp, outputs)
+
+
+@compiled
+def laws(memory, stamps, inputs, outputs):
+    """`law` over arrays."""
+    for k in range(len(stamps)):
+        law(memory, stamps[k], inputs[k], outputs[k])
+
+
+class Acu(Unit):
+    """The control unit of an AcuParameters. Its deck moves where an attitude is heard."""
+    NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
+    LIVE = ('tracker', 'azimuth', 'elevation')
+    REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/reset_faults')
+    MOMENTARY = (KEYHOLE, BLOCKAGE)
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        self.memory = Memory(joined(RECORD, state=control_unit.initial_state(parameters),
+                                    constants=control_unit.constants(parameters)), np.zeros(0), np.zeros((0, 2)))
+        self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE in self.reads, 1
+        self.parts['outputs']['mode'] = modes.STANDBY
+        control_unit.clear(self.parts['outputs'])
+        self.drive_state = 'unknown'
+
+    def latency(self, topic):
+        return self.parameters.attitude_latency if topic == ATTITUDE else self.parameters.receiver_latency
+
+    def configure(self, parameters):
+        super().configure(parameters)
+        self.memory.record['constants'] = control_unit.constants(parameters)
+
+    def decode(self, topic, message):
+        """A program track: two or more points in earth angles; or a preset: one point in deck angles. Raises
+        ValueError."""
+        times, angles = rows(message)
+        if len(angles) == 1:
+            self.parts['inputs']['preset'], self.parts['inputs']['preset_valid'] = angles[0], 1
+        else:
+            start = messages.nanoseconds(message.header.stamp) * 1e-9
+            times, angles = program_track.checked(times + start, angles)
+            self.parts['inputs']['program_count'] = len(times)
+            self.memory = self.memory._replace(times=times, angles=angles)
+
+    def take_text(self, topic, text):
+        super().take_text(topic, text)
+        if topic == DRIVE:
+            self.drive_state = text
+
+    def encode(self, topic, code):
+        ahead = self.parts['state']['ahead']
+        if topic == KEYHOLE:
+            return announcement.keyhole(ahead, self.parameters.tracker.receiver.beamwidth)
+        return announcement.hidden(ahead) if topic == BLOCKAGE else modes.MODES[code]
+
+    def request(self, name):
+        mode = name.removeprefix('acu/')
+        if mode == 'reset_faults':
+            return Reply(True, 'cleared')
+        m, outputs = self.parts, self.parts['outputs']
+        m['inputs']['drive_ready'] = self.inputs[0][DRIVE] <= READY
+        granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, modes.MODES.index(mode),
+                                       self.memory.times, self.memory.angles)
+        refusal = '' if granted else f'refused: {modes.REASONS[outputs["reason"]]}; '
+        return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
+
+    def requests_for(self, topic, text):
+        return [f'acu/{text}'] if topic == MODE and text in modes.MODES else []
+
+    def diagnose(self):
+        state, outputs = self.parts['state'], self.parts['outputs']
+        mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
+        invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
+        self.parts['invalid'] = 0
+        values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
+                  ('coasting', str(int(outputs['coasting']))), ('drive', self.drive_state),
+                  ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
+                  ('rates gated', str(int(outputs['rates_gated']))),
+                  ('ranges gated', str(int(outputs['ranges_gated'])))]
+        kinds = ('angle', 'rate', 'acceleration')
+        values += [(f'{axis} limited', ' '.join(kind for kind in kinds if outputs[f'{kind}_limited'][i]))
+                   for i, axis in enumerate(topics.AXES)]
+        for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
+            values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
+        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['ahead'])]
+        if invalid == ['error_gated']:
+            return Diagnosis(WARN, 'an error of the receiver was too far off to be believed', values)
+        if invalid:
+            return Diagnosis(ERROR, f'invalid input: {" ".join(invalid)}', values)
+        if state['cramped']:
+            return Diagnosis(WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit',
+                             values)
+        return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
+
+    @staticmethod
+    def idle(numbers):
+        if not np.isfinite(numbers[ERRORS][:, 0]).any():
+            return 'the receiver never locked'
+        return '' if 'autotrack' in numbers[MODE] else 'the ACU was never in autotrack'
 
 
 def rows(message):
     """(times after the stamp (n,) [s], angles (n, 2) [rad]) of a JointTrajectory; ValueError when not there."""
-    if not set(messages.AXES) <= set(message.joint_names):
-        raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(messages.AXES)}')
-    columns = [message.joint_names.index(axis) for axis in messages.AXES]
+    if not set(topics.AXES) <= set(message.joint_names):
+        raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(topics.AXES)}')
+    columns = [message.joint_names.index(axis) for axis in topics.AXES]
     for row, point in enumerate(message.points):
         if len(point.positions) != len(message.joint_names):
             raise ValueError(f'row {row}: {len(point.positions)} positions; must be {len(message.joint_names)}')

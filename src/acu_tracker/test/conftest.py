@@ -81,7 +81,7 @@ class Rig:
         u['quaternion'], u['deck_rate'] = self.attitude(t).as_quat(), self.body_rate(self.attitude, t)
         for name, value in changes.items():
             u[name] = value
-        control_unit.step(self.state, self.constants, u, self.outputs, self.times, self.angles)
+        control_unit.step(self.state[0], self.constants[0], u[0], self.outputs[0], self.times, self.angles)
         self.commands.append(tuple(self.outputs['rate'][0]))
         self.velocity = np.array(self.commands[-1 - round(self.delay / self.T)])
         self.angle = self.angle + self.T * self.velocity
@@ -89,8 +89,8 @@ class Rig:
         return self.outputs[0]
 
     def ask(self, mode):
-        return control_unit.request(self.state, self.constants, self.inputs, self.outputs, mode, self.times,
-                                    self.angles)
+        return control_unit.request(self.state[0], self.constants[0], self.inputs[0], self.outputs[0], mode,
+                                    self.times, self.angles)
 
     def run(self, seconds, **changes):
         """Steps of this many seconds; columns: rates (2), pointing error (2)."""

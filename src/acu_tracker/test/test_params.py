@@ -33,7 +33,7 @@ def test_what_does_not_go_together_is_refused(values, line):
 def test_what_a_beam_does_not_keep_does_not_limit_it():
     """80 periods on their way; the encoders of then must still be there for the receiver's errors."""
     beam = {'azimuth.controller': 'beam', 'elevation.controller': 'beam', 'period': 0.001, 'command_delay': 0.08}
-    build(AcuParameters, beam).check_drive(True)
+    build(AcuParameters, beam).check_graph(1)
     for more in ({'azimuth.controller': 'adrc'}, {'receiver_latency': 0.061}, {'tracker.receiver.beam_age': 0.061}):
         with pytest.raises(ParameterError, match='must be 0 to 60 periods'):
             build(AcuParameters, beam | more)

@@ -1,45 +1,26 @@
-"""ROS shell of an electronically steered array: owns the time, publishes the beams in force, obeys references."""
-import math
+"""ROS node of an electronically steered array: owns the time, publishes the beams in force, obeys references."""
 import sys
 
-from adu_drive import electronic_beam
-from adu_drive.beam_unit import Beam
-from adu_drive.params import BeamParameters
-from adu_drive.timekeeper_node import DriveShell
-from pedestal_common import messages, shell, topics
+from adu_drive.timekeeper_node import Timekeeper
+from pedestal_common import shell
+from pedestal_common.unit import Diagnosis
 
 
-class BeamSteeringNode(DriveShell):
+class BeamSteeringNode(Timekeeper):
+    """Runs a unit for each beam, and diagnoses them together."""
 
     def __init__(self):
-        super().__init__(BeamParameters)
-        self.invalid = []
+        super().__init__('adu_drive.beam_steering_node')
 
-    def units(self):
-        return [(prefix, Beam(self.parameters)) for prefix in topics.prefixes(self.graph.beams)]
-
-    def judge(self):
-        self.invalid += [part.command for part in self.parts
-                         if part.unit.outputs[0]['invalid_command'] and part.command not in self.invalid]
-
-    def diagnose(self):
-        """What is now, and the topics that held no angle since the last diagnosis."""
-        now = self.first.condition()
-        invalid, self.invalid = ', '.join(self.invalid), []
-        values = [(f'{part.prefix}{axis}_deg', f'{math.degrees(angle):.4f}') for part in self.parts
-                  for axis, angle in zip(messages.AXES, part.unit.outputs[0]['position'])]
-        values = self.diagnosed([*values, ('state', now)])
-        if now != 'enabled':
-            return (shell.ERROR if now == 'emergency stop' else shell.WARN), now, values
-        if invalid:
-            return shell.ERROR, (f'{invalid} holds NaN or infinity, goes beyond {electronic_beam.LARGEST:g} rad or is '
-                                 'not newer than the one before: the beam stays'), values
-        if self.stale():
-            limit = self.parameters.command_timeout * self.parameters.period
-            return shell.ERROR, f'no new {self.stale()} for {limit:g} s: the beam stays', values
-        if self.refused:
-            return shell.WARN, self.refused, values
-        return shell.OK, 'following', values
+    def diagnosed(self):
+        """The angles of every beam, the state that they share, and the beam that is worst."""
+        of_beams = [(port, port.unit.diagnose()) for port in self.ports]
+        port, worst = max(of_beams, key=lambda pair: pair[1].level)
+        values = [(port.prefix + key, text) for port, diagnosis in of_beams for key, text in diagnosis.values
+                  if key != 'state']
+        state = [pair for pair in worst.values if pair[0] == 'state']
+        command = port.unit.COMMAND
+        return Diagnosis(worst.level, worst.message.replace(command, port.named(command)), values + state)
 
 
 def main(args=None):

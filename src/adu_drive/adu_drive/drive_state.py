@@ -6,11 +6,11 @@ The drive wants to be enabled while it is asked to be, no fault and no emergency
 control, lets the brakes grip while the motors still hold, and only then takes their torque away. Overcurrent, and a
 stop that takes too long, take the torque away at once and let the brakes fall in.
 """
-from adu_drive.faults import OVERCURRENT, names
+from adu_drive.faults import ALL, FAULTS, OVERCURRENT, names
 from pedestal_common.compiled import compiled
 
-PHASES = ('disabled', 'releasing brakes', 'enabled', 'stopping', 'engaging brakes')
-DISABLED, RELEASING, ENABLED, STOPPING, ENGAGING = range(len(PHASES))
+PHASES = ('enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brakes')
+ENABLED, STOPPING, ENGAGING, DISABLED, RELEASING = range(len(PHASES))
 
 ENABLE, DISABLE, EMERGENCY_STOP, RESET_FAULTS = range(4)
 REQUESTS = {'adu/enable': ENABLE, 'adu/disable': DISABLE, 'adu/emergency_stop': EMERGENCY_STOP,
@@ -25,6 +25,11 @@ REFUSALS = {
     CAUSE_PERSISTS: 'the cause is still there'}
 """Answers to a request, and why it is not granted."""
 
+PHASE, PREVENTED, EMERGENCY = 7, 8, 16
+AZIMUTH_FAULTS = 5
+ELEVATION_FAULTS = AZIMUTH_FAULTS + len(FAULTS)
+"""Bits of the code of adu/state: phase, whether following is not permitted, emergency stop, fault words."""
+
 STANDSTILL = 1e-3
 """Load rate [rad/s] below which an axis stands."""
 
@@ -37,21 +42,20 @@ def permitted(s):
 
 @compiled
 def condition(s):
-    """All that `described` tells, in one number: it changes when something of it does."""
-    return (s.phase | s.emergency << 3 | (1 if permitted(s) else 0) << 4
-            | s.azimuth.faults << 8 | s.elevation.faults << 16)
+    """Code of adu/state, 0 for 'enabled': all that `described` tells, in one number, so that it changes when something
+    of it does."""
+    return (s.phase | (0 if permitted(s) else PREVENTED) | (EMERGENCY if s.emergency else 0)
+            | s.azimuth.faults << AZIMUTH_FAULTS | s.elevation.faults << ELEVATION_FAULTS)
 
 
 def described(condition):
     """'enabled' when the drive follows commands, otherwise why it does not."""
-    phase, allowed = condition & 7, condition >> 4 & 1
-    if allowed:
-        if phase == DISABLED:
-            phase = RELEASING
-        return PHASES[phase]
-    tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', 8), ('elevation', 16))
-               for kind in names(condition >> shift & 0xff)]
-    why = ['emergency stop'] if condition >> 3 & 1 else []
+    phase = condition & PHASE
+    if not condition & PREVENTED:
+        return PHASES[RELEASING if phase == DISABLED else phase]
+    tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', AZIMUTH_FAULTS), ('elevation', ELEVATION_FAULTS))
+               for kind in names(condition >> shift & ALL)]
+    why = ['emergency stop'] if condition & EMERGENCY else []
     if tripped:
         why.append('fault: ' + ', '.join(tripped))
     if why:
@@ -100,13 +104,12 @@ def advance(s, c):
 
 
 @compiled
-def request(state, constants, what):
+def request(s, c, what):
     """Ask something of the drive between two periods: GRANTED, or why not. It acts in the next period.
 
     Faults and emergency stop can be reset when both axes stand and no cause is present; the drive is then enabled
     again by itself if it was before.
     """
-    s, c = state[0], constants[0]
     if what == DISABLE:
         s.wanted = 0
     elif what == EMERGENCY_STOP:

@@ -48,7 +48,7 @@ bias              T_b [Nm]
 torque_limited, voltage_limited                 1 when it happened within the period
 end_stop          1 when the end of travel cut the rate command within the period
 stopping          1 when not enabled within the period: ramped to standstill, then held there
-faults            latched fault word, see faults.KINDS
+faults            latched fault word, see faults.FAULTS
 thermal_load      of motor 1 and 2; 1 after rated torque for ever
 load_position, load_velocity, true_torque       the truth, for tests and studies; never published: where the beam
                   points (the dish, where the structure is flexible), and K_t i_q of motor 1 and 2
@@ -157,9 +157,8 @@ def _receive(s, u, disturbance_believed):
 
 
 @compiled
-def read(state, constants, outputs):
-    """Outputs as they are now, nothing integrated: at t_0, before the first step."""
-    s, c, y = state[0], constants[0], outputs[0]
+def read(s, c, y):
+    """Outputs y as they are now, nothing integrated: at t_0, before the first step. Records of this module."""
     axis.read(s.azimuth, c.azimuth, y.azimuth)
     axis.read(s.elevation, c.elevation, y.elevation)
     y.phase, y.wanted, y.emergency, y.braked = s.phase, s.wanted, s.emergency, s.braked
@@ -168,20 +167,19 @@ def read(state, constants, outputs):
 
 
 @compiled
-def request(state, constants, outputs, what):
+def request(s, c, y, what):
     """drive_state.request between two periods; the outputs read back what is now."""
-    answer = drive_state.request(state, constants, what)
-    read(state, constants, outputs)
+    answer = drive_state.request(s, c, what)
+    read(s, c, y)
     return answer
 
 
 @compiled
-def step(state, constants, inputs, outputs):
-    """One control period from t_k to t_k+1. All four are (1,) records; state and outputs are written."""
-    s, c, u = state[0], constants[0], inputs[0]
+def step(s, c, u, y):
+    """One control period from t_k to t_k+1. Records STATE, CONSTANTS, INPUTS, OUTPUTS; s and y are written."""
     az, el, c_az, c_el = s.azimuth, s.elevation, c.azimuth, c.elevation
     T_az, T_el, believed = _external(s, c, u)
-    outputs[0].invalid_command = 0 if _receive(s, u, believed) else 1
+    y.invalid_command = 0 if _receive(s, u, believed) else 1
     s.braked = drive_state.advance(s, c)
     enabled = s.phase == drive_state.ENABLED and u.enable == 1
     powered, free = s.phase != drive_state.DISABLED, not s.braked
@@ -202,4 +200,4 @@ def step(state, constants, inputs, outputs):
                 axis.plant_step(az, c_az, T_az)
                 axis.plant_step(el, c_el, T_el)
     s.k += 1
-    read(state, constants, outputs)
+    read(s, c, y)

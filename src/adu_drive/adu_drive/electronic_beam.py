@@ -76,17 +76,15 @@ def release(s, c, stamp_ns):
 
 
 @compiled
-def read(state, outputs):
-    """Outputs as they are now: at t_0, before the first step."""
-    s, y = state[0], outputs[0]
+def read(s, y):
+    """Outputs as they are now: at t_0, before the first step. Records STATE, OUTPUTS."""
     y.position[0], y.position[1] = s.position[0], s.position[1]
 
 
 @compiled
-def step(state, constants, inputs, outputs):
-    """One step from t_k to t_k+1. All four are (1,) records; state and outputs are written."""
-    s, c, u, y = state[0], constants[0], inputs[0], outputs[0]
+def step(s, c, u, y):
+    """One step from t_k to t_k+1. Records STATE, CONSTANTS, INPUTS, OUTPUTS; s and y are written."""
     y.invalid_command = 1 if u.due == 1 and not receive(s, u) else 0
     y.stale = 1 if s.command_stamp_ns == NEVER or u.stamp_ns - s.command_stamp_ns > c.timeout_ns else 0
     release(s, c, u.stamp_ns)
-    read(state, outputs)
+    read(s, y)

@@ -1,15 +1,35 @@
 """What a drive trips on, from what it measures itself. A fault stays until it is reset (drive_state.request)."""
+import typing
+
 from adu_drive import thermal
 from pedestal_common.compiled import compiled
 
-KINDS = ('overcurrent', 'overspeed', 'encoder disagreement', 'following error', 'overtemperature')
-"""Bit i of a fault word stands for KINDS[i]."""
-OVERCURRENT, OVERSPEED, DISAGREEMENT, FOLLOWING, OVERTEMPERATURE = (1 << i for i in range(len(KINDS)))
+
+class Fault(typing.NamedTuple):
+    """A fault of an axis: its name, what it is told by, the parameters of an axis that say when."""
+    name: str
+    doc: str
+    parameters: tuple
+
+
+FAULTS = (
+    Fault('overcurrent', 'phase current of a motor; torque off at once, the brakes fall in', ('faults.overcurrent',)),
+    Fault('overspeed', 'speed of a motor over the gear ratio', ('faults.overspeed',)),
+    Fault('encoder disagreement', 'load encoder against the mean of the motor encoders',
+          ('faults.encoder_disagreement',)),
+    Fault('following error', 'rate wanted against rate measured, for longer than `faults.following_time`',
+          ('faults.following_error', 'faults.following_time')),
+    Fault('overtemperature', 'I2t of a motor, 1 after rated torque for ever; gone below 0.8',
+          ('faults.overtemperature', 'thermal')),
+)
+"""Bit i of a fault word stands for FAULTS[i]."""
+OVERCURRENT, OVERSPEED, DISAGREEMENT, FOLLOWING, OVERTEMPERATURE = (1 << i for i in range(len(FAULTS)))
+ALL = (1 << len(FAULTS)) - 1
 
 
 def names(bits):
-    """The kinds in a fault word, as a tuple."""
-    return tuple(kind for i, kind in enumerate(KINDS) if int(bits) >> i & 1)
+    """The names of the faults in a fault word, a tuple."""
+    return tuple(fault.name for i, fault in enumerate(FAULTS) if int(bits) >> i & 1)
 
 
 @compiled

@@ -1,81 +1,139 @@
-"""The drive unit between its messages: what it makes of those it hears, and what it puts into those it says.
-
-The node takes one step at a time, a recomputed bag all of them at once, through the same `say` and `advance`.
-"""
+"""The unit of the drive: rate commands and the ship's motion in, encoders and motors out, enable and faults."""
 import math
+import typing
 
 import numpy as np
 
-from adu_drive import drive_state, drive_unit
-from pedestal_common import messages, records
+from adu_drive import drive_state, drive_unit, faults, thermal
+from pedestal_common import nodes, topics
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
 
 CLOCK, COMMAND, SHIP, JOINTS, MOTORS = 'clock', 'acu/rate_command', 'ship/truth', 'joint_states', 'adu/motor_states'
 STATE = 'adu/state'
-HEARD, SAID = records.of(JOINTS, COMMAND, SHIP), records.of(JOINTS, CLOCK, MOTORS, more=(STATE,))
-"""The joint states it hears are its own, of which it takes the stamp: t_k of the step that follows."""
 
-MEMORY = np.dtype([('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)), ('timeout', 'i8'),
-                   ('begun', 'i8')])
-"""Stamps of the last command and of the last truth with a finite rate (FLU, rad/s); age at which a command is stale
-[ns]; answers: 1 once the first step was said."""
+INVALID = ('', COMMAND, SHIP)
+"""Topics that can hold what the drive does not believe."""
+
+LINK = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
+                 ('timeout', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
+"""Stamps [ns] of the last step, of the last command and of the last truth with a finite rate (FLU, rad/s); age [ns] at
+which a command is stale; stale: 1 while it is; invalid: of INVALID, since the last diagnosis."""
 
 
-class Adu:
-    """The drive of an AduNodeParameters; on_ship: it hears how its deck turns.
+RECORD = np.dtype([('state', drive_unit.STATE), ('constants', drive_unit.CONSTANTS), ('inputs', drive_unit.INPUTS),
+                   ('outputs', drive_unit.OUTPUTS), ('link', LINK)], align=True)
 
-    heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
-    a step waits for; WORDS: {topic: function from its code in `said` to its text}; SERVICES: what it can be asked for.
-    """
-    HEARD, SAID, WORDS, COMMAND = HEARD, SAID, {STATE: drive_state.described}, COMMAND
-    SERVICES = tuple(drive_state.REQUESTS)
 
-    def __init__(self, params, on_ship):
-        self.constants, self.state = drive_unit.constants(params), drive_unit.initial_state(params)
-        self.inputs, self.outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
-        drive_unit.read(self.state, self.constants, self.outputs)
-        self.memory = np.zeros(1, MEMORY)
-        self.memory['command_stamp'] = self.memory['truth_stamp'] = NEVER
-        self.memory['timeout'] = round(params.command_timeout * params.period * 1e9)
-        self.heard, self.said, self.last = np.zeros(1, HEARD), np.zeros(1, SAID), np.zeros(1, HEARD)
-        self.remembers = self.state, self.inputs, self.outputs, self.memory, self.last
-        self.messages = {JOINTS: messages.joint_state(messages.AXES), MOTORS: messages.joint_state(messages.MOTORS),
-                         CLOCK: messages.Clock(clock=messages.Time(sec=0, nanosec=0))}
-        self.followers = {COMMAND: 0.0, **({SHIP: 0.0} if on_ship else {})}
-        self.events = {}
+class Memory(typing.NamedTuple):
+    """All the drive works on."""
+    record: np.ndarray
 
-    def prepare(self):
-        """Compile `say`, `advance` and `ask`."""
-        state, outputs = self.state.copy(), self.outputs.copy()
-        say(outputs, self.heard, self.said.copy())
-        advance(state, self.constants, self.inputs.copy(), outputs, self.memory.copy(), self.heard)
-        drive_unit.request(state, self.constants, outputs, drive_state.DISABLE)
 
-    def say(self):
-        """Put what is at the stamp of `heard` into `said`."""
-        say(self.outputs, self.heard, self.said)
+@compiled
+def deck_acceleration(u, m, ship):
+    """Angular acceleration of the deck [rad/s2, FLU] from two successive truths and their stamps."""
+    w, last = ship.twist_angular, m.truth_stamp
+    if last != NEVER and ship.stamp > last:
+        for i in range(3):
+            u.base_acceleration[i] = (w[i] - m.deck_rate[i]) / ((ship.stamp - last) * 1e-9)
+    if math.isfinite(w[0]) and math.isfinite(w[1]) and math.isfinite(w[2]) and ship.stamp != last:
+        m.truth_stamp = ship.stamp
+        for i in range(3):
+            m.deck_rate[i] = w[i]
 
-    def advance(self):
-        """One period on from the stamp of `heard`, obeying it; whether the command in force is stale."""
-        return advance(self.state, self.constants, self.inputs, self.outputs, self.memory, self.heard)
 
+@compiled
+def decode(u, m, command, ship):
+    """Records of the messages -> inputs of the drive, which is at the stamp of the last step."""
+    if command.stamp != NEVER:
+        m.command_stamp = command.stamp
+        u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
+        u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
+    m.stale = m.command_stamp == NEVER or m.stamp - m.command_stamp > m.timeout
+    u.enable = 0 if m.stale else 1
+    if ship.stamp != NEVER:
+        deck_acceleration(u, m, ship)
+
+
+@compiled
+def note_invalid(u, m):
+    """Remember which topic held no number."""
+    deck = u.base_acceleration
+    believed = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.LARGEST
+    m.invalid = 1 if believed else 2
+
+
+@compiled
+def encode(y, stamp, outputs):
+    """Outputs of the drive -> records of its messages."""
+    joints, motors = outputs[JOINTS], outputs[MOTORS]
+    joints.stamp = motors.stamp = outputs[CLOCK].stamp = stamp
+    for i in range(2):
+        axis = y.azimuth if i == 0 else y.elevation
+        joints.position[i], joints.velocity[i], joints.effort[i] = axis.position, axis.velocity, axis.torque
+        for j in range(2):
+            motors.position[2 * i + j] = axis.motor_position[j]
+            motors.velocity[2 * i + j] = axis.motor_velocity[j]
+            motors.effort[2 * i + j] = axis.motor_torque[j]
+    outputs[STATE] = y.condition
+
+
+@compiled
+def law(memory, stamp, inputs, outputs):
+    """Step k: from t_k-1 to t_k, obeying what was said of step k - 1."""
+    m = memory.record[0]
+    if m.link.stamp != NEVER:
+        decode(m.inputs, m.link, inputs[COMMAND], inputs[SHIP])
+        drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
+        if m.outputs.invalid_command:
+            note_invalid(m.inputs, m.link)
+    m.link.stamp = stamp
+    encode(m.outputs, stamp, outputs)
+
+
+@compiled
+def laws(memory, stamps, inputs, outputs):
+    """`law` over arrays."""
+    for k in range(len(stamps)):
+        law(memory, stamps[k], inputs[k], outputs[k])
+
+
+class Adu(Unit):
+    """The drive of an AduNodeParameters."""
+    NODE, COMMAND, LAWS = nodes.row(nodes.DRIVE), COMMAND, {Memory: (law, laws)}
+    REQUESTS = tuple(drive_state.REQUESTS)
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        link = np.zeros(1, LINK)
+        link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NEVER
+        link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
+        self.memory = Memory(joined(RECORD, state=drive_unit.initial_state(parameters),
+                                    constants=drive_unit.constants(parameters), link=link))
+        drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
+
+    def latency(self, topic):
+        return self.parameters.period
+
+    def encode(self, topic, code):
+        return drive_state.described(code)
+
+    @property
     def condition(self):
         """The text of adu/state as it is now, also between two steps."""
-        return drive_state.described(int(self.outputs[0]['condition']))
+        return drive_state.described(int(self.parts['outputs']['condition']))
 
-    def refusal(self, service):
-        """Ask for one of SERVICES between two steps: '' when granted, else why not."""
-        answer = drive_unit.request(self.state, self.constants, self.outputs, drive_state.REQUESTS[service])
-        return '' if answer == drive_state.GRANTED else drive_state.REFUSALS[answer]
+    def request(self, name):
+        m = self.parts
+        answer = drive_unit.request(m['state'], m['constants'], m['outputs'], drive_state.REQUESTS[name])
+        granted = answer == drive_state.GRANTED
+        refusal = '' if granted else f'refused: {drive_state.REFUSALS[answer]}; '
+        return Reply(granted, f'{refusal}drive is {self.condition}')
 
-    def request(self, service):
-        """The same; True when granted."""
-        return not self.refusal(service)
-
-    def services_to(self, text):
-        """The services that bring adu/state to a text."""
-        o = self.outputs[0]
+    def requests_for(self, topic, text):
+        o = self.parts['outputs']
         tripped, stopped = 'fault' in text, 'emergency stop' in text
         latched = o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults']
         wanted = {'adu/emergency_stop': stopped and not o['emergency'],
@@ -84,63 +142,33 @@ class Adu:
                   'adu/enable': text in ('releasing brakes', 'enabled') and not o['wanted']}
         return [service for service, due in wanted.items() if due]
 
-    def answers(self, heard, said):
-        """Many steps, records (n,): `advance` by what was heard last, then `say`."""
-        answers(self.state, self.constants, self.inputs, self.outputs, self.memory, self.last, heard, said)
+    def diagnose(self):
+        outputs, link = self.parts['outputs'], self.parts['link']
+        invalid, link['invalid'] = INVALID[link['invalid']], 0
+        axes = {axis: outputs[axis] for axis in topics.AXES}
+        values = [(f'{name} {mark}', '1' if axis[mark] else '0') for name, axis in axes.items()
+                  for mark in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
+        values += [(f'{name} faults', ', '.join(faults.names(axis['faults']))) for name, axis in axes.items()]
+        values += [(f'{name}_motor_{i} thermal_load', f'{load:.3f}') for name, axis in axes.items()
+                   for i, load in enumerate(axis['thermal_load'], 1)]
+        values += [('state', self.condition), ('phase', drive_state.PHASES[outputs['phase']]),
+                   ('brakes', 'on' if outputs['braked'] else 'off')]
+        if outputs['emergency'] or any(axis['faults'] for axis in axes.values()):
+            return Diagnosis(ERROR, self.condition, values)
+        if invalid:
+            largest = f'{drive_unit.LARGEST:g}'
+            return Diagnosis(ERROR, f'{invalid} holds NaN or infinity, or goes beyond {largest}: stopping', values)
+        if link['stale']:
+            return Diagnosis(ERROR, f'no new {COMMAND} for {link["timeout"] / 1e9:g} s: stopping', values)
+        if self.condition != 'enabled':
+            return Diagnosis(WARN, self.condition, values)
+        if any(axis['end_stop'] for axis in axes.values()):
+            return Diagnosis(WARN, 'at an end stop', values)
+        hottest = max(axis['thermal_load'].max() for axis in axes.values())
+        if hottest > thermal.WARM:
+            return Diagnosis(WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values)
+        return Diagnosis(OK, 'following', values)
 
-
-@compiled
-def say(outputs, heard, said):
-    """Outputs of the drive -> records of its messages."""
-    y, joints, motors = outputs[0], said[0][JOINTS], said[0][MOTORS]
-    joints.stamp = motors.stamp = said[0][CLOCK].stamp = heard[0][JOINTS].stamp
-    for i in range(2):
-        axis = y.azimuth if i == 0 else y.elevation
-        joints.position[i], joints.velocity[i], joints.effort[i] = axis.position, axis.velocity, axis.torque
-        for j in range(2):
-            motors.position[2 * i + j] = axis.motor_position[j]
-            motors.velocity[2 * i + j] = axis.motor_velocity[j]
-            motors.effort[2 * i + j] = axis.motor_torque[j]
-    said[0][STATE] = y.condition
-
-
-@compiled
-def hear(u, m, stamp, command, ship):
-    """Records of the messages of a step -> inputs of the drive; whether the command in force is stale."""
-    if command.stamp != NEVER:
-        m.command_stamp = command.stamp
-        u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
-        u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
-    stale = m.command_stamp == NEVER or stamp - m.command_stamp > m.timeout
-    u.enable = 0 if stale else 1
-    if ship.stamp != NEVER:
-        w, last = ship.twist_angular, m.truth_stamp
-        # The deck's angular acceleration, from two successive truths and their stamps.
-        if last != NEVER and ship.stamp > last:
-            for i in range(3):
-                u.base_acceleration[i] = (w[i] - m.deck_rate[i]) / ((ship.stamp - last) * 1e-9)
-        if math.isfinite(w[0]) and math.isfinite(w[1]) and math.isfinite(w[2]) and ship.stamp != last:
-            m.truth_stamp = ship.stamp
-            for i in range(3):
-                m.deck_rate[i] = w[i]
-    return stale
-
-
-@compiled
-def advance(state, constants, inputs, outputs, memory, heard):
-    """From t_k to t_k+1; whether the command in force is stale."""
-    h = heard[0]
-    stale = hear(inputs[0], memory[0], h[JOINTS].stamp, h[COMMAND], h[SHIP])
-    drive_unit.step(state, constants, inputs, outputs)
-    return stale
-
-
-@compiled
-def answers(state, constants, inputs, outputs, memory, last, heard, said):
-    """Step by step; what is asked for before heard[k] comes between the answer to heard[k - 1] and the next."""
-    for k in range(len(heard)):
-        if memory[0].begun:
-            advance(state, constants, inputs, outputs, memory, last)
-        say(outputs, heard[k:k + 1], said[k:k + 1])
-        last[0] = heard[k]
-        memory[0].begun = 1
+    @staticmethod
+    def idle(numbers):
+        return '' if (numbers[COMMAND][:, 2:4] != 0.0).any() else 'the drive was never told to move'

@@ -29,7 +29,7 @@ class Drive:
             self.inputs['enable'] = enable
         for name, value in axis_inputs.items():
             self.inputs['azimuth'][name] = value
-        drive_unit.step(self.state, self.constants, self.inputs, self.outputs)
+        drive_unit.step(self.state[0], self.constants[0], self.inputs[0], self.outputs[0])
         self.steps.append(self.outputs.copy())
         return self.outputs[0]
 

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive.beam_unit import COMMAND, JOINTS, STATE, Beam
+from adu_drive.beam_unit import CLOCK, COMMAND, JOINTS, STATE, Beam
 from adu_drive.params import BeamParameters
 from pedestal_common import records
 
@@ -16,20 +16,21 @@ class Rig:
     """A Beam fed step by step."""
 
     def __init__(self, params=P):
-        self.unit, self.k = Beam(params), 0
-        self.now, self.command = (records.only(self.unit.heard, name) for name in (JOINTS, COMMAND))
+        self.unit, self.k = Beam(params, (CLOCK, COMMAND)), 0
 
     def step(self, azimuth=None, elevation=0.5, late=0):
         """The beam at t_k and adu/state; then t_k is answered with a command `late` steps old, None: with none."""
-        self.now.stamp[0] = self.k * T
-        self.unit.say()
-        said = self.unit.said[0]
-        self.command.stamp[0] = records.NEVER if azimuth is None else (self.k - late) * T
+        unit, command = self.unit, self.unit.inputs[COMMAND]
+        unit.step(np.full(1, self.k * T), unit.inputs, unit.outputs)
+        command['stamp'] = records.NEVER if azimuth is None else (self.k - late) * T
         if azimuth is not None:
-            self.command.numbers[:2] = azimuth, elevation
-        self.stale = self.unit.advance()
+            command['position'] = azimuth, elevation
         self.k += 1
-        return said[JOINTS]['position'].copy(), self.unit.WORDS[STATE](int(said[STATE]))
+        return unit.outputs[0][JOINTS]['position'].copy(), unit.encode(STATE, int(unit.outputs[0][STATE]))
+
+    @property
+    def outputs(self):
+        return self.unit.parts['outputs']
 
 
 def test_the_beam_is_the_command_of_one_delay_and_one_step_before():
@@ -42,14 +43,14 @@ def test_the_beam_is_the_command_of_one_delay_and_one_step_before():
 
 def test_many_steps_at_once_are_the_same():
     commands = np.random.default_rng(2).uniform(-1.0, 1.0, 40)
-    one, unit = Rig(), Beam(P)
+    one, unit = Rig(), Beam(P, (CLOCK, COMMAND))
     beams = np.array([one.step(command)[0] for command in commands])
-    heard, said = np.zeros(40, unit.HEARD), np.zeros(40, unit.SAID)
-    heard[JOINTS]['stamp'] = heard[COMMAND]['stamp'] = np.arange(40) * T
-    heard[COMMAND]['position'][:, 0], heard[COMMAND]['position'][:, 1] = commands, 0.5
-    unit.answers(heard, said)
-    assert np.array_equal(said[JOINTS]['position'], beams)
-    assert not said[JOINTS]['velocity'].any() and not said[JOINTS]['effort'].any()
+    inputs, outputs = records.empty(unit.inputs_type(), 40), records.empty(unit.outputs_type(), 40)
+    inputs[COMMAND]['stamp'][1:] = np.arange(39) * T
+    inputs[COMMAND]['position'][1:, 0], inputs[COMMAND]['position'][:, 1] = commands[:-1], 0.5
+    unit.step(np.arange(40) * T, inputs, outputs)
+    assert np.array_equal(outputs[JOINTS]['position'], beams)
+    assert not outputs[JOINTS]['velocity'].any() and not outputs[JOINTS]['effort'].any()
 
 
 @pytest.mark.parametrize('wrong', [math.nan, math.inf, -1e9])
@@ -58,16 +59,18 @@ def test_no_angle_leaves_the_beam_and_says_so(wrong):
     for _ in range(6):
         rig.step(0.1)
     rig.step(wrong)
-    assert rig.unit.outputs[0]['invalid_command']
-    for _ in range(6):
+    rig.step()
+    assert rig.outputs['invalid_command']
+    for _ in range(5):
         beam, state = rig.step()
         assert tuple(beam) == (0.1, 0.5) and state == 'enabled'
-    assert not rig.stale
+    assert not rig.outputs['stale']
     for _ in range(6):
         rig.step()
-    assert rig.stale
+    assert rig.outputs['stale']
     rig.step(0.2)
-    assert not rig.stale
+    rig.step(0.2)
+    assert not rig.outputs['stale']
 
 
 @pytest.mark.parametrize('stop, go, text', [('adu/disable', 'adu/enable', 'disabled'),
@@ -77,12 +80,13 @@ def test_a_beam_that_is_stopped_stays_and_forgets_what_is_on_its_way(stop, go, t
     for k in range(10):
         rig.step(0.1 * k)
     before, _ = rig.step(9.0)
-    assert rig.unit.request(stop) and rig.unit.condition() == text
+    assert rig.unit.request(stop).granted and rig.unit.condition == text
     where = {tuple(rig.step(5.0)[0]) for _ in range(10)}
-    assert len(where) == 1 and where.pop()[0] == pytest.approx(before[0] + 0.1)
-    assert rig.unit.services_to('enabled')[-1] == 'adu/enable'
+    assert len(where) == 1 and where.pop()[0] == before[0]
+    assert rig.unit.requests_for(STATE, 'enabled')[-1] == 'adu/enable'
     if text == 'emergency stop':
-        assert rig.unit.refusal('adu/enable')
-    assert rig.unit.request(go)
+        assert not rig.unit.request('adu/enable').granted
+    rig.step()
+    assert rig.unit.request(go).granted
     beams = [rig.step(0.7)[0][0] for _ in range(6)]
     assert beams[-1] == 0.7 and 5.0 not in beams and 9.0 not in beams

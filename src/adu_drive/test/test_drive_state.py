@@ -23,7 +23,7 @@ def phases(d):
 
 
 def request(d, what):
-    return drive_state.request(d.state, d.constants, getattr(drive_state, what))
+    return drive_state.request(d.state[0], d.constants[0], getattr(drive_state, what))
 
 
 CAUSES = {
@@ -40,7 +40,7 @@ CAUSES = {
 2 * 64 * 90 Nm and friction."""
 
 
-@pytest.mark.parametrize('kind', faults.KINDS)
+@pytest.mark.parametrize('kind', [fault.name for fault in faults.FAULTS])
 def test_each_fault_trips_latches_and_stops_both_axes(drive, kind):
     values, command = CAUSES[kind]
     d = made(drive, **values).run(3.0, elevation=0.05, **command)

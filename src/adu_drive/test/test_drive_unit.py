@@ -57,7 +57,7 @@ def test_bias_keeps_the_teeth_closed_in_a_reversal(drive):
 
 def test_starts_at_rest_in_balance(drive):
     d = drive(AduParameters(initial_azimuth=1.0, initial_elevation=0.3, wind=WindParameters(azimuth=800.0)))
-    drive_unit.read(d.state, d.constants, d.outputs)
+    drive_unit.read(d.state[0], d.constants[0], d.outputs[0])
     assert d.outputs[0]['azimuth']['position'] == pytest.approx(1.0, abs=0.51 * LOAD_STEP)
     assert d.outputs[0]['elevation']['velocity'] == 0.0
     d.run(1.0, azimuth=0.0, elevation=0.0)
@@ -176,7 +176,7 @@ COMMANDS = [(0.5 * math.sin(0.05 * k), 300.0 * math.cos(0.05 * k), 0 if 60 <= k 
 def compose(state, constants, inputs, outputs, rates, torques, enables, log):
     for k in range(len(rates)):
         inputs[0].azimuth.rate, inputs[0].azimuth.torque, inputs[0].enable = rates[k], torques[k], enables[k]
-        drive_unit.step(state, constants, inputs, outputs)
+        drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
         log[k] = outputs[0]
 
 

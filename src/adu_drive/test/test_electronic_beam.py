@@ -19,14 +19,14 @@ class Beam:
         self.constants = electronic_beam.constants(period, delay, timeout)
         self.state = electronic_beam.initial_state(0.1, 0.2)
         self.inputs, self.outputs = np.zeros(1, electronic_beam.INPUTS), np.zeros(1, electronic_beam.OUTPUTS)
-        electronic_beam.read(self.state, self.outputs)
+        electronic_beam.read(self.state[0], self.outputs[0])
 
     def step(self, command=None, stamp_ns=None):
         u, t = self.inputs, self.k * self.period_ns
         u['stamp_ns'], u['due'] = t, command is not None
         if command is not None:
             u['position'], u['command_stamp_ns'] = command, t if stamp_ns is None else stamp_ns
-        electronic_beam.step(self.state, self.constants, u, self.outputs)
+        electronic_beam.step(self.state[0], self.constants[0], u[0], self.outputs[0])
         self.k += 1
         return self.outputs[0]
 

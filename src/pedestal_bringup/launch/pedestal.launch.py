@@ -10,7 +10,7 @@ from launch_ros.actions import Node
 
 from launch import LaunchDescription
 from pedestal_bringup.run import graph, scenario
-from pedestal_common import topics
+from pedestal_common import nodes
 
 
 def start(context):
@@ -26,9 +26,9 @@ def start(context):
             send = ['pedestal', 'program', given['scenario'], '--duration', str(chosen.header.duration)]
             actions.append(ExecuteProcess(cmd=send, output='screen'))
             continue
-        package, module = chosen.kind(name).module.split('.')
-        node = Node(package=package, executable=module, name=topics.plain(name), namespace=topics.beam_of(name),
-                    parameters=[str(file)], output='screen')
+        row = chosen.row(name)
+        node = Node(package=row.package, executable=row.executable, name=nodes.plain(name),
+                    namespace=nodes.beam_of(name), parameters=[str(file)], output='screen')
         actions.append(node)
         if name == 'adu':
             end = OnProcessExit(target_action=node, on_exit=[EmitEvent(event=Shutdown())])

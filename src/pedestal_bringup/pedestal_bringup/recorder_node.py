@@ -2,22 +2,21 @@
 import collections
 import hashlib
 import inspect
-import json
 import struct
 import sys
 import time
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import HistoryPolicy
 
 from pedestal_bringup.bags import configuration
 from pedestal_bringup.bags.bag import BagError
-from pedestal_bringup.bags.columns import STAMPED
 from pedestal_bringup.bags.step_order import OrderError, StepOrder
 from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run.recorder_params import RecorderParameters
-from pedestal_common import messages, parameters, topics
-from pedestal_common.shell import ERROR, OK, SECOND, WARN, GraphError, Shell, message_class
-from pedestal_common.shell import main as shell_main
+from pedestal_common import messages, middleware, nodes, parameters, shell, topics
+from pedestal_common.cdr import STAMPED
+from pedestal_common.steps import SECOND, GraphError
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis
 
 QUIET = 0.5
 DRAIN = 4.0
@@ -28,22 +27,22 @@ discovered with the next heartbeat of the writer, by default every 3 s."""
 _stamp_of = struct.Struct('<iI').unpack_from
 
 
-class RecorderNode(Shell):
+class RecorderNode(shell.Shell):
     """Lockstep: in the order of steps (StepOrder). Realtime: as it comes, published at the writer's wall time."""
 
     def __init__(self):
         super().__init__('recorder', RecorderParameters)
-        nodes = self.graph.members
-        if self.graph.lockstep and not nodes:
+        names = self.graph.members
+        if self.graph.lockstep and not names:
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
         beams, flags = self.graph.beams, [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
-        recorded = topics.read_by('recorder', nodes, flags, beams) if nodes else list(self.topics.values())
+        recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
             'git': configuration.git_revision(), **configuration.versions()},
             configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
-        self._order = StepOrder(recorded, nodes, self._bag.write)
+        self._order = StepOrder(recorded, names, self._bag.write)
         self._end = round(self.parameters.duration * SECOND) or None
         self._lost = collections.Counter()
         self._broken = 0
@@ -59,16 +58,15 @@ class RecorderNode(Shell):
 
     def _record(self, index, topic):
         """Subscribe with unlimited history, whatever the writer keeps: a reader's own queue must drop nothing."""
-        durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.qos == 'state' else DurabilityPolicy.VOLATILE
-        profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                             durability=durability)
-        self.create_subscription(message_class(topic.type), topic.name, self._callback(index, topic), profile,
-                                 raw=True)
+        profile = middleware.qos(topic.rate)
+        profile.history = HistoryPolicy.KEEP_ALL
+        self.create_subscription(middleware.message_class(topic.type), topic.name, self._callback(index, topic),
+                                 profile, raw=True)
 
     def _callback(self, index, topic):
         put = self._in_step(index, topic) if self.graph.lockstep else self._as_it_comes(index, topic)
         checked = len(topic.writers) == 1
-        expected = 1 if topic.qos == 'step' and self.graph.members else 0
+        expected = 1 if topic.rate == 'step' and self.graph.members else 0
         taken = self._taken
 
         def take(data, info=None):
@@ -203,9 +201,10 @@ class RecorderNode(Shell):
             level, message = WARN, 'recording; some messages have no valid or no proper stamp'
         if self._lost:
             level, message = ERROR, self._losses()
-        return level, message, [('messages', str(self._bag.messages)), ('waiting steps', str(self._order.waiting)),
-                                ('lost', str(self._lost.total())), ('without valid stamp', str(self._broken)),
-                                ('out of order', str(self._order.odd))]
+        return Diagnosis(level, message, [
+            ('messages', str(self._bag.messages)), ('waiting steps', str(self._order.waiting)),
+            ('lost', str(self._lost.total())), ('without valid stamp', str(self._broken)),
+            ('out of order', str(self._order.odd))])
 
     def draining(self):
         now = time.monotonic()
@@ -235,8 +234,8 @@ class RecorderNode(Shell):
             while block := file.read(1 << 20):
                 digest.update(block)
             size = file.tell()
-        print(json.dumps({'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),
-                          'sha256': digest.hexdigest(), 'bytes': size}), flush=True)
+        self.result = {'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),
+                       'sha256': digest.hexdigest(), 'bytes': size}
         if self._error is None and self._lost:
             self._error = self._losses()
         if self._error is not None:
@@ -244,7 +243,7 @@ class RecorderNode(Shell):
 
 
 def main(args=None):
-    return shell_main(RecorderNode, args)
+    return shell.main(RecorderNode, args)
 
 
 if __name__ == '__main__':

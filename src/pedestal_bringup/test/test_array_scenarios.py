@@ -18,7 +18,7 @@ RAMP = [*QUIET, 'scenario.ship=false', 'tracking_receiver.target.kind=ramp', 'ac
 
 
 def composed(*overrides, duration):
-    return closed_loop.run(closed_loop.cores(scenario.load(SWAY, overrides, duration=duration)))
+    return closed_loop.Loop(scenario.load(SWAY, overrides, duration=duration)).run()
 
 
 @pytest.mark.parametrize('smoothing, n', [('none', 20), ('moving_average', 20), ('moving_average', 13),
@@ -26,9 +26,10 @@ def composed(*overrides, duration):
 def test_a_ramp_is_met_in_the_middle_of_the_hold_with_every_smoothing(smoothing, n):
     """30 deg/s, T = 10 ms: the beam is off by v T / 2 at either end of its interval, one way and the other."""
     run = composed(*RAMP, f'tracking_receiver.receiver.smoothing={smoothing}',
-                   f'tracking_receiver.receiver.smoothing_samples={n}', duration=5.0)[-50:]
+                   f'tracking_receiver.receiver.smoothing_samples={n}', duration=5.0)
     hold = 0.5 * math.pi / 6 * 0.01 * math.cos(0.6)
-    end, begin = run['true_error'][1:, 0], tracking.began(run['position'], run['true_error'])[1:, 0]
+    error = run.truth['error'][-50:]
+    end, begin = error[1:, 0], tracking.began(run['joint_states']['position'][-50:], error)[1:, 0]
     assert np.abs(0.5 * (end + begin)).max() < 0.01 * hold
     assert end == pytest.approx(np.full(49, hold), rel=0.02) and begin == pytest.approx(np.full(49, -hold), rel=0.02)
 
@@ -101,7 +102,7 @@ def test_the_papers_loop_through_the_cores_reads_what_its_kernel_does(delta, rea
     of_axes = [f'acu.{axis}.beam.{key}={value}' for axis in ('azimuth', 'elevation')
                for key, value in (('form', 'type_1'), ('rate_compensation', delta))]
     run = composed(*QUIET, *of_axes, 'adu.transport_delay=0', duration=14.0)
-    read = np.degrees(np.abs(run['measured'][run['t'] > 6.0]).max())
+    read = np.degrees(np.abs(run['tracking_receiver/angle_error']['vector'][run.t > 6.0, :2]).max())
     target, rate = phased_array.sway_target()
     kernel = np.degrees(np.abs(phased_array.settled(Paper(delta=delta).run(target, rate)[1])).max())
     assert kernel == pytest.approx(reading, rel=0.005)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.estimation import motion_models, tracker
 from acu_tracker.params import ReceiverLaw
 from pedestal_bringup.analysis import consistency, results
-from pedestal_common import line_of_sight, messages
+from pedestal_common import line_of_sight, topics
 from pedestal_common.parameters import build
 from tracking_receiver_sim import receiver, target
 from tracking_receiver_sim.params import SMOOTHINGS, TrackingReceiverParameters
@@ -110,9 +110,9 @@ def test_true_rates_seen_from_a_sailing_ship():
 
 
 def test_names_are_those_of_the_models_and_axes():
-    assert messages.MODELS == motion_models.MODELS
-    told = {f'{axis}_{name}' for axis in messages.AXES for name in (*consistency.NAMES, *messages.MODELS)}
-    assert told | {f'{axis}_innovation_sigma' for axis in messages.AXES} == set(messages.FILTER)
+    assert topics.MOTION_MODELS == motion_models.MODELS
+    told = {f'{axis}_{name}' for axis in topics.AXES for name in (*consistency.NAMES, *topics.MOTION_MODELS)}
+    assert told | {f'{axis}_innovation_sigma' for axis in topics.AXES} == set(topics.BY_NAME['acu/filter'].names)
 
 
 @pytest.mark.parametrize('smoothing', SMOOTHINGS)
@@ -132,7 +132,7 @@ def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_d
     errors, expected, law = [], [], ReceiverLaw()
     for k, row in enumerate(normals):
         inputs['stamp_ns'] = 5_000_000 * k
-        receiver.step(state, constants, inputs, outputs, built.breaks, built.coefficients, row)
+        receiver.step(state[0], constants[0], inputs[0], outputs[0], built.breaks, built.coefficients, row)
         if k >= 400:
             x, e, level = (float(outputs[name][0]) for name in ('cross_elevation', 'elevation', 'cn0_dbhz'))
             errors += [[x, e]]

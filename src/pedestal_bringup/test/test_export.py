@@ -21,12 +21,12 @@ def run():
     """[(topic, stamp, message)]: numbers that are hard to write, texts that are hard to quote."""
     rows = []
     for k, value in enumerate(VALUES):
-        joints = messages.joint_state(messages.AXES)
+        joints = messages.template('joint_states')
         joints.position[:], joints.velocity[:] = (value, k), (-value, 0.5)
         error = messages.Vector3Stamped(header=messages.header('beam'), vector=messages.vector3(value, 0.25, 46.4))
-        estimate = messages.joint_trajectory('earth', [messages.trajectory_point()])
+        estimate = messages.template('acu/estimate')
         estimate.points[0].accelerations[:] = value, -value
-        truth = messages.odometry('earth', 'base_link')
+        truth = messages.template('ship/truth')
         truth.twist.twist.angular.y = value
         for name, message in (('joint_states', joints), ('tracking_receiver/angle_error', error),
                               ('acu/estimate', estimate), ('ship/truth', truth)):
@@ -35,12 +35,12 @@ def run():
         rows.append(('acu/mode', k * T, messages.String(data=TEXTS[k % len(TEXTS)])))
     points = []
     for time in range(3):
-        point = messages.trajectory_point()
+        point = messages.trajectory_point(2)
         point.positions[:] = 0.1 * time, 0.2
         point.velocities = point.accelerations = np.zeros(0)
         point.time_from_start = messages.Duration(sec=time, nanosec=500_000_000)
         points.append(point)
-    rows.append(('acu/program_track', 0, messages.joint_trajectory('earth', points)))
+    rows.append(('acu/program_track', 0, messages.program_track(points)))
     array = messages.DiagnosticArray(header=messages.header(''), status=[
         messages.DiagnosticStatus(level=level, name=name, message=TEXTS[1], hardware_id='', values=[
             messages.KeyValue(key='locked', value='1'), messages.KeyValue(key='gain', value='0.5')])
@@ -84,7 +84,7 @@ def tabulated(name, message):
         v = message.vector
         return [{'x [rad]': v.x, 'y [rad]': v.y, 'z [dB-Hz]': v.z}]
     if name == 'acu/estimate':
-        return [{f'{axis}.{field} [{unit}]': values[i] for i, axis in enumerate(messages.AXES)
+        return [{f'{axis}.{field} [{unit}]': values[i] for i, axis in enumerate(topics.AXES)
                  for field, unit, values in (('position', 'rad', message.points[0].positions),
                                              ('velocity', 'rad/s', message.points[0].velocities),
                                              ('acceleration', 'rad/s2', message.points[0].accelerations))}]

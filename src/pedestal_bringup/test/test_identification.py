@@ -58,8 +58,8 @@ def test_drive(sine):
     loop = identification.identify(sine())['azimuth']
     errors = []
     for k_a in (0.0, loop.k_a):
-        run = closed_loop.run(closed_loop.cores(sine(f'acu.azimuth.feedforward.acceleration_feedforward={k_a}')))
-        error = (run['reference'][:, 0, 0] - run['position'][:, 0])[run['t'] > 2.0]
+        run = closed_loop.Loop(sine(f'acu.azimuth.feedforward.acceleration_feedforward={k_a}')).run()
+        error = (run['acu/reference']['position'] - run['joint_states']['position'])[run.t > 2.0, 0]
         errors.append(np.sqrt(np.mean(error**2)))
     print(f'following a sine of 0.2 Hz: {1e6 * errors[0]:.1f} urad without, {1e6 * errors[1]:.1f} with k_a')
     assert errors[1] < 0.7 * errors[0]

@@ -19,6 +19,13 @@ def stamped(message, stamp):
     return messages.serialize(message)
 
 
+def framed(topic, frame):
+    """A message of a topic in another frame."""
+    message = messages.template(topic)
+    message.header.frame_id = frame
+    return message
+
+
 def write(path, rows):
     """A bag of (topic, stamp, log time, text of acu/mode or number of the message) in this order."""
     table = (*topics.TOPICS, OTHER)
@@ -28,11 +35,11 @@ def write(path, rows):
         if name == 'acu/mode':
             data = messages.serialize(messages.String(data=content))
         elif name == 'acu/program_track':
-            data = stamped(messages.joint_trajectory(content, []), stamp)
+            data = stamped(framed('acu/program_track', content), stamp)
         elif name == 'tracking_receiver/angle_error':
             data = stamped(messages.Vector3Stamped(header=messages.header(content), vector=messages.vector3()), stamp)
         else:
-            data = stamped(messages.joint_state(messages.AXES, content), stamp)
+            data = stamped(framed('joint_states', content), stamp)
         writer.write(names.index(name), log, log, data)
     writer.close()
     return bag.read(path)

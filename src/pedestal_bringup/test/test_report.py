@@ -29,14 +29,14 @@ def stamped(message, k):
 def step(k, rng, locked=True, effort=True):
     """{topic: message} of step k: a target that crosses south of the zenith through azimuth 180 deg."""
     azimuth, elevation = math.pi + 0.1 * (k - STEPS / 2) * T * 1e-9, 0.8
-    joints = messages.joint_state(messages.AXES)
+    joints = messages.template('joint_states')
     joints.position[:] = azimuth - 0.0002 * math.sin(0.05 * k), elevation - 0.0001
     joints.effort[:] = 100.0, 50.0
     if not effort:
         joints.effort = np.zeros(0)
-    motors = messages.joint_state(messages.MOTORS)
+    motors = messages.template('adu/motor_states')
     motors.effort[:] = 15.0, -9.0, 13.0, -11.0
-    target = messages.odometry('earth', 'target')
+    target = messages.template('target/truth')
     at = target.pose.pose.position
     at.x, at.y, at.z = (1000.0 * f for f in (math.sin(azimuth) * math.cos(elevation),
                                              math.cos(azimuth) * math.cos(elevation), math.sin(elevation)))
@@ -44,14 +44,15 @@ def step(k, rng, locked=True, effort=True):
     error = messages.Vector3Stamped(header=messages.header('beam'), vector=messages.vector3(
         0.0002 * math.sin(0.05 * k) * math.cos(elevation) + noise[0] if locked and k >= 40 else math.nan,
         0.0001 + noise[1] if locked and k >= 40 else math.nan, 45.0))
-    point = messages.trajectory_point()
+    estimate = messages.template('acu/estimate')
+    [point] = estimate.points
     point.positions[:] = azimuth + 0.1 * noise[0], elevation + 0.1 * noise[1]
     point.velocities[:] = 0.1 + 0.01 * noise[0], 0.01 * noise[1]
-    told = messages.named_numbers(messages.FILTER)
+    told = messages.template('acu/filter')
     told.position[:] = [value for nu in noise for value in (
         nu, math.nan, (nu / NOISE)**2, 0.1 * NOISE, 0.02 * NOISE, 0.0, NOISE, 0.3, 0.3, math.nan, 0.4)]
     made = {'joint_states': joints, 'acu/filter': told, 'adu/motor_states': motors, 'target/truth': target,
-            'tracking_receiver/angle_error': error, 'acu/estimate': messages.joint_trajectory('earth', [point])}
+            'tracking_receiver/angle_error': error, 'acu/estimate': estimate}
     return {name: stamped(message, k) for name, message in made.items()}
 
 

@@ -8,10 +8,10 @@ from pedestal_bringup.again import rerun
 from pedestal_bringup.bags import bag, configuration
 from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run import scenario
-from pedestal_common import messages, topics
+from pedestal_common import messages, nodes
 
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
-RECORDED = [topic for topic in topics.read_by('recorder', NODES)
+RECORDED = [topic for topic in nodes.recorded(NODES)
             if topic.name in ('clock', 'joint_states', 'acu/rate_command', 'acu/mode')]
 NAMES = [topic.name for topic in RECORDED]
 T = 5_000_000
@@ -27,7 +27,7 @@ def rows(steps=20, **changed):
             elif name == 'acu/mode':
                 message = messages.String(data='standby')
             else:
-                message = messages.joint_state(messages.AXES)
+                message = messages.template('joint_states')
                 message.header.stamp.nanosec = k * T
                 message.position[:] = 0.1 * k
                 for field, (step, axis, value) in changed.items():

@@ -4,16 +4,16 @@ import pytest
 
 from pedestal_bringup.bags import step_order
 from pedestal_bringup.bags.step_order import OrderError, StepOrder
-from pedestal_common import topics
+from pedestal_common import nodes
 
 T = 5_000_000
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
-RECORDED = topics.read_by('recorder', NODES)
+RECORDED = nodes.recorded(NODES)
 NAMES = [topic.name for topic in RECORDED]
 ANSWERS = {'acu/mode': 'acu/rate_command', 'acu/keyhole': 'acu/rate_command', 'acu/blockage': 'acu/rate_command',
            'adu/state': 'clock'}
 """The first step topic of whoever writes a `change` topic."""
-SPEAKERS = [node for node in topics.NODES if node in topics.BY_NAME['diagnostics'].writers and node in NODES]
+SPEAKERS = [node for node in nodes.links()['diagnostics'].writers if node in NODES]
 
 
 class Collected:

@@ -7,6 +7,8 @@ it could be the same twice; rosbags writes zeros there, and reads a JointState i
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
+from pedestal_common import layouts, topics
+
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 _TYPES = TYPESTORE.types
 
@@ -33,15 +35,6 @@ TwistWithCovariance = _TYPES['geometry_msgs/msg/TwistWithCovariance']
 Vector3 = _TYPES['geometry_msgs/msg/Vector3']
 Vector3Stamped = _TYPES['geometry_msgs/msg/Vector3Stamped']
 
-AXES = ('azimuth', 'elevation')
-MODELS = ('cv', 'ca', 'singer', 'current_statistical')
-"""Motion models of the ACU's filters, in the order of their probabilities."""
-FILTER = tuple(f'{axis}_{name}' for axis in AXES for name in (
-    'innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation', 'innovation_sigma', *MODELS))
-"""Names of the numbers on acu/filter."""
-MOTORS = ('azimuth_motor_1', 'azimuth_motor_2', 'elevation_motor_1', 'elevation_motor_2')
-
-
 def serialize(message) -> bytes:
     """CDR bytes of a message, padding zeroed."""
     return bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
@@ -66,65 +59,71 @@ def put_stamp(stamp, ns):
 
 
 def header(frame_id) -> Header:
+    """A Header at stamp 0."""
     return Header(stamp=Time(sec=0, nanosec=0), frame_id=frame_id)
 
 
-def joint_state(names, frame_id='base_link') -> JointState:
-    """A JointState with zeros for every name."""
-    n = len(names)
-    return JointState(header=header(frame_id), name=list(names), position=np.zeros(n), velocity=np.zeros(n),
-                      effort=np.zeros(n))
+def vector3(x=0.0, y=0.0, z=0.0) -> Vector3:
+    """A Vector3."""
+    return Vector3(x=x, y=y, z=z)
 
 
-def named_numbers(names, frame_id='') -> JointState:
-    """A JointState as a vector of named numbers, all in `position`."""
-    return JointState(header=header(frame_id), name=list(names), position=np.zeros(len(names)), velocity=np.zeros(0),
-                      effort=np.zeros(0))
-
-
-def trajectory_point() -> JointTrajectoryPoint:
-    size = len(AXES)
+def trajectory_point(size) -> JointTrajectoryPoint:
+    """A point of so many joints, all zero, without effort."""
     return JointTrajectoryPoint(positions=np.zeros(size), velocities=np.zeros(size), accelerations=np.zeros(size),
                                 effort=np.zeros(0), time_from_start=Duration(sec=0, nanosec=0))
 
 
-def joint_trajectory(frame_id, points) -> JointTrajectory:
-    return JointTrajectory(header=header(frame_id), joint_names=list(AXES), points=points)
+def _joint_state(row):
+    sizes = {field.name: len(row.names) for field in layouts.fields(row.name)}
+    return JointState(header=header(row.frame), name=list(row.names),
+                      **{name: np.zeros(sizes.get(name, 0)) for name in ('position', 'velocity', 'effort')})
 
 
-def vector3(x=0.0, y=0.0, z=0.0) -> Vector3:
-    return Vector3(x=x, y=y, z=z)
+def _joint_trajectory(row):
+    return JointTrajectory(header=header(row.frame), joint_names=list(row.names),
+                           points=[trajectory_point(len(row.names))])
 
 
-def vector3_stamped(frame_id) -> Vector3Stamped:
-    return Vector3Stamped(header=header(frame_id), vector=vector3())
+def _vector3_stamped(row):
+    return Vector3Stamped(header=header(row.frame), vector=vector3())
 
 
-def range_message(frame_id, field_of_view) -> Range:
-    """A Range of radio, which the type has no code for (its 0 is the other one that is no light); any distance."""
-    return Range(header=header(frame_id), radiation_type=0, field_of_view=field_of_view, min_range=0.0,
-                 max_range=float('inf'), range=0.0, variance=0.0)
+def _range(row):
+    """Of radio, which the type has no code for (its 0 is the other one that is no light); any distance."""
+    return Range(header=header(row.frame), radiation_type=0, field_of_view=0.0, min_range=0.0, max_range=float('inf'),
+                 range=0.0, variance=0.0)
 
 
-def odometry(frame_id, child_frame_id) -> Odometry:
-    """An Odometry at rest in the origin, covariances zero (unknown)."""
+def _odometry(row):
+    """At rest in the origin, covariances zero (unknown)."""
     pose = Pose(position=Point(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
-    return Odometry(header=header(frame_id), child_frame_id=child_frame_id,
+    return Odometry(header=header(row.frame), child_frame_id=row.child,
                     pose=PoseWithCovariance(pose=pose, covariance=np.zeros(36)),
                     twist=TwistWithCovariance(twist=Twist(linear=vector3(), angular=vector3()),
                                               covariance=np.zeros(36)))
 
 
-def imu(frame_id) -> Imu:
-    """An Imu without orientation (REP 145: covariance[0] = -1)."""
-    unknown = np.zeros(9)
-    unknown[0] = -1.0
-    return Imu(header=header(frame_id), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
-               orientation_covariance=unknown, angular_velocity=vector3(), angular_velocity_covariance=np.zeros(9),
+def _imu(row):
+    return Imu(header=header(row.frame), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
+               orientation_covariance=np.zeros(9), angular_velocity=vector3(), angular_velocity_covariance=np.zeros(9),
                linear_acceleration=vector3(), linear_acceleration_covariance=np.zeros(9))
 
 
-def by_name(names, values, wanted) -> tuple:
-    """values in the order of the wanted joint names; NaN where a name or a value is missing."""
-    return tuple(float(values[names.index(name)]) if name in names and names.index(name) < len(values)
-                 else float('nan') for name in wanted)
+_TEMPLATES = {'sensor_msgs/msg/JointState': _joint_state, 'trajectory_msgs/msg/JointTrajectory': _joint_trajectory,
+              'geometry_msgs/msg/Vector3Stamped': _vector3_stamped, 'sensor_msgs/msg/Range': _range,
+              'nav_msgs/msg/Odometry': _odometry, 'sensor_msgs/msg/Imu': _imu,
+              'rosgraph_msgs/msg/Clock': lambda row: Clock(clock=Time(sec=0, nanosec=0))}
+
+
+def template(topic):
+    """A message of a stamped topic of the table as its writer begins it: names and frames set, numbers zero."""
+    row = topics.BY_NAME[topic]
+    return _TEMPLATES[row.type](row)
+
+
+def program_track(points) -> JointTrajectory:
+    """An acu/program_track of JointTrajectoryPoints."""
+    message = template('acu/program_track')
+    message.points = points
+    return message

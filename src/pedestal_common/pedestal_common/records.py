@@ -1,179 +1,181 @@
-"""The numbers of a message as a record, for one message in a node and for the many of a bag.
+"""The numbers of messages as records: of one message in a node, of a whole run in the closed loop, of many in a bag.
 
-A node takes the messages it hears into a record of records, its compiled step answers it with another, and that is put
-into the messages it says; a recomputation fills the same records from the columns of a bag. So what a node makes of
-its messages exists once.
+A unit reads and writes one record that has a field for each of its topics:
 
-HEARD, SAID = of('joint_states', 'ship/truth'), of('acu/rate_command')
-    one field per topic: stamp [ns], then the numbers; one that did not come, or is not to be sent, has stamp NEVER
+    stamped message     stamp [ns], then the fields of its layout; one that did not come, or is not to be sent, has
+                        stamp NEVER
+    text                a whole number, its code; topics.SILENT before the first
+
+A Decoder takes the numbers out of the CDR bytes of a message, an Encoder puts numbers into them, both by the places at
+which they lie (cdr.Places); neither builds a message object.
 """
-import math
-import typing
+import struct
 
 import numpy as np
 
-from pedestal_common import messages, topics
+from pedestal_common import cdr, layouts, messages, topics
 
 NEVER = -2**63
-_AXES = list(messages.AXES)
+"""Stamp [ns] of a message that did not come."""
+
+_STAMP = struct.Struct('<iI')
+_FORMATS = {'f8': 'd', 'f4': 'f'}
 
 
-def _type(*fields):
-    return np.dtype([('stamp', 'i8'), *((name, 'f8', (size,)) for name, size in fields)])
+def _type(topic):
+    row = topics.BY_NAME[topic]
+    if row.type == 'std_msgs/msg/String':
+        return 'i8'
+    sizes = [(field.name, 'f8', (len(field.components or row.names),)) for field in layouts.fields(topic)]
+    return np.dtype([('stamp', 'i8'), *sizes])
 
 
-def _joints(names):
-    fields = ('position', 'velocity', 'effort')
-    return (_type(*((field, len(names)) for field in fields)),
-            tuple(f'{name}.{field}' for field in fields for name in names))
+def of(*names) -> np.dtype:
+    """The record of these topics."""
+    return np.dtype([(name, _type(name)) for name in names])
 
 
-def _spatial(*fields):
-    return _type(*fields), tuple(f'{name.replace("twist_", "twist.")}.{letter}' for name, size in fields
-                                 for letter in 'xyzw'[:size])
+def is_text(topic) -> bool:
+    """Whether a topic of the table is a text, told by its code."""
+    return topics.BY_NAME[topic].type == 'std_msgs/msg/String'
 
 
-_KINDS = {
-    'Clock': (_type(), ()),
-    'JointState': _joints(messages.AXES),
-    'JointTrajectory': (_type(('position', 2), ('velocity', 2), ('acceleration', 2)),
-                        tuple(f'{name}.{field}' for field in ('position', 'velocity', 'acceleration')
-                              for name in messages.AXES)),
-    'Range': (_type(('range', 1), ('variance', 1)), ('range', 'variance')),
-    'Vector3Stamped': (_type(('vector', 3)), ('x', 'y', 'z')),
-    'Odometry': _spatial(('position', 3), ('orientation', 4), ('twist_linear', 3), ('twist_angular', 3)),
-    'Imu': _spatial(('orientation', 4), ('angular_velocity', 3), ('linear_acceleration', 3),
-                    ('orientation_variance', 3)),
-}
-_NAMED = {'adu/motor_states': _joints(messages.MOTORS),
-          'acu/filter': (_type(('position', len(messages.FILTER))),
-                         tuple(f'{name}.position' for name in messages.FILTER))}
+def empty(record_type, count) -> np.ndarray:
+    """Records (count,) in which nothing came and nothing was said."""
+    made = np.zeros(count, record_type)
+    for name in record_type.names:
+        if record_type[name].names is None:
+            made[name] = topics.SILENT
+        else:
+            made[name]['stamp'] = NEVER
+    return made
 
 
-def _kind(topic):
-    return _NAMED[topic] if topic in _NAMED else _KINDS[topics.BY_NAME[topic].type.rpartition('/')[2]]
+def numbers(records, topic) -> np.ndarray:
+    """View (n, columns) of the numbers of a stamped topic in records (n,)."""
+    start = records.dtype.fields[topic][1] // 8 + 1
+    return records.view('f8').reshape(len(records), -1)[:, start:start + len(layouts.columns(topic))]
 
 
-def of(*names, more=()) -> np.dtype:
-    """The record of these topics, `more` whole numbers behind them."""
-    return np.dtype([*((name, _kind(name)[0]) for name in names), *((name, 'i8') for name in more)])
+def code_of(topic, text) -> int:
+    """The code of a text that a reader tells apart; of any other the number of those."""
+    texts = topics.BY_NAME[topic].texts
+    return texts.index(text) if text in texts else len(texts)
 
 
-def columns(topic) -> tuple:
-    """What the numbers of a topic's record are called, in its order; the names of a bag's columns."""
-    return _kind(topic)[1]
+class _Shape:
+    """Where the columns of a topic lie in messages alike in everything but their numbers, from one of them.
+
+    found: [(column, start, dtype)]; reader: the Struct that reads these numbers at once.
+    """
+
+    def __init__(self, topic, data):
+        type_name = topics.BY_NAME[topic].type
+        places = cdr.Places(data, type_name)
+        index = {column.name: i for i, column in enumerate(layouts.columns(topic))}
+        self.size = places.stop
+        self.guard = [(start, stop, bytes(data[start:stop])) for start, stop in _joined(places.fixed)]
+        self.found = [(index[name], start, dtype) for path, start, dtype in places.numbers
+                      if (name := layouts.column(type_name, path, places.texts)) in index]
+        self.in_order = [column for column, _, _ in self.found] == list(range(len(index)))
+        form, at = places.order, 0
+        for _, start, dtype in self.found:
+            form += f'{start - at}x{_FORMATS[dtype[1:]]}'
+            at = start + int(dtype[2:])
+        self.reader = struct.Struct(form)
+
+    def fits(self, data):
+        """Whether the numbers of a message lie at the same places."""
+        return 0 <= len(data) - self.size < cdr.PADDING and all([data[start:stop] == text
+                                                                 for start, stop, text in self.guard])
 
 
-class Slot(typing.NamedTuple):
-    """Where the numbers of a topic are in a record: views of its stamps (n,) [ns] and numbers (n, columns)."""
-    stamp: np.ndarray
-    numbers: np.ndarray
+def _joined(fixed):
+    """Neighbouring (start, stop) as one."""
+    joined = []
+    for start, stop in sorted(fixed):
+        if joined and joined[-1][1] == start:
+            joined[-1] = joined[-1][0], stop
+        elif start < stop:
+            joined.append((start, stop))
+    return joined
 
 
-def slot(record, topic) -> Slot:
-    """The Slot of a topic in records (n,)."""
-    start = record.dtype.fields[topic][1] // 8
-    return Slot(record[topic]['stamp'],
-                record.view('f8').reshape(len(record), -1)[:, start + 1:start + 1 + len(columns(topic))])
+def _runs(found):
+    """[(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], neighbours written at once."""
+    runs = []
+    for column, start, dtype in found:
+        dtype = np.dtype(dtype)
+        if runs:
+            first, kind, count, begin = runs[-1]
+            if kind == dtype and column == first + count and start == begin + count * kind.itemsize:
+                runs[-1] = first, kind, count + 1, begin
+                continue
+        runs.append((column, dtype, 1, start))
+    return [(slice(first, first + count), kind, count, begin) for first, kind, count, begin in runs]
 
 
-def only(record, topic) -> Slot:
-    """The Slot of a topic in one record (1,), as `take` and `put` want it: stamp (1,), numbers (columns,)."""
-    stamp, numbers = slot(record, topic)
-    return Slot(stamp, numbers[0])
+class Decoder:
+    """Takes the messages of one stamped topic apart. record: (1,), whose field of this topic `put` fills."""
+
+    def __init__(self, topic, record):
+        self.topic = topic
+        self._columns = len(layouts.columns(topic))
+        self._shape = _Shape(topic, messages.serialize(messages.template(topic)))
+        self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
+
+    def decoded(self, data):
+        """(stamp [ns], numbers (columns,)) of CDR bytes; NaN for a number the message has not. Raises ValueError when
+        they are no message of the topic's type, or their stamp is none."""
+        if not self._shape.fits(data):
+            self._shape = _Shape(self.topic, data)
+        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        if seconds < 0 or nanoseconds >= 1_000_000_000:
+            raise ValueError(f'{self.topic}: {seconds} s {nanoseconds} ns is no stamp')
+        values = self._shape.reader.unpack_from(data)
+        if not self._shape.in_order:
+            given, values = values, [np.nan] * self._columns
+            for (column, _, _), value in zip(self._shape.found, given):
+                values[column] = value
+        return seconds * 1_000_000_000 + nanoseconds, values
+
+    def put(self, stamp, values):
+        """Put what `decoded` gave into the record; values None: nothing came."""
+        if values is None:
+            self._stamp[0] = NEVER
+        else:
+            self._stamp[0] = stamp
+            self._numbers[:] = values
 
 
-def take(place, message):
-    """Take the numbers of a message into its Slot; None leaves them as they are and says NEVER."""
-    if message is None:
-        place.stamp[0] = NEVER
-    else:
-        place.stamp[0] = messages.nanoseconds(message.header.stamp)
-        place.numbers[:] = _TAKE[type(message)](message)
+class Encoder:
+    """Makes the messages of one stamped topic.
 
+    template: a message whose names, frames and constants stay; record: (1,), whose field of this topic holds the
+    numbers; None where only `bytes_of` is asked for.
+    """
 
-def _of_axes(names, fields):
-    """The numbers of both axes of three fields; NaN for a name or a number that is not there."""
-    # The usual case costs a tenth of looking for each name.
-    if names == _AXES and len(fields[0]) == len(fields[1]) == len(fields[2]) == len(_AXES):
-        return [value for values in fields for value in values.tolist()]
-    return [value for values in fields for value in messages.by_name(names, values, messages.AXES)]
+    def __init__(self, topic, template, record=None):
+        data = messages.serialize(template)
+        shape = _Shape(topic, data)
+        self._buffer = bytearray(data)
+        self._views = [(columns, np.frombuffer(self._buffer, dtype, count, start))
+                       for columns, dtype, count, start in _runs(shape.found)]
+        if record is not None:
+            self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 
+    @property
+    def due(self):
+        """Whether the record holds a message."""
+        return self._stamp[0] != NEVER
 
-def _joint_numbers(message):
-    return _of_axes(message.name, (message.position, message.velocity, message.effort))
+    def encoded(self) -> bytes:
+        """The message with the numbers of the record."""
+        return self.bytes_of(self._stamp.item(), self._numbers)
 
-
-def _point_numbers(message):
-    if not message.points:
-        return math.nan
-    point = message.points[0]
-    return _of_axes(message.joint_names, (point.positions, point.velocities, point.accelerations))
-
-
-def _vector_numbers(message):
-    v = message.vector
-    return v.x, v.y, v.z
-
-
-def _range_numbers(message):
-    return message.range, message.variance
-
-
-def _odometry_numbers(message):
-    pose, twist = message.pose.pose, message.twist.twist
-    p, q, v, w = pose.position, pose.orientation, twist.linear, twist.angular
-    return p.x, p.y, p.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z
-
-
-def _imu_numbers(message):
-    q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
-    return (q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z, *message.orientation_covariance[::4].tolist())
-
-
-def put(message, place):
-    """Put the numbers of a Slot into its message."""
-    if type(message) is messages.Clock:
-        messages.put_stamp(message.clock, place.stamp.item())
-    else:
-        messages.put_stamp(message.header.stamp, place.stamp.item())
-        _PUT[type(message)](message, place.numbers)
-
-
-def _put_joints(message, numbers):
-    n = len(message.name)
-    message.position[:], message.velocity[:], message.effort[:] = numbers[:n], numbers[n:2 * n], numbers[2 * n:]
-
-
-def _put_trajectory(message, numbers):
-    point = message.points[0]
-    point.positions[:], point.velocities[:], point.accelerations[:] = numbers[:2], numbers[2:4], numbers[4:]
-
-
-def _put_vector(message, numbers):
-    v = message.vector
-    v.x, v.y, v.z = numbers.tolist()
-
-
-def _put_range(message, numbers):
-    message.range, message.variance = numbers.tolist()
-
-
-def _put_odometry(message, numbers):
-    pose, twist = message.pose.pose, message.twist.twist
-    p, q, v, w = pose.position, pose.orientation, twist.linear, twist.angular
-    p.x, p.y, p.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z = numbers.tolist()
-
-
-def _put_imu(message, numbers):
-    q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
-    q.x, q.y, q.z, q.w, w.x, w.y, w.z, f.x, f.y, f.z = numbers[:10].tolist()
-    message.orientation_covariance[::4] = numbers[10:]
-
-
-_TAKE = {messages.JointState: _joint_numbers, messages.JointTrajectory: _point_numbers,
-         messages.Vector3Stamped: _vector_numbers, messages.Range: _range_numbers,
-         messages.Odometry: _odometry_numbers, messages.Imu: _imu_numbers}
-_PUT = {messages.JointState: _put_joints, messages.JointTrajectory: _put_trajectory,
-        messages.Vector3Stamped: _put_vector, messages.Range: _put_range, messages.Odometry: _put_odometry,
-        messages.Imu: _put_imu}
+    def bytes_of(self, stamp, values) -> bytes:
+        """The message with a stamp [ns] and numbers (columns,)."""
+        _STAMP.pack_into(self._buffer, 4, *divmod(stamp, 1_000_000_000))
+        for columns, view in self._views:
+            view[:] = values[columns]
+        return bytes(self._buffer)

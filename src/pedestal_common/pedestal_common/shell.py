@@ -1,13 +1,8 @@
-"""The ROS shell every node shares: main, parameters, topics, step matching, diagnostics.
-
-A node is `class AcuNode(Shell)` with a parameter dataclass, the topics it reads and a `step`; everything
-it computes is in its column's compiled step.
-"""
+"""What every node is: parameters, topics of the table, diagnostics, waiting for its graph, `main`."""
 import dataclasses
 import gc
-import importlib
+import json
 import os
-import pathlib
 import signal
 import sys
 import time
@@ -23,24 +18,15 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from pedestal_common import messages, parameters, topics
+from pedestal_common import messages, middleware, nodes, parameters
 from pedestal_common.compiled import compiled_once
-from pedestal_common.steps import SECOND, GraphError, Steps
+from pedestal_common.nodes import MAX_BEAMS
+from pedestal_common.steps import SECOND, GraphError
 
-QOS = {
-    'step': QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE, depth=1),
-    'state': QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                        durability=DurabilityPolicy.TRANSIENT_LOCAL),
-    'event': QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE),
-}
-
-OK, WARN, ERROR = 0, 1, 2
 START_DEADLINE = 300.0
 """Seconds a node waits for its graph: the others may be compiling their laws for the first time."""
-
 
 PARTING = 1.0
 """Seconds a node that ends waits for readers to take what it published."""
@@ -52,20 +38,20 @@ class GraphParameters(parameters.Parameters):
     pacing: str = parameters.choice('realtime', ('lockstep', 'realtime'), 'who waits for whom')
     nodes: str = parameters.text('', 'names of the nodes of this run, comma separated; each waits for its readers '
                                  'among them')
-    beams: int = parameters.parameter(0, 0, topics.MAX_BEAMS, '', 'beams of an electronic array, each of several in '
+    beams: int = parameters.parameter(0, 0, MAX_BEAMS, '', 'beams of an electronic array, each of several in '
                                       'its namespace beam_i; 0: a drive with motors')
     deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
 
     def check(self):
         for name in self._names:
-            if name not in topics.NODES:
+            if name not in nodes.NAMES:
                 raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}' is none of "
-                                                f'{", ".join(topics.NODES)}')
+                                                f'{", ".join(nodes.NAMES)}')
 
     @property
     def members(self):
         """`nodes` as a tuple, with the nodes of every beam."""
-        return topics.members(self._names, self.beams)
+        return nodes.members(self._names, self.beams)
 
     @property
     def _names(self):
@@ -98,12 +84,6 @@ def _on_signal(*_):
         raise Stopped
 
 
-def message_class(type_name):
-    """The rclpy class of 'package/msg/Name'."""
-    package, _, name = type_name.split('/')
-    return getattr(importlib.import_module(f'{package}.msg'), name)
-
-
 def node_of(info, root='/'):
     """The name in the graph at a namespace (with a '/' at its end) of the node behind an endpoint, as 'beam_2/acu'."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'.removeprefix(root)
@@ -126,7 +106,7 @@ def _descriptor(field, read_only):
 class Shell(Node):
     """A node of the graph.
 
-    parameters_type: the column's dataclass; its fields become ROS parameters of the same dotted names.
+    parameters_type: the node's dataclass; its fields become ROS parameters of the same dotted names.
     live: prefixes of parameters that may change while running; the node then implements `reconfigure()`.
     Raises parameters.ParameterError for an unknown or refused parameter.
     """
@@ -135,22 +115,23 @@ class Shell(Node):
         super().__init__(name)
         self._parameters_type = parameters_type
         self._declare(live)
-        self.topics = topics.graph(self.graph.beams)
+        self.links = nodes.links(self.graph.beams)
         self._root, self.beam = self._place(name)
         self.name = self.beam + name
         self.finished = False
         self.failure = None
-        self._publishers_by_topic = {}
+        self.result = {}
+        self.publishers_by_link = {}
         self._next_second = 0
         self._stamp = 0
         self._started = False
-        self._send_diagnostics = None
+        self._publish_diagnosis = None
 
     def _place(self, name):
         """(namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their end."""
         namespace = self.get_namespace().rstrip('/') + '/'
-        prefix = next((prefix for prefix in topics.prefixes(self.graph.beams) if name in topics.BEAM_NODES
-                       and namespace.endswith('/' + prefix)), '')
+        prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NAMES
+                       and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')
         return namespace.removesuffix(prefix), prefix
 
     def _declare(self, live):
@@ -161,7 +142,7 @@ class Shell(Node):
                    if name not in known and not name.startswith('qos_overrides')]
         self.parameters = parameters.build(self._parameters_type, {**own, **dict.fromkeys(unknown)})
         self.graph = parameters.build(GraphParameters, graph, 'graph.')
-        self.check_parameters(self.parameters)
+        self.parameters.check_graph(self.graph.beams)
         if live:
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)
@@ -177,11 +158,8 @@ class Shell(Node):
         values = parameters.as_dict(self.parameters)
         values.update({change.name: change.value for change in changes if change.name in values})
         changed = parameters.build(self._parameters_type, values)
-        self.check_parameters(changed)
+        changed.check_graph(self.graph.beams)
         return changed
-
-    def check_parameters(self, params):
-        """Overridden where parameters must fit the graph; raises ParameterError."""
 
     def _on_set(self, changes):
         try:
@@ -197,26 +175,28 @@ class Shell(Node):
     def reconfigure(self):
         """`self.parameters` has changed; overridden by a node with live parameters."""
 
-    def _topic(self, name):
-        """(Topic, its name for ROS) of a topic of the table; a node of a beam names its own without the prefix."""
-        topic = self.topics.get(self.beam + name) or self.topics[name]
-        return topic, self._root + topic.name if self.beam else topic.name
+    def _link(self, name):
+        """(Link, its name for ROS) of a topic of the graph; a node of a beam names its own without the prefix."""
+        link = self.links.get(self.beam + name) or self.links[name]
+        return link, self._root + link.name if self.beam else link.name
 
     def writer(self, name):
-        """A function that publishes a message of messages.py on a topic of the table."""
-        topic, ros_name = self._topic(name)
-        publisher = self.create_publisher(message_class(topic.type), ros_name, QOS[topic.qos])
-        self._publishers_by_topic[topic] = publisher
-        to_bytes, publish = messages.serialize, publisher.publish
-        return lambda message: publish(to_bytes(message))
+        """A function that publishes the CDR bytes of a message on a topic of the graph."""
+        link, ros_name = self._link(name)
+        publisher = self.create_publisher(middleware.message_class(link.type), ros_name, middleware.qos(link.rate))
+        self.publishers_by_link[link] = publisher
+        return publisher.publish
 
     def reader(self, name, take):
-        """Call take(message) for every message on a topic of the table; broken bytes end the node with a reason."""
-        topic, ros_name = self._topic(name)
-        from_bytes, type_name = messages.deserialize, topic.type
-        self.create_subscription(message_class(topic.type), ros_name,
-                                 self._guarded(lambda data: take(from_bytes(data, type_name))), QOS[topic.qos],
-                                 raw=True)
+        """Call take(CDR bytes) for every message on a topic of the graph."""
+        link, ros_name = self._link(name)
+        self.create_subscription(middleware.message_class(link.type), ros_name, self._guarded(take),
+                                 middleware.qos(link.rate), raw=True)
+
+    def message_reader(self, name, take):
+        """Call take(message) for every message on a topic; broken bytes end the node with a reason."""
+        type_name = self._link(name)[0].type
+        self.reader(name, lambda data: take(messages.deserialize(data, type_name)))
 
     def every(self, period, function):
         """A timer on the steady wall clock [s]."""
@@ -232,44 +212,11 @@ class Shell(Node):
                 self.finished = True
         return call
 
-    def follow(self, trigger, followers, answer):
-        """Read the trigger and its followers {topic: latency s}; call answer once per step (see Steps).
-
-        A trigger that is no topic is the node's own: it calls `self.steps.take(trigger, stamp, None)`. In lockstep a
-        step whose inputs stay away for the deadline ends the node with the names of the silent writers.
-        """
-        steps = Steps(trigger, {name: round(latency * SECOND) for name, latency in followers.items()},
-                      self.graph.lockstep, answer)
-        for name in (trigger, *followers):
-            if topics.plain(name) in topics.BY_NAME:
-                self.reader(name, self._stamped(steps, name))
-        self.steps = steps
-        self._progress = (None, time.monotonic())
-        if self.graph.lockstep:
-            self.every(0.2, self._watch)
-
-    def _watch(self):
-        pending = self.steps.pending_stamp
-        if pending is None or self._progress[0] != pending:
-            self._progress = (pending, time.monotonic())
-        elif time.monotonic() - self._progress[1] > self.graph.deadline:
-            waiting = self.steps.waiting_for
-            silent = ', '.join(writer for name in waiting for writer in self._topic(name)[0].writers)
-            raise GraphError(f'no {", ".join(waiting)} for step {pending / SECOND:.6f} s after '
-                             f'{self.graph.deadline:g} s; silent: {silent}')
-
-    @staticmethod
-    def _stamped(steps, name):
-        nanoseconds = messages.nanoseconds
-        if name == 'clock':
-            return lambda message: steps.take(name, nanoseconds(message.clock), message)
-        return lambda message: steps.take(name, nanoseconds(message.header.stamp), message)
-
     def diagnose_with(self, diagnose):
         """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time,
         in realtime at every second of the wall."""
         self._diagnose = diagnose
-        self._send_diagnostics = self.writer('diagnostics')
+        self._publish_diagnosis = self.writer('diagnostics')
         if not self.graph.lockstep:
             self.every(1.0, self._publish_diagnostics)
 
@@ -279,10 +226,10 @@ class Shell(Node):
             level=level, name=self.name, message=message, hardware_id='pedestal',
             values=[messages.KeyValue(key=key, value=value) for key, value in values])])
         messages.put_stamp(array.header.stamp, self._stamp)
-        self._send_diagnostics(array)
+        self._publish_diagnosis(messages.serialize(array))
 
     def begin_step(self, stamp):
-        """To be called with t_k before anything of step k is published. The first call waits for the graph; in
+        """To be called with t_k [ns] before anything of step k is published. The first call waits for the graph; in
         lockstep every whole second publishes diagnostics."""
         if not self._started:
             self.await_graph()
@@ -307,17 +254,16 @@ class Shell(Node):
     def await_acknowledged(self):
         """Wait until every reader has received all that this node published. Raises GraphError after the deadline: in
         lockstep it is the recorder that is silent, for everyone else has answered the step before."""
-        for topic, publisher in self._publishers_by_topic.items():
+        for link, publisher in self.publishers_by_link.items():
             if not publisher.wait_for_all_acked(Duration(seconds=self.graph.deadline)):
-                raise GraphError(f'a reader of {topic.name} took nothing for {self.graph.deadline:g} s; '
-                                 'silent: recorder')
+                raise GraphError(f'a reader of {link.name} took nothing for {self.graph.deadline:g} s', ('recorder',))
 
-    def announce(self, send, message):
-        """Publish a latched message that has no stamp. In lockstep it keeps its place between two steps: what was
-        sent before has arrived everywhere before it, and it has before anything that follows."""
+    def announce(self, publish, text):
+        """Publish a text, which has no stamp. In lockstep it keeps its place between two steps: what was published
+        before has arrived everywhere before it, and it has before anything that follows."""
         if self.graph.lockstep:
             self.await_acknowledged()
-        send(message)
+        publish(messages.serialize(messages.String(data=text)))
         if self.graph.lockstep:
             self.await_acknowledged()
 
@@ -327,27 +273,27 @@ class Shell(Node):
         Raises GraphError after START_DEADLINE, or when another graph writes the same topics.
         """
         deadline = time.monotonic() + START_DEADLINE
-        for topic, publisher in self._publishers_by_topic.items():
-            wanted = topics.readers(topic, self.graph.members)
-            while missing := self._missing(topic, publisher, wanted):
+        for link, publisher in self.publishers_by_link.items():
+            wanted = nodes.readers(link, self.graph.members)
+            while missing := self._missing(publisher, wanted):
                 if time.monotonic() > deadline:
-                    raise GraphError(f'{topic.name} is not read by {", ".join(missing)} after {START_DEADLINE:g} s')
+                    raise GraphError(f'{link.name} is not read by {", ".join(missing)} after {START_DEADLINE:g} s')
                 if _stop:
                     raise Stopped
                 time.sleep(0.01)
-        for topic, publisher in self._publishers_by_topic.items():
-            if len(topic.writers) == 1 and self.count_publishers(publisher.topic_name) > 1:
-                raise GraphError(f'{topic.name} already has a writer: another graph runs on ROS_DOMAIN_ID '
+        for link, publisher in self.publishers_by_link.items():
+            if len(link.writers) == 1 and self.count_publishers(publisher.topic_name) > 1:
+                raise GraphError(f'{link.name} already has a writer: another graph runs on ROS_DOMAIN_ID '
                                  f'{self.context.get_domain_id()}; set a free one')
 
-    def _missing(self, topic, publisher, wanted):
+    def _missing(self, publisher, wanted):
         """Which of the wanted readers a topic has not got yet. By name: a stranger who listens is no substitute, but
         a replay stands in for whoever is not there."""
         if not wanted:
             return []
         there = self.get_subscriptions_info_by_topic(publisher.topic_name)
         names = {node_of(info, self._root) for info in there}
-        missing = [name for name in wanted if name not in names and topics.STAND_IN not in names]
+        missing = [name for name in wanted if name not in names and nodes.STAND_IN not in names]
         return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
     def draining(self):
@@ -357,40 +303,26 @@ class Shell(Node):
     def close(self):
         """Called once before the node ends; overridden by a node that has something to put away. What was published
         and is still on its way would die with the node, so it waits a little for the readers."""
-        for publisher in self._publishers_by_topic.values():
+        for publisher in self.publishers_by_link.values():
             publisher.wait_for_all_acked(Duration(seconds=PARTING))
 
 
-def set_middleware_defaults():
-    """What DDS of this process and its children does unless the user says otherwise: it talks to this machine only, on
-    loopback sockets, and acknowledges promptly (fastdds.xml). To be called before rclpy.init."""
-    if os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST') == 'LOCALHOST':
-        profiles = pathlib.Path(__file__).with_name('fastdds.xml')
-        os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(profiles))
+def main(make_node, args=None) -> int:
+    """Run the node of make_node() until it is finished or told to stop.
 
-
-def make_executor():
-    """The executor every node runs in."""
-    try:
-        from rclpy.experimental.events_executor import EventsExecutor
-        return EventsExecutor()
-    except ImportError:
-        from rclpy.executors import SingleThreadedExecutor
-        return SingleThreadedExecutor()
-
-
-def main(node_class, args=None) -> int:
-    """Run a node until it is finished or told to stop; exit code 0, or 1 with one line on stderr."""
+    Exit code 0; 1 with one line on stderr. On stdout its `result`, if it has one, as a JSON object, to which an error
+    adds {'error': the line, 'silent': the nodes that it waited for}.
+    """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _on_signal)
-    set_middleware_defaults()
+    middleware.set_defaults()
     node = None
     name = os.path.basename(sys.argv[0])
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = node_class()
+        node = make_node()
         name = node.get_name()
-        executor = make_executor()
+        executor = middleware.make_executor()
         executor.add_node(node)
         gc.freeze()
         while not (_stop or node.finished) or node.draining():
@@ -398,10 +330,14 @@ def main(node_class, args=None) -> int:
         node.close()
         if node.failure is not None:
             raise node.failure
+        if node.result:
+            print(json.dumps(node.result), flush=True)
         return 0
     except Stopped:
         return 0
     except EXPECTED as error:
+        result = node.result if node is not None else {}
+        print(json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}), flush=True)
         print(f'{name}: error: {error}', file=sys.stderr)
         return 1
     finally:

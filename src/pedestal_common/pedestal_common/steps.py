@@ -5,7 +5,15 @@ SECOND = 1_000_000_000
 
 
 class GraphError(RuntimeError):
-    """The graph around a node is not what it must be; one line that names topic, stamp or node."""
+    """The graph around a node is not what it must be; one line that names topic, stamp or node. silent: the nodes that
+    were waited for."""
+
+    def __init__(self, message, silent=()):
+        super().__init__(message)
+        self.silent = tuple(silent)
+
+    def __str__(self):
+        return super().__str__() + (f'; silent: {", ".join(self.silent)}' if self.silent else '')
 
 
 class Steps:
@@ -13,12 +21,13 @@ class Steps:
 
     followers: {topic: latency in ns}; due is the newest trigger stamp <= t_k - latency (none at the start).
     Lockstep waits for exactly that message. Realtime answers t_k at the latest when the trigger of the next
-    step arrives, with whatever newest message is there and None for a follower that sent nothing new.
+    step arrives, with whatever newest message is there and None for a follower that sent nothing new; prompt: at once.
     `answer(stamp_ns, trigger_message, {topic: message or None})` is called once per step, in order.
     """
 
-    def __init__(self, trigger, followers, lockstep, answer):
-        self._trigger, self._lockstep, self._answer = trigger, lockstep, answer
+    def __init__(self, trigger, followers, lockstep, answer, prompt=False):
+        self.trigger, self._lockstep, self._answer = trigger, lockstep, answer
+        self._prompt = prompt and not lockstep
         self._latency = dict(followers)
         self._awaited = {topic: collections.deque() for topic in followers}
         self._due = dict.fromkeys(followers)
@@ -36,7 +45,7 @@ class Steps:
             self._refuse(f'{topic} stamp went back from {last / SECOND:.6f} to {stamp / SECOND:.6f} s')
             return
         self._last[topic] = stamp
-        if topic == self._trigger:
+        if topic == self.trigger:
             if self._lockstep and last is not None:
                 if self._period is not None and stamp - last != self._period:
                     raise GraphError(f'{topic} stamp jumped from {last / SECOND:.6f} to {stamp / SECOND:.6f} s; '
@@ -55,7 +64,7 @@ class Steps:
                     self._due[name] = awaited.popleft()
         else:
             self._arrived[topic].append((stamp, message))
-        if self._pending is not None and all(map(self._ready, self._due)):
+        if self._pending is not None and (self._prompt or all(map(self._ready, self._due))):
             self._close()
 
     def _refuse(self, reason):

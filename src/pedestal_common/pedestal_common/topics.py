@@ -1,155 +1,116 @@
-"""The graph as one table: every topic with its type, writer, readers, QoS and rate. No ROS here.
+"""The topics of the graph as one table: type, rate, meaning of every number. Who writes and reads them is in `nodes`.
 
-A topic with a flag is in a graph only where something measures it; the parameter of that name tells its readers (the
-ACU, the recorder) that it is there.
-
-Qos
-    step    one message per drive step: reliable, keep all (nothing may be lost)
-    state   latched: reliable, transient local, depth 1
-    event   reliable, keep last 10
 Rate
-    step    one per drive step, stamped with the step (or the step it measured, where latency is modelled)
-    once    one at stamp 0, before the first step
+    step    one message per drive step, stamped with the step (or the step it measured, where latency is modelled)
+    once    one before the first step
     second  one per writer at every whole second of the drive's time
-    change  whenever the value changes; has no stamp, belongs to the step its writer answers next
-
-An electronic array of several beams has the nodes BEAM_NODES and their topics once per beam, with the prefix `beam_1/`
-... `beam_N/`; everything else is shared.
+    change  a text, whenever it changes; it has no stamp and belongs to the step that its writer answers next
+The rate gives the quality of service: see QOS.
 """
-import functools
-import re
 import typing
+
+AXES = ('azimuth', 'elevation')
+MOTORS = tuple(f'{axis}_motor_{i}' for axis in AXES for i in (1, 2))
+MOTION_MODELS = ('cv', 'ca', 'singer', 'current_statistical')
+"""Motion models of the target that the ACU's filters know."""
+
+FILTER = {'innovation': 'rad', 'rate_innovation': 'rad/s', 'nis': '', 'sigma': 'rad', 'rate_sigma': 'rad/s',
+          'correlation': '', 'innovation_sigma': 'rad', **dict.fromkeys(MOTION_MODELS, '')}
+"""{number: unit} that acu/filter tells of the filter of one axis; of a model its probability."""
+
+SILENT = -1
+"""In records the code of a text that was never published."""
+
+
+class Qos(typing.NamedTuple):
+    """Quality of service, always reliable. depth: messages kept; 0: all."""
+    depth: int
+    latched: bool
+
+
+QOS = {'step': Qos(0, False), 'once': Qos(1, True), 'change': Qos(1, True), 'second': Qos(10, False)}
 
 
 class Topic(typing.NamedTuple):
+    """One topic.
+
+    doc      what it tells
+    names    of a JointState, JointTrajectory: whose numbers they are
+    frame    header.frame_id; child: child_frame_id
+    units    {column: unit} where the type alone does not tell (see layouts)
+    texts    of a text: those that a reader tells apart, in the order of their codes
+    flag     the parameter of its readers that says whether something measures it; '': it is always there
+    """
     name: str
     type: str
-    writers: tuple
-    readers: tuple
-    qos: str
     rate: str
     doc: str
+    names: tuple = AXES
+    frame: str = ''
+    child: str = ''
+    units: typing.Mapping = {}
+    texts: tuple = ()
     flag: str = ''
 
 
-NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
-"""Names of the nodes; `operator` is whoever sends the ACU its program track (`pedestal run`)."""
-
-STAND_IN = 'replay'
-"""The node that replays a recording to the others."""
-
-BEAM_NODES = ('tracking_receiver', 'acu')
-"""The nodes each beam of an array has of its own."""
-
-MAX_BEAMS = 16
-
-_ALL = NODES[:-2]
-
 TOPICS = (
-    Topic('clock', 'rosgraph_msgs/msg/Clock', ('adu',), ('ship_motion',), 'step', 'step',
-          "the drive's time"),
-    Topic('joint_states', 'sensor_msgs/msg/JointState', ('adu',), ('tracking_receiver', 'acu'), 'step', 'step',
-          'azimuth, elevation: encoder angle [rad], rate [rad/s], torque on the load [Nm]'),
-    Topic('adu/motor_states', 'sensor_msgs/msg/JointState', ('adu',), (), 'step', 'step',
-          'azimuth_motor_1 ... elevation_motor_2: shaft angle [rad], rate [rad/s], torque [Nm]'),
-    Topic('adu/state', 'std_msgs/msg/String', ('adu',), ('acu',), 'state', 'change',
-          "'enabled' when the drive follows commands, otherwise why not"),
-    Topic('ship/truth', 'nav_msgs/msg/Odometry', ('ship_motion',), ('tracking_receiver', 'adu'), 'step', 'step',
-          'pose of base_link (FLU) in earth (ENU), twist in base_link'),
-    Topic('ship/imu/data_raw', 'sensor_msgs/msg/Imu', ('ship_motion',), ('ins',), 'step', 'step',
-          'specific force [m/s2] and angular rate [rad/s] (REP 145); orientation_covariance[0] = -1'),
-    Topic('ship/imu/data', 'sensor_msgs/msg/Imu', ('ins',), ('acu',), 'step', 'step',
-          'attitude deck -> earth and deck rate [rad/s] as the INS knows them'),
-    Topic('ins/state', 'std_msgs/msg/String', ('ins',), ('acu',), 'state', 'change',
-          'aligning, or aligned once the heading is known well enough; an INS that never says it counts as aligned'),
-    Topic('tracking_receiver/angle_error', 'geometry_msgs/msg/Vector3Stamped', ('tracking_receiver',), ('acu',),
-          'step', 'step', 'x cross-elevation error [rad], y elevation error [rad], z C/N0 [dB-Hz]; x, y NaN unlocked'),
-    Topic('tracking_receiver/angle_rate', 'geometry_msgs/msg/Vector3Stamped', ('tracking_receiver',), ('acu',),
-          'step', 'step', 'x cross-elevation, y elevation error rate [rad/s], NaN unlocked; z their 1-sigma',
-          'receiver_rate'),
-    Topic('tracking_receiver/range', 'sensor_msgs/msg/Range', ('tracking_receiver',), ('acu',), 'step', 'step',
-          'range of the target [m], NaN unlocked, and its variance [m2]', 'receiver_range'),
-    Topic('target/truth', 'nav_msgs/msg/Odometry', ('tracking_receiver',), (), 'step', 'step',
-          'target position [m] and velocity [m/s] in the ENU frame of the station'),
-    Topic('acu/rate_command', 'sensor_msgs/msg/JointState', ('acu',), ('adu',), 'step', 'step',
-          'azimuth, elevation: velocity [rad/s], effort = feed-forward load torque [Nm]'),
-    Topic('acu/estimate', 'trajectory_msgs/msg/JointTrajectory', ('acu',), (), 'step', 'step',
-          'target azimuth, elevation as filtered (earth angles): angle [rad], rate, acceleration; NaN without one'),
-    Topic('acu/reference', 'trajectory_msgs/msg/JointTrajectory', ('acu',), (), 'step', 'step',
-          'what the position loop follows, deck angles: angle [rad], rate, acceleration'),
-    Topic('acu/filter', 'sensor_msgs/msg/JointState', ('acu',), (), 'step', 'step',
-          'named numbers, all in `position`: innovations, NIS, 1-sigmas, probabilities of the models; NaN: none'),
-    Topic('acu/mode', 'std_msgs/msg/String', ('acu',), (), 'state', 'change',
-          'standby, stow, preset, program or autotrack'),
-    Topic('acu/keyhole', 'std_msgs/msg/String', ('acu',), (), 'state', 'change',
-          'how the azimuth will go through the zenith of the deck, and what is lost'),
-    Topic('acu/blockage', 'std_msgs/msg/String', ('acu',), (), 'state', 'change',
+    Topic('clock', 'rosgraph_msgs/msg/Clock', 'step', "the drive's time t_k"),
+    Topic('joint_states', 'sensor_msgs/msg/JointState', 'step',
+          '`azimuth`, `elevation`: encoder angle [rad], rate [rad/s], torque on the load [Nm]', frame='base_link'),
+    Topic('adu/motor_states', 'sensor_msgs/msg/JointState', 'step',
+          '`azimuth_motor_1` ... `elevation_motor_2`: shaft angle [rad], rate [rad/s], torque [Nm]', names=MOTORS,
+          frame='base_link'),
+    Topic('adu/state', 'std_msgs/msg/String', 'change',
+          '`enabled` when the drive follows commands, otherwise why not: `stopping`, `engaging brakes`, `disabled`, '
+          '`releasing brakes`, `emergency stop`, `fault: azimuth overspeed, ...`', texts=('enabled',)),
+    Topic('ship/truth', 'nav_msgs/msg/Odometry', 'step',
+          'pose of `base_link` (FLU) in `earth` (ENU), twist in `base_link`', frame='earth', child='base_link'),
+    Topic('ship/imu/data_raw', 'sensor_msgs/msg/Imu', 'step',
+          'REP 145: specific force [m/s2], rate against inertial space [rad/s]; no orientation',
+          frame='base_link'),
+    Topic('ship/imu/data', 'sensor_msgs/msg/Imu', 'step',
+          'attitude deck -> earth with its 1-sigma, deck rate against the earth [rad/s]; `latency` late',
+          frame='base_link'),
+    Topic('ins/state', 'std_msgs/msg/String', 'change',
+          '`aligning`, or `aligned` once the 1-sigma of its heading is below `alignment.aligned_sigma`, and again '
+          '`aligning` after 0.1 s without its IMU; method `model` never says it, which counts as aligned',
+          texts=('aligning', 'aligned')),
+    Topic('tracking_receiver/angle_error', 'geometry_msgs/msg/Vector3Stamped', 'step',
+          'x cross-elevation error [rad], y elevation error [rad], z C/N0 [dB-Hz]; x, y are NaN while unlocked; '
+          '`latency` late', frame='beam',
+          units={'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'}),
+    Topic('tracking_receiver/angle_rate', 'geometry_msgs/msg/Vector3Stamped', 'step',
+          'x cross-elevation, y elevation: rate of the error [rad/s], NaN while unlocked; z their 1-sigma [rad/s], '
+          'tachometer and receiver together; `latency` late', frame='beam',
+          units={'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'}, flag='receiver_rate'),
+    Topic('tracking_receiver/range', 'sensor_msgs/msg/Range', 'step',
+          'range of the target [m], NaN while unlocked, and its variance [m2]; `latency` late', frame='beam',
+          units={'field_of_view': 'rad', 'min_range': 'm', 'max_range': 'm'}, flag='receiver_range'),
+    Topic('target/truth', 'nav_msgs/msg/Odometry', 'step',
+          'target position [m] and velocity [m/s], ENU of the station', frame='earth', child='target'),
+    Topic('acu/rate_command', 'sensor_msgs/msg/JointState', 'step',
+          'velocity [rad/s], effort = feed-forward load torque [Nm]', frame='base_link'),
+    Topic('acu/estimate', 'trajectory_msgs/msg/JointTrajectory', 'step',
+          'one point: the target as filtered, earth angles at t_k; NaN without an estimate',
+          frame='earth'),
+    Topic('acu/reference', 'trajectory_msgs/msg/JointTrajectory', 'step',
+          'one point: what the position loop follows, deck angles at t_k', frame='base_link'),
+    Topic('acu/filter', 'sensor_msgs/msg/JointState', 'step',
+          'named numbers of each axis, all in `position`, NaN where there is none in this step: '
+          + ', '.join(f'`azimuth_{name}`' + (f' [{unit}]' if unit else '') for name, unit in FILTER.items()),
+          names=tuple(f'{axis}_{name}' for axis in AXES for name in FILTER), frame='earth',
+          units={f'{axis}_{name}.position': unit for axis in AXES for name, unit in FILTER.items()}),
+    Topic('acu/mode', 'std_msgs/msg/String', 'change', 'the mode'),
+    Topic('acu/keyhole', 'std_msgs/msg/String', 'change',
+          'how the azimuth will go through the zenith of the deck: when, which way round, expected loss; the numbers '
+          'are in the diagnostics (`keyhole_begins_s`, `keyhole_ends_s`, `keyhole_loss_s`, `keyhole_worst_deg`, '
+          '`keyhole_needed_deg_s`, `deck_motion_deg`)'),
+    Topic('acu/blockage', 'std_msgs/msg/String', 'change',
           'from when until when the superstructure will hide the target'),
-    Topic('acu/program_track', 'trajectory_msgs/msg/JointTrajectory', ('operator',), ('acu',), 'state', 'once',
-          'time-tagged azimuth, elevation (earth); one point is a preset (deck)'),
-    Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', _ALL, ('operator',), 'event', 'second',
-          'state of each node'),
+    Topic('acu/program_track', 'trajectory_msgs/msg/JointTrajectory', 'once',
+          'two or more points: time-tagged azimuth and elevation (earth); one point: a preset (deck)', frame='earth'),
+    Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'second', 'state of each node'),
 )
 
 BY_NAME = {topic.name: topic for topic in TOPICS}
 FLAGS = tuple(topic.flag for topic in TOPICS if topic.flag)
-
-
-def beam_of(name):
-    """'beam_2' of a node or topic 'beam_2/...'; '' of one without a beam."""
-    found = re.match(r'beam_[1-9]\d*(?=/)', name)
-    return found[0] if found else ''
-
-
-def plain(name):
-    """The name of a node or topic without its beam."""
-    return name[len(beam_of(name)) + 1:] if beam_of(name) else name
-
-
-def prefixes(beams):
-    """What the names of each beam's nodes and topics begin with: nothing where there is one only."""
-    return tuple(f'beam_{i}/' for i in range(1, beams + 1)) if beams > 1 else ('',)
-
-
-def members(nodes, beams):
-    """The nodes of a graph, each of BEAM_NODES once per beam."""
-    return tuple(prefix + node for node in nodes for prefix in (prefixes(beams) if node in BEAM_NODES else ('',)))
-
-
-def of_beam(name):
-    """Whether each beam has a topic of this (plain) name of its own."""
-    return name in ('joint_states', 'target/truth') or name.partition('/')[0] in BEAM_NODES
-
-
-def _of_array(topic):
-    """The row where the drive is an electronic array: it obeys angles instead of rates and does not feel the ship."""
-    readers = tuple(node for node in topic.readers if node != 'adu')
-    return topic._replace(readers=(*readers, 'adu') if topic.name == 'acu/reference' else readers)
-
-
-@functools.cache
-def graph(beams=0):
-    """{name: Topic} of a graph; beams 0: the drive has motors, else it is an electronic array of so many beams."""
-    rows = [_of_array(topic) for topic in TOPICS if topic.name != 'adu/motor_states'] if beams else TOPICS
-    found = {}
-    for topic in rows:
-        for prefix in prefixes(beams) if of_beam(topic.name) else ('',):
-            writers, readers = (tuple(name for name in members(nodes, beams) if beam_of(name) in ('', prefix[:-1])
-                                      or not prefix) for nodes in (topic.writers, topic.readers))
-            found[prefix + topic.name] = topic._replace(name=prefix + topic.name, writers=writers, readers=readers)
-    return found
-
-
-def read_by(node, nodes, flags=(), beams=0):
-    """The topics `node` reads for which a graph of these nodes has a writer; the recorder reads every one.
-
-    flags: those of FLAGS that are set.
-    """
-    return [topic for topic in graph(beams).values()
-            if (node in topic.readers or node == 'recorder') and any(w in nodes for w in topic.writers)
-            and (not topic.flag or topic.flag in flags)]
-
-
-def readers(topic, nodes):
-    """The nodes that must read a topic before a graph of these nodes may start."""
-    return [node for node in nodes if node in topic.readers or node == 'recorder']

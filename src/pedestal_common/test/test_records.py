@@ -1,60 +1,98 @@
+"""Records of messages: encoded and decoded by their places, against rosbags, which builds them from their types."""
 import math
+import operator
 
 import numpy as np
 import pytest
 
-from pedestal_common import messages, records
+from pedestal_common import layouts, messages, records, topics
 
-TOPICS = ('joint_states', 'adu/motor_states', 'acu/estimate', 'acu/filter', 'tracking_receiver/angle_error',
-          'tracking_receiver/range', 'ship/truth', 'ship/imu/data')
-
-
-def made(topic):
-    return {'joint_states': lambda: messages.joint_state(messages.AXES),
-            'adu/motor_states': lambda: messages.joint_state(messages.MOTORS),
-            'acu/estimate': lambda: messages.joint_trajectory('earth', [messages.trajectory_point()]),
-            'acu/filter': lambda: messages.named_numbers(messages.FILTER),
-            'tracking_receiver/angle_error': lambda: messages.vector3_stamped('beam'),
-            'tracking_receiver/range': lambda: messages.range_message('beam', 0.0175),
-            'ship/truth': lambda: messages.odometry('earth', 'base_link'),
-            'ship/imu/data': lambda: messages.imu('base_link')}[topic]()
+STAMPED = [topic.name for topic in topics.TOPICS if topic.rate == 'step']
+STAMP = 3_000_000_007
 
 
-@pytest.mark.parametrize('topic', TOPICS)
-def test_what_is_put_into_a_message_has_the_names_of_a_bags_columns(topic):
-    """Through the bytes of the message and the definition of its type: another route than `take`."""
-    columns = pytest.importorskip('pedestal_bringup.bags.columns')
-    record = np.zeros(1, records.of('clock', topic))
-    place = records.only(record, topic)
-    place.stamp[0] = 3_000_000_007
-    place.numbers[:] = np.random.default_rng(1).normal(size=len(records.columns(topic))).astype(np.float32)
-    message = made(topic)
-    records.put(message, place)
-    table = columns.table([messages.serialize(message)], message.__msgtype__, np.zeros(1))
-    assert table['t'][0] == 3.000000007
-    assert [table[name][0] for name in records.columns(topic)] == place.numbers.tolist()
+def numbers_of(message, topic):
+    """The numbers of a message by the attributes of its fields."""
+    numbers = []
+    for field in layouts.fields(topic):
+        path = field.path.replace('\\', '').split('(')[0].rstrip('.[').replace('[0]', '')
+        head, _, rest = path.partition('points')
+        holder = operator.attrgetter(rest.lstrip('.'))(message.points[0]) if rest else (
+            operator.attrgetter(head)(message) if head else message)
+        for part in field.components or range(len(topics.BY_NAME[topic].names)):
+            numbers.append(float(holder[int(part)] if isinstance(holder, np.ndarray) else getattr(holder, part)))
+    return numbers
 
 
-@pytest.mark.parametrize('topic', ['joint_states', 'tracking_receiver/angle_error', 'tracking_receiver/range',
-                                   'ship/truth', 'ship/imu/data'])
-def test_what_was_put_is_taken(topic):
-    record = np.zeros(2, records.of(topic))
-    first, second = records.only(record[:1], topic), records.only(record[1:], topic)
-    first.stamp[0] = 5_000_000
-    first.numbers[:] = np.arange(1.0, 1.0 + first.numbers.size)
-    message = made(topic)
-    records.put(message, first)
-    records.take(second, message)
-    assert record[0] == record[1]
-    records.take(second, None)
-    assert second.stamp[0] == records.NEVER
-    assert second.numbers.tolist() == first.numbers.tolist()
+def filled(topic):
+    """(record (1,), numbers) of a message of a topic."""
+    record = records.empty(records.of('clock', topic) if topic != 'clock' else records.of(topic), 1)
+    numbers = np.random.default_rng(1).normal(size=len(layouts.columns(topic))).astype(np.float32)
+    record[topic]['stamp'] = STAMP
+    records.numbers(record, topic)[:] = numbers
+    return record, numbers.tolist()
 
 
-def test_joints_are_taken_by_name():
-    record = np.zeros(1, records.of('joint_states'))
-    place = records.only(record, 'joint_states')
-    message = messages.joint_state(('pump', 'elevation', 'azimuth'))
-    message.position[:], message.velocity = (7.0, 2.0, 1.0), np.array((0.5, 4.0))
-    records.take(place, message)
-    np.testing.assert_array_equal(place.numbers[:4], [1.0, 2.0, math.nan, 4.0])
+@pytest.mark.parametrize('topic', STAMPED)
+def test_an_encoded_message_is_what_rosbags_makes_of_it(topic):
+    record, numbers = filled(topic)
+    data = records.Encoder(topic, messages.template(topic), record).encoded()
+    message = messages.deserialize(data, topics.BY_NAME[topic].type)
+    assert messages.serialize(message) == data
+    assert messages.nanoseconds(message.clock if topic == 'clock' else message.header.stamp) == STAMP
+    assert numbers_of(message, topic) == numbers
+
+
+@pytest.mark.parametrize('topic', STAMPED)
+@pytest.mark.parametrize('padding', [b'', b'\0\0'])
+def test_what_was_encoded_is_decoded(topic, padding):
+    record, numbers = filled(topic)
+    data = records.Encoder(topic, messages.template(topic), record).encoded()
+    other = records.empty(record.dtype, 1)
+    decoder = records.Decoder(topic, other)
+    assert (other[topic]['stamp'] == records.NEVER).all()
+    stamp, values = decoder.decoded(data + padding)
+    assert (stamp, list(values)) == (STAMP, numbers)
+    decoder.put(stamp, values)
+    assert other[topic] == record[topic]
+    decoder.put(records.NEVER, None)
+    assert other[topic]['stamp'] == records.NEVER and records.numbers(other, topic)[0].tolist() == numbers
+
+
+def test_joints_are_taken_by_name_whatever_came_before():
+    decoder = records.Decoder('joint_states', records.empty(records.of('joint_states'), 1))
+    message = messages.template('joint_states')
+    message.name, message.position = ['pump', 'elevation', 'azimuth'], np.array((7.0, 2.0, 1.0))
+    message.velocity, message.effort = np.array((0.5, 4.0)), np.zeros(0)
+    for _ in range(2):
+        np.testing.assert_array_equal(decoder.decoded(messages.serialize(message))[1],
+                                      [1.0, 2.0, math.nan, 4.0, math.nan, math.nan])
+        plain = decoder.decoded(messages.serialize(messages.template('joint_states')))
+        assert plain == (0, (0.0,) * 6)
+
+
+def test_a_point_that_is_not_there_holds_no_number():
+    message = messages.template('acu/reference')
+    message.points = []
+    decoder = records.Decoder('acu/reference', records.empty(records.of('acu/reference'), 1))
+    assert np.isnan(decoder.decoded(messages.serialize(message))[1]).all()
+
+
+@pytest.mark.parametrize('data, reason', [(b'', '0 bytes are no sensor_msgs/msg/JointState'),
+                                          (b'\0\1\0\0' + b'\xff' * 20, 'are no sensor_msgs/msg/JointState')])
+def test_broken_bytes_are_named(data, reason):
+    with pytest.raises(ValueError, match=reason):
+        records.Decoder('joint_states', records.empty(records.of('joint_states'), 1)).decoded(data)
+
+
+def test_a_stamp_that_is_none_is_refused():
+    message = messages.template('joint_states')
+    message.header.stamp.sec = -1
+    decoder = records.Decoder('joint_states', records.empty(records.of('joint_states'), 1))
+    with pytest.raises(ValueError, match='joint_states: -1 s 0 ns is no stamp'):
+        decoder.decoded(messages.serialize(message))
+
+
+def test_a_text_has_the_code_of_its_row():
+    assert [records.code_of('ins/state', text) for text in ('aligning', 'aligned', 'lost')] == [0, 1, 2]
+    assert records.empty(records.of('ins/state'), 1)['ins/state'] == topics.SILENT

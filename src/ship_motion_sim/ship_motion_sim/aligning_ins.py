@@ -122,9 +122,8 @@ def measure(c, s, stamp_ns, rate, force):
 
 
 @compiled
-def step(state, constants, inputs, outputs, normals):
+def step(s, c, i, out, normals):
     """One IMU message: as ins.step. Of the normals the first three are the aid's noise."""
-    s, c, i, out = state[0], constants[0], inputs[0], outputs[0]
     out.status, out.due = ins.OK, 0
     if i.stamp_ns <= s.last_stamp_ns:
         out.status = ins.BAD_STAMP

@@ -134,12 +134,11 @@ def spoil(errors, dt, values, normals, first, left):
 
 
 @compiled
-def step(state, constants, ship, inputs, truth, outputs, normals):
-    """One sample. ship: motion.CONSTANTS (1,); truth: motion.OUTPUTS (1,) at the instant of the sample; normals
-    (NORMALS,) standard normals."""
-    s, c, u, out = state[0], constants[0], inputs[0], outputs[0]
+def step(s, c, ship, u, truth, out, normals):
+    """One sample. Records STATE, CONSTANTS, motion.CONSTANTS, INPUTS, motion.OUTPUTS at the instant of the sample,
+    OUTPUTS; normals (NORMALS,) standard normals."""
     rate, force = out.angular_velocity, out.linear_acceleration
-    if truth[0].status != motion.OK:
+    if truth.status != motion.OK:
         out.status = BAD_TRUTH
     elif not 0.0 < u.dt < math.inf:
         out.status = BAD_STEP
@@ -150,9 +149,9 @@ def step(state, constants, ship, inputs, truth, outputs, normals):
             rate[i] = force[i] = math.nan
         return
     if c.increment == 1:
-        mean_rates(s, c, ship[0], u.t, u.dt, rate, force)
+        mean_rates(s, c, ship, u.t, u.dt, rate, force)
     else:
-        rate[0], rate[1], rate[2] = inertial_rate(truth[0], c.earth_rate)
-        force[0], force[1], force[2] = specific_force(truth[0], c.earth_rate, c.gravity)
+        rate[0], rate[1], rate[2] = inertial_rate(truth, c.earth_rate)
+        force[0], force[1], force[2] = specific_force(truth, c.earth_rate, c.gravity)
     spoil(c.gyro, u.dt, rate, normals, 0, s.angle_left)
     spoil(c.accelerometer, u.dt, force, normals, 3, s.force_left)

@@ -161,12 +161,11 @@ def release(c, s, now_ns, out):
 
 
 @compiled
-def step(state, constants, inputs, outputs, normals):
-    """One IMU message. Arrays (1,) of STATE, CONSTANTS, INPUTS, OUTPUTS; normals (NORMALS,) standard normals.
+def step(s, c, i, out, normals):
+    """One IMU message. Records STATE, CONSTANTS, INPUTS, OUTPUTS; normals (NORMALS,) standard normals.
 
     A stamp that does not advance changes nothing; a message that is not finite is not measured. Both still say so.
     """
-    s, c, i, out = state[0], constants[0], inputs[0], outputs[0]
     out.status, out.due, out.stage = OK, 0, NO_STAGE
     if i.stamp_ns <= s.last_stamp_ns:
         out.status = BAD_STAMP

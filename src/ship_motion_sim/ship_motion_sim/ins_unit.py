@@ -1,59 +1,46 @@
-"""The INS between its messages: what it makes of those it hears, and what it puts into those it says.
+"""The unit of the INS: its IMU in, attitude and deck rate as the INS knows them out, and whether it is aligned.
 
-The node answers one message at a time, a recomputed bag all of them at once, through the same code.
+Method `model` knows the true attitude with stated errors and never tells a state; the others align by themselves.
 """
+import math
+import typing
+
 import numpy as np
 
-from pedestal_common import messages, noise, records
+from pedestal_common import nodes, noise
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
 from ship_motion_sim import aligning_ins, ins, navigator
 
 RAW, DATA, STATE = 'ship/imu/data_raw', 'ship/imu/data', 'ins/state'
-HEARD, SAID = records.of(RAW), records.of(DATA, more=(STATE,))
 
 
-class Ins:
-    """The INS of an InsParameters.
+def _record_of(state, constants):
+    """The record of an INS. row: of the noise that the next step takes; worst: the highest status since the last
+    diagnosis."""
+    return np.dtype([('state', state), ('constants', constants), ('inputs', ins.INPUTS), ('outputs', ins.OUTPUTS),
+                     ('row', 'i8'), ('worst', 'i8')], align=True)
 
-    heard, said: the records (1,) of one step; messages: {topic: message} it says; WORDS: {topic: function from its
-    code in `said` to its text}. Method model never says how it is: its code is NO_STAGE.
-    """
-    HEARD, SAID, WORDS = HEARD, SAID, {STATE: navigator.STAGES.__getitem__}
 
-    def __init__(self, params, _on_ship=True):
-        if params.method == 'model':
-            self._answers, self.constants, self.state = model_answers, ins.constants(params), ins.initial_state()
-        else:
-            self._answers, self.constants = aligning_answers, aligning_ins.constants(params)
-            self.state = aligning_ins.initial_state(self.constants)
-        self.inputs, self.outputs = np.zeros(1, ins.INPUTS), np.zeros(1, ins.OUTPUTS)
-        self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
-        self.rng = noise.generator(params.seed, 'ins')
-        data = messages.imu('base_link')
-        data.orientation_covariance = np.zeros(9)
-        rate_noise = params.rate_noise if params.method == 'model' else 0.0     # zeros: unknown
-        data.angular_velocity_covariance = (np.eye(3) * rate_noise**2).ravel()
-        self.messages = {DATA: data}
-        self.followers, self.events = {}, {}
+MODEL_RECORD = _record_of(ins.STATE, ins.CONSTANTS)
+ALIGNING_RECORD = _record_of(aligning_ins.STATE, aligning_ins.CONSTANTS)
 
-    def prepare(self):
-        """Compile what answers."""
-        self._answers(self.state.copy(), self.constants, self.inputs.copy(), self.outputs.copy(),
-                      np.zeros((1, ins.NORMALS)), self.heard, self.said.copy())
 
-    def answer(self):
-        """Answer `heard` with `said`."""
-        self.answers(self.heard, self.said)
+class ModelMemory(typing.NamedTuple):
+    """All the INS of method `model` works on: the noise of the next steps."""
+    record: np.ndarray
+    normals: np.ndarray
 
-    def answers(self, heard, said):
-        """The same for many steps, records (n,)."""
-        self._answers(self.state, self.constants, self.inputs, self.outputs,
-                      self.rng.standard_normal((len(heard), ins.NORMALS)), heard, said)
+
+class AligningMemory(typing.NamedTuple):
+    """All an INS that aligns works on. A type of its own, so that a run with the model does not compile it."""
+    record: np.ndarray
+    normals: np.ndarray
 
 
 @compiled
-def hear(u, raw):
+def decode(u, raw):
     """Record of an IMU message -> inputs of the INS."""
     u.stamp_ns = raw.stamp
     for i in range(3):
@@ -61,31 +48,102 @@ def hear(u, raw):
 
 
 @compiled
-def say(o, said):
+def encode(o, outputs):
     """Outputs of the INS -> records of its messages."""
-    data = said[DATA]
+    data = outputs[DATA]
     data.stamp = o.stamp_ns if o.due == 1 else NEVER
     for i in range(4):
         data.orientation[i] = o.quaternion[i]
     for i in range(3):
         data.angular_velocity[i], data.linear_acceleration[i] = o.angular_velocity[i], o.linear_acceleration[i]
         data.orientation_variance[i] = o.variance[i]
-    said[STATE] = o.stage
+    outputs[STATE] = o.stage
 
 
 @compiled
-def model_answers(state, constants, inputs, outputs, normals, heard, said):
-    """Step by step: said[k] answers heard[k]."""
-    for k in range(len(heard)):
-        hear(inputs[0], heard[k][RAW])
-        ins.step(state, constants, inputs, outputs, normals[k])
-        say(outputs[0], said[k])
+def model_law(memory, stamp, inputs, outputs):
+    """Step k of method `model`."""
+    m = memory.record[0]
+    decode(m.inputs, inputs[RAW])
+    ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
+    m.row += 1
+    m.worst = max(m.worst, m.outputs.status)
+    encode(m.outputs, outputs)
 
 
 @compiled
-def aligning_answers(state, constants, inputs, outputs, normals, heard, said):
-    """The same of an INS that aligns: a function of its own, so that a run with the model compiles only that."""
-    for k in range(len(heard)):
-        hear(inputs[0], heard[k][RAW])
-        aligning_ins.step(state, constants, inputs, outputs, normals[k])
-        say(outputs[0], said[k])
+def aligning_law(memory, stamp, inputs, outputs):
+    """Step k of an INS that aligns."""
+    m = memory.record[0]
+    decode(m.inputs, inputs[RAW])
+    aligning_ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
+    m.row += 1
+    m.worst = max(m.worst, m.outputs.status)
+    encode(m.outputs, outputs)
+
+
+@compiled
+def model_laws(memory, stamps, inputs, outputs):
+    """`model_law` over arrays."""
+    for k in range(len(stamps)):
+        model_law(memory, stamps[k], inputs[k], outputs[k])
+
+
+@compiled
+def aligning_laws(memory, stamps, inputs, outputs):
+    """`aligning_law` over arrays."""
+    for k in range(len(stamps)):
+        aligning_law(memory, stamps[k], inputs[k], outputs[k])
+
+
+class Ins(Unit):
+    """The INS of an InsParameters."""
+    NODE = nodes.row('ins')
+    LAWS = {ModelMemory: (model_law, model_laws), AligningMemory: (aligning_law, aligning_laws)}
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        self._noise = noise.generator(parameters.seed, self.NODE.name)
+        normals = np.zeros((1, ins.NORMALS))
+        model = parameters.method == 'model'
+        if model:
+            self.memory = ModelMemory(joined(MODEL_RECORD, state=ins.initial_state(),
+                                             constants=ins.constants(parameters)), normals)
+        else:
+            constants = aligning_ins.constants(parameters)
+            self.memory = AligningMemory(joined(ALIGNING_RECORD, state=aligning_ins.initial_state(constants),
+                                                constants=constants), normals)
+        rate_noise = parameters.rate_noise if model else 0.0     # zeros: unknown
+        self.messages[DATA].angular_velocity_covariance = (np.eye(3) * rate_noise**2).ravel()
+
+    def block(self, steps):
+        self.parts['row'] = 0
+        return self.memory._replace(normals=self._noise.standard_normal((steps, ins.NORMALS)))
+
+    def diagnose(self):
+        outputs, status = self.parts['outputs'], int(self.parts['worst'])
+        self.parts['worst'] = 0
+        stage, sigma, p = int(outputs['stage']), outputs['variance']**0.5, self.parameters
+        values = [('latency_s', f'{p.latency:g}')]
+        known = self.parts['state']['released'] > 0
+        if known:
+            values.append(('heading_error_rms_rad', f'{sigma[2]:g}'))
+        if stage != ins.NO_STAGE:
+            values += [('method', p.method), ('state', navigator.STAGES[stage])]
+            if known:
+                values.append(('level_error_rms_rad', f'{sigma[0]:g}'))
+        if stage == navigator.NAVIGATING:
+            values += [(f'velocity_{axis}', f'{v:.3f}') for axis, v in zip(('east', 'north', 'up'),
+                                                                           outputs['velocity'])]
+        if status:
+            return Diagnosis(ERROR, ins.STATUS[status], values)
+        if stage == navigator.ALIGNING:
+            heading, wanted = (math.degrees(x) for x in (sigma[2], p.alignment.aligned_sigma))
+            so_far = f'heading known to {heading:.2g} deg (1 sigma)' if known else 'heading not known yet'
+            return Diagnosis(WARN, f'aligning: {so_far}, navigates from {wanted:.2g} deg on', values)
+        return Diagnosis(OK, 'navigating', values)
+
+    @staticmethod
+    def idle(numbers):
+        moved = DATA in numbers and len(numbers[DATA]) and np.ptp(numbers[DATA], axis=0).any()
+        return '' if moved else 'the ship never moved'

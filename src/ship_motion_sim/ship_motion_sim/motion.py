@@ -1,7 +1,7 @@
 """The ship's truth at an instant: position, attitude and their exact derivatives. Stateless.
 
-    inputs = np.zeros(1, INPUTS); inputs['t'] = 12.5
-    step(constants(params), inputs, outputs)
+    outputs = np.zeros(1, OUTPUTS)
+    truth(constants(params)[0], 12.5, outputs[0])
 """
 import math
 
@@ -27,8 +27,6 @@ CONSTANTS = np.dtype([
     ('breaks', 'f8', (recording.PIECES + 1,)),      # [s]
     ('coefficients', 'f8', (recording.PIECES, FREEDOMS, recording.ORDER)),      # [m, rad], highest power first
 ], align=True)
-
-INPUTS = np.dtype([('t', 'f8')], align=True)        # [s]
 
 OUTPUTS = np.dtype([
     ('status', 'i8'),                               # index into STATUS; not OK: everything else is NaN
@@ -165,9 +163,3 @@ def truth(ship, t, out):
     w[0], w[1], w[2], dw[0], dw[1], dw[2] = body_rates(
         roll, pitch, x[1, ROLL], x[1, PITCH], x[1, YAW], x[2, ROLL], x[2, PITCH], x[2, YAW])
     u[0], u[1], u[2] = to_deck(out.mat_ed, v[0], v[1], v[2])
-
-
-@compiled
-def step(constants, inputs, outputs):
-    """The truth at inputs['t']; arrays (1,) of CONSTANTS, INPUTS, OUTPUTS. The same t gives the same truth always."""
-    truth(constants[0], inputs[0].t, outputs[0])

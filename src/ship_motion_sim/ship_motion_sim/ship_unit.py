@@ -1,76 +1,98 @@
-"""The ship between its messages: what it makes of the clock, and what it puts into the messages it says.
+"""The unit of the ship and its IMU: the drive's clock in, the ship's truth and what its IMU feels out."""
+import typing
 
-The node answers one tick at a time, a recomputed bag all of them at once, through the same `answers`.
-"""
 import numpy as np
 
-from pedestal_common import messages, noise, records
+from pedestal_common import nodes, noise
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
 from ship_motion_sim import imu, motion
 
-CLOCK, TRUTH, RAW = 'clock', 'ship/truth', 'ship/imu/data_raw'
-HEARD, SAID = records.of(CLOCK), records.of(TRUTH, RAW)
+TRUTH, RAW = 'ship/truth', 'ship/imu/data_raw'
 
 NOMINAL_PERIOD = 5e-3
 """What the IMU takes for the length of its first sample [s]."""
 
 
-class ShipMotion:
-    """The ship and its IMU of a ShipMotionParameters.
+RECORD = np.dtype([('ship', motion.CONSTANTS), ('truth', motion.OUTPUTS), ('imu_state', imu.STATE),
+                   ('imu', imu.CONSTANTS), ('imu_inputs', imu.INPUTS), ('felt', imu.OUTPUTS), ('last', 'i8'),
+                   ('row', 'i8')], align=True)
+"""last: stamp of the last step [ns]; row: of the noise that the next step takes."""
 
-    heard, said: the records (1,) of one step; messages: {topic: message} it says.
-    """
-    HEARD, SAID, WORDS = HEARD, SAID, {}
 
-    def __init__(self, params, _on_ship=True):
-        self.ship, self.imu = motion.constants(params.ship), imu.constants(params)
-        self.inputs, self.truth = np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS)
-        self.imu_state = imu.initial_state()
-        self.imu_inputs, self.felt = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
-        self.last = np.full(1, NEVER)
-        self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
-        self.rng = noise.generator(params.imu.seed, 'ship_motion')
-        self.messages = {TRUTH: messages.odometry('earth', 'base_link'), RAW: messages.imu('base_link')}
-        self.followers, self.events = {}, {}
-
-    def prepare(self):
-        """Compile `answers`; until the first tick, the truth is that of stamp 0."""
-        answers(self.last.copy(), self.ship, self.inputs, self.truth, self.imu_state.copy(), self.imu, self.imu_inputs,
-                self.felt, np.zeros((1, imu.NORMALS)), self.heard, self.said.copy())
-
-    def over(self):
-        """Whether the last tick lies past the end of a recorded motion."""
-        ship = self.ship[0]
-        return ship['pieces'] > 0 and self.last[0] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
-
-    def answer(self):
-        """Answer `heard` with `said`."""
-        self.answers(self.heard, self.said)
-
-    def answers(self, heard, said):
-        """The same for many steps, records (n,)."""
-        answers(self.last, self.ship, self.inputs, self.truth, self.imu_state, self.imu, self.imu_inputs, self.felt,
-                self.rng.standard_normal((len(heard), imu.NORMALS)), heard, said)
+class Memory(typing.NamedTuple):
+    """All the ship works on: the noise of the next steps."""
+    record: np.ndarray
+    normals: np.ndarray
 
 
 @compiled
-def answers(last, ship, inputs, truth, imu_state, imu_constants, imu_inputs, felt, normals, heard, said):
-    """Tick by tick: said[k] answers heard[k]; last (1,): stamp of the tick before [ns]."""
-    o, f = truth[0], felt[0]
-    for k in range(len(heard)):
-        stamp = heard[k][CLOCK].stamp
-        inputs[0].t = imu_inputs[0].t = stamp * 1e-9
-        imu_inputs[0].dt = (stamp - last[0]) * 1e-9 if last[0] != NEVER else NOMINAL_PERIOD
-        last[0] = stamp
-        motion.step(ship, inputs, truth)
-        imu.step(imu_state, imu_constants, ship, imu_inputs, truth, felt, normals[k])
-        pose, raw = said[k][TRUTH], said[k][RAW]
-        pose.stamp = raw.stamp = stamp
-        raw.orientation[3], raw.orientation_variance[0] = 1.0, -1.0     # REP 145: no orientation
-        for i in range(4):
-            pose.orientation[i] = o.quaternion[i]
-        for i in range(3):
-            pose.position[i], pose.twist_linear[i], pose.twist_angular[i] = (
-                o.position[i], o.velocity_deck[i], o.angular_velocity[i])
-            raw.angular_velocity[i], raw.linear_acceleration[i] = f.angular_velocity[i], f.linear_acceleration[i]
+def encode(truth, felt, stamp, outputs):
+    """Truth of the ship and what its IMU feels -> records of the messages."""
+    pose, raw = outputs[TRUTH], outputs[RAW]
+    pose.stamp = raw.stamp = stamp
+    raw.orientation[3], raw.orientation_variance[0] = 1.0, -1.0     # REP 145: no orientation
+    for i in range(4):
+        pose.orientation[i] = truth.quaternion[i]
+    for i in range(3):
+        pose.position[i], pose.twist_linear[i] = truth.position[i], truth.velocity_deck[i]
+        pose.twist_angular[i] = truth.angular_velocity[i]
+        raw.angular_velocity[i], raw.linear_acceleration[i] = felt.angular_velocity[i], felt.linear_acceleration[i]
+
+
+@compiled
+def law(memory, stamp, inputs, outputs):
+    """Step k."""
+    m = memory.record[0]
+    m.imu_inputs.t = stamp * 1e-9
+    m.imu_inputs.dt = (stamp - m.last) * 1e-9 if m.last != NEVER else NOMINAL_PERIOD
+    m.last = stamp
+    motion.truth(m.ship, m.imu_inputs.t, m.truth)
+    imu.step(m.imu_state, m.imu, m.ship, m.imu_inputs, m.truth, m.felt, memory.normals[m.row])
+    m.row += 1
+    encode(m.truth, m.felt, stamp, outputs)
+
+
+@compiled
+def laws(memory, stamps, inputs, outputs):
+    """`law` over arrays."""
+    for k in range(len(stamps)):
+        law(memory, stamps[k], inputs[k], outputs[k])
+
+
+class ShipMotion(Unit):
+    """The ship and its IMU of a ShipMotionParameters."""
+    NODE, LAWS = nodes.row('ship_motion'), {Memory: (law, laws)}
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        self._noise = noise.generator(parameters.imu.seed, self.NODE.name)
+        self.memory = Memory(joined(RECORD, ship=motion.constants(parameters.ship), imu_state=imu.initial_state(),
+                                    imu=imu.constants(parameters), last=NEVER), np.zeros((1, imu.NORMALS)))
+
+    def block(self, steps):
+        self.parts['row'] = 0
+        return self.memory._replace(normals=self._noise.standard_normal((steps, imu.NORMALS)))
+
+    @property
+    def over(self):
+        """Whether the last step lies past the end of a recorded motion."""
+        ship = self.parts['ship']
+        return ship['pieces'] > 0 and self.parts['last'] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
+
+    def diagnose(self):
+        truth, felt = self.parts['truth'], self.parts['felt']
+        values = [(f'{name}_deg', f'{np.degrees(truth[name]):.3f}') for name in ('roll', 'pitch')]
+        for status, names in ((truth['status'], motion.STATUS), (felt['status'], imu.STATUS)):
+            if status:
+                return Diagnosis(ERROR, names[status], values)
+        if self.over:
+            return Diagnosis(WARN, 'the recorded motion is over, the deck is at rest', values)
+        return Diagnosis(OK, 'under way', values)
+
+    @staticmethod
+    def idle(numbers):
+        moved = any(len(numbers[name]) and np.ptp(numbers[name], axis=0).any() for name in (TRUTH, RAW)
+                    if name in numbers)
+        return '' if moved else 'the ship never moved'

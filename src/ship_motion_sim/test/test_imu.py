@@ -15,17 +15,16 @@ NO_NOISE = np.zeros(imu.NORMALS)
 
 
 def truth_at(params, t):
-    inputs, truth = np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS)
-    inputs['t'] = t
-    motion.step(motion.constants(params.ship), inputs, truth)
+    truth = np.zeros(1, motion.OUTPUTS)
+    motion.truth(motion.constants(params.ship)[0], t, truth[0])
     return truth
 
 
 def sample(params, t, dt=0.005, normals=NO_NOISE):
     inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
     inputs['t'], inputs['dt'] = t, dt
-    imu.step(imu.initial_state(), imu.constants(params), motion.constants(params.ship), inputs, truth_at(params, t),
-             outputs, normals)
+    imu.step(imu.initial_state()[0], imu.constants(params)[0], motion.constants(params.ship)[0], inputs[0],
+             truth_at(params, t)[0], outputs[0], normals)
     return outputs[0]
 
 
@@ -85,7 +84,7 @@ def test_noise_is_a_density_and_bias_is_added(dt):
     inputs['dt'] = dt
     rates, forces = [], []
     for row in normals:
-        imu.step(state, constants, ship, inputs, truth, outputs, row)
+        imu.step(state[0], constants[0], ship[0], inputs[0], truth[0], outputs[0], row)
         rates.append(outputs[0]['angular_velocity'].copy())
         forces.append(outputs[0]['linear_acceleration'].copy())
     rates -= sample(ideal, 0.0)['angular_velocity']
@@ -143,7 +142,8 @@ def test_quantised_increments_are_whole_and_lose_nothing():
         for i in range(2):
             inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
             inputs['t'], inputs['dt'] = k * dt, dt
-            imu.step(states[i], imu.constants(params[i]), ship, inputs, truth_at(params[i], k * dt), outputs, NO_NOISE)
+            imu.step(states[i][0], imu.constants(params[i])[0], ship[0], inputs[0],
+                     truth_at(params[i], k * dt)[0], outputs[0], NO_NOISE)
             increment = dt * np.concatenate((outputs[0]['angular_velocity'], outputs[0]['linear_acceleration']))
             total[i] += increment
             if i == 1:

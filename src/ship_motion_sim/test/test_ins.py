@@ -27,10 +27,11 @@ class Bench:
         self.inputs, self.truth = np.zeros(1, ins.INPUTS), np.zeros(1, motion.OUTPUTS)
 
     def step(self, stamp, spoil=None):
-        at, dt, raw = np.zeros(1, motion.INPUTS), np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
-        at['t'], dt['dt'] = 1e-9 * stamp, 0.005
-        motion.step(self.ship, at, self.truth)
-        imu.step(imu.initial_state(), self.imu, self.ship, dt, self.truth, raw, np.zeros(imu.NORMALS))
+        dt, raw = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
+        dt['dt'] = 0.005
+        motion.truth(self.ship[0], 1e-9 * stamp, self.truth[0])
+        imu.step(imu.initial_state()[0], self.imu[0], self.ship[0], dt[0], self.truth[0], raw[0],
+                 np.zeros(imu.NORMALS))
         self.inputs['stamp_ns'] = stamp
         for field in ('angular_velocity', 'linear_acceleration'):
             self.inputs[field] = raw[field]
@@ -40,7 +41,8 @@ class Bench:
 
     def run(self):
         outputs = np.zeros(1, ins.OUTPUTS)
-        ins.step(self.state, self.constants, self.inputs, outputs, self.random.standard_normal(ins.NORMALS))
+        ins.step(self.state[0], self.constants[0], self.inputs[0], outputs[0],
+                 self.random.standard_normal(ins.NORMALS))
         return outputs[0]
 
 
@@ -174,7 +176,7 @@ def test_more_samples_than_the_buffer_holds_are_said():
 def test_compiled_callers_get_the_same_result():
     @numba.njit
     def call(state, constants, inputs, outputs, normals):
-        ins.step(state, constants, inputs, outputs, normals)
+        ins.step(state[0], constants[0], inputs[0], outputs[0], normals)
 
     one, other = Bench(InsParameters()), Bench(InsParameters())
     for k in range(3):

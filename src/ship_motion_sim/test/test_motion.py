@@ -16,12 +16,11 @@ WILD = PlainParameters(roll_amplitude_deg=30.0, pitch_amplitude_deg=20.0, pitch_
 
 def ship(**values):
     """t -> truth record of a ship with these parameters."""
-    constants, inputs = motion.constants(ShipParameters(**values)), np.zeros(1, motion.INPUTS)
+    constants = motion.constants(ShipParameters(**values))
 
     def at(t):
         outputs = np.zeros(1, motion.OUTPUTS)
-        inputs['t'] = t
-        motion.step(constants, inputs, outputs)
+        motion.truth(constants[0], t, outputs[0])
         return outputs[0]
     return at
 
@@ -161,10 +160,9 @@ def test_time_that_is_not_finite_is_said_and_nothing_looks_valid(t):
 
 def test_compiled_callers_get_the_same_truth():
     @numba.njit
-    def call(constants, inputs, outputs):
-        motion.step(constants, inputs, outputs)
+    def call(constants, t, outputs):
+        motion.truth(constants[0], t, outputs[0])
 
-    inputs, outputs = np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS)
-    inputs['t'] = 77.7
-    call(motion.constants(ShipParameters()), inputs, outputs)
+    outputs = np.zeros(1, motion.OUTPUTS)
+    call(motion.constants(ShipParameters()), 77.7, outputs)
     assert outputs.tobytes() == ship()(77.7).tobytes()

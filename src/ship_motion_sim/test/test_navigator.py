@@ -10,20 +10,26 @@ from pedestal_common import parameters, records
 from ship_motion_sim import ins, navigator
 from ship_motion_sim.ins_unit import DATA, RAW, STATE, Ins
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
-from ship_motion_sim.ship_unit import CLOCK, TRUTH, ShipMotion
+from ship_motion_sim.ship_unit import TRUTH, ShipMotion
 
 STEP = 20_000_000
 SEA = {'ship.sea_state': 4, 'ship.heading_deg': 60.0}
 WRONG = {'alignment.initial_heading_deg': 240.0}
 
 
+def answers(unit, stamps, raw=None):
+    """What a unit writes in the steps of these stamps [ns]."""
+    inputs, outputs = (records.empty(kind, len(stamps)) for kind in (unit.inputs_type(), unit.outputs_type()))
+    if raw is not None:
+        inputs[RAW] = raw
+    unit.step(stamps, inputs, outputs)
+    return outputs
+
+
 def sailed(seconds, sea=SEA, **imu):
     """(IMU messages, true attitude (n, 4), true deck rate (n, 3)) of a ship on sea state 4."""
-    unit = ShipMotion(parameters.build(ShipMotionParameters, {**sea, **{f'imu.{k}': v for k, v in imu.items()}}))
-    heard = np.zeros(round(seconds * 1e9 / STEP), unit.HEARD)
-    heard[CLOCK]['stamp'] = STEP * np.arange(len(heard))
-    said = np.zeros(len(heard), unit.SAID)
-    unit.answers(heard, said)
+    unit = ShipMotion(parameters.build(ShipMotionParameters, {**sea, **{f'imu.{k}': v for k, v in imu.items()}}), ())
+    said = answers(unit, STEP * np.arange(round(seconds * 1e9 / STEP)))
     return said[RAW], said[TRUTH]['orientation'], said[TRUTH]['twist_angular']
 
 
@@ -34,11 +40,7 @@ def ordinary(output):
 
 def answered(raw, **values):
     """What an INS says to IMU messages."""
-    unit = Ins(parameters.build(InsParameters, {**SEA, 'latency': 0.0, **values}))
-    heard, said = np.zeros(len(raw), unit.HEARD), np.zeros(len(raw), unit.SAID)
-    heard[RAW] = raw
-    unit.answers(heard, said)
-    return said
+    return answers(Ins(parameters.build(InsParameters, {**SEA, 'latency': 0.0, **values}), (RAW,)), raw['stamp'], raw)
 
 
 def errors(said, truth):
@@ -154,12 +156,12 @@ def test_after_a_long_silence_of_the_imu_it_aligns_anew(how):
     else:
         raw['linear_acceleration'][~there] = math.nan
     unit = Ins(parameters.build(InsParameters, {**SEA, **WRONG, 'latency': 0.0, 'method': 'riccati_eso',
-                                                'imu_output': 'increment', 'aid.source': 'log'}))
-    heard, said, statuses = np.zeros(1, unit.HEARD), np.zeros(len(raw), unit.SAID), []
+                                                'imu_output': 'increment', 'aid.source': 'log'}), (RAW,))
+    said, statuses = records.empty(unit.outputs_type(), len(raw)), []
     for k in range(len(raw)):
-        heard[RAW] = raw[k]
-        unit.answers(heard, said[k:k + 1])
-        statuses.append(ins.STATUS[unit.outputs[0]['status']])
+        unit.inputs[RAW] = raw[k]
+        unit.step(raw['stamp'][k:k + 1], unit.inputs, said[k:k + 1])
+        statuses.append(ins.STATUS[unit.parts['outputs']['status']])
     back = statuses.index('IMU was silent for too long, the attitude is lost: it aligns anew')
     assert back == (9000 if how == 'missing' else 9200)
     assert said[STATE][back - 1 if how == 'missing' else 8999] == navigator.NAVIGATING

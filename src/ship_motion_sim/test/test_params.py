@@ -54,7 +54,7 @@ def test_what_is_allowed_is_stable(step):
     ({'method': 'adrc', 'alignment.gyro_bias': 1e-6}, '0.0201')])
 def test_an_alignment_that_could_never_end_is_named(values, least):
     with pytest.raises(parameters.ParameterError, match=f'aligned_sigma = 0.0035 rad: must be above {least}'):
-        Ins(parameters.build(InsParameters, values))
+        Ins(parameters.build(InsParameters, values), ())
 
 
 def test_plain_motion_needs_no_sea():

@@ -14,9 +14,8 @@ PERIOD, LENGTH = 0.1, 60.0
 
 
 def truth(constants, t):
-    inputs, outputs = np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS)
-    inputs['t'] = t
-    motion.step(constants, inputs, outputs)
+    outputs = np.zeros(1, motion.OUTPUTS)
+    motion.truth(constants[0], t, outputs[0])
     return outputs[0]
 
 

@@ -24,11 +24,11 @@ SEA = ShipParameters(sea_state=6, wave_angle_deg=60.0, heading_deg=130.0, latitu
 
 
 @numba.njit
-def measured(state, constants, ship, inputs, at, truth, outputs, count, angle, force):
+def measured(state, constants, ship, inputs, truth, outputs, count, angle, force):
     for k in range(count):
-        inputs[0].t = at[0].t = (k + 1) * inputs[0].dt
-        motion.step(ship, at, truth)
-        imu.step(state, constants, ship, inputs, truth, outputs, np.zeros(imu.NORMALS))
+        inputs[0].t = (k + 1) * inputs[0].dt
+        motion.truth(ship[0], inputs[0].t, truth[0])
+        imu.step(state[0], constants[0], ship[0], inputs[0], truth[0], outputs[0], np.zeros(imu.NORMALS))
         for i in range(3):
             angle[k, i] = outputs[0].angular_velocity[i] * inputs[0].dt
             force[k, i] = outputs[0].linear_acceleration[i] * inputs[0].dt
@@ -37,18 +37,17 @@ def measured(state, constants, ship, inputs, at, truth, outputs, count, angle, f
 def increments(ship, seconds):
     """(angle, force) (n, 3) of an errorless IMU from 0 s on."""
     params, count = ShipMotionParameters(ship, EXACT), round(seconds / DT)
-    inputs, at = np.zeros(1, imu.INPUTS), np.zeros(1, motion.INPUTS)
+    inputs = np.zeros(1, imu.INPUTS)
     inputs['dt'] = DT
     angle, force = np.zeros((count, 3)), np.zeros((count, 3))
-    measured(imu.initial_state(), imu.constants(params), motion.constants(ship), inputs, at,
+    measured(imu.initial_state(), imu.constants(params), motion.constants(ship), inputs,
              np.zeros(1, motion.OUTPUTS), np.zeros(1, imu.OUTPUTS), count, angle, force)
     return angle, force
 
 
 def truth_at(ship, t):
-    at, truth = np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS)
-    at['t'] = t
-    motion.step(motion.constants(ship), at, truth)
+    truth = np.zeros(1, motion.OUTPUTS)
+    motion.truth(motion.constants(ship)[0], t, truth[0])
     return truth[0]
 
 

@@ -41,7 +41,7 @@ class Bench:
         for k, stamp in enumerate(stamps):
             self.inputs['stamp_ns'] = stamp
             normals = np.zeros(count) if rng is None else rng.standard_normal(count)
-            receiver.step(self.state, self.constants, self.inputs, outputs, self.target.breaks,
+            receiver.step(self.state[0], self.constants[0], self.inputs[0], outputs[0], self.target.breaks,
                           self.target.coefficients, normals)
             out[k] = outputs[0]
         self.next_ns = int(stamps[-1]) + self.period_ns

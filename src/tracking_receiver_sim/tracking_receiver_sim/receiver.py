@@ -292,10 +292,9 @@ def forget(o):
 
 
 @compiled
-def step(state, constants, inputs, outputs, breaks, coefficients, normals):
-    """One drive step: STATE, CONSTANTS, INPUTS, OUTPUTS of shape (1,), breaks and coefficients of the Target,
-    normals (normals_per_step,). Never raises: OUTPUTS' status says what is missing."""
-    s, c, i, o = state[0], constants[0], inputs[0], outputs[0]
+def step(s, c, i, o, breaks, coefficients, normals):
+    """One drive step: records STATE, CONSTANTS, INPUTS, OUTPUTS, breaks and coefficients of the Target, normals
+    (normals_per_step,). Never raises: OUTPUTS' status says what is missing."""
     forget(o)
     if i.stamp_ns <= s.stamp_ns:
         o.status = STAMP_ORDER

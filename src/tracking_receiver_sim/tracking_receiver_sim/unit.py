@@ -1,70 +1,39 @@
-"""The tracking receiver between its messages: what it makes of those it hears, and what it puts into those it says.
+"""The unit of the tracking receiver: where the antenna points and where the ship is in, its channels out."""
+import math
+import typing
 
-The node answers one step at a time, a recomputed bag all of them at once, through the same `answers`.
-"""
 import numpy as np
 
-from pedestal_common import line_of_sight, messages, noise, records
+from pedestal_common import line_of_sight, nodes, noise
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
 from tracking_receiver_sim import receiver, target
 
-JOINTS, SHIP, ERROR, TARGET = 'joint_states', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
+JOINTS, SHIP, ERRORS, TARGET = 'joint_states', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
-HEARD, SAID = records.of(JOINTS, SHIP), records.of(ERROR, RATE, RANGE, TARGET)
 
-BLOCK = 2000
-"""Steps whose noise is drawn at once."""
+FAULTS = (receiver.NO_TARGET, receiver.NO_JOINTS, receiver.STAMP_ORDER)
+"""Statuses that are kept for the next diagnosis."""
 
 
-class TrackingReceiver:
-    """The receiver of a TrackingReceiverNodeParameters; on_ship: it hears where its deck is.
+RECORD = np.dtype([('state', receiver.STATE), ('constants', receiver.CONSTANTS), ('inputs', receiver.INPUTS),
+                   ('outputs', receiver.OUTPUTS), ('row', 'i8'), ('fault', 'i8')], align=True)
+"""row: of the noise that the next step takes; fault: the last of FAULTS since the last diagnosis, else LOCKED."""
 
-    heard, said: the records (1,) of one step; messages: {topic: message} it says; followers: {topic: latency [s]} that
-    a step waits for.
-    """
-    HEARD, SAID, WORDS = HEARD, SAID, {}
 
-    def __init__(self, params, on_ship):
-        self.target = target.build(params.target, params.duration)
-        self.constants = receiver.constants(params, params.period, self.target)
-        self.state = receiver.initial_state()
-        self.inputs, self.outputs = np.zeros(1, receiver.INPUTS), np.zeros(1, receiver.OUTPUTS)
-        self.inputs[0]['mat_ed'] = line_of_sight.ashore_matrix()
-        self.heard, self.said = np.zeros(1, HEARD), np.zeros(1, SAID)
-        self.rng = noise.generator(params.seed, 'tracking_receiver')
-        self.normals = receiver.normals_per_step(params)
-        self.messages = {ERROR: messages.vector3_stamped('beam')}
-        if params.receiver.rate.measured:
-            self.messages[RATE] = messages.vector3_stamped('beam')
-        if params.receiver.ranging.measured:
-            self.messages[RANGE] = messages.range_message('beam', params.antenna.beamwidth)
-        self.messages[TARGET] = messages.odometry('earth', 'target')
-        self.followers = {SHIP: 0.0} if on_ship else {}
-        self.events = {}
-
-    def prepare(self):
-        """Compile `answers`."""
-        answers(self.state.copy(), self.constants, self.inputs.copy(), self.outputs.copy(), self.target.breaks,
-                self.target.coefficients, np.zeros((1, self.normals)), self.heard, self.said.copy())
-
-    def answer(self):
-        """Answer `heard` with `said`."""
-        self.answers(self.heard, self.said)
-
-    def answers(self, heard, said):
-        """The same for many steps, records (n,)."""
-        for first in range(0, len(heard), BLOCK):
-            part = slice(first, first + BLOCK)
-            answers(self.state, self.constants, self.inputs, self.outputs, self.target.breaks,
-                    self.target.coefficients, self.rng.standard_normal((len(heard[part]), self.normals)), heard[part],
-                    said[part])
+class Memory(typing.NamedTuple):
+    """All the receiver works on: breaks and coefficients of the target's track, the noise of the next steps."""
+    record: np.ndarray
+    breaks: np.ndarray
+    coefficients: np.ndarray
+    normals: np.ndarray
 
 
 @compiled
-def hear(u, joints, ship):
+def decode(u, stamp, joints, ship):
     """Records of the messages of a step -> inputs of the receiver; the ship stays where it was until the next."""
-    u.stamp_ns = joints.stamp
+    u.stamp_ns = stamp
     u.azimuth, u.elevation = joints.position[0], joints.position[1]
     u.azimuth_rate, u.elevation_rate = joints.velocity[0], joints.velocity[1]
     u.valid = 1
@@ -77,25 +46,77 @@ def hear(u, joints, ship):
 
 
 @compiled
-def say(o, c, stamp, error, rate, distance, target_truth):
+def encode(o, c, stamp, outputs):
     """Outputs of the receiver -> records of its messages."""
+    error, rate, distance, truth = outputs[ERRORS], outputs[RATE], outputs[RANGE], outputs[TARGET]
     error.stamp = o.stamp_ns if o.due == 1 else NEVER
     error.vector[0], error.vector[1], error.vector[2] = o.cross_elevation, o.elevation, o.cn0_dbhz
     rate.stamp = error.stamp if c.rate_measured != 0 else NEVER
     rate.vector[0], rate.vector[1], rate.vector[2] = o.rate[0], o.rate[1], c.rate_sigma
     distance.stamp = error.stamp if c.range_measured != 0 else NEVER
     distance.range[0], distance.variance[0] = o.range, c.range_variance
-    target_truth.stamp = stamp
-    target_truth.orientation[3] = 1.0
+    truth.stamp = stamp
+    truth.orientation[3] = 1.0
     for i in range(3):
-        target_truth.position[i], target_truth.twist_linear[i] = o.target_position[i], o.target_velocity[i]
+        truth.position[i], truth.twist_linear[i] = o.target_position[i], o.target_velocity[i]
 
 
 @compiled
-def answers(state, constants, inputs, outputs, breaks, coefficients, normals, heard, said):
-    """Step by step: said[k] answers heard[k]."""
-    for k in range(len(heard)):
-        h, y = heard[k], said[k]
-        hear(inputs[0], h[JOINTS], h[SHIP])
-        receiver.step(state, constants, inputs, outputs, breaks, coefficients, normals[k])
-        say(outputs[0], constants[0], h[JOINTS].stamp, y[ERROR], y[RATE], y[RANGE], y[TARGET])
+def law(memory, stamp, inputs, outputs):
+    """Step k."""
+    m = memory.record[0]
+    decode(m.inputs, stamp, inputs[JOINTS], inputs[SHIP])
+    receiver.step(m.state, m.constants, m.inputs, m.outputs, memory.breaks, memory.coefficients,
+                  memory.normals[m.row])
+    m.row += 1
+    if m.outputs.status in FAULTS:
+        m.fault = m.outputs.status
+    encode(m.outputs, m.constants, stamp, outputs)
+
+
+@compiled
+def laws(memory, stamps, inputs, outputs):
+    """`law` over arrays."""
+    for k in range(len(stamps)):
+        law(memory, stamps[k], inputs[k], outputs[k])
+
+
+class TrackingReceiver(Unit):
+    """The receiver of a TrackingReceiverNodeParameters."""
+    NODE, LAWS = nodes.row('tracking_receiver'), {Memory: (law, laws)}
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        self.target = target.build(parameters.target, parameters.duration)
+        self._noise = noise.generator(parameters.seed, self.NODE.name)
+        constants = receiver.constants(parameters, parameters.period, self.target)
+        record = joined(RECORD, state=receiver.initial_state(), constants=constants, fault=receiver.LOCKED)
+        record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
+        self.memory = Memory(record, self.target.breaks, self.target.coefficients,
+                             np.zeros((1, receiver.normals_per_step(parameters))))
+        self.messages[RANGE].field_of_view = parameters.antenna.beamwidth
+        for topic, measured in ((RATE, parameters.receiver.rate.measured),
+                                (RANGE, parameters.receiver.ranging.measured)):
+            if not measured:
+                del self.messages[topic]
+
+    def block(self, steps):
+        self.parts['row'] = 0
+        return self.memory._replace(normals=self._noise.standard_normal((steps, self.memory.normals.shape[1])))
+
+    def diagnose(self):
+        outputs, fault = self.parts['outputs'], int(self.parts['fault'])
+        self.parts['fault'] = receiver.LOCKED
+        status, p = int(outputs['status']), self.parameters
+        sigma = receiver.angle_noise(p, float(outputs['cn0_dbhz']), p.period)
+        values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
+                  ('target', p.target.kind), ('angle_noise_deg', f'{math.degrees(sigma):.4g}')]
+        if self.target.start_time:
+            values.append(('stamp_0_utc', self.target.start_time))
+        if fault in FAULTS:
+            return Diagnosis(ERROR, receiver.STATUSES[fault], values)
+        return Diagnosis(OK if status == receiver.LOCKED else WARN, receiver.STATUSES[status], values)
+
+    @staticmethod
+    def idle(numbers):
+        return '' if np.isfinite(numbers[ERRORS][:, 0]).any() else 'the receiver never locked'

@@ -11,29 +11,26 @@ import math
 import numpy as np
 
 from pedestal_bringup.bags import columns
-from pedestal_common import messages, records, topics
+from pedestal_common import layouts, messages, topics
 
 REST = 'names, frames and the rest'
 """The field that stands for everything in a message that is neither its stamp nor one of its numbers."""
 
-ABSOLUTE = {'position': 1e-9, 'velocity': 1e-8, 'acceleration': 1e-6, 'effort': 1e-6, 'orientation': 1e-9,
-            'angular_velocity': 1e-9, 'linear_acceleration': 1e-9, 'twist': 1e-9}
-"""Absolute tolerance by the kind of number, in its own unit; 1e-9 for what is not named."""
 RELATIVE = 1e-9
+"""Relative tolerance; the absolute one is of the column (layouts)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Tolerance:
-    """How far numbers may differ: absolute and relative; None: by the kind of number. ignored: patterns of topics or
-    of topic.field that are not compared, for example 'acu/reference*'."""
+    """How far numbers may differ: absolute and relative; None: that of the column and RELATIVE. ignored: patterns of
+    topics or of topic.field that are not compared, for example 'acu/reference*'."""
     absolute: float | None = None
     relative: float | None = None
     ignored: tuple = ()
 
     def of(self, column):
-        """(absolute, relative) of a column."""
-        kind = next((part for part in column.split('.') if part in ABSOLUTE), '')
-        return (ABSOLUTE.get(kind, 1e-9) if self.absolute is None else self.absolute,
+        """(absolute, relative) of a layouts.Column."""
+        return (column.tolerance if self.absolute is None else self.absolute,
                 RELATIVE if self.relative is None else self.relative)
 
     def ignores(self, name):
@@ -102,7 +99,8 @@ class Output:
         """{column: array (n,)} with the names of columns.table."""
         if self.texts is not None:
             return {'t': self.stamps / 1e9, 'data': self.texts}
-        return {'t': self.stamps / 1e9, **dict(zip(records.columns(topic), self.values.T))}
+        return {'t': self.stamps / 1e9,
+                **{column.name: values for column, values in zip(layouts.columns(topic), self.values.T)}}
 
 
 def recorded(data, log, topic) -> Output:
@@ -112,9 +110,9 @@ def recorded(data, log, topic) -> Output:
     if type_name == 'std_msgs/msg/String':
         return Output(log, np.zeros((len(data), 0)), columns.table(data, type_name, log)['data'])
     table = columns.table(data, type_name, log)
-    values = np.full((len(data), len(records.columns(topic))), math.nan)
-    for number, name in enumerate(records.columns(topic)):
-        values[:, number] = table.get(name, math.nan)
+    values = np.full((len(data), len(layouts.columns(topic))), math.nan)
+    for number, column in enumerate(layouts.columns(topic)):
+        values[:, number] = table.get(column.name, math.nan)
     return Output(columns.stamps(data, type_name, log), values)
 
 
@@ -136,17 +134,18 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
         different = np.array([was.texts[i] != now.texts[j] for i, j in zip(here, there)], bool)
         add('data', different, different, np.full(different.size, math.inf))
         return difference
-    for number, column in enumerate(records.columns(topic)):
+    for number, column in enumerate(layouts.columns(topic)):
         a, b = was.values[here, number], now.values[there, number]
         absolute, relative = tolerance.of(column)
         different = ~((a == b) | (np.isnan(a) & np.isnan(b)))
         with np.errstate(invalid='ignore'):
             size = np.abs(b - a)
             beyond = different & ~(size <= absolute + relative * np.abs(a))
-        add(column, different, beyond, np.where(np.isfinite(size), size, math.inf))
+        add(column.name, different, beyond, np.where(np.isfinite(size), size, math.inf))
     if template is not None:
         type_name = topics.BY_NAME[topic].type
-        different = ~columns.alike(data, type_name, messages.serialize(template), records.columns(topic))
+        names = {column.name for column in layouts.columns(topic)}
+        different = ~columns.alike(data, type_name, messages.serialize(template), names)
         add(REST, different, different, np.full(different.size, math.inf), was.stamps)
     return difference
 

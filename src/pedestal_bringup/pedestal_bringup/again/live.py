@@ -15,12 +15,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from pedestal_bringup.again import difference as comparison
-from pedestal_bringup.again import recompute
-from pedestal_bringup.run import scenario
+from pedestal_bringup.again import difference, recompute
 from pedestal_bringup.run.graph import Operator, RunError, command_line, sole_run
-from pedestal_common import parameters, records, topics
-from pedestal_common.shell import QOS, message_class, set_middleware_defaults
+from pedestal_common import middleware, nodes, parameters, records
 from pedestal_common.steps import SECOND
 
 START = 300.0
@@ -31,30 +28,33 @@ STOP = 10.0
 
 
 class Feeder(Operator):
-    """Stands for everything around the node: writes what it hears, reads what it says."""
+    """Stands for everything around the node: writes what it reads, reads what it writes.
 
-    def __init__(self, node, heard):
+    inputs: topics that are fed; written: topics that are kept in `answers`.
+    """
+
+    def __init__(self, node, inputs, written):
         super().__init__()
         self.node = node
-        self.publishers_of = {name: self.create_publisher(message_class(topics.BY_NAME[name].type), name,
-                                                          QOS[topics.BY_NAME[name].qos]) for name in heard}
-        self.answers = {}
+        self.publishers_of = {name: self._publisher(self.links[name]) for name in inputs}
+        self.answers = {name: [] for name in written}
+        self.readers = []
 
-    def readers(self, said, nodes):
-        """The nodes the process waits for, which read what it says; the recorder keeps it in `answers`."""
-        self.answers = {name: [] for name in said}
-        made = []
-        written = [topic for topic in topics.TOPICS if self.node in topic.writers]
-        for reader in nodes:
+    def stand_in(self, names):
+        """Make nodes of these names, those the process is told of, which read what it writes."""
+        for reader in names:
             if reader not in (self.node, self.name):
-                made.append(rclpy.create_node(reader))
-                for topic in written:
-                    if reader in topics.readers(topic, nodes):
-                        kept = reader == 'recorder' and topic.name in said
-                        made[-1].create_subscription(
-                            message_class(topic.type), topic.name,
-                            self.answers[topic.name].append if kept else lambda data: None, QOS[topic.qos], raw=True)
-        return made
+                self.readers.append(rclpy.create_node(reader))
+                for link in self.links.values():
+                    if self.node in link.writers and reader in nodes.readers(link, names):
+                        kept = reader == 'recorder' and link.name in self.answers
+                        self.readers[-1].create_subscription(
+                            middleware.message_class(link.type), link.name,
+                            self.answers[link.name].append if kept else lambda data: None, middleware.qos(link.rate),
+                            raw=True)
+
+    def _publisher(self, link):
+        return self.create_publisher(middleware.message_class(link.type), link.name, middleware.qos(link.rate))
 
     def announce_now(self, name, data):
         """Publish a message that no step waits for, and wait until it has arrived."""
@@ -67,10 +67,10 @@ class Feeder(Operator):
 class Live:
     """The node's process and the feeder, spun until what is waited for has come."""
 
-    def __init__(self, feeder, readers, process, log):
+    def __init__(self, feeder, process, log):
         self.feeder, self.process, self.log = feeder, process, log
         self.executor = SingleThreadedExecutor()
-        for node in (feeder, *readers):
+        for node in (feeder, *feeder.readers):
             self.executor.add_node(node)
 
     def until(self, condition, limit, what):
@@ -97,40 +97,38 @@ def outputs(recording, done, params):
     if not recording.lockstep:
         raise recompute.RecomputeError('--live feeds in lockstep: a realtime recording, whose steps may lack inputs, '
                                        'is recomputed without it')
-    nodes = _graph(recording, done)
-    set_middleware_defaults()
+    middleware.set_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         with tempfile.TemporaryDirectory() as folder:
-            return _run(recording, done, params, nodes, pathlib.Path(folder))
+            return _run(recording, done, params, pathlib.Path(folder))
     finally:
         rclpy.try_shutdown()
 
 
-def _graph(recording, done):
+def _graph(recording, unit):
     """Names of the nodes the process is told of: itself, who records it, and whoever changes what it reads."""
-    around = {'acu': (('ins', 'ship/imu/data'), ('operator', 'acu/program_track')),
-              'adu': (('ship_motion', 'ship/truth'),), 'tracking_receiver': (('ship_motion', 'ship/truth'),)}
-    return (done.node, 'recorder', *(name for name, topic in around.get(done.node, ()) if recording.has(topic)))
+    optional = [node.name for node in nodes.NODES if (node.optional or node.name == 'operator')
+                and any(topic in unit.NODE.reads and recording.has(topic) for topic in node.writes)]
+    return (unit.NODE.name, 'recorder', *optional)
 
 
-def _run(recording, done, params, nodes, folder):
+def _run(recording, done, params, folder):
     file, log = folder / 'parameters.yaml', folder / 'log'
-    beams = recording.bag.beams
-    values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(nodes),
-              'graph.beams': beams}
+    names = _graph(recording, done.unit)
+    values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(names),
+              'graph.beams': recording.bag.beams}
     file.write_text(yaml.safe_dump({done.node: {'ros__parameters': values}}))
-    heard = [name for name in (*done.feed.rows, *{name for _, name, _ in done.feed.events})
-             if done.node not in topics.BY_NAME[name].writers]
-    feeder = Feeder(done.node, heard)
+    inputs = [name for name in done.unit.reads if recording.has(name) and name not in done.unit.NODE.writes]
+    feeder = Feeder(done.node, inputs, done.outputs)
     with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:
         feeder.refuse_company()
-        readers = feeder.readers(list(done.outputs), nodes)
-        process = subprocess.Popen(command_line(done.node, scenario.kind(done.node, beams > 0), file),
+        feeder.stand_in(names)
+        process = subprocess.Popen(command_line(done.node, done.unit.NODE.module, file),
                                    stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                                    env={**os.environ, 'ROS_LOG_DIR': str(folder)})
         try:
-            live = Live(feeder, readers, process, log)
+            live = Live(feeder, process, log)
             live.until(lambda: all(publisher.get_subscription_count() for publisher in feeder.publishers_of.values())
                        and feeder.count_publishers('diagnostics'), START, lambda: 'reader of its inputs')
             time.sleep(0.5)  # the other side of the discovery
@@ -163,32 +161,25 @@ def _feed(recording, done, live):
         names = [name for name, count in due.items() if len(feeder.answers[name]) < count[step]]
         return f'{", ".join(names)} for step {feed.stamps[step] / SECOND:.6f} s'
 
-    own = recompute.kind_of(recording, done.node).trigger not in feeder.publishers_of
     for step in range(len(feed.stamps)):
         for name, row in events[step]:
             feeder.announce_now(name, recording.data(name)[row])
-        if own:
-            live.until(lambda step=step: answered(step), START if step == 0 else PATIENCE,
-                       lambda step=step: missing(step))
-        # What is asked for before the answer to a step: the drive answers before it is fed.
-        for service, _ in done.requests.get(step + own, ()):
+        for service, _ in done.requests.get(step, ()):
             live.ask(service)
         for name, rows in feed.rows.items():
             if rows[step] >= 0 and name in feeder.publishers_of:
                 feeder.publishers_of[name].publish(recording.data(name)[rows[step]])
-        if not own:
-            live.until(lambda step=step: answered(step), START if step == 0 else PATIENCE,
-                       lambda step=step: missing(step))
+        live.until(lambda step=step: answered(step), START if step == 0 else PATIENCE, lambda step=step: missing(step))
     return steps
 
 
 def _due(done, name):
     """How many messages of a topic must have come by each step (n,)."""
-    if name in done.unit.WORDS:
+    if records.is_text(name):
         return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
-    return np.cumsum(records.slot(done.said, name).stamp != records.NEVER)
+    return np.cumsum(done.steps[name]['stamp'] != records.NEVER)
 
 
 def _output(name, data, done, steps):
     log = done.feed.stamps[np.array(steps[:len(data)], np.int64)]
-    return comparison.recorded([bytes(message) for message in data[:len(log)]], log, name)
+    return difference.recorded([bytes(message) for message in data[:len(log)]], log, name)

@@ -11,11 +11,11 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from pedestal_bringup.again.playlist import latched, reads
 from pedestal_bringup.again.terminal import RIGHT, StatusLine
 from pedestal_bringup.bags import bag as bags
-from pedestal_common import shell, topics
-from pedestal_common.shell import SECOND, GraphError
+from pedestal_common import middleware, nodes, shell
+from pedestal_common.steps import SECOND, GraphError
 
-ANSWERS = {'ship_motion': ('clock', 'ship/truth'), 'tracking_receiver': ('joint_states', 'target/truth'),
-           'acu': ('joint_states', 'acu/rate_command'), 'adu': (None, 'joint_states')}
+ANSWERS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
+           for node in nodes.NODES if node.answer}
 """{node: (topic, the topic on which the node answers it in every step, with the same stamp)}: what lockstep waits for.
 The drive begins the steps: it answers nothing (None). The INS answers late, by its latency, and is not waited for."""
 
@@ -44,9 +44,9 @@ _stamp_of = struct.Struct('<iI').unpack_from
 
 
 def answer_of(node, graph):
-    """ANSWERS of a node by its name in a graph {name: Topic}; an array of several beams is asked by its first."""
-    return tuple(name if name is None or name in graph else f'{topics.beam_of(node) or "beam_1"}/{name}'
-                 for name in ANSWERS[topics.plain(node)])
+    """ANSWERS of a node by its name in a graph {name: Link}; an array of several beams is asked by its first."""
+    return tuple(name if name is None or name in graph else f'{nodes.beam_of(node) or "beam_1"}/{name}'
+                 for name in ANSWERS[nodes.plain(node)])
 
 
 @dataclasses.dataclass
@@ -123,19 +123,19 @@ class Player(Node):
     """
 
     def __init__(self, playlist, companion, options, keyboard, stopped):
-        super().__init__(topics.STAND_IN)
+        super().__init__(nodes.STAND_IN)
         self.playlist, self.companion = playlist, companion
         self.nodes, self.deadline = options.nodes, options.deadline
         self.keyboard, self.stopped, self.status = keyboard, stopped, StatusLine()
         self.graph = playlist.bag.graph
         self.channels = {name: Channel(self._publisher(name, playlist.bag.topics[name])) for name in playlist.names}
         self.under_test = [NodeUnderTest(node, *answer_of(node, self.graph)) for node in self.nodes
-                           if topics.plain(node) in ANSWERS]
+                           if nodes.plain(node) in ANSWERS]
         self.pace = Pace(options.rate, options.paused)
         for topic in self.graph.values():
             if any(node in topic.writers for node in self.nodes):
                 self._listen(topic)
-        self.spinner = shell.make_executor()
+        self.spinner = middleware.make_executor()
         self.spinner.add_node(self)
         self.position = playlist.first
         self._next_look = self._next_readers = self._spun = 0.0
@@ -145,11 +145,11 @@ class Player(Node):
         if topic is not None and topic.type != type_name:
             raise bags.BagError(f'{self.playlist.bag.path}: {name} is a {type_name}; must be a {topic.type}')
         try:
-            kind = shell.message_class(type_name)
+            kind = middleware.message_class(type_name)
         except (ImportError, AttributeError, ValueError):
             raise bags.BagError(f'{self.playlist.bag.path}: {name} is of type {type_name}, which is not installed '
                                 'here; choose others with --topics') from None
-        return self.create_publisher(kind, name, shell.QOS[topic.qos if topic is not None else 'step'])
+        return self.create_publisher(kind, name, middleware.qos(topic.rate if topic is not None else 'step'))
 
     def _listen(self, topic):
         """Read what a node under test writes, in the place of the nodes that are not there."""
@@ -161,7 +161,7 @@ class Player(Node):
                 node.answered = max(node.answered, seconds * SECOND + nanoseconds)
                 node.answers += 1
         profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)
-        self.create_subscription(shell.message_class(topic.type), topic.name, take, profile, raw=True)
+        self.create_subscription(middleware.message_class(topic.type), topic.name, take, profile, raw=True)
 
     def _spin(self, seconds):
         self.spinner.spin_once(timeout_sec=seconds)

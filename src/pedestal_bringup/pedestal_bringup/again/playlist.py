@@ -11,43 +11,44 @@ import numpy as np
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import columns
-from pedestal_common import topics
+from pedestal_common import nodes, topics
 
 SECOND = 1_000_000_000
 
 
 def reads(graph, node, name):
-    """Whether a node of the graph {name: Topic} reads a topic; the recorder reads every one."""
+    """Whether a node of the graph {name: Link} reads a topic; the recorder reads every one."""
     return node == 'recorder' or name in graph and node in graph[name].readers
 
 
 def writes(graph, node, name):
-    """Whether a node of the graph {name: Topic} writes a topic."""
+    """Whether a node of the graph {name: Link} writes a topic."""
     return name in graph and node in graph[name].writers
 
 
 def latched(graph, name):
-    """Whether a topic of the graph {name: Topic} holds until its next message."""
-    return name in graph and graph[name].qos == 'state'
+    """Whether a topic of the graph {name: Link} holds until its next message."""
+    return name in graph and topics.QOS[graph[name].rate].latched
 
 
-def select(bag, nodes, names):
-    """The topics of a bag.Bag to publish: those named, else those the nodes read and none of them writes, else all.
+def select(bag, of, names):
+    """The topics of a bag.Bag to publish: those named, else those that the nodes `of` read and none of
+    them writes, else all.
 
     Raises BagError for a topic that is not in the bag, an unknown node, and a node that reads nothing of the bag.
     """
     if names:
         return bags.chosen_topics(bag, names)
-    if not nodes:
+    if not of:
         return list(bag.topics)
-    chosen, graph, known = [], bag.graph, topics.members(topics.NODES, bag.beams)
-    for node in nodes:
+    chosen, graph, known = [], bag.graph, nodes.members(nodes.NAMES, bag.beams)
+    for node in of:
         if node not in known:
             near = difflib.get_close_matches(node, known, n=1)
             hint = f'did you mean {near[0]}? ' if near else ''
             raise bags.BagError(f'--node {node} is no node; {hint}there are {", ".join(known)}')
         of_node = [name for name in bag.topics
-                   if reads(graph, node, name) and not any(writes(graph, other, name) for other in nodes)]
+                   if reads(graph, node, name) and not any(writes(graph, other, name) for other in of)]
         if not of_node:
             wanted = ', '.join(name for name in graph if reads(graph, node, name))
             raise bags.BagError(f'{bag.path}: nothing in it for node {node}, which reads {wanted}')

@@ -13,79 +13,32 @@ both       services are not recorded: a change of acu/mode or adu/state that the
 """
 import dataclasses
 import time
-import typing
 
 import numpy as np
 import yaml
 
-from acu_tracker.unit import Acu
-from adu_drive.beam_unit import Beam
-from adu_drive.unit import Adu
-from pedestal_bringup.again import difference as comparison
+from pedestal_bringup.again import difference
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import scenario
-from pedestal_common import messages, parameters, records, topics
-from pedestal_common.records import NEVER
+from pedestal_common import messages, nodes, parameters, records, topics
 from pedestal_common.steps import SECOND, GraphError, Steps
-from ship_motion_sim.ins_unit import Ins
-from ship_motion_sim.ship_unit import ShipMotion
-from tracking_receiver_sim.unit import TrackingReceiver
+from pedestal_common.unit import announced
 
-MODE, COMMAND, ERROR = 'acu/mode', 'acu/rate_command', 'tracking_receiver/angle_error'
-REFERENCE = 'acu/reference'
 AFTER_ALL = 2**63 - 1
+"""Stamp of the step of a message after which its writer answered none."""
+
+UNITS = tuple(node.name for node in nodes.NODES if node.unit)
+"""Nodes that can be recomputed."""
 
 
-def _never_tracked(outputs, inputs):
-    if not np.isfinite(inputs[ERROR].numbers[:, 0]).any():
-        return 'the receiver never locked'
-    return '' if 'autotrack' in outputs[MODE].texts else 'the ACU was never in autotrack'
+def row_of(recording, node) -> nodes.Node:
+    """The row of a node as a recording has it: its drive may be an array."""
+    return nodes.row(node, recording.bag.beams > 0)
 
 
-def _never_locked(outputs, _inputs):
-    return '' if np.isfinite(outputs[ERROR].values[:, 0]).any() else 'the receiver never locked'
-
-
-def _never_moved(_outputs, inputs):
-    command = inputs[COMMAND]
-    return '' if (command.numbers[command.stamp != NEVER, 2:4] != 0.0).any() else 'the drive was never told to move'
-
-
-def _never_steered(_outputs, inputs):
-    reference = inputs[REFERENCE]
-    angles = reference.numbers[reference.stamp != NEVER, :2]
-    return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'
-
-
-def _never_sailed(outputs, _inputs):
-    return '' if any(np.ptp(output.values, axis=0).any() for output in outputs.values() if len(output.stamps)) else \
-        'the ship never moved'
-
-
-class Kind(typing.NamedTuple):
-    """How a node is recomputed: its unit(parameters, on_ship), the topic that begins its steps, the topic whose
-    presence says that it is on a ship, idle(outputs, inputs) -> why the recording does not exercise it, or ''."""
-    unit: type
-    trigger: str
-    ship: str
-    idle: typing.Callable
-
-
-KINDS = {
-    'ship_motion': Kind(ShipMotion, 'clock', 'clock', _never_sailed),
-    'ins': Kind(Ins, 'ship/imu/data_raw', 'ship/imu/data_raw', _never_sailed),
-    'tracking_receiver': Kind(TrackingReceiver, 'joint_states', 'ship/truth', _never_locked),
-    'acu': Kind(Acu, 'joint_states', 'ship/imu/data', _never_tracked),
-    'adu': Kind(Adu, 'joint_states', 'ship/truth', _never_moved),
-}
-"""The drive's steps begin with its own joint states."""
-
-BEAM = Kind(Beam, 'joint_states', 'ship/truth', _never_steered)
-"""What `adu` is where an array was recorded."""
-
-
-def kind_of(recording, node):
-    return BEAM if node == 'adu' and recording.bag.beams else KINDS[node]
+def writer_of(topic) -> nodes.Node:
+    """The Node that writes a topic."""
+    return next(node for node in nodes.NODES if topic in node.writes)
 
 
 class RecomputeError(ValueError):
@@ -124,11 +77,11 @@ class Recording:
             self._data[topic] = [data for _, _, _, data in self.bag.raw(topic)]
         return self._data[topic]
 
-    def output(self, topic) -> comparison.Output:
+    def output(self, topic) -> difference.Output:
         """Its messages as numbers."""
         if topic not in self._outputs:
             try:
-                output = comparison.recorded(self.data(topic), self.rows(topic).log, topic)
+                output = difference.recorded(self.data(topic), self.rows(topic).log, topic)
                 self._outputs[topic] = output if output.texts is None else dataclasses.replace(
                     output, stamps=self.steps(topic))
             except ValueError as error:
@@ -140,7 +93,7 @@ class Recording:
         others they came before the answer to that step; AFTER_ALL where none came any more, their log where no answer
         was recorded."""
         log = self.rows(topic).log
-        answer = 'joint_states' if topics.BY_NAME[topic].writers == ('adu',) else COMMAND
+        answer = writer_of(topic).writes[0]
         if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(answer):
             return log
         after = np.searchsorted(self.arrival(answer), self.arrival(topic))
@@ -158,10 +111,13 @@ class Recording:
 
 @dataclasses.dataclass
 class Feed:
-    """The inputs of a node by step: heard (n,) of its HEARD; rows: {topic: row of its message at each step, -1 none};
-    stamps (n,) [ns]; events: [(step before which, topic, row)]; problem: why it ends early, or ''; refused: messages
-    that no step took."""
-    heard: np.ndarray
+    """The inputs of a unit by step.
+
+    inputs (n,) of its record; rows: {topic: row of its message at each step, -1 none}; stamps (n,) [ns]; events:
+    [(step before which it came, topic, row)] of what no step waits for, whose texts are in inputs as well; problem:
+    why it ends early, or ''; refused: messages that no step took.
+    """
+    inputs: np.ndarray
     rows: dict
     stamps: np.ndarray
     events: list
@@ -169,9 +125,13 @@ class Feed:
     refused: int
 
 
-def feed(recording, unit, trigger) -> Feed:
-    """Match the recorded inputs of a unit to its steps."""
-    names = [trigger, *unit.followers]
+def feed(recording, unit) -> Feed:
+    """Match the recorded inputs of a unit to its steps. A drive makes its own steps: where its clock was not recorded,
+    its joint states tell them."""
+    paces = unit.trigger in unit.NODE.writes
+    trigger = unit.NODE.writes[0] if paces and not recording.has(unit.trigger) else unit.trigger
+    latencies = unit.latencies
+    names = [trigger, *latencies]
     for name in names:
         if not recording.has(name):
             raise RecomputeError(f'{recording.bag.path}: no {name} in it, which the node hears')
@@ -183,8 +143,8 @@ def feed(recording, unit, trigger) -> Feed:
     order = np.lexsort((sources, stamps)) if recording.lockstep else np.argsort(arrival, kind='stable')
 
     steps, taken = [], []
-    matched = Steps(trigger, {name: round(latency * SECOND) for name, latency in unit.followers.items()},
-                    recording.lockstep, lambda *step: steps.append(step))
+    matched = Steps(trigger, {name: round(latency * SECOND) for name, latency in latencies.items()},
+                    recording.lockstep, lambda *step: steps.append(step), prompt=paces)
     problem = ''
     try:
         take = matched.take
@@ -194,172 +154,180 @@ def feed(recording, unit, trigger) -> Feed:
                 taken.append(at)
     except GraphError as error:
         problem = f'inputs: {error}'
-    heard, rows, stamps = _gathered(recording, unit, trigger, steps)
-    return Feed(heard, rows, stamps, _events(recording, unit, stamps, taken), problem, matched.refused)
+    stamps = np.array([stamp for stamp, _, _ in steps], np.int64)
+    inputs, rows = _gathered(recording, unit, trigger, steps)
+    events = _events(recording, unit, stamps, taken)
+    for step, topic, row in events:
+        if records.is_text(topic):
+            inputs[topic][step:] = records.code_of(topic, recording.output(topic).texts[row])
+    return Feed(inputs, rows, stamps, events, problem, matched.refused)
 
 
 def _events(recording, unit, stamps, taken):
     """[(step before which it came, topic, row)] of the messages that no step waits for, in order; taken (n,): when the
-    last input of each step came. What a writer says along with a follower that is late comes as late."""
-    found = []
-    for name in unit.events:
-        if recording.has(name):
-            if recording.has(COMMAND) or recording.bag.metadata.get('pacing') == 'lockstep':
-                late = max((latency for follower, latency in unit.followers.items()
-                            if topics.BY_NAME[follower].writers == topics.BY_NAME[name].writers), default=0.0)
+    last input of each step came. What a writer says along with a late message of its own comes as late."""
+    events = []
+    for name in unit.reads:
+        if topics.BY_NAME[name].rate != 'step' and recording.has(name):
+            if recording.has(unit.NODE.writes[0]) or recording.bag.metadata.get('pacing') == 'lockstep':
+                late = max((latency for other, latency in unit.latencies.items()
+                            if writer_of(other) is writer_of(name)), default=0.0)
                 steps = np.searchsorted(stamps - round(late * SECOND), recording.steps(name))
             else:
                 steps = np.searchsorted(taken, recording.arrival(name))
-            found += [(step, name, row) for row, step in enumerate(steps.tolist())]
-    return sorted(found, key=lambda event: event[0])
+            events += [(step, name, row) for row, step in enumerate(steps.tolist())]
+    return sorted(events, key=lambda event: event[0])
 
 
 def _gathered(recording, unit, trigger, steps):
-    """(records of HEARD (n,), rows, stamps) of matched steps."""
-    taken = {trigger: np.array([row for _, row, _ in steps], np.int64)}
-    for name in unit.followers:
-        taken[name] = np.array([-1 if row[name] is None else row[name] for _, _, row in steps], np.int64)
-    heard = np.zeros(len(steps), unit.HEARD)
-    for name in unit.HEARD.names:
-        place = records.slot(heard, name)
-        rows = taken.get(name)
-        came = rows >= 0 if rows is not None else np.zeros(len(steps), bool)
-        place.stamp[:] = NEVER
-        if came.any():
-            output = recording.output(name)
-            place.stamp[came] = output.stamps[rows[came]]
-            place.numbers[came] = output.values[rows[came]]
-    return heard, taken, np.array([stamp for stamp, _, _ in steps], np.int64)
+    """(inputs (n,), rows) of matched steps."""
+    rows = {trigger: np.array([row for _, row, _ in steps], np.int64)}
+    for name in unit.latencies:
+        rows[name] = np.array([-1 if row[name] is None else row[name] for _, _, row in steps], np.int64)
+    inputs = records.empty(unit.inputs_type(), len(steps))
+    for name, of_step in rows.items():
+        if name in inputs.dtype.names:
+            came, output = of_step >= 0, recording.output(name)
+            inputs[name]['stamp'][came] = output.stamps[of_step[came]]
+            records.numbers(inputs, name)[came] = output.values[of_step[came]]
+    return inputs, rows
 
 
-def compute(recording, unit, fed, states=None, requests=()):
-    """(said (n,), requests made {step: [(service, granted)]}) of a unit on a Feed.
+def state_of(unit) -> str:
+    """The text topic that tells the state of a unit which can be asked for one; '' where it cannot."""
+    told = [name for name in unit.NODE.writes if records.is_text(name) and name not in unit.MOMENTARY]
+    return told[0] if unit.REQUESTS else ''
+
+
+def compute(recording, unit, fed, states=None, requests=None):
+    """(outputs (n,), requests made {step: [(service, granted)]}) of a unit on a Feed.
 
     states: {step: text} of the unit's state as recorded; where it does not come to it by itself, it is asked to.
     requests: {step: [service]} that are asked for whatever happens.
     """
-    states, made, events = states or {}, {}, {}
+    states, requests, made, events = states or {}, requests or {}, {}, {}
+    state = state_of(unit)
     for step, topic, row in fed.events:
-        events.setdefault(step, []).append((topic, row))
-    said = np.zeros(len(fed.heard), unit.SAID)
+        if not records.is_text(topic):
+            events.setdefault(step, []).append((topic, row))
+    outputs = records.empty(unit.outputs_type(), len(fed.inputs))
+
+    def advance(first, last):
+        unit.step(fed.stamps[first:last], fed.inputs[first:last], outputs[first:last])
+
+    def ask(services, step):
+        unit.inputs[0] = fed.inputs[step]
+        return [(service, unit.request(service).granted) for service in services]
+
     last = 0
-    for step in sorted({*events, *states, *requests, len(said)}):
-        unit.answers(fed.heard[last:step], said[last:step])
+    for step in sorted({*events, *states, *requests, len(outputs)}):
+        advance(last, step)
         last = step
-        if step == len(said):
+        if step == len(outputs):
             break
         for topic, row in events.get(step, ()):
             try:
-                unit.events[topic](messages.deserialize(recording.data(topic)[row], topics.BY_NAME[topic].type))
+                unit.decode(topic, messages.deserialize(recording.data(topic)[row], topics.BY_NAME[topic].type))
             except ValueError:
                 pass  # refused, as the node does
         if step in requests:
-            made[step] = [(service, unit.request(service)) for service in requests[step]]
+            made[step] = ask(requests[step], step)
         elif step in states:
-            [(name, words)] = unit.WORDS.items()
-            before = [array.copy() for array in unit.remembers]
-            unit.answers(fed.heard[step:step + 1], said[step:step + 1])
+            before = unit.memory.record.copy()
+            advance(step, step + 1)
             last = step + 1
-            if words(int(said[step][name])) != states[step]:
-                for array, values in zip(unit.remembers, before):
-                    array[...] = values
-                made[step] = [(service, unit.request(service)) for service in unit.services_to(states[step])]
+            if unit.encode(state, int(outputs[step][state])) != states[step]:
+                unit.memory.record[...] = before
+                made[step] = ask(unit.requests_for(state, states[step]), step)
                 last = step
-    return said, {step: done for step, done in made.items() if done}
+    return outputs, {step: done for step, done in made.items() if done}
 
 
-def outputs_of(unit, fed, said):
-    """{topic: Output} of what a unit said. A text belongs to the step its writer answers with it, by the answer's
-    stamp where that is late."""
-    found = {}
-    answer = next(said[name]['stamp'] for name in unit.SAID.names if name in unit.messages)
-    stamps = np.where(answer != NEVER, answer, fed.stamps)
-    for name in unit.SAID.names:
-        if name in unit.WORDS:
-            found[name] = _announced(stamps, said[name], unit.WORDS[name])
-        elif name in unit.messages:
-            place = records.slot(said, name)
-            sent = place.stamp != NEVER
-            found[name] = comparison.Output(place.stamp[sent], place.numbers[sent])
-    return found
-
-
-def _announced(stamps, codes, words):
-    """The Output of a topic that tells the words of a code when they change."""
-    change, texts = [], []
-    for step in np.flatnonzero(np.diff(codes, prepend=-1)).tolist():
-        text = words(int(codes[step]))
-        if not texts or text != texts[-1]:
-            change.append(step)
-            texts.append(text)
-    return comparison.Output(stamps[np.array(change, np.int64)], np.zeros((len(change), 0)), texts)
+def outputs_of(unit, fed, outputs):
+    """{topic: Output} of what a unit wrote in outputs (n,)."""
+    written = {}
+    for name in unit.NODE.writes:
+        if not records.is_text(name):
+            sent = outputs[name]['stamp'] != records.NEVER
+            written[name] = difference.Output(outputs[name]['stamp'][sent], records.numbers(outputs, name)[sent])
+        elif name not in unit.MOMENTARY:
+            stamps, texts = announced(unit, name, fed.stamps, outputs)
+            written[name] = difference.Output(stamps, np.zeros((len(stamps), 0)), texts)
+    return {name: output for name, output in written.items() if name in unit.messages or output.texts is not None}
 
 
 @dataclasses.dataclass
 class Recomputed:
-    """One node on one recording."""
+    """One node on one recording: steps (n,), what it wrote in each step of its feed; outputs, the same by topic."""
     node: str
     unit: object
     feed: Feed
-    said: np.ndarray
+    steps: np.ndarray
     outputs: dict
     requests: dict
+
+
+def unit_of(recording, node, params):
+    """The unit of a node with parameters of its dataclass, in the graph that was recorded."""
+    row = row_of(recording, node)
+    names = [other.name for other in nodes.NODES if any(map(recording.has, other.writes))]
+    flags = [flag for flag in topics.FLAGS if getattr(params, flag, False)]
+    return row.unit_type()(params, nodes.reads(row, names, flags))
 
 
 def recompute(recording, node, params, requests=None) -> Recomputed:
     """Recompute a node with parameters of its dataclass. requests {step: [service]}: what was asked of it; None: what
     its recorded states tell."""
-    kind = kind_of(recording, node)
-    unit = kind.unit(params, recording.has(kind.ship))
-    fed = feed(recording, unit, kind.trigger)
-    if requests is None:
-        # an INS tells its state and cannot be asked for one
-        told = unit.WORDS if hasattr(unit, 'request') else ()
-        states = {step: text for name in told for step, text in recording.states(name, fed.stamps).items()}
-        said, made = compute(recording, unit, fed, states)
-    else:
-        said, made = compute(recording, unit, fed, requests=requests)
-    return Recomputed(node, unit, fed, said, outputs_of(unit, fed, said), made)
+    unit = unit_of(recording, node, params)
+    fed = feed(recording, unit)
+    states = recording.states(state_of(unit), fed.stamps) if requests is None and unit.REQUESTS else None
+    outputs, made = compute(recording, unit, fed, states, requests)
+    return Recomputed(node, unit, fed, outputs, outputs_of(unit, fed, outputs), made)
 
 
 def idle(recording, done) -> str:
     """Why the recording does not exercise a node; '' if it does. Recorded outputs are asked where there are any."""
-    outputs = {name: recording.output(name) if recording.has(name) else output
-               for name, output in done.outputs.items()}
-    inputs = {name: records.slot(done.feed.heard, name) for name in done.unit.HEARD.names}
-    return kind_of(recording, done.node).idle(outputs, inputs)
+    numbers = {}
+    for name, output in done.outputs.items():
+        output = recording.output(name) if recording.has(name) else output
+        numbers[name] = output.values if output.texts is None else output.texts
+    for name, rows in done.feed.rows.items():
+        numbers[name] = recording.output(name).values[rows[rows >= 0]]
+    return done.unit.idle(numbers)
 
 
 def compare(recording, outputs, unit, tolerance) -> list:
-    """TopicComparison of every output that was recorded."""
-    found = []
+    """TopicDifference of every output that was recorded."""
+    compared = []
     for name, output in outputs.items():
         if recording.has(name) and not tolerance.ignores(name):
             template = unit.messages.get(name)
-            found.append(comparison.compare(name, recording.output(name), output, tolerance,
-                                            recording.data(name) if template else None, template))
-    return found
+            compared.append(difference.compare(name, recording.output(name), output, tolerance,
+                                               recording.data(name) if template else None, template))
+    return compared
 
 
-def chosen(recording, nodes, file_values):
+def chosen(recording, names, file_values):
     """The nodes to recompute: those named, else those whose parameters are known and whose inputs and outputs are
     there, and the ACU also without outputs; of a recording that does not say how it was made, the ACU."""
-    nodes = [node.removeprefix(recording.bag.beam) for node in nodes]
-    for node in nodes:
-        if topics.beam_of(node):
-            raise RecomputeError(f'--node {node}: of one beam at a time; say --beam {topics.beam_of(node)} --node '
-                                 f'{topics.plain(node)}')
-        if node not in KINDS:
-            raise RecomputeError(f'--node {node}: must be one of {", ".join(KINDS)}')
+    names = [name.removeprefix(recording.bag.beam) for name in names]
+    for name in names:
+        if nodes.beam_of(name):
+            raise RecomputeError(f'--node {name}: of one beam at a time; say --beam {nodes.beam_of(name)} --node '
+                                 f'{nodes.plain(name)}')
+        if name not in UNITS:
+            raise RecomputeError(f'--node {name}: must be one of {", ".join(UNITS)}')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
-    kinds = {node: kind_of(recording, node) for node in KINDS}
-    able = [node for node, kind in kinds.items() if recording.has(kind.trigger) and node in (known or ('acu',))
-            and (node == 'acu' or any(map(recording.has, kind.unit.SAID.names)))]
-    found = [node for node in KINDS if node in nodes] if nodes else able
-    if not found:
+
+    def able(name):
+        row = row_of(recording, name)
+        begun = recording.has(row.reads[0]) or row.reads[0] in row.writes and recording.has(row.writes[0])
+        return begun and name in (known or ('acu',)) and (name == 'acu' or any(map(recording.has, row.writes)))
+    selected = [name for name in UNITS if (name in names if names else able(name))]
+    if not selected:
         raise RecomputeError(f'{recording.bag.path}: no node whose inputs are in it; there are '
                              f'{", ".join(recording.bag.topics)}')
-    return found
+    return selected
 
 
 def file_parameters(path, beam=''):
@@ -375,27 +343,27 @@ def file_parameters(path, beam=''):
         raise RecomputeError(f'--params-file {path}: must hold a section for a node')
     if 'scenario' in tree and 'recorder' not in tree:
         chosen = scenario.load(str(path))
-        return {node: chosen.given(beam + node if node in topics.BEAM_NODES else node) for node in chosen.values
-                if not topics.beam_of(node)}
+        return {node: chosen.given(beam + node if nodes.row(node).of_beam else node) for node in chosen.values
+                if not nodes.beam_of(node)}
     found = {}
     for name, body in tree.items():
         node = name.removeprefix(beam)
-        if node in KINDS:
+        if node in UNITS:
             if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
                 raise RecomputeError(f'--params-file {path}: section {node} must hold ros__parameters')
             found[node] = scenario.dotted(body['ros__parameters'])
     return found
 
 
-def overrides(texts, nodes):
+def overrides(texts, names):
     """{node: {key: value}} of texts [node.]key=value; the node may be left out where there is only one."""
     found = {}
     for text in texts:
-        if text.partition('=')[0].partition('.')[0] not in scenario.NODE_KINDS and len(nodes) == 1:
-            text = f'{nodes[0]}.{text}'
+        if text.partition('=')[0].partition('.')[0] not in scenario.RUN and len(names) == 1:
+            text = f'{names[0]}.{text}'
         node, key, value = scenario.parse_override(text)
-        if node not in nodes:
-            raise RecomputeError(f'--param {text}: {node} is not recomputed; that is {", ".join(nodes)}')
+        if node not in names:
+            raise RecomputeError(f'--param {text}: {node} is not recomputed; that is {", ".join(names)}')
         found.setdefault(node, {})[key] = value
     return found
 
@@ -404,11 +372,9 @@ def parameters_of(recording, node, file_values=None, changes=()):
     """The parameter dataclass of a node: of the file, else as recorded, else the defaults; then changed."""
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
-    array = recording.bag.beams > 0
     try:
-        params = parameters.build(scenario.kind(node, array).parameters, {**values, **dict(changes)})
-        if node == 'acu':
-            params.check_drive(array)
+        params = parameters.build(row_of(recording, node).parameters_type(), {**values, **dict(changes)})
+        params.check_graph(recording.bag.beams)
         return params
     except parameters.ParameterError as error:
         raise RecomputeError(f'{node}: {error}') from None
@@ -419,7 +385,7 @@ def measure(path, node='acu'):
     def run():
         recording = Recording(path)
         done = recompute(recording, node, parameters_of(recording, node))
-        compare(recording, done.outputs, done.unit, comparison.Tolerance())
+        compare(recording, done.outputs, done.unit, difference.Tolerance())
         return (done.feed.stamps[-1] - done.feed.stamps[0]) / SECOND
 
     run()

@@ -196,8 +196,5 @@ def _bytes(topic, output, templates):
     """The CDR messages of an Output."""
     if output.texts is not None:
         return [messages.serialize(messages.String(data=text)) for text in output.texts]
-    message, made = templates[topic], []
-    for stamp, values in zip(output.stamps.reshape(-1, 1), output.values):
-        records.put(message, records.Slot(stamp, values))
-        made.append(messages.serialize(message))
-    return made
+    encoder = records.Encoder(topic, templates[topic])
+    return [encoder.bytes_of(stamp, values) for stamp, values in zip(output.stamps.tolist(), output.values)]

@@ -12,8 +12,8 @@ from pedestal_bringup.again.player import ANSWERS, Player, answer_of
 from pedestal_bringup.again.playlist import Playlist, select, writes
 from pedestal_bringup.again.terminal import Keyboard
 from pedestal_bringup.bags import bag as bags
-from pedestal_common import shell, topics
-from pedestal_common.shell import SECOND
+from pedestal_common import middleware, nodes, shell
+from pedestal_common.steps import SECOND
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,7 +92,7 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
     keyboard = Keyboard()
     if options.paused and not keyboard.there:
         raise ValueError('--paused: standard input is no terminal, no key could end the pause')
-    shell.set_middleware_defaults()
+    middleware.set_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         with _stop_by_signal() as stopped, keyboard:
@@ -117,10 +117,11 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
         rclpy.try_shutdown()
 
 
-def _check_lockstep(nodes, chosen, graph):
-    answering = [node for node in nodes if topics.plain(node) in ANSWERS]
+def _check_lockstep(under_test, chosen, graph):
+    answering = [node for node in under_test if nodes.plain(node) in ANSWERS]
     if not answering:
-        why = f'{", ".join(nodes)} answers no step at its stamp' if nodes else 'say with --node who answers the steps'
+        why = (f'{", ".join(under_test)} answers no step at its stamp' if under_test else
+               'say with --node who answers the steps')
         raise ValueError(f'--lockstep: {why}; there are {", ".join(ANSWERS)}')
     for node in answering:
         trigger, _ = answer_of(node, graph)

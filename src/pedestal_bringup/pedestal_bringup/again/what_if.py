@@ -13,7 +13,7 @@ import numpy as np
 from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.analysis.results import Result
 from pedestal_bringup.analysis.tracking import DEGREES, largest, rms
-from pedestal_common.messages import AXES
+from pedestal_common.topics import AXES
 
 RIPPLE = 0.25
 """What is faster than a moving mean of this length [s] counts as noise of a command."""

@@ -13,7 +13,7 @@ from scipy import special
 
 from acu_tracker.geometry import deck_reference
 from pedestal_bringup.analysis import tracking
-from pedestal_common import line_of_sight, messages
+from pedestal_common import line_of_sight, topics
 from pedestal_common.compiled import compiled
 
 FREEDOMS = 2
@@ -29,7 +29,7 @@ class Consistency:
     """The numbers of acu/filter on the steps of a Tracking: arrays (n, 2) of azimuth and elevation, NaN where none.
 
     innovation [rad], rate_innovation [rad/s], nis; sigma [rad], rate_sigma [rad/s] and correlation that the filter
-    states of its estimate; probability (n, 2, 4) of messages.MODELS; error, rate_error: estimate less truth [rad,
+    states of its estimate; probability (n, 2, 4) of topics.MOTION_MODELS; error, rate_error: estimate less truth [rad,
     rad/s]; nees of the two; tracking (n,) bool: the evaluated part.
     """
     t: np.ndarray
@@ -72,12 +72,12 @@ def read(bag, run):
         return None
     t = run.t
     at_steps = functools.partial(tracking.on_grid, bag, t)
-    numbers = at_steps('acu/filter', [f'{axis}_{name}.position' for name in NAMES for axis in messages.AXES])
+    numbers = at_steps('acu/filter', [f'{axis}_{name}.position' for name in NAMES for axis in topics.AXES])
     numbers = dict(zip(NAMES, np.split(numbers, len(NAMES), axis=1)))
-    probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in messages.AXES
-                                         for model in messages.MODELS]).reshape(t.size, 2, -1)
+    probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in topics.AXES
+                                         for model in topics.MOTION_MODELS]).reshape(t.size, 2, -1)
     estimate = at_steps('acu/estimate', [f'{axis}.{field}' for field in ('position', 'velocity')
-                                        for axis in messages.AXES])
+                                        for axis in topics.AXES])
     place, twist = ('position.x', 'position.y', 'position.z'), ('twist.linear.x', 'twist.linear.y', 'twist.linear.z')
     relative, velocity = at_steps('target/truth', place), at_steps('target/truth', twist)
     attitude, ship_velocity = np.tile(line_of_sight.ASHORE, (t.size, 1)), np.zeros((t.size, 3))

@@ -14,7 +14,7 @@ import numpy as np
 from acu_tracker.servo import feedforward
 from adu_drive import drive_unit
 from adu_drive.params import WindParameters
-from pedestal_common import messages
+from pedestal_common import topics
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import record
 
@@ -82,7 +82,7 @@ def _drive(state, constants, inputs, outputs, rate, torque, position):
         position[k, 0], position[k, 1] = y.azimuth.position, y.elevation.position
         u.azimuth.rate, u.elevation.rate = rate[k, 0], rate[k, 1]
         u.azimuth.torque, u.elevation.torque = torque[k, 0], torque[k, 1]
-        drive_unit.step(state, constants, inputs, outputs)
+        drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 def identify(scenario, torque=True) -> dict:
@@ -91,16 +91,16 @@ def identify(scenario, torque=True) -> dict:
     Raises ValueError for a period that does not divide PERIOD, and for travel that is too short.
     """
     acu, drive = scenario.node_parameters('acu'), scenario.node_parameters('adu')
-    axes = [getattr(drive, name) for name in messages.AXES]
+    axes = [getattr(drive, name) for name in topics.AXES]
     duration = (DROPPED + KEPT) * PERIOD
     start = {f'initial_{name}': 0.5 * (axis.limits.lower + axis.limits.upper - rate * duration)
-             for name, axis, rate in zip(messages.AXES, axes, RATE)}
+             for name, axis, rate in zip(topics.AXES, axes, RATE)}
     drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True, **start)
     w = 2.0 * math.pi * FREQUENCIES
     steps = round(PERIOD / drive.period)
     if abs(steps * drive.period - PERIOD) > 1e-9:
         raise ValueError(f'adu.period = {drive.period:g} s: must divide the {PERIOD:g} s it is identified over')
-    for name, axis, rate in zip(messages.AXES, axes, RATE):
+    for name, axis, rate in zip(topics.AXES, axes, RATE):
         if axis.limits.upper - axis.limits.lower < 1.1 * rate * duration:
             raise ValueError(f'adu.{name}.limits: travel must be at least '
                              f'{1.1 * rate * duration:g} rad to identify the drive')
@@ -110,18 +110,18 @@ def identify(scenario, torque=True) -> dict:
     v, a = PEAK * np.cos(angle).sum(axis=1), -PEAK * (w * np.sin(angle)).sum(axis=1)
     rate, acceleration = np.tile(v, DROPPED + KEPT)[:, np.newaxis] + RATE, np.tile(a, DROPPED + KEPT)
     torques = np.zeros_like(rate)
-    for i, name in enumerate(messages.AXES if torque else ()):
+    for i, name in enumerate(topics.AXES if torque else ()):
         known = record(getattr(acu, name).feedforward)[0]
         torques[:, i] = [feedforward.torque(*motion, known) for motion in zip(rate[:, i], acceleration)]
     state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
     inputs, outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
     inputs['enable'] = 1
-    drive_unit.read(state, constants, outputs)
+    drive_unit.read(state[0], constants[0], outputs[0])
     position = np.empty_like(rate)
     _drive(state, constants, inputs, outputs, rate, torques, position)
     kept = slice(DROPPED * steps, None)
     loops = {}
-    for i, name in enumerate(messages.AXES):
+    for i, name in enumerate(topics.AXES):
         W = response(rate[kept, i], position[kept, i], drive.period, drive.transport_delay, w)
         loops[name] = RateLoop(w, W, series(w, W))
     return loops

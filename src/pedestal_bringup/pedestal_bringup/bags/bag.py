@@ -16,8 +16,7 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from pedestal_bringup.bags import columns
-from pedestal_common import messages
-from pedestal_common import topics as tables
+from pedestal_common import messages, nodes
 
 SQLITE = b'SQLite format 3'
 _RECORD = struct.Struct('<BQ')
@@ -208,18 +207,18 @@ class Bag:
     @property
     def beams(self):
         """Beams of the array that was recorded; 0: a drive with motors."""
-        several = sum(1 for name in self.topics if tables.plain(name) == 'joint_states' != name)
+        several = sum(1 for name in self.topics if nodes.plain(name) == 'joint_states' != name)
         return several or int(self.metadata.get('beams', 0))
 
     @property
     def graph(self):
         """{name: Topic} of the graph that was recorded."""
-        return tables.graph(self.beams)
+        return nodes.links(self.beams)
 
     def view(self, beam=''):
         """The Bag of one beam of several, '' for the first: the beam's own topics under their plain names and those
         that all beams share. A Bag of one beam is its own view. Raises BagError for a beam that is not in it."""
-        prefixes = tables.prefixes(self.beams)
+        prefixes = nodes.prefixes(self.beams)
         if prefixes == ('',) and beam:
             raise BagError(f'{self.path}: beam {beam!r}: there is only one in it')
         prefix = f'{beam}/' if beam else prefixes[0]
@@ -229,14 +228,14 @@ class Bag:
             return self
 
         def own(content):
-            return {tables.plain(name): value for name, value in content.items()
-                    if tables.beam_of(name) in ('', prefix[:-1])}
+            return {nodes.plain(name): value for name, value in content.items()
+                    if nodes.beam_of(name) in ('', prefix[:-1])}
 
         view = copy.copy(self)
         view.beam = prefix
         view.topics = own(self.topics)
-        view._channels = {channel: tables.plain(name) for channel, name in self._channels.items()
-                          if tables.beam_of(name) in ('', prefix[:-1])}
+        view._channels = {channel: nodes.plain(name) for channel, name in self._channels.items()
+                          if nodes.beam_of(name) in ('', prefix[:-1])}
         view.index = self.index[np.isin(self.index.channel, list(view._channels))]
         view.statistics = None if self.statistics is None else own(self.statistics)
         view.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}

@@ -13,31 +13,10 @@ import numpy as np
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import columns
-from pedestal_common import messages, topics
+from pedestal_common import layouts, messages, nodes
 
 FORMATS = ('csv', 'parquet')
 STAMP, NANOSECONDS = 't [s]', 'stamp [ns]'
-
-_MOTION = {'position': 'rad', 'velocity': 'rad/s', 'acceleration': 'rad/s2', 'effort': 'Nm', 'time_from_start': 's'}
-_UNITS = {
-    'sensor_msgs/msg/JointState': _MOTION,
-    'trajectory_msgs/msg/JointTrajectory': _MOTION,
-    'sensor_msgs/msg/Imu': {'angular_velocity': 'rad/s', 'linear_acceleration': 'm/s2',
-                            'orientation_variance': 'rad2'},
-    'nav_msgs/msg/Odometry': {'position': 'm', 'linear': 'm/s', 'angular': 'rad/s'},
-}
-"""Units of the topics in the table of topics: {type: {part of the column's name: unit}}."""
-_FILTER = {'innovation': 'rad', 'innovation_sigma': 'rad', 'sigma': 'rad', 'rate_innovation': 'rad/s',
-           'rate_sigma': 'rad/s'}
-_OWN = {
-    'tracking_receiver/angle_error': {'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'},
-    'tracking_receiver/angle_rate': {'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'},
-    'tracking_receiver/range': {'range': 'm', 'variance': 'm2', 'min_range': 'm', 'max_range': 'm',
-                                'field_of_view': 'rad'},
-    'acu/filter': {f'{axis}_{name}.position': unit for axis in messages.AXES for name, unit in _FILTER.items()},
-}
-"""Units of topics whose type does not determine them: {topic: {column: unit}}."""
-
 
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
     """Write the topics of a bag as tables; iterator of (file, rows, columns), or (None, why, topic) of one left out.
@@ -100,12 +79,8 @@ def _times(stamps):
 
 
 def _header(name, type_name, column):
-    unit = None
-    if topics.plain(name) in _OWN:
-        unit = _OWN[topics.plain(name)].get(column)
-    elif topics.plain(name) in topics.BY_NAME:
-        units = _UNITS.get(type_name, {})
-        unit = next((units[part] for part in reversed(column.split('.')) if part in units), None)
+    """The head of a column: its unit behind it, where the topic is one of the graph and of its type."""
+    unit = layouts.unit(nodes.plain(name), type_name, column)
     return f'{column} [{unit}]' if unit else column
 
 

@@ -22,7 +22,7 @@ from mcap.stream_reader import get_chunk_data_stream
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.bag import MAGIC, MESSAGE, BagError, reason
 from pedestal_bringup.bags.writer import BagFile
-from pedestal_common import topics
+from pedestal_common import nodes, topics
 
 _RECORD = struct.Struct('<BQ')
 _READ = {Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
@@ -79,8 +79,8 @@ class Recovered:
         lines = [gap.line() for gap in self.gaps]
         if self.lost:
             steps = max((count for name, count in self.lost.items()
-                         if topics.plain(name) in topics.BY_NAME
-                         and topics.BY_NAME[topics.plain(name)].rate == 'step'), default=0)
+                         if nodes.plain(name) in topics.BY_NAME
+                         and topics.BY_NAME[nodes.plain(name)].rate == 'step'), default=0)
             lines.append(f'lost in the middle: {steps} steps, {sum(self.lost.values())} messages: '
                          + ', '.join(f'{count} of {name}' for name, count in self.lost.items()))
         planned = self.duration is not None and self.last / 1e9 < self.duration

@@ -8,7 +8,7 @@ import yaml
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import columns, configuration
-from pedestal_common import messages, topics
+from pedestal_common import messages, nodes
 
 MAX_LATENCY = 1_000_000_000
 """A topic may end this much [ns] before the last step: the next messages were still on their way (latency)."""
@@ -127,7 +127,7 @@ def _grid(stamps):
     """The _Grid of the stamps {topic: (n,) [ns]} of the topics that have one message for each step."""
     if not stamps:
         return _Grid(0, 0, 0)
-    steps = np.unique(next((stamp for name, stamp in stamps.items() if topics.plain(name) == 'joint_states'),
+    steps = np.unique(next((stamp for name, stamp in stamps.items() if nodes.plain(name) == 'joint_states'),
                            next(iter(stamps.values()))))
     period = int(np.median(np.diff(steps))) if steps.size > 1 else 0
     return _Grid(int(steps[0]), int(max(steps[-1], *(stamp.max() for stamp in stamps.values()))), period)

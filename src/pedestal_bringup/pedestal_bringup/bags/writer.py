@@ -18,20 +18,20 @@ from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from pedestal_bringup.bags.bag import BagError, reason
-from pedestal_common import messages
+from pedestal_common import messages, topics
 
 CHUNK_SIZE = 1_000_000
 CHUNK_SPAN = 1_000_000_000
 """A chunk ends after this many bytes or ns of log time, so that a crash loses at most the last second."""
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
-_HISTORY = {'step': ('keep_all', 0, 'volatile'), 'state': ('keep_last', 1, 'transient_local'),
-            'event': ('keep_last', 10, 'volatile')}
 
 
-def _qos(name):
-    history, depth, durability = _HISTORY[name]
-    return [{'history': history, 'depth': depth, 'reliability': 'reliable', 'durability': durability,
+def _qos(rate):
+    """The offered_qos_profiles of a topic of a rate."""
+    depth, latched = topics.QOS[rate]
+    return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
+             'durability': 'transient_local' if latched else 'volatile',
              'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',
              'liveliness_lease_duration': dict(_INFINITE), 'avoid_ros_namespace_conventions': False}]
 
@@ -218,20 +218,20 @@ def _profiles(channel):
 class Writer(BagFile):
     """A bag of topics of the graph, whose messages it numbers from 1.
 
-    directory: must not exist. topics: rows of topics.TOPICS; a message names its topic by the index in them.
+    directory: must not exist. rows: of topics.TOPICS, or nodes.Links; a message names its topic by the index in them.
     metadata: {text: text} of the run, kept as the metadata record `pedestal`. more: {name: {text: text}} of further
     metadata records. Raises BagError as a BagFile does.
     """
 
-    def __init__(self, directory, topics, metadata, more=()):
+    def __init__(self, directory, rows, metadata, more=()):
         super().__init__(directory)
         schemas = {name: self.add_schema(
             name, 'ros2msg', messages.TYPESTORE.generate_msgdef(name, ros_version=2)[0].encode())
-            for name in dict.fromkeys(topic.type for topic in topics)}
+            for name in dict.fromkeys(topic.type for topic in rows)}
         self._channels = [self.add_channel('/' + topic.name, schemas[topic.type], {
-            'offered_qos_profiles': yaml.safe_dump(_qos(topic.qos), sort_keys=False),
-            'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)}) for topic in topics]
-        self._sequences = [0] * len(topics)
+            'offered_qos_profiles': yaml.safe_dump(_qos(topic.rate), sort_keys=False),
+            'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)}) for topic in rows]
+        self._sequences = [0] * len(rows)
         for name, content in (('pedestal', metadata), *dict(more).items()):
             self.add_metadata(name, {str(key): str(value) for key, value in content.items()})
         self.flush()

@@ -9,7 +9,7 @@ import time
 
 from rclpy.node import Node
 
-from pedestal_common import messages, shell, topics
+from pedestal_common import layouts, middleware, nodes, shell, topics
 
 ROLES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 TRIGGERS = {'tracking_receiver': 'joint_states', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
@@ -20,12 +20,11 @@ WARM_UP = 300
 def _filled(topic):
     """An rclpy message with as many values as the graph's."""
     type_name = topic.type
-    message = shell.message_class(type_name)()
-    if topic.name == 'acu/filter':
-        message.name, message.position = list(messages.FILTER), [0.0] * len(messages.FILTER)
-    elif type_name.endswith('JointState'):
-        message.name = ['azimuth', 'elevation']
-        message.position, message.velocity, message.effort = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+    message = middleware.message_class(type_name)()
+    if type_name.endswith('JointState'):
+        message.name = list(topics.BY_NAME[topic.name].names)
+        for field in layouts.fields(topic.name):
+            setattr(message, field.name, [0.0] * len(message.name))
     elif type_name.endswith('JointTrajectory'):
         from trajectory_msgs.msg import JointTrajectoryPoint
         message.joint_names = ['azimuth', 'elevation']
@@ -39,17 +38,18 @@ class Ring(Node):
     def __init__(self, role, steps):
         super().__init__(role)
         self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
-        step_topics = [topic for topic in topics.TOPICS if topic.rate == 'step' and not topic.flag]
-        self.writers = [(self.create_publisher(shell.message_class(topic.type), topic.name, shell.QOS['step']),
-                         _filled(topic), len(topics.readers(topic, ROLES)))
+        step_topics = [link for link in nodes.recorded(ROLES) if link.rate == 'step']
+        profile = middleware.qos('step')
+        self.writers = [(self.create_publisher(middleware.message_class(topic.type), topic.name, profile),
+                         _filled(topic), len(nodes.readers(topic, ROLES)))
                         for topic in step_topics if role in topic.writers]
         for topic in step_topics:
-            if role == 'recorder' and topic.writers[0] in ROLES:
-                self.create_subscription(shell.message_class(topic.type), topic.name, self.ignore, shell.QOS['step'],
-                                         raw=True)
-            elif role in topic.readers and topic.writers[0] in ROLES:
+            kind = middleware.message_class(topic.type)
+            if role == 'recorder':
+                self.create_subscription(kind, topic.name, self.ignore, profile, raw=True)
+            elif role in topic.readers:
                 take = self.pass_on if TRIGGERS[role] == topic.name else self.ignore
-                self.create_subscription(shell.message_class(topic.type), topic.name, take, shell.QOS['step'])
+                self.create_subscription(kind, topic.name, take, profile)
         if role == 'adu':
             self.start_timer = self.create_timer(0.01, self.start)
 

@@ -26,7 +26,7 @@ SOLVE_IVP_TICKS = 100
 @compiled
 def _drive_steps(state, constants, inputs, outputs, count):
     for _ in range(count):
-        drive_unit.step(state, constants, inputs, outputs)
+        drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 FILTER_STEPS = 20_000
@@ -134,9 +134,9 @@ def run():
     substep = best_of(lambda: _drive_steps(state, constants, inputs, outputs, count)) / count / SUBSTEPS * 1e9
 
     loop = scenario.load('ship_pass', duration=CORE_SECONDS)
-    closed_loop.run(closed_loop.cores(loop))
-    runs = [closed_loop.cores(loop) for _ in range(5)]
-    factor = CORE_SECONDS / best_of(lambda: closed_loop.run(runs.pop()))
+    closed_loop.Loop(loop).run()
+    loops = [closed_loop.Loop(loop) for _ in range(5)]
+    factor = CORE_SECONDS / best_of(lambda: loops.pop().run())
 
     tick = axis.CURRENT_PERIOD
     scipy_time = best_of(lambda: solve_ivp_axis.run(params.azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)

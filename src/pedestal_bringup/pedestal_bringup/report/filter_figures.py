@@ -12,7 +12,7 @@ from pedestal_bringup.report.figures import (
     new_panels,
     outside_legend,
 )
-from pedestal_common import messages
+from pedestal_common import topics
 
 MODELS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current_statistical': '#e57a00'}
 SPAN = 1.0
@@ -23,7 +23,7 @@ def estimate(data):
     """Estimate less truth and twice the sigma that the filter states, angle [deg] and rate [deg/s]."""
     known = data.filter
     figure, panels = new_panels(2, 2, sharex=True)
-    for row, axis, i in zip(panels, messages.AXES, range(2)):
+    for row, axis, i in zip(panels, topics.AXES, range(2)):
         for axes, error, sigma, unit in ((row[0], known.error, known.sigma, 'deg'),
                                          (row[1], known.rate_error, known.rate_sigma, 'deg/s')):
             error, sigma = np.degrees(error[:, i]), np.degrees(sigma[:, i])
@@ -48,7 +48,7 @@ def innovations(data):
     """Innovations [deg] and the mean NIS of SPAN seconds in its band."""
     known = data.filter
     figure, panels = new_panels(2, 2, sharex=True)
-    for row, axis, i in zip(panels, messages.AXES, range(2)):
+    for row, axis, i in zip(panels, topics.AXES, range(2)):
         draw_line(row[0], known.t, np.degrees(known.innovation[:, i]), color=RAW, linewidth=0.7)
         row[0].set_ylabel('[deg]')
         row[0].set_title(f'{axis}: innovation')
@@ -82,8 +82,8 @@ def probabilities(data):
     """Probability of each motion model."""
     known = data.filter
     figure, panels = new_panels(2, sharex=True)
-    for axes, axis, i in zip(panels[:, 0], messages.AXES, range(2)):
-        for number, model in enumerate(messages.MODELS):
+    for axes, axis, i in zip(panels[:, 0], topics.AXES, range(2)):
+        for number, model in enumerate(topics.MOTION_MODELS):
             values = known.probability[:, i, number]
             if np.isfinite(values).any():
                 draw_line(axes, known.t, values, color=MODELS[model], label=model.replace('_', ' '))

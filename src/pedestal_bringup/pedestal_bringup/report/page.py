@@ -14,7 +14,7 @@ from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.report import attitude_figures, figures, filter_figures, run_data, run_figures
 from pedestal_common import topics
-from pedestal_common.messages import AXES
+from pedestal_common.topics import AXES
 
 SHOWN = 200
 """Rows of the table of diagnostics at the most."""

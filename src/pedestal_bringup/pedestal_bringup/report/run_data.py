@@ -6,7 +6,7 @@ import numpy as np
 
 from pedestal_bringup.analysis import consistency, known_attitude, tracking
 from pedestal_bringup.bags import bag as bags
-from pedestal_common import line_of_sight, messages, topics
+from pedestal_common import line_of_sight, topics
 from pedestal_common.compiled import compiled
 
 
@@ -61,7 +61,7 @@ def read(bag) -> RunData:
     run, no_truth = _tracking(bag)
     raw = _raw_angles(run, table(bag, 'ship/truth')) if run is not None else None
     motors = table(bag, 'adu/motor_states')
-    if motors and not {f'{motor}.effort' for motor in messages.MOTORS} <= set(motors):
+    if motors and not {f'{motor}.effort' for motor in topics.MOTORS} <= set(motors):
         motors = None
     statuses = [(log / 1e9, status.name, int(status.level), status.message)
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status

@@ -5,7 +5,6 @@ import dataclasses
 import json
 import os
 import pathlib
-import re
 import signal
 import socket
 import subprocess
@@ -20,9 +19,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from pedestal_bringup.bags import configuration
 from pedestal_bringup.run.program import program_messages
-from pedestal_bringup.run.scenario import NODE_KINDS
-from pedestal_common import messages, parameters, topics
-from pedestal_common.shell import Shell, set_middleware_defaults
+from pedestal_common import messages, middleware, nodes, parameters
+from pedestal_common.shell import Shell
 
 LOG_LINES = 8
 STOP_TIME = 20.0
@@ -34,6 +32,10 @@ REALTIME_SILENCE = 5.0
 
 ANSWER_TIME = 2.0
 """Seconds a node has to answer a parameter service before it counts as stuck."""
+
+
+ENDING = (nodes.DRIVE, 'recorder')
+"""Nodes that end by themselves when the run is over."""
 
 
 class RunError(RuntimeError):
@@ -48,28 +50,28 @@ class Outcome:
 
 
 class Operator(Shell):
-    """Sends the program tracks to a graph of `beams` (topics.graph) and listens to the diagnostics of the others."""
+    """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of the others."""
 
     def __init__(self, beams=0):
         super().__init__('operator', parameters.Parameters)
-        self.topics = topics.graph(beams)
+        self.links = nodes.links(beams)
         self.time = 0.0
         self.heard = {}
         self._writers = {}
-        self.reader('diagnostics', self._take)
+        self.message_reader('diagnostics', self._take)
 
     def send(self, tracks):
         """The program tracks {topic: message}, latched."""
         self._open(tracks)
         for topic, message in tracks.items():
-            self._writers[topic](message)
+            self._writers[topic](messages.serialize(message))
 
-    def send_to(self, nodes, tracks):
+    def send_to(self, names, tracks):
         """The same once all of the nodes that read them are there, or a short run may end before its recorder has
         them; whether they are sent."""
         self._open(tracks)
-        if any(self._missing(topic, publisher, topics.readers(topic, nodes))
-               for topic, publisher in self._publishers_by_topic.items()):
+        if any(self._missing(publisher, nodes.readers(link, names))
+               for link, publisher in self.publishers_by_link.items()):
             return False
         self.send(tracks)
         return True
@@ -84,7 +86,7 @@ class Operator(Shell):
         deadline = time.monotonic() + DISCOVERY_TIME
         while time.monotonic() < deadline:
             names = self.get_node_names()
-            if names.count(self.name) > 1 or any(node in names for node in NODE_KINDS):
+            if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.module):
                 raise another_graph(self.context.get_domain_id())
             time.sleep(0.02)
 
@@ -98,9 +100,9 @@ class Operator(Shell):
         last = min(self.heard, key=self.heard.get, default=None)
         return last if last is not None and time.monotonic() - self.heard[last] > limit else None
 
-    def stuck(self, nodes, executor):
+    def stuck(self, names, executor):
         """Those of the nodes whose process does not even answer a parameter service."""
-        clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in nodes}
+        clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in names}
         answers = {}
         deadline = time.monotonic() + ANSWER_TIME
         while time.monotonic() < deadline and not (len(answers) == len(clients) and all(
@@ -109,7 +111,7 @@ class Operator(Shell):
                 if node not in answers and client.service_is_ready():
                     answers[node] = client.call_async(GetParameters.Request())
             executor.spin_once(timeout_sec=0.02)
-        return [node for node in nodes if node not in answers or not answers[node].done()]
+        return [node for node in names if node not in answers or not answers[node].done()]
 
 
 def free_bag(scenario):
@@ -124,18 +126,18 @@ def free_bag(scenario):
 
 def parameter_file(scenario, pacing, bag):
     """The scenario as a ROS 2 parameter file, every node told of the graph it is in."""
-    nodes = ','.join(dict.fromkeys(map(topics.plain, scenario.nodes)))
-    told = {'graph.pacing': pacing, 'graph.nodes': nodes, 'graph.beams': scenario.header.graph_beams,
+    names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
+    told = {'graph.pacing': pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
             'graph.deadline': scenario.header.deadline}
     sections = {node: {**scenario.given(node), **told} for node in scenario.nodes if node != 'operator'}
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
     return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()})
 
 
-def command_line(node, kind, file):
-    """What starts a node, 'beam_2/acu' in the namespace of its beam, with a parameter file."""
-    beam = topics.beam_of(node)
-    return [sys.executable, '-m', kind.module, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []),
+def command_line(node, module, file):
+    """What starts the module of a node, 'beam_2/acu' in the namespace of its beam, with a parameter file."""
+    beam = nodes.beam_of(node)
+    return [sys.executable, '-m', module, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []),
             '--params-file', str(file)]
 
 
@@ -195,7 +197,7 @@ class Graph:
             if node != 'operator':
                 with open(self._log_of(node), 'wb') as output:
                     self.processes[node] = subprocess.Popen(
-                        command_line(node, self.scenario.kind(node), self.file),
+                        command_line(node, self.scenario.row(node).module, self.file),
                         stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
                         env={**os.environ, 'ROS_LOG_DIR': str(self.log)}, start_new_session=True,
                         preexec_fn=_end_with_parent)
@@ -230,16 +232,24 @@ class Graph:
         return self.log / f'{node.replace("/", ".")}.log'
 
     def last_lines(self, node):
-        """The end of a node's log."""
+        """The end of a node's log, its result left out."""
         lines = self._log_of(node).read_text(errors='replace').strip().splitlines()
-        return lines[-LOG_LINES:]
+        return [line for line in lines if not line.startswith('{')][-LOG_LINES:]
 
     def result(self, node):
-        """The JSON object on the last line of a node's log."""
-        for line in reversed(self.last_lines(node)):
+        """The last JSON object in a node's log: its result, or why it ended (shell.main); {} where there is none."""
+        for line in reversed(self._log_of(node).read_text(errors='replace').splitlines()):
             if line.startswith('{'):
-                return json.loads(line)
-        raise RunError(f'{node} ended without its result; its log is {self._log_of(node)}')
+                with contextlib.suppress(ValueError):
+                    return json.loads(line)
+        return {}
+
+    def outcome(self, node):
+        """The result of a node that has ended well. Raises RunError where it left none."""
+        result = self.result(node)
+        if not result:
+            raise RunError(f'{node} ended without its result; its log is {self._log_of(node)}')
+        return result
 
     def ended(self):
         """{node: exit code} of the processes that have ended."""
@@ -248,13 +258,12 @@ class Graph:
     def failure(self, stuck, unheard=None):
         """The error of a run in which a node has ended before its time, or `unheard` says nothing any more.
 
-        stuck(nodes) -> those that do not answer. A node may accuse one that itself waits for the node that is stuck.
+        stuck(names) -> those that do not answer. A node may accuse one that itself waits for the node that is stuck.
         """
         time.sleep(0.5)
-        early = {node: code for node, code in self.ended().items() if code != 0 or node not in ('adu', 'recorder')}
+        early = {node: code for node, code in self.ended().items() if code != 0 or node not in ENDING}
         lines = {node: self.last_lines(node) for node in self.processes}
-        said = '\n'.join(line for node in early for line in lines[node])
-        accused = ','.join(re.findall(r'silent: ([\w/, ]+)', said)).replace(' ', '').split(',')
+        accused = {name for node in early for name in self.result(node).get('silent', ())}
         killed = [node for node, code in early.items() if code < 0]
         silent = [node for node in self.processes if node in accused and node not in early] or [
             node for node in (unheard,) if node is not None and node not in early]
@@ -283,7 +292,7 @@ def run(scenario, bag, progress):
     """
     tracks = program_messages(scenario)
     graph = Graph(scenario, bag)
-    set_middleware_defaults()
+    middleware.set_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         operator = Operator(scenario.header.graph_beams)
@@ -306,14 +315,14 @@ def _run(graph, operator, tracks, progress):
         executor = SingleThreadedExecutor()
         executor.add_node(operator)
 
-        def stuck(nodes):
-            return operator.stuck(nodes, executor)
+        def stuck(names):
+            return operator.stuck(names, executor)
 
-        while graph.ended().get('adu') != 0:
+        while graph.ended().get(nodes.DRIVE) != 0:
             executor.spin_once(timeout_sec=0.1 if sent else 0.02)
             sent = sent or operator.send_to(graph.scenario.nodes, tracks)
             progress(operator.time)
-            if any(code != 0 or node not in ('adu', 'recorder') for node, code in graph.ended().items()):
+            if any(code != 0 or node not in ENDING for node, code in graph.ended().items()):
                 raise graph.failure(stuck, operator.silent(header.deadline))
             mute = operator.silent(patience)
             if mute:
@@ -321,12 +330,12 @@ def _run(graph, operator, tracks, progress):
         progress(header.duration)
         if not graph.stop():
             raise graph.failure(stuck)
-        return Outcome(graph.result('adu'), graph.result('recorder'))
+        return Outcome(graph.outcome(nodes.DRIVE), graph.outcome('recorder'))
 
 
 def send_program(scenario) -> int:
     """Send a scenario's program track to a running ACU and keep it latched until Ctrl-C."""
-    set_middleware_defaults()
+    middleware.set_defaults()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         operator = Operator(scenario.header.graph_beams)

@@ -30,12 +30,13 @@ def program_messages(scenario):
 
 
 def program_message(times, angles):
+    """The JointTrajectory of a table: times (n,) s, angles (n, 2) rad."""
     points = []
-    for time, (azimuth, elevation) in zip(times, angles):
-        point = messages.trajectory_point()
-        point.positions[:] = azimuth, elevation
+    for time, positions in zip(times, angles):
+        point = messages.trajectory_point(len(positions))
+        point.positions[:] = positions
         nanoseconds = round(time * 1e9)
         point.time_from_start = messages.Duration(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
         point.velocities = point.accelerations = np.zeros(0)
         points.append(point)
-    return messages.joint_trajectory('earth', points)
+    return messages.program_track(points)

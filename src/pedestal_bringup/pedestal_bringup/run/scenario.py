@@ -11,18 +11,12 @@ import importlib.resources
 import json
 import pathlib
 import re
-import typing
 
 import numpy as np
 import yaml
 
-from acu_tracker.params import AcuParameters
-from adu_drive.params import AduNodeParameters, BeamParameters
-from pedestal_bringup.run.recorder_params import RecorderParameters
-from pedestal_common import parameters, topics
-from ship_motion_sim.params import InsParameters, ShipMotionParameters
+from pedestal_common import nodes, parameters
 from tracking_receiver_sim import receiver
-from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +38,7 @@ class ScenarioParameters(parameters.Parameters):
     seed: int = parameters.parameter(1, 0, 2**31 - 1, '', 'seed of every noise stream')
     ship: bool = parameters.flag(False, 'the pedestal stands on a ship: ship_motion and ins take part')
     beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
-    beams: int = parameters.parameter(1, 1, topics.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
+    beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
                                       'in a namespace beam_1 ...')
     deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
     program: ProgramParameters = parameters.group(ProgramParameters)
@@ -55,7 +49,7 @@ class ScenarioParameters(parameters.Parameters):
 
     @property
     def graph_beams(self):
-        """Beams of the graph as topics.graph counts them."""
+        """Beams of the graph as nodes.links counts them."""
         return self.beams if self.beam else 0
 
 
@@ -71,25 +65,14 @@ _Loader.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^(?:true|Tru
                               list('tTfF'))
 
 
-class NodeKind(typing.NamedTuple):
-    module: str
-    parameters: type
+RUN = tuple(node.name for node in nodes.NODES if node.module)
+"""Nodes that a scenario can have a section for."""
+
+OF_BEAMS = tuple(node.name for node in nodes.NODES if node.of_beam)
+"""Those that each beam of several has of its own."""
 
 
-NODE_KINDS = {
-    'ship_motion': NodeKind('ship_motion_sim.ship_motion_node', ShipMotionParameters),
-    'ins': NodeKind('ship_motion_sim.ins_node', InsParameters),
-    'tracking_receiver': NodeKind('tracking_receiver_sim.tracking_receiver_node', TrackingReceiverNodeParameters),
-    'acu': NodeKind('acu_tracker.acu_node', AcuParameters),
-    'adu': NodeKind('adu_drive.adu_node', AduNodeParameters),
-    'recorder': NodeKind('pedestal_bringup.recorder_node', RecorderParameters),
-}
-
-ARRAY = NodeKind('adu_drive.beam_steering_node', BeamParameters)
-"""What `adu` is in a scenario with `beam: true`."""
-
-
-KNOWN = (
+TOLD = (
     ('adu', 'period', 'acu', 'tracker.receiver.integration'),
     ('adu', 'transport_delay', 'acu', 'command_delay'),
     ('tracking_receiver', 'receiver.latency', 'acu', 'receiver_latency'),
@@ -124,20 +107,21 @@ class Scenario:
 
     @property
     def nodes(self):
-        """Nodes that take part, in the order of topics.NODES and of the beams; the operator where there is a program
+        """Nodes that take part, in the order of nodes.NODES and of the beams; the operator where there is a program
         track."""
         ship = ('ship_motion', 'ins') if self.header.ship else ()
         operator = ('operator',) if self.header.program.source != 'none' else ()
-        return topics.members((*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator),
+        return nodes.members((*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator),
                               self.header.graph_beams)
 
     @property
     def prefixes(self):
         """What the names of each beam's nodes begin with; ('',) of a single one."""
-        return topics.prefixes(self.header.graph_beams)
+        return nodes.prefixes(self.header.graph_beams)
 
-    def kind(self, node):
-        return kind(node, self.header.beam)
+    def row(self, node):
+        """The nodes.Node of one of its nodes."""
+        return nodes.row(node, self.header.beam)
 
     def given(self, node):
         """{dotted name: value} of what this scenario says of a node."""
@@ -145,7 +129,7 @@ class Scenario:
 
     def node_parameters(self, node):
         """The parameter dataclass of one node as this scenario sets it."""
-        return parameters.build(self.kind(node).parameters, self.given(node))
+        return parameters.build(self.row(node).parameters_type(), self.given(node))
 
     def as_yaml(self):
         """The scenario as a ROS 2 parameter file."""
@@ -196,18 +180,13 @@ def dotted(tree, prefix=''):
     return flat
 
 
-def kind(node, beam=False):
-    """The NodeKind of a node, 'beam_2/acu' as well as 'acu'; beam: of a graph whose drive is an array."""
-    return ARRAY if beam and node == 'adu' else NODE_KINDS[topics.plain(node)]
-
-
 def _whole(sections, node):
     """The values of a node, what holds for every beam first."""
-    return {**sections.get(topics.plain(node), {}), **sections.get(node, {})}
+    return {**sections.get(nodes.plain(node), {}), **sections.get(node, {})}
 
 
 def _is_node(name):
-    return topics.plain(name) in (topics.BEAM_NODES if topics.beam_of(name) else NODE_KINDS)
+    return nodes.plain(name) in (OF_BEAMS if nodes.beam_of(name) else RUN)
 
 
 def _sections(name, content):
@@ -220,7 +199,7 @@ def _sections(name, content):
     sections = {}
     for section, body in tree.items():
         if section != 'scenario' and not _is_node(section):
-            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(NODE_KINDS)}')
+            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(RUN)}')
         whole = isinstance(body, dict) and list(body) == ['ros__parameters']
         values = body['ros__parameters'] or {} if whole else None
         if not isinstance(values, dict):
@@ -233,10 +212,10 @@ def parameters_of(node):
     """The parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`; ScenarioError for
     any other name."""
     if node in ('scenario', 'beam_steering'):
-        return ScenarioParameters if node == 'scenario' else ARRAY.parameters
+        return ScenarioParameters if node == 'scenario' else nodes.ARRAY.parameters_type()
     if not _is_node(node):
-        raise ScenarioError(f'{node!r} is no node; there are {", ".join(NODE_KINDS)}, beam_steering, scenario')
-    return kind(node).parameters
+        raise ScenarioError(f'{node!r} is no node; there are {", ".join(RUN)}, beam_steering, scenario')
+    return nodes.row(node).parameters_type()
 
 
 def parse_override(text):
@@ -288,24 +267,23 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
         if value is not None:
             header_values[key] = value
     header = _checked(name, 'scenario', ScenarioParameters, header_values)
-    of_beams = [name for name in topics.members(topics.BEAM_NODES, header.graph_beams) if topics.beam_of(name)]
+    of_beams = [name for name in nodes.members(OF_BEAMS, header.graph_beams) if nodes.beam_of(name)]
     for node in sections:
-        if topics.beam_of(node) and node not in of_beams:
+        if nodes.beam_of(node) and node not in of_beams:
             raise ScenarioError(f'scenario {name}: section {node!r}: the scenario has beams = {header.beams}')
     if header.beam:
         for axis in ('azimuth', 'elevation'):
             sections.setdefault('acu', {}).setdefault(f'{axis}.controller', 'beam')
-    for node in (*NODE_KINDS, *of_beams):
+    for node in (*RUN, *of_beams):
         sections.setdefault(node, {})
-        _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
+        _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
     _spread(name, sections, header, seed)
     for node in of_beams:
         _spread_to_beam(name, node, sections, header, seed)
     for node, values in sections.items():
-        checked = _checked(name, node, kind(node, header.beam).parameters, _whole(sections, node))
-        if topics.plain(node) == 'acu':
-            with _named(name, node):
-                checked.check_drive(header.beam)
+        checked = _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
+        with _named(name, node):
+            checked.check_graph(header.graph_beams)
         typed = parameters.as_dict(checked)
         sections[node] = {key: typed[key] for key in values}
     return Scenario(name, header, sections)
@@ -318,7 +296,7 @@ def _spread(name, sections, header, seed):
     """
     def tell(node, key, value):
         sections[node].setdefault(key, value)
-        for section in [section for section in sections if topics.plain(section) == node]:
+        for section in [section for section in sections if nodes.plain(section) == node]:
             told = sections[section].get(key, value)
             if told != value:
                 raise ScenarioError(f'scenario {name}, {section}: {key} = {told}: must be {value}, as is said '
@@ -337,20 +315,20 @@ def _spread(name, sections, header, seed):
             tell('ins', key, value)
     for node in ('acu', 'tracking_receiver'):
         tell(node, 'period', sections['adu'].get(
-            'period', parameters.defaults(kind('adu', header.beam).parameters)['period']))
+            'period', parameters.defaults(nodes.row(nodes.DRIVE, header.beam).parameters_type())['period']))
     for key, told in MEASURED:
         measured = sections['tracking_receiver'].get(key, False)
         for node in ('acu', 'recorder'):
             if measured or any(told in values for section, values in sections.items()
-                               if topics.plain(section) == node):
+                               if nodes.plain(section) == node):
                 tell(node, told, measured)
-    for owner, key, node, told in KNOWN:
+    for owner, key, node, told in TOLD:
         if key in sections[owner]:
             sections[node].setdefault(told, sections[owner][key])
     if header.beam:
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
-        for prefix in topics.prefixes(header.graph_beams):
-            tracking = _checked(name, f'{prefix}tracking_receiver', TrackingReceiverNodeParameters,
+        for prefix in nodes.prefixes(header.graph_beams):
+            tracking = _checked(name, f'{prefix}tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
                                 _whole(sections, f'{prefix}tracking_receiver'))
             for key, value in (('age', receiver.age(tracking, tracking.period)),
                                ('beam_age', receiver.beam_age(tracking, tracking.period))):
@@ -360,14 +338,14 @@ def _spread(name, sections, header, seed):
 
 def _spread_to_beam(name, node, sections, header, seed):
     """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
-    values, beam = sections[node], topics.beam_of(node)
+    values, beam = sections[node], nodes.beam_of(node)
     own_receiver = f'{beam}/tracking_receiver'
     if node == own_receiver and (seed is not None or 'seed' not in values):
         spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
         values['seed'] = int(spread.generate_state(1)[0] >> 1)
-    for owner, key, other, told in KNOWN:
+    for owner, key, other, told in TOLD:
         own = sections.get(f'{beam}/{owner}', {})
-        if topics.plain(node) == other and key in own:
+        if nodes.plain(node) == other and key in own:
             values.setdefault(told, own[key])
     for key, _ in MEASURED:
         if key in sections[own_receiver]:

@@ -87,14 +87,14 @@ class Batch:
 
 
 @compiled
-def simulate(state, constants, ship, inputs, at, truth, felt, normals, velocity, angle, force, attitude):
+def simulate(state, constants, ship, inputs, truth, felt, normals, velocity, angle, force, attitude):
     """Fill the increments angle, force (n, 3) and the true attitude (n, 4) of an IMU; normals (n, NORMALS), velocity
     (n + 1, 3): what is added to the ship's, ENU [m/s]."""
     dt = inputs[0].dt
     for k in range(len(angle)):
-        inputs[0].t = at[0].t = (k + 1) * dt
-        motion.step(ship, at, truth)
-        imu.step(state, constants, ship, inputs, truth, felt, normals[k])
+        inputs[0].t = (k + 1) * dt
+        motion.truth(ship[0], inputs[0].t, truth[0])
+        imu.step(state[0], constants[0], ship[0], inputs[0], truth[0], felt[0], normals[k])
         gained = velocity[k + 1] - velocity[k]
         x, y, z = to_deck(truth[0].mat_ed, gained[0], gained[1], gained[2])
         rate, push = felt[0].angular_velocity, felt[0].linear_acceleration
@@ -163,12 +163,12 @@ def recorded(batch, run):
                       accelerometer_scale=70e-6, output='increment'))
     ship, n = motion.constants(params.ship), round(batch.duration / PERIOD)
     ship['phase'][0, :4] = random.uniform(0.0, 2.0 * math.pi, 4)
-    inputs, at, truth = np.zeros(1, imu.INPUTS), np.zeros(1, motion.INPUTS), np.zeros(1, motion.OUTPUTS)
+    inputs, truth = np.zeros(1, imu.INPUTS), np.zeros(1, motion.OUTPUTS)
     inputs['dt'] = PERIOD
-    motion.step(ship, at, truth)
+    motion.truth(ship[0], 0.0, truth[0])
     start = misaligned(truth[0]['quaternion'].tolist(), angles)
     angle, force, attitude = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4))
-    simulate(imu.initial_state(), imu.constants(params), ship, inputs, at, truth, np.zeros(1, imu.OUTPUTS),
+    simulate(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS),
              random.standard_normal((n, imu.NORMALS)), disturbance(batch, random, n), angle, force, attitude)
     return angle, force, attitude, start
 

@@ -78,27 +78,27 @@ def structure_case(name):
 
 def standstill(record):
     """The load's position long after the step, and when [rad, s]."""
-    late = record['t'] >= SETTLED
-    return record['t'][late], record['load_position'][late, 0]
+    late = record.t >= SETTLED
+    return record.t[late], record.truth['load_position'][late, 0]
 
 
 def steady_residual(record, amplitude, w):
     """Time [s] and error [rad] without its fundamental w [rad/s], over the whole periods after the first."""
-    t, period = record['t'], 2.0 * math.pi / w
-    error = amplitude * np.sin(w * t) - record['load_position'][:, 0]
+    t, period = record.t, 2.0 * math.pi / w
+    error = amplitude * np.sin(w * t) - record.truth['load_position'][:, 0]
     steady = experiment.whole_periods(t, period, period)
     return t[steady], experiment.residual(t[steady], error[steady], period)
 
 
 def fight(record):
     """Torque with which the motors work against each other beyond the bias asked for [Nm]."""
-    motors = record['motor_torque'][:, 0]
-    return 0.5 * (motors[:, 0] - motors[:, 1]) - record['bias'][:, 0]
+    motors = record['adu/motor_states']['effort'][:, :2]
+    return 0.5 * (motors[:, 0] - motors[:, 1]) - record.truth['bias'][:, 0]
 
 
 def synchronism_error(record):
     """Speed of motor 1 less that of motor 2 [rad/s], as their encoders see it."""
-    return record['motor_velocity'][:, 0, 0] - record['motor_velocity'][:, 0, 1]
+    return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
 
 CASES = {('standstill', name): standstill_case(name) for name in PAPER_CASES}
@@ -119,9 +119,9 @@ def measured(kind, name, record):
         left = steady_residual(record, servo.AMPLITUDE, servo.FREQUENCIES['0p4hz'])[1]
         return {'sine_residual_rad': (experiment.peak(left), 'rad')}
     if kind == 'step':
-        overshoot = experiment.overshoot_percent(record['load_position'][:, 0], servo.STEP)
+        overshoot = experiment.overshoot_percent(record.truth['load_position'][:, 0], servo.STEP)
         return {'step_overshoot_percent': (overshoot, '%')}
-    moving = record['t'] < MOVED
+    moving = record.t < MOVED
     return {'fight_torque_rms_nm': (experiment.rms(fight(record)[~moving]), 'Nm'),
             'synchronism_error_rms_rad_s': (experiment.rms(synchronism_error(record)[~moving]), 'rad/s'),
             'move_fight_torque_rms_nm': (experiment.rms(fight(record)[moving]), 'Nm'),
@@ -194,7 +194,7 @@ def standstill_figure(done):
 def reversal_figure(done):
     """What lash leaves of a slow sine: reference and load, then the error without its fundamental."""
     figure, axes = experiment.panels(3, size=(7.4, 5.6), sharex=True, height_ratios=(1, 1.2, 1.2))
-    t = done['reversal', 'bias-off']['t']
+    t = done['reversal', 'bias-off'].t
     w = REVERSALS['reversal']
     axes[0, 0].plot(t, REVERSAL_AMPLITUDE * np.sin(w * t), color=INK)
     axes[0, 0].set_ylabel('reference [rad]')
@@ -253,7 +253,7 @@ def structures_figure(done):
     for column, name in enumerate(STRUCTURES):
         record = done['structure', name]
         experiment.draw_torques(axes[0, column], record)
-        axes[1, column].plot(record['t'], fight(record), color=INK)
+        axes[1, column].plot(record.t, fight(record), color=INK)
         axes[0, column].set_title(name)
         axes[1, column].set_xlabel('time [s]')
     axes[0, 0].set_xlim(0.0, 1.0)

@@ -25,7 +25,7 @@ from pedestal_bringup.run import closed_loop
 from pedestal_bringup.studies import experiment, servo
 from pedestal_bringup.studies.experiment import Case, Result, row
 from pedestal_common.compiled import compiled
-from pedestal_common.messages import AXES
+from pedestal_common.topics import AXES
 
 MOTORS = ('motor_1', 'motor_2')
 START = (-2.0, 0.15)
@@ -168,10 +168,10 @@ def case(name, scenario, parameters):
 def position(case, axes=AXES, sweep=POSITION):
     """Responses of the position loops of a case: {name: Response}."""
     loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
-    loop = closed_loop.cores(loaded)
-    added = np.zeros((loop.steps + 1, 2))
+    loop = closed_loop.Loop(loaded)
+    added = np.zeros((loop.steps, 2))
     added[:-1] = sweep.signal(loop.period_ns * 1e-9)[:, np.newaxis]
-    commanded = closed_loop.run(loop, added)['rate']
+    commanded = loop.run(added)['acu/rate_command']['velocity']
     return {f'position/{name}/{case.name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
             for i, name in enumerate(AXES) if name in axes}
 

@@ -27,8 +27,8 @@ class Case:
         return scenario.load(self.scenario, self.overrides(), duration=self.duration)
 
     def run(self):
-        """The closed loop's RESULT records of this case, one per drive step."""
-        return closed_loop.run(closed_loop.cores(self.loaded()))
+        """The closed loop of this case, a closed_loop.Run."""
+        return closed_loop.Loop(self.loaded()).run()
 
     def overrides(self):
         return [f'{key}={value}' for key, value in self.parameters.items()]
@@ -165,7 +165,7 @@ def panels(rows, columns=1, size=SIZE, **options):
 def draw_torques(axes, record):
     """Torque of both azimuth motors over time."""
     for i, (colour, style) in enumerate(((figures.MOTOR_1, '-'), (figures.MOTOR_2, '--'))):
-        axes.plot(record['t'], record['motor_torque'][:, 0, i], style, color=colour, label=f'motor {i + 1}')
+        axes.plot(record.t, record['adu/motor_states']['effort'][:, i], style, color=colour, label=f'motor {i + 1}')
 
 
 def save(draw, path):

@@ -83,9 +83,9 @@ DRIVE_CASES = {
 def driven(case):
     """(t, true error of the axis, each (n,) [s, rad]) of a Case while it counts; NaN if autotrack was left."""
     record = case.run()
-    record = record[record['t'] >= DRIVE_START]
-    error = record['true_error'][:, list(REVERSALS).index(case.name)]
-    return record['t'], error if np.all(record['mode'] == AUTOTRACK) else np.full_like(error, math.nan)
+    record = record.where(record.t >= DRIVE_START)
+    error = record.truth['error'][:, list(REVERSALS).index(case.name)]
+    return record.t, error if np.all(record['acu/mode'] == AUTOTRACK) else np.full_like(error, math.nan)
 
 
 TARGETS = {

@@ -350,10 +350,10 @@ def graph_rows(progress):
     for i, case in enumerate(GRAPH):
         progress(0.75 + 0.25 * i / len(GRAPH), case)
         noisy, quiet = graph_case(case).run(), graph_case(case, quiet=True).run()
-        kept = quiet['t'] >= 10.0
-        ends = quiet['true_error'], began(quiet['position'], quiet['true_error'])
+        kept = quiet.t >= 10.0
+        ends = quiet.truth['error'], began(quiet['joint_states']['position'], quiet.truth['error'])
         worst = max(peak(np.hypot(*error[kept].T)) for error in ends)
-        jitter = rms(noisy['true_error'][kept, 1] - quiet['true_error'][kept, 1])
+        jitter = rms(noisy.truth['error'][kept, 1] - quiet.truth['error'][kept, 1])
         rows += [(case, 'max_error_deg', math.degrees(worst), 'deg'), (case, 'isolation_db', isolation(worst), 'dB'),
                  (case, 'jitter_rms_deg', math.degrees(jitter), 'deg')]
     return rows

@@ -104,7 +104,7 @@ def gust_case(name, **more):
 
 
 def step_metrics(record):
-    t, y = record['t'], record['load_position'][:, 0]
+    t, y = record.t, record.truth['load_position'][:, 0]
     return {'step_overshoot_percent': experiment.overshoot_percent(y, STEP),
             'step_settling_2percent_s': experiment.settling_time(t, y, STEP, BAND),
             'step_crossings': experiment.crossings(y, STEP)}
@@ -112,14 +112,14 @@ def step_metrics(record):
 
 def sine_error(record, w):
     """The reference as it is meant less the true load angle [rad]."""
-    return AMPLITUDE * np.sin(w * record['t']) - record['load_position'][:, 0]
+    return AMPLITUDE * np.sin(w * record.t) - record.truth['load_position'][:, 0]
 
 
 def sine_metrics(record, reading):
     w = FREQUENCIES[reading]
-    t, error, period = record['t'], sine_error(record, w), 2.0 * math.pi / w
+    t, error, period = record.t, sine_error(record, w), 2.0 * math.pi / w
     steady = experiment.whole_periods(t, period, period)
-    amplitude, fitted = experiment.amplitude_and_period(t[steady], record['load_position'][steady, 0], period)
+    amplitude, fitted = experiment.amplitude_and_period(t[steady], record.truth['load_position'][steady, 0], period)
     return {f'sine_{reading}_max_error_rad': experiment.peak(error[steady]),
             f'sine_{reading}_rms_error_rad': experiment.rms(error[steady]),
             f'sine_{reading}_amplitude_rad': amplitude, f'sine_{reading}_period_s': fitted,
@@ -127,7 +127,7 @@ def sine_metrics(record, reading):
 
 
 def gust_metrics(record):
-    t, y = record['t'], record['load_position'][:, 0]
+    t, y = record.t, record.truth['load_position'][:, 0]
     return {'gust_1000nm_peak_rad': experiment.peak(y[t >= GUST_START] - y[t < GUST_START][-1])}
 
 
@@ -218,8 +218,8 @@ def step_figure(done):
     top.axhline(STEP, color=INK, linewidth=0.8, linestyle='--', label='reference')
     for name, below in zip(names, axes[1:, 0]):
         record = done[name, 'step']
-        t = record['t']
-        top.plot(t, record['load_position'][:, 0], color=COLOURS[name], linewidth=1.4, label=name)
+        t = record.t
+        top.plot(t, record.truth['load_position'][:, 0], color=COLOURS[name], linewidth=1.4, label=name)
         experiment.draw_torques(below, record)
         below.set_title(f'{name}: torque of the motors')
         below.set_ylabel('torque [Nm]')
@@ -238,10 +238,10 @@ def sine_figure(done):
     figure, axes = experiment.panels(3, size=(7.4, 7.0), sharex=True, height_ratios=(1.4, 1.2, 1))
     period = 2.0 * math.pi / FREQUENCIES['0p4hz']
     record = done['paper-r1', '0p4hz']
-    t = record['t'] / period
-    axes[0, 0].plot(t, AMPLITUDE * np.sin(FREQUENCIES['0p4hz'] * record['t']), color=INK, linestyle='--',
+    t = record.t / period
+    axes[0, 0].plot(t, AMPLITUDE * np.sin(FREQUENCIES['0p4hz'] * record.t), color=INK, linestyle='--',
                     label='reference')
-    axes[0, 0].plot(t, record['load_position'][:, 0], color=COLOURS['paper-r1'], linewidth=1.4,
+    axes[0, 0].plot(t, record.truth['load_position'][:, 0], color=COLOURS['paper-r1'], linewidth=1.4,
                     label='paper-r1, 0.4 Hz')
     axes[0, 0].set_title('sine of 0.87 rad (figure 6 of the paper)')
     axes[0, 0].set_ylabel('azimuth [rad]')
@@ -249,7 +249,7 @@ def sine_figure(done):
             ('paper-r1', '0p4hz', TRUTH, '-', 1e3, 1), ('paper-r2', '0p4rads', INK, '--', 1e3, 1),
             ('best', '0p4hz', FILTERED, '-', 1e6, 2), ('best', '0p4rads', MOTOR_1, '-', 1e6, 2)):
         record, w = done[name, reading], FREQUENCIES[reading]
-        axes[panel, 0].plot(record['t'] * w / (2.0 * math.pi), scale * sine_error(record, w), style, color=colour,
+        axes[panel, 0].plot(record.t * w / (2.0 * math.pi), scale * sine_error(record, w), style, color=colour,
                             label=f'{name}, {READINGS[reading]}')
     axes[1, 0].set_ylabel('error [mrad]')
     axes[2, 0].set_title('best, its start beyond the scale')
@@ -268,8 +268,8 @@ def gust_figure(done):
     axes = axes[0, 0]
     for name in ('paper-r1', 'adrc', 'best'):
         record = done[name, 'gust']
-        y = record['load_position'][:, 0]
-        axes.plot(record['t'], 1e6 * (y - y[record['t'] < GUST_START][-1]), color=COLOURS[name], linewidth=1.3,
+        y = record.truth['load_position'][:, 0]
+        axes.plot(record.t, 1e6 * (y - y[record.t < GUST_START][-1]), color=COLOURS[name], linewidth=1.3,
                   label=name)
     stiffness = 2.0 * step_case('best').loaded().node_parameters('adu').azimuth.gear_train.stiffness
     axes.axhline(1e6 * GUST / stiffness, color=INK, linewidth=0.8, linestyle='--',
@@ -288,8 +288,9 @@ def inertia_figure(done):
     for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as known'),
                         ('best-inertia-plus', 'load 20 % heavier')):
         record = done[name, 'step']
-        axes[0, 0].plot(record['t'], 1e3 * (record['load_position'][:, 0] - STEP), color=COLOURS[name], label=label)
-        axes[1, 0].plot(record['t'], record['motor_torque'][:, 0].mean(axis=1), color=COLOURS[name], label=label)
+        axes[0, 0].plot(record.t, 1e3 * (record.truth['load_position'][:, 0] - STEP), color=COLOURS[name], label=label)
+        torque = record['adu/motor_states']['effort'][:, :2].mean(axis=1)
+        axes[1, 0].plot(record.t, torque, color=COLOURS[name], label=label)
     for side in (-BAND, BAND):
         axes[0, 0].axhline(1e3 * side * STEP, color=INK, linewidth=0.8, linestyle='--')
     axes[0, 0].set_xlim(0.0, 0.3)

@@ -18,26 +18,24 @@ import pathlib
 import numpy as np
 import yaml
 
-from acu_tracker import control_unit
 from acu_tracker.estimation.axis_filter import KINDS
 from acu_tracker.modes import AUTOTRACK, STANDBY
 from acu_tracker.params import AcuParameters
-from acu_tracker.unit import FILTER, RANGE, Acu
+from acu_tracker.unit import RANGE
 from pedestal_bringup.again import recompute, what_if
 from pedestal_bringup.analysis import identification
 from pedestal_bringup.analysis.tracking import SETTLING
 from pedestal_bringup.bags import configuration
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.trials import tuning
-from pedestal_common import messages, parameters, records
-from pedestal_common.records import NEVER
+from pedestal_common import layouts, parameters, records, topics
 from pedestal_common.steps import SECOND
 
 HUBER = 4.0
 """Standard deviations of an innovation beyond which it is an outlier."""
 CONVERGED, PIECE = 1.0, 0.5
 """Recording: what the filter is given to converge after the first error [s]; the pieces it is cut into [s]."""
-AXES = messages.AXES
+AXES = topics.AXES
 RUNS = 2
 """Seeds a scenario is tuned on."""
 ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
@@ -84,10 +82,10 @@ class Recorded:
         done = recompute.recompute(self.recording, 'acu', self.params)
         self.feed = done.feed
         self.requests = {step: [service for service, _ in made] for step, made in done.requests.items()}
-        ranges = records.slot(self.feed.heard, RANGE)
-        self.ranged = np.isfinite(ranges.numbers[ranges.stamp != NEVER, 0]).any()
+        came = self.feed.inputs[RANGE]['stamp'] != records.NEVER
+        self.ranged = np.isfinite(self.feed.inputs[RANGE]['range'][came]).any()
         t = self.feed.stamps / SECOND
-        compared = np.isfinite(self._innovations(done.said)[0]).all(axis=1)
+        compared = np.isfinite(self._innovations(done.steps)[0]).all(axis=1)
         if not compared.any():
             raise TuneError(f'{path}: the receiver gave no error that the filter could be compared with')
         counted = compared & (t >= t[compared][0] + CONVERGED)
@@ -97,15 +95,13 @@ class Recorded:
             raise TuneError(f'{path}: the receiver gave errors for {np.ptp(t[compared]):.3g} s; must be at least '
                             f'{CONVERGED + 2.0 * PIECE:g} s')
 
-    def _innovations(self, said):
-        """Innovation, its sigma and NIS (3, n, 2) of both axes at every step."""
-        numbers = records.slot(said, FILTER).numbers
-        return np.array([[numbers[:, messages.FILTER.index(f'{axis}_{name}')] for axis in AXES]
-                         for name in ('innovation', 'innovation_sigma', 'nis')]).transpose(0, 2, 1)
+    def _innovations(self, steps):
+        """Innovation, its sigma and NIS (3, n, 2) of both axes in steps (n,)."""
+        return np.array([layouts.of_filter(steps, name) for name in ('innovation', 'innovation_sigma', 'nis')])
 
     def _run(self, params):
-        """(the unit, what it says) with these parameters."""
-        unit = Acu(params, self.recording.has(recompute.KINDS['acu'].ship))
+        """(the unit, what it writes in every step) with these parameters."""
+        unit = recompute.unit_of(self.recording, 'acu', params)
         return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
 
     def criterion(self, params):
@@ -113,10 +109,10 @@ class Recorded:
         return _mean(-log_density(innovation, sigma)[self.parts[0]])
 
     def score(self, params) -> Score:
-        unit, said = self._run(params)
-        innovation, sigma, nis = self._innovations(said)
+        unit, steps = self._run(params)
+        innovation, sigma, nis = self._innovations(steps)
         density = log_density(innovation, sigma)
-        found = what_if.numbers(self.recording.bag, [recompute.outputs_of(unit, self.feed, said)])
+        found = what_if.numbers(self.recording.bag, [recompute.outputs_of(unit, self.feed, steps)])
         return Score(_mean(-density[self.parts[0]]), _mean(-density[self.parts[1]]), _mean(nis[self.parts[1]]),
                      {name: (found[name][0][0], found[name][1]) for name in ESTIMATE_ERRORS if name in found})
 
@@ -142,25 +138,25 @@ class Simulated:
             raise TuneError(f'scenario {chosen.name}: never {mode} for more than {SETTLING:g} s')
 
     def runs(self, params, seeds):
-        """RESULT records of the settled part of each run."""
-        found = []
+        """(steps, truth) of the settled parts of all runs, records of closed_loop.STEP and TRUTH."""
+        parts = []
         for seed in seeds:
-            loop = closed_loop.cores(self._scenarios[seed])
-            loop.acu = control_unit.initial_state(params), control_unit.constants(params), *loop.acu[2:]
-            run = closed_loop.run(loop)
-            on = run['mode'] != STANDBY if self.any_mode else run['mode'] == AUTOTRACK
-            start = run['t'][on][0] + SETTLING if on.any() else math.inf
-            found.append(run[on & (run['t'] >= start)])
-        return np.concatenate(found)
+            run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
+            on = run['acu/mode'] != STANDBY if self.any_mode else run['acu/mode'] == AUTOTRACK
+            start = run.t[on][0] + SETTLING if on.any() else math.inf
+            settled = on & (run.t >= start)
+            parts.append((run.steps[settled], run.truth[settled]))
+        return tuple(map(np.concatenate, zip(*parts)))
 
     def criterion(self, params):
-        return np.degrees(np.sqrt(_mean(self.runs(params, self.seeds)['true_error']**2)))
+        return np.degrees(np.sqrt(_mean(self.runs(params, self.seeds)[1]['error']**2)))
 
     def score(self, params) -> Score:
-        kept = self.runs(params, self.kept_seeds)
-        rms = np.degrees(np.sqrt(_mean(kept['true_error']**2)))
-        following = np.degrees(np.sqrt(_mean((kept['reference'][:, :, 0] - kept['position'])**2)))
-        return Score(self.criterion(params), rms, _mean(kept['nis']), {
+        kept, truth = self.runs(params, self.kept_seeds)
+        rms = np.degrees(np.sqrt(_mean(truth['error']**2)))
+        difference = kept['acu/reference']['position'] - kept['joint_states']['position']
+        following = np.degrees(np.sqrt(_mean(difference**2)))
+        return Score(self.criterion(params), rms, _mean(layouts.of_filter(kept, 'nis')), {
             **{f'{name}_rms_deg': (value, 'deg') for name, value in zip(('cross_elevation', 'elevation'), rms)},
             **{f'{axis}_following_rms_deg': (value, 'deg') for axis, value in zip(AXES, following)}})
 

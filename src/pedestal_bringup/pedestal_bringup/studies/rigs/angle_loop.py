@@ -136,7 +136,7 @@ def _paper(form, alpha, period, delta, slope, beamwidth, lost, kind, target, rat
             R, v = beam_loop.step(form, R, v, error, alpha, beta, T, delta * rate[i])
         seen[i] = error
         command(inputs[0], i, i % period == 0, R)
-        electronic_beam.step(state, constants, inputs, outputs)
+        electronic_beam.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 @compiled
@@ -167,7 +167,7 @@ def _better(constants_of_filter, variance, period, hold, delay, tau, target, noi
             earth, _, _ = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + ahead)
             aimed = earth + attitude[i] + deck_reference.turn(rate[i], acceleration, 0.5 * GRID + ahead)
         command(inputs[0], i, running and i % hold == 0, aimed)
-        electronic_beam.step(state, constants, inputs, outputs)
+        electronic_beam.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 def stable(loop, size=1e-9, seconds=20.0):

@@ -1,0 +1,116 @@
+"""The tables of README.md and docs/, written from the tables of the code: `make docs`.
+
+A table stands between <!-- table NAME --> and <!-- end --> in a file; a test holds the files against it.
+"""
+import pathlib
+import re
+import sys
+
+from adu_drive import faults
+from pedestal_bringup.again import what_if
+from pedestal_bringup.analysis import results
+from pedestal_bringup.run import scenario
+from pedestal_common import nodes, parameters, topics
+
+FILES = ('README.md', 'docs/graph.md')
+FIRST = (
+    'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
+    'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
+    'adu.azimuth.speed_loop.disturbance_observer', 'adu.azimuth.structure.inertia_share', 'adu.wind.gust.kind',
+    'adu.azimuth.gear_train.lash', 'acu.azimuth.filter.kind', 'acu.azimuth.filter.current_statistical.a_max',
+    'acu.azimuth.filter.current_statistical.alpha', 'acu.tracker.ukf.cv_noise',
+    'acu.azimuth.feedforward.acceleration_feedforward', 'acu.azimuth.filter.imm.models', 'acu.tracker.gate',
+    'acu.azimuth.controller', 'acu.azimuth.feedforward.bandwidth', 'acu.azimuth.notch.frequency',
+    'acu.azimuth.shaper.acceleration', 'acu.initial_mode', 'tracking_receiver.receiver.cn0_dbhz',
+    'tracking_receiver.antenna.beamwidth', 'tracking_receiver.receiver.latency', 'ship_motion.ship.motion',
+    'ship_motion.ship.sea_state', 'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
+"""Parameters that one touches first."""
+
+RATES = {'step': 'step', 'once': 'once, latched', 'second': '1 Hz', 'change': 'on change, latched'}
+
+
+def _table(head, rows):
+    """Lines of a Markdown table."""
+    return ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head), *('| ' + ' | '.join(row) + ' |' for row in rows)]
+
+
+def node_table():
+    """Every node: executable, what it is, what takes its place on a real antenna."""
+    rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.module else '', node.doc,
+             node.stands_for) for node in (*nodes.NODES, nodes.ARRAY)]
+    return _table(('node', 'executable (package)', 'what it is', 'stands for'), rows)
+
+
+def topic_table():
+    """Every topic: type, who writes and reads it, when, what it holds."""
+    links = nodes.links()
+    rows = []
+    for topic in topics.TOPICS:
+        link, kind = links[topic.name], topic.type.replace('/msg/', '/')
+        writers = 'every node' if len(link.writers) > 1 else ''.join(link.writers)
+        when = RATES[topic.rate] + (f'; with `{topic.flag}`' if topic.flag else '')
+        rows.append((f'`{topic.name}`', kind, writers, ', '.join(link.readers), when, topic.doc))
+    return _table(('topic', 'type', 'from', 'to', 'rate', 'content'), rows)
+
+
+def service_table():
+    """The services of every node."""
+    rows = [(f'`{node.name}` ({node.executable})', ', '.join(f'`{name}`' for name in node.unit_type().REQUESTS))
+            for node in nodes.UNITS if node.unit_type().REQUESTS]
+    return _table(('node', 'services (std_srvs/Trigger)'), rows)
+
+
+def fault_table():
+    """What the drive trips on."""
+    return _table(('fault, per axis', 'from', 'parameter'),
+                  [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
+                   for fault in faults.FAULTS])
+
+
+def parameter_table():
+    """The parameters of FIRST."""
+    rows = []
+    for name in FIRST:
+        node, _, key = name.partition('.')
+        kind = scenario.parameters_of(node)
+        field, value = dict(parameters.flatten(kind))[key], parameters.defaults(kind)[key]
+        meta = field.metadata
+        allowed = (f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ())))
+        text = f'{value:g}' if isinstance(value, float) else str(value)
+        rows.append((f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc']))
+    return _table(('parameter', 'default', 'range', 'unit', 'meaning'), rows)
+
+
+def result_table(table=results.RESULTS):
+    """The results of a run: name, unit, what it is, target."""
+    return _table(('result', 'unit', 'what it is', 'target'),
+                  [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
+                   results.documented(table)])
+
+
+TABLES = {'nodes': node_table, 'topics': topic_table, 'services': service_table, 'drive faults': fault_table,
+          'results': result_table, 'recomputed results': lambda: result_table(what_if.NUMBERS),
+          'first parameters': parameter_table}
+
+
+def written(text):
+    """A file's text with its tables made anew. Raises KeyError for a table that is not known."""
+    def table(match):
+        return '\n'.join((f'<!-- table {match[1]} -->', *TABLES[match[1]](), '<!-- end -->'))
+    return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)
+
+
+def main(root='.') -> int:
+    """Write the tables of every file under a checkout."""
+    for name in FILES:
+        file = pathlib.Path(root, name)
+        old = file.read_text()
+        new = written(old)
+        if new != old:
+            file.write_text(new)
+            print(f'{name}: tables written')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,178 @@
+"""A unit: the law of one node between its messages.
+
+Drive, beam, receiver, control unit, ship and INS are units. The same unit runs in its node, in the closed loop, in a
+recomputed recording and in many trials; who runs it gives it a record of what its topics hold (see records) and takes
+another one back. No ROS here.
+"""
+import typing
+
+import numpy as np
+
+from pedestal_common import messages, nodes, records, topics
+
+OK, WARN, ERROR = 0, 1, 2
+
+BLOCK = 2000
+"""Steps for which a unit holds noise ready at most."""
+
+
+class Diagnosis(typing.NamedTuple):
+    """How a node is: level OK, WARN or ERROR; one line for people; values [(key, text)]."""
+    level: int
+    message: str
+    values: list
+
+
+class Reply(typing.NamedTuple):
+    """The answer to a request: whether it was granted, and one line for people."""
+    granted: bool
+    text: str
+
+
+def joined(record_type, **parts) -> np.ndarray:
+    """A record (1,) of these parts, arrays (1,)."""
+    record = np.zeros(1, record_type)
+    for name, part in parts.items():
+        record[name] = part
+    return record
+
+
+class Unit(typing.Protocol):
+    """What a unit is. A subclass adds its memory and its compiled law
+
+        law(memory, stamp, inputs, outputs)
+
+    of one step: its memory, the stamp t_k [ns] of the step, a record that holds what it reads, one that takes what it
+    writes. These records may hold more topics than its own; in the closed loop both are the record of the step, but
+    for the drive, which obeys what was said in the step before.
+
+    NODE         the row of nodes.NODES, or nodes.ARRAY, that it is the law of
+    LAWS         {type of its memory: (law, the same over arrays of stamps and records)}, compiled
+    LIVE         prefixes of the parameters that may change while it runs
+    REQUESTS     names of the services it answers
+    MOMENTARY    texts that `encode` knows only right after the step that says them; a recomputation of many steps
+                 leaves them out
+
+    parameters   an instance of the parameter class of NODE
+    reads        topics that it hears in its graph, a part of NODE.reads
+    memory       a named tuple of arrays, all that a step reads or changes beside its records: `record` (1,) with the
+                 records of its law, then what is no record (noise, a track)
+    inputs, outputs     records (1,) of one step in a node
+    messages     {topic: message} of the stamped topics it writes, of which only the numbers change
+    """
+    NODE: nodes.Node
+    LAWS: typing.Mapping
+    LIVE: tuple = ()
+    REQUESTS: tuple = ()
+    MOMENTARY: tuple = ()
+    parameters: object
+    memory: tuple
+
+    def __init__(self, parameters, reads):
+        self.parameters, self.reads = parameters, tuple(reads)
+        self.inputs = records.empty(self.inputs_type(), 1)
+        self.outputs = records.empty(self.outputs_type(), 1)
+        self.messages = {name: messages.template(name) for name in self.NODE.writes if not records.is_text(name)}
+
+    @classmethod
+    def inputs_type(cls) -> np.dtype:
+        """The record of what it reads; what comes once, before the first step, is not in it (see `decode`)."""
+        return records.of(*(name for name in cls.NODE.reads if topics.BY_NAME[name].rate != 'once'))
+
+    @classmethod
+    def outputs_type(cls) -> np.dtype:
+        """The record of what it writes."""
+        return records.of(*cls.NODE.writes)
+
+    @property
+    def trigger(self) -> str:
+        """The topic that begins its steps."""
+        return self.NODE.reads[0]
+
+    @property
+    def latencies(self) -> dict:
+        """{topic: s} of what a step waits for beside its trigger: how much older than the step it is."""
+        return {name: self.latency(name) for name in self.reads
+                if name != self.trigger and topics.BY_NAME[name].rate == 'step'}
+
+    def latency(self, topic) -> float:
+        """How much older than the step [s] a topic is; overridden where one is."""
+        return 0.0
+
+    @property
+    def parts(self):
+        """The records of its law by name, views: self.parts['outputs']['status']."""
+        return self.memory.record[0]
+
+    def block(self, steps) -> tuple:
+        """The memory with which the next `steps` (at most BLOCK) are made; overridden where they need noise."""
+        return self.memory
+
+    def step(self, stamps, inputs, outputs):
+        """Make the steps of stamps (n,) [ns], from inputs (n,) to outputs (n,)."""
+        _, law_of_many = self.LAWS[type(self.memory)]
+        for first in range(0, len(stamps), BLOCK):
+            part = slice(first, first + BLOCK)
+            law_of_many(self.block(len(stamps[part])), stamps[part], inputs[part], outputs[part])
+
+    def decode(self, topic, message):
+        """Take a message that comes once. Raises ValueError for one that is refused."""
+        raise ValueError(f'{topic} is not read')
+
+    def take_text(self, topic, text):
+        """A text topic that it reads says this from now on."""
+        self.inputs[topic] = records.code_of(topic, text)
+
+    def encode(self, topic, code) -> str:
+        """The text of a code of a text topic that it writes."""
+        return topics.BY_NAME[topic].texts[code]
+
+    def configure(self, parameters):
+        """Take other values of the parameters that are LIVE."""
+        self.parameters = parameters
+
+    def request(self, name) -> Reply:
+        """Ask for one of REQUESTS between two steps; it acts in the next."""
+        raise KeyError(name)
+
+    def requests_for(self, topic, text) -> list:
+        """The requests that make it say `text` on a text topic."""
+        return []
+
+    def diagnose(self) -> Diagnosis:
+        """How it is now, and what happened since the last diagnosis."""
+
+    @staticmethod
+    def idle(numbers) -> str:
+        """Why a recording did not exercise it, '' if it did.
+
+        numbers: {topic: (n, columns)} of its stamped topics, {topic: texts} of the others, as far as recorded.
+        """
+        return ''
+
+    def prepare(self):
+        """Compile all that a node calls; nothing is changed by it."""
+        arrays = self.memory.record, self.inputs, self.outputs
+        before = [array.copy() for array in arrays]
+        _, law_of_many = self.LAWS[type(self.memory)]
+        law_of_many(self.memory, np.zeros(1, np.int64), self.inputs, self.outputs)
+        for name in self.REQUESTS[:1]:
+            self.request(name)
+        for array, values in zip(arrays, before):
+            array[...] = values
+
+
+def announced(unit, topic, stamps, outputs):
+    """(stamps [ns] (m,), texts) of a text topic of a unit whenever it changed in outputs (n,), steps of stamps (n,).
+
+    A text belongs to the step that its writer answers with it, by the answer's stamp where that is late.
+    """
+    answers = next(outputs[name]['stamp'] for name in unit.NODE.writes if not records.is_text(name))
+    stamps = np.where(answers != records.NEVER, answers, stamps)
+    codes, rows, texts = outputs[topic], [], []
+    for row in np.flatnonzero(np.diff(codes, prepend=topics.SILENT)).tolist():
+        text = unit.encode(topic, int(codes[row]))
+        if not texts or text != texts[-1]:
+            rows.append(row)
+            texts.append(text)
+    return stamps[np.array(rows, np.int64)], texts

@@ -1,0 +1,200 @@
+"""The node of a unit: what its topics hold becomes a record, the unit answers it, the answer becomes messages.
+
+One class runs every unit. A node of its own kind adds what is no law: the drive owns the time
+(adu_drive.timekeeper_node), the ship speaks NMEA.
+"""
+import time
+
+import numpy as np
+from std_srvs.srv import Trigger
+
+from pedestal_common import nodes, records, shell, topics
+from pedestal_common.steps import SECOND, Steps
+from pedestal_common.unit import ERROR, WARN
+
+
+class Port:
+    """A unit and its topics. prefix: of the beam it serves in a node that serves several, else ''."""
+
+    def __init__(self, node, unit, prefix=''):
+        self.unit, self.prefix = unit, prefix
+        self.decoders = {self.named(name): records.Decoder(name, unit.inputs)
+                         for name in (unit.trigger, *unit.latencies)}
+        self.stamps = np.zeros(1, np.int64)
+        written = [name for name in unit.NODE.writes if not prefix or name in nodes.OF_BEAM
+                   or prefix == nodes.prefixes(node.graph.beams)[0]]
+        self._encoders = [(records.Encoder(name, message, unit.outputs), node.writer(self.named(name)))
+                          for name, message in unit.messages.items() if name in written]
+        self._texts = {name: [node.writer(self.named(name)), topics.SILENT, '']
+                       for name in written if records.is_text(name)}
+        self._announce = node.announce
+
+    def named(self, topic):
+        """The topic as the graph names it."""
+        return self.prefix + topic if topic in nodes.OF_BEAM else topic
+
+    def step(self, stamp, values):
+        """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing came}."""
+        for name, decoder in self.decoders.items():
+            decoder.put(*(values.get(name) or (records.NEVER, None)))
+        self.stamps[0] = stamp
+        self.unit.step(self.stamps, self.unit.inputs, self.unit.outputs)
+
+    def publish(self):
+        """The texts that have changed, then every message that is due."""
+        outputs = self.unit.outputs[0]
+        for name, last in self._texts.items():
+            code = outputs[name]
+            if code != last[1]:
+                last[1] = code
+                text = self.unit.encode(name, int(code))
+                if text != last[2]:
+                    last[2] = text
+                    self._announce(last[0], text)
+        for encoder, publish in self._encoders:
+            if encoder.due:
+                publish(encoder.encoded())
+
+
+class UnitNode(shell.Shell):
+    """Runs the unit of a module (nodes.Node.module).
+
+    A message that is no message of its topic ends the node with a reason.
+    """
+
+    def __init__(self, module, serves_beams=False):
+        self.row = nodes.of_executable(module)
+        unit_type = self.row.unit_type()
+        super().__init__(self.row.name, self.row.parameters_type(), unit_type.LIVE)
+        flags = [flag for flag in topics.FLAGS if getattr(self.parameters, flag, False)]
+        reads = nodes.reads(self.row, self.graph.members, flags)
+        prefixes = nodes.prefixes(self.graph.beams) if serves_beams else ('',)
+        self.ports = []
+        for prefix in prefixes:
+            unit = unit_type(self.parameters, reads)
+            self.prepare(unit)
+            self.ports.append(Port(self, unit, prefix))
+        self.unit = self.ports[0].unit
+        self.steps = None
+        self.refused = ''
+        self._waiting_for_once, self._held = set(), None
+        for port in self.ports:
+            self._listen(port)
+        for name in unit_type.REQUESTS:
+            self.create_service(Trigger, name, self._service(name))
+        self.diagnose_with(self.diagnose)
+        self.begin()
+
+    def _listen(self, port):
+        """Subscribe to what does not belong to a step: texts, and what comes once."""
+        for name in port.unit.reads:
+            rate = topics.BY_NAME[name].rate
+            if rate == 'change':
+                self.message_reader(port.named(name), self._text_taker(port, name))
+            elif rate == 'once':
+                self.message_reader(port.named(name), self._once_taker(port, name))
+                if self.graph.lockstep and any(writer in self.graph.members for writer in self.links[
+                        self.beam + name if self.beam + name in self.links else name].writers):
+                    self._waiting_for_once.add(name)
+
+    @staticmethod
+    def _text_taker(port, name):
+        return lambda message: port.unit.take_text(name, message.data)
+
+    def _once_taker(self, port, name):
+        def take(message):
+            try:
+                port.unit.decode(name, message)
+                self.refused = ''
+            except ValueError as error:
+                self.refused = f'{name} refused: {error}'
+                self.get_logger().warning(self.refused)
+            self._waiting_for_once.discard(name)
+            if self._held is not None and not self._waiting_for_once:
+                step, self._held = self._held, None
+                self.answer(*step)
+        return take
+
+    def begin(self):
+        """Start to follow the trigger of the unit; overridden by who makes the time."""
+        self.follow(self.unit.trigger, self.unit.latencies)
+
+    def follow(self, trigger, latencies):
+        """Bring the inputs of each step together (see Steps) and `answer` it. latencies: {topic: s}.
+
+        In lockstep a step whose inputs stay away for the deadline ends the node with the names of the silent writers.
+        """
+        self.steps = Steps(trigger, {name: round(latency * SECOND) for name, latency in latencies.items()},
+                           self.graph.lockstep, self._answer)
+        decoders = {name: decoder for port in self.ports for name, decoder in port.decoders.items()}
+        for name in (trigger, *latencies):
+            if nodes.plain(name) not in self.row.writes:
+                self.reader(name, self._step_taker(name, decoders[name]))
+        self._progress = (None, time.monotonic())
+        if self.graph.lockstep:
+            self.every(0.2, self._watch)
+
+    def _step_taker(self, name, decoder):
+        take, decoded = self.steps.take, decoder.decoded
+
+        def taker(data):
+            message = decoded(data)
+            take(name, message[0], message)
+        return taker
+
+    def _answer(self, stamp, trigger, values):
+        """A step is complete; in lockstep the first one waits for what comes once."""
+        values[self.steps.trigger] = trigger
+        if self._waiting_for_once:
+            self._held = stamp, values
+        else:
+            self.answer(stamp, values)
+
+    def answer(self, stamp, values):
+        """Answer the step of a stamp [ns]. values: {topic: (stamp, numbers) or None}."""
+        for port in self.ports:
+            port.step(stamp, values)
+        self.begin_step(stamp)
+        for port in self.ports:
+            port.publish()
+
+    def _watch(self):
+        pending = self.steps.pending_stamp
+        if pending is None or self._progress[0] != pending:
+            self._progress = (pending, time.monotonic())
+        elif time.monotonic() - self._progress[1] > self.graph.deadline:
+            waiting = self.steps.waiting_for
+            silent = [writer for name in waiting for writer in self._link(name)[0].writers]
+            raise shell.GraphError(f'no {", ".join(waiting)} for step {pending / SECOND:.6f} s after '
+                                   f'{self.graph.deadline:g} s', silent)
+
+    def _service(self, name):
+        """The callback of a service: asks every unit between two steps and answers with what it reads back."""
+        def serve(_request, response):
+            [reply] = {port.unit.request(name) for port in self.ports}
+            if name.endswith('/reset_faults') and reply.granted:
+                self.refused = ''
+            response.success, response.message = reply
+            return response
+        return serve
+
+    def reconfigure(self):
+        for port in self.ports:
+            port.unit.configure(self.parameters)
+
+    def diagnosed(self):
+        """The Diagnosis of the unit; overridden by who runs several."""
+        return self.unit.diagnose()
+
+    def diagnose(self):
+        """A refused input comes before anything but an error of the unit."""
+        diagnosis = self.diagnosed()
+        refusal = self.refused or (self.steps.refusal if self.steps else '')
+        if refusal and diagnosis.level < ERROR:
+            return diagnosis._replace(level=WARN, message=refusal)
+        return diagnosis
+
+
+def main(module, args=None) -> int:
+    """Run the unit of a module."""
+    return shell.main(lambda: UnitNode(module), args)

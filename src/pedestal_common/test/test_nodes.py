@@ -1,0 +1,69 @@
+"""The table of nodes: the graph of a drive, of one electronic beam, of several; what each row names exists."""
+import importlib
+
+import pytest
+
+from pedestal_common import nodes, topics, unit
+
+SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'diagnostics'}
+
+
+def test_every_topic_is_written_by_one_node_and_every_name_is_in_the_table_of_topics():
+    for topic in topics.TOPICS:
+        writers = [node.name for node in nodes.NODES if topic.name in node.writes]
+        assert len(writers) == (0 if topic.name == 'diagnostics' else 1), topic.name
+    for node in (*nodes.NODES, nodes.ARRAY):
+        assert set(node.reads) | set(node.writes) <= set(topics.BY_NAME), node.name
+        assert node.answer in ('', *node.writes)
+
+
+@pytest.mark.parametrize('node', [node for node in (*nodes.NODES, nodes.ARRAY) if node.module], ids=lambda n: n.module)
+def test_what_a_row_names_exists(node):
+    pytest.importorskip('rclpy')
+    pytest.importorskip(node.package)
+    assert callable(importlib.import_module(node.module).main)
+    assert hasattr(node.parameters_type(), 'check')
+    if node.unit:
+        assert unit.Unit in node.unit_type().__mro__ and node.unit_type().NODE == node
+
+
+def test_a_graph_with_a_drive_holds_every_topic():
+    graph = nodes.links()
+    assert list(graph) == list(topics.BY_NAME)
+    assert graph['joint_states'].readers == ('tracking_receiver', 'acu') and graph['clock'].readers == ('ship_motion',)
+    assert graph['diagnostics'].writers == ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu')
+    assert nodes.members(nodes.NAMES, 0) == nodes.members(nodes.NAMES, 1) == nodes.NAMES
+
+
+def test_one_beam_keeps_every_name_and_obeys_the_reference():
+    graph = nodes.links(1)
+    assert set(topics.BY_NAME) - set(graph) == {'adu/motor_states'}
+    assert {name for name, link in graph.items() if 'adu' in link.readers} == {'acu/reference'}
+    assert all(graph[name].writers == link.writers for name, link in nodes.links().items() if name in graph)
+
+
+def test_several_beams_share_what_belongs_to_the_ship_and_the_clock():
+    graph = nodes.links(3)
+    assert {name for name in graph if '/' not in name or not name.startswith('beam_')} == SHARED
+    own = [name for name in nodes.links(1) if name not in SHARED]
+    assert [name for name in graph if name.startswith('beam_2/')] == [f'beam_2/{name}' for name in own]
+    assert graph['beam_3/acu/reference'].writers == ('beam_3/acu',)
+    assert graph['beam_3/joint_states'] == nodes.links()['joint_states']._replace(
+        name='beam_3/joint_states', readers=('beam_3/tracking_receiver', 'beam_3/acu'))
+    assert graph['ship/imu/data'].readers == ('beam_1/acu', 'beam_2/acu', 'beam_3/acu')
+
+
+def test_a_node_hears_what_may_be_real_equipment_and_no_ship_where_none_is_named():
+    acu = nodes.row('acu')
+    ashore = ('joint_states', 'tracking_receiver/angle_error', 'adu/state', 'acu/program_track')
+    assert nodes.reads(acu, ()) == ashore == nodes.reads(acu, ('acu', 'adu', 'recorder'))
+    aboard = nodes.reads(acu, ('beam_1/acu', 'ins'), ('receiver_range',))
+    assert set(aboard) - set(ashore) == {'ship/imu/data', 'ins/state', 'tracking_receiver/range'}
+    assert nodes.reads(nodes.row('ins'), ('ins', 'acu')) == ('ship/imu/data_raw',)
+
+
+@pytest.mark.parametrize('name, beam, plain', [
+    ('beam_2/acu/mode', 'beam_2', 'acu/mode'), ('beam_16/acu', 'beam_16', 'acu'), ('beam_2', '', 'beam_2'),
+    ('acu/mode', '', 'acu/mode'), ('beam_0/acu', '', 'beam_0/acu'), ('my_beam_2/acu', '', 'my_beam_2/acu')])
+def test_a_beam_is_a_prefix(name, beam, plain):
+    assert (nodes.beam_of(name), nodes.plain(name)) == (beam, plain)
