@@ -9,6 +9,7 @@ import sys
 from acu_tracker import modes
 from acu_tracker.estimation.kinds import KINDS
 from adu_drive import faults
+from pedestal_bringup import studies
 from pedestal_bringup.again import what_if
 from pedestal_bringup.analysis import results
 from pedestal_bringup.run import scenario
@@ -80,6 +81,12 @@ def fault_table():
                    for fault in faults.FAULTS])
 
 
+def study_table():
+    """The studies."""
+    return _table(('study', 'what it measures'),
+                  [(f'`{name}`', line) for name, line in studies.descriptions().items()])
+
+
 def parameter_table():
     """The parameters of FIRST."""
     rows = []
@@ -101,7 +108,8 @@ def result_table(table=results.RESULTS):
                    results.documented(table)])
 
 
-TABLES = {'nodes': node_table, 'topics': topic_table, 'services': service_table, 'modes': mode_table,
+TABLES = {'nodes': node_table, 'studies': study_table, 'topics': topic_table, 'services': service_table,
+          'modes': mode_table,
           'filter kinds': filter_table, 'drive faults': fault_table, 'results': result_table,
           'recomputed results': lambda: result_table(what_if.NUMBERS),
           'first parameters': parameter_table}

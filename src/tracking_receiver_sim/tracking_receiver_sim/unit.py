@@ -94,11 +94,8 @@ class TrackingReceiver(Unit):
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         self.memory = Memory(record, self.target.breaks, self.target.coefficients,
                              np.zeros((1, receiver.normals_per_step(parameters))))
-        self.messages[RANGE].field_of_view = parameters.antenna.beamwidth
-        for topic, measured in ((RATE, parameters.receiver.rate.measured),
-                                (RANGE, parameters.receiver.ranging.measured)):
-            if not measured:
-                del self.messages[topic]
+        if RANGE in self.messages:
+            self.messages[RANGE].field_of_view = parameters.antenna.beamwidth
 
     def block(self, steps):
         self.parts['row'] = 0
