@@ -1,11 +1,11 @@
-"""How a ship moves on a seaway, what an IMU on it feels and what its INS reports.
+"""How a ship moves on a seaway, what its IMU measures and what its INS reports.
 
 recording       a recorded motion as piecewise polynomials, where motion.step is not to make waves
 motion.step     time -> the ship's truth (stateless: the same seed and time give the same bits in any order)
-imu.step        truth -> specific force and angular rate as REP 145 wants them
+imu.step        truth -> specific force and angular rate by REP 145
 strapdown.step  increments of angle and velocity -> attitude and velocity in a computed frame
 ins.step        stamp of an IMU message -> attitude and deck rate as a late and imperfect INS knows them
-aligning_ins.step   an IMU message -> the same by an INS that integrates it: alignment, then navigation (navigator)
+aligning_ins.step   stamp and data of an IMU message -> attitude and deck rate of an INS that aligns and navigates
 
 Frames
     earth   ENU tangent plane at the place where the ship is at t = 0.

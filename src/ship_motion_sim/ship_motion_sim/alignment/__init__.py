@@ -2,12 +2,12 @@
 
 classical           fourth-order gyrocompass: the azimuth loop is closed through the level error it makes
 adrc                paper 001, corrected: levelled by ADRC, azimuth from the least-squares slope of the level commands
-adrc_scheduled      the same observer with a bandwidth that falls as 6/t, azimuth from what it finds (z3)
-riccati_eso         the same observer with the gains of a Kalman filter
-oba                 optimisation-based: two bundles of vectors brought to cover each other, no loop at all
+adrc_scheduled      adrc's observer with a bandwidth that falls as 6/t, azimuth from its z3
+riccati_eso         adrc's observer with the gains of a Kalman filter
+oba                 optimisation-based: the rotation that maps one set of vectors onto another, no feedback loop
 
-Each is a file with one `step` and its STATE; extended_observer, levelling, slope and steady_state are what they share,
-conditions is what all are told, navigator runs the selected one. Sources: paper 001 (Zhou, Yang, Qin 2011) with the
+Each is a file with one `step` and its STATE; they share extended_observer, levelling, slope and steady_state, and
+get the same conditions; navigator runs the selected one. Sources: paper 001 (Zhou, Yang, Qin 2011) with the
 corrections of reference/nav.md section 1.1; Han 2009 (ADRC); Horn 1987 and Wu 2013 (optimisation-based alignment).
 
 Symbols

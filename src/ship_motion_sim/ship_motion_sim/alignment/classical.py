@@ -1,9 +1,9 @@
-"""The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity turns the azimuth back.
+"""The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity corrects the azimuth.
 
 v' = f - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N with K1 = K4 = 2 s0, k2 = 4 s0^2/g,
 K3 = 4 s0^4/g: all four poles at -s0 +- j s0 (reference/nav.md section 1.2). 180 deg of azimuth is an unstable
-equilibrium, left by what the first levelling kicks: the loop is closed from the start. Its velocities are those of a
-gyrocompass, integrals of what two accelerometers feel: that they turn with w_cU the axes they stand on do not know.
+equilibrium, which the transient of the first levelling leaves: the loop is closed from the start. Its velocities are
+those of a gyrocompass, the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
 """
 import math
 
@@ -32,7 +32,7 @@ STATE = np.dtype([
 
 
 def constants(k, s0, h) -> np.ndarray:
-    """The record () of CONSTANTS for the bandwidth s0 [rad/s]; k CONDITIONS."""
+    """The record () of CONSTANTS for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS."""
     record = np.zeros((), CONSTANTS)
     g, w_north = float(k['gravity']), float(k['earth_rate'][1])
     K1 = K4 = 2.0 * s0
@@ -53,13 +53,13 @@ def constants(k, s0, h) -> np.ndarray:
 
 @compiled
 def envelope(x):
-    """What is left of 1 after x = s0 t: the slower pair of its poles."""
+    """Decay from 1 after x = s0 t [-], by the slower pair of the loop's poles."""
     return (1.0 + x) * math.exp(-x)
 
 
 @compiled
 def step(s, c, k, v_east, v_north, h):
-    """One step; records STATE, CONSTANTS, CONDITIONS."""
+    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONSTANTS, CONDITIONS."""
     s.t += h
     s.turning += h * (v_north - c.K4 * s.turning)
     # The damping, and what the strapdown has just made of w_c x v.
