@@ -10,13 +10,13 @@ Symbols
     alpha           manoeuvre frequency of the 'current' statistical model              [1/s]
     a_max, abar     largest and mean acceleration of the target                         [rad/s2]
     sigma_a         standard deviation of the acceleration about abar                   [rad/s2]
-    T, x = alpha T  time between two errors; the same without a unit                    [s], [-]
+    T, x = alpha T  time between two errors; that time over 1 / alpha                   [s], [-]
     X = (x1 x2 x3)  estimate: angle, rate, acceleration                                 [rad, rad/s, rad/s2]
     Phi, U, Q, P    transition, input, process noise, covariance of X
     F, H, K         Phi of any of the `motion_models`; what is measured of X; gain of the filter
     y, R, nu, S     measured angle, its variance, innovation, variance of the innovation
     alpha, beta, gamma      constant gains of angle, rate, acceleration (`alpha_beta`)          [-]
-    mu, cbar        `imm`: probability of a model; the same as predicted                 [-]
+    mu, cbar        `imm`: probability of a model; its predicted probability             [-]
     A, E            azimuth (clockwise), elevation; dA, ddA ... their time derivatives  [rad, rad/s, rad/s2]
     w, dw           rate and angular acceleration of the deck, FLU                      [rad/s, rad/s2]
     t_k             stamp of the drive step                                             [s]
@@ -36,7 +36,7 @@ Symbols
     w, width, depth notch: centre, damping of its poles, what is left at the centre     [rad/s], [-], [-]
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
     W, E0           rate of a target along its great circle, its highest elevation      [rad/s], [rad]
-    t1, t2          a slew through the keyhole leaves the target, and meets it again    [s]
+    t1, t2          begin and end of a slew through the keyhole                         [s]
     r, rho, R       lever arm from INS to antenna; range of the antenna, of the INS     [m]
 
 References: paper 000 (Ma Jijun et al. 2023, 'current' statistical model filter of an antenna; PID position loop);

@@ -1,9 +1,9 @@
-"""The kinds of target filter: one row each, which says of what an axis's bank of motion models is made.
+"""The kinds of target filter: one row each, with the bank of motion models of an axis.
 
     alpha_beta, alpha_beta_gamma    cv or ca without process noise, corrected with constant gains
     cv, ca, singer, current_statistical     a Kalman filter with that model of motion
     imm             interacting models
-    imm_ukf         the Cartesian filter where the range is measured; without it the axes have what imm has
+    imm_ukf         the Cartesian filter where the range is measured, beside the bank of imm on each axis
 """
 import functools
 import typing

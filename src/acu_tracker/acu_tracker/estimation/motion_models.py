@@ -1,4 +1,4 @@
-"""How a target may move: F and Q of the motion models of one axis, X = (angle, rate, acceleration).
+"""Motion models of a target: F and Q of one axis, X = (angle, rate, acceleration).
 
     cv                      constant rate, disturbed by white acceleration; its third state stays 0
     ca                      constant acceleration, disturbed by white jerk

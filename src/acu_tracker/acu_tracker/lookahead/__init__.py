@@ -1,1 +1,1 @@
-"""What lies ahead of the deck: keyholes, hidden sectors."""
+"""Look-ahead on the levelled deck: keyholes, hidden sectors."""
