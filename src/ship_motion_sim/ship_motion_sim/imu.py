@@ -86,7 +86,7 @@ def specific_force(truth, earth_rate, gravity):
     """mat_ed^T (a + 2 w_ie x v - g), FLU [m/s2]; earth_rate (3,) = w_ie in ENU.
 
     The earth is the rotating tangent plane in which the truth is given, with g constant along -z: gravity does not
-    turn with the ship's place (v/R = 1e-6 rad/s at 7 m/s), and the rate above holds no transport rate either.
+    turn with the ship's place (v/R = 1e-6 rad/s at 7 m/s), and `inertial_rate` has no transport rate either.
     """
     a, v, e = truth.acceleration, truth.velocity, earth_rate
     return to_deck(truth.mat_ed,

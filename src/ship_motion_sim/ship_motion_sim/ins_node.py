@@ -1,4 +1,4 @@
-"""ROS node of the INS: hears the IMU, publishes attitude and deck rate as the INS knows them."""
+"""ROS node of the INS: subscribes to the IMU, publishes measured attitude and deck rate."""
 import sys
 
 from pedestal_common import unit_node

@@ -1,6 +1,6 @@
-"""The unit of the INS: its IMU in, attitude and deck rate as the INS knows them out, and whether it is aligned.
+"""The unit of the INS: IMU data in; attitude, deck rate and the state of the alignment out.
 
-Method `model` knows the true attitude with stated errors and never tells a state; the others align by themselves.
+Method `model` has the true attitude with stated errors and never publishes a state; the others align by themselves.
 """
 import math
 import typing

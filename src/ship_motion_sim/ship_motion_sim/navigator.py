@@ -1,9 +1,9 @@
-"""A strapdown INS from power-up on: it aligns by the selected method, then navigates.
+"""A strapdown INS from power-up on: alignment by the selected method, then navigation.
 
-aligning    strapdown at the IMU's rate, the method's step every `step` seconds: its commands turn n'. oba commands
-            nothing and integrates the gyros in inertial space.
+aligning    strapdown at the IMU's rate, the method's step every `step` seconds: its commands rotate n'. oba
+            commands nothing and integrates the gyros in inertial space.
 navigating  from the moment the 1-sigma of azimuth is small enough. Without aid free inertial; with one, riccati_eso
-            goes on from there with the velocity less the aid's, so level and azimuth keep improving.
+            continues with the velocity less the aid's, so level and azimuth keep improving.
 
 An aid is a velocity in deck axes (log) or ENU (gnss).
 """

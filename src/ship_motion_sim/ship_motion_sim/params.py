@@ -141,7 +141,7 @@ class AdrcParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class AlignmentParameters(Parameters):
-    """How an INS with gyros aligns itself, and what it is told of them and of the sea."""
+    """The alignment of an INS: its laws, and the sensors and sea that they assume."""
     step: float = parameter(0.02, 0.001, 1.0, 's', 'of the alignment laws; at least the period of the IMU')
     initial_heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'taken for true at power-up; may be any')
     aligned_sigma: float = parameter(0.0035, 1e-5, 0.5, 'rad', 'it navigates once the 1-sigma of heading is below')

@@ -4,7 +4,7 @@
     roll_deg    positive with the port side up
     pitch_deg   positive with the bow up: the signs of a ship's instruments (PASHR), where FLU has the bow down
     heading_deg clockwise from north, 0 to 360 or -180 to 180
-    surge_m     ahead along the mean heading; this and the next two may be left out and are 0 then
+    surge_m     forward along the mean heading; this and the next two columns are optional, 0 without
     sway_m      to port
     heave_m     up
 

@@ -3,9 +3,9 @@
     step(state, angle, force, dt, earth_rate, command, gravity)
 
 C' = C [w_ib x] - [(w_ie + w_c) x] C (reference/nav.md section 1.1), v' = C f - (2 w_ie + w_c) x v - g u; w_c is the
-rate an alignment turns n' with, and the velocity's components with it. Position is held, so there is no transport
-rate: the tangent plane in which the truth is given (see imu.specific_force) has none either. Coning and sculling from
-the increment before, as in Savage 1998, "Strapdown Inertial Navigation Integration Algorithm Design".
+rate at which an alignment rotates n', and the velocity's components with it. Position is held, so there is no
+transport rate: the tangent plane in which the truth is given (see imu.specific_force) has none either. Coning and
+sculling from the increment before, as in Savage 1998, "Strapdown Inertial Navigation Integration Algorithm Design".
 """
 import math
 

@@ -3,13 +3,13 @@
 One `step` per drive step. Between the previous step and this one the true error runs in a straight line, along which
 `samples_per_step` samples of sum and difference voltages are taken, the last one at the stamp. Where the beam is held
 (an electronic beam jumps at the steps) the line begins at the offset of the previous target from the present beam.
-Each sample is turned into an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the detector's
-full scale, then smoothed.
+Each sample is converted to an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the
+detector's full scale, then smoothed.
 
 Where they are measured, the rate of the error at the stamp and the range come with each result, with white noise.
 
 Voltages are scaled so that one channel's noise has unit power in one sample: the carrier power on axis is
-C/N0 tau, and the receiver, which knows its own noise floor, takes 1 off the sum power it measures.
+C/N0 tau, and the receiver, which knows its own noise floor, subtracts 1 from the sum power it measures.
 """
 import math
 from collections import namedtuple
@@ -307,7 +307,7 @@ def forget(o):
 @compiled
 def step(s, c, i, o, breaks, coefficients, normals):
     """One drive step: records STATE, CONSTANTS, INPUTS, OUTPUTS, breaks and coefficients of the Target, normals
-    (normals_per_step,). Never raises: OUTPUTS' status says what is missing."""
+    (normals_per_step,). Never raises: the status in OUTPUTS names what is missing."""
     forget(o)
     if i.stamp_ns <= s.stamp_ns:
         o.status = STAMP_ORDER

@@ -3,7 +3,7 @@
     none            the mean of the samples of one step
     recursion       eq. (1) as printed: a first-order low-pass, x = (n - 1) / n x + 1 / n y. Its bandwidth (eq. 2) is
                     1 / ((n - 1) T) rad/s, its mean delay n - 1 samples
-    moving_average  what the text says and eq. (1) is not: the mean of the last n samples, delay (n - 1) / 2 samples
+    moving_average  the text of the paper, not its eq. (1): the mean of the last n samples, delay (n - 1) / 2 samples
 """
 import numpy as np
 

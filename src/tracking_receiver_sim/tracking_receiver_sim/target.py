@@ -41,9 +41,9 @@ KNOT_SPACING = 1.0
 SEARCH_SPACING = 20.0
 """Between the pass finder's looks [s]; a LEO pass lasts minutes."""
 MARGIN = 5.0
-"""How far all but a track_file is laid out before and past the run [s], for a program track that looks ahead."""
+"""Time before and after the run [s] that every kind but a track_file covers, for a program track."""
 TLE_AGE = 30.0
-"""Largest time between TLE epoch and start_time [days]: past it SGP4 says nothing about the satellite."""
+"""Largest time between TLE epoch and start_time [days]: beyond it SGP4 is useless."""
 COLUMNS = {'time_s': (-1e12, 1e12), 'latitude_deg': (-90.0, 90.0), 'longitude_deg': (-180.0, 360.0),
            'altitude_m': (-1000.0, 1e8)}
 """Of a track file, with the range of each."""

@@ -11,11 +11,11 @@ get the same conditions; navigator runs the selected one. Sources: paper 001 (Zh
 corrections of reference/nav.md section 1.1; Han 2009 (ADRC); Horn 1987 and Wu 2013 (optimisation-based alignment).
 
 Symbols
-    n, n'           ENU; what the computer takes for it, turned by a_z about up and by a_x, a_y (small) about level
+    n, n'           ENU; the computer's frame for it, rotated by a_z about up and by a_x, a_y (small) about level
     az              azimuth misalignment a_z: C_b^n = R_z(az) C_b^n'                [rad]
     w_c             commanded rate of n' against the earth, in n' (E, N, U)         [rad/s]
     w_N, g          north part of the earth's rate, gravity                         [rad/s, m/s2]
-    v_E, v_N        level velocity in n' less what an aid says it is: the error     [m/s]
+    v_E, v_N        level velocity in n' less that of an aid: the error            [m/s]
     x1, x2, x3      v, its rate, the rate of that without command; z1, z2, z3 as observed
                     north: x2 = g a_x, x3 = g (-sin az w_N - eps_E), b0 = g
                     east: x2 = -g a_y, x3 = -g ((1 - cos az) w_N - eps_N), b0 = -g

@@ -24,9 +24,9 @@ CONSTANTS = np.dtype([
 
 STATE = np.dtype([
     ('t', 'f8'),                    # since the start [s]
-    ('turning', 'f8'),              # v_N / (s + K4) [m]
-    ('residual', 'f8'),             # azimuth that the loop still turns back, smoothed [rad]
-    ('taken', 'f8', (2,)),          # what this step takes off v_E, v_N [m/s]
+    ('lagged', 'f8'),               # v_N / (s + K4) [m]
+    ('residual', 'f8'),             # azimuth that the loop still corrects, smoothed [rad]
+    ('taken', 'f8', (2,)),          # subtracted from v_E, v_N in this step [m/s]
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
 
@@ -37,7 +37,7 @@ def constants(k, s0, h) -> np.ndarray:
     g, w_north = float(k['gravity']), float(k['earth_rate'][1])
     K1 = K4 = 2.0 * s0
     k2, K3 = 4.0 * s0**2 / g, 4.0 * s0**4 / g
-    # north channel: v, a_x, turning, az, residual under velocity noise per step and random walk of the gyros
+    # north channel: v, a_x, lagged, az, residual under velocity noise per step and random walk of the gyros
     rates = np.array([[-K1, g, 0.0, 0.0, 0.0], [-k2, 0.0, 0.0, -w_north, 0.0], [1.0, 0.0, -K4, 0.0, 0.0],
                       [0.0, 0.0, K3 / w_north, 0.0, 0.0], [0.0, 0.0, K3 / w_north, 0.0, -0.5 * s0]])
     noise = h * rates[:, 0]
@@ -61,13 +61,13 @@ def envelope(x):
 def step(s, c, k, v_east, v_north, h):
     """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONSTANTS, CONDITIONS."""
     s.t += h
-    s.turning += h * (v_north - c.K4 * s.turning)
+    s.lagged += h * (v_north - c.K4 * s.lagged)
     # The damping, and what the strapdown has just made of w_c x v.
     s.taken[0] = h * (c.K1 * v_east + s.command[2] * v_north)
     s.taken[1] = h * (c.K1 * v_north - s.command[2] * v_east)
     s.command[0], s.command[1] = -c.k2 * v_north, c.k2 * v_east
-    s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.turning, -RATE_LIMIT), RATE_LIMIT)
-    # A steady az is turned back at az s0 / 2. At 180 deg it is not, which the envelope covers.
+    s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.lagged, -RATE_LIMIT), RATE_LIMIT)
+    # The loop corrects a steady az at az s0 / 2, except at 180 deg, which the envelope covers.
     s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
     left = SIGMA_UNKNOWN * envelope(c.s0 * s.t)
     moving = max(s.residual**2 - 9.0 * c.residual**2, 0.0)      # beyond three sigma of its noise

@@ -48,7 +48,7 @@ def step(s, k, a, v, h):
     o = s.observer
     l1, l2, l3, variance = riccati_eso.limit(o, k, h)
     if v[0] == 0.0 and v[1] == 0.0:
-        # The innovations tell how far the sea is from what is expected; a GNSS takes the ship's motion off b.
+        # The innovations show how the sea differs from the expected; with a GNSS b has the ship's motion already.
         extended_observer.predict(o, h)
         extended_observer.correct(o, a[0], a[1], l1, l2, l3, variance, h)
     s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k)
@@ -58,7 +58,7 @@ def step(s, k, a, v, h):
     s.coriolis[1] += h * cy
     s.coriolis[2] += h * cz
     bx, by, bz = gravity_integral(s.t, k)
-    # n turned back to n0: w_ie t is small
+    # From n back to n0: w_ie t is small.
     bx += v[0] + s.t * cx + s.coriolis[0]
     by += v[1] + s.t * cy + s.coriolis[1]
     bz += v[2] + s.t * cz + s.coriolis[2]
