@@ -64,7 +64,7 @@ def test_rates_of_a_fixed_direction_by_turning_the_deck():
     moved = []
     for sign in (-1.0, 1.0):
         mat = np.zeros((3, 3))
-        line_of_sight.rotation(*attitude.turned(np.array([0.0, 0.0, 0.0, 1.0]), tuple(sign * h * w)), mat)
+        line_of_sight.rotation(*attitude.rotated(np.array([0.0, 0.0, 0.0, 1.0]), tuple(sign * h * w)), mat)
         moved.append(line_of_sight.angles(*line_of_sight.to_deck(mat, *line_of_sight.direction(A, E))))
     np.testing.assert_allclose(rates, np.subtract(moved[1], moved[0]) / (2.0 * h), atol=1e-8)
 

@@ -50,20 +50,25 @@ def test_through_the_keyhole(Rig, mode, with_program):
     heard(rig, 2.0)
     rig.track = rig.track if with_program else NO_TRACK
     before = heard(rig, 18.0)
-    said = announcement.keyhole(rig.state[0]['lookahead'], BEAMWIDTH)
+    text = announcement.keyhole(rig.state[0]['lookahead'], BEAMWIDTH)
+    numbers = dict(announcement.numbers(rig.state[0]['lookahead']))
     plan = rig.state['lookahead']['slew'][0].copy()
     assert before[:, 1].max() < 1e-3 and plan['t1'] > before[-1, 0]
     during = heard(rig, 25.0)
     assert rig.mode == mode
     after = heard(rig, 5.0)
     loss = np.sum(during[:, 1] > 0.5 * BEAMWIDTH) * rig.T
-    print(f'{mode}: predicted {plan["loss"]:.2f} s, lost {loss:.2f} s; {said}')
+    print(f'{mode}: predicted {plan["loss"]:.2f} s, lost {loss:.2f} s; {text}')
     assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 5.0
     assert plan['worst'] == pytest.approx(during[:, 1].max(), rel=0.2)
     assert after[:, 1].max() < 1e-3 and rig.mode == mode
     A, E = rig.target((rig.k - 1) * rig.T)
     np.testing.assert_allclose(rig.outputs['estimate'][0, :, 0], [A, E], atol=2e-3)
-    assert f'expected loss {plan["loss"]:.1f} s' in said and 'clockwise' in said
+    assert f'expected loss {plan["loss"]:.1f} s' in text and 'clockwise' in text and 'rough' not in text
+    assert numbers['keyhole_loss_s'] == f'{plan["loss"]:.3f}' and float(numbers['deck_motion_deg']) == 0.0
+    moving = rig.state[0]['lookahead'].copy()
+    moving['deck_motion'] = 0.5 * BEAMWIDTH
+    assert f'the deck moves by {math.degrees(0.5 * BEAMWIDTH):.2f} deg rms' in announcement.keyhole(moving, BEAMWIDTH)
 
 
 def slewing(Rig, **parameters):

@@ -66,7 +66,7 @@ def test_turned_is_the_rotation_by_a_vector():
     rng = np.random.default_rng(1)
     for size in (0.0, 1e-9, 0.1, 2.0):
         q, r = Rotation.from_rotvec(rng.normal(size=3)), size * rng.normal(size=3)
-        got = Rotation.from_quat(attitudes.turned(q.as_quat(), tuple(r)))
+        got = Rotation.from_quat(attitudes.rotated(q.as_quat(), tuple(r)))
         assert (got.inv() * q * Rotation.from_rotvec(r)).magnitude() < 1e-14
 
 

@@ -27,7 +27,7 @@ FIRST = (
     'acu.azimuth.shaper.acceleration', 'acu.initial_mode', 'tracking_receiver.receiver.cn0_dbhz',
     'tracking_receiver.antenna.beamwidth', 'tracking_receiver.receiver.latency', 'ship_motion.ship.motion',
     'ship_motion.ship.sea_state', 'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
-"""Parameters that one touches first."""
+"""The parameters in the table of README.md."""
 
 RATES = {'step': 'step', 'once': 'once, latched', 'second': '1 Hz', 'change': 'on change, latched'}
 
@@ -75,7 +75,7 @@ def filter_table():
 
 
 def fault_table():
-    """What the drive trips on."""
+    """The faults on which the drive trips."""
     return _table(('fault, per axis', 'from', 'parameter'),
                   [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
                    for fault in faults.FAULTS])
@@ -116,7 +116,7 @@ TABLES = {'nodes': node_table, 'studies': study_table, 'topics': topic_table, 's
 
 
 def written(text):
-    """A file's text with its tables made anew. Raises KeyError for a table that is not known."""
+    """A file's text with its tables written again. Raises KeyError for an unknown table."""
     def table(match):
         return '\n'.join((f'<!-- table {match[1]} -->', *TABLES[match[1]](), '<!-- end -->'))
     return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)

@@ -146,22 +146,22 @@ def turning(p, f):
     return 1.0 / (1.0 + m.pole_pairs * m.flux_linkage / (m.inductance * s + m.resistance) * M(s) * (1.0 - D))
 
 
-def agrees(found, loop, low, high, gain, phase, factor=None):
+def agrees(measured, loop, low, high, gain, phase, factor=None):
     """Whether L is within gain (relative) and phase [deg] (and 50 us) of the model from low to high [Hz]."""
-    band = (low <= found.frequency) & (found.frequency <= high)
-    f = found.frequency[band]
-    ratio = found.open_loop[band] / model_at(loop, f) / (factor(f) if factor else 1.0)
+    band = (low <= measured.frequency) & (measured.frequency <= high)
+    f = measured.frequency[band]
+    ratio = measured.open_loop[band] / model_at(loop, f) / (factor(f) if factor else 1.0)
     early = 360.0 * f * PLANT_PERIOD
     turned = np.degrees(np.angle(ratio))
     return np.all(np.abs(np.abs(ratio) - 1.0) < gain) and np.all((-phase < turned) & (turned < early + phase))
 
 
-def margins_agree(found, loop, lowest):
+def margins_agree(measured, loop, lowest):
     """Margins within 1 dB and 3 deg of python-control's on a fine grid of the model from `lowest` [Hz]."""
     f = np.geomspace(lowest, 0.45 / loop.dt, 20000)
     gm, pm, _, _, w_pm, _ = control.stability_margins(
         control.frd(model_at(loop, f), 2.0 * math.pi * f, smooth=True), returnall=True)
-    ours = {metric: value for metric, (value, _) in bode.margins(found).items()}
+    ours = {metric: value for metric, (value, _) in bode.margins(measured).items()}
     return (ours['crossover_hz'] == pytest.approx(np.min(w_pm) / (2.0 * math.pi), rel=0.01)
             and ours['gain_margin_db'] == pytest.approx(20.0 * math.log10(np.min(gm[gm > 1.0])), abs=1.0)
             and ours['phase_margin_deg'] == pytest.approx(np.min(np.abs(pm)), abs=3.0))

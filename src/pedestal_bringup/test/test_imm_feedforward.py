@@ -94,7 +94,7 @@ def test_noise_of_the_rate_is_the_steady_states():
     P = solve_discrete_are(F.T, H.T, q * q * np.array([[T**3 / 3.0, T * T / 2.0], [T * T / 2.0, T]]), R)
     K = P @ H.T / (P[0, 0] + R)
     expected = math.degrees(math.sqrt(solve_discrete_lyapunov((np.eye(2) - K @ H) @ F, K @ K.T * R)[1, 1]))
-    found = loop.outcomes({'cv': ('azimuth', loop.cv(0.5))}, 50, monte_carlo.Pool(1))['cv']
+    found = loop.statistics({'cv': ('azimuth', loop.cv(0.5))}, 50, monte_carlo.Pool(1))['cv']
     assert found.measures()['rate_noise_deg_s'][0] == pytest.approx(expected, rel=0.03)
 
 
@@ -102,7 +102,7 @@ def test_an_outcome_is_that_of_all_its_runs():
     """More than one batch, against one array of all runs."""
     case = ('azimuth', study.SOURCES['imm-predicted'])
     count = loop.BATCH + 3
-    found = loop.outcomes({'case': case}, count, monte_carlo.Pool(1))['case']
+    found = loop.statistics({'case': case}, count, monte_carlo.Pool(1))['case']
     miss = loop.steps_of(*case, 0, count)['miss']
     t, _, period = loop.motion('azimuth')
     assert found.miss_mean == pytest.approx(miss.mean(axis=0), abs=1e-12)
@@ -149,6 +149,6 @@ def test_batches_are_added_as_they_come():
                 yield sums, 1.0
 
     runs = 12 * loop.BATCH
-    outcome = loop.outcomes({'case': ('azimuth', loop.cv(0.1))}, runs, Pool())['case']
+    outcome = loop.statistics({'case': ('azimuth', loop.cv(0.1))}, runs, Pool())['case']
     assert most <= 3
     assert outcome.miss_mean == pytest.approx(66.0 / runs) and outcome.peak == pytest.approx(12.0 / runs)

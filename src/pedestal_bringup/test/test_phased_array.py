@@ -10,7 +10,7 @@ from acu_tracker.estimation.alpha_beta import benedict_bordner
 from pedestal_bringup.studies import phased_array
 from pedestal_bringup.studies.phased_array import instants, settled
 from pedestal_bringup.studies.rigs import drawing, metrics, rows
-from pedestal_bringup.studies.rigs.angle_loop import GRID, LENGTH, Better, Paper, received
+from pedestal_bringup.studies.rigs.angle_loop import GRID, LENGTH, Better, Paper, Receiver, received
 from tracking_receiver_sim import monopulse
 
 
@@ -127,12 +127,12 @@ def test_with_the_ins_only_what_the_attitude_is_late_is_left():
 def test_receiver_is_the_monopulse_pattern():
     width = math.radians(1.0)
     v = np.linspace(-0.7, 0.7, 29)
-    seen = np.array([received(x * width, 1.0, width, 0.4) for x in v])
+    errors = np.array([received(x * width, Receiver(1.0, width, 0.4)) for x in v])
     S = np.array([monopulse.sum_pattern(x) for x in v])
     expected = np.array([monopulse.difference_pattern(x, 1.0) for x in v]) / S
-    np.testing.assert_allclose(seen[S * S >= 0.4], np.clip(expected, -0.7, 0.7)[S * S >= 0.4] * width, atol=1e-15)
-    assert np.all(np.isnan(seen[S * S < 0.4])) and np.sum(S * S < 0.4) > 2
-    assert received(0.3, 1.5, 0.0, 0.5) == pytest.approx(0.45)
+    np.testing.assert_allclose(errors[S * S >= 0.4], np.clip(expected, -0.7, 0.7)[S * S >= 0.4] * width, atol=1e-15)
+    assert np.all(np.isnan(errors[S * S < 0.4])) and np.sum(S * S < 0.4) > 2
+    assert received(0.3, Receiver(1.5, 0.0, 0.5)) == pytest.approx(0.45)
 
 
 @pytest.mark.parametrize('smoothing', ['S0', 'S1', 'S2'])

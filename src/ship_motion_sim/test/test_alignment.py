@@ -173,7 +173,7 @@ def test_the_solution_is_the_rotation_and_agrees_with_kabsch():
     for n in range(1, 400):
         b.append(np.array(oba.gravity_integral(n * 0.5, k)))
         a.append(turn.inv().apply(b[-1]) + start + 0.05 * random.standard_normal(3))
-        oba.step(s[0], k, *map(float, a[-1]), 0.0, 0.0, 0.0, 0.5)
+        oba.step(s[0], k, tuple(map(float, a[-1])), (0.0, 0.0, 0.0), 0.5)
     ours = Rotation.from_quat(oba.solve(s[0]))
     a, b = np.array(a), np.array(b)
     kabsch, _ = Rotation.align_vectors(b - b.mean(axis=0), a - a.mean(axis=0))
@@ -186,5 +186,5 @@ def test_quaternion_helpers_against_scipy():
     np.testing.assert_allclose(np.abs(strapdown.product(*a.as_quat(), *b.as_quat())), np.abs((a * b).as_quat()),
                                atol=1e-15)
     for size in (0.0, 1e-6, 1e-3, 2.0):
-        np.testing.assert_allclose(strapdown.turn(0.6 * size, 0.0, 0.8 * size),
+        np.testing.assert_allclose(strapdown.from_rotvec(0.6 * size, 0.0, 0.8 * size),
                                    Rotation.from_rotvec([0.6 * size, 0.0, 0.8 * size]).as_quat(), atol=1e-15)

@@ -20,7 +20,9 @@ def built(duration=120.0, **values):
 
 
 def states(made, times):
-    return np.array([target.state(made.constants[0], made.breaks, made.coefficients, t) for t in times])
+    """(valid, ENU position [m], velocity [m/s]) at times [s], (n, 7)."""
+    made_states = (target.state(made.constants[0], made.breaks, made.coefficients, t) for t in times)
+    return np.array([(state.valid, *state.position, *state.velocity) for state in made_states])
 
 
 def vectors(azimuth, elevation):

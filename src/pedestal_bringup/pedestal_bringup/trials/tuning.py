@@ -1,10 +1,9 @@
-"""The one procedure by which the parameters of a filter are found.
+"""The one procedure that tunes the parameters of a filter.
 
-The criterion (a number to make small: the angle rms of a study, the negative log-likelihood of a bag's innovations)
-is taken as a function of the logarithms of the kind's own parameters. First on a grid over RANGES, for one or two of
-them; then, from the best point (from the given parameters where there are more than two), downhill by the simplex of
-Nelder and Mead until the parameters stay within 2 %. Judge the result on seeds, or a part of the recording, of its
-own.
+It minimises a criterion (the angle rms of a study, the negative log-likelihood of a bag's innovations) over the
+logarithms of the kind's own parameters: first on a grid over RANGES, for one or two of them; then, from the best point
+(from the given parameters where there are more than two), by the simplex of Nelder and Mead until the parameters stay
+within 2 %. The result must be judged on other seeds, or on another part of the recording.
 """
 import itertools
 import math
@@ -25,7 +24,7 @@ TOLERANCE = 0.02
 """Of the logarithms."""
 
 FAILED = 1e300
-"""Stands for the criterion where it does not work: finite, so that the simplex can tell its differences."""
+"""Value of a criterion that is not finite; finite itself, so that the simplex can take differences."""
 
 
 def names(params):
@@ -40,10 +39,10 @@ def _of_kind(kind):
 
 
 def tuned(params, criterion, searched=None):
-    """(parameters with the least criterion found, that criterion), from FilterParameters or UkfParameters.
+    """(parameters with the least criterion, that criterion), searched from FilterParameters or UkfParameters.
 
-    criterion: function of them, infinite or NaN where it does not work. searched: names, None: those of `names`.
-    Raises ValueError where it works nowhere.
+    criterion: function of them, infinite or NaN where it has no value. searched: names, None: those of `names`.
+    Raises ValueError where it has no value anywhere.
     """
     searched = names(params) if searched is None else tuple(searched)
     given = parameters.as_dict(params)
@@ -68,7 +67,7 @@ def tuned(params, criterion, searched=None):
         start = min([start, *grid], key=cost)
     corners = np.vstack((start, np.asarray(start) + 0.7 * np.eye(len(start))))
     options = {'initial_simplex': corners, 'xatol': TOLERANCE, 'fatol': math.inf, 'maxfev': 100 * len(start)}
-    found = minimize(cost, start, method='Nelder-Mead', bounds=bounds, options=options)
-    if found.fun >= FAILED:
+    optimum = minimize(cost, start, method='Nelder-Mead', bounds=bounds, options=options)
+    if optimum.fun >= FAILED:
         raise ValueError(f'no {", ".join(searched)} gives a finite criterion')
-    return at(found.x), float(found.fun)
+    return at(optimum.x), float(optimum.fun)
