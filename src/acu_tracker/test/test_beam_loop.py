@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker.estimation import alpha_beta
+from acu_tracker.estimation import constant_gain
 from acu_tracker.geometry import attitude, deck_reference
 from acu_tracker.geometry.vector import Vector
 from acu_tracker.servo import beam_loop
@@ -16,7 +16,7 @@ T = 0.01
 
 def step_response(law, alpha, delay, steps):
     """Beam (steps,) that sees a step of 1 from the start on, a command in force `delay` periods late."""
-    beta = alpha_beta.benedict_bordner(alpha)
+    beta = constant_gain.benedict_bordner(alpha)
     R, v, commands, seen = 0.0, 0.0, [0.0] * (delay + 1), []
     for _ in range(steps):
         seen.append(commands[-1 - delay])
@@ -28,7 +28,7 @@ def step_response(law, alpha, delay, steps):
 @pytest.mark.parametrize('alpha, delay', [(0.1, 0), (0.3, 0), (0.1, 4), (0.05, 10)])
 def test_step_responses_are_those_of_the_closed_transfer_functions(alpha, delay):
     """By hand from eq. (3): R = z^-1 (R + v T) + alpha nu, nu = e - T z^-1 v, and so on, e = 1 - z^-(1 + delay) R."""
-    beta = alpha_beta.benedict_bordner(alpha)
+    beta = constant_gain.benedict_bordner(alpha)
     # v T (1 - z^-1 (1 - beta)) = beta e;  R (1 - z^-1) = (1 - alpha) z^-1 v T + alpha e
     one = np.polymul([1.0, -1.0], [1.0, beta - 1.0])
     type_1 = np.polyadd(alpha * np.array([1.0, beta - 1.0]), [(1.0 - alpha) * beta]), one
@@ -52,7 +52,7 @@ def test_a_ramp_is_met_late_by_one_period_or_not_at_all(law, lag, delay):
         R, v, commands = 0.0, 0.0, [0.0] * (delay + 1)
         for k in range(4000):
             error = 0.2 * k * T - commands[-1 - delay]
-            R, v = law(R, v, error, 0.05, alpha_beta.benedict_bordner(0.05), T, compensation)
+            R, v = law(R, v, error, 0.05, constant_gain.benedict_bordner(0.05), T, compensation)
             commands.append(R)
         assert error == pytest.approx(expected, abs=1e-11)
 

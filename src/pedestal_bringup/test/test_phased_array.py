@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from acu_tracker.estimation.alpha_beta import benedict_bordner
+from acu_tracker.estimation.constant_gain import benedict_bordner
 from pedestal_bringup.studies import phased_array
 from pedestal_bringup.studies.phased_array import instants, settled
 from pedestal_bringup.studies.rigs import drawing, metrics, rows

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation import alpha_beta, imm, kalman, motion_models
+from acu_tracker.estimation import constant_gain, imm, kalman, motion_models
 from acu_tracker.estimation.kalman import Gaussian, Symmetric
 from acu_tracker.estimation.kinds import KINDS
 from acu_tracker.estimation.measurement import AxisInnovation, AxisMeasurement, AxisVariances
@@ -152,7 +152,7 @@ def correct(f, c, m):
         f.weights[j] = kalman.log_likelihood(nu, S)
         # Constant gains, but for a start (or after a gap) that deserves more: a growing memory until alpha is reached.
         if g.P.p11 < c.alpha * S:
-            g = kalman.update_with_gain(g, nu, m.variance, alpha_beta.gain(c.alpha, c.beta, c.gamma, f.T))
+            g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
         else:
             g = kalman.update(g, nu, m.variance)
         if not math.isnan(m.rate):

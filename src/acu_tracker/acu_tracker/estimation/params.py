@@ -13,37 +13,41 @@ _ALPHA = '1/s', 'manoeuvre frequency: one over the time an acceleration lasts'
 class AlphaBetaParameters(Parameters):
     """alpha_beta and alpha_beta_gamma: alpha sets the other gains (Benedict-Bordner; Kalata)."""
 
-    alpha: float = parameter(0.15, 1e-3, 0.999, '', 'share of an innovation that the angle takes')
+    alpha: float = parameter(0.15, 1e-3, 0.999, '', 'share of an innovation that the angle takes',
+                             grid=(0.003, 0.8, 8))
 
 
 @dataclasses.dataclass(frozen=True)
 class CvParameters(Parameters):
     """Constant rate."""
 
-    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s2/sqrt(Hz)', 'of the white acceleration')
+    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s2/sqrt(Hz)', 'of the white acceleration',
+                             grid=(1e-6, 1.0, 7))
 
 
 @dataclasses.dataclass(frozen=True)
 class CaParameters(Parameters):
     """Constant acceleration."""
 
-    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s3/sqrt(Hz)', 'of the white jerk')
+    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s3/sqrt(Hz)', 'of the white jerk', grid=(1e-6, 10.0, 8))
 
 
 @dataclasses.dataclass(frozen=True)
 class SingerParameters(Parameters):
     """An acceleration of mean zero and limited duration."""
 
-    alpha: float = parameter(0.5, 1e-4, 100.0, *_ALPHA)
-    sigma: float = parameter(0.3 * _DEG, 1e-7, 100.0, 'rad/s2', 'standard deviation of the acceleration')
+    alpha: float = parameter(0.5, 1e-4, 100.0, *_ALPHA, grid=(0.03, 3.0, 3))
+    sigma: float = parameter(0.3 * _DEG, 1e-7, 100.0, 'rad/s2', 'standard deviation of the acceleration',
+                             grid=(1e-5, 1.0, 6))
 
 
 @dataclasses.dataclass(frozen=True)
 class CurrentStatisticalParameters(Parameters):
     """An acceleration of limited duration about its present estimate (paper 000)."""
 
-    alpha: float = parameter(0.1, 1e-4, 100.0, *_ALPHA)
-    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
+    alpha: float = parameter(0.1, 1e-4, 100.0, *_ALPHA, grid=(0.03, 3.0, 3))
+    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target',
+                             grid=(1e-4, 1.0, 5))
     floor: float = parameter(0.3, 0.0, 1.0, '', 'least sigma_a over a_max; without it the filter locks')
 
 

@@ -9,7 +9,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from acu_tracker.estimation import alpha_beta
+from acu_tracker.estimation import constant_gain
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import adrc, beam_loop, feedforward, notch, pid, reference
 from pedestal_common.compiled import compiled
@@ -106,7 +106,7 @@ def follow(axis, c, target, feedback, now):
 def _steer(axis, p, target, feedback, T):
     """Command of an electronic beam: the raw target at t_m, or the beam of its own loop on the error."""
     b, r = p.beam, axis.reference
-    beta, compensation = alpha_beta.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
+    beta, compensation = constant_gain.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
     axis.controller = BEAM
     r.acceleration = 0.0
     if not feedback.closed or b.form == beam_loop.TRACKED:

@@ -11,7 +11,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from acu_tracker.estimation import alpha_beta, axis_filter
+from acu_tracker.estimation import axis_filter, constant_gain
 from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import CaParameters, FilterParameters
 from acu_tracker.geometry import attitude as attitudes
@@ -148,7 +148,7 @@ def command(u, stamp, due, beam):
 def _paper(constants, receiver, target, smoothers, plant, beam, errors):
     """Paper 002's loop over a Target into beam and errors (n,) [rad]; plant: the Beam."""
     form, alpha, period, delta, kind = constants
-    s, beta, T = smoothers[0].error, alpha_beta.benedict_bordner(alpha), period * GRID
+    s, beta, T = smoothers[0].error, constant_gain.benedict_bordner(alpha), period * GRID
     R = v = error = 0.0
     for i in range(len(target.angle)):
         beam[i] = plant.outputs[0].position[0]
@@ -226,7 +226,7 @@ def spectral_radius(loop):
     the next period (and of the moving average before it). In sample j = 1 ... period after the update k the command
     k + floor((j - 1 - delay) / period) is in force.
     """
-    M, beta, n = loop.period, alpha_beta.benedict_bordner(loop.alpha), LENGTH
+    M, beta, n = loop.period, constant_gain.benedict_bordner(loop.alpha), LENGTH
     first = {'S0': M, 'S1': 1, 'S2': M - n + 1}[loop.smoothing]
     ages = [-((j - 1 - loop.delay) // M) for j in range(first, M + 1)]
     V, E, C = 0, 1, 2
