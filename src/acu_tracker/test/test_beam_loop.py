@@ -17,12 +17,12 @@ T = 0.01
 def step_response(law, alpha, delay, steps):
     """Beam (steps,) that sees a step of 1 from the start on, a command in force `delay` periods late."""
     beta = constant_gain.benedict_bordner(alpha)
-    R, v, commands, seen = 0.0, 0.0, [0.0] * (delay + 1), []
+    R, v, commands, beams = 0.0, 0.0, [0.0] * (delay + 1), []
     for _ in range(steps):
-        seen.append(commands[-1 - delay])
-        R, v = law(R, v, 1.0 - seen[-1], alpha, beta, T, 0.0)
+        beams.append(commands[-1 - delay])
+        R, v = law(R, v, 1.0 - beams[-1], alpha, beta, T, 0.0)
         commands.append(R)
-    return np.array(seen)
+    return np.array(beams)
 
 
 @pytest.mark.parametrize('alpha, delay', [(0.1, 0), (0.3, 0), (0.1, 4), (0.05, 10)])
@@ -71,18 +71,18 @@ def test_rates_of_a_fixed_direction_by_turning_the_deck():
 
 @pytest.fixture(name='beam')
 def beam_rig(Rig):
-    """The unit on a beam that is where it was told, `delay` late; the receiver measures with the beam that stood."""
+    """The unit on a beam that follows its command after `delay`; the receiver measures with the beam in force."""
     class BeamRig(Rig):
         def __init__(self, *args, at=(0.5, 0.6), delay=0.0, both=None, **parameters):
             axes = {f'{axis}.{name}': value for axis in ('azimuth', 'elevation')
                     for name, value in {'controller': 'beam', **(both or {})}.items()}
             super().__init__(*args, at=at, delay=delay, **{**Rig.QUICK, **axes, **parameters})
-            self.told = [tuple(at)] * (1 + round(delay / self.T))
+            self.commanded = [tuple(at)] * (1 + round(delay / self.T))
 
         def step(self, **changes):
             o = super().step(**changes)
-            self.told.append(tuple(o['reference'][:, 0]))
-            self.angle, self.velocity = np.array(self.told[-1 - round(self.delay / self.T)]), np.zeros(2)
+            self.commanded.append(tuple(o['reference'][:, 0]))
+            self.angle, self.velocity = np.array(self.commanded[-1 - round(self.delay / self.T)]), np.zeros(2)
             return o
 
         def middle(self, rows):
@@ -186,6 +186,6 @@ def test_an_error_that_is_a_mean_over_several_steps_is_met_with_the_mean_of_thei
     rig = beam(lambda t: (0.5 + rate * t, 0.0), at=(0.5, 0.0), **of_beam)
     for k in range(400):
         rig.angle = np.array([0.5 + rate * k * rig.T - 0.001, 0.0])
-        off = 0.001 + rate * np.average(stairs * rig.T - ages, weights=weights)
-        o = rig.step(cross_elevation=off, elevation=0.0)
+        error = 0.001 + rate * np.average(stairs * rig.T - ages, weights=weights)
+        o = rig.step(cross_elevation=error, elevation=0.0)
     assert o['estimate'][0, 0] == pytest.approx(0.5 + rate * 399 * rig.T, abs=1e-6)

@@ -142,10 +142,10 @@ def test_paper_loop_against_its_equations_written_out(smoothing):
     rng = np.random.default_rng(3)
     target, noise = np.cumsum(1e-4 * rng.standard_normal(600)), 1e-4 * rng.standard_normal(600)
     beams, errors, x, R, v = [0.0] * 14, [], 0.0, 0.0, 0.0
-    met = []
+    in_force = []
     for i in range(600):
-        met.append(beams[-14])
-        errors.append(1.3 * (target[i] - met[-1]) + noise[i])
+        in_force.append(beams[-14])
+        errors.append(1.3 * (target[i] - in_force[-1]) + noise[i])
         x = (LENGTH - 1) / LENGTH * x + errors[-1] / LENGTH
         if i % 5 == 0:
             e = {'S0': errors[-1], 'S1': x, 'S2': np.mean(errors[-LENGTH:])}[smoothing]
@@ -153,4 +153,4 @@ def test_paper_loop_against_its_equations_written_out(smoothing):
             nu = R + e - predicted
             R, v = predicted + 0.2 * nu, v + 0.04 / 1.8 / 0.005 * nu
         beams.append(R)
-    np.testing.assert_allclose(loop.run(target, noise=noise)[0], met, atol=1e-13)
+    np.testing.assert_allclose(loop.run(target, noise=noise)[0], in_force, atol=1e-13)
