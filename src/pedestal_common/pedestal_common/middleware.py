@@ -7,6 +7,9 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from pedestal_common import topics
 
+PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
+"""{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
+
 
 def qos(rate) -> QoSProfile:
     """The profile of topics of a rate, for writers and readers."""
@@ -23,11 +26,19 @@ def message_class(type_name):
 
 
 def set_defaults():
-    """What DDS of this process and its children does unless the user says otherwise: it talks to this machine only, on
-    loopback sockets, and acknowledges promptly (fastdds.xml). To be called before rclpy.init."""
-    if os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST') == 'LOCALHOST':
-        profiles = pathlib.Path(__file__).with_name('fastdds.xml')
-        os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(profiles))
+    """What DDS of this process and its children does, by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
+    profile of his own. To be called before rclpy.init.
+
+    Not set, or LOCALHOST: the graph stays on this machine and on its loopback (fastdds.xml). rclpy is then told
+    SYSTEM_DEFAULT, because under LOCALHOST rmw_fastrtps opens transports of its own on every interface.
+    SUBNET: the graph may spread over several hosts, by UDP (fastdds_subnet.xml).
+    """
+    scope = os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    if scope in PROFILES:
+        profile = str(pathlib.Path(__file__).with_name(PROFILES[scope]))
+        chosen = os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', profile)
+        if (scope, chosen) == ('LOCALHOST', profile):
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SYSTEM_DEFAULT'
 
 
 def make_executor():
