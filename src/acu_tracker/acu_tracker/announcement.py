@@ -1,24 +1,27 @@
-"""What the operator is told of what lies ahead, and its numbers for the diagnostics. `h`: an `ahead.AHEAD` record."""
+"""What the operator is told of what lies ahead, and its numbers for the diagnostics.
+
+`h` is the record of lookahead.planner.PLANNER.
+"""
 import math
 
-from acu_tracker.lookahead import ahead
+from acu_tracker.lookahead import planner
 
 
 def keyhole(h, beamwidth):
     """The text of acu/keyhole; beamwidth [rad]."""
-    if h['what'] == ahead.NO_TURN:
+    if h['forecast'] == planner.NO_WRAP:
         return 'keyhole ahead: no turn of the azimuth holds the pass, the axis will stop at the end of its travel'
-    plan = h['plan']
-    way = 'clockwise' if plan['peak'] > 0.0 else 'counter-clockwise'
-    if plan['other_cost'] == math.inf:
+    slew = h['slew']
+    way = 'clockwise' if slew['peak'] > 0.0 else 'counter-clockwise'
+    if slew['other_cost'] == math.inf:
         other = 'the other way round is closed by the limits'
     else:
-        other = f'the other way round would lose {plan["other_cost"] - plan["cost"]:.1f} s more'
-    text = (f'keyhole at {plan["culmination"]:.1f} s, elevation {_deg(plan["highest"]):.1f} deg: azimuth leaves the '
-            f'target at {plan["t1"]:.1f} s, goes {abs(_deg(plan["azimuth2"] - plan["azimuth1"])):.0f} deg {way} and '
-            f'meets it at {plan["t2"]:.1f} s; expected loss {plan["loss"]:.1f} s, at most '
-            f'{_deg(plan["worst"]):.2f} deg off; {other}')
-    if h['motion'] > 0.25 * beamwidth:
+        other = f'the other way round would lose {slew["other_cost"] - slew["cost"]:.1f} s more'
+    text = (f'keyhole at {slew["culmination"]:.1f} s, elevation {_deg(slew["highest"]):.1f} deg: azimuth leaves the '
+            f'target at {slew["t1"]:.1f} s, goes {abs(_deg(slew["azimuth2"] - slew["azimuth1"])):.0f} deg {way} and '
+            f'meets it at {slew["t2"]:.1f} s; expected loss {slew["loss"]:.1f} s, at most '
+            f'{_deg(slew["worst"]):.2f} deg off; {other}')
+    if h['deck_motion'] > 0.25 * beamwidth:
         text += f'; rough, as the deck moves by {_deg(h["motion"]):.2f} deg rms'
     return text
 
@@ -31,12 +34,12 @@ def hidden(h):
 
 def numbers(h):
     """[(key, value text)] of what is planned; nothing where nothing is."""
-    values = [('keyhole', ahead.WHATS[h['what']])]
-    if h['what'] == ahead.KEYHOLE:
-        plan = h['plan']
-        values += [('keyhole_begins_s', f'{plan["t1"]:.3f}'), ('keyhole_ends_s', f'{plan["t2"]:.3f}'),
-                   ('keyhole_loss_s', f'{plan["loss"]:.3f}'), ('keyhole_worst_deg', f'{_deg(plan["worst"]):.3f}'),
-                   ('keyhole_needed_deg_s', f'{_deg(plan["needed"]):.3g}'),
+    values = [('keyhole', planner.FORECASTS[h['forecast']])]
+    if h['forecast'] == planner.KEYHOLE:
+        slew = h['slew']
+        values += [('keyhole_begins_s', f'{slew["t1"]:.3f}'), ('keyhole_ends_s', f'{slew["t2"]:.3f}'),
+                   ('keyhole_loss_s', f'{slew["loss"]:.3f}'), ('keyhole_worst_deg', f'{_deg(slew["worst"]):.3f}'),
+                   ('keyhole_needed_deg_s', f'{_deg(slew["needed"]):.3g}'),
                    ('deck_motion_deg', f'{_deg(h["motion"]):.3f}')]
     if h['hidden'][0] == h['hidden'][0]:
         values += [('hidden_from_s', f'{h["hidden"][0]:.1f}'), ('hidden_to_s', f'{h["hidden"][1]:.1f}')]

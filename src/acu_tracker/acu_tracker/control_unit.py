@@ -7,24 +7,19 @@ import math
 import numpy as np
 
 from acu_tracker import modes
-from acu_tracker.estimation import tracker
-from acu_tracker.geometry import deck_reference, estimate_frame, lever_arm
-from acu_tracker.geometry.attitude import (
-    attitude_at,
-    deck_rates,
-    estimate_from_deck,
-    levelled,
-    seen_from_deck,
-    take_attitude,
-)
-from acu_tracker.history import bracket, history_type, push
-from acu_tracker.lookahead import ahead
-from acu_tracker.params import AcuParameters
+from acu_tracker.estimation import measurement, target, target_filter, tracker
+from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.geometry import attitude, azimuth_wrap, deck_reference, encoders
+from acu_tracker.geometry.azimuth_wrap import Travel
+from acu_tracker.geometry.motion import AxisMotion, Motion
+from acu_tracker.geometry.vector import vector
+from acu_tracker.lookahead import levelled_deck, planner
+from acu_tracker.params import AxisParameters, SharedParameters
 from acu_tracker.program import bridge, program_track
 from acu_tracker.servo import notch, position_loop
-from pedestal_common import blockage
+from acu_tracker.servo.position_loop import Feedback, Instants
+from pedestal_common import blockage, line_of_sight
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import ASHORE, displaced, displaced_motion, earth_angles, earth_direction, to_earth
 from pedestal_common.parameters import record, record_type
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
@@ -33,8 +28,8 @@ INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'at
 (_STAMP, _ENCODER, _ERROR, _ERROR_STAMP, _ERROR_GATED, _ATTITUDE, _PROGRAM, _PRESET,
  _STEP_GAP) = (1 << i for i in range(len(INVALID_INPUTS)))
 
-BELIEVED = 0.5
-"""Beamwidths that the beam may be meant to be off the target for the receiver's error still to be taken."""
+ON_TARGET = 0.5
+"""Beamwidths by which the beam may be meant to be off the target for the receiver's error still to be taken."""
 
 INPUTS = np.dtype([
     ('stamp', 'f8'),                                                            # t_k [s]
@@ -48,7 +43,6 @@ INPUTS = np.dtype([
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
     ('aligning', 'i8'),                                                         # 1: the INS does not know it yet
     ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
-    ('program_count', 'i8'),                                                    # rows of the table in use
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
 ], align=True)
 
@@ -58,7 +52,8 @@ OUTPUTS = np.dtype([
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
     ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
                                                                                 # of a beam at t_m: the command
-    ('covariance', 'f8', (2, 3)), ('probability', 'f8', (2, 4)),                # p11, p12, p22 at t_k; of MODELS
+    ('covariance', 'f8', (2, 3)),                                              # p11, p12, p22 at t_k
+    ('probability', 'f8', (2, len(MODELS))),                                   # of MODELS
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
@@ -68,336 +63,358 @@ OUTPUTS = np.dtype([
 ], align=True)
 
 STATE = np.dtype([
-    ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'), ('stabilised', 'i8'),
-    ('encoder', history_type(4)),                                               # azimuth, elevation, their rates
-    ('attitude', history_type(10)),                                             # quaternion, w, dw
-    ('tracker', tracker.TRACKER), ('azimuth', position_loop.AXIS), ('elevation', position_loop.AXIS),
-    ('turn', 'f8'), ('seen', 'f8', (2,)),         # raw azimuth last followed; deck angles of the target then
+    ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'),
+    ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('aligning', 'i8'),
+    ('target', target.TARGET), ('error', 'f8', (2,)),                           # of this step, azimuth, elevation
     ('preset', 'f8', (2,)),
-    ('error', 'f8', (2,)),                                                      # of this step, azimuth, elevation
-    ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)),          # attitude last asked for
-    ('frame', estimate_frame.FRAME), ('mat_fd', 'f8', (3, 3)),                 # of the filter; deck -> it
-    ('ahead', ahead.AHEAD), ('aligning', 'i8'), ('blocked', 'i8'),
-    ('cramped', 'i8'),                                          # 1: no turn of the azimuth held the whole program
-    ('off', 'f8'), ('excused', 'f8'),                           # beam meant to be off by [rad]; last such stamp [s]
+    ('azimuth', 'f8'), ('seen', 'f8', (2,)),      # raw azimuth last asked for; deck angles of the target then
+    ('pointing_offset', 'f8'),                                  # by which the beam is meant to be off the target [rad]
+    ('overtravel', 'i8'),                                       # 1: no azimuth wrap held the whole program
+    ('outage', 'f8'), ('blocked', 'i8'),                        # stamp at which an outage had a reason last [s]
     ('bridge', bridge.BRIDGE),                                  # program where the target was last seen
-    ('arm', 'f8', (3,)), ('range', 'f8'),                       # lever arm over range [-]; from the INS [m], 0: none
+    ('lookahead', planner.PLANNER), ('axis', position_loop.AXIS, (2,)),
 ], align=True)
 
-CONSTANTS = np.dtype([('p', record_type(AcuParameters)), ('tracker', tracker.CONSTANTS), ('ahead', 'f8'),
-                      ('notch', 'f8', (2, 5)), ('sectors', 'f8', (blockage.MOST, 3))], align=True)
+AXIS_CONSTANTS = np.dtype([('p', record_type(AxisParameters)), ('notch', 'f8', (5,))], align=True)
+CONSTANTS = np.dtype([('p', record_type(SharedParameters)), ('axis', AXIS_CONSTANTS, (2,)), ('lead', 'f8'),
+                      ('tracker', tracker.CONSTANTS), ('lookahead', planner.CONSTANTS)], align=True)
+"""p: the parameters; notch: coefficients; lead: t_m - t_k [s]."""
+
+
+def axis_constants(params, period) -> np.ndarray:
+    """Constants (1,) of AxisParameters, for steps of period [s]."""
+    c, n = np.zeros(1, AXIS_CONSTANTS), params.notch
+    c['p'] = record(params, AxisParameters)
+    c['notch'] = notch.coefficients(n.frequency, n.width, n.depth, period)
+    return c
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of an AcuParameters: the parameters, those of the target filter, `ahead` = t_m - t_k [s], the
-    notches' coefficients, hidden sectors."""
-    c = np.zeros(1, CONSTANTS)
-    c['p'] = record(params, AcuParameters)
-    c['tracker'] = tracker.constants(params.tracker, params.azimuth.filter, params.elevation.filter)
-    c['sectors'] = blockage.sectors(params.blockage)
-    c['ahead'] = params.command_delay + 0.5 * params.period
-    for i, axis in enumerate((params.azimuth, params.elevation)):
-        c['notch'][0, i] = notch.coefficients(axis.notch.frequency, axis.notch.width, axis.notch.depth, params.period)
+    """Constants (1,) of AcuParameters."""
+    c, axes = np.zeros(1, CONSTANTS), (params.azimuth, params.elevation)
+    c['p'] = record(params, SharedParameters)
+    c['lead'] = params.command_delay + 0.5 * params.period
+    c['axis'] = np.concatenate([axis_constants(axis, params.period) for axis in axes])
+    c['tracker'] = tracker.constants(params.tracker, [axis.filter for axis in axes])
+    c['lookahead'] = planner.constants(params)
     return c
 
 
 def initial_state(params) -> np.ndarray:
-    """State (1,) before the first step: standby, the initial mode pending."""
+    """State (1,) before the first step of AcuParameters: standby, the initial mode pending."""
     s = np.zeros(1, STATE)
-    s['stamp'] = -math.inf
+    s['stamp'] = s['outage'] = -math.inf
     s['pending'] = modes.MODES.index(params.initial_mode)
     s['preset'] = params.azimuth.preset, params.elevation.preset
-    s['excused'] = s['ahead']['looked'] = s['ahead']['latest'] = -math.inf
-    s['ahead']['hidden'] = math.nan
-    s['ahead']['mean'] = ASHORE
-    s['frame']['mat'] = np.eye(3)
+    target.initialise(s['target'])
+    planner.initialise(s['lookahead'])
     return s
 
 
 @compiled
-def take_encoder(s, u):
-    """Remember the encoders of this step; False where they are not to be used."""
-    ok = u.encoder_valid and math.isfinite(u.position[0] + u.position[1] + u.velocity[0] + u.velocity[1])
-    if ok:
-        row = push(s.encoder, u.stamp)
-        for i in range(2):
-            s.encoder.sample[row, i], s.encoder.sample[row, 2 + i] = u.position[i], u.velocity[i]
-    return ok
+def _take_encoders(s, u):
+    """Take the encoders of this step; its flag where they are not to be used."""
+    return 0 if u.encoder_valid and encoders.take(s.encoders, u.stamp, u.position, u.velocity) else _ENCODER
 
 
 @compiled
-def met(s, i, j, f, index):
-    """Column `index` of the encoder's history, a share f between two rows."""
-    a, b = s.encoder.sample[i, index], s.encoder.sample[j, index]
-    return a + f * (b - a)
+def _take_attitude(s, c, u):
+    """Take the attitude of this step, and into the mean of the look-ahead; its flag where it is unusable."""
+    s.aligning = u.aligning
+    if u.stabilised != s.attitude.stabilised:
+        s.attitude.stabilised, s.target.tracker.running = u.stabilised, 0
+        planner.forget(s.lookahead)
+    if not u.stabilised:
+        return 0
+    if not u.attitude_valid:
+        return _ATTITUDE
+    outcome = attitude.take(s.attitude, c.p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate)
+    if outcome == attitude.NEW:
+        deck = s.lookahead.deck
+        if s.aligning:
+            # Its heading is still being looked for: the mean begins with the one that is found.
+            levelled_deck.restart(deck)
+        h = s.attitude.history
+        levelled_deck.take(deck, u.attitude_stamp, h.sample[h.newest], c.p.keyhole.mean_time)
+    return _ATTITUDE if outcome == attitude.INVALID else 0
 
 
 @compiled
-def target_rates(s, u, A, E, dA, dE):
-    """Rates (azimuth, elevation) of the target: those of the antenna at A, E and of the error, turned into the frame
-    of the filter by the attitude `s` was last asked for."""
-    x, y, z, dx, dy, dz = displaced_motion(A, E, dA, dE, u.cross_elevation, u.elevation, u.error_rate[0],
-                                           u.error_rate[1])
-    if s.stabilised or s.frame.tilted:
-        estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
-        x, y, z, dx, dy, dz, _, _, _ = deck_reference.from_lever_arm(-s.arm[0], -s.arm[1], -s.arm[2], x, y, z, dx, dy,
-                                                                    dz, 0.0, 0.0, 0.0)
-        return deck_reference.earth_rates(s.mat_fd, s.w[0], s.w[1], s.w[2], x, y, z, dx, dy, dz)
-    _, dA, _, _, dE, _ = deck_reference.moving_angles(x, y, z, dx, dy, dz, 0.0, 0.0, 0.0)
-    return dA, dE
-
-
-@compiled
-def take_error(s, p, c, u, o):
-    """Filter y = encoder at the instant of the error, displaced by the error, in the angles of the estimate.
+def _take_error(s, c, u, o):
+    """Filter y = encoder at the instant of the error, displaced by the error; its flag where it is not accepted.
 
     The error is the mean of samples that were taken while a beam jumped from step to step: target and beam each have
     an instant that they are the mean of. Between two steps the mean moves as a straight line does, so that it is exact
     of a ramp, whatever the weights of the samples are. While the beam is meant to be off the target the receiver's
     reading is none.
     """
-    e = p.tracker.receiver
+    s.error[0] = s.error[1] = math.nan
+    receiver = c.p.tracker.receiver
+    if not u.error_valid:
+        return 0
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
         return _ERROR
-    if s.off > BELIEVED * e.beamwidth:
+    if s.pointing_offset > ON_TARGET * receiver.beamwidth:
         return 0
-    if not s.tracker.running:
-        estimate_frame.level(s.frame)
-    t = u.error_stamp - e.age
-    i, j, f = bracket(s.encoder, u.error_stamp - e.beam_age)
-    if i < 0:
+    known, at = encoders.at(s.encoders, u.error_stamp - receiver.beam_age)
+    if not known:
         return _ERROR_STAMP
-    A, E = met(s, i, j, f, 0), met(s, i, j, f, 1)
-    azimuth, elevation = displaced(A, E, u.cross_elevation, u.elevation)
-    s.error[0], s.error[1] = azimuth - A, elevation - E
-    if s.stabilised or s.frame.tilted:
-        if not attitude_at(s, p, t):
-            return _ATTITUDE
-        # The deck's azimuth is clockwise from the bow: a direction in FLU is (north, west, up) of an ENU vector.
-        y, x, z = earth_direction(azimuth, elevation)
-        azimuth, elevation = earth_angles(*to_earth(s.mat_ed, *lever_arm.from_ins(s, p.lever_arm, u.range, x, -y, z)))
-        if s.frame.tilted:
-            azimuth, elevation = estimate_frame.measured(s.frame, azimuth, elevation)
-    azimuth_rate, elevation_rate = math.nan, math.nan
-    if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
-        azimuth_rate, elevation_rate = target_rates(s, u, A, E, met(s, i, j, f, 2), met(s, i, j, f, 3))
-    R = tracker.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e.beamwidth, e.slope, e.integration,
-                               e.sigma_floor)
-    R_rate = u.error_rate_sigma * u.error_rate_sigma
-    cos_el = max(math.cos(elevation), 0.01)
-    (outcome, o.innovation[0], o.innovation[1], o.rate_innovation[0], o.rate_innovation[1], o.nis[0],
-     o.nis[1]) = tracker.observe(s.tracker, p.tracker, c, t, azimuth, elevation, R / (cos_el * cos_el), R,
-                                 azimuth_rate, elevation_rate, R_rate / (cos_el * cos_el), R_rate, u.range,
-                                 u.range_variance, math.inf if excused(s, p) else p.tracker.restart_gap)
-    if outcome == tracker.STALE:
+    seen = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
+    s.error[0], s.error[1] = seen[0] - at.A, seen[1] - at.E
+    restart_gap = math.inf if _outage_permitted(s, c) else c.p.tracker.restart_gap
+    outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, seen, restart_gap)
+    for i in range(2):
+        one = innovation.axis[i]
+        o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
+        o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(one.S)
+    if outcome == target.NO_ATTITUDE:
+        return _ATTITUDE
+    if outcome == target.STALE:
         return _ERROR_STAMP
-    reframe(s, c)
-    if o.nis[0] == o.nis[0]:
-        o.innovation_sigma[0], o.innovation_sigma[1] = math.sqrt(s.tracker.S[0]), math.sqrt(s.tracker.S[1])
-    return _ERROR_GATED if outcome == tracker.GATED else 0
+    return _ERROR_GATED if outcome == target.GATED else 0
 
 
 @compiled
-def reframe(s, c):
-    """Let the filter go on in the frame that suits the elevation of the target."""
-    t, f = s.tracker, s.frame
-    A, dA, ddA, E, dE, ddE = tracker.outlook(t, c, t.stamp)
-    if not (f.tilted or E > estimate_frame.RAISE):
-        return
-    e, n, u, de, dn, du, dde, ddn, ddu = estimate_frame.moving_in_earth(f, A, dA, ddA, E, dE, ddE)
-    if f.tilted and u >= math.sin(estimate_frame.LOWER):
-        return
-    if f.tilted:
-        estimate_frame.level(f)
-    else:
-        estimate_frame.tilt(f, e, n, u, de, dn, du)
-    tracker.turn(t, c, *estimate_frame.moving_in_frame(f, e, n, u, de, dn, du, dde, ddn, ddu))
+def _take_preset(s, u):
+    """Take a new preset; its flag where it is not finite."""
+    if not u.preset_valid:
+        return 0
+    if not math.isfinite(u.preset[0] + u.preset[1]):
+        return _PRESET
+    s.preset[0], s.preset[1] = u.preset[0], u.preset[1]
+    return 0
 
 
 @compiled
-def excused(s, p):
-    """Whether the receiver is silent for a reason, a keyhole or a hidden sector, or has been until just now."""
-    return s.stamp - s.excused <= p.tracker.coast_time
+def _since_accepted(s, c):
+    """Time [s] since the last accepted measurement, beyond the receiver's latency and the age of its errors."""
+    return s.stamp - s.target.tracker.stamp - c.p.receiver_latency - c.p.tracker.receiver.age
 
 
 @compiled
-def followed(s, p, c, times, angles, t):
-    """(in the frame of the filter, A, dA, ddA, E, dE, ddE) at t of what program or autotrack follows: 1 for angles in
-    that frame, 0 for earth angles. A silence that has a reason is bridged by the program."""
-    if s.mode == modes.PROGRAM:
-        A, dA, ddA, E, dE, ddE = program_track.outlook(times, angles, t)
-        return 0, A, dA, ddA, E, dE, ddE
-    if s.bridge.there and silent(s, p) and excused(s, p) and program_track.status(times, t) == modes.NONE:
-        A, dA, ddA, E, dE, ddE = bridge.outlook(s.bridge, times, angles, t)
-        return 0, A, dA, ddA, E, dE, ddE
-    A, dA, ddA, E, dE, ddE = tracker.outlook(s.tracker, c, t)
-    return 1, A, dA, ddA, E, dE, ddE
+def _coasting(s, c):
+    """Whether the estimate has gone without a measurement for coast_after."""
+    return _since_accepted(s, c) > c.p.tracker.coast_after
 
 
 @compiled
-def program_target(s, p, times, angles, t):
-    """Deck angles of the program track at t; the azimuth not yet on a turn."""
-    A, dA, ddA, E, dE, ddE = program_track.outlook(times, angles, t)
-    return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
+def _outage_permitted(s, c):
+    """Whether the receiver has, or had until lately, a reason to be without signal: a keyhole or a hidden sector."""
+    return s.stamp - s.outage <= c.p.tracker.coast_time
 
 
 @compiled
-def outside(azimuth, elevation, p):
-    """OUTSIDE_LIMITS if deck angles cannot be pointed at, else NONE; NaN is outside."""
-    a, e = p.azimuth.limits, p.elevation.limits
-    inside = a.low <= azimuth <= a.high and e.low <= elevation <= e.high
-    return modes.NONE if inside else modes.OUTSIDE_LIMITS
+def _outside(c, A, E):
+    """OUTSIDE_LIMITS if deck angles [rad] cannot be pointed at, else NONE; NaN is outside."""
+    a, e = c.axis[0].p.limits, c.axis[1].p.limits
+    return modes.NONE if a.low <= A <= a.high and e.low <= E <= e.high else modes.OUTSIDE_LIMITS
 
 
 @compiled
-def overdue(s, p):
-    """How long [s] no error was believed, beyond the receiver's latency and the age of its errors."""
-    return s.stamp - s.tracker.stamp - p.receiver_latency - p.tracker.receiver.age
+def _program_obstacle(s, c, program, t_m):
+    """(NONE or why the program cannot be followed, by its times or where it is at t_m [s]; _PROGRAM if it is bad)."""
+    obstacle = program_track.status(program, s.stamp)
+    if obstacle != modes.NONE:
+        return obstacle, 0
+    source = target.Followed(0, program_track.motion_at(program, t_m))
+    motion = target.on_deck(s.target, c.p, s.attitude, t_m, source)
+    A, E, limits = motion.azimuth.angle, motion.elevation.angle, c.axis[0].p.limits
+    if not math.isfinite(A + E):
+        return modes.NO_PROGRAM, _PROGRAM
+    return _outside(c, azimuth_wrap.nearest(A, s.azimuth, limits.low, limits.high, Travel(0.0, 0.0)), E), 0
 
 
 @compiled
-def change_mode(s, p, o, drive_ready, times, angles, t_m, request):
-    """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
-    flags = 0
-    encoder_ok = s.encoder.count > 0 and s.encoder.stamp[s.encoder.newest] == s.stamp
-    attitude = modes.NONE
-    if s.stabilised:
+def _situation(s, c, drive_ready, program, t_m, request):
+    """(modes.Situation at s.stamp, flags of the program); the program is only looked at where it matters."""
+    unstable = modes.NONE
+    if s.attitude.stabilised:
         # Before the first attitude it is not determined whether the INS has said how it is.
-        attitude = (modes.INS_ALIGNING if s.aligning and s.attitude.count > 0 else
-                    modes.NONE if attitude_at(s, p, t_m) else modes.ATTITUDE_INVALID)
-    lost = not s.tracker.running or (overdue(s, p) > p.tracker.coast_time and not excused(s, p))
-    program = program_track.status(times, s.stamp)
+        unstable = (modes.INS_ALIGNING if s.aligning and s.attitude.history.count > 0 else
+                    modes.NONE if attitude.at(s.attitude, c.p, t_m) else modes.ATTITUDE_INVALID)
+    since = _since_accepted(s, c)
+    lost = not s.target.tracker.running or (since > c.p.tracker.coast_time and not _outage_permitted(s, c))
     wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)
-    if program == modes.NONE and attitude == modes.NONE and wanted:
-        A, _, _, E, _, _ = program_target(s, p, times, angles, t_m)
-        if not math.isfinite(A + E):
-            program, flags = modes.NO_PROGRAM, _PROGRAM
-        else:
-            low, high = p.azimuth.limits.low, p.azimuth.limits.high
-            program = outside(deck_reference.nearest_turn(A, s.turn, low, high, 0.0, 0.0), E, p)
-    o.locked = tracker.locked(s.tracker, p.tracker, overdue(s, p))
-    mode, reason, result = modes.next_mode(
-        s.mode, request, encoder_ok, drive_ready, attitude, program, outside(p.azimuth.stow, p.elevation.stow, p),
-        outside(s.preset[0], s.preset[1], p), o.locked, lost, p.tracker.handover)
+    unable, flags = modes.NONE, 0
+    if wanted and unstable == modes.NONE:
+        unable, flags = _program_obstacle(s, c, program, t_m)
+    locked = tracker.locked(s.target.tracker, c.p.tracker, since)
+    return modes.situation(
+        encoders.taken(s.encoders, s.stamp), drive_ready, unstable, _outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
+        _outside(c, s.preset[0], s.preset[1]), unable, locked, lost), flags
+
+
+@compiled
+def _change_mode(s, c, o, drive_ready, program, request):
+    """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
+    now, flags = _situation(s, c, drive_ready, program, s.stamp + c.lead, request)
+    o.locked = now.obstacle[modes.AUTOTRACK] == modes.NONE
+    mode, reason, result = modes.next_mode(s.mode, request, now, c.p.tracker.handover)
     if result == modes.ACCEPTED:
         s.pending = modes.NO_REQUEST
         if mode == modes.PROGRAM:
-            s.tracker.in_a_row = 0
+            s.target.tracker.accepted_in_a_row = 0
     if reason != modes.NONE:
         s.reason = reason
-    if s.mode == modes.AUTOTRACK and lost:
-        s.tracker.running = 0
+    if s.mode == modes.AUTOTRACK and now.end[modes.AUTOTRACK] != modes.NONE:
+        s.target.tracker.running = 0
     if mode != s.mode:
         s.mode, s.entered = mode, 1
     return result, flags
 
 
 @compiled
-def request(s, c, u, o, mode, program_times, program_angles):
-    """Ask for a mode between two steps; True when granted. outputs.mode and .reason tell what is now.
+def request(s, c, u, o, program, mode):
+    """Ask for a mode (its code) between two steps; True when granted. outputs.mode and .reason tell what is now.
 
-    It is decided on what the last step knew, and takes effect on the command of the next step.
+    It is decided on what the last step knew, and takes effect on the command of the next step. Arguments as of `step`.
     """
-    rows = max(u.program_count, 0)
-    result, _ = change_mode(s, c.p, o, u.drive_ready, program_times[:rows], program_angles[:rows], s.stamp + c.ahead,
-                            mode)
+    result, _ = _change_mode(s, c, o, u.drive_ready, program, mode)
     o.mode, o.reason = s.mode, s.reason
     return result == modes.ACCEPTED
 
 
 @compiled
-def seat(s, p, u):
-    """Targets := actual."""
-    position_loop.seat(s.azimuth, p.azimuth, u.stamp, u.position[0], u.velocity[0])
-    position_loop.seat(s.elevation, p.elevation, u.stamp, u.position[1], u.velocity[1])
-    s.turn = u.position[0]
-
-
-@compiled
-def look_ahead(s, p, c, sectors, times, angles):
-    """Now and then: what the target will ask of the axes."""
-    h = s.ahead
-    if s.mode != modes.PROGRAM and s.mode != modes.AUTOTRACK:
-        ahead.forget(h)
-        s.cramped, s.off = 0, 0.0
-        return
-    if ahead.another_program(h, times, angles):
-        # What was planned for the last one means nothing; this one begins as a mode does.
-        ahead.forget(h)
-        s.bridge.there, s.entered = 0, 1
-    if s.stamp - h.looked < ahead.INTERVAL or (h.what == ahead.KEYHOLE and s.stamp <= h.plan.t2):
-        return
-    known, e, n, u, de, dn, du = True, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def _followed(s, c, program, t):
+    """The Followed of program or autotrack at t [s]. An outage that has a reason is bridged by the program."""
     if s.mode == modes.PROGRAM:
-        s.bridge.there = 0
-    else:
-        e, n, u, de, dn, du, _, _, _ = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c, s.stamp))
-        if not silent(s, p):
-            bridge.begin(s.bridge, times, angles, s.stamp, e, n, u)
-        known = s.bridge.there != 0 and program_track.status(times, s.stamp) == modes.NONE
-    ahead.look(h, s.bridge, p, sectors, s.stamp, s.turn, times, angles, known, e, n, u, de, dn, du)
+        return target.Followed(0, program_track.motion_at(program, t))
+    if (s.bridge.valid and _coasting(s, c) and _outage_permitted(s, c)
+            and program_track.status(program, t) == modes.NONE):
+        return target.Followed(0, bridge.motion_at(s.bridge, program, t))
+    return target.outlook(s.target, c.tracker, t)
 
 
 @compiled
-def silent(s, p):
-    """Whether no error is believed any more; an autotrack coasts."""
-    return overdue(s, p) > p.tracker.coast_after
+def _pointed(s, A, E):
+    """Motion of axes that are to stand at deck angles [rad]."""
+    s.azimuth = s.axis[0].reference.angle
+    return Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0))
 
 
 @compiled
-def explain(s, p, c, times, angles):
-    """Note why the receiver hears nothing: the target is hidden, or the beam on its way through the keyhole."""
-    follows = s.mode == modes.PROGRAM or s.mode == modes.AUTOTRACK
-    s.blocked = follows and blockage.blocked(c.sectors, s.seen[0], s.seen[1])
-    why = (modes.BLOCKED if s.blocked else
-           modes.KEYHOLE if follows and ahead.slewing(s.ahead, s.stamp) else modes.NONE)
-    if why != modes.NONE:
-        s.excused, s.reason = s.stamp, why
-        if s.mode == modes.AUTOTRACK and not silent(s, p):
-            motion = estimate_frame.moving_in_earth(s.frame, *tracker.outlook(s.tracker, c.tracker, s.stamp))
-            bridge.begin(s.bridge, times, angles, s.stamp, motion[0], motion[1], motion[2])
+def _reference(s, c, program, t):
+    """Motion on the deck at t [s] that the mode asks of the axes: its target, on the wrap that fits, or a slew."""
+    if s.mode == modes.STOW:
+        return _pointed(s, c.axis[0].p.stow, c.axis[1].p.stow)
+    if s.mode == modes.PRESET:
+        return _pointed(s, s.preset[0], s.preset[1])
+    source = _followed(s, c, program, t)
+    motion = target.on_deck(s.target, c.p, s.attitude, t, source)
+    s.seen[0], s.seen[1] = motion.azimuth.angle, motion.elevation.angle
+    s.pointing_offset = 0.0
+    if planner.slewing(s.lookahead, t):
+        level = motion.azimuth
+        if s.attitude.stabilised:
+            level = target.levelled_azimuth(s.target, s.lookahead.level, source)
+        motion, s.pointing_offset = planner.motion_at(s.lookahead, c.lookahead, t, motion, level)
+        s.azimuth = motion.azimuth.angle
+        return motion
+    return Motion(_wrapped(s, c, program, t, motion.azimuth), motion.elevation)
+
+
+@compiled
+def _wrapped(s, c, program, t, azimuth):
+    """AxisMotion of the azimuth at t [s] on the wrap that fits; a program that begins, on one that holds all of it."""
+    limits, travel = c.axis[0].p.limits, Travel(0.0, 0.0)
+    begins = s.entered and s.mode == modes.PROGRAM
+    if begins:
+        travel = program_track.azimuth_travel(program, t)
+    s.azimuth = azimuth_wrap.nearest(azimuth.angle, s.azimuth, limits.low, limits.high, travel)
+    if begins:
+        s.overtravel = s.azimuth + travel.below < limits.low or s.azimuth + travel.above > limits.high
+    return AxisMotion(s.azimuth, azimuth.rate, azimuth.acceleration)
+
+
+@compiled
+def _reference_of_axes(s, c, program, now):
+    """`_reference` of each axis at the instant when its controller wants to know it."""
+    t_azimuth, t_elevation = (position_loop.instant(c.axis[0].p, now.t_k, now.t_m),
+                              position_loop.instant(c.axis[1].p, now.t_k, now.t_m))
+    motion = _reference(s, c, program, t_azimuth)
+    if t_elevation != t_azimuth:
+        motion = Motion(motion.azimuth, _reference(s, c, program, t_elevation).elevation)
+    return motion
+
+
+@compiled
+def _deck_rates(s, c):
+    """(azimuth, elevation) rate [rad/s] at which a fixed target where the beam is seems to move because the deck does;
+    0 where nobody compensates for it."""
+    wanted = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
+    if wanted and s.attitude.stabilised and attitude.at(s.attitude, c.p, s.stamp):
+        return deck_reference.fixed_rates(vector(s.attitude.w), s.axis[0].reference.angle, s.axis[1].reference.angle)
+    return 0.0, 0.0
+
+
+@compiled
+def _follow(s, c, u, o, motion, now):
+    """Let the axes follow a Motion."""
+    V, closed = _deck_rates(s, c), s.mode == modes.AUTOTRACK
+    for i in range(2):
+        feedback = Feedback(u.position[i], u.velocity[i], s.error[i], V[i], closed)
+        _write(o, i, position_loop.follow(s.axis[i], c.axis[i], motion[i], feedback, now))
+
+
+@compiled
+def _write(o, i, command):
+    """The Command of axis i into the outputs."""
+    o.rate[i], o.torque[i] = command.rate, command.torque
+    o.reference[i, 0], o.reference[i, 1], o.reference[i, 2] = command.reference
+    o.angle_limited[i], o.rate_limited[i] = command.angle_limited, command.rate_limited
+    o.acceleration_limited[i] = command.acceleration_limited
+
+
+@compiled
+def _watch_outage(s, c, program):
+    """Note why the receiver is without signal: the target is hidden, or the beam on its way through the keyhole."""
+    follows = modes.FOLLOWS[s.mode]
+    s.blocked = follows and blockage.blocked(c.lookahead.sectors, s.seen[0], s.seen[1])
+    reason = (modes.BLOCKED if s.blocked else
+              modes.KEYHOLE if follows and planner.slewing(s.lookahead, s.stamp) else modes.NONE)
+    if reason != modes.NONE:
+        s.outage, s.reason = s.stamp, reason
+        if s.mode == modes.AUTOTRACK and not _coasting(s, c):
+            bridge.begin(s.bridge, program, s.stamp, target.earth_outlook(s.target, c.tracker, s.stamp).u)
     elif s.reason == modes.BLOCKED or s.reason == modes.KEYHOLE:
         s.reason = modes.NONE
 
 
 @compiled
-def read_estimate(s, p, c, o):
+def _read_estimate(s, c, o):
     """What is known of the target now, in earth angles of the antenna."""
-    tracker.read(s.tracker, c, s.stamp, o)
-    if s.frame.tilted:
-        estimate_frame.put_in_earth(s.frame, o.estimate, o.covariance)
-    if s.range > 0.0 and attitude_at(s, p, s.stamp):
-        lever_arm.to_antenna(s, o.estimate)
+    estimate = target.read(s.target, c.p, c.tracker, s.attitude, s.stamp)
+    for i in range(2):
+        o.estimate[i, 0], o.estimate[i, 1], o.estimate[i, 2] = estimate.motion[i]
+        o.covariance[i, 0], o.covariance[i, 1], o.covariance[i, 2] = estimate.variances[i]
+    target_filter.probabilities(s.target.tracker.filter, c.tracker.filter, o.probability)
 
 
 @compiled
-def raw_target(s, p, c, times, angles, t):
-    """Deck (A, dA, ddA, E, dE, ddE) at t of what the mode follows, the azimuth on the turn that fits."""
-    if s.mode == modes.STOW:
-        s.turn = s.azimuth.position
-        return p.azimuth.stow, 0.0, 0.0, p.elevation.stow, 0.0, 0.0
-    if s.mode == modes.PRESET:
-        s.turn = s.azimuth.position
-        return s.preset[0], 0.0, 0.0, s.preset[1], 0.0, 0.0
-    framed, B, dB, ddB, F, dF, ddF = followed(s, p, c, times, angles, t)
-    if framed:
-        A, dA, ddA, E, dE, ddE = estimate_from_deck(s, p, t, B, dB, ddB, F, dF, ddF)
+def _look_ahead(s, c, program):
+    """Now and then: what the target will ask of the axes."""
+    h = s.lookahead
+    if not modes.FOLLOWS[s.mode]:
+        planner.forget(h)
+        s.overtravel, s.pointing_offset = 0, 0.0
+        return
+    if planner.another_program(h, program):
+        # What was planned for the last one means nothing; this one begins as a mode does.
+        planner.forget(h)
+        s.bridge.valid, s.entered = 0, 1
+    if not planner.due(h, s.stamp):
+        return
+    if s.mode == modes.PROGRAM:
+        s.bridge.valid = 0
+        planner.look_along_program(h, c.lookahead, s.stamp, s.azimuth, program, s.bridge)
+        return
+    sight = target.earth_outlook(s.target, c.tracker, s.stamp)
+    if not _coasting(s, c):
+        bridge.begin(s.bridge, program, s.stamp, sight.u)
+    if s.bridge.valid and program_track.status(program, s.stamp) == modes.NONE:
+        planner.look_along_program(h, c.lookahead, s.stamp, s.azimuth, program, s.bridge)
     else:
-        A, dA, ddA, E, dE, ddE = seen_from_deck(s, p, t, B, dB, ddB, F, dF, ddF)
-    s.seen[0], s.seen[1] = A, E
-    s.off = 0.0
-    if ahead.slewing(s.ahead, t):
-        B, dB, ddB = levelled(s, framed, B, dB, ddB, F, dF, ddF) if s.stabilised else (A, dA, ddA)
-        s.turn, dA, ddA, E, dE, ddE, s.off = ahead.through(s.ahead, t, A, dA, ddA, E, dE, ddE, B, dB, ddB,
-                                                           p.elevation.limits.high - p.keyhole.elevation_margin)
-        return s.turn, dA, ddA, E, dE, ddE
-    below = above = 0.0
-    if s.entered and s.mode == modes.PROGRAM:
-        below, above = program_track.azimuth_travel(times, angles, t)
-    s.turn = deck_reference.nearest_turn(A, s.turn, p.azimuth.limits.low, p.azimuth.limits.high, below, above)
-    if s.entered and s.mode == modes.PROGRAM:
-        s.cramped = s.turn + below < p.azimuth.limits.low or s.turn + above > p.azimuth.limits.high
-    return s.turn, dA, ddA, E, dE, ddE
+        planner.look_along_great_circle(h, c.lookahead, s.stamp, s.azimuth, sight.u, sight.du)
 
 
 @compiled
@@ -419,75 +436,45 @@ def clear(o):
 
 
 @compiled
-def step(s, c, u, o, program_times, program_angles):
-    """One drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS, the table (n,) [s] and (n, 2) [rad] earth.
+def step(s, c, u, o, program):
+    """One drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and a ProgramTrack.
 
     A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
     """
-    p = c.p
     dt = u.stamp - s.stamp
     if not (dt > 0.0 and math.isfinite(u.stamp)):
         o.invalid_input = _STAMP
         o.reason = modes.BAD_STAMP
         return
     clear(o)
-    tracker.adopt(s.tracker, p.tracker, c.tracker)
-    rows = max(u.program_count, 0)
-    times, angles = program_times[:rows], program_angles[:rows]
-    jumped = dt > p.step_gap
+    jumped = dt > c.p.step_gap
     flags = _STEP_GAP if jumped and math.isfinite(s.stamp) else 0
-    dt = p.period if jumped else dt
-    s.stamp, s.aligning = u.stamp, u.aligning
+    now = Instants(u.stamp, u.stamp + c.lead, c.p.period if jumped else dt)
+    s.stamp = u.stamp
 
-    encoder_ok = take_encoder(s, u)
-    if not encoder_ok:
-        flags |= _ENCODER
-    s.error[0] = s.error[1] = math.nan
-    if u.stabilised != s.stabilised:
-        s.stabilised, s.tracker.running = u.stabilised, 0
-        ahead.forget(s.ahead)
-    if u.stabilised and not take_attitude(s, p, u):
-        flags |= _ATTITUDE
-    if u.error_valid:
-        flags |= take_error(s, p, c.tracker, u, o)
-    if u.preset_valid:
-        if math.isfinite(u.preset[0] + u.preset[1]):
-            s.preset[0], s.preset[1] = u.preset[0], u.preset[1]
-        else:
-            flags |= _PRESET
+    tracker.transfer(s.target.tracker, c.p.tracker, c.tracker)
+    flags |= _take_encoders(s, u) | _take_attitude(s, c, u) | _take_error(s, c, u, o) | _take_preset(s, u)
 
-    t_m = u.stamp + c.ahead
     rested = s.mode == modes.STANDBY
-    _, program_flags = change_mode(s, p, o, u.drive_ready, times, angles, t_m,
-                                   s.pending if rested else modes.NO_REQUEST)
-    if encoder_ok and (rested or jumped):
-        seat(s, p, u)
-    if s.mode == modes.STANDBY:
-        position_loop.rest(s.azimuth, p.azimuth, dt, o, 0)
-        position_loop.rest(s.elevation, p.elevation, dt, o, 1)
-    else:
-        # The azimuth wants its target at one instant, the elevation perhaps at another.
-        t_azimuth = position_loop.instant(p.azimuth, u.stamp, t_m)
-        t_elevation = position_loop.instant(p.elevation, u.stamp, t_m)
-        A = dA = ddA = E = dE = ddE = 0.0
-        for i in range(1 if t_elevation == t_azimuth else 2):
-            B, dB, ddB, E, dE, ddE = raw_target(s, p, c.tracker, times, angles,
-                                                t_azimuth if i == 0 else t_elevation)
-            if i == 0:
-                A, dA, ddA = B, dB, ddB
-        autotrack, (V_A, V_E) = s.mode == modes.AUTOTRACK, deck_rates(s, p, u.stamp)
-        position_loop.follow(s.azimuth, p.azimuth, c.notch[0], A, dA, ddA, u.stamp, t_m, u.position[0],
-                             u.velocity[0], s.error[0], V_A, autotrack, dt, o, 0)
-        position_loop.follow(s.elevation, p.elevation, c.notch[1], E, dE, ddE, u.stamp, t_m, u.position[1],
-                             u.velocity[1], s.error[1], V_E, autotrack, dt, o, 1)
-        s.entered = 0
-        explain(s, p, c, times, angles)
-        o.blocked = s.blocked
-        o.coasting = s.mode == modes.AUTOTRACK and silent(s, p)
+    _, program_flags = _change_mode(s, c, o, u.drive_ready, program, s.pending if rested else modes.NO_REQUEST)
+    if (rested or jumped) and encoders.taken(s.encoders, s.stamp):
+        for i in range(2):
+            position_loop.initialise(s.axis[i], c.axis[i].p, s.stamp, u.position[i], u.velocity[i])
+        s.azimuth = u.position[0]
 
+    if s.mode == modes.STANDBY:
+        for i in range(2):
+            _write(o, i, position_loop.stop(s.axis[i], c.axis[i].p, now.dt))
+    else:
+        _follow(s, c, u, o, _reference_of_axes(s, c, program, now), now)
+        s.entered = 0
+        _watch_outage(s, c, program)
+        o.blocked = s.blocked
+        o.coasting = s.mode == modes.AUTOTRACK and _coasting(s, c)
+
+    t = s.target.tracker
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
-    o.rate[0], o.rate[1] = s.azimuth.command, s.elevation.command
-    o.gated, o.rates_gated, o.ranges_gated = s.tracker.gated, s.tracker.rates_gated, s.tracker.ranges_gated
-    if s.tracker.running:
-        read_estimate(s, p, c.tracker, o)
-    look_ahead(s, p, c.tracker, c.sectors, times, angles)
+    o.gated, o.rates_gated, o.ranges_gated = t.gated, t.rates_gated, t.ranges_gated
+    if t.running:
+        _read_estimate(s, c, o)
+    _look_ahead(s, c, program)

@@ -23,7 +23,7 @@ def push(history, stamp):
 
 @compiled
 def bracket(history, t):
-    """(older row, newer row, fraction between them) around the instant t; rows -1 where t is outside."""
+    """(older row, newer row, fraction between them) around the instant t [s]; rows -1 where t is outside."""
     newer = history.newest
     if history.count == 0 or not t <= history.stamp[newer]:
         return -1, -1, 0.0
@@ -35,3 +35,11 @@ def bracket(history, t):
             return older, newer, (t - history.stamp[older]) / (history.stamp[newer] - history.stamp[older])
         newer = older
     return -1, -1, 0.0
+
+
+@compiled
+def interpolated(history, rows, column):
+    """A column of the samples between two rows, as `bracket` gives them."""
+    i, j, f = rows
+    a, b = history.sample[i, column], history.sample[j, column]
+    return a + f * (b - a)

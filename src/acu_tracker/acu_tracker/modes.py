@@ -1,8 +1,33 @@
-"""The mode machine: which target the antenna follows, and why. One pure transition function."""
+"""The mode machine: which target the antenna follows, and why. One pure transition function over one table."""
+import typing
+from collections import namedtuple
+
 from pedestal_common.compiled import compiled
 
-MODES = ('standby', 'stow', 'preset', 'program', 'autotrack')
+
+class Mode(typing.NamedTuple):
+    """A row of TABLE. follows: it follows a target through the sky, for which the deck's attitude must be known;
+    fallback: the mode it falls back on when its target ends; handover: the mode it hands over to by itself, once that
+    can be entered. Both are names, '' for none."""
+    name: str
+    follows: bool = False
+    fallback: str = ''
+    handover: str = ''
+
+
+TABLE = (Mode('standby'),
+         Mode('stow'),
+         Mode('preset'),
+         Mode('program', follows=True, handover='autotrack'),
+         Mode('autotrack', follows=True, fallback='program'))
+"""Another mode is a row here, its entries in `situation`, and what it asks of the axes in control_unit."""
+
+MODES = tuple(row.name for row in TABLE)
 STANDBY, STOW, PRESET, PROGRAM, AUTOTRACK = range(len(MODES))
+FOLLOWS = tuple(row.follows for row in TABLE)
+NEVER = -1
+_FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else STANDBY for row in TABLE)
+_HANDOVER = tuple(MODES.index(row.handover) if row.handover else NEVER for row in TABLE)
 
 REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'attitude invalid', 'no program track',
            'before program track', 'after program track', 'receiver not locked', 'outside limits', 'unknown mode',
@@ -14,61 +39,69 @@ REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'att
 NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 
 
+Situation = namedtuple('Situation', 'encoder_valid drive_ready attitude obstacle end')
+"""What decides.
+
+drive_ready: the drive follows commands; a mode that runs ends with it, and none begins without it. attitude: NONE
+or why it is not known; obstacle: for each mode NONE or what stands against entering it; end: for each mode NONE or
+why it cannot go on."""
+
+
 @compiled
-def obstacle(request, encoder_ok, drive_ready, attitude, program, stow, preset, locked):
-    """Why a mode cannot be entered now, NONE if it can. `attitude`, `program`, `stow`, `preset`: NONE or their own
-    obstacle."""
+def situation(encoder_valid, drive_ready, attitude, stow, preset, program, locked, lost):
+    """The Situation of these facts.
+
+    attitude, stow, preset, program: NONE or what stands against each; locked: the receiver has delivered long enough
+    and the filter has converged; lost: no measurement for longer than permitted. A program that leads outside the
+    limits cannot be entered, but goes on.
+    """
+    ends = program if program != OUTSIDE_LIMITS else NONE
+    return Situation(encoder_valid, drive_ready, attitude,
+                     (NONE, stow, preset, program, NONE if locked else NOT_LOCKED),
+                     (NONE, NONE, NONE, ends, SIGNAL_LOST if lost else NONE))
+
+
+Decision = namedtuple('Decision', 'mode reason result')
+"""The mode from now on; reason: NONE where nothing happened; result: NO_REQUEST, REFUSED or ACCEPTED."""
+
+
+@compiled
+def obstacle(request, now):
+    """Why a mode cannot be entered in a Situation, NONE if it can."""
     if request == STANDBY:
         return NONE
-    if request < STANDBY or request > AUTOTRACK:
+    if request < STANDBY or request >= len(FOLLOWS):
         return UNKNOWN_MODE
-    if not encoder_ok:
+    if not now.encoder_valid:
         return ENCODER_INVALID
-    if not drive_ready:
+    if not now.drive_ready:
         return DRIVE_NOT_READY
-    if request == STOW:
-        return stow
-    if request == PRESET:
-        return preset
-    if attitude != NONE:
-        return attitude
-    if request == PROGRAM:
-        return program
-    return NONE if locked else NOT_LOCKED
+    if FOLLOWS[request] and now.attitude != NONE:
+        return now.attitude
+    return now.obstacle[request]
 
 
 @compiled
-def next_mode(mode, request, encoder_ok, drive_ready, attitude, program, stow, preset, locked, lost, handover):
-    """(mode, reason, result) of one step.
-
-    request     mode asked for, NO_REQUEST for none
-    drive_ready the drive follows commands; a mode that runs ends with it, and none begins without it
-    locked      the receiver has delivered long enough and the filter has converged
-    lost        the coast time is over
-    handover    program -> autotrack by itself once locked
-    reason      NONE where nothing happened
-    """
-    result = NO_REQUEST
+def next_mode(mode, request, now, handover):
+    """The Decision of one step in a Situation; request: mode asked for, NO_REQUEST for none; handover: modes may hand
+    over by themselves."""
+    why, result = NONE, NO_REQUEST
     if request != NO_REQUEST:
-        why = obstacle(request, encoder_ok, drive_ready, attitude, program, stow, preset, locked)
+        why = obstacle(request, now)
         if why == NONE:
-            return request, REQUESTED, ACCEPTED
+            return Decision(request, REQUESTED, ACCEPTED)
         result = REFUSED
-    else:
-        why = NONE
     if mode == STANDBY:
-        return mode, why, result
-    if not encoder_ok:
-        return STANDBY, ENCODER_INVALID, result
-    if not drive_ready:
-        return STANDBY, DRIVE_NOT_READY, result
-    if mode == PROGRAM or mode == AUTOTRACK:
-        if attitude != NONE:
-            return STANDBY, attitude, result
-        if mode == PROGRAM and locked and handover:
-            return AUTOTRACK, LOCKED, result
-        if mode == PROGRAM and program != NONE and program != OUTSIDE_LIMITS:
-            return STANDBY, program, result
-        if mode == AUTOTRACK and lost:
-            return (PROGRAM if program == NONE else STANDBY), SIGNAL_LOST, result
-    return mode, why, result
+        return Decision(mode, why, result)
+    if not now.encoder_valid:
+        return Decision(STANDBY, ENCODER_INVALID, result)
+    if not now.drive_ready:
+        return Decision(STANDBY, DRIVE_NOT_READY, result)
+    if FOLLOWS[mode] and now.attitude != NONE:
+        return Decision(STANDBY, now.attitude, result)
+    if handover and _HANDOVER[mode] != NEVER and now.obstacle[_HANDOVER[mode]] == NONE:
+        return Decision(_HANDOVER[mode], LOCKED, result)
+    if now.end[mode] != NONE:
+        fallback = _FALLBACK[mode]
+        return Decision(fallback if now.obstacle[fallback] == NONE else STANDBY, now.end[mode], result)
+    return Decision(mode, why, result)

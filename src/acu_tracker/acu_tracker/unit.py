@@ -31,10 +31,9 @@ RECORD = np.dtype([('state', control_unit.STATE), ('constants', control_unit.CON
 
 
 class Memory(typing.NamedTuple):
-    """All the control unit works on: the program track, times (n,) [s] and earth angles (n, 2) [rad]."""
+    """All the control unit works on."""
     record: np.ndarray
-    times: np.ndarray
-    angles: np.ndarray
+    program: program_track.ProgramTrack
 
 
 @compiled
@@ -69,7 +68,7 @@ def decode(u, stamp, inputs):
 
 
 @compiled
-def encode(o, ahead, stamp, outputs):
+def encode(o, lookahead, stamp, outputs):
     """Outputs of the control unit, and what lies ahead -> records of its messages."""
     command, estimate, reference = outputs[COMMAND], outputs[ESTIMATE], outputs[REFERENCE]
     command.stamp = estimate.stamp = reference.stamp = outputs[FILTER].stamp = stamp
@@ -86,7 +85,7 @@ def encode(o, ahead, stamp, outputs):
         numbers[6] = o.innovation_sigma[i]
         for model in range(MODELS):
             numbers[FILTER_SIZE - MODELS + model] = o.probability[i, model]
-    outputs[MODE], outputs[KEYHOLE], outputs[BLOCKAGE] = o.mode, ahead.number - 1, ahead.hidden_number - 1
+    outputs[MODE], outputs[KEYHOLE], outputs[BLOCKAGE] = o.mode, lookahead.forecasts - 1, lookahead.blockages - 1
 
 
 @compiled
@@ -94,10 +93,10 @@ def law(memory, stamp, inputs, outputs):
     """Step k."""
     m = memory.record[0]
     decode(m.inputs, stamp, inputs)
-    control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.times, memory.angles)
+    control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.program)
     m.inputs.preset_valid = 0
     m.invalid |= m.outputs.invalid_input
-    encode(m.outputs, m.state.ahead, stamp, outputs)
+    encode(m.outputs, m.state.lookahead, stamp, outputs)
 
 
 @compiled
@@ -117,7 +116,7 @@ class Acu(Unit):
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         self.memory = Memory(joined(RECORD, state=control_unit.initial_state(parameters),
-                                    constants=control_unit.constants(parameters)), np.zeros(0), np.zeros((0, 2)))
+                                    constants=control_unit.constants(parameters)), program_track.NO_TRACK)
         self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE in self.reads, 1
         self.parts['outputs']['mode'] = modes.STANDBY
         control_unit.clear(self.parts['outputs'])
@@ -138,9 +137,7 @@ class Acu(Unit):
             self.parts['inputs']['preset'], self.parts['inputs']['preset_valid'] = angles[0], 1
         else:
             start = messages.nanoseconds(message.header.stamp) * 1e-9
-            times, angles = program_track.checked(times + start, angles)
-            self.parts['inputs']['program_count'] = len(times)
-            self.memory = self.memory._replace(times=times, angles=angles)
+            self.memory = self.memory._replace(program=program_track.checked(times + start, angles))
 
     def take_text(self, topic, text):
         super().take_text(topic, text)
@@ -148,10 +145,10 @@ class Acu(Unit):
             self.drive_state = text
 
     def encode(self, topic, code):
-        ahead = self.parts['state']['ahead']
+        lookahead = self.parts['state']['lookahead']
         if topic == KEYHOLE:
-            return announcement.keyhole(ahead, self.parameters.tracker.receiver.beamwidth)
-        return announcement.hidden(ahead) if topic == BLOCKAGE else modes.MODES[code]
+            return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
+        return announcement.hidden(lookahead) if topic == BLOCKAGE else modes.MODES[code]
 
     def request(self, name):
         mode = name.removeprefix('acu/')
@@ -159,8 +156,8 @@ class Acu(Unit):
             return Reply(True, 'cleared')
         m, outputs = self.parts, self.parts['outputs']
         m['inputs']['drive_ready'] = self.inputs[0][DRIVE] <= READY
-        granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, modes.MODES.index(mode),
-                                       self.memory.times, self.memory.angles)
+        granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, self.memory.program,
+                                       modes.MODES.index(mode))
         refusal = '' if granted else f'refused: {modes.REASONS[outputs["reason"]]}; '
         return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
 
@@ -182,12 +179,12 @@ class Acu(Unit):
                    for i, axis in enumerate(topics.AXES)]
         for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
-        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['ahead'])]
+        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead'])]
         if invalid == ['error_gated']:
             return Diagnosis(WARN, 'an error of the receiver was too far off to be believed', values)
         if invalid:
             return Diagnosis(ERROR, f'invalid input: {" ".join(invalid)}', values)
-        if state['cramped']:
+        if state['overtravel']:
             return Diagnosis(WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit',
                              values)
         return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)

@@ -9,6 +9,7 @@ from acu_tracker import control_unit
 from acu_tracker.control_unit import INVALID_INPUTS
 from acu_tracker.modes import MODES, REASONS
 from acu_tracker.params import AcuParameters
+from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from pedestal_common import line_of_sight
 from pedestal_common.parameters import as_dict, build
 
@@ -47,7 +48,7 @@ class Rig:
         self.delay, self.latency = delay, error_latency
         self.constants, self.state = control_unit.constants(params), control_unit.initial_state(params)
         self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
-        self.times, self.angles = np.zeros(2000), np.zeros((2000, 2))
+        self.track = NO_TRACK
         self.angle, self.velocity = np.array(at, float), np.zeros(2)
         self.commands, self.passed, self.k = [(0.0, 0.0)] * (round(delay / self.T) + 1), [], 0
         self.receiver_on, self.sigma, self.rng = True, sigma, np.random.default_rng(7)
@@ -81,7 +82,7 @@ class Rig:
         u['quaternion'], u['deck_rate'] = self.attitude(t).as_quat(), self.body_rate(self.attitude, t)
         for name, value in changes.items():
             u[name] = value
-        control_unit.step(self.state[0], self.constants[0], u[0], self.outputs[0], self.times, self.angles)
+        control_unit.step(self.state[0], self.constants[0], u[0], self.outputs[0], self.track)
         self.commands.append(tuple(self.outputs['rate'][0]))
         self.velocity = np.array(self.commands[-1 - round(self.delay / self.T)])
         self.angle = self.angle + self.T * self.velocity
@@ -89,8 +90,8 @@ class Rig:
         return self.outputs[0]
 
     def ask(self, mode):
-        return control_unit.request(self.state[0], self.constants[0], self.inputs[0], self.outputs[0], mode,
-                                    self.times, self.angles)
+        return control_unit.request(self.state[0], self.constants[0], self.inputs[0], self.outputs[0], self.track,
+                                    mode)
 
     def run(self, seconds, **changes):
         """Steps of this many seconds; columns: rates (2), pointing error (2)."""
@@ -102,9 +103,8 @@ class Rig:
         return np.array(rows)
 
     def program(self, start=0.0, rows=100, target=None):
-        self.times[:rows] = start + np.arange(rows)
-        self.angles[:rows] = [(target or self.target)(t) for t in self.times[:rows]]
-        self.inputs['program_count'] = rows
+        times = start + np.arange(rows, dtype=float)
+        self.track = ProgramTrack(times, np.array([(target or self.target)(t) for t in times]))
 
     @property
     def mode(self):

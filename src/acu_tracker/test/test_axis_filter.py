@@ -5,8 +5,9 @@ import pytest
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 
 from acu_tracker.estimation import alpha_beta, axis_filter
-from acu_tracker.estimation.axis_filter import KINDS
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.kinds import KINDS
+from acu_tracker.estimation.measurement import AxisMeasurement
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import ParameterError, build
 
 DEG = math.pi / 180
@@ -21,7 +22,7 @@ PARAMS = {'cv.noise': 0.02, 'ca.noise': 0.03, 'singer.sigma': 0.05, 'singer.alph
 def run(t, y, rate=None, initial_rate=0.1, **params):
     """Estimates of the filter over angles y of SIGMA, and rates of RATE_SIGMA where given."""
     out, ones = np.zeros(len(t), axis_filter.ESTIMATE), np.ones(len(t))
-    params = build(Filter, {'rate_measurement': rate is not None, **params})
+    params = build(FilterParameters, {'rate_measurement': rate is not None, **params})
     axis_filter.estimates(axis_filter.constants(params), t, y, SIGMA**2 * ones,
                           math.nan * ones if rate is None else rate, RATE_SIGMA**2 * ones, initial_rate, out)
     return out
@@ -29,6 +30,12 @@ def run(t, y, rate=None, initial_rate=0.1, **params):
 
 def noisy(angle, seed=2):
     return angle + SIGMA * np.random.default_rng(seed).standard_normal(len(angle))
+
+
+def variances(f, c, T):
+    """(p11, p12, p22) T after the last measurement."""
+    axis_filter.predict(f, c, T)
+    return axis_filter.variances(axis_filter.expected(f))
 
 
 def rms(values):
@@ -48,7 +55,7 @@ def van_loan(kind, T):
 def test_parameters_of_the_bank_are_checked():
     for models in ('cv', 'cv cv', 'cv constant', ''):
         with pytest.raises(ParameterError, match=f"imm.models = '{models}': must be two or more of cv, ca, singer"):
-            build(Filter, {'imm.models': models})
+            build(FilterParameters, {'imm.models': models})
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -183,7 +190,7 @@ def test_what_is_missing_or_does_not_advance_is_not_taken(kind):
         np.testing.assert_array_equal(out[taken][name], alone[name])
 
 
-def test_consistency_of_angle_and_rate_is_that_of_both_at_once():
+def test_innovation_of_angle_and_rate_is_that_of_both_at_once():
     f, rng = np.zeros(1, axis_filter.FILTER)[0], np.random.default_rng(1)
     for _ in range(20):
         root = rng.normal(size=(3, 3))
@@ -191,12 +198,12 @@ def test_consistency_of_angle_and_rate_is_that_of_both_at_once():
         f['count'], f['mu_prior'][0] = 1, 1.0
         f['x_prior'][0], f['p_prior'][0] = rng.normal(size=3), P[np.triu_indices(3)]
         y, R = rng.normal(size=2), rng.uniform(0.1, 1.0, 2)
-        nu, nu_rate, nis, more = axis_filter.consistency(f, y[0], R[0], y[1], R[1])
+        i = axis_filter.innovation(f, AxisMeasurement(y[0], R[0], y[1], R[1]))
         both = y - f['x_prior'][0, :2]
-        np.testing.assert_allclose((nu, nu_rate), both, rtol=1e-12)
-        assert nis == pytest.approx(both[0]**2 / (P[0, 0] + R[0]))
-        assert nis + more == pytest.approx(both @ np.linalg.solve(P[:2, :2] + np.diag(R), both))
-        assert np.isnan(axis_filter.consistency(f, y[0], R[0], math.nan, R[1])[3])
+        np.testing.assert_allclose((i.nu, i.rate), both, rtol=1e-12)
+        assert i.S == pytest.approx(P[0, 0] + R[0]) and i.chi_square == pytest.approx(both[0]**2 / i.S)
+        assert i.chi_square + i.rate_chi_square == pytest.approx(both @ np.linalg.solve(P[:2, :2] + np.diag(R), both))
+        assert np.isnan(axis_filter.innovation(f, AxisMeasurement(y[0], R[0], math.nan, R[1])).rate_chi_square)
 
 
 def flyby(distance, speed=15.0, seconds=60.0):
@@ -239,7 +246,7 @@ def test_quadratic_motion_is_followed_without_bias():
 @pytest.mark.parametrize('kind, alpha', [('singer', 0.5), ('current_statistical', 0.0)])
 def test_outlook_coasts_as_the_model_moves(kind, alpha):
     """The acceleration of singer fades, that of current_statistical has itself for its mean and stays."""
-    c = axis_filter.constants(build(Filter, {'kind': kind, f'{kind}.alpha': 0.5}))[0]
+    c = axis_filter.constants(build(FilterParameters, {'kind': kind, f'{kind}.alpha': 0.5}))[0]
     f = np.zeros(1, axis_filter.FILTER)[0]
     f['count'], f['mu'][0], f['x'][0] = 1, 1.0, (0.1, 0.2, 0.3)
     t = np.linspace(0, 3, 30001)
@@ -253,7 +260,7 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
     """A million targets, each of a model drawn by its probability, in a state drawn by its covariance; then the model
     that moves it on is drawn, as the chain says, that one or the other."""
     dwell, ahead = 1.5, 0.7
-    c = axis_filter.constants(build(Filter, {'kind': 'imm', 'imm.models': 'cv ca', 'imm.cv.noise': 1e-2,
+    c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', 'imm.models': 'cv ca', 'imm.cv.noise': 1e-2,
                                              'imm.ca.noise': 3e-2, 'imm.dwell': dwell}))[0]
     f, rng = np.zeros(1, axis_filter.FILTER)[0], np.random.default_rng(9)
     f['count'], f['mu'][:2] = 2, (0.3, 0.7)
@@ -275,15 +282,15 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
         X[holds == j] = moved + rng.multivariate_normal(np.zeros(3), phi @ block[:3, 3:], len(moved))
     np.testing.assert_allclose(axis_filter.outlook(f, c, ahead), X.mean(axis=0), atol=3e-5)
     C = np.cov(X[:, :2].T)
-    np.testing.assert_allclose(axis_filter.variances(f, c, ahead), (C[0, 0], C[0, 1], C[1, 1]), rtol=5e-3)
+    np.testing.assert_allclose(variances(f, c, ahead), (C[0, 0], C[0, 1], C[1, 1]), rtol=5e-3)
 
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_outlook_now_is_the_estimate_even_if_a_model_is_ruled_out(kind):
-    c = axis_filter.constants(build(Filter, {'kind': kind}))[0]
+    c = axis_filter.constants(build(FilterParameters, {'kind': kind}))[0]
     f = np.zeros(1, axis_filter.FILTER)[0]
     axis_filter.start(f, c, 0.1, SIGMA**2, 0.1)
     f['mu'] = 0.0
     f['mu'][0] = 1.0
     assert axis_filter.outlook(f, c, 0.0) == (0.1, 0.0, 0.0)
-    np.testing.assert_allclose(axis_filter.variances(f, c, 0.0), (SIGMA**2, 0.0, 0.01), rtol=1e-14)
+    np.testing.assert_allclose(variances(f, c, 0.0), (SIGMA**2, 0.0, 0.01), rtol=1e-14)

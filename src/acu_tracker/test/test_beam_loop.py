@@ -6,7 +6,8 @@ import pytest
 from scipy import signal
 
 from acu_tracker.estimation import alpha_beta
-from acu_tracker.geometry import deck_reference
+from acu_tracker.geometry import attitude, deck_reference
+from acu_tracker.geometry.vector import Vector
 from acu_tracker.servo import beam_loop
 from pedestal_common import line_of_sight
 
@@ -59,11 +60,11 @@ def test_a_ramp_is_met_late_by_one_period_or_not_at_all(law, lag, delay):
 def test_rates_of_a_fixed_direction_by_turning_the_deck():
     h, w = 1e-6, np.array([0.1, -0.05, 0.2])
     A, E = 0.7, 0.9
-    rates = deck_reference.fixed_rates(*w, A, E)
+    rates = deck_reference.fixed_rates(Vector(*w), A, E)
     moved = []
     for sign in (-1.0, 1.0):
         mat = np.zeros((3, 3))
-        line_of_sight.rotation(*deck_reference.turned(0.0, 0.0, 0.0, 1.0, *(sign * h * w)), mat)
+        line_of_sight.rotation(*attitude.turned(np.array([0.0, 0.0, 0.0, 1.0]), tuple(sign * h * w)), mat)
         moved.append(line_of_sight.angles(*line_of_sight.to_deck(mat, *line_of_sight.direction(A, E))))
     np.testing.assert_allclose(rates, np.subtract(moved[1], moved[0]) / (2.0 * h), atol=1e-8)
 

@@ -6,8 +6,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acu_tracker import announcement
-from acu_tracker.lookahead import ahead
+from acu_tracker.lookahead import levelled_deck, planner
 from acu_tracker.modes import AUTOTRACK, PRESET, PROGRAM, STANDBY, STOW
+from acu_tracker.program.program_track import NO_TRACK
 from pedestal_common import line_of_sight
 
 BEAMWIDTH = 0.0175
@@ -47,10 +48,10 @@ def test_through_the_keyhole(Rig, mode, with_program):
               **SLOW, **{'tracker.handover': mode == 'autotrack', 'tracker.receiver.sigma_floor': 2e-4})
     rig.program(start=-2.0, rows=90)
     heard(rig, 2.0)
-    rig.inputs['program_count'] = 90 if with_program else 0
+    rig.track = rig.track if with_program else NO_TRACK
     before = heard(rig, 18.0)
-    said = announcement.keyhole(rig.state[0]['ahead'], BEAMWIDTH)
-    plan = rig.state['ahead']['plan'][0].copy()
+    said = announcement.keyhole(rig.state[0]['lookahead'], BEAMWIDTH)
+    plan = rig.state['lookahead']['slew'][0].copy()
     assert before[:, 1].max() < 1e-3 and plan['t1'] > before[-1, 0]
     during = heard(rig, 25.0)
     assert rig.mode == mode
@@ -70,7 +71,7 @@ def slewing(Rig, **parameters):
     rig = Rig(overhead(math.radians(88.0)), at=overhead(math.radians(88.0))(0.0), initial_mode='program', **SLOW,
               **{'tracker.handover': False}, **parameters)
     rig.program(start=-2.0, rows=90)
-    while not rig.state['off'][0] > 0.5 * BEAMWIDTH:
+    while not rig.state['pointing_offset'][0] > 0.5 * BEAMWIDTH:
         rig.run(0.1)
         assert rig.k * rig.T < CULMINATION
     return rig
@@ -91,7 +92,7 @@ def test_another_program_ends_what_was_planned_for_the_last(Rig):
     rig.target = lambda t: (A, 0.5)
     rig.program(start=-2.0, rows=90)
     rig.run(0.02)
-    assert ahead.WHATS[rig.state['ahead']['what'][0]] == 'none'
+    assert planner.FORECASTS[rig.state['lookahead']['forecast'][0]] == 'none'
     rig.run(6.0)
     np.testing.assert_allclose(rig.angle, [A, 0.5], atol=1e-4)
 
@@ -103,9 +104,9 @@ def test_a_mast_hides_the_target(Rig):
               **{'tracker.receiver.sigma_floor': 2e-5, 'blockage': f'{sector[0]} {sector[1]} 0.8',
                  'azimuth.filter.current_statistical.a_max': 0.002})
     heard(rig, 3.5)
-    begin, end = rig.state['ahead']['hidden'][0]
+    begin, end = rig.state['lookahead']['hidden'][0]
     assert (begin, end) == (pytest.approx(4.0, abs=0.2), pytest.approx(32.0 / 3.0, abs=0.2))
-    assert announcement.hidden(rig.state[0]['ahead']).startswith('target hidden from')
+    assert announcement.hidden(rig.state[0]['lookahead']).startswith('target hidden from')
     rig.run(0.1)
     for _ in range(2):
         off = heard(rig, 3.4, lambda deck: not sector[0] <= deck[0] <= sector[1])
@@ -128,20 +129,20 @@ def test_every_sector_on_the_way_is_announced(Rig):
     told = []
     for _ in range(12):
         rig.run(1.0)
-        h = rig.state[0]['ahead']
-        if h['hidden_number'] > len(told):
+        h = rig.state[0]['lookahead']
+        if h['blockages'] > len(told):
             told.append(h['hidden'].tolist())
     np.testing.assert_allclose(told, [[5.0, 20.0 / 3.0], [26.0 / 3.0, 35.0 / 3.0]], atol=0.07)
-    assert h['hidden_number'] == 2
+    assert h['blockages'] == 2
 
 
 def test_a_program_that_fits_no_turn_is_told(Rig):
-    for travel, cramped in ((4.0, 0), (9.6, 1)):
+    for travel, overtravel in ((4.0, 0), (9.6, 1)):
         rig = Rig(lambda t, travel=travel: (travel * t / 50.0, 0.6), at=(0.0, 0.6), initial_mode='program',
                   **{'tracker.handover': False})
         rig.program(rows=51)
         rig.run(0.1)
-        assert rig.mode == 'program' and rig.state['cramped'][0] == cramped
+        assert rig.mode == 'program' and rig.state['overtravel'][0] == overtravel
 
 
 def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
@@ -161,7 +162,7 @@ def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     rig.run(0.1, aligning=0)
     rig.run(0.1, aligning=1)
     assert (rig.mode, rig.reason) == ('standby', 'INS aligning')
-    np.testing.assert_allclose(rig.state['ahead']['mean'][0], line_of_sight.ASHORE, atol=1e-9)
+    np.testing.assert_allclose(rig.state['lookahead']['deck']['mean'][0], line_of_sight.ASHORE, atol=1e-9)
     ashore = Rig()
     ashore.program()
     ashore.step(aligning=1)
@@ -188,7 +189,8 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
         if k > 1400:
             worst = max(worst, off)
             estimate = rig.outputs['estimate'][0]
-            swing.append((*(estimate[:, 0] - seen(t)), rig.state['tracker']['azimuth']['x'][0, 0, 1]))
+            azimuth = rig.state[0]['target']['tracker']['filter']['axis'][0]
+            swing.append((*(estimate[:, 0] - seen(t)), azimuth['x'][0, 1]))
     swing = np.array(swing)
     print(f'range measured {ranged}: off {worst:.2e} rad, filtered rate {np.ptp(swing[:, 2]):.2e} rad/s')
     assert rig.mode == 'autotrack'
@@ -199,13 +201,13 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
 
 def test_the_levelled_deck_is_the_mean_of_its_attitudes():
     """Roll and pitch average out, the heading stays; the spread is the mean square of the tilt."""
-    h = np.zeros(1, ahead.AHEAD)
-    h['latest'] = -math.inf
+    h = np.zeros(1, levelled_deck.LEVELLED_DECK)
+    levelled_deck.initialise(h)
     times = 0.05 * np.arange(2400)
     tilts = []
     for t in times:
         attitude = Rotation.from_euler('ZYX', [0.7, 0.03 * math.sin(0.9 * t), 0.05 * math.sin(0.6 * t)])
-        ahead.take_attitude(h[0], t, attitude.as_quat() * (-1.0 if int(t) % 2 else 1.0), 60.0)
+        levelled_deck.take(h[0], t, attitude.as_quat() * (-1.0 if int(t) % 2 else 1.0), 60.0)
         tilts.append(math.acos(attitude.as_matrix()[2, 2]))
     off = Rotation.from_quat(h['mean'][0]).inv() * Rotation.from_euler('Z', 0.7)
     assert off.magnitude() < 3e-3

@@ -125,7 +125,7 @@ def test_requests_are_refused_with_the_reason(Rig):
     rig.program(target=lambda t: (0.0, -0.3))
     assert refused(PROGRAM) == 'outside limits'
     rig.program()
-    rig.angles[1, 0] = math.nan
+    rig.track.angles[1, 0] = math.nan
     assert refused(PROGRAM) == 'no program track'
     assert refused(AUTOTRACK) == 'receiver not locked'
     assert refused(PRESET, preset=(0.0, 3.0), preset_valid=1) == 'outside limits'
@@ -144,7 +144,7 @@ def test_initial_mode_waits_until_it_can_be(Rig):
     rig.run(0.1)
     assert (rig.mode, rig.reason) == ('standby', 'no program track')
     rig.program()
-    rig.angles[1, 0] = math.nan
+    rig.track.angles[1, 0] = math.nan
     rig.step()
     assert (rig.mode, rig.reason, rig.invalid) == ('standby', 'no program track', {'program'})
     rig.program()

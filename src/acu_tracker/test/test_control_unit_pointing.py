@@ -4,6 +4,8 @@ import math
 import numpy as np
 import pytest
 
+from acu_tracker.program.program_track import ProgramTrack
+
 
 @pytest.mark.parametrize('delay, latency', [(0.0, 0.0), (0.01, 0.0), (0.02, 0.015)])
 def test_autotrack_points_at_an_accelerating_target(Rig, delay, latency):
@@ -19,11 +21,11 @@ def test_what_the_known_delay_is_worth(Rig):
         return 0.3 * math.sin(0.8 * t), 0.6
 
     worst = []
-    for ahead in (0.02 + 0.5 * Rig.T, 0.5 * Rig.T):
+    for lead in (0.02 + 0.5 * Rig.T, 0.5 * Rig.T):
         rig = Rig(swinging, initial_mode='program', at=(0.0, 0.6), delay=0.02, **{'tracker.handover': False})
-        rig.times[:] = 0.05 * np.arange(2000)
-        rig.angles[:], rig.inputs['program_count'] = [swinging(t) for t in rig.times], 2000
-        rig.constants['ahead'] = ahead
+        times = 0.05 * np.arange(2000)
+        rig.track = ProgramTrack(times, np.array([swinging(t) for t in times]))
+        rig.constants['lead'] = lead
         worst.append(np.abs(rig.run(12.0)[1600:, 2:]).max())
     assert worst[0] < 1e-6 and worst[1] > 1e-4
 

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker.geometry import deck_reference
+from acu_tracker.geometry import attitude as attitudes
+from acu_tracker.geometry import deck_reference, lever_arm
+from acu_tracker.geometry.azimuth_wrap import Travel, nearest
+from acu_tracker.geometry.deck_reference import STILL, Attitude
+from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, line_of_sight, north_west_up
+from acu_tracker.geometry.vector import Vector
+from acu_tracker.lookahead.slew import best_elevation
 
 LOW, HIGH = -1.5 * math.pi, 1.5 * math.pi
 
@@ -23,6 +29,12 @@ def earth(t):
     return 1.0 + 0.03 * t + 0.002 * t * t, 0.5 + 0.02 * t - 0.001 * t * t
 
 
+def earth_motion(t):
+    """The Motion of `earth`."""
+    A, E = earth(t)
+    return Motion(AxisMotion(A, 0.03 + 0.004 * t, 0.004), AxisMotion(E, 0.02 - 0.002 * t, -0.002))
+
+
 def deck_by_rotation(t):
     A, E = earth(t)
     x, y, z = attitude(t).inv().apply([math.cos(E) * math.sin(A), math.cos(E) * math.cos(A), math.sin(E)])
@@ -33,10 +45,8 @@ def deck_by_rotation(t):
 def test_deck_angles_rates_and_accelerations(t):
     w = body_rate(t)
     dw = (body_rate(t + 1e-3) - body_rate(t - 1e-3)) / 2e-3
-    A, E = earth(t)
-    got = deck_reference.deck_angles(attitude(t).as_matrix(), *w, *dw, A, 0.03 + 0.004 * t, 0.004, E, 0.02 - 0.002 * t,
-                                     -0.002)
-    got = np.array(got).reshape(2, 3)
+    deck = Attitude(attitude(t).as_matrix(), Vector(*w), Vector(*dw))
+    got = np.array(angles(deck_reference.on_deck(deck, line_of_sight(earth_motion(t)))))
     h = 1e-3
     before, here, after = (deck_by_rotation(t + d) for d in (-h, 0.0, h))
     np.testing.assert_allclose(got[:, 0], here, atol=1e-13)
@@ -45,16 +55,18 @@ def test_deck_angles_rates_and_accelerations(t):
 
 
 def test_the_zenith_gives_finite_numbers():
-    got = deck_reference.deck_angles(np.eye(3), 0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.5 * math.pi, 0.01, 0.0)
-    assert np.isfinite(got).all()
-    assert np.isfinite(deck_reference.moving_angles(0.0, 0.0, 1.0, 0.1, 0.0, 0.0, 0.0, 0.0, -0.01)).all()
+    deck = Attitude(np.eye(3), Vector(0.1, 0.1, 0.1), STILL)
+    zenith = Motion(AxisMotion(0.0, 0.01, 0.0), AxisMotion(0.5 * math.pi, 0.01, 0.0))
+    assert np.isfinite(angles(deck_reference.on_deck(deck, line_of_sight(zenith)))).all()
+    up = LineOfSight(Vector(0.0, 0.0, 1.0), Vector(0.1, 0.0, 0.0), Vector(0.0, 0.0, -0.01))
+    assert np.isfinite(angles(up)).all()
 
 
 def test_turned_is_the_rotation_by_a_vector():
     rng = np.random.default_rng(1)
     for size in (0.0, 1e-9, 0.1, 2.0):
         q, r = Rotation.from_rotvec(rng.normal(size=3)), size * rng.normal(size=3)
-        got = Rotation.from_quat(deck_reference.turned(*q.as_quat(), *r))
+        got = Rotation.from_quat(attitudes.turned(q.as_quat(), tuple(r)))
         assert (got.inv() * q * Rotation.from_rotvec(r)).magnitude() < 1e-14
 
 
@@ -62,12 +74,12 @@ def test_turned_is_the_rotation_by_a_vector():
     (0.5, 0.4, (0, 0), 0.5),
     (-3.0, 3.0, (0, 0), 2 * math.pi - 3.0),
     (-1.4, 4.7, (0, 0), -1.4),                  # 2 pi - 1.4 = 4.88 lies behind the limit
-    (3.0, 4.0, (0, 2.0), 3.0 - 2 * math.pi),    # the travel would hit the limit on the near turn
+    (3.0, 4.0, (0, 2.0), 3.0 - 2 * math.pi),    # the travel would hit the limit on the near wrap
     (3.0, 4.0, (-1.0, 0), 3.0),
-    (3.0, 4.0, (-9.0, 9.0), 3.0),               # no turn holds all of it
+    (3.0, 4.0, (-9.0, 9.0), 3.0),               # no wrap holds all of it
 ])
-def test_nearest_turn(azimuth, near, travel, expected):
-    assert deck_reference.nearest_turn(azimuth, near, LOW, HIGH, *travel) == pytest.approx(expected, abs=1e-12)
+def test_nearest_wrap(azimuth, near, travel, expected):
+    assert nearest(azimuth, near, LOW, HIGH, Travel(*map(float, travel))) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize('t', [0.0, 1.7, 4.4, 9.1])
@@ -76,7 +88,8 @@ def test_a_deck_rate_comes_back_to_earth(t):
     before, after = (attitude(t + d).inv().apply([math.cos(E) * math.sin(A), math.cos(E) * math.cos(A), math.sin(E)])
                      for d in (-h, h) for A, E in [earth(t + d)])
     here = 0.5 * (before + after)
-    got = deck_reference.earth_rates(attitude(t).as_matrix(), *body_rate(t), *here, *(after - before) / (2.0 * h))
+    deck = Attitude(attitude(t).as_matrix(), Vector(*body_rate(t)), STILL)
+    got = deck_reference.earth_rates(deck, Vector(*here), Vector(*(after - before) / (2.0 * h)))
     assert got == pytest.approx((0.03 + 0.004 * t, 0.02 - 0.002 * t), abs=1e-7)
 
 
@@ -91,10 +104,13 @@ def test_the_end_of_a_lever_arm_sees_the_target_from_there(t):
         return u, (u - arm) / np.linalg.norm(u - arm)
     h = 1e-3
     (u0, n0), (u1, n1), (u2, n2) = (seen(t + d) for d in (-h, 0.0, h))
-    got = np.array(deck_reference.from_lever_arm(*arm, *u1, *(u2 - u0) / (2 * h), *(u2 - 2 * u1 + u0) / h**2))
-    np.testing.assert_allclose(got[:3], n1, atol=1e-14)
-    np.testing.assert_allclose(got[3:6], (n2 - n0) / (2 * h), atol=1e-7)
-    np.testing.assert_allclose(got[6:], (n2 - 2 * n1 + n0) / h**2, atol=1e-6)
+    state = np.zeros(1, lever_arm.LEVER_ARM)
+    state['arm'] = arm
+    sight = LineOfSight(Vector(*u1), Vector(*(u2 - u0) / (2 * h)), Vector(*(u2 - 2 * u1 + u0) / h**2))
+    got = lever_arm.to_antenna(state[0], sight)
+    np.testing.assert_allclose(got.u, n1, atol=1e-14)
+    np.testing.assert_allclose(got.du, (n2 - n0) / (2 * h), atol=1e-7)
+    np.testing.assert_allclose(got.ddu, (n2 - 2 * n1 + n0) / h**2, atol=1e-6)
 
 
 def test_the_best_elevation_is_closest_to_the_target():
@@ -104,10 +120,8 @@ def test_the_best_elevation_is_closest_to_the_target():
     h = 1e-3
     for t in np.arange(0.0, 12.0, 0.83):
         A, E = earth(t)
-        rates = (0.03 + 0.004 * t, 0.004), (0.02 - 0.002 * t, -0.002)
-        e, n, u, de, dn, du, dde, ddn, ddu = deck_reference.moving_direction(A, *rates[0], E, *rates[1])
-        got = deck_reference.best_elevation(beam(t), math.cos(0.4 * t + 0.1), -0.4 * math.sin(0.4 * t + 0.1), n, -e, u,
-                                            dn, -de, du, ddn, -dde, ddu)
+        sight = LineOfSight(*map(north_west_up, line_of_sight(earth_motion(t))))
+        got = best_elevation(AxisMotion(beam(t), math.cos(0.4 * t + 0.1), -0.4 * math.sin(0.4 * t + 0.1)), sight)
         grid = np.linspace(0.0, math.pi, 20001)
         along = math.cos(E) * math.cos(A - beam(t)) * np.cos(grid) + math.sin(E) * np.sin(grid)
         assert got[0] == pytest.approx(grid[np.argmax(along)], abs=2e-4)

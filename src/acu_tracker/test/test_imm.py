@@ -6,7 +6,8 @@ from filterpy.kalman import IMMEstimator, KalmanFilter
 from scipy.linalg import expm
 
 from acu_tracker.estimation import axis_filter, imm
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.measurement import AxisMeasurement
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import build
 
 T, SIGMA, RATE_SIGMA = 0.01, 5e-4, 2e-3
@@ -50,8 +51,8 @@ def test_against_filterpy(with_rate):
     y = np.cumsum(rate) * T + SIGMA * rng.standard_normal(len(t))
     y_rate = rate + RATE_SIGMA * rng.standard_normal(len(t)) if with_rate else np.full(len(t), math.nan)
     out = np.zeros(len(t), axis_filter.ESTIMATE)
-    axis_filter.estimates(axis_filter.constants(build(Filter, {'kind': 'imm', 'rate_measurement': True, **MODELS})), t,
-                          y, np.full(len(t), SIGMA**2), y_rate, np.full(len(t), RATE_SIGMA**2), 0.1, out)
+    c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', 'rate_measurement': True, **MODELS}))
+    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA**2), y_rate, np.full(len(t), RATE_SIGMA**2), 0.1, out)
     oracle = filterpys(y[0], with_rate)
     for k in range(1, len(t)):
         oracle.predict()
@@ -80,16 +81,16 @@ def test_a_far_measurement_keeps_its_evidence(distance):
 
     The oracle is a ratio of densities: log mu_i - log mu_j = log(cbar_i / cbar_j) + (nu_j^2/S_j - nu_i^2/S_i)/2 + ...
     """
-    c = axis_filter.constants(build(Filter, {'kind': 'imm', **MODELS}))[0]
+    c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', **MODELS}))[0]
     f = np.zeros(1, axis_filter.FILTER)[0]
     axis_filter.start(f, c, 0.0, SIGMA**2, 0.1)
     for _ in range(300):
         axis_filter.predict(f, c, T)
-        axis_filter.correct(f, c, 0.0, SIGMA**2, math.nan, math.nan)
+        axis_filter.correct(f, c, AxisMeasurement(0.0, SIGMA**2, math.nan, math.nan))
     axis_filter.predict(f, c, T)
     S = f['p_prior'][:3, 0] + SIGMA**2
     nu = distance - f['x_prior'][:3, 0]
-    axis_filter.correct(f, c, distance, SIGMA**2, math.nan, math.nan)
+    axis_filter.correct(f, c, AxisMeasurement(distance, SIGMA**2, math.nan, math.nan))
     expected = np.log(f['mu_prior'][:3] / np.sqrt(S)) - 0.5 * nu**2 / S
     mu = f['mu'][:3]
     assert mu.sum() == pytest.approx(1.0) and np.argmax(mu) == np.argmax(expected)
@@ -99,7 +100,7 @@ def test_a_far_measurement_keeps_its_evidence(distance):
     # And the next measurements bring the others back.
     for _ in range(2000):
         axis_filter.predict(f, c, T)
-        axis_filter.correct(f, c, distance, SIGMA**2, math.nan, math.nan)
+        axis_filter.correct(f, c, AxisMeasurement(distance, SIGMA**2, math.nan, math.nan))
     assert f['mu'][0] > 0.5
     estimate = axis_filter.outlook(f, c, 0.0)
     np.testing.assert_allclose(estimate[:2], (distance, 0.0), atol=1e-2 * distance)

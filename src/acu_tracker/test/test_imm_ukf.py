@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from acu_tracker.estimation import tracker
-from acu_tracker.estimation.params import Filter, Ukf
-from acu_tracker.params import TrackerParameters
+from acu_tracker.estimation.measurement import AxisMeasurement, Measurement
+from acu_tracker.estimation.params import FilterParameters, TrackerParameters, UkfParameters
 from pedestal_common.parameters import record
 
 DEG = math.pi / 180.0
@@ -31,11 +31,11 @@ class Pass:
         self.put(kinds)
 
     def put(self, kinds):
-        self.c = tracker.constants(self.params, *(Filter(kind=kind) for kind in kinds))[0]
-        tracker.adopt(self.state[0], self.p, self.c)
+        self.c = tracker.constants(self.params, [FilterParameters(kind=kind) for kind in kinds])[0]
+        tracker.transfer(self.state[0], self.p, self.c)
 
     def now(self, stamp=None):
-        return np.array(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
+        return np.ravel(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
 
     def take(self, seconds, ranged=True, offset=0.0, range_offset=0.0):
         """Take the errors of the next seconds; the outcomes."""
@@ -44,13 +44,20 @@ class Pass:
             k, (A, E) = self.k, self.truth[self.k] + offset
             a, e, r = self.noise[k] * (SIGMA / math.cos(E), SIGMA, RANGE_SIGMA)
             distance = self.range[k] + r + range_offset if ranged else math.nan
-            outcomes.append(tracker.observe(
-                self.state[0], self.p, self.c, self.t[k], (A + a + math.pi) % (2.0 * math.pi) - math.pi, E + e,
-                (SIGMA / math.cos(E))**2, SIGMA**2, math.nan, math.nan, math.nan, math.nan, distance,
-                RANGE_SIGMA**2, 1.0)[0])
+            azimuth = (A + a + math.pi) % (2.0 * math.pi) - math.pi
+            outcomes.append(self.observe(self.t[k], azimuth, E + e, ((SIGMA / math.cos(E))**2, SIGMA**2), distance,
+                                         RANGE_SIGMA**2, 1.0)[0])
             self.k += 1
             self.estimates[k] = self.now()
         return outcomes
+
+    def observe(self, stamp, azimuth, elevation, variances, distance, R_range, restart_gap):
+        axis = (AxisMeasurement(azimuth, variances[0], math.nan, math.nan),
+                AxisMeasurement(elevation, variances[1], math.nan, math.nan))
+        return tracker.observe(self.state[0], self.p, self.c, Measurement(stamp, axis, distance, R_range), restart_gap)
+
+    def filter(self, name):
+        return self.state['filter'][name][0]
 
     def rate_rms(self, start=5.0):
         rows = slice(round(start / T), self.k - 1)
@@ -61,8 +68,8 @@ def test_the_range_takes_the_geometry_out_of_the_rate():
     rms = {}
     for kinds in (BOTH, ('imm', 'imm')):
         tracked = Pass(kinds)
-        assert set(tracked.take(49.0)[1:]) == {tracker.BELIEVED}
-        assert tracked.state['ranged'][0] == (kinds == BOTH)
+        assert set(tracked.take(49.0)[1:]) == {tracker.ACCEPTED}
+        assert tracked.filter('running') == (kinds == BOTH)
         rms[kinds] = tracked.rate_rms()
     print({kinds[0]: value.round(4).tolist() for kinds, value in rms.items()}, 'deg/s')
     assert np.all(rms[BOTH] < 0.5 * rms['imm', 'imm'])
@@ -89,7 +96,7 @@ def test_no_bump_when_the_first_range_comes():
     tracked = Pass()
     tracked.take(22.0, ranged=False)
     first = tracked.k
-    while not tracked.state['used'].all():
+    while not tracked.filter('used').all():
         tracked.take(T)
         assert tracked.k < first + 100
     took = tracked.k
@@ -110,21 +117,21 @@ def test_no_bump_when_the_range_is_lost_or_the_kind_changes():
         tracked.put(kinds)
         assert tracked.now()[[0, 1, 3, 4]] == pytest.approx(before[[0, 1, 3, 4]], abs=1e-12)
         # The axis that stays goes on with it, and it ends with the last one.
-        assert tracked.state['used'].tolist() == [[kinds[0] == 'imm_ukf', kinds == ('imm_ukf', 'imm_ukf')]]
-        assert tracked.state['ranged'] == ('imm_ukf' in kinds)
+        assert tracked.filter('used').tolist() == [kinds[0] == 'imm_ukf', kinds == ('imm_ukf', 'imm_ukf')]
+        assert tracked.filter('running') == ('imm_ukf' in kinds)
     lost = Pass()
     lost.take(15.0)
     lost.take(1.0, ranged=False)
-    assert lost.state['used'].all()
-    lost.params = TrackerParameters(ukf=Ukf(range_share=1e-4))
+    assert lost.filter('used').all()
+    lost.params = TrackerParameters(ukf=UkfParameters(range_share=1e-4))
     lost.put(BOTH)
     lost.take(0.2, ranged=False)
-    assert not lost.state['used'].any() and not lost.state['ranged'].any()
+    assert not lost.filter('used').any() and not lost.filter('running')
     assert np.all(largest_step(lost.estimates[lost.k - 12:lost.k])[[1, 4]] < 0.1 * DEG)
     lost.params = TrackerParameters()
     lost.put(BOTH)
     lost.take(2.0)
-    assert lost.state['used'].all()
+    assert lost.filter('used').all()
 
 
 def test_a_direction_is_compared_with_what_was_told_in_the_coast():
@@ -134,11 +141,11 @@ def test_a_direction_is_compared_with_what_was_told_in_the_coast():
     tracked.k += round(0.8 / T)
     stamp, (A, E) = tracked.t[tracked.k], tracked.truth[tracked.k]
     told = tracked.now(stamp)
-    a11, _, _, e11, _, _ = tracker.variances(tracked.state[0], tracked.c, stamp)
-    _, nu_a, nu_e, *_ = tracker.observe(tracked.state[0], tracked.p, tracked.c, stamp, A, E, 1e-9, 1e-9, math.nan,
-                                        math.nan, math.nan, math.nan, math.nan, math.nan, tracked.p['restart_gap'])
-    sigma = np.sqrt(tracked.state['S'][0])
-    assert sigma == pytest.approx(np.sqrt((a11 + 1e-9, e11 + 1e-9)), rel=0.01)
+    azimuth, elevation = tracker.read(tracked.state[0], tracked.c, stamp).variances
+    _, innovation = tracked.observe(stamp, A, E, (1e-9, 1e-9), math.nan, math.nan, tracked.p['restart_gap'])
+    (nu_a, S_a, *_), (nu_e, S_e, *_) = innovation.axis
+    sigma = np.sqrt((S_a, S_e))
+    assert sigma == pytest.approx(np.sqrt((azimuth.p11 + 1e-9, elevation.p11 + 1e-9)), rel=0.01)
     assert np.abs([nu_a - (A - told[0]), nu_e - (E - told[3])]).max() < 0.05 * sigma.min()
 
 
@@ -147,35 +154,35 @@ def test_a_cartesian_filter_that_is_nowhere_does_not_take_the_axes_along(ranged)
     tracked = Pass()
     tracked.take(10.0)
     for name in ('x', 'p'):
-        tracked.state['cartesian'][name] = math.nan
+        tracked.state['filter']['cartesian'][name] = math.nan
     if not ranged:
         tracked.put(('imm_ukf', 'cv'))
         assert np.isfinite(tracked.now()[3:]).all()
     tracked.take(5.0, ranged)
-    assert tracked.state['used'].all() == ranged
+    assert tracked.filter('used').all() == ranged
     error = tracked.now()[[0, 3]] - tracked.truth[tracked.k - 1]
     assert np.abs((error + math.pi) % (2.0 * math.pi) - math.pi).max() < 3.0 * SIGMA
-    assert set(tracked.take(1.0, ranged)) == {tracker.BELIEVED}
+    assert set(tracked.take(1.0, ranged)) == {tracker.ACCEPTED}
 
 
 def test_it_ends_when_both_leave_before_it_is_used():
     tracked = Pass()
-    while not tracked.state['ranged']:
+    while not tracked.filter('running'):
         tracked.take(T)
-    assert not tracked.state['used'].any()
+    assert not tracked.filter('used').any()
     tracked.put(('cv', 'cv'))
-    assert not tracked.state['ranged']
+    assert not tracked.filter('running')
 
 
 def test_bad_ranges_and_directions_are_not_believed():
     tracked = Pass()
     tracked.take(10.0)
-    before = tracked.state['cartesian']['x'].copy()
+    before = tracked.state['filter']['cartesian']['x'].copy()
     for wrong in (30.0, -1e9, math.inf, math.nan):
-        assert tracked.take(T, range_offset=wrong) == [tracker.BELIEVED]
+        assert tracked.take(T, range_offset=wrong) == [tracker.ACCEPTED]
     # The negative one and NaN are none.
     assert tracked.state['ranges_gated'] == 2
-    assert np.abs(tracked.state['cartesian']['x'] - before)[0, :, :3].max() < 3.0
+    assert np.abs(tracked.state['filter']['cartesian']['x'] - before)[0, :, :3].max() < 3.0
     assert tracked.take(T, offset=1.0 * DEG) == [tracker.GATED]
     outcomes = tracked.take(21 * T, offset=3.0 * DEG)
     assert tracker.STARTED in outcomes and np.isfinite(tracked.now()).all()

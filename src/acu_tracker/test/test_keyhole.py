@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from acu_tracker.lookahead import keyhole
+from acu_tracker.geometry.azimuth_wrap import Travel
+from acu_tracker.lookahead import keyhole, slew
+from acu_tracker.lookahead.path import Path, complete
 
 W, RATE, ACCELERATION, HALF_BEAM = math.radians(0.87), math.radians(10.0), math.radians(20.0), math.radians(0.5)
 LIMIT, HIGHEST, CENTRE, ROWS, SPAN = 1.5 * math.pi, 1.66, 30.0, 2049, 60.0
@@ -26,20 +28,19 @@ def azimuth(t, E0):
 
 def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.0, tilt=0.0):
     """(what was found, the plan); turn: whole turns of the axis at the start."""
-    path = np.zeros((ROWS, 6))
-    path[:, :3] = target(start + H * np.arange(ROWS), E0)
-    keyhole.complete(path, 0.0, above)
-    best, trial = np.zeros(1, keyhole.PLAN), np.zeros(1, keyhole.PLAN)
-    found = keyhole.plan(best[0], trial[0], path, start, H, path[0, 3] + turn, rate, ACCELERATION, low, high, HIGHEST,
-                         HALF_BEAM, tilt)
-    return found, best[0]
+    path = Path(np.zeros((ROWS, 6)), start, H)
+    path.rows[:, :3] = target(start + H * np.arange(ROWS), E0)
+    complete(path, Travel(0.0, above))
+    limits = np.array([(rate, ACCELERATION, low, high, HIGHEST, HALF_BEAM)], keyhole.LIMITS)[0]
+    slews = np.zeros(2, slew.SLEW)
+    return keyhole.plan(slews, path, path.rows[0, 3] + turn, limits, tilt), slews[0]
 
 
 @pytest.mark.parametrize('E0_deg, keyhole_ahead', [(80.0, False), (84.9, False), (85.1, True), (89.0, True)])
 def test_a_keyhole_is_where_W_over_cos_E0_is_too_fast(E0_deg, keyhole_ahead):
     E0 = math.radians(E0_deg)
     found, plan = planned(E0)
-    assert (W / math.cos(E0) > RATE) == keyhole_ahead == (found == keyhole.AHEAD)
+    assert (W / math.cos(E0) > RATE) == keyhole_ahead == (found == keyhole.PLANNED)
     if keyhole_ahead:
         assert plan['needed'] == pytest.approx(W / math.cos(E0), rel=0.02)
         assert plan['highest'] == pytest.approx(E0, abs=1e-4)
@@ -50,14 +51,14 @@ def test_a_keyhole_is_where_W_over_cos_E0_is_too_fast(E0_deg, keyhole_ahead):
 def test_the_slew_leaves_and_meets_the_target_within_its_limits(E0_deg):
     E0 = math.radians(E0_deg)
     found, plan = planned(E0)
-    assert found == keyhole.AHEAD and plan['long_way'] == 0
+    assert found == keyhole.PLANNED and plan['long_way'] == 0
     for end in ('1', '2'):
         off = plan['azimuth' + end] - azimuth(plan['t' + end], E0)
         assert abs(off - 2.0 * math.pi * round(off / (2.0 * math.pi))) < 2e-4
-        at = np.array(keyhole.slew(plan, plan['t' + end]))
+        at = np.array(slew.azimuth_at(plan, plan['t' + end]))
         np.testing.assert_allclose(at[:2], [plan['azimuth' + end], plan['rate' + end]], atol=1e-5)
     t = np.linspace(plan['t1'], plan['t2'], 4001)
-    a, rate, acceleration = np.array([keyhole.slew(plan, at) for at in t]).T
+    a, rate, acceleration = np.array([slew.azimuth_at(plan, at) for at in t]).T
     # Its rate is that of its angle but for the corners; the mean of neighbours is exact where the rate is linear.
     np.testing.assert_allclose(np.diff(a), 0.5 * (rate[1:] + rate[:-1]) * np.diff(t), atol=2e-6)
     assert np.abs(np.diff(rate)).max() <= ACCELERATION * (t[1] - t[0]) * (1.0 + 1e-6)
@@ -111,13 +112,13 @@ def test_the_limits_choose_the_side_and_the_other_way_costs_more():
     E0 = math.radians(89.0)
     _, free = planned(E0, low=-5.5)
     found, forced = planned(E0, low=-5.5, high=0.5)
-    assert found == keyhole.AHEAD
+    assert found == keyhole.PLANNED
     assert free['peak'] > 0.0 > forced['peak'] and forced['long_way'] == 1 and forced['other_cost'] == math.inf
     assert forced['cost'] == pytest.approx(free['other_cost'], rel=1e-2) and forced['loss'] > 1.2 * free['loss']
     assert forced['loss'] == pytest.approx(loss(forced['t1'], E0, -1.0), rel=0.02)
     # What the pass still travels once the path has ended needs its room too.
     assert planned(E0, low=-5.5, above=LIMIT)[1]['long_way'] == 1
-    assert planned(E0, low=-1.5, high=0.5)[0] == keyhole.NO_TURN
+    assert planned(E0, low=-1.5, high=0.5)[0] == keyhole.NO_WRAP
 
 
 def test_over_the_top_either_way_is_as_good():
@@ -137,6 +138,6 @@ def test_a_deck_that_tilts_by_more_than_the_beam_loses_all_of_the_slew():
 def test_begun_late_or_not_seen_to_its_end():
     E0 = math.radians(89.0)
     found, plan = planned(E0, start=CENTRE - 1.0)
-    assert found == keyhole.AHEAD and plan['t1'] >= CENTRE - 1.0
+    assert found == keyhole.PLANNED and plan['t1'] >= CENTRE - 1.0
     assert planned(E0, start=CENTRE - SPAN + 3.0)[0] == keyhole.BEYOND
     assert planned(E0, start=CENTRE + 20.0)[0] == keyhole.NOTHING

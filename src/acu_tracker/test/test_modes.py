@@ -26,14 +26,12 @@ from acu_tracker.modes import (
     UNKNOWN_MODE,
 )
 
-GOOD = dict(encoder_ok=True, drive_ready=True, attitude=NONE, program=NONE, stow=NONE, preset=NONE, locked=True,
-            lost=False, handover=False)
-ARGUMENTS = tuple(GOOD)
 
-
-def next_mode(mode, request=NO_REQUEST, **changes):
-    values = {**GOOD, **changes}
-    return modes.next_mode(mode, request, *(values[name] for name in ARGUMENTS))
+def next_mode(mode, request=NO_REQUEST, encoder_ok=True, drive_ready=True, attitude=NONE, program=NONE, stow=NONE,
+              preset=NONE, locked=True, lost=False, handover=False):
+    """Of a situation in which all is well but for what is named."""
+    now = modes.situation(encoder_ok, drive_ready, attitude, stow, preset, program, locked, lost)
+    return modes.next_mode(mode, request, now, handover)
 
 
 @pytest.mark.parametrize('mode', range(5))

@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import expm
 
-from acu_tracker.estimation import motion_models
+from acu_tracker.estimation import kalman, motion_models
+from acu_tracker.geometry.motion import AxisMotion
 
 CASES = [(0.1, 0.01), (0.5, 0.005), (0.5, 0.0999), (0.7, 0.3), (2.0, 0.24999), (2.0, 0.25001), (5.0, 0.4), (1.0, 3.0)]
 
@@ -78,7 +79,8 @@ def test_prediction_of_current_statistical_is_phi_x_plus_u_abar(alpha, T):
     rise = -math.expm1(-alpha * T)
     U = np.array([(-T + alpha * T * T / 2 + rise / alpha) / alpha, T - rise / alpha, rise])
     m = model('current_statistical', alpha=alpha, a_max=1.0)
-    np.testing.assert_allclose(motion_models.predicted(m, *X, T), Phi @ X + U * X[2], rtol=1e-12)
+    mean = kalman.predicted_mean(AxisMotion(*X), motion_models.discretised(m, X[2], T).mean, T)
+    np.testing.assert_allclose(mean, Phi @ X + U * X[2], rtol=1e-12)
 
 
 CONTINUOUS = {'cv': ([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [0, 0.3, 0]),
@@ -94,11 +96,12 @@ def test_every_model_against_van_loan(kind, T):
     block = expm(np.block([[-A, np.outer(g, g)], [np.zeros((3, 3)), A.T]]) * T)
     phi = block[3:, 3:].T
     m = model(kind, noise=0.3, alpha=0.7, sigma=0.2)
-    f13, f23, f33 = motion_models.transition(m, T)
+    found = motion_models.discretised(m, 5.0, T)
+    f13, f23, f33 = found.F
     np.testing.assert_allclose([[1, T, f13], [0, 1, f23]], phi[:2], rtol=1e-12, atol=1e-15)
     assert f33 == (0.0 if kind == 'cv' else pytest.approx(phi[2, 2], rel=1e-12))
-    np.testing.assert_allclose(symmetric(*motion_models.process_noise(m, 5.0, T)), phi @ block[:3, 3:], rtol=1e-7,
-                               atol=1e-18)
+    assert found.mean == found.F
+    np.testing.assert_allclose(symmetric(*found.Q), phi @ block[:3, 3:], rtol=1e-7, atol=1e-18)
 
 
 def test_modified_rayleigh_variance_by_quadrature():

@@ -42,4 +42,4 @@ def test_what_a_beam_does_not_keep_does_not_limit_it():
 def test_constants_hold_the_parameters():
     c = control_unit.constants(build(AcuParameters, {'azimuth.filter.current_statistical.a_max': 0.123,
                                                        'command_delay': 0.01}))
-    assert c['tracker']['azimuth']['models'][0, 0]['a_max'] == 0.123 and c['ahead'] == 0.0125
+    assert c['tracker']['filter']['axis'][0, 0]['models'][0]['a_max'] == 0.123 and c['lead'] == 0.0125

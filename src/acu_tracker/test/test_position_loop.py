@@ -5,8 +5,11 @@ import pytest
 from scipy import signal
 
 from acu_tracker import control_unit
-from acu_tracker.params import AxisParameters, Feedforward
-from acu_tracker.servo import feedforward, notch, position_loop
+from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.params import AxisParameters
+from acu_tracker.servo import feedforward, position_loop
+from acu_tracker.servo.params import FeedforwardParameters
+from acu_tracker.servo.position_loop import Feedback, Instants
 from pedestal_common.parameters import build, record
 
 T = 0.005
@@ -23,17 +26,14 @@ class Axis:
     def __init__(self, target, lag=0.0, **parameters):
         self.target, self.lag, self.disturbance = target, lag, 0.0
         self.angle, self.velocity, self.k = 0.0, 0.0, 0
-        self.state, self.outputs = np.zeros(1, position_loop.AXIS), np.zeros(1, control_unit.OUTPUTS)
-        self.values = {}
+        self.state, self.command, self.values = np.zeros(1, position_loop.AXIS), None, {}
         self.put(**parameters)
-        position_loop.seat(self.state[0], self.p, 0.0, 0.0, 0.0)
+        position_loop.initialise(self.state[0], self.c['p'], 0.0, 0.0, 0.0)
 
     def put(self, **parameters):
         """Change live parameters."""
         self.values.update(parameters)
-        params = build(AxisParameters, self.values)
-        self.p = record(params)[0]
-        self.notch = np.array(notch.coefficients(params.notch.frequency, params.notch.width, params.notch.depth, T))
+        self.c = control_unit.axis_constants(build(AxisParameters, self.values), T)[0]
 
     def move(self, command, acceleration):
         if not self.lag:
@@ -49,13 +49,13 @@ class Axis:
         """Rows of angle, command, integral, disturbance as observed, before the command takes effect."""
         rows = []
         for _ in range(steps):
-            t_k, t_m = self.k * T, (self.k + 0.5) * T
-            raw = self.target(position_loop.instant(self.p, t_k, t_m))
-            position_loop.step(self.state[0], self.p, self.notch, *raw, t_k, t_m, self.angle, self.velocity, T,
-                               self.outputs[0], 0)
+            now = Instants(self.k * T, (self.k + 0.5) * T, T)
+            raw = AxisMotion(*self.target(position_loop.instant(self.c['p'], now.t_k, now.t_m)))
+            feedback = Feedback(float(self.angle), float(self.velocity), math.nan, 0.0, False)
+            self.command = position_loop.follow(self.state[0], self.c, raw, feedback, now)
             s = self.state[0]
-            rows.append((self.angle, s['command'], s['integral'], s['z'][2]))
-            self.move(s['command'], s['acceleration'])
+            rows.append((self.angle, self.command.rate, s['integral'], s['z'][2]))
+            self.move(self.command.rate, s['reference']['acceleration'])
             self.k += 1
         return np.array(rows).T
 
@@ -116,17 +116,17 @@ def test_integral_leaves_the_limit():
     axis = Axis(still(-0.01), **pid(20.0, 0.25), **{'limits.rate': 0.5, 'shaper.rate': 0.5})
     axis.state['integral'], axis.state['command'] = 2.0, 0.5
     _, (command,), (integral,), _ = axis.run(1)
-    assert command == 0.5 and integral == 2.0 - 0.01 * 100.0 * T and axis.outputs['rate_limited'][0, 0]
+    assert command == 0.5 and integral == 2.0 - 0.01 * 100.0 * T and axis.command.rate_limited
 
 
 def test_raw_target_beyond_the_travel_is_held_at_its_end():
     axis = Axis(lambda t: (1.0 + t, 1.0, 0.0), **pid(20.0), **{'limits.high': 0.3})
     angles, *_ = axis.run(400)
-    assert angles[-1] == pytest.approx(0.3, abs=1e-6) and axis.outputs['angle_limited'][0, 0]
+    assert angles[-1] == pytest.approx(0.3, abs=1e-6) and axis.command.angle_limited
 
 
 def test_torque_is_what_inertia_and_friction_take():
-    c = record(Feedforward(inertia=280.0, friction=60.0, friction_rate=0.002))[0]
+    c = record(FeedforwardParameters(inertia=280.0, friction=60.0, friction_rate=0.002))[0]
     assert feedforward.torque(0.1, 0.5, c) == pytest.approx(200.0)
     assert feedforward.torque(-0.1, 0.0, c) == pytest.approx(-60.0)
     assert feedforward.torque(0.002, 0.0, c) == pytest.approx(60.0 * math.tanh(1.0))
@@ -195,7 +195,7 @@ def test_adrc_knows_of_its_limited_command():
     limited = {'limits.rate': 0.5, 'shaper.rate': 0.5}
     axis = Axis(still(1.0), lag=176.0, controller='adrc', **limited)
     axis.run(20)
-    axis.p['limits']['rate'] = 0.3
+    axis.c['p']['limits']['rate'] = 0.3
     angles, commands, _, disturbance = axis.run(1200)
     assert (commands == 0.3).sum() > 300 and np.abs(disturbance).max() < 0.5
     assert angles[-1] == pytest.approx(1.0, abs=1e-6)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from acu_tracker.geometry import deck_reference
+from acu_tracker.geometry.motion import line_of_sight
 from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
 from acu_tracker.program import program_track
+from acu_tracker.program.program_track import ProgramTrack
 
 
 def table(n=40, seed=2):
@@ -25,9 +26,10 @@ def test_is_the_hermite_spline_with_parabolic_slopes():
     times, angles = table()
     slopes = np.gradient(angles, times, axis=0, edge_order=2)
     spline = CubicHermiteSpline(times, angles, slopes)
+    program = ProgramTrack(times, wrapped(angles))
     for t in np.linspace(times[0], times[-1] - 1e-9, 500):
         for axis in (0, 1):
-            got = program_track.interpolated(times, wrapped(angles), t, axis)
+            got = program_track.interpolated(program, t, axis)
             expected = [spline(t, derivative)[axis] for derivative in range(3)]
             turns = 2 * math.pi * round((got[0] - expected[0]) / (2 * math.pi)) if axis == 0 else 0.0
             np.testing.assert_allclose(np.subtract(got, (turns, 0, 0)), expected, atol=1e-11)
@@ -37,35 +39,38 @@ def test_quadratic_is_reproduced_and_two_rows_are_a_line():
     times = np.array([0.0, 1.0, 2.5, 3.0])
     angles = np.column_stack([0.1 * times**2, 0.2 - 0.05 * times**2])
     for t in (0.0, 0.7, 1.0, 2.9, 3.0, 3.01):
-        np.testing.assert_allclose(program_track.interpolated(times, angles, t, 0), (0.1 * t * t, 0.2 * t, 0.2),
-                                   atol=1e-13)
-    line = program_track.interpolated(times[:2], angles[:2], 0.25, 0)
+        np.testing.assert_allclose(program_track.interpolated(ProgramTrack(times, angles), t, 0),
+                                   (0.1 * t * t, 0.2 * t, 0.2), atol=1e-13)
+    line = program_track.interpolated(ProgramTrack(times[:2], angles[:2]), 0.25, 0)
     np.testing.assert_allclose(line, (0.025, 0.1, 0.0), atol=1e-15)
 
 
 def test_rate_is_continuous_over_rows_and_the_north_crossing():
     times, angles = table()
+    program = ProgramTrack(times, wrapped(angles))
     for row in times[1:-1]:
         for axis in (0, 1):
-            before = program_track.interpolated(times, wrapped(angles), row - 1e-9, axis)
-            after = program_track.interpolated(times, wrapped(angles), row + 1e-9, axis)
-            assert before[1] == pytest.approx(after[1], abs=1e-8)
+            before = program_track.interpolated(program, row - 1e-9, axis)
+            after = program_track.interpolated(program, row + 1e-9, axis)
+            assert before.rate == pytest.approx(after.rate, abs=1e-8)
 
 
 def test_status():
-    times, _ = table()
-    assert program_track.status(times, times[0]) == NONE
-    assert program_track.status(times, times[-1]) == NONE
-    assert program_track.status(times, times[0] - 1e-6) == BEFORE_PROGRAM
-    assert program_track.status(times, times[-1] + 1e-6) == AFTER_PROGRAM
-    assert program_track.status(times[:1], times[0]) == NO_PROGRAM
+    times, angles = table()
+    program = ProgramTrack(times, angles)
+    assert program_track.status(program, times[0]) == NONE
+    assert program_track.status(program, times[-1]) == NONE
+    assert program_track.status(program, times[0] - 1e-6) == BEFORE_PROGRAM
+    assert program_track.status(program, times[-1] + 1e-6) == AFTER_PROGRAM
+    assert program_track.status(ProgramTrack(times[:1], angles[:1]), times[0]) == NO_PROGRAM
+    assert program_track.status(program_track.NO_TRACK, times[0]) == NO_PROGRAM
 
 
 def test_travel_until_the_end():
     times = np.arange(5.0)
     angles = np.zeros((5, 2))
     angles[:, 0] = (3.0, -3.0, -2.5, 3.0, 2.0)
-    below, above = program_track.azimuth_travel(times, angles, 1.0)
+    below, above = program_track.azimuth_travel(ProgramTrack(times, angles), 1.0)
     assert above == pytest.approx(0.5)
     assert below == pytest.approx(2.0 - (2 * math.pi - 3.0))
 
@@ -95,8 +100,8 @@ def test_a_pass_through_the_zenith_is_interpolated_as_a_direction(E0_deg):
         du = W * np.array([math.cos(s), -math.sin(s) * math.cos(E0), -math.sin(s) * math.sin(E0)])
         return np.array([*u, *du])
     times = np.arange(41.0)
-    angles = np.array([(math.atan2(u[0], u[1]), math.asin(u[2])) for u in map(motion, times)])
+    program = ProgramTrack(times, np.array([(math.atan2(u[0], u[1]), math.asin(u[2])) for u in map(motion, times)]))
     for t in np.arange(5.0, 36.0, 0.37):
-        got = deck_reference.moving_direction(*program_track.outlook(times, angles, t))
-        np.testing.assert_allclose(got[:6], motion(t), atol=4e-5)
-        np.testing.assert_allclose(program_track.direction(times, angles, t), motion(t)[:3], atol=2e-5)
+        got = line_of_sight(program_track.motion_at(program, t))
+        np.testing.assert_allclose([*got.u, *got.du], motion(t), atol=4e-5)
+        np.testing.assert_allclose(program_track.direction(program, t), motion(t)[:3], atol=2e-5)

@@ -4,25 +4,31 @@ import numba
 import numpy as np
 import pytest
 
+from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import shaper
+from acu_tracker.servo.params import ShaperParameters
+from pedestal_common.parameters import record
 
 RATE, ACCELERATION, JERK, H0, T = 2.3, 30.0, 4000.0, 0.01, 0.005
 
 
+LIMITS = record(ShaperParameters(rate=RATE, acceleration=ACCELERATION, jerk=JERK, h0=H0))
+
+
 @numba.njit
-def shaped(raw, start, rate, acceleration, jerk, h0, low, high):
+def shaped(raw, now, limits, low, high):
     out = np.empty((len(raw), 3))
-    p, v, a = start
-    for k in range(len(raw)):
-        r, dr, ddr, _ = shaper.held_inside(raw[k, 0], raw[k, 1], raw[k, 2], low, high, acceleration,
-                                           h0 + acceleration / jerk)
-        p, v, a, _, _ = shaper.shape(p, v, a, r, dr, ddr, T, rate, acceleration, jerk, h0)
-        out[k] = p, v, a
+    k = limits[0]
+    for i in range(len(raw)):
+        target, _ = shaper.held_inside(AxisMotion(raw[i, 0], raw[i, 1], raw[i, 2]), low, high, k.acceleration,
+                                       k.h0 + k.acceleration / k.jerk)
+        now, _, _ = shaper.shape(now, target, T, k)
+        out[i] = now
     return out
 
 
 def run(raw, start=(0.0, 0.0, 0.0), low=-1e3, high=1e3):
-    return shaped(np.asarray(raw), start, RATE, ACCELERATION, JERK, H0, low, high)
+    return shaped(np.asarray(raw), AxisMotion(*start), LIMITS, low, high)
 
 
 def still(angle, seconds=1.0):
@@ -94,6 +100,6 @@ def test_stops_at_the_limit(rate):
 
 
 def test_raw_reference_within_the_limits_passes_unchanged():
-    assert shaper.held_inside(0.5, 0.1, 0.2, -1.0, 1.0, 30.0, 0.02) == (0.5, 0.1, 0.2, False)
-    assert shaper.held_inside(1.5, -0.1, 0.2, -1.0, 1.0, 30.0, 0.02) == (1.0, 0.0, 0.0, True)
-    assert shaper.held_inside(-0.99, -1.0, 0.2, -1.0, 1.0, 30.0, 0.02) == (-1.0, 0.0, 0.0, True)
+    for raw, expected in (((0.5, 0.1, 0.2), ((0.5, 0.1, 0.2), False)), ((1.5, -0.1, 0.2), ((1.0, 0.0, 0.0), True)),
+                          ((-0.99, -1.0, 0.2), ((-1.0, 0.0, 0.0), True))):
+        assert shaper.held_inside(AxisMotion(*raw), -1.0, 1.0, 30.0, 0.02) == expected

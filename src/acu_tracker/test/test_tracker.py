@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from acu_tracker.estimation import axis_filter, tracker
-from acu_tracker.estimation.axis_filter import KINDS
-from acu_tracker.estimation.params import Filter
-from acu_tracker.params import TrackerParameters
+from acu_tracker.estimation import target_filter, tracker
+from acu_tracker.estimation.kinds import KINDS
+from acu_tracker.estimation.measurement import AxisMeasurement, Measurement, error_variance, nis
+from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters, TrackerParameters
 from pedestal_common.parameters import build, record
 
 DEG = math.pi / 180
@@ -26,24 +26,29 @@ class Target:
         self.put(**filter_params)
 
     def put(self, **filter_params):
-        params = build(Filter, {'current_statistical.a_max': 0.02, **filter_params})
-        self.c = tracker.constants(self.params, params, params)[0]
-        tracker.adopt(self.state[0], self.p, self.c)
+        params = build(FilterParameters, {'current_statistical.a_max': 0.02, **filter_params})
+        self.c = tracker.constants(self.params, (params, params))[0]
+        tracker.transfer(self.state[0], self.p, self.c)
 
     def observe(self, stamp, azimuth, elevation=0.0, azimuth_rate=NONE, elevation_rate=NONE):
-        """(outcome, nu azimuth, elevation, of their rates, nu' S^-1 nu of azimuth, elevation)."""
-        return tracker.observe(self.state[0], self.p, self.c, stamp, azimuth, elevation, SIGMA**2, SIGMA**2,
-                               azimuth_rate, elevation_rate, RATE_SIGMA**2, RATE_SIGMA**2, NONE, NONE,
-                               self.p['restart_gap'])
+        """(outcome, AxisInnovation of the azimuth)."""
+        axis = (AxisMeasurement(azimuth, SIGMA**2, azimuth_rate, RATE_SIGMA**2),
+                AxisMeasurement(elevation, SIGMA**2, elevation_rate, RATE_SIGMA**2))
+        outcome, innovation = tracker.observe(self.state[0], self.p, self.c, Measurement(stamp, axis, NONE, NONE),
+                                              self.p['restart_gap'])
+        return outcome, innovation.axis[0]
 
     def outlook(self, stamp):
-        return np.array(tracker.outlook(self.state[0], self.c, stamp))
+        return np.ravel(tracker.outlook(self.state[0], self.c, stamp))
 
     def variances(self, T=0.0):
-        return axis_filter.variances(self.state[0]['azimuth'], self.c['azimuth'], T)
+        """(p11, p12, p22) of the azimuth T after the last measurement."""
+        f = self.state[0]['filter']
+        target_filter.predict(f, self.c['filter'], T)
+        return target_filter.read(f).variances[0]
 
-    def locked(self, overdue=0.0):
-        return bool(tracker.locked(self.state[0], self.p, overdue))
+    def locked(self, since_accepted=0.0):
+        return bool(tracker.locked(self.state[0], self.p, since_accepted))
 
 
 def test_azimuth_is_unwrapped_against_the_estimate():
@@ -51,7 +56,7 @@ def test_azimuth_is_unwrapped_against_the_estimate():
     t = np.arange(0.0, 20.0, T)
     angle = 3.0 + 0.05 * t
     outcomes = [target.observe(stamp, (y + math.pi) % (2 * math.pi) - math.pi)[0] for stamp, y in zip(t, angle)]
-    assert outcomes == [tracker.STARTED] + [tracker.BELIEVED] * (len(t) - 1)
+    assert outcomes == [tracker.STARTED] + [tracker.ACCEPTED] * (len(t) - 1)
     assert target.outlook(t[-1])[0] == pytest.approx(angle[-1], abs=1e-6)
 
 
@@ -64,18 +69,18 @@ def test_stale_gated_counted_and_restarted_measurements():
     assert target.observe(1.0, 0.1)[0] == tracker.STALE
     np.testing.assert_array_equal(target.state, before)
 
-    outcome, nu, _, _, _, nis, _ = target.observe(300 * T, 0.2)
-    assert outcome == tracker.GATED and nu == pytest.approx(0.1, abs=1e-9) and nis > 25.0
+    outcome, azimuth = target.observe(300 * T, 0.2)
+    assert outcome == tracker.GATED and azimuth.nu == pytest.approx(0.1, abs=1e-9) and azimuth.chi_square > 25.0
     for name in ('x', 'p', 'mu'):
-        np.testing.assert_array_equal(target.state['azimuth'][name], before['azimuth'][name])
-    assert target.state['in_a_row'] == 0 and target.state['gated'] == 1
+        np.testing.assert_array_equal(target.state['filter']['axis'][name], before['filter']['axis'][name])
+    assert target.state['accepted_in_a_row'] == 0 and target.state['gated'] == 1
 
     for k in range(301, 301 + 18):
         assert target.observe(k * T, 0.2)[0] == tracker.GATED
     assert target.observe(320 * T, 0.2)[0] == tracker.STARTED
     assert target.outlook(320 * T)[0] == 0.2 and target.state['gated'] == 20
 
-    assert target.observe(320 * T + 0.9, 0.2)[0] == tracker.BELIEVED
+    assert target.observe(320 * T + 0.9, 0.2)[0] == tracker.ACCEPTED
     assert target.observe(320 * T + 2.0, 0.7)[0] == tracker.STARTED
     assert target.outlook(320 * T + 2.0)[0] == pytest.approx(0.7)
     assert target.state['gated'] == 20
@@ -85,12 +90,12 @@ def test_only_refusals_in_a_row_restart():
     target = Target()
     outcomes = [target.observe(k * T, 0.1 if k < 300 or k % 15 == 0 else 0.2)[0] for k in range(400)]
     assert outcomes[0] == tracker.STARTED and tracker.STARTED not in outcomes[1:]
-    assert outcomes[301:315] == [tracker.GATED] * 14 and outcomes[315] == tracker.BELIEVED
+    assert outcomes[301:315] == [tracker.GATED] * 14 and outcomes[315] == tracker.ACCEPTED
 
 
 @pytest.mark.parametrize('gate', [1.0, 9.0, 25.0, 600.0, 1e6])
 def test_gate_of_a_rate_is_as_rarely_exceeded(gate):
-    limit = tracker.constants(TrackerParameters(gate=gate), Filter(), Filter())['gates'][0, 1]
+    limit = tracker.constants(TrackerParameters(gate=gate), 2 * (FilterParameters(),))['gates'][0, 1]
     assert 0.0 < limit < gate
     if gate <= 600.0:
         assert chi2.logsf(limit, 1) == pytest.approx(-gate / 2, rel=1e-9)
@@ -105,17 +110,18 @@ def test_a_rate_is_believed_by_itself():
         assert (target.variances() == alone.variances()) == (k <= 50)
     assert target.variances()[2] < 0.7 * alone.variances()[2] and target.state['rates_gated'] == 0
     # Without a rate (the sensor is late) the angles alone are believed, and with one that is off.
-    assert target.observe(3.0, 0.13, 0.0)[0] == tracker.BELIEVED
+    assert target.observe(3.0, 0.13, 0.0)[0] == tracker.ACCEPTED
     rate = target.outlook(3.0)[1]
-    outcome, _, _, nu_rate, _, nis, _ = target.observe(3.01, 0.1301, 0.0, 0.01 + 8 * RATE_SIGMA, 0.0)
-    assert outcome == tracker.BELIEVED and nu_rate == pytest.approx(8 * RATE_SIGMA, rel=1e-2) and nis > 50.0
+    outcome, azimuth = target.observe(3.01, 0.1301, 0.0, 0.01 + 8 * RATE_SIGMA, 0.0)
+    assert outcome == tracker.ACCEPTED and azimuth.rate == pytest.approx(8 * RATE_SIGMA, rel=1e-2)
+    assert nis(azimuth) > 50.0
     assert target.outlook(3.01)[1] == pytest.approx(rate, abs=1e-6)
     assert target.state['rates_gated'] == 1 and target.state['gated'] == 0
     # The other axis goes on with its own.
     assert target.state['rates_in_a_row'].tolist() == [[0, 300]]
     # A filter that is not to use the rate does not look at it.
     target.put(rate_measurement=False)
-    assert target.observe(3.02, 0.1302, 0.0, 1.0, 0.0)[0] == tracker.BELIEVED
+    assert target.observe(3.02, 0.1302, 0.0, 1.0, 0.0)[0] == tracker.ACCEPTED
     assert target.state['rates_gated'] == 1
 
 
@@ -146,7 +152,7 @@ def test_lock_needs_a_row_of_fresh_errors_and_convergence(kind):
         target.observe(k * T, 0.1)
         locks.append(target.locked())
     assert not any(locks[:49]) and all(locks[60:])
-    assert not target.locked(overdue=0.11)
+    assert not target.locked(since_accepted=0.11)
     target.observe(299 * T + 0.5, 0.1)
     assert not target.locked()
 
@@ -204,15 +210,18 @@ def test_an_error_is_compared_with_what_was_told_in_the_coast(kind, gap):
         target.observe(k * T, 0.1 + 0.02 * k * T + 0.5 * 0.02 * max(k * T - 2.0, 0.0)**2)
     stamp = 299 * T + gap
     angle, variance = target.outlook(stamp)[0], target.variances(gap)[0]
-    outcome, nu, _, _, _, nis, _ = target.observe(stamp, 0.3)
-    assert outcome == tracker.BELIEVED and nu == pytest.approx(0.3 - angle, abs=1e-12)
-    assert target.state['S'][0, 0] == pytest.approx(variance + SIGMA**2, rel=1e-12)
-    assert nis == pytest.approx(nu**2 / (variance + SIGMA**2), rel=1e-12)
+    outcome, azimuth = target.observe(stamp, 0.3)
+    assert outcome == tracker.ACCEPTED and azimuth.nu == pytest.approx(0.3 - angle, abs=1e-12)
+    assert azimuth.S == pytest.approx(variance + SIGMA**2, rel=1e-12)
+    assert nis(azimuth) == pytest.approx(azimuth.nu**2 / (variance + SIGMA**2), rel=1e-12)
 
 
 def test_receiver_law():
     # theta3 / (k_m sqrt(2 C/N0 tau)): 1 deg, 1.6, 40 dB-Hz, 10 ms -> 1 / (1.6 sqrt(200)) deg
-    R = tracker.error_variance(0.0, 0.0, 40.0, DEG, 1.6, 0.01, 0.0)
+    receiver = record(ReceiverModelParameters(beamwidth=DEG, slope=1.6, integration=0.01))[0]
+    receiver['sigma_floor'] = 0.0
+    R = error_variance(0.0, 0.0, 40.0, receiver)
     assert math.sqrt(R) == pytest.approx(DEG / (1.6 * math.sqrt(200.0)))
-    assert tracker.error_variance(0.3 * DEG, 0.4 * DEG, 40.0, DEG, 1.6, 0.01, 0.0) == pytest.approx(1.64 * R)
-    assert tracker.error_variance(0.0, 0.0, 300.0, DEG, 1.6, 0.01, 1e-3) == pytest.approx(1e-6)
+    assert error_variance(0.3 * DEG, 0.4 * DEG, 40.0, receiver) == pytest.approx(1.64 * R)
+    receiver['sigma_floor'] = 1e-3
+    assert error_variance(0.0, 0.0, 300.0, receiver) == pytest.approx(1e-6)

@@ -9,7 +9,9 @@ import pytest
 from filterpy.kalman import IMMEstimator, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
 from acu_tracker.estimation import unscented
-from acu_tracker.estimation.params import Ukf
+from acu_tracker.estimation.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
+from acu_tracker.estimation.params import UkfParameters
+from acu_tracker.geometry.motion import AxisMotion, Motion
 
 DEG = math.pi / 180.0
 T = 0.02
@@ -24,13 +26,19 @@ def filtered(s, c, y, R, T, out, variances, mu):
         A, E, r = y[k]
         R_A = R[0] / math.cos(E)**2
         if s[0].mu[0] + s[0].mu[1] == 0.0:
-            unscented.start(s[0], c[0], A, 0.0, 0.0, E, 0.0, 0.0, R_A, 0.0, 0.1, R[1], 0.0, 0.1, r, R[2])
+            known = AxisVariances(R_A, 0.0, 0.1), AxisVariances(R[1], 0.0, 0.1)
+            first = Estimate(Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0)), known)
+            unscented.start(s[0], c[0], first, r, R[2])
         else:
             unscented.predict(s[0], c[0], T)
-            unscented.innovation(s[0], A, E, r, R_A, R[1], R[2])
-            unscented.correct(s[0], A, E, r)
-        out[k] = unscented.outlook(s[0], c[0], 0.0)
-        variances[k] = unscented.variances(s[0], c[0], 0.0)
+            m = Measurement(0.0, (AxisMeasurement(A, R_A, math.nan, math.nan),
+                                  AxisMeasurement(E, R[1], math.nan, math.nan)), r, R[2])
+            unscented.innovation(s[0], m)
+            unscented.correct(s[0], m)
+        unscented.predict(s[0], c[0], 0.0)
+        axes, variances[k, 6] = unscented.variances(s[0])
+        for i, axis in enumerate(unscented.expected(s[0])):
+            out[k, 3 * i:3 * i + 3], variances[k, 3 * i:3 * i + 3] = axis, axes[i]
         mu[k] = s[0].mu
 
 
@@ -40,6 +48,13 @@ def run(y, constants, state=None):
     out, variances, mu = np.empty((len(y), 6)), np.empty((len(y), 7)), np.empty((len(y), 2))
     filtered(s, constants, y, R, T, out, variances, mu)
     return out, variances, mu, s[0]
+
+
+def told(s, c, T):
+    """(angles, rates, accelerations (6,), variances (7,)) T after the last measurement."""
+    unscented.predict(s, c, T)
+    axes, variance = unscented.variances(s)
+    return np.ravel(unscented.expected(s)), np.append(axes, variance)
 
 
 def seen(p):
@@ -106,7 +121,7 @@ def filterpy_imm(params, x, P):
 @pytest.mark.parametrize('dropped', [slice(0, 0), slice(30, 70)])
 def test_equals_filterpy(dropped):
     """A pass through south, where the azimuth wraps, with and without a gap in the range."""
-    params = Ukf(cv_noise=0.3, ca_noise=3.0, dwell=2.0)
+    params = UkfParameters(cv_noise=0.3, ca_noise=3.0, dwell=2.0)
     t, p = flyby(distance=-60.0, seconds=3.0)
     y = noisy(seen(p), 1)
     y[:, 0] = wrapped(y[:, 0])
@@ -137,10 +152,10 @@ def test_rates_and_accelerations_are_derivatives_of_the_angles():
     s['x'] = [[-30.0, -52.0, 21.0, 14.0, -3.0, 2.0, 0.0, 0.0, 0.0],
               [-30.3, -52.1, 21.1, 14.4, -3.2, 2.1, 1.5, -2.0, 0.7]]
     s['mu'] = 0.3, 0.7
-    c = unscented.constants(Ukf())
+    c = unscented.constants(UkfParameters())
     c['dwell'] = 1e9
     h = 1e-3
-    before, now, after = (np.array(unscented.outlook(s[0], c[0], 1.0 + k * h)) for k in (-1, 0, 1))
+    before, now, after = (told(s[0], c[0], 1.0 + k * h)[0] for k in (-1, 0, 1))
     for angle in (0, 3):
         assert now[angle + 1] == pytest.approx((after[angle] - before[angle]) / (2 * h), rel=1e-5)
         assert now[angle + 2] == pytest.approx((after[angle] - 2 * now[angle] + before[angle]) / h**2, rel=1e-4)
@@ -154,10 +169,10 @@ def test_variances_are_those_of_many_targets():
     s['mu'] = 0.3, 0.7
     root = rng.normal(size=(2, 9, 9)) * np.repeat([0.02, 0.05, 0.1], 3)[:, np.newaxis]
     s['p'] = root @ np.swapaxes(root, 1, 2)
-    c = unscented.constants(Ukf(cv_noise=1e-6, ca_noise=1e-6))
-    found = unscented.variances(s[0], c[0], 0.5)
+    c = unscented.constants(UkfParameters(cv_noise=1e-6, ca_noise=1e-6))
+    _, found = told(s[0], c[0], 0.5)
     # Of the targets that were of mode i some are of mode j by then, which moved them.
-    stay, samples = 0.5 * (1.0 + math.exp(-2.0 * 0.5 / Ukf().dwell)), []
+    stay, samples = 0.5 * (1.0 + math.exp(-2.0 * 0.5 / UkfParameters().dwell)), []
     for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
         count = round(50000 * s['mu'][0, i] * (stay if i == j else 1.0 - stay))
         x = rng.multivariate_normal(s['x'][0, i], s['p'][0, i], count)
@@ -170,13 +185,14 @@ def test_variances_are_those_of_many_targets():
 
 
 def test_starts_where_the_angles_were():
-    s, c = np.zeros(1, unscented.STATE), unscented.constants(Ukf())
-    before = 2.0, 0.11, -0.03, 0.7, -0.05, 0.02
-    known = 1e-6, 2e-7, 1e-6, 2e-6, -3e-7, 2e-6
-    unscented.start(s[0], c[0], *before, *known, 800.0, 4.0)
-    assert unscented.outlook(s[0], c[0], 0.0) == pytest.approx(before, rel=1e-12)
-    assert unscented.variances(s[0], c[0], 0.0)[:6] == pytest.approx(known, rel=1e-3)
-    assert unscented.variances(s[0], c[0], 0.0)[6] == pytest.approx(4.0)
+    s, c = np.zeros(1, unscented.STATE), unscented.constants(UkfParameters())
+    before = Motion(AxisMotion(2.0, 0.11, -0.03), AxisMotion(0.7, -0.05, 0.02))
+    known = AxisVariances(1e-6, 2e-7, 1e-6), AxisVariances(2e-6, -3e-7, 2e-6)
+    unscented.start(s[0], c[0], Estimate(before, known), 800.0, 4.0)
+    motion, variances = told(s[0], c[0], 0.0)
+    assert motion == pytest.approx(np.ravel(before), rel=1e-12)
+    assert variances[:6] == pytest.approx(np.ravel(known), rel=1e-3)
+    assert variances[6] == pytest.approx(4.0)
 
 
 def rates_rms(p, params, seeds, kinds=unscented.MODES):
@@ -196,10 +212,10 @@ def test_rate_on_the_near_flyby():
     """
     _, p = flyby()
     cv, ca = unscented.MODES
-    rms = {'cv': rates_rms(p, Ukf(cv_noise=0.3, ca_noise=0.3), range(3), (cv, cv)),
-           'imm': rates_rms(p, Ukf(cv_noise=0.3), range(3)),
-           'ca': rates_rms(p, Ukf(cv_noise=1.0, ca_noise=1.0), range(3), (ca, ca)),
-           'default': rates_rms(p, Ukf(), range(3))}
+    rms = {'cv': rates_rms(p, UkfParameters(cv_noise=0.3, ca_noise=0.3), range(3), (cv, cv)),
+           'imm': rates_rms(p, UkfParameters(cv_noise=0.3), range(3)),
+           'ca': rates_rms(p, UkfParameters(cv_noise=1.0, ca_noise=1.0), range(3), (ca, ca)),
+           'default': rates_rms(p, UkfParameters(), range(3))}
     print({name: round(value, 4) for name, value in rms.items()})
     assert rms['cv'] < 0.035 and rms['imm'] < 0.035 and rms['ca'] < 0.06
     assert rms['default'] < 0.02
@@ -209,7 +225,7 @@ def test_goes_on_without_a_range_and_says_how_sure_it_is():
     t, p = flyby(distance=500.0, height=100.0, heading=0.4)
     y = noisy(seen(p), 7)
     y[1500:2000, 2] = math.nan
-    out, variances, _, _ = run(y, unscented.constants(Ukf()))
+    out, variances, _, _ = run(y, unscented.constants(UkfParameters()))
     true = seen(p)
     sigma = np.sqrt(variances[:, [0, 2, 3, 5, 6]])
     assert (sigma[1999] > sigma[1499])[4] and sigma[1999, 4] > 3.0 * sigma[1499, 4]
@@ -225,7 +241,7 @@ def test_a_turn_is_noticed():
     heading = np.cumsum(np.where((t > 12.0) & (t < 16.0), 3.0 / 15.0, 0.0) * T)
     v = 15.0 * np.column_stack((np.cos(heading), np.sin(heading), np.zeros_like(t)))
     p = np.array([-150.0, 200.0, 60.0]) + np.cumsum(v, axis=0) * T
-    _, _, mu, _ = run(noisy(seen(p), 3), unscented.constants(Ukf()))
+    _, _, mu, _ = run(noisy(seen(p), 3), unscented.constants(UkfParameters()))
     assert mu[400:590, 1].mean() < 0.3 and mu[650:800, 1].mean() > 0.6
-    straight = dataclasses.replace(Ukf(), ca_noise=1e-6, initial_acceleration=1e-6)
-    assert rates_rms(p, Ukf(), (3,)) < 0.7 * rates_rms(p, straight, (3,))
+    straight = dataclasses.replace(UkfParameters(), ca_noise=1e-6, initial_acceleration=1e-6)
+    assert rates_rms(p, UkfParameters(), (3,)) < 0.7 * rates_rms(p, straight, (3,))

@@ -6,11 +6,12 @@ import pytest
 from scipy import signal, stats
 from scipy.spatial.transform import Rotation
 
-from acu_tracker.estimation import motion_models, tracker
-from acu_tracker.params import ReceiverLaw
+from acu_tracker.estimation import motion_models
+from acu_tracker.estimation.measurement import error_variance
+from acu_tracker.estimation.params import ReceiverModelParameters
 from pedestal_bringup.analysis import consistency
 from pedestal_common import line_of_sight, topics
-from pedestal_common.parameters import build
+from pedestal_common.parameters import build, record
 from tracking_receiver_sim import receiver, target
 from tracking_receiver_sim.params import SMOOTHINGS, TrackingReceiverParameters
 
@@ -129,15 +130,14 @@ def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_d
     inputs['mat_ed'], inputs['valid'] = line_of_sight.ashore_matrix(), 1
     inputs['azimuth'], inputs['elevation'] = 0.3, 0.6
     normals = np.random.default_rng(2).standard_normal((40_400, receiver.normals_per_step(params)))
-    errors, expected, law = [], [], ReceiverLaw()
+    errors, expected, law = [], [], record(ReceiverModelParameters())[0]
     for k, row in enumerate(normals):
         inputs['stamp_ns'] = 5_000_000 * k
         receiver.step(state[0], constants[0], inputs[0], outputs[0], built.breaks, built.coefficients, row)
         if k >= 400:
             x, e, level = (float(outputs[name][0]) for name in ('cross_elevation', 'elevation', 'cn0_dbhz'))
             errors += [[x, e]]
-            expected += [tracker.error_variance(x, e, level, law.beamwidth, law.slope, law.integration,
-                                                law.sigma_floor)]
+            expected.append(error_variance(x, e, level, law))
     errors, variance = np.array(errors), np.mean(expected)
     means = errors.reshape(-1, 50, 2).mean(axis=1)
     assert 50 * means.var() == pytest.approx(variance, rel=0.15)

@@ -10,10 +10,10 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from acu_tracker.estimation import axis_filter
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup import cli
-from pedestal_bringup.studies import experiment, filters, manoeuvre, pareto
-from pedestal_bringup.studies.rigs import ensemble
+from pedestal_bringup.studies import filters, manoeuvre, pareto
+from pedestal_bringup.studies.rigs import drawing, ensemble
 from pedestal_bringup.studies.rigs.ensemble import Noise
 from pedestal_bringup.trials import tuning
 from pedestal_common.parameters import as_dict
@@ -82,7 +82,7 @@ def test_rows_with_a_target_are_printed_and_doubts_are_said(filters_result):
 def test_figures_of_filters(filters_result, tmp_path):
     assert set(filters_result.figures) == {'errors', 'rates', 'rms', 'nis', 'probabilities', 'noise'}
     for name, draw in filters_result.figures.items():
-        experiment.save(draw, tmp_path / f'{name}.png')
+        drawing.save(draw, tmp_path / f'{name}.png')
 
 
 def test_tuning_saw_other_noise():
@@ -110,7 +110,7 @@ def test_coloured_noise_has_the_rms_and_the_bandwidth_asked_for():
 def test_moments_are_those_of_the_estimates():
     t = ensemble.PERIOD * np.arange(300)
     truth = np.sin(t), np.cos(t), -np.sin(t)
-    noise, params = Noise(0.01, None, 0.02), Filter(kind='imm')
+    noise, params = Noise(0.01, None, 0.02), FilterParameters(kind='imm')
     measured = ensemble.records(truth, noise, 3, 0, 4)
     sums = ensemble.moments(params, t, truth, noise, measured)
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=True))
@@ -131,28 +131,28 @@ def test_tuning_finds_the_least_criterion(kind, least):
         given = as_dict(params)
         return sum((i + 1) * math.log(given[name] / value)**2 for i, (name, value) in enumerate(least.items()))
 
-    found, value = tuning.tuned(Filter(kind=kind), criterion)
+    found, value = tuning.tuned(FilterParameters(kind=kind), criterion)
     assert value == criterion(found)
     for name, best in least.items():
         assert as_dict(found)[name] == pytest.approx(best, rel=0.05)
 
 
 def test_tuning_of_many_parameters_begins_where_they_are():
-    best = dataclasses.replace(Filter(kind='imm').imm, dwell=3.0)
+    best = dataclasses.replace(FilterParameters(kind='imm').imm, dwell=3.0)
 
     def criterion(params):
         imm = params.imm
         return (math.log(imm.dwell / best.dwell)**2 + math.log(imm.cv.noise / best.cv.noise)**2
                 + math.log(imm.ca.noise / best.ca.noise)**2)
 
-    found, value = tuning.tuned(Filter(kind='imm'), criterion)
-    assert value < criterion(Filter(kind='imm')) / 20.0
+    found, value = tuning.tuned(FilterParameters(kind='imm'), criterion)
+    assert value < criterion(FilterParameters(kind='imm')) / 20.0
     assert found.imm.dwell == pytest.approx(3.0, rel=0.15)
 
 
 def test_a_criterion_that_never_works_is_refused():
     with pytest.raises(ValueError, match='no cv.noise gives a finite criterion'):
-        tuning.tuned(Filter(kind='cv'), lambda params: math.nan)
+        tuning.tuned(FilterParameters(kind='cv'), lambda params: math.nan)
 
 
 def test_the_reversals_follow_each_other_smoothly():

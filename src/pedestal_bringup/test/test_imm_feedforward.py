@@ -9,9 +9,9 @@ import pytest
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
 from acu_tracker.estimation import axis_filter
-from acu_tracker.estimation.params import Filter
-from pedestal_bringup.studies import experiment
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.studies import imm_feedforward as study
+from pedestal_bringup.studies.rigs import drawing, metrics, rows
 from pedestal_bringup.studies.rigs import feedforward_loop as loop
 from pedestal_bringup.trials import monte_carlo
 
@@ -45,7 +45,7 @@ def followed(angle, late):
     target = np.column_stack([angle.deriv(i)(t) if i else angle(t) for i in range(3)])
     known = np.column_stack([angle.deriv(i)(t + 0.5 * T - late) for i in (1, 2)])
     out = np.zeros((1, len(t)), loop.STEP)
-    loop._follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(Filter()), 0.0,
+    loop._follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(FilterParameters()), 0.0,
                   loop.rate_loop_step(W, ZETA), np.zeros((1, len(t))), out)
     return out['miss'][0, -1]
 
@@ -108,7 +108,7 @@ def test_an_outcome_is_that_of_all_its_runs():
     assert found.miss_mean == pytest.approx(miss.mean(axis=0), abs=1e-12)
     counts = t >= 0.5 * period
     values = found.measures()
-    assert values['miss_rms_deg'][0] == pytest.approx(math.degrees(experiment.rms(miss[:, counts])))
+    assert values['miss_rms_deg'][0] == pytest.approx(math.degrees(metrics.rms(miss[:, counts])))
     assert values['miss_peak_deg'][0] == pytest.approx(np.degrees(np.abs(miss[:, counts]).max(axis=1).mean()))
     assert values['miss_rms_deg'][0] < values['miss_worst_second_deg'][0] < values['miss_peak_deg'][0]
 
@@ -125,12 +125,12 @@ def test_no_row_misses_its_target(result):
         for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state'):
             assert {(f'{axis}/{name}', 'miss_rms_deg'), (f'{axis}/{name}', 'rate_noise_deg_s')} <= named.keys()
     assert sum(row['target'] is not None for row in result.rows) == 15
-    assert [row for row in result.rows if experiment.missed(row)] == []
+    assert [row for row in result.rows if rows.missed(row)] == []
 
 
 def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
-        experiment.save(draw, tmp_path / f'{name}.png')
+        drawing.save(draw, tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 10000
 
 

@@ -7,8 +7,9 @@ import pytest
 from scipy import linalg
 
 from acu_tracker.estimation.alpha_beta import benedict_bordner
-from pedestal_bringup.studies import experiment, phased_array
+from pedestal_bringup.studies import phased_array
 from pedestal_bringup.studies.phased_array import instants, settled
+from pedestal_bringup.studies.rigs import drawing, metrics, rows
 from pedestal_bringup.studies.rigs.angle_loop import GRID, LENGTH, Better, Paper, received
 from tracking_receiver_sim import monopulse
 
@@ -26,7 +27,7 @@ def values_of(result):
 def test_every_target_is_met(result):
     targets = {(row['case'], row['metric']): row['target'] for row in result.rows if row['target'] is not None}
     assert targets == phased_array.TARGETS
-    assert [row for row in result.rows if experiment.missed(row)] == []
+    assert [row for row in result.rows if rows.missed(row)] == []
 
 
 def test_limits_found_by_bisection_are_those_of_the_eigenvalues(values):
@@ -73,7 +74,7 @@ def test_figures_are_drawn(result, tmp_path):
         figure = draw()
         lines = [line for axes in figure.axes for line in axes.get_lines()]
         assert lines and all(np.isfinite(line.get_ydata()).any() for line in lines), name
-    experiment.save(result.figures['figure-7'], tmp_path / 'figure-7.png')
+    drawing.save(result.figures['figure-7'], tmp_path / 'figure-7.png')
     assert (tmp_path / 'figure-7.png').stat().st_size > 10000
 
 
@@ -110,7 +111,7 @@ def test_jitter_is_that_of_the_steady_filter():
     expected = math.sqrt(np.mean([g @ covariance @ g for g in (np.array([1.0, a, a * a / 2]) for a in ahead)]))
     noise = sigma * np.random.default_rng(2).standard_normal(200_000)
     beam, _ = Better(q, sigma).run(np.zeros(200_000), noise)
-    assert experiment.rms(beam[20_000:]) == pytest.approx(expected, rel=0.06)
+    assert metrics.rms(beam[20_000:]) == pytest.approx(expected, rel=0.06)
 
 
 def test_with_the_ins_only_what_the_attitude_is_late_is_left():
@@ -118,9 +119,9 @@ def test_with_the_ins_only_what_the_attitude_is_late_is_left():
     sway, rate = phased_array.sway_target()
     errors = {late: settled(sway - Better(1e-4, 1e-3, ins=True, late=late).run(sway, None, sway, rate)[0])
               for late in (0, 5, 20)}
-    assert experiment.peak(errors[0]) < 2e-5 * phased_array.SWAY
+    assert metrics.peak(errors[0]) < 2e-5 * phased_array.SWAY
     # The attitude error is a sine of rate x late, of which the slow filter takes little away again.
-    assert experiment.peak(errors[20]) / experiment.peak(errors[5]) == pytest.approx(4.0, rel=0.1)
+    assert metrics.peak(errors[20]) / metrics.peak(errors[5]) == pytest.approx(4.0, rel=0.1)
 
 
 def test_receiver_is_the_monopulse_pattern():

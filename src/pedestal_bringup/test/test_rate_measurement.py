@@ -6,8 +6,8 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from acu_tracker.estimation import axis_filter
-from pedestal_bringup.studies import experiment
 from pedestal_bringup.studies import rate_measurement as study
+from pedestal_bringup.studies.rigs import drawing, metrics, rows
 
 T, ALPHA, SIGMA = study.T, study.ALPHA, study.SIGMA
 CASES = [(sigma_a, rate_sigma) for sigma_a in study.SIGMA_A for rate_sigma in study.RATE_SIGMA.values()]
@@ -50,7 +50,7 @@ def test_a_sine_through_the_filter(frequency, rate_sigma):
     late = t >= 100.0
     angle, rate = study.responses(*study.settled(study.MAIN, rate_sigma), np.array([frequency]))
     for field, turn, G in (('angle', 1.0, angle[0]), ('rate', 1j * w, rate[0])):
-        _, a, b = experiment.harmonic_fit(t[late], out[field][late], w)
+        _, a, b = metrics.harmonic_fit(t[late], out[field][late], w)
         assert (a + 1j * b) / turn == pytest.approx(G, abs=1e-5)
 
 
@@ -76,7 +76,7 @@ def result():
 def test_rows(result):
     values = {(row['case'], row['metric']): row['value'] for row in result.rows}
     assert len(values) == len(result.rows)
-    assert [row for row in result.rows if experiment.missed(row)] == []
+    assert [row for row in result.rows if rows.missed(row)] == []
     for name in ('position', 'position-rate'):
         assert values[name, 'rate_bandwidth_hz'] > 1.0 and values[name, 'dynamic_error_0p2hz'] < 0.02
     assert values['position-rate', 'rate_bandwidth_ratio'] == pytest.approx(
@@ -94,5 +94,5 @@ def test_only_an_independent_rate_helps(result):
 
 def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
-        experiment.save(draw, tmp_path / f'{name}.png')
+        drawing.save(draw, tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 10000

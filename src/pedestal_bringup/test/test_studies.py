@@ -77,10 +77,10 @@ def test_two_loops_fight_at_rest_where_one_does_not(studied):
 
 
 def test_what_misses_its_target_is_marked(done):
-    from pedestal_bringup.studies import experiment
+    from pedestal_bringup.studies.rigs.rows import missed
     _, folder, result = done
     rows = json.loads((folder / 'rows.json').read_text())['rows']
-    assert result.stdout.count('MISSED') == sum(map(experiment.missed, rows))
+    assert result.stdout.count('MISSED') == sum(map(missed, rows))
 
 
 def test_rows_are_written_and_printed_one_a_line(done):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import yaml
 
-from pedestal_bringup.studies import alignment, experiment
+from pedestal_bringup.studies import alignment
+from pedestal_bringup.studies.rigs import cases, metrics, rows
 
 T = np.arange(0.0, 3.0, 1e-4)
 
@@ -18,41 +19,41 @@ def second_order(damping, w=20.0, size=0.3):
 @pytest.mark.parametrize('damping', [0.2, 0.5, 0.7])
 def test_overshoot_of_a_second_order_response(damping):
     expected = 100.0 * math.exp(-math.pi * damping / math.sqrt(1.0 - damping * damping))
-    assert experiment.overshoot_percent(second_order(damping), 0.3) == pytest.approx(expected, rel=1e-3)
+    assert metrics.overshoot_percent(second_order(damping), 0.3) == pytest.approx(expected, rel=1e-3)
 
 
 def test_overshoot_is_zero_where_there_is_none_and_counts_downwards():
-    assert experiment.overshoot_percent(1.0 - np.exp(-T), 1.0) == 0.0
-    assert experiment.overshoot_percent(np.array([0.0, -1.1, -1.0]), -1.0) == pytest.approx(10.0)
+    assert metrics.overshoot_percent(1.0 - np.exp(-T), 1.0) == 0.0
+    assert metrics.overshoot_percent(np.array([0.0, -1.1, -1.0]), -1.0) == pytest.approx(10.0)
 
 
 def test_settling_of_a_first_order_response():
-    assert experiment.settling_time(T, 1.0 - np.exp(-5.0 * T), 1.0) == pytest.approx(math.log(50.0) / 5.0, abs=1e-6)
+    assert metrics.settling_time(T, 1.0 - np.exp(-5.0 * T), 1.0) == pytest.approx(math.log(50.0) / 5.0, abs=1e-6)
 
 
 def test_settling_is_nan_when_it_never_settles_and_zero_when_it_never_left():
-    assert math.isnan(experiment.settling_time(T, np.sin(T), 1.0))
-    assert experiment.settling_time(T, np.ones_like(T), 1.0) == 0.0
+    assert math.isnan(metrics.settling_time(T, np.sin(T), 1.0))
+    assert metrics.settling_time(T, np.ones_like(T), 1.0) == 0.0
 
 
 def test_crossings():
     swings = np.exp(-0.2 * math.pi / math.sqrt(0.96) * np.arange(1, 30))
-    assert experiment.crossings(second_order(0.2, size=1.0), 1.0, band=1e-3) == np.sum(swings > 1e-3)
-    assert experiment.crossings(1.0 - np.exp(-T), 1.0) == 0
-    assert experiment.crossings(np.array([0.0, 1.1, 0.999, 1.001, 1.0]), 1.0) == 1
+    assert metrics.crossings(second_order(0.2, size=1.0), 1.0, band=1e-3) == np.sum(swings > 1e-3)
+    assert metrics.crossings(1.0 - np.exp(-T), 1.0) == 0
+    assert metrics.crossings(np.array([0.0, 1.1, 0.999, 1.001, 1.0]), 1.0) == 1
 
 
 def test_whole_periods_begin_at_the_skip():
-    mask = experiment.whole_periods(T, 0.7, 0.5)
+    mask = metrics.whole_periods(T, 0.7, 0.5)
     assert np.sum(mask) == 3 * 7000
     assert T[mask][0] == pytest.approx(0.5)
     with pytest.raises(ValueError, match='no whole period'):
-        experiment.whole_periods(T, 2.9, 0.5)
+        metrics.whole_periods(T, 2.9, 0.5)
 
 
 def test_amplitude_and_period_are_found_beside_an_offset():
     y = 0.4 + 0.87 * np.sin(2.0 * math.pi / 0.731 * T + 0.3)
-    amplitude, period = experiment.amplitude_and_period(T, y, 0.75)
+    amplitude, period = metrics.amplitude_and_period(T, y, 0.75)
     assert amplitude == pytest.approx(0.87, rel=1e-12)
     assert period == pytest.approx(0.731, rel=1e-12)
 
@@ -62,7 +63,7 @@ def test_residual_keeps_all_but_offset_and_fundamental():
     t = T[whole]
     rest = 0.01 * np.sin(2.0 * math.pi * 3.0 * t)
     y = 0.2 + np.sin(2.0 * math.pi * t + 1.0) + rest
-    assert experiment.residual(t, y, 1.0) == pytest.approx(rest, abs=1e-12)
+    assert metrics.residual(t, y, 1.0) == pytest.approx(rest, abs=1e-12)
 
 
 @pytest.mark.parametrize('value, target, met', [
@@ -70,24 +71,24 @@ def test_residual_keeps_all_but_offset_and_fundamental():
     (1.0, '>= 1', True), (1.0, '< 1', False), (13.4, '12 +- 1.5', True), (13.6, '12 +- 1.5', False),
     (0.8683, '0.868 to 0.8695', True), (0.87, '0.868 to 0.8695', False), (None, '<= 1', False)])
 def test_targets(value, target, met):
-    assert experiment.meets(value, target) is met
+    assert rows.meets(value, target) is met
 
 
 def test_a_row_without_a_number_is_null_and_misses():
-    row = experiment.row('case', 'metric', math.nan, 's', target='<= 1')
-    assert row['value'] is None and experiment.missed(row)
-    assert not experiment.missed(experiment.row('case', 'metric', 1.0, 's'))
+    row = rows.row('case', 'metric', math.nan, 's', target='<= 1')
+    assert row['value'] is None and rows.missed(row)
+    assert not rows.missed(rows.row('case', 'metric', 1.0, 's'))
 
 
 def test_a_case_says_how_to_run_it_through_the_nodes():
-    case = experiment.Case('fast', 'servo_step', {'adu.azimuth.bias.torque': 3.0}, 2.0)
+    case = cases.Case('fast', 'servo_step', {'adu.azimuth.bias.torque': 3.0}, 2.0)
     assert case.command() == 'pedestal run servo_step --duration 2 --param adu.azimuth.bias.torque=3.0'
     assert case.loaded().node_parameters('adu').azimuth.bias.torque == 3.0
 
 
 def test_off_is_a_word():
     """YAML 1.1 takes off for false; a schedule of that name must survive, also in the file the nodes read."""
-    loaded = experiment.Case('off', 'servo_step', {'adu.azimuth.bias.schedule': 'off'}).loaded()
+    loaded = cases.Case('off', 'servo_step', {'adu.azimuth.bias.schedule': 'off'}).loaded()
     assert loaded.node_parameters('adu').azimuth.bias.schedule == 'off'
     assert yaml.safe_load(loaded.as_yaml())['adu']['ros__parameters']['azimuth.bias.schedule'] == 'off'
 

@@ -23,5 +23,5 @@ def kalata(alpha):
 
 @compiled
 def gain(alpha, beta, gamma, T):
-    """(k1, k2, k3) of the gains over T [s]."""
-    return alpha, beta / T, gamma / (2.0 * T * T)
+    """(k1 [-], k2 [1/s], k3 [1/s2]) over T [s]."""
+    return (alpha, beta / T, gamma / (2.0 * T * T))

@@ -1,35 +1,36 @@
-"""The target filter of one axis: any of KINDS, all as a bank of one to four models, so that everybody reads a bank.
+"""The target filter of one axis, of any of `kinds`: all are a bank of motion models, so that everybody reads a bank.
 
-    alpha_beta, alpha_beta_gamma    cv or ca without process noise, corrected with constant gains
-    cv, ca, singer, current_statistical     a Kalman filter with that model of motion
-    imm             interacting models; imm_ukf is the same here, what it falls back on without a range
-
-The state stays at the last measurement that was believed; whoever needs it later predicts.
+The state stays at the last measurement that was accepted; whoever needs it later predicts.
 """
 import math
 
 import numpy as np
 
 from acu_tracker.estimation import alpha_beta, imm, kalman, motion_models
+from acu_tracker.estimation.kalman import Gaussian, Symmetric
+from acu_tracker.estimation.kinds import KINDS
+from acu_tracker.estimation.measurement import AxisInnovation, AxisMeasurement, AxisVariances
 from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
-from pedestal_common.parameters import ParameterError
 
-KINDS = ('alpha_beta', 'alpha_beta_gamma', *MODELS, 'imm', 'imm_ukf')
 BANK = len(MODELS)
 
-CONSTANTS = np.dtype([('count', 'i8'), ('bank', 'i8'), ('models', motion_models.MODEL, (BANK,)), ('dwell', 'f8'),
-                      ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'), ('rate_measurement', 'i8')], align=True)
-"""count: models in use, the first of `models`; bank: a number that tells which; alpha: 0 but for constant gains."""
+CONSTANTS = np.dtype([('count', 'i8'), ('bank', 'i8'), ('models', motion_models.MODEL, (BANK,)), ('states', 'i8'),
+                      ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'), ('rate_measurement', 'i8')],
+                     align=True)
+"""count: models in use, the first of `models`; bank: a number that tells which; states: the most of any of them;
+alpha: 0 but for constant gains."""
 
-FILTER = np.dtype([('bank', 'i8'), ('count', 'i8'), ('T', 'f8'),
+FILTER = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
                    ('x', 'f8', (BANK, 3)), ('p', 'f8', (BANK, 6)), ('mu', 'f8', (BANK,)),
                    ('x_prior', 'f8', (BANK, 3)), ('p_prior', 'f8', (BANK, 6)), ('mu_prior', 'f8', (BANK,)),
                    ('weights', 'f8', (BANK,))], align=True)
-"""x, p, mu: estimate, covariance (upper triangle) and probability of each model, after the last measurement.
+"""bank, count, states: of the constants that x, p, mu belong to: estimate, covariance (as in kalman.Symmetric) and
+probability of each model, after the last measurement.
 
-The same _prior: predicted by T [s] from there, set by `predict`, which all that is said of a later time goes through.
-weights: scratch.
+x_prior, p_prior, mu_prior: predicted by T [s] from there. `predict` sets them, `expected`, `innovation`, `correct` use
+them. weights: scratch.
 """
 
 ESTIMATE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
@@ -39,89 +40,71 @@ ESTIMATE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('
 [rad/s] and nu' S^-1 nu, NaN where nothing was measured; probability of each of MODELS, NaN if not in the bank."""
 
 
-def named_models(names) -> tuple:
-    """Codes of the models in a text such as 'cv ca'. Raises ParameterError."""
-    models = names.split()
-    if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODELS)):
-        raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODELS)}, each once")
-    return tuple(sorted(MODELS.index(name) for name in models))
-
-
 def constants(params) -> np.ndarray:
-    """Constants (1,) of a filter_params.Filter."""
-    c = np.zeros(1, CONSTANTS)
-    source, kind = params, params.kind
-    if kind == 'alpha_beta':
-        models, alpha = (motion_models.CV,), params.alpha_beta.alpha
-        c['alpha'], c['beta'] = alpha, alpha_beta.benedict_bordner(alpha)
-    elif kind == 'alpha_beta_gamma':
-        models, alpha = (motion_models.CA,), params.alpha_beta_gamma.alpha
-        c['alpha'], (c['beta'], c['gamma']) = alpha, alpha_beta.kalata(alpha)
-    elif kind in MODELS:
-        models = (MODELS.index(kind),)
-    else:
-        source, models = params.imm, named_models(params.imm.models)
-        c['dwell'] = source.dwell
-    for model, code in zip(c['models'][0], models):
-        model['kind'] = code
-        for name, value in vars(getattr(source, MODELS[code])).items():
-            model[name] = value
-        if c['alpha'] > 0.0:
-            model['noise'] = 0.0
-    c['count'], c['bank'] = len(models), sum(1 << code for code in models)
+    """Constants (1,) of FilterParameters."""
+    c, bank = np.zeros(1, CONSTANTS), KINDS[params.kind].bank(params)
+    c['count'] = len(bank.models)
+    c['models'][0, :len(bank.models)] = bank.models
+    c['bank'], c['states'] = np.sum(1 << bank.models['kind']), bank.models['states'].max()
+    c['dwell'], (c['alpha'], c['beta'], c['gamma']) = bank.dwell, bank.gains
     c['rate_measurement'] = params.rate_measurement
     return c
 
 
 @compiled
-def _store(x, p, j, estimate):
-    x[j, 0], x[j, 1], x[j, 2], p[j, 0], p[j, 1], p[j, 2], p[j, 3], p[j, 4], p[j, 5] = estimate
+def _put(x, p, j, g):
+    """Row j of x (n, 3), p (n, 6) := a Gaussian."""
+    x[j, 0], x[j, 1], x[j, 2] = g.x
+    P = g.P
+    p[j, 0], p[j, 1], p[j, 2], p[j, 3], p[j, 4], p[j, 5] = P.p11, P.p12, P.p13, P.p22, P.p23, P.p33
 
 
 @compiled
-def _fill(f, c, estimate):
-    """Give every model of the constants the same estimate and probability."""
-    f.bank, f.count = c.bank, c.count
+def _fill(f, c, g):
+    """Give every model of the constants the same Gaussian and probability."""
+    f.bank, f.count, f.states = c.bank, c.count, c.states
     for j in range(c.count):
         f.mu[j] = 1.0 / c.count
-        _store(f.x, f.p, j, estimate)
+        _put(f.x, f.p, j, g)
+
+
+@compiled
+def _open_acceleration(f, c, rate_sigma):
+    """Let the acceleration be as unknown as at the start."""
+    for j in range(c.count):
+        f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
 
 
 @compiled
 def start(f, c, y, R, rate_sigma):
     """Begin at a measured angle y [rad] of variance R, the rate unknown to rate_sigma [rad/s]."""
-    _fill(f, c, (y, 0.0, 0.0, R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0))
+    _fill(f, c, Gaussian(AxisMotion(y, 0.0, 0.0), Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
     _open_acceleration(f, c, rate_sigma)
 
 
 @compiled
-def adopt(f, c, rate_sigma):
+def transfer(f, c, rate_sigma):
     """If the bank is another than before: its models start from the combined estimate and covariance of the old.
 
-    Of an acceleration that the old one does not know they know as much as at a `start` with rate_sigma.
+    Of an acceleration that the old one does not know they know as much as at a `start` with rate_sigma [rad/s].
     """
     if f.bank != c.bank:
-        unknown = f.bank == 1 << motion_models.CV
+        unknown = f.states == 2
         _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
         if unknown:
             _open_acceleration(f, c, rate_sigma)
 
 
 @compiled
-def _open_acceleration(f, c, rate_sigma):
+def move(f, c, motion):
+    """Shift the models so that together they estimate this AxisMotion, as far as they have an acceleration; their
+    covariances stay."""
+    x = outlook(f, c, 0.0)
     for j in range(c.count):
-        f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
-
-
-@compiled
-def move(f, c, angle, rate, acceleration):
-    """Shift the models so that together they estimate this, as far as they have an acceleration; the rest stays."""
-    x1, x2, x3 = outlook(f, c, 0.0)
-    for j in range(c.count):
-        f.x[j, 0] += angle - x1
-        f.x[j, 1] += rate - x2
-        if c.models[j].kind != motion_models.CV:
-            f.x[j, 2] += acceleration - x3
+        f.x[j, 0] += motion.angle - x.angle
+        f.x[j, 1] += motion.rate - x.rate
+        if c.models[j].states > 2:
+            f.x[j, 2] += motion.acceleration - x.acceleration
 
 
 @compiled
@@ -131,84 +114,65 @@ def predict(f, c, T):
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
         f.mu_prior[j] = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
-        x1, x2, x3, p11, p12, p13, p22, p23, p33 = imm.combine(f.weights, f.x, f.p, c.count)
-        x1, x2, x3, p = _predicted(c.models[j], x1, x2, x3, p11, p12, p13, p22, p23, p33, T)
-        p11, p12, p13, p22, p23, p33 = p
-        _store(f.x_prior, f.p_prior, j, (x1, x2, x3, p11, p12, p13, p22, p23, p33))
-
-
-@compiled
-def _predicted(m, x1, x2, x3, p11, p12, p13, p22, p23, p33, T):
-    """(x1, x2, x3, P) of one model after T [s]."""
-    f13, f23, f33 = motion_models.transition(m, T)
-    q11, q12, q13, q22, q23, q33 = motion_models.process_noise(m, x3, T)
-    p = kalman.predict_covariance(p11, p12, p13, p22, p23, p33, T, f13, f23, f33, q11, q12, q13, q22, q23, q33)
-    x1, x2, x3 = motion_models.predicted(m, x1, x2, x3, T)
-    return x1, x2, x3, p
+        g = imm.combine(f.weights, f.x, f.p, c.count)
+        model = motion_models.discretised(c.models[j], g.x.acceleration, T)
+        _put(f.x_prior, f.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
+                                               kalman.predicted_covariance(g.P, model.F, model.Q, T)))
 
 
 @compiled
 def expected(f):
-    """(x1, x2, x3, p11, p12, p13, p22, p23, p33) of what `predict` left: mean and covariance of the bank."""
+    """Gaussian of what `predict` left: mean and covariance of the bank."""
     return imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
 
 
 @compiled
-def consistency(f, y, R, y_rate, R_rate):
-    """(nu, nu of the rate, nu^2 / S, and what the rate adds to nu' S^-1 nu) against what `predict` left.
-
-    The last is chi-square of one degree of freedom by itself: the rate given the angle. y_rate NaN: both its NaN.
-    """
-    x1, x2, _, p11, p12, _, p22, _, _ = expected(f)
-    nu, nu_rate, S = y - x1, y_rate - x2, p11 + R
-    more = nu_rate - p12 / S * nu
-    return nu, nu_rate, nu * nu / S, more * more / (p22 + R_rate - p12 * p12 / S)
+def variances(g):
+    """The AxisVariances of a Gaussian."""
+    return AxisVariances(g.P.p11, g.P.p12, g.P.p22)
 
 
 @compiled
-def correct(f, c, y, R, y_rate, R_rate):
-    """Take what `predict` left, corrected by a measured angle y [rad], and by the rate y_rate [rad/s] unless NaN."""
+def innovation(f, m):
+    """AxisInnovation of an AxisMeasurement against what `predict` left."""
+    x, P = expected(f)
+    nu, nu_rate, S = m.angle - x.angle, m.rate - x.rate, P.p11 + m.variance
+    # The rate given the angle.
+    more = nu_rate - P.p12 / S * nu
+    return AxisInnovation(nu, S, nu * nu / S, nu_rate, more * more / (P.p22 + m.rate_variance - P.p12 * P.p12 / S))
+
+
+@compiled
+def correct(f, c, m):
+    """Take what `predict` left, corrected by an AxisMeasurement."""
     for j in range(c.count):
         x, p = f.x_prior[j], f.p_prior[j]
-        x1, x2, x3, p11, p12, p13, p22, p23, p33 = x[0], x[1], x[2], p[0], p[1], p[2], p[3], p[4], p[5]
-        nu, S = y - x1, p11 + R
+        g = Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
+        nu, S = m.angle - g.x.angle, g.P.p11 + m.variance
         f.weights[j] = kalman.log_likelihood(nu, S)
         # Constant gains, but for a start (or after a gap) that deserves more: a growing memory until alpha is reached.
-        if p11 < c.alpha * S:
-            k1, k2, k3 = alpha_beta.gain(c.alpha, c.beta, c.gamma, f.T)
-            x1, x2, x3, p11, p12, p13, p22, p23, p33 = kalman.update_with_gain(
-                x1, x2, x3, p11, p12, p13, p22, p23, p33, nu, R, k1, k2, k3)
+        if g.P.p11 < c.alpha * S:
+            g = kalman.update_with_gain(g, nu, m.variance, alpha_beta.gain(c.alpha, c.beta, c.gamma, f.T))
         else:
-            x1, x2, x3, p11, p12, p13, p22, p23, p33 = kalman.update(
-                x1, x2, x3, p11, p12, p13, p22, p23, p33, nu, R)
-        if not math.isnan(y_rate):
-            nu = y_rate - x2
-            f.weights[j] += kalman.log_likelihood(nu, p22 + R_rate)
-            x1, x2, x3, p11, p12, p13, p22, p23, p33 = kalman.update_rate(
-                x1, x2, x3, p11, p12, p13, p22, p23, p33, nu, R_rate)
-        _store(f.x, f.p, j, (x1, x2, x3, p11, p12, p13, p22, p23, p33))
+            g = kalman.update(g, nu, m.variance)
+        if not math.isnan(m.rate):
+            nu = m.rate - g.x.rate
+            f.weights[j] += kalman.log_likelihood(nu, g.P.p22 + m.rate_variance)
+            g = kalman.update_rate(g, nu, m.rate_variance)
+        _put(f.x, f.p, j, g)
     imm.weigh(f.mu_prior, f.weights, c.count, f.mu)
 
 
 @compiled
 def outlook(f, c, T):
-    """(angle, rate, acceleration) T [s] >= 0 after the estimate: what a measurement then is compared with."""
+    """AxisMotion T [s] >= 0 after the last measurement: what a measurement then is compared with."""
     predict(f, c, T)
-    x1, x2, x3, _, _, _, _, _, _ = expected(f)
-    return x1, x2, x3
-
-
-@compiled
-def variances(f, c, T):
-    """(p11, p12, p22) of the same: variances of angle and rate, p12 between them."""
-    predict(f, c, T)
-    _, _, _, p11, p12, _, p22, _, _ = expected(f)
-    return p11, p12, p22
+    return expected(f).x
 
 
 @compiled
 def probabilities(f, c, mu):
-    """mu (4,) = probability of each of MODELS, NaN where it is not in the bank."""
+    """mu (BANK,) = probability of each of MODELS, NaN where it is not in the bank."""
     mu[:] = math.nan
     for j in range(c.count):
         mu[c.models[j].kind] = f.mu[j]
@@ -222,26 +186,28 @@ def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
     or one whose stamp does not advance, is not taken: its row is the outlook from the last one taken.
     """
     state = np.zeros(1, FILTER)
-    f, m = state[0], c[0]
+    f, model = state[0], c[0]
     f.mu[:] = last = math.nan
-    f.count = m.count
+    f.count = model.count
     for k in range(len(t)):
         o = out[k]
         o.innovation = o.rate_innovation = o.nis = math.nan
         T = t[k] - last
         measured = math.isfinite(y[k])
         if measured and math.isnan(last):
-            start(f, m, y[k], R[k], initial_rate)
+            start(f, model, y[k], R[k], initial_rate)
             last = t[k]
         elif measured and T > 0.0:
-            rate = y_rate[k] if m.rate_measurement else math.nan
-            predict(f, m, T)
-            o.innovation, o.rate_innovation, o.nis, more = consistency(f, y[k], R[k], rate, R_rate[k])
-            if not math.isnan(more):
-                o.nis += more
-            correct(f, m, y[k], R[k], rate, R_rate[k])
+            m = AxisMeasurement(y[k], R[k], y_rate[k] if model.rate_measurement else math.nan, R_rate[k])
+            predict(f, model, T)
+            i = innovation(f, m)
+            o.innovation, o.rate_innovation, o.nis = i.nu, i.rate, i.chi_square
+            if not math.isnan(i.rate_chi_square):
+                o.nis += i.rate_chi_square
+            correct(f, model, m)
             last = t[k]
-        T = max(t[k] - last, 0.0)
-        predict(f, m, T)
-        o.angle, o.rate, o.acceleration, o.variance, o.covariance, _, o.rate_variance, _, _ = expected(f)
-        probabilities(f, m, o.mu)
+        predict(f, model, max(t[k] - last, 0.0))
+        g = expected(f)
+        o.angle, o.rate, o.acceleration = g.x
+        o.variance, o.covariance, o.rate_variance = variances(g)
+        probabilities(f, model, o.mu)

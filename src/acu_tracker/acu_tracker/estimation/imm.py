@@ -6,6 +6,8 @@ weighed by logarithms of likelihoods, so that a measurement far from all models 
 """
 import math
 
+from acu_tracker.estimation.kalman import Gaussian, Symmetric
+from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 
 
@@ -42,7 +44,7 @@ def mix(mu, count, stay, switch, j, weights):
 
 @compiled
 def combine(weights, x, p, count):
-    """(x1, x2, x3, p11, p12, p13, p22, p23, p33): mean and covariance of the weighted models (eq. 10, 11)."""
+    """Gaussian with mean and covariance of the weighted models (eq. 10, 11); x (n, 3), p (n, 6) as in Symmetric."""
     x1 = x2 = x3 = 0.0
     for i in range(count):
         x1 += weights[i] * x[i, 0]
@@ -57,7 +59,7 @@ def combine(weights, x, p, count):
         p22 += w * (p[i, 3] + d2 * d2)
         p23 += w * (p[i, 4] + d2 * d3)
         p33 += w * (p[i, 5] + d3 * d3)
-    return x1, x2, x3, p11, p12, p13, p22, p23, p33
+    return Gaussian(AxisMotion(x1, x2, x3), Symmetric(p11, p12, p13, p22, p23, p33))
 
 
 @compiled

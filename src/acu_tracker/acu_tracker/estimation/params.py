@@ -1,37 +1,37 @@
-"""Parameters of the filter of one axis."""
+"""Parameters of the target filter: of the kind of each axis, of the Cartesian one, of gate and lock."""
 import dataclasses
 import math
 
-from acu_tracker.estimation.axis_filter import KINDS, named_models
-from pedestal_common.parameters import Parameters, choice, flag, group, parameter, text
+from acu_tracker.estimation.kinds import KINDS, named_models
+from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 _DEG = math.pi / 180.0
 _ALPHA = '1/s', 'manoeuvre frequency: one over the time an acceleration lasts'
 
 
 @dataclasses.dataclass(frozen=True)
-class AlphaBeta(Parameters):
+class AlphaBetaParameters(Parameters):
     """alpha_beta and alpha_beta_gamma: alpha sets the other gains (Benedict-Bordner; Kalata)."""
 
     alpha: float = parameter(0.15, 1e-3, 0.999, '', 'share of an innovation that the angle takes')
 
 
 @dataclasses.dataclass(frozen=True)
-class Cv(Parameters):
+class CvParameters(Parameters):
     """Constant rate."""
 
     noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s2/sqrt(Hz)', 'of the white acceleration')
 
 
 @dataclasses.dataclass(frozen=True)
-class Ca(Parameters):
+class CaParameters(Parameters):
     """Constant acceleration."""
 
     noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s3/sqrt(Hz)', 'of the white jerk')
 
 
 @dataclasses.dataclass(frozen=True)
-class Singer(Parameters):
+class SingerParameters(Parameters):
     """Acceleration of mean zero that lasts a while."""
 
     alpha: float = parameter(0.5, 1e-4, 100.0, *_ALPHA)
@@ -39,8 +39,8 @@ class Singer(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
-class CurrentStatistical(Parameters):
-    """The same about the acceleration that is estimated now (paper 000)."""
+class CurrentStatisticalParameters(Parameters):
+    """An acceleration that lasts a while, about the one that is estimated now (paper 000)."""
 
     alpha: float = parameter(0.1, 1e-4, 100.0, *_ALPHA)
     a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
@@ -48,38 +48,39 @@ class CurrentStatistical(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
-class Imm(Parameters):
+class ImmParameters(Parameters):
     """Several models at once, each with parameters of its own here."""
 
     models: str = text('cv ca current_statistical', 'two or more of cv, ca, singer, current_statistical')
     dwell: float = parameter(5.0, 1e-3, 1e6, 's', 'mean time that one model holds')
-    cv: Cv = group(Cv, noise=0.003 * _DEG)
-    ca: Ca = group(Ca)
-    singer: Singer = group(Singer)
-    current_statistical: CurrentStatistical = group(CurrentStatistical, alpha=2.0, a_max=15.0 * _DEG)
+    cv: CvParameters = group(CvParameters, noise=0.003 * _DEG)
+    ca: CaParameters = group(CaParameters)
+    singer: SingerParameters = group(SingerParameters)
+    current_statistical: CurrentStatisticalParameters = group(CurrentStatisticalParameters, alpha=2.0,
+                                                              a_max=15.0 * _DEG)
 
     def check(self):
         named_models(self.models)
 
 
 @dataclasses.dataclass(frozen=True)
-class Filter(Parameters):
+class FilterParameters(Parameters):
     """Filter of an axis: its kind, and for every kind its parameters; all may be changed while it runs."""
 
     kind: str = choice('current_statistical', KINDS, 'of the filter; may be changed while it runs')
     rate_measurement: bool = flag(False, 'use the measured rate of the target, where there is one (paper 004); '
                                   'imm_ukf does while it has no range')
-    alpha_beta: AlphaBeta = group(AlphaBeta)
-    alpha_beta_gamma: AlphaBeta = group(AlphaBeta)
-    cv: Cv = group(Cv)
-    ca: Ca = group(Ca)
-    singer: Singer = group(Singer)
-    current_statistical: CurrentStatistical = group(CurrentStatistical)
-    imm: Imm = group(Imm)
+    alpha_beta: AlphaBetaParameters = group(AlphaBetaParameters)
+    alpha_beta_gamma: AlphaBetaParameters = group(AlphaBetaParameters)
+    cv: CvParameters = group(CvParameters)
+    ca: CaParameters = group(CaParameters)
+    singer: SingerParameters = group(SingerParameters)
+    current_statistical: CurrentStatisticalParameters = group(CurrentStatisticalParameters)
+    imm: ImmParameters = group(ImmParameters)
 
 
 @dataclasses.dataclass(frozen=True)
-class Ukf(Parameters):
+class UkfParameters(Parameters):
     """Cartesian CV and CA of filter kind imm_ukf, where the receiver measures the range."""
 
     cv_noise: float = parameter(0.1, 1e-6, 1e4, 'm/s2/sqrt(Hz)', 'white acceleration of a target that flies straight')
@@ -89,3 +90,40 @@ class Ukf(Parameters):
     initial_acceleration: float = parameter(5.0, 1e-6, 1e4, 'm/s2', 'of the acceleration at the start')
     range_share: float = parameter(0.1, 1e-6, 1.0, '', 'standard deviation of the range over the range above which '
                                    'the filter of the angles takes over')
+
+
+@dataclasses.dataclass(frozen=True)
+class ReceiverModelParameters(Parameters):
+    """The receiver's thermal noise as the control unit knows it: sigma = theta3 / (k_m sqrt(2 C/N0 tau))."""
+
+    beamwidth: float = parameter(0.0175, 1e-5, 1.0, 'rad', '3 dB beamwidth theta3 of the sum pattern')
+    slope: float = parameter(1.6, 0.1, 10.0, '', 'monopulse slope k_m: difference over sum per beamwidth')
+    integration: float = parameter(0.005, 1e-6, 10.0, 's', 'integration time tau of one error')
+    sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not fall with C/N0 (encoder, phase)')
+    age: float = parameter(0.0, 0.0, 0.5, 's', 'an error is the one of this long before its stamp: of a beam that '
+                           'stands, the middle of the samples it is the mean of')
+    beam_age: float = parameter(0.0, 0.0, 0.5, 's', 'the encoders that belong to it are those of this long before: of '
+                                'a beam that stands, the mean of those in the samples')
+
+
+@dataclasses.dataclass(frozen=True)
+class TrackerParameters(Parameters):
+    """The target filter and what it takes for a lock."""
+
+    gate: float = parameter(25.0, 1.0, 1e6, '', "largest nu' S^-1 nu of the two angles that is believed; of a rate or "
+                            'a range the one as rarely exceeded')
+    gate_restart: int = parameter(20, 1, 100000, '', 'errors refused in a row before the filter restarts on them')
+    restart_gap: float = parameter(1.0, 1e-3, 1000.0, 's', 'gap between errors after which the filter restarts')
+    initial_rate: float = parameter(0.1, 1e-6, 100.0, 'rad/s', 'standard deviation of the rate at the start')
+    lock_count: int = parameter(100, 1, 100000, '', 'errors believed in a row before program hands over, and rates '
+                                'that agree with them in a row before they are used')
+    coast_after: float = parameter(0.1, 1e-3, 100.0, 's', 'time without an error after which autotrack coasts')
+    coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack is left')
+    handover: bool = flag(True, 'program hands over to autotrack by itself once locked')
+    receiver: ReceiverModelParameters = group(ReceiverModelParameters)
+    ukf: UkfParameters = group(UkfParameters)
+
+    def check(self):
+        if self.coast_time < self.coast_after:
+            raise ParameterError(f'coast_time = {self.coast_time:g} s: must be at least coast_after = '
+                                 f'{self.coast_after:g} s')

@@ -1,35 +1,31 @@
-"""The target filter: an axis_filter for each axis, for kind imm_ukf a Cartesian one of both; one gate, coasting, lock.
+"""The target tracker: a target filter behind one gate; lock, restarts, and a coast where no measurement comes.
 
-Between believed errors the state stays at the stamp of the last one; everybody who needs it later predicts.
-The Cartesian filter begins on the first range, where the axes' filters are, and is used once it knows the rates twice
-as well. They run on beside it, and go on where it was once it does not know the range any more. Measured rates are
-theirs alone.
+Between accepted measurements the filter stays at the stamp of the last one; everybody who needs it later predicts.
 """
 import math
 
 import numpy as np
 
-from acu_tracker.estimation import axis_filter, unscented
-from acu_tracker.estimation.motion_models import CA, CV
+from acu_tracker.estimation import target_filter
+from acu_tracker.estimation.measurement import (
+    NO_INNOVATION,
+    Measurement,
+    with_azimuth_near,
+    with_rate,
+)
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import wrap
 
-CONSTANTS = np.dtype([('azimuth', axis_filter.CONSTANTS), ('elevation', axis_filter.CONSTANTS),
-                      ('gates', 'f8', (2,)), ('cartesian', unscented.CONSTANTS), ('range_share_2', 'f8'),
-                      ('wanted', 'i8', (2,))], align=True)
-"""gates: largest nu' S^-1 nu that is believed, of the two angles, of one rate or range; range_share_2: square of
-ukf.range_share; wanted: 1 for azimuth, elevation of kind imm_ukf."""
+CONSTANTS = np.dtype([('filter', target_filter.CONSTANTS), ('gates', 'f8', (2,))], align=True)
+"""gates: largest nu' S^-1 nu that is accepted, of the two angles, of one rate or range."""
 
-TRACKER = np.dtype([('azimuth', axis_filter.FILTER), ('elevation', axis_filter.FILTER), ('stamp', 'f8'),
-                    ('running', 'i8'), ('in_a_row', 'i8'), ('refused', 'i8'), ('gated', 'i8'), ('converged', 'i8'),
-                    ('rates_in_a_row', 'i8', (2,)), ('rates_gated', 'i8'), ('ranges_gated', 'i8'),
-                    ('cartesian', unscented.STATE), ('ranged', 'i8'), ('used', 'i8', (2,)), ('S', 'f8', (2,))],
-                   align=True)
-"""in_a_row: errors believed, refused: errors gated since the other happened; gated: in all; rates_in_a_row: rates of
-an axis that agreed with its angles; rates_gated, ranges_gated: those that did not; ranged: 1 while the Cartesian
-filter runs; used: 1 for an axis that takes its estimate; S: variances of the last innovations."""
+TRACKER = np.dtype([('filter', target_filter.FILTER), ('stamp', 'f8'), ('running', 'i8'), ('converged', 'i8'),
+                    ('accepted_in_a_row', 'i8'), ('gated_in_a_row', 'i8'), ('rates_in_a_row', 'i8', (2,)),
+                    ('gated', 'i8'), ('rates_gated', 'i8'), ('ranges_gated', 'i8')], align=True)
+"""stamp: of the last accepted measurement [s]; accepted_in_a_row, gated_in_a_row: measurements since the other
+happened; rates_in_a_row: rates of an axis that agreed with its angles; gated, rates_gated, ranges_gated: in all."""
 
-STARTED, BELIEVED, GATED, STALE = range(4)
+STARTED, ACCEPTED, GATED, STALE = range(4)
+"""What `observe` makes of a measurement."""
 
 
 def gate_of_one(gate):
@@ -49,85 +45,31 @@ def gate_of_one(gate):
     return high
 
 
-def constants(params, azimuth, elevation) -> np.ndarray:
-    """Constants (1,) of a TrackerParameters and the Filter parameters of both axes."""
+def constants(params, axes) -> np.ndarray:
+    """Constants (1,) of TrackerParameters and the FilterParameters of both axes."""
     c = np.zeros(1, CONSTANTS)
-    c['azimuth'], c['elevation'] = axis_filter.constants(azimuth), axis_filter.constants(elevation)
+    c['filter'] = target_filter.constants(params.ukf, axes)
     c['gates'] = params.gate, gate_of_one(params.gate)
-    c['cartesian'], c['range_share_2'] = unscented.constants(params.ukf), params.ukf.range_share**2
-    c['wanted'] = azimuth.kind == 'imm_ukf', elevation.kind == 'imm_ukf'
     return c
 
 
 @compiled
-def error_variance(cross_elevation, elevation, cn0_dbhz, theta3, k_m, tau, floor):
-    """Variance [rad2] of one receiver error: thermal noise, growing off the axis of the beam, and a floor."""
-    slope = k_m / theta3
-    off = slope * math.hypot(cross_elevation, elevation)
-    return (1.0 + off * off) / (slope * slope * 2.0 * 10.0**(0.1 * cn0_dbhz) * tau) + floor * floor
+def transfer(t, p, c):
+    """The constants may have changed: a filter of another kind goes on from the estimate of the one before.
+
+    p: record of TrackerParameters, here and below.
+    """
+    target_filter.transfer(t.filter, c.filter, p.initial_rate, t.running)
 
 
 @compiled
-def adopt(t, p, c):
-    """The constants may have changed: a filter of another kind goes on from the estimate of the one before."""
-    if t.running:
-        axis_filter.adopt(t.azimuth, c.azimuth, p.initial_rate)
-        axis_filter.adopt(t.elevation, c.elevation, p.initial_rate)
-    hand_back(t, c, t.used[0] and not c.wanted[0], t.used[1] and not c.wanted[1])
-    if not (c.wanted[0] or c.wanted[1]):
-        t.ranged = 0
+def move(t, c, motion):
+    """The angles are counted in another frame, where the target has this Motion now."""
+    target_filter.move(t.filter, c.filter, motion)
 
 
 @compiled
-def hand_back(t, c, azimuth, elevation):
-    """The filters of these axes (1: of this one) go on where the Cartesian one is, which they use no more; one that is
-    nowhere any more (NaN) leaves them where they are."""
-    if not (azimuth or elevation):
-        return
-    A, dA, ddA, E, dE, ddE = outlook(t, c, t.stamp)
-    if azimuth:
-        if math.isfinite(A + dA + ddA):
-            axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
-        t.used[0] = 0
-    if elevation:
-        if math.isfinite(E + dE + ddE):
-            axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
-        t.used[1] = 0
-
-
-@compiled
-def turn(t, c, A, dA, ddA, E, dE, ddE):
-    """The angles are counted in another frame, where the target is at these now; the covariance stays. The Cartesian
-    filter, which lives in the old one, ends."""
-    t.ranged = t.used[0] = t.used[1] = 0
-    axis_filter.move(t.azimuth, c.azimuth, A, dA, ddA)
-    axis_filter.move(t.elevation, c.elevation, E, dE, ddE)
-
-
-@compiled
-def begin_cartesian(t, c, range_, R_range):
-    """The Cartesian filter starts where the filters of the axes are, at a first range [m]."""
-    predict(t, c, t.stamp)
-    A, dA, ddA, E, dE, ddE = expected(t)
-    a11, a12, a22, e11, e12, e22 = expected_variances(t)
-    unscented.start(t.cartesian, c.cartesian, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, range_, R_range)
-    t.ranged = 1
-
-
-@compiled
-def use_cartesian(t, c):
-    """Use the Cartesian estimate for an axis that wants it, from when on it knows the rate twice as well."""
-    if (t.used[0] or not c.wanted[0]) and (t.used[1] or not c.wanted[1]):
-        return
-    _, _, a22, _, _, e22, _ = unscented.variances(t.cartesian, c.cartesian, 0.0)
-    if c.wanted[0] and a22 <= 0.25 * axis_filter.variances(t.azimuth, c.azimuth, 0.0)[2]:
-        t.used[0] = 1
-    if c.wanted[1] and e22 <= 0.25 * axis_filter.variances(t.elevation, c.elevation, 0.0)[2]:
-        t.used[1] = 1
-
-
-@compiled
-def believed_rate(t, p, c, i, rate, chi_square):
+def _accepted_rate(t, p, c, i, rate, chi_square):
     """A rate measured on axis i as it is to be taken, else NaN; chi_square: of it, given the angle and all before.
 
     A rate can only be told to be wrong by what the angles alone have made of it, so it is taken once lock_count in a
@@ -144,157 +86,87 @@ def believed_rate(t, p, c, i, rate, chi_square):
 
 
 @compiled
-def observe(t, p, c, stamp, azimuth, elevation, R_azimuth, R_elevation, azimuth_rate, elevation_rate, R_azimuth_rate,
-            R_elevation_rate, range_, R_range, restart_gap):
-    """Take one measured direction, its rates and the range (NaN: none), with their variances; p the TrackerParameters;
-    the filter restarts after restart_gap [s] without one.
+def _with_accepted_rates(t, p, c, m, innovation):
+    """The Measurement with the rates that are accepted by themselves."""
+    (a, e), (i_a, i_e) = m.axis, innovation.axis
+    a = with_rate(a, _accepted_rate(t, p, c, 0, a.rate, i_a.rate_chi_square))
+    e = with_rate(e, _accepted_rate(t, p, c, 1, e.rate, i_e.rate_chi_square))
+    return Measurement(m.stamp, (a, e), m.range, m.range_variance)
 
-    The direction is believed or gated, and then each of the others by itself.
 
-    (what became of it, nu azimuth, nu elevation, nu of their rates, nu' S^-1 nu azimuth, elevation); NaN unless
-    there was a prediction to compare with.
+@compiled
+def observe(t, p, c, m, restart_gap):
+    """Take a Measurement: (STARTED, ACCEPTED, GATED or STALE; its Innovation, NaN unless there was a prediction).
+
+    The direction is accepted or gated, and then each of range and rates by itself. The filter restarts after
+    gate_restart gated ones in a row, and after restart_gap [s] without any.
     """
-    T = stamp - t.stamp
-    none = math.nan
+    T = m.stamp - t.stamp
     if t.running and T <= 0.0:
-        return STALE, none, none, none, none, none, none
-    a, e, x = t.azimuth, t.elevation, t.cartesian
-    azimuth_rate = azimuth_rate if c.azimuth.rate_measurement else none
-    elevation_rate = elevation_rate if c.elevation.rate_measurement else none
-    range_ = range_ if range_ > 0.0 and R_range > 0.0 else none
-    nu_a = nu_e = nu_da = nu_de = nis_a = nis_e = none
-    outcome = STARTED
+        return STALE, NO_INNOVATION
+    f, k = t.filter, c.filter
+    m = target_filter.usable(k, m)
+    outcome, innovation = STARTED, NO_INNOVATION
     if t.running and T <= restart_gap:
-        axis_filter.predict(a, c.azimuth, T)
-        axis_filter.predict(e, c.elevation, T)
-        near = axis_filter.expected(a)[0]
-        azimuth = near + wrap(azimuth - near)
-        nu_a, nu_da, nis_a, more_a = axis_filter.consistency(a, azimuth, R_azimuth, azimuth_rate, R_azimuth_rate)
-        nu_e, nu_de, nis_e, more_e = axis_filter.consistency(e, elevation, R_elevation, elevation_rate,
-                                                             R_elevation_rate)
-        t.S[0], t.S[1] = axis_filter.expected(a)[3] + R_azimuth, axis_filter.expected(e)[3] + R_elevation
-        if t.ranged:
-            unscented.predict(x, c.cartesian, T)
-            n_a, S_a, n_e, S_e, n_r, S_r = unscented.innovation(x, azimuth, elevation, range_, R_azimuth, R_elevation,
-                                                                R_range)
-            if n_r * n_r > c.gates[1] * S_r:
-                t.ranges_gated += 1
-                range_ = none
-            if t.used[0]:
-                nu_a, nu_da, nis_a, t.S[0] = n_a, none, n_a * n_a / S_a, S_a
-            if t.used[1]:
-                nu_e, nu_de, nis_e, t.S[1] = n_e, none, n_e * n_e / S_e, S_e
-        direction = nis_a + nis_e
-        if nu_da == nu_da:
-            nis_a += more_a
-        if nu_de == nu_de:
-            nis_e += more_e
-        if direction <= c.gates[0]:
-            azimuth_rate = believed_rate(t, p, c, 0, azimuth_rate, more_a)
-            elevation_rate = believed_rate(t, p, c, 1, elevation_rate, more_e)
-            axis_filter.correct(a, c.azimuth, azimuth, R_azimuth, azimuth_rate, R_azimuth_rate)
-            axis_filter.correct(e, c.elevation, elevation, R_elevation, elevation_rate, R_elevation_rate)
-            if t.ranged:
-                unscented.correct(x, azimuth, elevation, range_)
-            outcome = BELIEVED
+        target_filter.predict(f, k, T)
+        m = with_azimuth_near(m, target_filter.axes_azimuth(f))
+        innovation = target_filter.innovation(f, m)
+        if innovation.range_nu * innovation.range_nu > c.gates[1] * innovation.range_S:
+            t.ranges_gated += 1
+            m = Measurement(m.stamp, m.axis, math.nan, m.range_variance)
+        if innovation.axis[0].chi_square + innovation.axis[1].chi_square <= c.gates[0]:
+            m = _with_accepted_rates(t, p, c, m, innovation)
+            target_filter.correct(f, k, m)
+            outcome = ACCEPTED
         else:
             t.gated += 1
-            if t.refused + 1 < p.gate_restart:
-                t.refused += 1
-                t.in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
-                return GATED, nu_a, nu_e, nu_da, nu_de, nis_a, nis_e
+            if t.gated_in_a_row + 1 < p.gate_restart:
+                t.gated_in_a_row += 1
+                t.accepted_in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
+                return GATED, innovation
     if outcome == STARTED:
-        near = outlook(t, c, t.stamp)[0] if t.running else azimuth
-        near = near if math.isfinite(near) else azimuth
-        axis_filter.start(a, c.azimuth, near + wrap(azimuth - near), R_azimuth, p.initial_rate)
-        axis_filter.start(e, c.elevation, elevation, R_elevation, p.initial_rate)
-        t.in_a_row = t.ranged = t.used[0] = t.used[1] = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
-    t.running, t.stamp, t.refused = 1, stamp, 0
-    if t.ranged:
-        if unscented.range_known(x, c.range_share_2):
-            use_cartesian(t, c)
-        else:
-            hand_back(t, c, t.used[0], t.used[1])
-            t.ranged = 0
-    elif (c.wanted[0] or c.wanted[1]) and R_range <= c.range_share_2 * range_ * range_:
-        begin_cartesian(t, c, range_, R_range)
-    t.in_a_row = 1 if T > p.coast_after else t.in_a_row + 1
-    # Converged: the rates across the line of sight are known four times as well as at the start. (The angle is no sign
-    # of it: a lively filter never knows that much better than its measurement.) R_azimuth grows as 1/cos2 does.
-    _, _, a22, _, _, e22 = variances(t, c, stamp)
-    known = (0.25 * p.initial_rate)**2
-    t.converged = a22 * R_elevation < known * R_azimuth and e22 < known
-    return outcome, nu_a, nu_e, nu_da, nu_de, nis_a, nis_e
+        near = outlook(t, c, t.stamp).azimuth.angle if t.running else math.nan
+        target_filter.start(f, k, with_azimuth_near(m, near if math.isfinite(near) else m.axis[0].angle),
+                            p.initial_rate)
+        t.accepted_in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
+    t.running, t.stamp, t.gated_in_a_row = 1, m.stamp, 0
+    target_filter.select(f, k, m)
+    t.accepted_in_a_row = 1 if T > p.coast_after else t.accepted_in_a_row + 1
+    t.converged = _converged(f, k, m, p.initial_rate)
+    return outcome, innovation
 
 
 @compiled
-def locked(t, p, overdue):
-    """Enough errors believed in a row, converged, and the next one not overdue by more than coast_after [s]."""
-    return t.running and t.in_a_row >= p.lock_count and t.converged and overdue <= p.coast_after
+def _converged(f, k, m, initial_rate):
+    """Whether the rates across the line of sight are known four times as well as at the start.
+
+    The angle is no sign of it: a lively filter never knows that much better than its measurement. Its azimuth's
+    variance grows as 1/cos2 of the elevation does.
+    """
+    target_filter.predict(f, k, 0.0)
+    azimuth, elevation = target_filter.read(f).variances
+    known = (0.25 * initial_rate)**2
+    return azimuth.p22 * m.axis[1].variance < known * m.axis[0].variance and elevation.p22 < known
 
 
 @compiled
-def predict(t, c, stamp):
-    """Both axes and the Cartesian filter, where it is used, at a stamp; before the last error they stay at that."""
-    T = max(stamp - t.stamp, 0.0)
-    axis_filter.predict(t.azimuth, c.azimuth, T)
-    axis_filter.predict(t.elevation, c.elevation, T)
-    if t.used[0] or t.used[1]:
-        unscented.predict(t.cartesian, c.cartesian, T)
+def locked(t, p, since_accepted):
+    """Enough measurements accepted in a row, converged, and the last one not longer ago than coast_after.
 
-
-@compiled
-def expected(t):
-    """Angle, rate, acceleration of azimuth and elevation of what `predict` left."""
-    A, dA, ddA, _, _, _, _, _, _ = axis_filter.expected(t.azimuth)
-    E, dE, ddE, _, _, _, _, _, _ = axis_filter.expected(t.elevation)
-    if t.used[0] or t.used[1]:
-        B, dB, ddB, F, dF, ddF = unscented.expected_angles(t.cartesian)
-        if t.used[0]:
-            A, dA, ddA = A + wrap(B - A), dB, ddB
-        if t.used[1]:
-            E, dE, ddE = F, dF, ddF
-    return A, dA, ddA, E, dE, ddE
-
-
-@compiled
-def expected_variances(t):
-    """(p11, p12, p22) of azimuth, then of elevation, of what `predict` left."""
-    _, _, _, a11, a12, _, a22, _, _ = axis_filter.expected(t.azimuth)
-    _, _, _, e11, e12, _, e22, _, _ = axis_filter.expected(t.elevation)
-    if t.used[0] or t.used[1]:
-        b11, b12, b22, f11, f12, f22, _ = unscented.expected_variances(t.cartesian)
-        if t.used[0]:
-            a11, a12, a22 = b11, b12, b22
-        if t.used[1]:
-            e11, e12, e22 = f11, f12, f22
-    return a11, a12, a22, e11, e12, e22
+    since_accepted: time since then, beyond the receiver's latency [s].
+    """
+    return t.running and t.accepted_in_a_row >= p.lock_count and t.converged and since_accepted <= p.coast_after
 
 
 @compiled
 def outlook(t, c, stamp):
-    """Angle, rate, acceleration of azimuth and elevation at a stamp: what an error of then is compared with."""
-    predict(t, c, stamp)
-    return expected(t)
+    """Motion at a stamp [s]: what an error of then is compared with; before the last one that of the last one."""
+    target_filter.predict(t.filter, c.filter, max(stamp - t.stamp, 0.0))
+    return target_filter.expected(t.filter)
 
 
 @compiled
-def variances(t, c, stamp):
-    """(p11, p12, p22) of azimuth, then of elevation, at a stamp."""
-    predict(t, c, stamp)
-    return expected_variances(t)
-
-
-@compiled
-def read(t, c, stamp, o):
-    """What is known of the target at a stamp, into o.estimate, .covariance, .probability (2, ...)."""
-    x, p = o.estimate, o.covariance
-    predict(t, c, stamp)
-    x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = expected(t)
-    p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2] = expected_variances(t)
-    axis_filter.probabilities(t.azimuth, c.azimuth, o.probability[0])
-    axis_filter.probabilities(t.elevation, c.elevation, o.probability[1])
-    for i in range(2):
-        if t.used[i]:
-            o.probability[i, :] = math.nan
-            o.probability[i, CV], o.probability[i, CA] = t.cartesian.mu[0], t.cartesian.mu[1]
+def read(t, c, stamp):
+    """Estimate at a stamp [s], as `outlook`."""
+    target_filter.predict(t.filter, c.filter, max(stamp - t.stamp, 0.0))
+    return target_filter.read(t.filter)

@@ -1,4 +1,4 @@
-"""IMM of two unscented filters of the target's position: Cartesian CV and CA; azimuth, elevation and range measured.
+"""The Cartesian target filter: an IMM of two unscented filters, CV and CA; azimuth, elevation and range measured.
 
 X = (east north up, velocity, acceleration) [m, m/s, m/s2] of each mode, relative to the antenna; CV keeps its
 acceleration at zero. Without a range the two angles are taken alone, and the range grows uncertain.
@@ -15,7 +15,9 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import imm, motion_models
-from acu_tracker.geometry import deck_reference
+from acu_tracker.estimation.measurement import AxisInnovation, AxisVariances, Innovation
+from acu_tracker.geometry.motion import line_of_sight, motion_of_position
+from acu_tracker.geometry.vector import Vector, dot, times
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.line_of_sight import earth_angles, wrap
 
@@ -31,12 +33,12 @@ MIDDLE = 1.0 - 6.0 * WEIGHT + 1.0 - ALPHA**2 + BETA
 
 STATE = np.dtype([
     ('x', 'f8', (2, N)), ('p', 'f8', (2, N, N)), ('mu', 'f8', (2,)),
-    ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('c', 'f8', (2,)),
+    ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('mu_prior', 'f8', (2,)),
     ('z', 'f8', (2, 3)), ('s', 'f8', (2, 3, 3)), ('g', 'f8', (2, N, 3)), ('points', 'f8', (2, 3, 3)),
     ('weights', 'f8', (2,)), ('mean', 'f8', (N,)), ('covariance', 'f8', (N, N))], align=True)
-"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, c: the
-same, predicted to the next one; z, s: what `innovation` expects to be measured, its covariance; g: that with X. The
-rest is room to work in.
+"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, mu_prior:
+these as `predict` left them; z, s: what `innovation` expects to be measured, and its covariance; g: its covariance
+with X. points, weights, mean, covariance: scratch.
 """
 
 CONSTANTS = np.dtype([('models', motion_models.MODEL, (2,)), ('dwell', 'f8'), ('initial_speed', 'f8'),
@@ -44,7 +46,7 @@ CONSTANTS = np.dtype([('models', motion_models.MODEL, (2,)), ('dwell', 'f8'), ('
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of a filter_params.Ukf."""
+    """Constants (1,) of UkfParameters."""
     c = np.zeros(1, CONSTANTS)
     c['models']['kind'] = MODES
     c['models']['noise'] = params.cv_noise, params.ca_noise
@@ -54,12 +56,13 @@ def constants(params) -> np.ndarray:
 
 
 @compiled
-def _spread(p, along, onward, s11, s12, s22):
-    """Add to p what is not known of one coordinate and its rate: variances s11, s22, covariance s12.
+def _spread(p, along, onward, variances):
+    """Add to p what is not known of one coordinate and its rate, their AxisVariances.
 
     A unit of it moves the position by along (3,) and the velocity by onward (3,), a unit of its rate the velocity by
     along.
     """
+    s11, s12, s22 = variances
     for i in range(3):
         for j in range(3):
             p[i, j] += s11 * along[i] * along[j]
@@ -70,28 +73,32 @@ def _spread(p, along, onward, s11, s12, s22):
 
 
 @compiled
-def start(s, c, A, dA, ddA, E, dE, ddE, a11, a12, a22, e11, e12, e22, r, R_range):
-    """Begin where angles, rates, their variances (as `variances` gives them) and a first range r lead.
+def start(s, c, estimate, r, R_range):
+    """Begin at an Estimate of the angles and a first range r [m] of variance R_range.
 
-    `outlook` goes on where they were: in CA, with the acceleration of a target at a constant range; CV begins without.
-
+    `expected` goes on where that was: in CA, with the acceleration of a target at a constant range; CV begins without.
     The radial speed is 0 to within c.initial_speed, the acceleration known to within c.initial_acceleration.
     """
-    e, n, u, de, dn, du, dde, ddn, ddu = deck_reference.moving_direction(A, dA, ddA, E, dE, ddE)
-    turn = de * de + dn * dn + du * du
+    A, dA, _ = estimate.motion.azimuth
+    E, dE, _ = estimate.motion.elevation
+    sight = line_of_sight(estimate.motion)
+    u, du, ddu = sight
+    # The centripetal share that keeps the range constant.
+    k = dot(du, du)
     x = s.x[1]
-    x[0], x[1], x[2], x[3], x[4], x[5] = r * e, r * n, r * u, r * de, r * dn, r * du
-    x[6], x[7], x[8] = r * (dde + turn * e), r * (ddn + turn * n), r * (ddu + turn * u)
+    x[0], x[1], x[2] = times(r, u)
+    x[3], x[4], x[5] = times(r, du)
+    x[6], x[7], x[8] = r * (ddu.x + k * u.x), r * (ddu.y + k * u.y), r * (ddu.z + k * u.z)
     for i in range(N):
         s.x[0, i] = x[i] if i < 6 else 0.0
     p = s.p[0]
     p[:, :] = 0.0
     rcA, rsA, sE, cE = r * math.cos(A), r * math.sin(A), math.sin(E), math.cos(E)
-    _spread(p, (e, n, u), (de, dn, du), R_range, 0.0, c.initial_speed * c.initial_speed)
-    _spread(p, (cE * rcA, -cE * rsA, 0.0),
-            (-cE * rsA * dA - sE * rcA * dE, -cE * rcA * dA + sE * rsA * dE, 0.0), a11, a12, a22)
-    _spread(p, (-sE * rsA, -sE * rcA, r * cE),
-            (-sE * rcA * dA - cE * rsA * dE, sE * rsA * dA - cE * rcA * dE, -r * sE * dE), e11, e12, e22)
+    _spread(p, u, du, AxisVariances(R_range, 0.0, c.initial_speed * c.initial_speed))
+    _spread(p, Vector(cE * rcA, -cE * rsA, 0.0),
+            Vector(-cE * rsA * dA - sE * rcA * dE, -cE * rcA * dA + sE * rsA * dE, 0.0), estimate.variances[0])
+    _spread(p, Vector(-sE * rsA, -sE * rcA, r * cE),
+            Vector(-sE * rcA * dA - cE * rsA * dE, sE * rsA * dA - cE * rcA * dE, -r * sE * dE), estimate.variances[1])
     assign(s.p[1], p)
     for i in range(6, N):
         s.p[1, i, i] = c.initial_acceleration * c.initial_acceleration
@@ -110,9 +117,9 @@ def _mixed(x, p, w, x_out, p_out):
 
 @compiled
 def _moved(x, p, m, T):
-    """x = F x and p = F p F' + Q of a model in place; the motion is the same in the three directions."""
-    f13, f23, f33 = motion_models.transition(m, T)
-    q11, q12, q13, q22, q23, q33 = motion_models.process_noise(m, 0.0, T)
+    """x = F x and p = F p F' + Q of a model over T [s] in place; the motion is the same in the three directions."""
+    model = motion_models.discretised(m, 0.0, T)
+    (f13, f23, f33), Q = model.F, model.Q
     for i in range(3):
         x[i] += T * x[i + 3] + f13 * x[i + 6]
         x[i + 3] += f23 * x[i + 6]
@@ -129,12 +136,12 @@ def _moved(x, p, m, T):
             for a in range(0, N, 3):
                 for b in range(0, N, 3):
                     p[j + b, i + a] = p[i + a, j + b]
-        p[i, i] += q11
-        p[i + 3, i + 3] += q22
-        p[i + 6, i + 6] += q33
-        p[i, i + 3] += q12
-        p[i, i + 6] += q13
-        p[i + 3, i + 6] += q23
+        p[i, i] += Q.p11
+        p[i + 3, i + 3] += Q.p22
+        p[i + 6, i + 6] += Q.p33
+        p[i, i + 3] += Q.p12
+        p[i, i + 6] += Q.p13
+        p[i + 3, i + 6] += Q.p23
         p[i + 3, i], p[i + 6, i], p[i + 6, i + 3] = p[i, i + 3], p[i, i + 6], p[i + 3, i + 6]
 
 
@@ -143,7 +150,7 @@ def predict(s, c, T):
     """Mix the modes and predict them by T [s] into the prior fields; what was estimated stays as it is."""
     stay, switch = imm.switching(T, c.dwell, 2)
     for j in range(2):
-        s.c[j] = imm.mix(s.mu, 2, stay, switch, j, s.weights)
+        s.mu_prior[j] = imm.mix(s.mu, 2, stay, switch, j, s.weights)
         _mixed(s.x, s.p, s.weights, s.x_prior[j], s.p_prior[j])
         _moved(s.x_prior[j], s.p_prior[j], c.models[j], T)
 
@@ -197,22 +204,36 @@ def _transformed(x, p, z, s, g, d):
 
 
 @compiled
-def innovation(s, azimuth, elevation, range_, R_azimuth, R_elevation, R_range):
-    """(nu, S of azimuth, of elevation, of range) against the prediction of both modes together; variances R.
+def innovation(s, m):
+    """Innovation of a Measurement against the prediction of both modes together.
 
-    A range that is NaN was not measured; S is then that of a perfect one.
+    A range that is NaN was not measured; its variance is then that of a perfect one. Rates are not used.
     """
     for j in range(2):
         _transformed(s.x_prior[j], s.p_prior[j], s.z[j], s.s[j], s.g[j], s.points)
-        s.s[j, 0, 0] += R_azimuth
-        s.s[j, 1, 1] += R_elevation
-        if range_ == range_:
-            s.s[j, 2, 2] += R_range
-    a, e, r = wrap(s.z[1, 0] - s.z[0, 0]), s.z[1, 1] - s.z[0, 1], s.z[1, 2] - s.z[0, 2]
-    c, both = s.c[1], s.c[0] * s.c[1]
-    return (wrap(azimuth - s.z[0, 0] - c * a), s.c[0] * s.s[0, 0, 0] + c * s.s[1, 0, 0] + both * a * a,
-            elevation - s.z[0, 1] - c * e, s.c[0] * s.s[0, 1, 1] + c * s.s[1, 1, 1] + both * e * e,
-            range_ - s.z[0, 2] - c * r, s.c[0] * s.s[0, 2, 2] + c * s.s[1, 2, 2] + both * r * r)
+        s.s[j, 0, 0] += m.axis[0].variance
+        s.s[j, 1, 1] += m.axis[1].variance
+        if m.range == m.range:
+            s.s[j, 2, 2] += m.range_variance
+    range_nu, range_S = _compared(s, 2, m.range)
+    return Innovation((_axis_innovation(s, 0, m), _axis_innovation(s, 1, m)), range_nu, range_S)
+
+
+@compiled
+def _compared(s, i, y):
+    """(nu, S) of what was measured as component i (azimuth, elevation, range), of both modes with their spread."""
+    d = s.z[1, i] - s.z[0, i]
+    if i == 0:
+        d = wrap(d)
+    nu = y - s.z[0, i] - s.mu_prior[1] * d
+    S = s.mu_prior[0] * s.s[0, i, i] + s.mu_prior[1] * s.s[1, i, i] + s.mu_prior[0] * s.mu_prior[1] * d * d
+    return wrap(nu) if i == 0 else nu, S
+
+
+@compiled
+def _axis_innovation(s, i, m):
+    nu, S = _compared(s, i, m.axis[i].angle)
+    return AxisInnovation(nu, S, nu * nu / S, math.nan, math.nan)
 
 
 @compiled
@@ -249,11 +270,11 @@ def _corrected(s, j, azimuth, elevation, range_):
 
 
 @compiled
-def correct(s, azimuth, elevation, range_):
-    """Take the measurement that `innovation` was told of; range NaN: the angles alone."""
+def correct(s, m):
+    """Take the Measurement that `innovation` was told of; one whose range is NaN now: the angles alone."""
     for j in range(2):
-        s.weights[j] = _corrected(s, j, azimuth, elevation, range_)
-    imm.weigh(s.c, s.weights, 2, s.mu)
+        s.weights[j] = _corrected(s, j, m.axis[0].angle, m.axis[1].angle, m.range)
+    imm.weigh(s.mu_prior, s.weights, 2, s.mu)
 
 
 @compiled
@@ -272,44 +293,38 @@ def range_known(s, share_2):
 
 
 @compiled
-def expected_angles(s):
-    """(A, dA, ddA, E, dE, ddE) of what `predict` left, both modes together; A in (-pi, pi]."""
-    _mixed(s.x_prior, s.p_prior, s.c, s.mean, s.covariance)
-    x = s.mean
-    return deck_reference.earth_motion(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
+def probabilities(s, mu):
+    """mu (BANK,) = probability of each of motion_models.MODELS, NaN where it is not in the filter."""
+    mu[:] = math.nan
+    for j in range(len(MODES)):
+        mu[MODES[j]] = s.mu[j]
 
 
 @compiled
-def outlook(s, c, T):
-    """The same T [s] >= 0 after the last measurement. Writes the prior fields."""
-    predict(s, c, T)
-    return expected_angles(s)
+def expected(s):
+    """Motion in earth angles of what `predict` left, both modes together; the azimuth in (-pi, pi]."""
+    _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
+    x = s.mean
+    return motion_of_position(Vector(x[0], x[1], x[2]), Vector(x[3], x[4], x[5]), Vector(x[6], x[7], x[8]))
 
 
 @compiled
 def _projected(p, g, h, v):
-    """(var g, cov, var h) of two numbers linear in position and velocity: g x and h x + v dx, each (3,) a tuple."""
+    """AxisVariances of two numbers linear in position and velocity: g x and h x + v dx, each (3,) a tuple."""
     gg = gh = hh = 0.0
     for a in range(3):
         for b in range(3):
             gg += g[a] * g[b] * p[a, b]
             gh += g[a] * (h[b] * p[a, b] + v[b] * p[a, b + 3])
             hh += h[a] * h[b] * p[a, b] + 2.0 * h[a] * v[b] * p[a, b + 3] + v[a] * v[b] * p[a + 3, b + 3]
-    return gg, gh, hh
+    return AxisVariances(gg, gh, hh)
 
 
 @compiled
-def variances(s, c, T):
-    """`expected_variances` T [s] >= 0 after the last measurement. Writes the prior fields."""
-    predict(s, c, T)
-    return expected_variances(s)
-
-
-@compiled
-def expected_variances(s):
-    """Variances (angle, angle and rate, rate) of the azimuth, the same of the elevation, and of the range, of what
-    `predict` left: both modes with their spread, linearised."""
-    _mixed(s.x_prior, s.p_prior, s.c, s.mean, s.covariance)
+def variances(s):
+    """(AxisVariances of both axes, variance of the range [m2]) of what `predict` left: both modes with their spread,
+    linearised."""
+    _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
     x, p = s.mean, s.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]
     rho2 = max(e * e + n * n, 1e-12 * u * u)
@@ -322,6 +337,4 @@ def expected_variances(s):
     k = (du + u * drho / rho) / rho - 2.0 * dE
     E_rate = ((k * e - u * de / rho) / r2, (k * n - u * dn / rho) / r2, (-drho - 2.0 * u * dE) / r2)
     R = (e / math.sqrt(r2), n / math.sqrt(r2), u / math.sqrt(r2))
-    a11, a12, a22 = _projected(p, A, A_rate, A)
-    e11, e12, e22 = _projected(p, E, E_rate, E)
-    return a11, a12, a22, e11, e12, e22, _projected(p, R, R, R)[0]
+    return (_projected(p, A, A_rate, A), _projected(p, E, E_rate, E)), _projected(p, R, R, R).p11

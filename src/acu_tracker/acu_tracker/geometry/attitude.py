@@ -1,29 +1,63 @@
-"""The attitude of the deck: what the INS said, what it is at any instant near it, and how a target looks from there.
-
-`s` is the unit's STATE.
-"""
+"""The attitude of the deck: what the INS measured lately, and what it is at any instant near that."""
 import math
 
-from acu_tracker.geometry import deck_reference, estimate_frame
-from acu_tracker.history import bracket, push
-from acu_tracker.lookahead import ahead
-from pedestal_common.compiled import assign, compiled
+import numpy as np
+
+from acu_tracker.geometry.deck_reference import Attitude
+from acu_tracker.geometry.vector import vector
+from acu_tracker.history import bracket, history_type, push
+from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import ASHORE, rotation
+
+ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)),
+                     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,))], align=True)
+"""stabilised: 1 on a ship, 0 ashore, where the attitude never changes; history: quaternion (x, y, z, w) deck -> earth,
+w [rad/s], dw [rad/s2] of the last steps. mat_ed (deck -> earth), w, dw: those that `at` last found."""
+
+INVALID, REPEATED, NEW = range(3)
+"""What `take` makes of an attitude."""
 
 
 @compiled
-def take_attitude(s, p, u):
-    """Remember a new attitude with its rate and low-passed angular acceleration; False where it is unusable."""
-    q, w = u.quaternion, u.deck_rate
+def smoothed_acceleration(before, w, w_before, T, tau):
+    """Angular acceleration [rad/s2] from two rates [rad/s] T [s] apart, low-passed with tau [s]; before: the last."""
+    return before + T / (tau + T) * ((w - w_before) / T - before)
+
+
+@compiled
+def rotation_angle(w, dw, T):
+    """Angle [rad] by which a rate w [rad/s] and its derivative dw [rad/s2] turn the deck in T [s]."""
+    return T * w + 0.5 * T * T * dw
+
+
+@compiled
+def turned(q, r):
+    """Quaternion (x, y, z, w) of a deck of attitude q (4,) once it has turned by the rotation vector r [rad] (FLU):
+    q (x) exp(r/2)."""
+    qx, qy, qz, qw = q[0], q[1], q[2], q[3]
+    rx, ry, rz = r
+    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
+    k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
+    ex, ey, ez, ew = k * rx, k * ry, k * rz, math.cos(0.5 * angle)
+    return (qw * ex + qx * ew + qy * ez - qz * ey, qw * ey - qx * ez + qy * ew + qz * ex,
+            qw * ez + qx * ey - qy * ex + qz * ew, qw * ew - qx * ex - qy * ey - qz * ez)
+
+
+@compiled
+def take(s, p, t_k, stamp, q, w):
+    """Take a measured quaternion q (4,) and rate w (3,) [rad/s] into the history: INVALID, REPEATED or NEW.
+
+    INVALID: not finite, no unit quaternion, older than the last or younger than the step t_k [s].
+    """
     norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    if not (u.attitude_valid and abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
-        return False
-    h = s.attitude
+    if not (abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
+        return INVALID
+    h = s.history
     last = h.newest
-    T = u.attitude_stamp - h.stamp[last] if h.count > 0 else math.inf
-    if not (T > 0.0 and u.attitude_stamp <= u.stamp):
-        return T == 0.0
-    row = push(h, u.attitude_stamp)
+    T = stamp - h.stamp[last] if h.count > 0 else math.inf
+    if not (T > 0.0 and stamp <= t_k):
+        return REPEATED if T == 0.0 else INVALID
+    row = push(h, stamp)
     # One sign of the quaternion, so that neighbours can be averaged.
     dot = 0.0
     for i in range(4):
@@ -34,25 +68,20 @@ def take_attitude(s, p, u):
         h.sample[row, 4 + i] = w[i]
         h.sample[row, 7 + i] = 0.0
         if T <= p.attitude_timeout:
-            h.sample[row, 7 + i] = deck_reference.smoothed_acceleration(
+            h.sample[row, 7 + i] = smoothed_acceleration(
                 h.sample[last, 7 + i], w[i], h.sample[last, 4 + i], T, p.attitude_smoothing)
-    if s.aligning:
-        # Its heading is still being looked for: the mean begins with the one that is found.
-        s.ahead.latest = -math.inf
-    ahead.take_attitude(s.ahead, u.attitude_stamp, h.sample[row, :4], p.keyhole.mean_time)
-    return True
+    return NEW
 
 
 @compiled
-def attitude_at(s, p, t):
-    """Set s.mat_ed, s.w, s.dw to the attitude at t: between two samples, or predicted from the last one; ashore it is
-    always the same."""
+def at(s, p, t):
+    """Whether there is an attitude at t [s], between two samples or predicted from the last; `found` gives it."""
     if not s.stabilised:
         rotation(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3], s.mat_ed)
         s.w[:] = 0.0
         s.dw[:] = 0.0
         return True
-    h = s.attitude
+    h = s.history
     last = h.sample[h.newest]
     T = t - h.stamp[h.newest]
     if h.count == 0 or T > p.attitude_timeout:
@@ -61,9 +90,8 @@ def attitude_at(s, p, t):
         for i in range(3):
             s.dw[i] = last[7 + i]
             s.w[i] = last[4 + i] + T * last[7 + i]
-        x, y, z, w = deck_reference.turned(
-            last[0], last[1], last[2], last[3], deck_reference.turn(last[4], last[7], T),
-            deck_reference.turn(last[5], last[8], T), deck_reference.turn(last[6], last[9], T))
+        x, y, z, w = turned(last, (rotation_angle(last[4], last[7], T), rotation_angle(last[5], last[8], T),
+                                   rotation_angle(last[6], last[9], T)))
     else:
         i, j, f = bracket(h, t)
         if i < 0:
@@ -80,42 +108,6 @@ def attitude_at(s, p, t):
 
 
 @compiled
-def estimate_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
-    """Deck angles of a target at t, given in the frame of the filter."""
-    if not s.frame.tilted and s.range == 0.0:
-        return seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE)
-    attitude_at(s, p, t)
-    estimate_frame.from_deck(s.frame, s.mat_ed, s.mat_fd)
-    return deck_reference.moving_angles(*deck_reference.from_lever_arm(
-        s.arm[0], s.arm[1], s.arm[2], *deck_reference.deck_motion(
-            s.mat_fd, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2], A, dA, ddA, E, dE, ddE)))
-
-
-@compiled
-def seen_from_deck(s, p, t, A, dA, ddA, E, dE, ddE):
-    """Deck angles of a target at t, given in earth angles."""
-    if s.stabilised and attitude_at(s, p, t):
-        return deck_reference.deck_angles(s.mat_ed, s.w[0], s.w[1], s.w[2], s.dw[0], s.dw[1], s.dw[2],
-                                          A, dA, ddA, E, dE, ddE)
-    return A, dA, ddA, E, dE, ddE
-
-
-@compiled
-def levelled(s, framed, A, dA, ddA, E, dE, ddE):
-    """Azimuth on the levelled deck of a plan, (A, dA, ddA), of what `followed` gave."""
-    if framed:
-        estimate_frame.from_deck(s.frame, s.ahead.level, s.mat_fd)
-    else:
-        assign(s.mat_fd, s.ahead.level)
-    A, dA, ddA, _, _, _ = deck_reference.deck_angles(s.mat_fd, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, A, dA, ddA, E, dE, ddE)
-    return A, dA, ddA
-
-
-@compiled
-def deck_rates(s, p, t):
-    """(azimuth, elevation) rate at which a fixed target where the beam is seems to move because the deck does; 0 where
-    nobody compensates for it."""
-    wanted = p.azimuth.beam.rate_compensation != 0.0 or p.elevation.beam.rate_compensation != 0.0
-    if wanted and s.stabilised and attitude_at(s, p, t):
-        return deck_reference.fixed_rates(s.w[0], s.w[1], s.w[2], s.azimuth.position, s.elevation.position)
-    return 0.0, 0.0
+def found(s):
+    """The Attitude, deck -> earth, that `at` found last."""
+    return Attitude(s.mat_ed, vector(s.w), vector(s.dw))

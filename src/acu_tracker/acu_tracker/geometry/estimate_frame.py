@@ -7,20 +7,22 @@ import math
 
 import numpy as np
 
-from acu_tracker.geometry.deck_reference import moving_angles, moving_direction
+from acu_tracker.geometry.deck_reference import Attitude
+from acu_tracker.geometry.motion import LineOfSight, earth_angles, line_of_sight
+from acu_tracker.geometry.vector import Vector, cross, dot, rotated, rotated_back
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import cross, earth_direction, to_deck, to_earth
+from pedestal_common.line_of_sight import earth_direction
 
 RAISE, LOWER = math.radians(75.0), math.radians(70.0)
 """Elevation in the earth's frame [rad] above which the frame is tilted, below which it is not any more."""
 
-FRAME = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8')], align=True)
-"""mat: frame -> earth; tilted: 0 where both are the same."""
+FRAME = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8'), ('mat_fd', 'f8', (3, 3))], align=True)
+"""mat: frame -> earth; tilted: 0 where both are the same; mat_fd: deck -> frame, of the last `on_deck`."""
 
 
 @compiled
 def level(f):
-    """The frame is the earth's."""
+    """Make the frame the earth's."""
     f.tilted = 0
     for i in range(3):
         for j in range(3):
@@ -28,79 +30,69 @@ def level(f):
 
 
 @compiled
-def tilt(f, e, n, u, de, dn, du):
-    """The equator runs from the unit vector (e, n, u) along its rate [1/s], azimuth 0 at the vector."""
-    W = math.sqrt(de * de + dn * dn + du * du)
+def tilt(f, u, du):
+    """Lay the equator from the ENU unit vector u along its rate du [1/s], azimuth 0 at u."""
+    W = math.sqrt(dot(du, du))
     if W > 0.0:
-        x, y, z = de / W, dn / W, du / W
+        along = Vector(du.x / W, du.y / W, du.z / W)
     else:
         # It stands still: any way is as good, say east.
-        rho = math.sqrt(n * n + u * u)
-        x, y, z = 0.0, 0.0, 0.0
-        if rho > 0.0:
-            x, y, z = rho, -e * n / rho, -e * u / rho
-    p, q, r = cross(x, y, z, e, n, u)
-    f.mat[0, 0], f.mat[1, 0], f.mat[2, 0] = x, y, z
-    f.mat[0, 1], f.mat[1, 1], f.mat[2, 1] = e, n, u
-    f.mat[0, 2], f.mat[1, 2], f.mat[2, 2] = p, q, r
+        rho = math.sqrt(u.y * u.y + u.z * u.z)
+        along = Vector(rho, -u.x * u.y / rho, -u.x * u.z / rho) if rho > 0.0 else Vector(0.0, 0.0, 0.0)
+    up = cross(along, u)
+    f.mat[0, 0], f.mat[1, 0], f.mat[2, 0] = along
+    f.mat[0, 1], f.mat[1, 1], f.mat[2, 1] = u
+    f.mat[0, 2], f.mat[1, 2], f.mat[2, 2] = up
     f.tilted = 1
 
 
 @compiled
-def moving_in_earth(f, A, dA, ddA, E, dE, ddE):
-    """ENU unit vector, first and second derivative (nine floats) of angles in the frame."""
-    e, n, u, de, dn, du, dde, ddn, ddu = moving_direction(A, dA, ddA, E, dE, ddE)
+def to_earth(f, motion):
+    """LineOfSight in ENU of a Motion in the frame."""
+    sight = line_of_sight(motion)
     if not f.tilted:
-        return e, n, u, de, dn, du, dde, ddn, ddu
-    e, n, u = to_earth(f.mat, e, n, u)
-    de, dn, du = to_earth(f.mat, de, dn, du)
-    dde, ddn, ddu = to_earth(f.mat, dde, ddn, ddu)
-    return e, n, u, de, dn, du, dde, ddn, ddu
+        return sight
+    return LineOfSight(rotated(f.mat, sight.u), rotated(f.mat, sight.du), rotated(f.mat, sight.ddu))
 
 
 @compiled
-def moving_in_frame(f, e, n, u, de, dn, du, dde, ddn, ddu):
-    """(A, dA, ddA, E, dE, ddE) in the frame of a moving ENU unit vector; the inverse of moving_in_earth."""
+def to_frame(f, sight):
+    """Motion in the frame of a LineOfSight in ENU; the inverse of to_earth."""
     if f.tilted:
-        e, n, u = to_deck(f.mat, e, n, u)
-        de, dn, du = to_deck(f.mat, de, dn, du)
-        dde, ddn, ddu = to_deck(f.mat, dde, ddn, ddu)
-    return moving_angles(n, -e, u, dn, -de, du, ddn, -dde, ddu)
+        sight = LineOfSight(rotated_back(f.mat, sight.u), rotated_back(f.mat, sight.du),
+                            rotated_back(f.mat, sight.ddu))
+    return earth_angles(sight)
 
 
 @compiled
-def from_deck(f, mat_ed, mat_fd):
-    """mat_fd (3, 3) deck -> frame := mat' mat_ed."""
+def direction_to_frame(f, azimuth, elevation):
+    """(azimuth, elevation) [rad] in the frame of a direction's earth angles."""
+    e, n, u = earth_direction(azimuth, elevation)
+    v = rotated_back(f.mat, Vector(e, n, u))
+    return math.atan2(v.x, v.y), math.atan2(v.z, math.hypot(v.x, v.y))
+
+
+@compiled
+def of_deck(f, attitude):
+    """The Attitude, deck -> frame, of an Attitude deck -> earth. It stands until the next call."""
+    mat = attitude.mat
     for i in range(3):
         for j in range(3):
-            mat_fd[i, j] = (f.mat[0, i] * mat_ed[0, j] + f.mat[1, i] * mat_ed[1, j] + f.mat[2, i] * mat_ed[2, j])
+            f.mat_fd[i, j] = f.mat[0, i] * mat[0, j] + f.mat[1, i] * mat[1, j] + f.mat[2, i] * mat[2, j]
+    return Attitude(f.mat_fd, attitude.w, attitude.dw)
 
 
 @compiled
-def earth_variances(f, A, E, azimuth, elevation, pa, pe):
-    """Variances of azimuth and elevation in the earth's frame of those, pa and pe, of angles A, E in the frame, at
-    earth angles azimuth, elevation; the frame's own correlation is not known and taken as none."""
+def earth_variances(f, framed, earth, p_A, p_E):
+    """Variances [rad2] of azimuth and elevation in the earth's frame of those in the frame, p_A and p_E.
+
+    framed, earth: the Motion of the target in either. The frame's own correlation is not known and taken as none.
+    """
+    A, E = framed.azimuth.angle, framed.elevation.angle
+    azimuth, elevation = earth.azimuth.angle, earth.elevation.angle
     # Unit vectors across, the way azimuth grows, of both frames.
-    x, y, z = to_earth(f.mat, math.cos(A), -math.sin(A), 0.0)
-    c = x * math.cos(azimuth) - y * math.sin(azimuth)
-    across = pa * math.cos(E)**2
+    across = rotated(f.mat, Vector(math.cos(A), -math.sin(A), 0.0))
+    c = across.x * math.cos(azimuth) - across.y * math.sin(azimuth)
+    p_across = p_A * math.cos(E)**2
     cos_el = max(math.cos(elevation), 0.01)
-    return (c * c * across + (1.0 - c * c) * pe) / (cos_el * cos_el), c * c * pe + (1.0 - c * c) * across
-
-
-@compiled
-def put_in_earth(f, x, p):
-    """An estimate x (2, 3), azimuth and elevation with their derivatives, and its (p11, p12, p22) p (2, 3), given in
-    the frame: the same in the earth's."""
-    A, E = x[0, 0], x[1, 0]
-    e, n, u, de, dn, du, dde, ddn, ddu = moving_in_earth(f, A, x[0, 1], x[0, 2], E, x[1, 1], x[1, 2])
-    x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2] = moving_angles(n, -e, u, dn, -de, du, ddn, -dde, ddu)
-    for i in range(3):
-        p[0, i], p[1, i] = earth_variances(f, A, E, x[0, 0], x[1, 0], p[0, i], p[1, i])
-
-
-@compiled
-def measured(f, azimuth, elevation):
-    """(azimuth, elevation) in the frame of an ENU direction's earth angles."""
-    e, n, u = to_deck(f.mat, *earth_direction(azimuth, elevation))
-    return math.atan2(e, n), math.atan2(u, math.hypot(e, n))
+    return (c * c * p_across + (1.0 - c * c) * p_E) / (cos_el * cos_el), c * c * p_E + (1.0 - c * c) * p_across

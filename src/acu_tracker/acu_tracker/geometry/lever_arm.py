@@ -1,47 +1,68 @@
-"""The arm r from the INS to the antenna, where the range is measured. `s` is the unit's STATE.
+"""The arm r from the INS to the antenna, where the range is measured.
 
 The antenna of a rolling ship swings, and a near target with it: by r / range. The INS's own line of sight does not.
 """
 import math
 
+import numpy as np
+
+from acu_tracker.geometry.motion import AxisMotion, Motion, normalised
+from acu_tracker.geometry.vector import Vector, minus, rotated, vector
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import earth_angles, earth_direction, to_earth, wrap
+from pedestal_common.line_of_sight import earth_angles, earth_direction, wrap
+
+LEVER_ARM = np.dtype([('arm', 'f8', (3,)), ('range', 'f8')], align=True)
+"""arm: r over the range of the INS, FLU [-]; range: that range [m], 0 where none was measured."""
 
 RANGE_SHARE = 0.05
 """Share of a measured range that the smoothed one takes."""
 
 
 @compiled
-def from_ins(s, r, measured, x, y, z):
-    """The FLU direction (x, y, z), measured at the antenna, as the INS would see it: a vector of length about 1.
+def from_ins(s, r, measured, running, v):
+    """The unit vector v (FLU), measured at the antenna, as the INS would see it: a Vector of length about 1.
 
-    r: the arm, record x, y, z [m]; measured: range of the antenna [m], NaN none. Sets s.range, s.arm.
+    r: the arm, record x, y, z [m]; measured: range of the antenna [m], NaN: none; running: whether a filter runs.
 
     With a range the estimate is the line of sight of the INS, which the deck's turning does not move: R = |rho u + r|
     is smoothed, and the arm put between. Only a filter that starts with a range does so, so that what it estimates
     stays the same.
     """
-    along, r2 = x * r.x + y * r.y + z * r.z, r.x * r.x + r.y * r.y + r.z * r.z
-    known = measured > 0.0 and s.stabilised
+    along, r2 = v.x * r.x + v.y * r.y + v.z * r.z, r.x * r.x + r.y * r.y + r.z * r.z
+    known = measured > 0.0
     R = math.sqrt(measured * measured + 2.0 * measured * along + r2) if known else 0.0
-    if not s.tracker.running:
+    if not running:
         s.range = R
     elif s.range > 0.0 and known:
         s.range += RANGE_SHARE * (R - s.range)
     if not s.range > math.sqrt(r2):
         s.arm[:] = 0.0
-        return x, y, z
+        return v
     k = 1.0 / s.range
     s.arm[0], s.arm[1], s.arm[2] = k * r.x, k * r.y, k * r.z
     rho = k * (math.sqrt(along * along + s.range * s.range - r2) - along)
-    return rho * x + s.arm[0], rho * y + s.arm[1], rho * z + s.arm[2]
+    return Vector(rho * v.x + s.arm[0], rho * v.y + s.arm[1], rho * v.z + s.arm[2])
 
 
 @compiled
-def to_antenna(s, x):
-    """An estimate x (2, 3) of the INS's line of sight, earth angles, becomes that of the antenna; the rates stay. The
-    attitude is the one last asked for."""
-    e, n, u = earth_direction(x[0, 0], x[1, 0])
-    re, rn, ru = to_earth(s.mat_ed, s.arm[0], s.arm[1], s.arm[2])
-    azimuth, x[1, 0] = earth_angles(e - re, n - rn, u - ru)
-    x[0, 0] += wrap(azimuth - x[0, 0])
+def to_antenna(s, sight):
+    """LineOfSight at the antenna of one at the INS, both FLU: v = u - r; the range is taken as constant."""
+    return normalised(minus(sight.u, vector(s.arm)), sight.du, sight.ddu)
+
+
+@compiled
+def to_ins(s, u, du):
+    """(u, du) at the INS of a unit vector u and its rate du [1/s] at the antenna, both FLU."""
+    sight = normalised(Vector(u.x + s.arm[0], u.y + s.arm[1], u.z + s.arm[2]), du, Vector(0.0, 0.0, 0.0))
+    return sight.u, sight.du
+
+
+@compiled
+def earth_angles_to_antenna(s, mat_ed, motion):
+    """Motion in earth angles at the antenna of one at the INS, mat_ed (3, 3) deck -> earth; the rates stay."""
+    A, E = motion.azimuth.angle, motion.elevation.angle
+    e, n, u = earth_direction(A, E)
+    r = rotated(mat_ed, vector(s.arm))
+    azimuth, elevation = earth_angles(e - r.x, n - r.y, u - r.z)
+    return Motion(AxisMotion(A + wrap(azimuth - A), motion.azimuth.rate, motion.azimuth.acceleration),
+                  AxisMotion(elevation, motion.elevation.rate, motion.elevation.acceleration))

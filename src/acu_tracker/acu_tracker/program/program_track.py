@@ -1,9 +1,12 @@
 """A time-tagged table of directions: cubic Hermite interpolation with parabolic slopes, so the rate is continuous."""
 import math
+import typing
 
 import numpy as np
 
-from acu_tracker.geometry.deck_reference import from_lever_arm, moving_angles
+from acu_tracker.geometry.azimuth_wrap import Travel
+from acu_tracker.geometry.motion import AxisMotion, Motion, angles, normalised, north_west_up
+from acu_tracker.geometry.vector import Vector
 from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
 from pedestal_common.compiled import compiled
 from pedestal_common.interval import interval
@@ -14,12 +17,21 @@ STEEP = math.radians(80.0)
 """Elevation of the rows above which directions are interpolated."""
 
 
+class ProgramTrack(typing.NamedTuple):
+    """times (n,) [s], growing; angles (n, 2) [rad]: azimuth and elevation in the earth's frame. n = 0: no program."""
+    times: np.ndarray
+    angles: np.ndarray
+
+
+NO_TRACK = ProgramTrack(np.zeros(0), np.zeros((0, 2)))
+
+
 class ProgramTrackError(ValueError):
     """A table that cannot be followed; the message names row, value and what is allowed."""
 
 
 def checked(times, angles):
-    """A table as arrays times (n,) [s], angles (n, 2) [rad azimuth, elevation]; ProgramTrackError if it is none."""
+    """The ProgramTrack of times (n,) [s] and angles (n, 2) [rad azimuth, elevation]; raises ProgramTrackError."""
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
         raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
@@ -36,109 +48,113 @@ def checked(times, angles):
     if high.size:
         raise ProgramTrackError(f'program track row {high[0]}: elevation {angles[high[0], 1]:g} rad; '
                                 'must be -1.5708 to 1.5708')
-    return times, angles
+    return ProgramTrack(times, angles)
 
 
 @compiled
-def status(times, t):
-    """NONE if the table covers t [s], otherwise the reason."""
-    if len(times) < 2:
+def status(program, t):
+    """NONE if the program covers t [s], otherwise the reason (of modes.REASONS)."""
+    if len(program.times) < 2:
         return NO_PROGRAM
-    if t < times[0]:
+    if t < program.times[0]:
         return BEFORE_PROGRAM
-    return NONE if t <= times[-1] else AFTER_PROGRAM
+    return NONE if t <= program.times[-1] else AFTER_PROGRAM
 
 
 @compiled
-def _difference(angles, i, axis):
-    difference = angles[i + 1, axis] - angles[i, axis]
+def _difference(program, i, axis):
+    difference = program.angles[i + 1, axis] - program.angles[i, axis]
     return wrap(difference) if axis == 0 else difference
 
 
 @compiled
-def _slope(times, angles, i, axis):
+def _slope(program, i, axis):
     """Rate at row i of the parabola through its neighbours; at the ends through the nearest three rows."""
+    times = program.times
     if len(times) == 2:
-        return _difference(angles, 0, axis) / (times[1] - times[0])
+        return _difference(program, 0, axis) / (times[1] - times[0])
     m = min(max(i, 1), len(times) - 2)
     before, after = times[m] - times[m - 1], times[m + 1] - times[m]
-    d0, d1 = _difference(angles, m - 1, axis) / before, _difference(angles, m, axis) / after
+    d0, d1 = _difference(program, m - 1, axis) / before, _difference(program, m, axis) / after
     bend = (d1 - d0) / (before + after)
     return d0 + bend * (before + 2.0 * (times[i] - times[m]))
 
 
 @compiled
-def interpolated(times, angles, t, axis):
-    """(angle, rate, acceleration) of axis 0 (azimuth, the short way round) or 1 (elevation) at t [s]."""
+def _hermite(y0, d, m0, m1, x, T):
+    """AxisMotion a share x into an interval of T [s]: it begins at y0, grows by d, its slopes times T are m0, m1."""
+    c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
+    return AxisMotion(y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
+                      (2.0 * c2 + 6.0 * x * c3) / (T * T))
+
+
+@compiled
+def interpolated(program, t, axis):
+    """AxisMotion of axis 0 (azimuth, the short way round) or 1 (elevation) at t [s]."""
+    times = program.times
     i = interval(times, t)
     T = times[i + 1] - times[i]
-    x = (t - times[i]) / T
-    y0, d = angles[i, axis], _difference(angles, i, axis)
-    m0, m1 = T * _slope(times, angles, i, axis), T * _slope(times, angles, i + 1, axis)
-    c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
-    return (y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
-            (2.0 * c2 + 6.0 * x * c3) / (T * T))
+    return _hermite(program.angles[i, axis], _difference(program, i, axis), T * _slope(program, i, axis),
+                    T * _slope(program, i + 1, axis), (t - times[i]) / T, T)
 
 
 @compiled
-def _component(angles, i, axis):
+def _component(program, i, axis):
     """Component (0 east, 1 north, 2 up) of the unit vector of row i."""
-    return earth_direction(angles[i, 0], angles[i, 1])[axis]
+    return earth_direction(program.angles[i, 0], program.angles[i, 1])[axis]
 
 
 @compiled
-def _component_slope(times, angles, i, axis):
-    """As _slope, of a component."""
+def _component_slope(program, i, axis):
+    """`_slope` of a component."""
+    times = program.times
     m = min(max(i, 1), len(times) - 2)
     before, after = times[m] - times[m - 1], times[m + 1] - times[m]
-    middle = _component(angles, m, axis)
-    d0 = (middle - _component(angles, m - 1, axis)) / before
-    d1 = (_component(angles, m + 1, axis) - middle) / after
+    middle = _component(program, m, axis)
+    d0 = (middle - _component(program, m - 1, axis)) / before
+    d1 = (_component(program, m + 1, axis) - middle) / after
     return d0 + (d1 - d0) / (before + after) * (before + 2.0 * (times[i] - times[m]))
 
 
 @compiled
-def _curve(times, angles, i, t, axis):
-    """(component, its rate, acceleration) at t between rows i and i + 1; as `interpolated`."""
+def _interpolated_component(program, i, t, axis):
+    """A component, its rate and acceleration at t between rows i and i + 1, interpolated as the angles are."""
+    times = program.times
     T = times[i + 1] - times[i]
-    x = (t - times[i]) / T
-    y0 = _component(angles, i, axis)
-    d = _component(angles, i + 1, axis) - y0
-    m0, m1 = T * _component_slope(times, angles, i, axis), T * _component_slope(times, angles, i + 1, axis)
-    c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
-    return (y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
-            (2.0 * c2 + 6.0 * x * c3) / (T * T))
+    y0 = _component(program, i, axis)
+    return _hermite(y0, _component(program, i + 1, axis) - y0, T * _component_slope(program, i, axis),
+                    T * _component_slope(program, i + 1, axis), (t - times[i]) / T, T)
 
 
 @compiled
-def outlook(times, angles, t):
-    """(A, dA, ddA, E, dE, ddE) at t [s]. Between two rows above STEEP, where the azimuth may turn by any amount from
+def motion_at(program, t):
+    """Motion in earth angles at t [s]. Between two rows above STEEP, where the azimuth may turn by any amount from
     one to the next, the unit vector is interpolated instead of the angles."""
-    i = interval(times, t)
-    if min(angles[i, 1], angles[i + 1, 1]) < STEEP or len(times) < 3:
-        A, dA, ddA = interpolated(times, angles, t, 0)
-        E, dE, ddE = interpolated(times, angles, t, 1)
-        return A, dA, ddA, E, dE, ddE
-    e, de, dde = _curve(times, angles, i, t, 0)
-    n, dn, ddn = _curve(times, angles, i, t, 1)
-    u, du, ddu = _curve(times, angles, i, t, 2)
-    return moving_angles(*from_lever_arm(0.0, 0.0, 0.0, n, -e, u, dn, -de, du, ddn, -dde, ddu))
+    i = interval(program.times, t)
+    if min(program.angles[i, 1], program.angles[i + 1, 1]) < STEEP or len(program.times) < 3:
+        return Motion(interpolated(program, t, 0), interpolated(program, t, 1))
+    e, de, dde = _interpolated_component(program, i, t, 0)
+    n, dn, ddn = _interpolated_component(program, i, t, 1)
+    u, du, ddu = _interpolated_component(program, i, t, 2)
+    return angles(normalised(north_west_up(Vector(e, n, u)), north_west_up(Vector(de, dn, du)),
+                             north_west_up(Vector(dde, ddn, ddu))))
 
 
 @compiled
-def direction(times, angles, t):
-    """ENU unit vector at t [s]."""
-    A, _, _, E, _, _ = outlook(times, angles, t)
-    return earth_direction(A, E)
+def direction(program, t):
+    """ENU unit Vector at t [s]."""
+    motion = motion_at(program, t)
+    e, n, u = earth_direction(motion.azimuth.angle, motion.elevation.angle)
+    return Vector(e, n, u)
 
 
 @compiled
-def azimuth_travel(times, angles, t):
-    """(below, above) [rad] that the azimuth still travels from its value at t until the end of the table."""
-    first = interval(times, t)
-    here = interpolated(times, angles, t, 0)[0] - angles[first, 0]
+def azimuth_travel(program, t):
+    """Travel of the azimuth from its value at t [s] until the end of the program."""
+    first = interval(program.times, t)
+    here = interpolated(program, t, 0).angle - program.angles[first, 0]
     at, below, above = 0.0, 0.0, 0.0
-    for i in range(first, len(times) - 1):
-        at += _difference(angles, i, 0)
+    for i in range(first, len(program.times) - 1):
+        at += _difference(program, i, 0)
         below, above = min(below, at - here), max(above, at - here)
-    return below, above
+    return Travel(below, above)

@@ -20,6 +20,8 @@ from pedestal_common.compiled import compiled
 def observer_gains(w_o, w_s, h):
     """(l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles of the observer at p = exp(-w_o h).
 
+    w_o, w_s [rad/s]: poles of the observer and of the drive's rate loop; h [s]: its step.
+
     For w_s -> 0 they are 1 - p^3, 1.5 (1 - p)^2 (1 + p) / h, (1 - p)^3 / h^2.
     """
     p, a = math.exp(-w_o * h), math.exp(-w_s * h)
@@ -32,8 +34,9 @@ def observer_gains(w_o, w_s, h):
 
 
 @compiled
-def observed(z1, z2, z3, y, u, v3, w_o, w_s, h):
-    """(z1, z2, z3) at the encoder angle y [rad], h after the last; u [rad/s] and v3 [rad/s2] were in force since."""
+def observed(z, y, u, v3, w_o, w_s, h):
+    """z = (z1, z2, z3) at the encoder angle y [rad], h [s] after z (3,) with u [rad/s] and v3 [rad/s2] in force."""
+    z1, z2, z3 = z[0], z[1], z[2]
     g = -math.expm1(-w_s * h) / w_s
     settled = u + (v3 + z3) / w_s
     z1 += h * settled + g * (z2 - settled)
@@ -44,7 +47,7 @@ def observed(z1, z2, z3, y, u, v3, w_o, w_s, h):
 
 
 @compiled
-def rate(z1, z2, z3, v1, v2, v2_m, w_c, w_s):
-    """Rate command [rad/s]: v1, v2 at t_k are to be met, v2_m at t_m is fed forward."""
-    u0 = w_c * w_c * (v1 - z1) + 2.0 * w_c * (v2 - z2)
-    return v2_m + (z2 - v2) + (u0 - z3) / w_s
+def rate(z, v1, v2, v2_m, w_c, w_s):
+    """Rate command [rad/s] of z (3,): v1 [rad], v2 [rad/s] at t_k are to be met, v2_m at t_m is fed forward."""
+    u0 = w_c * w_c * (v1 - z[0]) + 2.0 * w_c * (v2 - z[1])
+    return v2_m + (z[1] - v2) + (u0 - z[2]) / w_s

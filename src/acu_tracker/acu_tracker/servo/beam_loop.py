@@ -36,7 +36,7 @@ def type_2(R, v, error, alpha, beta, T, compensation):
 
 @compiled
 def coasted(R, v, T, compensation):
-    """Both without an error: the prediction stands."""
+    """(beam [rad], its rate [rad/s]) after T [s] without an error: the prediction stands."""
     return R + v * T + compensation * T, v
 
 

@@ -13,18 +13,21 @@ from pedestal_common.compiled import compiled
 
 
 @compiled
-def ahead(v, a, k_v, k_a):
-    """What of the rate command [rad/s] is fed forward: of a reference rate v [rad/s] and acceleration a [rad/s2]."""
+def fed(v, a, k_v, k_a):
+    """Rate [rad/s] that is fed forward of a reference rate v [rad/s] and acceleration a [rad/s2]; k_v [-], k_a [s]."""
     return k_v * v + k_a * a
 
 
 @compiled
-def rate(e, integral, fed, K_p):
-    """Rate command [rad/s] of an error e [rad] and what is fed forward."""
-    return fed + K_p * e + integral
+def rate(e, integral, fed_forward, K_p):
+    """Rate command [rad/s] of an error e [rad], its integral and what is fed forward [rad/s]; K_p [1/s]."""
+    return fed_forward + K_p * e + integral
 
 
 @compiled
 def torque(v, a, c):
-    """Load torque [Nm] = J a + Tc tanh(v / v_s) that the reference itself needs."""
+    """Load torque [Nm] = J a + Tc tanh(v / v_s) that a reference of rate v [rad/s] and acceleration a [rad/s2] needs.
+
+    c: record of FeedforwardParameters.
+    """
     return c.inertia * a + c.friction * math.tanh(v / c.friction_rate)

@@ -22,7 +22,7 @@ def coefficients(frequency, width, depth, period):
 
 @compiled
 def removed(x, memory, c):
-    """What the notch takes out of x; memory (4,): the last two x and y, c (5,): b0 b1 b2 a1 a2."""
+    """What the notch takes out of x (any unit); memory (4,): the last two x and y; c (5,): as `coefficients`."""
     y = c[0] * x + c[1] * memory[0] + c[2] * memory[1] - c[3] * memory[2] - c[4] * memory[3]
     memory[0], memory[1], memory[2], memory[3] = x, memory[0], y, memory[2]
     return x - y

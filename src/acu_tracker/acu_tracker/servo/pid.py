@@ -7,23 +7,24 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def gains(c):
-    """(K_p, K_i) of a bandwidth: K_i = integral K_p^2, so that `integral` alone sets the damping."""
+    """(K_p [1/s], K_i [1/s2]) of a record of PidParameters or FeedforwardParameters: K_i = integral K_p^2, so that
+    `integral` alone sets the damping."""
     return c.bandwidth, c.integral * (c.bandwidth * c.bandwidth)
 
 
 @compiled
 def integrated(integral, e, dt, K_p, K_i):
-    """The integral dt later. Without a K_i what a handover left in it fades with the bandwidth."""
+    """The integral [rad/s] dt [s] later. Without a K_i what a handover left in it fades with the bandwidth."""
     return integral + dt * K_i * e if K_i > 0.0 else integral / (1.0 + dt * K_p)
 
 
 @compiled
 def derivative(D, e, e_before, dt, derivative_time):
-    """Rate of the error [rad/s] through a first-order lag (backward Euler)."""
+    """D: rate of the error [rad/s] through a lag of derivative_time [s] (backward Euler), dt [s] after e_before."""
     return (derivative_time * D + e - e_before) / (derivative_time + dt)
 
 
 @compiled
 def rate(e, integral, D, K_p, K_d):
-    """Rate command [rad/s] of an error e [rad]."""
+    """Rate command [rad/s] of an error e [rad], its integral [rad/s] and its derivative D [rad/s]."""
     return K_p * e + integral + K_d * D

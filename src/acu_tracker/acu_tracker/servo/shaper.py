@@ -5,6 +5,7 @@ within the limits is followed without lag, and a jump is made in minimum time wi
 """
 import math
 
+from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
 
@@ -13,7 +14,8 @@ SUB_STEPS = 4
 
 @compiled
 def toward_rate_limit(gap, h, jerk):
-    """Largest acceleration that jerk can still take out before the rate has grown by gap (in steps of h).
+    """Largest acceleration [rad/s2] that jerk [rad/s3] can still take out before the rate has grown by gap [rad/s], in
+    steps of h [s].
 
     a^2/(2 j) + a h/2 = gap; the last part of a step costs up to j h^2/8 more.
     """
@@ -25,37 +27,40 @@ def toward_rate_limit(gap, h, jerk):
 
 
 @compiled
-def held_inside(position, rate, acceleration, low, high, braking, lag):
-    """(position, rate, acceleration, held): a raw reference that could not stop before a limit is set onto it."""
-    stop = position + rate * (abs(rate) / (2.0 * braking) + lag)
-    if position > high or (rate > 0.0 and stop > high):
-        return high, 0.0, 0.0, True
-    if position < low or (rate < 0.0 and stop < low):
-        return low, 0.0, 0.0, True
-    return position, rate, acceleration, False
+def held_inside(raw, low, high, braking, lag):
+    """(AxisMotion, held): a raw one that could not stop before a limit low, high [rad] is set onto it; braking
+    [rad/s2], lag [s] until it begins."""
+    stop = raw.angle + raw.rate * (abs(raw.rate) / (2.0 * braking) + lag)
+    if raw.angle > high or (raw.rate > 0.0 and stop > high):
+        return AxisMotion(high, 0.0, 0.0), True
+    if raw.angle < low or (raw.rate < 0.0 and stop < low):
+        return AxisMotion(low, 0.0, 0.0), True
+    return raw, False
 
 
 @compiled
-def shape(p, v, a, raw_p, raw_v, raw_a, dt, rate, acceleration, jerk, h0):
-    """(position, rate, acceleration, rate limited, acceleration limited) of the shaped reference dt later.
+def shape(before, raw, dt, limits):
+    """(AxisMotion, rate limited, acceleration limited) of the shaped reference dt [s] after `before`.
 
-    p, v, a are the shaped reference before, raw_* the raw one at the end of dt.
+    raw: the AxisMotion to be followed, at the end of dt; limits: record of ShaperParameters.
     """
+    p, v, a = before
     h = dt / SUB_STEPS
     # What the target's own acceleration takes is not there for closing the gap.
-    r = max(acceleration - abs(raw_a), 0.2 * acceleration)
+    r = max(limits.acceleration - abs(raw.acceleration), 0.2 * limits.acceleration)
     rate_limited = acceleration_limited = False
     for i in range(SUB_STEPS):
         back = (SUB_STEPS - i) * h
-        e = p - (raw_p - raw_v * back + 0.5 * raw_a * back * back)
-        de = v - (raw_v - raw_a * back)
-        wanted = raw_a + fhan(e, de, r, h0)
-        u = min(max(wanted, -acceleration), acceleration)
+        e = p - (raw.angle - raw.rate * back + 0.5 * raw.acceleration * back * back)
+        de = v - (raw.rate - raw.acceleration * back)
+        wanted = raw.acceleration + fhan(e, de, r, limits.h0)
+        u = min(max(wanted, -limits.acceleration), limits.acceleration)
         acceleration_limited |= u != wanted
-        up, down = toward_rate_limit(rate - v, h, jerk), -toward_rate_limit(rate + v, h, jerk)
+        up = toward_rate_limit(limits.rate - v, h, limits.jerk)
+        down = -toward_rate_limit(limits.rate + v, h, limits.jerk)
         rate_limited |= u > up or u < down
         u = min(max(u, down), up)
-        a = min(max(u, a - jerk * h), a + jerk * h)
+        a = min(max(u, a - limits.jerk * h), a + limits.jerk * h)
         p += v * h + 0.5 * a * h * h
         v += a * h
-    return p, v, a, rate_limited, acceleration_limited
+    return AxisMotion(p, v, a), rate_limited, acceleration_limited

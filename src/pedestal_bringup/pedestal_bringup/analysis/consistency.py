@@ -11,7 +11,8 @@ import math
 import numpy as np
 from scipy import special
 
-from acu_tracker.geometry import deck_reference
+from acu_tracker.geometry.motion import motion_of_position
+from acu_tracker.geometry.vector import Vector, minus, rotated, vector
 from pedestal_bringup.analysis import results
 from pedestal_common import line_of_sight, topics
 from pedestal_common.compiled import compiled
@@ -58,10 +59,9 @@ def _rates(relative, velocity, attitude, ship_velocity, rates):
     for k in range(len(relative)):
         q = attitude[k]
         line_of_sight.rotation(q[0], q[1], q[2], q[3], mat_ed)
-        e, n, u = relative[k, 0], relative[k, 1], relative[k, 2]
-        ve, vn, vu = line_of_sight.to_earth(mat_ed, ship_velocity[k, 0], ship_velocity[k, 1], ship_velocity[k, 2])
-        de, dn, du = velocity[k, 0] - ve, velocity[k, 1] - vn, velocity[k, 2] - vu
-        _, rates[k, 0], _, _, rates[k, 1], _ = deck_reference.earth_motion(e, n, u, de, dn, du, 0.0, 0.0, 0.0)
+        v = minus(vector(velocity[k]), rotated(mat_ed, vector(ship_velocity[k])))
+        motion = motion_of_position(vector(relative[k]), v, Vector(0.0, 0.0, 0.0))
+        rates[k, 0], rates[k, 1] = motion.azimuth.rate, motion.elevation.rate
 
 
 def read(bag, run):

@@ -17,7 +17,9 @@ from rich.console import Console
 from rich.table import Table
 
 from acu_tracker.estimation import axis_filter, unscented
-from acu_tracker.estimation.params import Filter, Ukf
+from acu_tracker.estimation.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
+from acu_tracker.estimation.params import FilterParameters, UkfParameters
+from acu_tracker.geometry.motion import AxisMotion, Motion
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup.again import recompute, replay
@@ -135,7 +137,7 @@ FILTER_PERIOD = 0.01
 
 def filter_step(kind):
     """Time [us] of one prediction and correction of an axis_filter kind on a noisy ramp."""
-    constants = axis_filter.constants(build(Filter, {'kind': kind}))
+    constants = axis_filter.constants(build(FilterParameters, {'kind': kind}))
     t = FILTER_PERIOD * np.arange(FILTER_STEPS)
     y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
     variance, state = np.full(FILTER_STEPS, 2.5e-7), np.zeros(1, axis_filter.FILTER)
@@ -149,12 +151,12 @@ def _filter_steps(state, constants, t, y, R):
     axis_filter.start(f, c, y[0], R[0], 0.1)
     for k in range(1, len(y)):
         axis_filter.predict(f, c, t[k] - t[k - 1])
-        axis_filter.correct(f, c, y[k], R[k], math.nan, math.nan)
+        axis_filter.correct(f, c, AxisMeasurement(y[k], R[k], math.nan, math.nan))
 
 
 def unscented_step():
     """Time [us] of one prediction and correction of both Cartesian filters, azimuth, elevation and range measured."""
-    state, constants = np.zeros(1, unscented.STATE), unscented.constants(Ukf())
+    state, constants = np.zeros(1, unscented.STATE), unscented.constants(UkfParameters())
     noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
     measured = noise + np.outer(FILTER_PERIOD * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
     _unscented_steps(state, constants, measured)
@@ -165,12 +167,16 @@ def unscented_step():
 def _unscented_steps(state, constants, measured):
     s, c = state[0], constants[0]
     R = 2.5e-7
-    unscented.start(s, c, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0, R, 0.0, 0.01, R, 0.0, 0.01, 500.0, 1.0)
+    known = AxisVariances(R, 0.0, 0.01)
+    first = Estimate(Motion(AxisMotion(0.0, 0.0, 0.0), AxisMotion(0.3, 0.0, 0.0)), (known, known))
+    unscented.start(s, c, first, 500.0, 1.0)
     for k in range(len(measured)):
         A, E, r = measured[k]
         unscented.predict(s, c, FILTER_PERIOD)
-        unscented.innovation(s, A, E, r, R, R, 1.0)
-        unscented.correct(s, A, E, r)
+        m = Measurement(0.0, (AxisMeasurement(A, R, math.nan, math.nan), AxisMeasurement(E, R, math.nan, math.nan)),
+                        r, 1.0)
+        unscented.innovation(s, m)
+        unscented.correct(s, m)
 
 
 def filterpy_unscented():

@@ -1,15 +1,15 @@
 """Studies: the compiled closed loop measured against what a paper claims and against our own targets.
 
-Each name in NAMES is one study, its module spelled with underscores: the first line of its docstring says what it
-is, and `run(progress) -> Result` does it, where progress(fraction, text) may be called with the share that is done and
-what comes next. A study of many runs has its default number as RUNS and is `run(progress, runs=RUNS, pool=None)`: pool
-is a monte_carlo.Pool, without one the runs are made in this process. `experiment` holds what they share. A case of the
-others is a scenario and parameters: `pedestal run SCENARIO --param ...` takes the same through the graph of nodes.
+A study is a module of this folder. The first line of its docstring says what it is; `run(progress)` gives its
+rigs.rows.Result; in it progress(fraction, text) may be called with the share that is done and what comes next. A study
+of many runs has its default number as RUNS and is `run(progress, runs=RUNS, pool=None)`: pool is a monte_carlo.Pool;
+without one the runs are made in this process. `rigs` holds what several studies use. A case that is a scenario with
+parameters can be run through the nodes as well: `pedestal run SCENARIO --param ...`.
 """
 import importlib
+import pkgutil
 
-NAMES = ('servo', 'backlash', 'bode', 'filters', 'manoeuvre', 'pareto', 'imm-feedforward', 'rate-measurement',
-         'phased-array', 'alignment')
+NAMES = tuple(module.name.replace('_', '-') for module in pkgutil.iter_modules(__path__) if not module.ispkg)
 
 
 def study(name):

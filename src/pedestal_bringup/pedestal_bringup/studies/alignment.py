@@ -12,8 +12,8 @@ import time
 import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.experiment import Result, row
+from pedestal_bringup.studies.rigs import drawing
+from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import to_deck
@@ -297,7 +297,7 @@ def figures(found, bound):
 
 def azimuth_figure(found, bound):
     """Figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs."""
-    figure, axes = experiment.panels(3, size=(7.4, 9.0))
+    figure, axes = drawing.panels(3, size=(7.4, 9.0))
     t = EVERY * np.arange(1, len(bound[0]) + 1)
     for case, (rms, _, first, _) in found[''].items():
         axes[0, 0].plot(t, np.degrees(first[:, 2]), color=COLOURS[case], label=case)
@@ -327,7 +327,7 @@ def finish(axes, bound, title):
 
 def level_figure(found, bound):
     """Figure 4 of the paper for level: one run after 100 s; then the rms over all."""
-    figure, axes = experiment.panels(2, size=(7.4, 6.4))
+    figure, axes = drawing.panels(2, size=(7.4, 6.4))
     t = EVERY * np.arange(1, len(bound[1]) + 1)
     for case, (rms, _, first, _) in found[''].items():
         axes[0, 0].plot(t, first[:, 0] / ARCMIN, color=COLOURS[case], linewidth=0.8, label=case)
@@ -342,7 +342,7 @@ def level_figure(found, bound):
 
 def swell_figure(found, bound):
     """Azimuth on swell."""
-    figure, axes = experiment.panels(1, size=(7.4, 3.8))
+    figure, axes = drawing.panels(1, size=(7.4, 3.8))
     for case, (rms, *_) in found['swell'].items():
         axes[0, 0].plot(EVERY * np.arange(1, len(rms) + 1), rms[:, 2], color=COLOURS[case], label=case)
     finish(axes[0, 0], bound[0][:round(SHORT / EVERY)],

@@ -9,8 +9,10 @@ import math
 import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, RAW, TRUTH
-from pedestal_bringup.studies import experiment, servo
-from pedestal_bringup.studies.experiment import Case, Result, row
+from pedestal_bringup.studies import servo
+from pedestal_bringup.studies.rigs import cases, drawing, metrics
+from pedestal_bringup.studies.rigs.cases import Case
+from pedestal_bringup.studies.rigs.rows import Result, row
 
 SETTLED = 2.0
 """Standstill is what is left so long after a step [s]."""
@@ -52,7 +54,7 @@ def standstill_case(name):
 
 def reversal_case(kind, name):
     """Three periods of a sine of REVERSALS."""
-    return experiment.sine_case(Case(name, 'servo_sine', {
+    return cases.sine_case(Case(name, 'servo_sine', {
         **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE}),
         REVERSALS[kind], 3)
 
@@ -86,8 +88,8 @@ def steady_residual(record, amplitude, w):
     """Time [s] and error [rad] without its fundamental w [rad/s], over the whole periods after the first."""
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record.truth['load_position'][:, 0]
-    steady = experiment.whole_periods(t, period, period)
-    return t[steady], experiment.residual(t[steady], error[steady], period)
+    steady = metrics.whole_periods(t, period, period)
+    return t[steady], metrics.residual(t[steady], error[steady], period)
 
 
 def fight(record):
@@ -114,18 +116,18 @@ def measured(kind, name, record):
         return {'standstill_peak_to_peak_rad': (np.ptp(standstill(record)[1]), 'rad')}
     if kind in REVERSALS:
         left = steady_residual(record, REVERSAL_AMPLITUDE, REVERSALS[kind])[1]
-        return {f'{kind}_error_rad': (experiment.peak(left), 'rad')}
+        return {f'{kind}_error_rad': (metrics.peak(left), 'rad')}
     if kind == 'sine':
         left = steady_residual(record, servo.AMPLITUDE, servo.FREQUENCIES['0p4hz'])[1]
-        return {'sine_residual_rad': (experiment.peak(left), 'rad')}
+        return {'sine_residual_rad': (metrics.peak(left), 'rad')}
     if kind == 'step':
-        overshoot = experiment.overshoot_percent(record.truth['load_position'][:, 0], servo.STEP)
+        overshoot = metrics.overshoot_percent(record.truth['load_position'][:, 0], servo.STEP)
         return {'step_overshoot_percent': (overshoot, '%')}
     moving = record.t < MOVED
-    return {'fight_torque_rms_nm': (experiment.rms(fight(record)[~moving]), 'Nm'),
-            'synchronism_error_rms_rad_s': (experiment.rms(synchronism_error(record)[~moving]), 'rad/s'),
-            'move_fight_torque_rms_nm': (experiment.rms(fight(record)[moving]), 'Nm'),
-            'move_synchronism_error_rms_rad_s': (experiment.rms(synchronism_error(record)[moving]), 'rad/s')}
+    return {'fight_torque_rms_nm': (metrics.rms(fight(record)[~moving]), 'Nm'),
+            'synchronism_error_rms_rad_s': (metrics.rms(synchronism_error(record)[~moving]), 'rad/s'),
+            'move_fight_torque_rms_nm': (metrics.rms(fight(record)[moving]), 'Nm'),
+            'move_synchronism_error_rms_rad_s': (metrics.rms(synchronism_error(record)[moving]), 'rad/s')}
 
 
 def rows(done):
@@ -175,13 +177,13 @@ def figures(done):
 
 def standstill_figure(done):
     """Limit cycle of the load at rest and the torque of both motors, without and with bias."""
-    figure, axes = experiment.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
+    figure, axes = drawing.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
     for column, name in enumerate(('bias-off', 'bias-on')):
         record = done['standstill', name]
         t, y = standstill(record)
         axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH, FILTERED)[column])
         axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
-        experiment.draw_torques(axes[1, column], record)
+        drawing.draw_torques(axes[1, column], record)
         axes[1, column].set_xlabel('time [s]')
     axes[0, 0].set_xlim(SETTLED, SETTLED + 0.5)
     axes[0, 0].set_ylabel('azimuth [\N{MICRO SIGN}rad]')
@@ -193,7 +195,7 @@ def standstill_figure(done):
 
 def reversal_figure(done):
     """What lash leaves of a slow sine: reference and load, then the error without its fundamental."""
-    figure, axes = experiment.panels(3, size=(7.4, 5.6), sharex=True, height_ratios=(1, 1.2, 1.2))
+    figure, axes = drawing.panels(3, size=(7.4, 5.6), sharex=True, height_ratios=(1, 1.2, 1.2))
     t = done['reversal', 'bias-off'].t
     w = REVERSALS['reversal']
     axes[0, 0].plot(t, REVERSAL_AMPLITUDE * np.sin(w * t), color=INK)
@@ -216,10 +218,10 @@ def turning():
 
 def torques_figure(done):
     """Torque of both motors over the reversal, without and with bias."""
-    figure, axes = experiment.panels(3, size=(7.4, 5.6), sharex=True, sharey=True)
+    figure, axes = drawing.panels(3, size=(7.4, 5.6), sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
-        experiment.draw_torques(panel, record)
+        drawing.draw_torques(panel, record)
         panel.set_title(name)
         panel.set_ylabel('torque [Nm]')
     axes[2, 0].set_xlim(*turning())
@@ -233,7 +235,7 @@ def schedules_figure(done):
     names = list(SCHEDULES)
     sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
     step = [measured('step', name, done['step', name])['step_overshoot_percent'][0] for name in names]
-    figure, axes = experiment.panels(1, 2, size=(7.4, 3.2), sharey=True)
+    figure, axes = drawing.panels(1, 2, size=(7.4, 3.2), sharey=True)
     for panel, values, bound, label in ((axes[0, 0], sine, 100.0, 'left of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
                                         (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
         bars = panel.barh(names, values, color=[FILTERED if name == 'hold-fade' else RAW for name in names])
@@ -249,10 +251,10 @@ def schedules_figure(done):
 
 def structures_figure(done):
     """One speed loop on the mean speed against one for each motor, over the step of the paper."""
-    figure, axes = experiment.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
+    figure, axes = drawing.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
     for column, name in enumerate(STRUCTURES):
         record = done['structure', name]
-        experiment.draw_torques(axes[0, column], record)
+        drawing.draw_torques(axes[0, column], record)
         axes[1, column].plot(record.t, fight(record), color=INK)
         axes[0, column].set_title(name)
         axes[1, column].set_xlabel('time [s]')

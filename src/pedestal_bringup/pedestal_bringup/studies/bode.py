@@ -22,8 +22,10 @@ from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.run import closed_loop
-from pedestal_bringup.studies import experiment, servo
-from pedestal_bringup.studies.experiment import Case, Result, row
+from pedestal_bringup.studies import servo
+from pedestal_bringup.studies.rigs import drawing
+from pedestal_bringup.studies.rigs.cases import Case
+from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_common.compiled import compiled
 from pedestal_common.topics import AXES
 
@@ -297,7 +299,7 @@ def degrees(x):
 
 def drawn(curves, design):
     """Bode diagrams of the open and the closed loop: {label: (Response, colour)}, design(s) the open loop or None."""
-    figure, axes = experiment.panels(2, 2, sharex=True)
+    figure, axes = drawing.panels(2, 2, sharex=True)
     believed = {label: found.deviation < 0.2 for label, (found, _) in curves.items()}
     for column, title in enumerate(('open loop', 'closed loop')):
         gain, phase = axes[:, column]

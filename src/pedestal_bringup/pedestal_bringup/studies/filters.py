@@ -9,14 +9,13 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation.axis_filter import KINDS
+from acu_tracker.estimation.kinds import KINDS
 from acu_tracker.estimation.motion_models import MODELS
-from acu_tracker.estimation.params import Filter, Ukf
+from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.rigs import ensemble, profiles
+from pedestal_bringup.studies.rigs import drawing, ensemble, profiles
 from pedestal_bringup.studies.rigs.ensemble import Noise
+from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_bringup.trials import monte_carlo, tuning
 
 RUNS = 200
@@ -37,8 +36,8 @@ NOISES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
 RATES = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
 """Filters with a rate measurement, its standard deviation [rad/s]."""
 
-FILTERS = {**{kind: Filter(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
-           **{name: Filter(kind='current_statistical') for name in RATES}}
+FILTERS = {**{kind: FilterParameters(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
+           **{name: FilterParameters(kind='current_statistical') for name in RATES}}
 
 FIXED = ('imm', 'imm_ukf')
 """Filters that keep their default parameters."""
@@ -117,8 +116,8 @@ def batch(item):
         found[name] = settled(sums), sums[::THINNED].copy()
     if profile == RANGED[0]:
         t = times()
-        sums = ensemble.unscented_moments(Ukf(), t, profiles.truth(profile, t), profiles.distance(profile, t),
-                                          NOISES[noise], RANGED[1], SEED, first, count)
+        sums = ensemble.unscented_moments(UkfParameters(), t, profiles.truth(profile, t),
+                                          profiles.distance(profile, t), NOISES[noise], RANGED[1], SEED, first, count)
         found['imm_ukf'] = settled(sums), sums[::THINNED].copy()
     return found
 
@@ -227,7 +226,7 @@ COMPARED = {'current_statistical': RAW, 'current_statistical-rate-0.1': FILTERED
 
 def errors_figure(over_time, on, what='angle'):
     """Ensemble of the error over time, mean +-1 sigma, and dashed the sigma that the filter itself believes."""
-    figure, axes = experiment.panels(len(on), len(COMPARED), size=(7.4, 1.0 + 1.4 * len(on)), sharex=True,
+    figure, axes = drawing.panels(len(on), len(COMPARED), size=(7.4, 1.0 + 1.4 * len(on)), sharex=True,
                                      sharey='row')
     t = times()[::THINNED]
     after = t >= SETTLED
@@ -252,7 +251,7 @@ def errors_figure(over_time, on, what='angle'):
 
 def bars(values, on, metric, label, colour, text):
     """A panel of bars for each profile: figure, panels."""
-    figure, axes = experiment.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
+    figure, axes = drawing.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
     for panel, profile in zip(axes[0], on):
         found = {name: values.get((profile, name, SHOWN)) for name in SHOWN_FILTERS}
         drawn = panel.barh(list(found), [metric(name, at) if at else 0.0 for name, at in found.items()],
@@ -292,7 +291,7 @@ def nis_figure(values, on):
 
 def probabilities_figure(over_time, on):
     """Mode probabilities of the imm, mean over the runs."""
-    figure, axes = experiment.panels(len(on), size=(7.4, 1.0 + 1.2 * len(on)), sharex=True, sharey=True)
+    figure, axes = drawing.panels(len(on), size=(7.4, 1.0 + 1.2 * len(on)), sharex=True, sharey=True)
     for panel, profile in zip(axes[:, 0], on):
         sums = over_time[profile, 'imm', SHOWN]
         for j, (name, colour) in enumerate(zip(MODELS, (MOTOR_1, MOTOR_2, RAW, TRUTH))):
@@ -308,7 +307,7 @@ def probabilities_figure(over_time, on):
 
 def noise_figure(values, on):
     """Reduction of every filter under each noise: what it owes to the bandwidth of the receiver."""
-    figure, axes = experiment.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
+    figure, axes = drawing.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
     for panel, profile in zip(axes[0], on):
         for noise, colour, marker in zip(NOISES, (RAW, RAW, FILTERED, FILTERED), 'o^o^'):
             there = [name for name in SHOWN_FILTERS if (profile, name, noise) in values]

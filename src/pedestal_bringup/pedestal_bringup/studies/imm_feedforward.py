@@ -14,12 +14,10 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.motion_models import MODELS
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.modes import AUTOTRACK
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.rigs import feedforward_loop, profiles
+from pedestal_bringup.studies.rigs import cases, drawing, feedforward_loop, metrics, profiles
 from pedestal_bringup.studies.rigs.feedforward_loop import (
     REVERSALS,
     SIGMA,
@@ -31,6 +29,7 @@ from pedestal_bringup.studies.rigs.feedforward_loop import (
     imm,
     outcomes,
 )
+from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.parameters import as_dict
 
@@ -62,17 +61,17 @@ CASES |= {cv_name(axis, q): (axis, cv(q)) for axis in REVERSALS for q in CV}
 
 
 def drive_case(axis, tuned):
-    """A Case of reversals without a pause on an axis, tracked with a Filter."""
+    """A Case of reversals without a pause on an axis, tracked with a filter (FilterParameters)."""
     w = math.pi / REVERSALS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
                   profiles.RATE / w if name == axis else 0.0 for name in REVERSALS}
-    return experiment.Case(axis, 'uav_flyby', {
+    return cases.Case(axis, 'uav_flyby', {
         'tracking_receiver.target.kind': 'sine', 'tracking_receiver.target.angle.frequency': 0.5 * w / math.pi,
         'tracking_receiver.target.angle.range': 510.0, 'tracking_receiver.target.angle.elevation': DRIVE_ELEVATION,
         **amplitudes, 'tracking_receiver.receiver.latency': feedforward_loop.DELAY * T, 'scenario.program.interval': T,
         'adu.initial_azimuth': 0.0, 'adu.initial_elevation': DRIVE_ELEVATION,
         **{f'acu.{axis}.filter.{name}': value for name, value in as_dict(tuned).items()
-           if value != as_dict(Filter())[name]}}, DRIVE_SECONDS)
+           if value != as_dict(FilterParameters())[name]}}, DRIVE_SECONDS)
 
 
 DRIVE_CASES = {
@@ -139,11 +138,11 @@ def drive_rows(driven):
     """The rows of {name of DRIVE_CASES: (t, error)}."""
     result = []
     for name, (_, error) in driven.items():
-        result += [row(name, 'miss_rms_deg', math.degrees(experiment.rms(error)), 'deg'),
-                   row(name, 'miss_peak_deg', math.degrees(experiment.peak(error)), 'deg')]
+        result += [row(name, 'miss_rms_deg', math.degrees(metrics.rms(error)), 'deg'),
+                   row(name, 'miss_peak_deg', math.degrees(metrics.peak(error)), 'deg')]
         usual = f'{name.partition("/")[0]}/drive-kalman-cv'
         if name != usual:
-            ratio = experiment.rms(driven[usual][1]) / experiment.rms(error)
+            ratio = metrics.rms(driven[usual][1]) / metrics.rms(error)
             result.append(row(name, 'miss_ratio_to_kalman_cv', ratio, '', 3.0, '>= 3'))
     return result
 
@@ -200,7 +199,7 @@ def from_first_turn(axis):
 def miss_figure(axis, those, found):
     """The paper's figures of the miss, one run of each and the mean over the runs."""
     names = ('kalman-cv', 'imm', 'imm-predicted')
-    figure, axes = experiment.panels(len(names), size=(7.4, 6.4), sharex=True, sharey=True)
+    figure, axes = drawing.panels(len(names), size=(7.4, 6.4), sharex=True, sharey=True)
     t, counts, _ = from_first_turn(axis)
     for name, panel in zip(names, axes[:, 0]):
         case = f'{axis}/{name}'
@@ -218,7 +217,7 @@ def miss_figure(axis, those, found):
 
 def feedforward_figure():
     """What is fed forward through one reversal, one run, beside the truth."""
-    figure, axes = experiment.panels(2, size=(7.4, 5.4), sharex=True)
+    figure, axes = drawing.panels(2, size=(7.4, 5.4), sharex=True)
     t, counts, target = from_first_turn('azimuth')
     for panel, field, column, label in ((axes[0, 0], 'rate', 1, 'rate [deg/s]'),
                                         (axes[1, 0], 'acceleration', 2, 'acceleration [deg/s2]')):
@@ -237,7 +236,7 @@ def feedforward_figure():
 
 def probability_figure():
     """Which model the IMM believes in while the target turns, mean of one BATCH."""
-    figure, axes = experiment.panels(2, size=(7.4, 4.6), sharex=True, height_ratios=(1, 1.6))
+    figure, axes = drawing.panels(2, size=(7.4, 4.6), sharex=True, height_ratios=(1, 1.6))
     t, counts, target = from_first_turn('azimuth')
     mu = feedforward_loop.steps_of(*CASES['azimuth/imm'], 0, feedforward_loop.BATCH)['mu'][:, counts].mean(axis=0)
     axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=INK)
@@ -254,7 +253,7 @@ def probability_figure():
 
 def tuning_figure(found):
     """Miss against the noise of the rate that it is bought with."""
-    figure, axes = experiment.panels(1, 2, size=(7.4, 3.8), sharex=True, sharey=True)
+    figure, axes = drawing.panels(1, 2, size=(7.4, 3.8), sharex=True, sharey=True)
     for axis, panel in zip(REVERSALS, axes[0]):
         panel.loglog(*conventional(found, axis), '.-', color=TRUTH, label='kalman-cv, q '
                      f'{CV[0]:g} to {CV[-1]:g}')
@@ -274,7 +273,7 @@ def tuning_figure(found):
 
 def drive_figure(through):
     """Miss of the product in reversals without a pause, each filter."""
-    figure, axes = experiment.panels(2, size=(7.4, 4.8), sharex=True)
+    figure, axes = drawing.panels(2, size=(7.4, 4.8), sharex=True)
     for axis, panel in zip(REVERSALS, axes[:, 0]):
         for name, colour in (('kalman-cv', TRUTH), ('imm', MOTOR_1), ('imm-default', FILTERED)):
             t, miss = through[f'{axis}/drive-{name}']

@@ -9,9 +9,8 @@ import math
 import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.rigs import ensemble, feedforward_loop, profiles
+from pedestal_bringup.studies.rigs import drawing, ensemble, feedforward_loop, profiles
+from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_bringup.trials import monte_carlo
 
 RUNS = 200
@@ -113,7 +112,7 @@ def remarks(values):
 def _panels(found, what, label, names):
     """Truth and mean estimates above, mean errors +-1 sigma below."""
     t, truth, turning = motion()
-    figure, axes = experiment.panels(2, size=(7.4, 5.4), sharex=True)
+    figure, axes = drawing.panels(2, size=(7.4, 5.4), sharex=True)
     of = truth[('angle', 'rate', 'acceleration').index(what)]
     axes[0, 0].plot(t, np.degrees(of), color=INK, linestyle='--', linewidth=0.8, label='truth')
     for name in names:
@@ -144,7 +143,7 @@ def acceleration_figure(found):
 
 def sharpness_figure(values):
     """Errors of rate and acceleration against the sharpness of the reversal."""
-    figure, axes = experiment.panels(1, 2, size=(7.4, 3.6), sharex=True)
+    figure, axes = drawing.panels(1, 2, size=(7.4, 3.6), sharex=True)
     x = [peak_acceleration(reversal) for reversal in REVERSALS]
     for i, (panel, label) in enumerate(zip(axes[0], ('rate rms [deg/s]', 'acceleration rms [deg/s2]'))):
         for name, colour in COLOURS.items():

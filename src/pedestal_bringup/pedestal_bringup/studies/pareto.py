@@ -10,10 +10,9 @@ import math
 import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.rigs import feedforward_loop
+from pedestal_bringup.studies.rigs import drawing, feedforward_loop
 from pedestal_bringup.studies.rigs.feedforward_loop import Source
+from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_bringup.trials import monte_carlo
 
 RUNS = 50
@@ -128,7 +127,7 @@ def remarks(points):
 
 def miss_figure(points):
     """Miss against the rate noise that it is bought with, a curve for every filter."""
-    figure, axes = experiment.panels(1, size=(7.4, 4.8))
+    figure, axes = drawing.panels(1, size=(7.4, 4.8))
     panel = axes[0, 0]
     for name, colour in COLOURS.items():
         panel.loglog(*curve(points, name), '.-', ms=5.0, color=colour, label=f'{name}, {TUNINGS[name][0]}')

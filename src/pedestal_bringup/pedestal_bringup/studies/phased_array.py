@@ -12,8 +12,7 @@ import math
 import numpy as np
 
 from pedestal_bringup.analysis import results
-from pedestal_bringup.studies import phased_array_figures as figures
-from pedestal_bringup.studies.experiment import Case, Result, overshoot_percent, peak, rms, row
+from pedestal_bringup.studies.rigs import phased_array_figures as figures
 from pedestal_bringup.studies.rigs.angle_loop import (
     GRID,
     LENGTH,
@@ -23,6 +22,9 @@ from pedestal_bringup.studies.rigs.angle_loop import (
     delay_limit,
     spectral_radius,
 )
+from pedestal_bringup.studies.rigs.cases import Case
+from pedestal_bringup.studies.rigs.metrics import overshoot_percent, peak, rms
+from pedestal_bringup.studies.rigs.rows import Result, row
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 

@@ -15,12 +15,12 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import axis_filter
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.measurement import AxisMeasurement
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.experiment import Result, row
-from pedestal_bringup.studies.rigs import ensemble, profiles
+from pedestal_bringup.studies.rigs import drawing, ensemble, profiles
 from pedestal_bringup.studies.rigs.ensemble import PERIOD as T
+from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 
@@ -67,9 +67,9 @@ BATCH, SEED = 25, 1
 
 
 def filter_of(a_max, floor):
-    """A 'current' statistical Filter that takes the measured rate; a_max in rad/s2."""
-    model = dataclasses.replace(Filter().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
-    return Filter(kind='current_statistical', rate_measurement=True, current_statistical=model)
+    """A 'current' statistical filter (FilterParameters) that takes the measured rate; a_max in rad/s2."""
+    model = dataclasses.replace(FilterParameters().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
+    return FilterParameters(kind='current_statistical', rate_measurement=True, current_statistical=model)
 
 
 @compiled
@@ -78,13 +78,13 @@ def _settle(f, c, rate, R_rate, steps):
     axis_filter.start(f[0], c[0], 0.0, SIGMA * SIGMA, 1.0)
     for _ in range(steps):
         axis_filter.predict(f[0], c[0], T)
-        axis_filter.correct(f[0], c[0], 0.0, SIGMA * SIGMA, rate, R_rate)
+        axis_filter.correct(f[0], c[0], AxisMeasurement(0.0, SIGMA * SIGMA, rate, R_rate))
 
 
 @compiled
 def _step(f, c, y, y_rate, R_rate):
     axis_filter.predict(f[0], c[0], T)
-    axis_filter.correct(f[0], c[0], y, SIGMA * SIGMA, y_rate, R_rate)
+    axis_filter.correct(f[0], c[0], AxisMeasurement(y, SIGMA * SIGMA, y_rate, R_rate))
 
 
 def settled(sigma_a, rate_sigma):
@@ -233,7 +233,7 @@ def figures():
 
 def bode_figure():
     """Responses of angle and rate with and without the rate, and the error they leave."""
-    figure, axes = experiment.panels(2, 2, size=(7.4, 5.6), sharex=True)
+    figure, axes = drawing.panels(2, 2, size=(7.4, 5.6), sharex=True)
     for name, colour in COLOURS.items():
         angle, rate = responses(*settled(MAIN, RATE_SIGMA[name]), BAND)
         for column, G in enumerate((angle, rate)):
@@ -254,7 +254,7 @@ def bode_figure():
 
 def sigma_a_figure():
     """What the rate adds to the band of the rate and takes from the dynamic error, over sigma_a."""
-    figure, axes = experiment.panels(1, 2, size=(7.4, 3.4), sharex=True)
+    figure, axes = drawing.panels(1, 2, size=(7.4, 3.4), sharex=True)
     sigma_a = np.geomspace(SIGMA_A[0], SIGMA_A[-1], 13)
     for name, colour in COLOURS.items():
         values = [measures(s, RATE_SIGMA[name]) for s in sigma_a]
@@ -269,7 +269,7 @@ def sigma_a_figure():
 
 def flyby_figure():
     """The paper's figures 1 to 8 on the flyby: rate, error of angle and rate, acceleration."""
-    figure, axes = experiment.panels(4, size=(7.4, 8.6), sharex=True)
+    figure, axes = drawing.panels(4, size=(7.4, 8.6), sharex=True)
     t, target = flyby()
     y, y_rate, _ = flown('position-rate', 0)
     near = np.abs(t - 0.5 * profiles.DURATION) <= 0.2 * profiles.DURATION

@@ -10,8 +10,9 @@ import math
 import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.experiment import Case, Result, row
+from pedestal_bringup.studies.rigs import cases, drawing, metrics
+from pedestal_bringup.studies.rigs.cases import Case
+from pedestal_bringup.studies.rigs.rows import Result, row
 
 STEP = 0.174
 """Of figure 5 [rad]."""
@@ -94,7 +95,7 @@ def step_case(name):
 
 def sine_case(name, reading):
     """PERIODS of one reading of the paper's sine."""
-    return experiment.sine_case(Case(name, 'servo_sine', CASES[name]), FREQUENCIES[reading], PERIODS)
+    return cases.sine_case(Case(name, 'servo_sine', CASES[name]), FREQUENCIES[reading], PERIODS)
 
 
 def gust_case(name, **more):
@@ -105,9 +106,9 @@ def gust_case(name, **more):
 
 def step_metrics(record):
     t, y = record.t, record.truth['load_position'][:, 0]
-    return {'step_overshoot_percent': experiment.overshoot_percent(y, STEP),
-            'step_settling_2percent_s': experiment.settling_time(t, y, STEP, BAND),
-            'step_crossings': experiment.crossings(y, STEP)}
+    return {'step_overshoot_percent': metrics.overshoot_percent(y, STEP),
+            'step_settling_2percent_s': metrics.settling_time(t, y, STEP, BAND),
+            'step_crossings': metrics.crossings(y, STEP)}
 
 
 def sine_error(record, w):
@@ -118,17 +119,17 @@ def sine_error(record, w):
 def sine_metrics(record, reading):
     w = FREQUENCIES[reading]
     t, error, period = record.t, sine_error(record, w), 2.0 * math.pi / w
-    steady = experiment.whole_periods(t, period, period)
-    amplitude, fitted = experiment.amplitude_and_period(t[steady], record.truth['load_position'][steady, 0], period)
-    return {f'sine_{reading}_max_error_rad': experiment.peak(error[steady]),
-            f'sine_{reading}_rms_error_rad': experiment.rms(error[steady]),
+    steady = metrics.whole_periods(t, period, period)
+    amplitude, fitted = metrics.amplitude_and_period(t[steady], record.truth['load_position'][steady, 0], period)
+    return {f'sine_{reading}_max_error_rad': metrics.peak(error[steady]),
+            f'sine_{reading}_rms_error_rad': metrics.rms(error[steady]),
             f'sine_{reading}_amplitude_rad': amplitude, f'sine_{reading}_period_s': fitted,
-            f'sine_{reading}_start_error_rad': experiment.peak(error[t < period])}
+            f'sine_{reading}_start_error_rad': metrics.peak(error[t < period])}
 
 
 def gust_metrics(record):
     t, y = record.t, record.truth['load_position'][:, 0]
-    return {'gust_1000nm_peak_rad': experiment.peak(y[t >= GUST_START] - y[t < GUST_START][-1])}
+    return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START] - y[t < GUST_START][-1])}
 
 
 RUNS = {
@@ -213,14 +214,14 @@ def figures(done):
 def step_figure(done):
     """Figure 5: the load's angle, and the torque of both motors below."""
     names = ('paper-r1', 'paper-r2', 'best')
-    figure, axes = experiment.panels(4, size=(7.4, 8.0), sharex=True, height_ratios=(2.2, 1, 1, 1))
+    figure, axes = drawing.panels(4, size=(7.4, 8.0), sharex=True, height_ratios=(2.2, 1, 1, 1))
     top = axes[0, 0]
     top.axhline(STEP, color=INK, linewidth=0.8, linestyle='--', label='reference')
     for name, below in zip(names, axes[1:, 0]):
         record = done[name, 'step']
         t = record.t
         top.plot(t, record.truth['load_position'][:, 0], color=COLOURS[name], linewidth=1.4, label=name)
-        experiment.draw_torques(below, record)
+        drawing.draw_torques(below, record)
         below.set_title(f'{name}: torque of the motors')
         below.set_ylabel('torque [Nm]')
         below.set_ylim(-100.0, 100.0)
@@ -235,7 +236,7 @@ def step_figure(done):
 
 def sine_figure(done):
     """Figure 6: reference and load, errors of both readings, the error of best on its own scale."""
-    figure, axes = experiment.panels(3, size=(7.4, 7.0), sharex=True, height_ratios=(1.4, 1.2, 1))
+    figure, axes = drawing.panels(3, size=(7.4, 7.0), sharex=True, height_ratios=(1.4, 1.2, 1))
     period = 2.0 * math.pi / FREQUENCIES['0p4hz']
     record = done['paper-r1', '0p4hz']
     t = record.t / period
@@ -264,7 +265,7 @@ def sine_figure(done):
 
 def gust_figure(done):
     """How far a gust moves the load."""
-    figure, axes = experiment.panels(1, size=(7.4, 3.4))
+    figure, axes = drawing.panels(1, size=(7.4, 3.4))
     axes = axes[0, 0]
     for name in ('paper-r1', 'adrc', 'best'):
         record = done[name, 'gust']
@@ -284,7 +285,7 @@ def gust_figure(done):
 
 def inertia_figure(done):
     """The step of best with 20 % more and less load, around its end, and the torque it takes."""
-    figure, axes = experiment.panels(2, size=(7.4, 5.2), sharex=True)
+    figure, axes = drawing.panels(2, size=(7.4, 5.2), sharex=True)
     for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as known'),
                         ('best-inertia-plus', 'load 20 % heavier')):
         record = done[name, 'step']

@@ -18,7 +18,7 @@ import pathlib
 import numpy as np
 import yaml
 
-from acu_tracker.estimation.axis_filter import KINDS
+from acu_tracker.estimation.kinds import KINDS
 from acu_tracker.modes import AUTOTRACK, STANDBY
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import RANGE

@@ -12,8 +12,7 @@ import math
 import numpy as np
 from scipy.optimize import minimize
 
-from acu_tracker.estimation.axis_filter import named_models
-from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.estimation.kinds import named_models
 from pedestal_common import parameters
 
 RANGES = {'alpha_beta.alpha': (0.003, 0.8, 8), 'alpha_beta_gamma.alpha': (0.003, 0.8, 8),
@@ -30,10 +29,9 @@ FAILED = 1e300
 
 
 def names(params):
-    """The parameters that are searched for a filter_params.Filter."""
+    """The parameters that are searched for FilterParameters."""
     if params.kind.startswith('imm'):
-        models = [MODELS[code] for code in named_models(params.imm.models)]
-        return ('imm.dwell', *(f'imm.{name}' for model in models for name in _of_kind(model)))
+        return ('imm.dwell', *(f'imm.{name}' for model in named_models(params.imm.models) for name in _of_kind(model)))
     return _of_kind(params.kind)
 
 
@@ -42,7 +40,7 @@ def _of_kind(kind):
 
 
 def tuned(params, criterion, searched=None):
-    """(parameters with the least criterion found, that criterion), from a filter_params.Filter or Ukf.
+    """(parameters with the least criterion found, that criterion), from FilterParameters or UkfParameters.
 
     criterion: function of them, infinite or NaN where it does not work. searched: names, None: those of `names`.
     Raises ValueError where it works nowhere.

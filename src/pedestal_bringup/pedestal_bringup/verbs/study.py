@@ -26,7 +26,7 @@ def main(options):
         for name, line in studies.descriptions().items():
             print(f'  {name:10} {line}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
-    from pedestal_bringup.studies import experiment
+    from pedestal_bringup.studies.rigs import drawing, rows
     output = options.output or pathlib.Path('studies', options.name)
     console.check_json(options.json)
     study = studies.study(options.name)
@@ -37,9 +37,9 @@ def main(options):
         result = study.run(progress, **many)
         for name, draw in result.figures.items():
             progress(None, f'drawing {name}')
-            experiment.save(draw, output / f'{name}.png')
+            drawing.save(draw, output / f'{name}.png')
     console.show_study(f'study {options.name}', result.rows if result.shown is None else result.shown,
-                       experiment.missed)
+                       rows.missed)
     for remark in result.remarks:
         print(remark)
     print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')

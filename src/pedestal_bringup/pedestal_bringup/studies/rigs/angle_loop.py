@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import alpha_beta, axis_filter
-from acu_tracker.estimation.params import Ca, Filter
-from acu_tracker.geometry import deck_reference
+from acu_tracker.estimation.measurement import AxisMeasurement
+from acu_tracker.estimation.params import CaParameters, FilterParameters
+from acu_tracker.geometry import attitude as attitudes
 from acu_tracker.servo import beam_loop
 from adu_drive import electronic_beam
 from pedestal_common.compiled import compiled
@@ -84,7 +85,7 @@ class Better:
         n = len(target)
         nothing, beam, seen = np.zeros(n), np.zeros(n), np.zeros(n)
         late = np.maximum(np.arange(n) - self.late, 0)
-        constants = axis_filter.constants(Filter(kind='ca', ca=Ca(noise=self.jerk)))
+        constants = axis_filter.constants(FilterParameters(kind='ca', ca=CaParameters(noise=self.jerk)))
         _better(constants, self.sigma**2 / self.period, self.period, self.hold,
                 GRID * (self.delay if self.known is None else self.known), self.tau, np.asarray(target),
                 nothing if noise is None else noise, attitude[late] if self.ins else nothing,
@@ -151,21 +152,22 @@ def _better(constants_of_filter, variance, period, hold, delay, tau, target, noi
         # The carrier turns the target by the attitude: what is left is where the earth has it.
         smoothing.put(s, beam[i] + (target[i] - beam[i] + noise[i]) - attitude[i], 0.0)
         if i > 0 and tau > 0.0:
-            acceleration = deck_reference.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID, tau)
+            acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID, tau)
         if (i + 1) % period == 0:
             y = smoothing.smoothed(s, smoothing.NO_SMOOTHING, period, period)
             if running:
+                m = AxisMeasurement(y, variance, math.nan, 0.0)
                 axis_filter.predict(f, c, period * GRID)
-                seen[i], _, _, _ = axis_filter.consistency(f, y, variance, math.nan, 0.0)
-                axis_filter.correct(f, c, y, variance, math.nan, 0.0)
+                seen[i] = axis_filter.innovation(f, m).nu
+                axis_filter.correct(f, c, m)
             else:
                 axis_filter.start(f, c, y, variance, 1.0)
             running = True
             block = i
         if running and i % hold == 0:
             ahead = delay + 0.5 * hold * GRID                  # from the stamp to the middle of the interval in force
-            earth, _, _ = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + ahead)
-            aimed = earth + attitude[i] + deck_reference.turn(rate[i], acceleration, 0.5 * GRID + ahead)
+            earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + ahead).angle
+            aimed = earth + attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID + ahead)
         command(inputs[0], i, running and i % hold == 0, aimed)
         electronic_beam.step(state[0], constants[0], inputs[0], outputs[0])
 

@@ -10,7 +10,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from acu_tracker.estimation import axis_filter, unscented
-from acu_tracker.params import TrackerParameters
+from acu_tracker.estimation.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
+from acu_tracker.estimation.params import TrackerParameters
+from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
 PERIOD = 0.01
@@ -61,7 +63,7 @@ def records(truth, noise, seed, first, count):
 
 
 def moments(params, t, truth, noise, measured):
-    """MOMENTS (n,) of a filter (filter_params.Filter) over measured records as of `records`.
+    """MOMENTS (n,) of a filter (FilterParameters) over measured records as of `records`.
 
     The filter is told sigma and rate_sigma, and takes both for white.
     """
@@ -102,7 +104,7 @@ def _add(s, o, angle, rate, acceleration, y):
 
 
 def unscented_moments(params, t, truth, distance, noise, range_sigma, seed, first, count):
-    """MOMENTS (n,) of the azimuth of the IMM of unscented filters (params: filter_params.Ukf).
+    """MOMENTS (n,) of the azimuth of the IMM of unscented filters (params: UkfParameters).
 
     The target is at elevation 0, `distance` (n,) [m] away, measured with range_sigma [m], white; both angles as
     `noise` says, the azimuth with the same draws as in `records`.
@@ -121,7 +123,6 @@ def unscented_moments(params, t, truth, distance, noise, range_sigma, seed, firs
 def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, ranges, R_range, rate_variance, sums):
     out = np.zeros(1, axis_filter.ESTIMATE)
     o = out[0]
-    o.mu[:] = math.nan
     for run in range(len(azimuth)):
         state = np.zeros(1, unscented.STATE)
         s = state[0]
@@ -129,18 +130,20 @@ def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, 
             A, E, r = azimuth[run, k], elevation[run, k], ranges[run, k]
             o.nis = math.nan
             if k == 0:
-                unscented.start(s, c[0], A, 0.0, 0.0, E, 0.0, 0.0, R, 0.0, rate_variance, R, 0.0, rate_variance, r,
-                                R_range)
+                known = AxisVariances(R, 0.0, rate_variance)
+                first = Estimate(Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0)), (known, known))
+                unscented.start(s, c[0], first, r, R_range)
             else:
                 unscented.predict(s, c[0], T)
-                nu, S, _, _, _, _ = unscented.innovation(s, A, E, r, R, R, R_range)
-                o.nis = nu * nu / S
-                unscented.correct(s, A, E, r)
+                m = Measurement(0.0, (AxisMeasurement(A, R, math.nan, math.nan),
+                                      AxisMeasurement(E, R, math.nan, math.nan)), r, R_range)
+                o.nis = unscented.innovation(s, m).axis[0].chi_square
+                unscented.correct(s, m)
             unscented.predict(s, c[0], 0.0)
-            o.angle, o.rate, o.acceleration, _, _, _ = unscented.expected_angles(s)
-            o.variance, o.covariance, o.rate_variance, _, _, _, _ = unscented.expected_variances(s)
-            for j in range(len(unscented.MODES)):
-                o.mu[unscented.MODES[j]] = s.mu[j]
+            o.angle, o.rate, o.acceleration = unscented.expected(s).azimuth
+            axes, _ = unscented.variances(s)
+            o.variance, o.covariance, o.rate_variance = axes[0]
+            unscented.probabilities(s, o.mu)
             _add(sums[k], o, angle[k], rate[k], acceleration[k], A)
 
 

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.linalg import expm
 
 from acu_tracker.estimation import axis_filter
-from acu_tracker.estimation.params import Filter
+from acu_tracker.estimation.measurement import AxisMeasurement
+from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.servo import feedforward
-from pedestal_bringup.studies import experiment
-from pedestal_bringup.studies.rigs import ensemble, profiles
+from pedestal_bringup.studies.rigs import ensemble, metrics, profiles
 from pedestal_bringup.studies.rigs.ensemble import PERIOD as T
 from pedestal_bringup.studies.rigs.profiles import RATE, STROKE
 from pedestal_bringup.trials import monte_carlo
@@ -89,11 +89,11 @@ def _follow(target, known, f, c, lead, M, normals, out):
                     axis_filter.start(f[0], c[0], y, R, RATE)
                 else:
                     axis_filter.predict(f[0], c[0], T)
-                    axis_filter.correct(f[0], c[0], y, R, math.nan, math.nan)
+                    axis_filter.correct(f[0], c[0], AxisMeasurement(y, R, math.nan, math.nan))
                 _, v, a = axis_filter.outlook(f[0], c[0], lead)
             if len(known) > 0:
                 v, a = known[k]
-            u = feedforward.rate(e, 0.0, feedforward.ahead(v, a, K_V, K_A), K_P)
+            u = feedforward.rate(e, 0.0, feedforward.fed(v, a, K_V, K_A), K_P)
             step = out[i, k]
             step.miss, step.rate, step.acceleration = target[k, 0] - theta, v, a
             axis_filter.probabilities(f[0], c[0], step.mu)
@@ -107,13 +107,13 @@ def _follow(target, known, f, c, lead, M, normals, out):
 class Source:
     """Where rate and acceleration come from: a filter, or None for the truth; `predicted` to the instant of the
     command, or as they were when the miss was measured."""
-    filter: Filter | None
+    filter: FilterParameters | None
     predicted: bool = False
 
 
 def filter_of(kind, **groups):
-    """A filter_params.Filter of a kind with groups of its parameters changed: cv=dict(noise=...)."""
-    return Filter(kind=kind, **{name: dataclasses.replace(getattr(Filter(), name), **values)
+    """FilterParameters of a kind with groups of its parameters changed: cv=dict(noise=...)."""
+    return FilterParameters(kind=kind, **{name: dataclasses.replace(getattr(FilterParameters(), name), **values)
                                 for name, values in groups.items()})
 
 
@@ -129,7 +129,7 @@ def ca(q):
 
 def imm(q_ca, predicted):
     """A quiet cv, a ca of q_ca [deg/s3/sqrt(Hz)], a lively current_statistical; each holds for 5 s."""
-    default = Filter().imm
+    default = FilterParameters().imm
     bank = {
         'models': 'cv ca current_statistical', 'dwell': 5.0,
         'cv': dataclasses.replace(default.cv, noise=math.radians(0.003)),
@@ -157,8 +157,8 @@ def steps_of(axis, source, first, count):
         known = np.column_stack(profiles.s_motion(at, STROKE, RATE, REVERSALS[axis])[1:])
     [normals] = ensemble.drawn(SEED, first, count, len(t), 1)
     out = np.zeros((count, len(t)), STEP)
-    _follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(source.filter or Filter()), lead,
-            rate_loop_step(*RATE_LOOP), normals, out)
+    c = axis_filter.constants(source.filter or FilterParameters())
+    _follow(target, known, np.zeros(1, axis_filter.FILTER), c, lead, rate_loop_step(*RATE_LOOP), normals, out)
     return out
 
 
@@ -199,7 +199,7 @@ class Outcome:
         return {'miss_rms_deg': (math.degrees(math.sqrt(squares.mean())), 'deg'),
                 'miss_worst_second_deg': (math.degrees(math.sqrt(windows.max())), 'deg'),
                 'miss_peak_deg': (math.degrees(self.peak), 'deg'),
-                'rate_noise_deg_s': (math.degrees(experiment.rms(self.rate_rms[counts & ~turning])), 'deg/s')}
+                'rate_noise_deg_s': (math.degrees(metrics.rms(self.rate_rms[counts & ~turning])), 'deg/s')}
 
 
 def outcomes(cases, count, pool, progress=lambda share, text: None):

@@ -2,7 +2,7 @@
 import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies import experiment
+from pedestal_bringup.studies.rigs import drawing
 from pedestal_bringup.studies.rigs.angle_loop import GRID
 
 COLOURS = (FILTERED, TRUTH, MOTOR_2, MOTOR_1, INK)
@@ -11,7 +11,7 @@ SMOOTHED = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, moving a
 
 def side_by_side(rows, **options):
     """(figure, axes (rows, 3)) with a column for each smoothing."""
-    figure, axes = experiment.panels(rows, 3, size=(9.6, 1.2 + 2.4 * rows), sharey='row', sharex=True, **options)
+    figure, axes = drawing.panels(rows, 3, size=(9.6, 1.2 + 2.4 * rows), sharey='row', sharex=True, **options)
     for column, title in zip(axes.T, SMOOTHED.values()):
         column[0].set_title(title, fontsize=10)
     return figure, axes
@@ -55,7 +55,7 @@ def lags(done, title, seconds):
 
 def stability(limits):
     """Largest stable delays {Paper: (bisected, by eigenvalues) [ms]} over alpha and over the slope."""
-    figure, axes = experiment.panels(1, 3, size=(9.6, 3.6))
+    figure, axes = drawing.panels(1, 3, size=(9.6, 3.6))
     for panel, T in zip(axes[0], (10, 5)):
         for S, colour in zip(SMOOTHED, COLOURS):
             found = {loop.alpha: both for loop, both in limits.items() if loop.smoothing == S and loop.period == T
@@ -81,7 +81,7 @@ def stability(limits):
 
 def better(errors, seconds):
     """True errors {case: (without noise, jitter (n,)) [rad]} of the paper's loop and of better ones."""
-    figure, axes = experiment.panels(3, size=(7.4, 7.6), sharex=True)
+    figure, axes = drawing.panels(3, size=(7.4, 7.6), sharex=True)
     lines = {'paper': RAW, 'paper-delta': INK, 'type-2': MOTOR_2, 'tracked-10ms': MOTOR_1, 'best': FILTERED}
     first = slice(*(round(t / GRID) for t in seconds))
     t = GRID * np.arange(first.start, first.stop)
@@ -109,7 +109,7 @@ def envelope(x, width=10):
 
 def loss(records, seconds):
     """True errors {label: (n,) in beamwidths} of a loop just before and after it loses the target."""
-    figure, axes = experiment.panels(1, size=(7.4, 3.6))
+    figure, axes = drawing.panels(1, size=(7.4, 3.6))
     panel, first = axes[0, 0], slice(*(round(t / GRID) for t in seconds))
     for (label, error), colour in zip(records.items(), COLOURS):
         panel.plot(GRID * np.arange(first.start, first.stop), error[first], color=colour, linewidth=1.0, label=label)

@@ -1,0 +1,42 @@
+"""The target filter of angles: an `axis_filter` each for azimuth and elevation, f and c their records (2,)."""
+import math
+
+from acu_tracker.estimation import axis_filter
+from acu_tracker.estimation.measurement import Estimate, Innovation
+from acu_tracker.geometry.motion import Motion
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def start(f, c, m, rate_sigma):
+    """Begin at a Measurement, the rates unknown to rate_sigma [rad/s]."""
+    for i in range(2):
+        axis_filter.start(f[i], c[i], m.axis[i].angle, m.axis[i].variance, rate_sigma)
+
+
+@compiled
+def predict(f, c, T):
+    """Predict by T [s] >= 0 from the last measurement, for what follows."""
+    for i in range(2):
+        axis_filter.predict(f[i], c[i], T)
+
+
+@compiled
+def innovation(f, m):
+    """Innovation of a Measurement against what `predict` left; they know nothing of the range."""
+    return Innovation((axis_filter.innovation(f[0], m.axis[0]), axis_filter.innovation(f[1], m.axis[1])), math.nan,
+                      math.nan)
+
+
+@compiled
+def correct(f, c, m):
+    """Take a Measurement into what `predict` left."""
+    for i in range(2):
+        axis_filter.correct(f[i], c[i], m.axis[i])
+
+
+@compiled
+def read(f):
+    """Estimate of what `predict` left."""
+    azimuth, elevation = axis_filter.expected(f[0]), axis_filter.expected(f[1])
+    return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(azimuth), axis_filter.variances(elevation)))

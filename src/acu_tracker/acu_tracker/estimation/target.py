@@ -1,0 +1,165 @@
+"""The target between the deck, where it is measured and pointed at, and the frame in which it is filtered.
+
+With a measured range the estimate is the line of sight of the INS, otherwise that of the antenna (`lever_arm`); its
+angles are those of the earth, near the zenith those of a tilted frame (`estimate_frame`).
+"""
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from acu_tracker.estimation import tracker
+from acu_tracker.estimation.measurement import (
+    NO_INNOVATION,
+    AxisMeasurement,
+    AxisVariances,
+    Estimate,
+    Measurement,
+    error_variance,
+)
+from acu_tracker.geometry import attitude, deck_reference, estimate_frame, lever_arm
+from acu_tracker.geometry.deck_reference import STILL, Attitude
+from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, line_of_sight
+from acu_tracker.geometry.vector import Vector, rotated
+from pedestal_common import line_of_sight as pointing
+from pedestal_common.compiled import compiled
+
+TARGET = np.dtype([('tracker', tracker.TRACKER), ('frame', estimate_frame.FRAME),
+                   ('lever_arm', lever_arm.LEVER_ARM)], align=True)
+
+GATED, STALE, NO_ATTITUDE = tracker.GATED, tracker.STALE, tracker.STALE + 1
+"""What `take` makes of an error: what the tracker does, or NO_ATTITUDE."""
+
+Followed = namedtuple('Followed', 'framed motion')
+"""A Motion to be pointed at: in the frame of the estimate (framed 1) or in earth angles (framed 0)."""
+
+
+def initialise(g):
+    """No estimate; g (n,) of TARGET."""
+    g['frame']['mat'] = np.eye(3)
+
+
+@compiled
+def _measured_direction(g, p, deck, u, azimuth, elevation):
+    """(azimuth, elevation) in the frame of a direction given by deck angles [rad], the attitude last found."""
+    x, y, z = pointing.direction(azimuth, elevation)
+    v = lever_arm.from_ins(g.lever_arm, p.lever_arm, u.range if deck.stabilised else math.nan, g.tracker.running,
+                           Vector(x, y, z))
+    v = rotated(deck.mat_ed, v)
+    azimuth, elevation = pointing.earth_angles(v.x, v.y, v.z)
+    if g.frame.tilted:
+        return estimate_frame.direction_to_frame(g.frame, azimuth, elevation)
+    return azimuth, elevation
+
+
+@compiled
+def _measured_rates(g, deck, u, at):
+    """(azimuth, elevation) rates [rad/s] of the target in the frame: those of the antenna and of the error; the
+    attitude is the one last found."""
+    n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, u.cross_elevation, u.elevation, u.error_rate[0],
+                                  u.error_rate[1])
+    v, dv = Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5])
+    if deck.stabilised or g.frame.tilted:
+        framed = estimate_frame.of_deck(g.frame, attitude.found(deck))
+        v, dv = lever_arm.to_ins(g.lever_arm, v, dv)
+        return deck_reference.earth_rates(framed, v, dv)
+    motion = angles(LineOfSight(v, dv, STILL))
+    return motion.azimuth.rate, motion.elevation.rate
+
+
+@compiled
+def take(g, p, c, deck, u, at, seen, restart_gap):
+    """Filter the receiver's error of INPUTS u: (STARTED, ACCEPTED, GATED, STALE or NO_ATTITUDE; its Innovation).
+
+    p, c: records of SharedParameters and of tracker.CONSTANTS; deck: ATTITUDE; at: Pointing of the antenna when the
+    error was measured; seen: deck angles (azimuth, elevation) of the target [rad], the antenna displaced by the error;
+    restart_gap: as in tracker.observe.
+    """
+    e = p.tracker.receiver
+    t = u.error_stamp - e.age
+    if not g.tracker.running:
+        estimate_frame.level(g.frame)
+    azimuth, elevation = seen
+    if deck.stabilised or g.frame.tilted:
+        if not attitude.at(deck, p, t):
+            return NO_ATTITUDE, NO_INNOVATION
+        azimuth, elevation = _measured_direction(g, p, deck, u, azimuth, elevation)
+    azimuth_rate, elevation_rate = math.nan, math.nan
+    if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
+        azimuth_rate, elevation_rate = _measured_rates(g, deck, u, at)
+    R = error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e)
+    R_rate = u.error_rate_sigma * u.error_rate_sigma
+    cos_el = max(math.cos(elevation), 0.01)
+    axis = (AxisMeasurement(azimuth, R / (cos_el * cos_el), azimuth_rate, R_rate / (cos_el * cos_el)),
+            AxisMeasurement(elevation, R, elevation_rate, R_rate))
+    outcome, innovation = tracker.observe(g.tracker, p.tracker, c, Measurement(t, axis, u.range, u.range_variance),
+                                          restart_gap)
+    if outcome != STALE:
+        _choose_frame(g, c)
+    return outcome, innovation
+
+
+@compiled
+def _choose_frame(g, c):
+    """Let the filter go on in the frame that suits the elevation of the target."""
+    f = g.frame
+    motion = tracker.outlook(g.tracker, c, g.tracker.stamp)
+    if not (f.tilted or motion.elevation.angle > estimate_frame.RAISE):
+        return
+    sight = estimate_frame.to_earth(f, motion)
+    if f.tilted and sight.u.z >= math.sin(estimate_frame.LOWER):
+        return
+    if f.tilted:
+        estimate_frame.level(f)
+    else:
+        estimate_frame.tilt(f, sight.u, sight.du)
+    tracker.move(g.tracker, c, estimate_frame.to_frame(f, sight))
+
+
+@compiled
+def outlook(g, c, t):
+    """The Followed that the filter expects at t [s]."""
+    return Followed(1, tracker.outlook(g.tracker, c, t))
+
+
+@compiled
+def earth_outlook(g, c, t):
+    """LineOfSight in ENU that the filter expects at t [s]."""
+    return estimate_frame.to_earth(g.frame, tracker.outlook(g.tracker, c, t))
+
+
+@compiled
+def on_deck(g, p, deck, t, target):
+    """Motion on the deck (ATTITUDE) at t [s] of a Followed."""
+    if target.framed and (g.frame.tilted or g.lever_arm.range != 0.0):
+        attitude.at(deck, p, t)
+        framed = estimate_frame.of_deck(g.frame, attitude.found(deck))
+        return angles(lever_arm.to_antenna(g.lever_arm, deck_reference.on_deck(framed, line_of_sight(target.motion))))
+    if deck.stabilised and attitude.at(deck, p, t):
+        return angles(deck_reference.on_deck(attitude.found(deck), line_of_sight(target.motion)))
+    return target.motion
+
+
+@compiled
+def levelled_azimuth(g, level, target):
+    """AxisMotion of the azimuth of a Followed on a deck that stands still, level (3, 3) deck -> earth."""
+    still = Attitude(level, STILL, STILL)
+    if target.framed:
+        still = estimate_frame.of_deck(g.frame, still)
+    return angles(deck_reference.on_deck(still, line_of_sight(target.motion))).azimuth
+
+
+@compiled
+def read(g, p, c, deck, t):
+    """Estimate at t [s] in earth angles of the antenna."""
+    framed, variances = tracker.read(g.tracker, c, t)
+    motion, (azimuth, elevation) = framed, variances
+    if g.frame.tilted:
+        motion = earth_angles(estimate_frame.to_earth(g.frame, framed))
+        A11, E11 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p11, elevation.p11)
+        A12, E12 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p12, elevation.p12)
+        A22, E22 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p22, elevation.p22)
+        azimuth, elevation = AxisVariances(A11, A12, A22), AxisVariances(E11, E12, E22)
+    if g.lever_arm.range > 0.0 and attitude.at(deck, p, t):
+        motion = lever_arm.earth_angles_to_antenna(g.lever_arm, deck.mat_ed, motion)
+    return Estimate(motion, (azimuth, elevation))

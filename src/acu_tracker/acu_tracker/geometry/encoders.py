@@ -1,0 +1,40 @@
+"""The encoders of both axes in the last steps, and where the antenna pointed at any instant among them."""
+import math
+from collections import namedtuple
+
+from acu_tracker.history import bracket, history_type, interpolated, push
+from pedestal_common.compiled import compiled
+
+ENCODERS = history_type(4)
+"""Azimuth, elevation [rad], their rates [rad/s], deck angles."""
+
+Pointing = namedtuple('Pointing', 'A E dA dE')
+"""Deck angles of the antenna [rad] and their rates [rad/s]."""
+
+
+@compiled
+def take(s, stamp, position, velocity):
+    """Take angles (2,) and rates (2,) of a step into the history; False where they are not finite."""
+    valid = math.isfinite(position[0] + position[1] + velocity[0] + velocity[1])
+    if valid:
+        row = push(s, stamp)
+        for i in range(2):
+            s.sample[row, i], s.sample[row, 2 + i] = position[i], velocity[i]
+    return valid
+
+
+@compiled
+def at(s, t):
+    """(whether t [s] lies among the last steps, the Pointing then)."""
+    rows = bracket(s, t)
+    known = rows[0] >= 0
+    if not known:
+        return known, Pointing(math.nan, math.nan, math.nan, math.nan)
+    return known, Pointing(interpolated(s, rows, 0), interpolated(s, rows, 1), interpolated(s, rows, 2),
+                           interpolated(s, rows, 3))
+
+
+@compiled
+def taken(s, stamp):
+    """Whether the encoders of the step at this stamp [s] are in the history."""
+    return s.count > 0 and s.stamp[s.newest] == stamp

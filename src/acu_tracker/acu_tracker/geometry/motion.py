@@ -1,0 +1,87 @@
+"""How a direction moves: azimuth and elevation, or a unit vector, each with its first and second time derivative.
+
+Azimuth is clockwise, from north in the earth's frame and from the bow on the deck, so that the same formulas hold of
+a vector in north-west-up and of one in FLU. Elsewhere earth vectors are ENU; `north_west_up` leads from there.
+"""
+import math
+from collections import namedtuple
+
+from acu_tracker.geometry.vector import Vector, dot, minus, times
+from pedestal_common.compiled import compiled
+
+AxisMotion = namedtuple('AxisMotion', 'angle rate acceleration')
+"""Angle [rad], rate [rad/s] and acceleration [rad/s2] of one axis."""
+
+Motion = namedtuple('Motion', 'azimuth elevation')
+"""Both axes; motion[0] is azimuth, motion[1] elevation."""
+
+LineOfSight = namedtuple('LineOfSight', 'u du ddu')
+"""Unit vector u [-] towards the target, its first [1/s] and second [1/s2] derivative."""
+
+
+@compiled
+def line_of_sight(motion):
+    """LineOfSight in ENU of a Motion in earth angles."""
+    A, dA, ddA = motion.azimuth
+    E, dE, ddE = motion.elevation
+    sA, cA, sE, cE = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
+    dh, ddh = -sE * dE, -cE * dE * dE - sE * ddE
+    ds, dds = cA * dA, cA * ddA - sA * dA * dA
+    dc, ddc = -sA * dA, -sA * ddA - cA * dA * dA
+    return LineOfSight(
+        Vector(cE * sA, cE * cA, sE),
+        Vector(dh * sA + cE * ds, dh * cA + cE * dc, cE * dE),
+        Vector(ddh * sA + 2.0 * dh * ds + cE * dds, ddh * cA + 2.0 * dh * dc + cE * ddc, cE * ddE - sE * dE * dE))
+
+
+@compiled
+def north_west_up(v):
+    """A vector given in ENU; of deck angles that were taken for earth angles: in FLU."""
+    return Vector(v.y, -v.x, v.z)
+
+
+@compiled
+def angles(sight):
+    """Motion of a LineOfSight in FLU or north-west-up.
+
+    Singular at the zenith: within 1e-6 rad of it the rates are those at 1e-6 rad.
+    """
+    u, du, ddu = sight
+    rho2 = max(u.x * u.x + u.y * u.y, 1e-12)
+    rho = math.sqrt(rho2)
+    dA = (u.y * du.x - u.x * du.y) / rho2
+    ddA = (u.y * ddu.x - u.x * ddu.y - 2.0 * dA * (u.x * du.x + u.y * du.y)) / rho2
+    dE = du.z / rho
+    return Motion(AxisMotion(math.atan2(-u.y, u.x), dA, ddA),
+                  AxisMotion(math.atan2(u.z, rho), dE, (ddu.z + u.z * dE * dE) / rho))
+
+
+@compiled
+def earth_angles(sight):
+    """Motion of a LineOfSight in ENU."""
+    return angles(LineOfSight(north_west_up(sight.u), north_west_up(sight.du), north_west_up(sight.ddu)))
+
+
+@compiled
+def normalised(v, dv, ddv):
+    """LineOfSight along a vector v of any length with its derivatives: n = v / |v|, n' = (v' - n (n.v')) / |v|, ..."""
+    k = 1.0 / math.sqrt(dot(v, v))
+    n, dv, ddv = times(k, v), times(k, dv), times(k, ddv)
+    along = dot(n, dv)
+    dn = minus(dv, times(along, n))
+    # n'' = v''/|v| - 2 n' (n.v')/|v| - n d/dt(n.v'/|v|) - n (n.v'/|v|)^2, from |v| n = v.
+    bend = dot(n, ddv) + dn.x * dn.x + dn.y * dn.y + dn.z * dn.z
+    return LineOfSight(n, dn, minus(minus(ddv, times(2.0 * along, dn)), times(bend, n)))
+
+
+@compiled
+def motion_of_position(p, v, a):
+    """Motion in earth angles of an ENU position p [m], its velocity v and acceleration a, seen from the origin."""
+    r = math.sqrt(dot(p, p))
+    u = Vector(p.x / r, p.y / r, p.z / r)
+    dr = dot(u, v)
+    du = Vector((v.x - dr * u.x) / r, (v.y - dr * u.y) / r, (v.z - dr * u.z) / r)
+    ddr = r * dot(du, du) + u.x * a.x + u.y * a.y + u.z * a.z
+    ddu = Vector((a.x - ddr * u.x - 2.0 * dr * du.x) / r, (a.y - ddr * u.y - 2.0 * dr * du.y) / r,
+                 (a.z - ddr * u.z - 2.0 * dr * du.z) / r)
+    return earth_angles(LineOfSight(u, du, ddu))

@@ -1,0 +1,54 @@
+"""The levelled deck: the mean attitude of the ship, on which a keyhole is planned."""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import ASHORE
+
+LEVELLED_DECK = np.dtype([('mean', 'f8', (4,)), ('spread', 'f8'), ('since', 'f8'), ('latest', 'f8')], align=True)
+"""mean: quaternion (x, y, z, w) levelled deck -> earth; spread: mean square of the deck's tilt from it [rad2];
+since, latest: stamps [s] of the first and the last attitude in it, latest -inf before there is one."""
+
+
+def initialise(s):
+    """Ashore, and no attitude of a ship yet; s (n,) of LEVELLED_DECK."""
+    s['mean'], s['latest'] = ASHORE, -math.inf
+
+
+@compiled
+def take(s, stamp, q, mean_time):
+    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s].
+
+    A ship whose mean is not known yet is taken to be level.
+    """
+    mean = s.mean
+    if not s.latest > -math.inf:
+        s.since = stamp
+        heading = math.hypot(q[2], q[3])
+        mean[0] = mean[1] = 0.0
+        mean[2], mean[3] = q[2] / heading, q[3] / heading
+        s.spread = 0.0
+    else:
+        T = stamp - s.latest
+        share = T / (mean_time + T)
+        dot = 0.0
+        for i in range(4):
+            dot += mean[i] * q[i]
+        norm = 0.0
+        for i in range(4):
+            mean[i] += share * (math.copysign(1.0, dot) * q[i] - mean[i])
+            norm += mean[i] * mean[i]
+        for i in range(4):
+            mean[i] /= math.sqrt(norm)
+        # The difference of what both have for the earth's vertical, in the two horizontal directions.
+        x = 2.0 * (q[0] * q[2] - q[3] * q[1] - mean[0] * mean[2] + mean[3] * mean[1])
+        y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
+        s.spread += T / (min(stamp - s.since, mean_time) + T) * (x * x + y * y - s.spread)
+    s.latest = stamp
+
+
+@compiled
+def restart(s):
+    """Begin the mean anew with the next attitude."""
+    s.latest = -math.inf

@@ -1,0 +1,83 @@
+"""The path of the target on the levelled deck, from now on: along the program track, or on its great circle."""
+import math
+from collections import namedtuple
+
+from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back
+from acu_tracker.program import bridge as program_bridge
+from acu_tracker.program import program_track
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import wrap
+
+ROWS, COLUMNS = 1025, 6
+
+
+Path = namedtuple('Path', 'rows t0 h')
+"""rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), and set by `complete`
+the azimuth counted through all turns, the least and the largest azimuth from there to the end [rad]."""
+
+
+@compiled
+def along_program(path, mat, program, bridge):
+    """Lay out the path of a ProgramTrack, turned by its `bridge` where that is valid: how many rows it covers.
+
+    mat (3, 3): levelled deck -> earth.
+    """
+    for i in range(len(path.rows)):
+        t = path.t0 + i * path.h
+        if t > program.times[-1]:
+            return i
+        u = program_track.direction(program, t)
+        if bridge.valid:
+            u = program_bridge.turned(bridge, u)
+        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(mat, u)
+    return len(path.rows)
+
+
+@compiled
+def along_great_circle(path, mat, u, du):
+    """Lay out the path of an ENU unit vector u that keeps its rate du [1/s]: how many rows it covers, all."""
+    W = math.sqrt(dot(du, du))
+    for i in range(len(path.rows)):
+        cos, sin = math.cos(W * i * path.h), math.sin(W * i * path.h) / W if W > 0.0 else 0.0
+        v = Vector(cos * u.x + sin * du.x, cos * u.y + sin * du.y, cos * u.z + sin * du.z)
+        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(mat, v)
+    return len(path.rows)
+
+
+@compiled
+def complete(path, travel):
+    """Fill the azimuth columns; travel: the Travel of the azimuth once the path has ended."""
+    rows, n = path.rows, len(path.rows)
+    before = math.atan2(-rows[0, 1], rows[0, 0])
+    rows[0, 3] = before
+    for i in range(1, n):
+        before += wrap(math.atan2(-rows[i, 1], rows[i, 0]) - before)
+        rows[i, 3] = before
+    rows[n - 1, 4], rows[n - 1, 5] = before + travel.below, before + travel.above
+    for i in range(n - 2, -1, -1):
+        rows[i, 4], rows[i, 5] = min(rows[i, 3], rows[i + 1, 4]), max(rows[i, 3], rows[i + 1, 5])
+
+
+@compiled
+def at(path, t):
+    """(u, du [1/s]) of the path at t [s], in straight lines between its rows."""
+    i = min(max(int((t - path.t0) / path.h), 0), len(path.rows) - 2)
+    f = (t - path.t0) / path.h - i
+    a = Vector(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
+    d = minus(Vector(path.rows[i + 1, 0], path.rows[i + 1, 1], path.rows[i + 1, 2]), a)
+    return (Vector(a.x + f * d.x, a.y + f * d.y, a.z + f * d.z),
+            Vector(d.x / path.h, d.y / path.h, d.z / path.h))
+
+
+@compiled
+def azimuth_at(path, t, rate):
+    """(azimuth [rad], its rate within +-rate [rad/s]) of the path at t [s]."""
+    u, du = at(path, t)
+    dA = (u.y * du.x - u.x * du.y) / max(u.x * u.x + u.y * u.y, 1e-12)
+    return math.atan2(-u.y, u.x), min(max(dA, -rate), rate)
+
+
+@compiled
+def end(path):
+    """Time of the last row [s]."""
+    return path.t0 + (len(path.rows) - 1) * path.h

@@ -1,0 +1,168 @@
+"""What lies ahead of the deck: a keyhole to be slewed through, sectors that hide the target.
+
+Once in INTERVAL the path of the target is laid out on the levelled deck, `horizon` seconds of it: from the program
+track, in autotrack turned so that it begins at the estimate, or along the great circle of the estimate where there is
+no program. The levelled deck is the mean attitude of the ship; a planned slew keeps the one it was made for.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.geometry.azimuth_wrap import Travel
+from acu_tracker.lookahead import keyhole, levelled_deck
+from acu_tracker.lookahead import path as paths
+from acu_tracker.lookahead import slew as slews
+from acu_tracker.program import program_track
+from pedestal_common import blockage
+from pedestal_common.compiled import assign, compiled
+from pedestal_common.line_of_sight import angles, rotation
+
+INTERVAL = 1.0
+"""Seconds from one look ahead to the next."""
+
+FORECASTS = ('none', 'keyhole', 'no turn')
+NONE, KEYHOLE, NO_WRAP = range(len(FORECASTS))
+
+PLANNER = np.dtype([
+    ('deck', levelled_deck.LEVELLED_DECK), ('looked', 'f8'),
+    ('forecast', 'i8'), ('forecasts', 'i8'), ('slew', slews.SLEW), ('level', 'f8', (3, 3)), ('deck_motion', 'f8'),
+    ('hidden', 'f8', (2,)), ('blockages', 'i8'), ('program', 'f8', (7,)),
+    ('next_slew', slews.SLEW, (2,)), ('next_level', 'f8', (3, 3)), ('rows', 'f8', (paths.ROWS, paths.COLUMNS)),
+], align=True)
+"""looked: when the path was last laid out [s]; forecast: one of FORECASTS, counted by forecasts; slew: while it is
+KEYHOLE, on the levelled deck `level` (levelled deck -> earth), deck_motion: the deck's tilt from there then [rad rms];
+hidden: from when until when [s] a sector will hide the target, NaN none, counted by blockages; program: what
+`another_program` knows the last one by; next_slew, next_level, rows: those of the look ahead that is made just now."""
+
+CONSTANTS = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyhole.LIMITS),
+                      ('sectors', 'f8', (blockage.MOST, 3))], align=True)
+
+
+def constants(params) -> np.ndarray:
+    """Constants (1,) of AcuParameters."""
+    c, k, a = np.zeros(1, CONSTANTS), params.keyhole, params.azimuth
+    c['horizon'], c['notice'] = k.horizon, k.notice
+    c['limits'] = (k.share * a.shaper.rate, k.share * a.shaper.acceleration, a.limits.low, a.limits.high,
+                   params.elevation.limits.high - k.elevation_margin, 0.5 * params.tracker.receiver.beamwidth)
+    c['sectors'] = blockage.sectors(params.blockage)
+    return c
+
+
+def initialise(h):
+    """Nothing planned, nothing known; h (n,) of PLANNER."""
+    levelled_deck.initialise(h['deck'])
+    h['looked'], h['hidden'] = -math.inf, math.nan
+
+
+@compiled
+def forget(h):
+    """Nothing is planned any more."""
+    h.forecast = NONE
+    h.looked = -math.inf
+    h.hidden[:] = math.nan
+
+
+@compiled
+def another_program(h, program):
+    """Whether the program is another one than at the call before: by its number of rows, its first and its last."""
+    last = len(program.times) - 1
+    same = h.program[0] == last
+    h.program[0] = last
+    for i in range(6 if last >= 0 else 0):
+        row = 0 if i < 3 else last
+        value = program.times[row] if i % 3 == 0 else program.angles[row, i % 3 - 1]
+        same = same and h.program[1 + i] == value
+        h.program[1 + i] = value
+    return not same
+
+
+@compiled
+def due(h, t):
+    """Whether to look ahead at t [s]: not within INTERVAL of the last time, and not before a slew has ended."""
+    return not (t - h.looked < INTERVAL or (h.forecast == KEYHOLE and t <= h.slew.t2))
+
+
+@compiled
+def look_along_program(h, c, t, azimuth, program, bridge):
+    """Look for a keyhole and hidden sectors from t [s] on, where the program leads, turned by its bridge where that is
+    valid; azimuth: of the axis at t, on the deck [rad]."""
+    path = _begin(h, c, t)
+    count = paths.along_program(path, h.next_level, program, bridge)
+    travel = Travel(0.0, 0.0)
+    if count >= 3 and t + count * path.h < program.times[-1]:
+        travel = program_track.azimuth_travel(program, t + (count - 1) * path.h)
+    _look(h, c, path, count, azimuth, travel)
+
+
+@compiled
+def look_along_great_circle(h, c, t, azimuth, u, du):
+    """Look ahead from t [s] on, where the ENU unit vector u leads that moves by du [1/s]."""
+    path = _begin(h, c, t)
+    count = paths.along_great_circle(path, h.next_level, u, du)
+    _look(h, c, path, count, azimuth, Travel(0.0, 0.0))
+
+
+@compiled
+def _begin(h, c, t):
+    """The Path that is to be laid out from t [s] on; the levelled deck is the mean of now."""
+    q = h.deck.mean
+    h.looked = t
+    rotation(q[0], q[1], q[2], q[3], h.next_level)
+    return paths.Path(h.rows, t, c.horizon / (paths.ROWS - 1))
+
+
+@compiled
+def _look(h, c, path, count, azimuth, travel):
+    """Look for a keyhole and hidden sectors on the first `count` rows of a Path; travel: of the azimuth after them.
+
+    A slew is kept once it begins within `notice`, or as soon as it is known that no wrap of the azimuth fits.
+    """
+    if count < 3:
+        return
+    path = paths.Path(path.rows[:count], path.t0, path.h)
+    paths.complete(path, travel)
+    _look_for_sectors(h, c.sectors, path)
+    outcome = keyhole.plan(h.next_slew, path, azimuth, c.limits, math.sqrt(0.5 * h.deck.spread))
+    if outcome == keyhole.PLANNED and h.next_slew[0].t1 - path.t0 <= c.notice:
+        h.slew = h.next_slew[0]
+        assign(h.level, h.next_level)
+        h.deck_motion = math.sqrt(h.deck.spread)
+        h.forecast = KEYHOLE
+        h.forecasts += 1
+    elif outcome == keyhole.NO_WRAP and h.forecast != NO_WRAP:
+        h.forecast = NO_WRAP
+        h.forecasts += 1
+    elif outcome == keyhole.NOTHING:
+        h.forecast = NONE
+
+
+@compiled
+def _look_for_sectors(h, sectors, path):
+    """The first time that a path is hidden; counted when it begins after the last one has ended."""
+    first = last = -1
+    for i in range(len(path.rows)):
+        A, E = angles(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
+        if blockage.blocked(sectors, A, E):
+            first = i if first < 0 else first
+            last = i
+        elif first >= 0:
+            break
+    if first < 0:
+        h.hidden[:] = math.nan
+    else:
+        begin = path.t0 + first * path.h
+        if not begin <= h.hidden[1]:        # NaN: there was none
+            h.blockages += 1
+        h.hidden[0], h.hidden[1] = begin, path.t0 + last * path.h
+
+
+@compiled
+def slewing(h, t):
+    """Whether a slew is under way at t [s]."""
+    return h.forecast == KEYHOLE and h.slew.t1 <= t <= h.slew.t2
+
+
+@compiled
+def motion_at(h, c, t, target, level):
+    """(Motion of the axes at t [s] of a slew under way, pointing offset [rad]); target, level as in slew.motion_at."""
+    return slews.motion_at(h.slew, t, target, level, c.limits.highest)

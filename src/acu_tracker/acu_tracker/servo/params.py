@@ -1,0 +1,88 @@
+"""Parameters of the position loop of one axis, a group for each law."""
+import dataclasses
+import math
+
+from acu_tracker.servo.beam_loop import FORMS
+from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class PidParameters(Parameters):
+    """PID on the raw target, as in paper 000. K_p = bandwidth, K_i = integral K_p^2, K_d = derivative."""
+
+    bandwidth: float = parameter(20.0, 0.0, 500.0, 'rad/s', 'of the position loop: K_p')
+    integral: float = parameter(0.05, 0.0, 10.0, '', 'K_i / K_p^2; 0.25: both poles of the loop at K_p / 2')
+    derivative: float = parameter(0.0, 0.0, 1.0, '', 'K_d on the rate of the error')
+    derivative_time: float = parameter(0.003, 0.0, 1.0, 's', 'lag of the derivative')
+
+
+@dataclasses.dataclass(frozen=True)
+class FeedforwardParameters(Parameters):
+    """Rate, torque and friction of the shaped reference fed forward, PI on the rest."""
+
+    bandwidth: float = parameter(20.0, 0.0, 500.0, 'rad/s', 'of the position loop: K_p')
+    integral: float = parameter(0.05, 0.0, 10.0, '', 'K_i / K_p^2; 0.25: both poles of the loop at K_p / 2')
+    rate_feedforward: float = parameter(1.0, 0.0, 2.0, '', 'k_v: share of the reference rate fed forward')
+    acceleration_feedforward: float = parameter(0.0, -1.0, 1.0, 's', 'k_a: of the reference acceleration; 0 where '
+                                                'inertia does it')
+    inertia: float = parameter(280.0, 0.0, 1e9, 'kg m2', 'load and motors, seen at the load')
+    friction: float = parameter(60.0, 0.0, 1e7, 'Nm', 'Coulomb friction Tc fed forward')
+    friction_rate: float = parameter(0.002, 1e-6, 1.0, 'rad/s', 'rate at which 76 % of the friction is fed forward')
+
+
+@dataclasses.dataclass(frozen=True)
+class AdrcParameters(Parameters):
+    """State feedback and disturbance observer (paper 001); torque and friction fed forward as in `feedforward`."""
+
+    bandwidth: float = parameter(60.0, 0.1, 500.0, 'rad/s', 'w_c: poles of the state feedback')
+    observer_bandwidth: float = parameter(100.0, 0.1, 1000.0, 'rad/s', 'w_o: poles of the observer; below w_s / 3 it '
+                                          'needs an exact rate_bandwidth')
+    rate_bandwidth: float = parameter(176.0, 0.1, 1000.0, 'rad/s', "w_s of the drive's rate loop: K_p / J of a motor")
+
+
+@dataclasses.dataclass(frozen=True)
+class BeamParameters(Parameters):
+    """The beam of a phased array (paper 002); alpha and rate_compensation belong to its own loops, type_1, type_2."""
+
+    form: str = choice('tracked', FORMS, "tracked: the target's filter predicted to t_m; type_1: the paper's loop; "
+                       'type_2: the same with the beam at its prediction')
+    alpha: float = parameter(0.1, 1e-3, 1.0, '', 'gain on the angle; beta by Benedict and Bordner')
+    rate_compensation: float = parameter(0.0, 0.0, 2.0, '', "delta: share of the deck's rate fed forward")
+
+
+@dataclasses.dataclass(frozen=True)
+class NotchParameters(Parameters):
+    """Takes a structural resonance out of the feedback."""
+
+    frequency: float = parameter(0.0, 0.0, 5000.0, 'Hz', 'centre; 0: off')
+    width: float = parameter(0.5, 0.01, 2.0, '', 'damping ratio of the denominator')
+    depth: float = parameter(0.1, 0.0, 1.0, '', 'gain that is left at the centre')
+
+
+@dataclasses.dataclass(frozen=True)
+class ShaperParameters(Parameters):
+    """What the shaped reference may ask of the axis."""
+
+    rate: float = parameter(2.3, 1e-4, 100.0, 'rad/s', 'largest rate')
+    acceleration: float = parameter(30.0, 1e-4, 1000.0, 'rad/s2', 'largest acceleration')
+    jerk: float = parameter(4000.0, 1e-3, 1e6, 'rad/s3', 'largest jerk')
+    h0: float = parameter(0.02, 1e-4, 10.0, 's', "filter step of Han's fhan; longer: smoother, more lag")
+
+    def check(self):
+        if self.acceleration > 1.5 * self.jerk * self.h0:
+            raise ParameterError(f'h0 = {self.h0:g} s: must be at least acceleration / (1.5 jerk) = '
+                                 f'{self.acceleration / (1.5 * self.jerk):g} s, or the end of a move rings')
+
+
+@dataclasses.dataclass(frozen=True)
+class LimitsParameters(Parameters):
+    """Limits of the axis; the rate command never leaves them."""
+
+    low: float = parameter(-1.5 * math.pi, -20.0, 20.0, 'rad', 'lowest deck angle')
+    high: float = parameter(1.5 * math.pi, -20.0, 20.0, 'rad', 'highest deck angle')
+    rate: float = parameter(2.45, 1e-4, 100.0, 'rad/s', 'largest rate command')
+    acceleration: float = parameter(40.0, 1e-4, 1e5, 'rad/s2', 'largest change of the rate command over time')
+
+    def check(self):
+        if self.low >= self.high:
+            raise ParameterError(f'low = {self.low:g} rad: must be below high = {self.high:g} rad')

@@ -1,0 +1,93 @@
+"""The reference of one axis, and its past: what was planned for an instant is what the encoder is compared with then.
+
+A controller of the raw target has none of its own: it rests on the antenna's own angle and rate, so that another one
+begins there.
+"""
+import numpy as np
+
+from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.history import LENGTH, bracket, history_type, interpolated, push
+from acu_tracker.servo import shaper
+from pedestal_common.compiled import compiled
+
+REFERENCE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('planned', history_type(4))],
+                     align=True)
+"""The shaped reference at its newest stamp [rad, rad/s, rad/s2]; planned: it and the rate command [rad/s], at t_m."""
+
+COMMAND = 3
+
+
+@compiled
+def now(r):
+    """The AxisMotion of the newest stamp."""
+    return AxisMotion(r.angle, r.rate, r.acceleration)
+
+
+@compiled
+def put(r, motion):
+    """The reference is this AxisMotion."""
+    r.angle, r.rate, r.acceleration = motion
+
+
+@compiled
+def _plan(r, stamp, command):
+    """Keep the reference for the instant when the encoder meets it."""
+    row = r.planned.sample[push(r.planned, stamp)]
+    row[0], row[1], row[2], row[COMMAND] = r.angle, r.rate, r.acceleration, command
+
+
+@compiled
+def initialise(r, stamp, y, dy, command):
+    """Begin anew at an angle y [rad] and rate dy [rad/s] at a stamp [s]; command: rate command in force [rad/s]."""
+    r.planned.count = 0
+    put(r, AxisMotion(y, dy, 0.0))
+    _plan(r, stamp, command)
+
+
+@compiled
+def follow(r, p, target, stamp, command):
+    """Shape an AxisMotion that is to be met at a stamp [s]: (angle, rate, acceleration limited).
+
+    p: record of AxisParameters.
+    """
+    k = p.shaper
+    dt = stamp - r.planned.stamp[r.planned.newest]
+    target, angle_limited = shaper.held_inside(target, p.limits.low, p.limits.high, k.acceleration,
+                                               k.h0 + k.acceleration / k.jerk)
+    shaped, rate_limited, acceleration_limited = shaper.shape(now(r), target, dt, k)
+    put(r, shaped)
+    _plan(r, stamp, command)
+    return angle_limited, rate_limited, acceleration_limited
+
+
+@compiled
+def commanded(r, command):
+    """Keep the rate command [rad/s] of this step with the reference it belongs to."""
+    r.planned.sample[r.planned.newest, COMMAND] = command
+
+
+@compiled
+def _around(history, t):
+    """(older row, newer row, fraction between them) at t [s]; the oldest where t lies before it."""
+    i, j, f = bracket(history, t)
+    if i < 0:
+        i = j = (history.newest + 1 - history.count) % LENGTH
+    return i, j, f
+
+
+@compiled
+def planned(r, t):
+    """AxisMotion that was planned for t [s]; the angle by a cubic Hermite."""
+    i, j, f = rows = _around(r.planned, t)
+    a, b = r.planned.sample[i], r.planned.sample[j]
+    T = r.planned.stamp[j] - r.planned.stamp[i]
+    d, m0, m1 = b[0] - a[0], T * a[1], T * b[1]
+    return AxisMotion(a[0] + f * (m0 + f * (3.0 * d - 2.0 * m0 - m1 + f * (m0 + m1 - 2.0 * d))),
+                      interpolated(r.planned, rows, 1), interpolated(r.planned, rows, 2))
+
+
+@compiled
+def in_force(r, t):
+    """(rate command [rad/s], acceleration [rad/s2] of the reference) at t [s]."""
+    rows = _around(r.planned, t)
+    return interpolated(r.planned, rows, COMMAND), interpolated(r.planned, rows, 2)

@@ -1,0 +1,40 @@
+"""Cases of a study: scenarios with parameters changed, run through the composed units."""
+import dataclasses
+import math
+import shlex
+
+from pedestal_bringup.run import closed_loop, scenario
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A scenario with some parameters changed: parameters is {'node.key': value}, duration [s] None for its own."""
+    name: str
+    scenario: str
+    parameters: dict = dataclasses.field(default_factory=dict)
+    duration: float | None = None
+
+    def loaded(self):
+        """The scenario.Scenario of this case."""
+        return scenario.load(self.scenario, self.overrides(), duration=self.duration)
+
+    def run(self):
+        """The closed loop of this case, a closed_loop.Run."""
+        return closed_loop.Loop(self.loaded()).run()
+
+    def overrides(self):
+        return [f'{key}={value}' for key, value in self.parameters.items()]
+
+    def command(self):
+        """How to run the same through the nodes."""
+        duration = [] if self.duration is None else ['--duration', f'{self.duration:g}']
+        parameters = [part for override in self.overrides() for part in ('--param', override)]
+        return shlex.join(['pedestal', 'run', self.scenario, *duration, *parameters])
+
+
+def sine_case(case, w, periods):
+    """A case of servo_sine with a sine of w [rad/s], for `periods` and a little more, so that the last is whole."""
+    step = 0.002
+    duration = math.ceil((2.0 * math.pi * periods / w + 0.01) / step) * step
+    parameters = {**case.parameters, 'tracking_receiver.target.angle.frequency': w / (2.0 * math.pi)}
+    return dataclasses.replace(case, parameters=parameters, duration=round(duration, 3))

@@ -1,0 +1,74 @@
+"""Metrics of steps and sines. Angles [rad], times [s], arrays (n,) on one even grid of time."""
+import math
+
+import numpy as np
+
+
+def overshoot_percent(y, size):
+    """How far a step response from 0 goes past its size [%]."""
+    return 100.0 * max(float(np.max(y / size)) - 1.0, 0.0)
+
+
+def settling_time(t, y, size, band=0.02):
+    """Time after which y stays within +-band * size of size; NaN if it never does. Linear between samples."""
+    off = np.abs(y / size - 1.0) - band
+    outside = np.flatnonzero(off > 0.0)
+    if outside.size == 0:
+        return float(t[0])
+    last = outside[-1]
+    if last == len(t) - 1:
+        return math.nan
+    return float(t[last] + (t[last + 1] - t[last]) * off[last] / (off[last] - off[last + 1]))
+
+
+def crossings(y, size, band=0.005):
+    """How often y crosses its final value, moves within +-band * size of it not counted."""
+    side = np.sign(y - size)[np.abs(y - size) > band * abs(size)]
+    return int(np.sum(side[1:] != side[:-1]))
+
+
+def whole_periods(t, period, skip):
+    """The whole periods of a record from `skip` [s] after its start on, as a mask."""
+    t = t - t[0]
+    whole = math.floor((t[-1] - skip) / period + 1e-6)
+    if whole < 1:
+        raise ValueError(f'a record of {t[-1]:g} s has no whole period of {period:g} s after {skip:g} s')
+    return (t >= skip - 1e-9) & (t < skip + whole * period - 1e-9)
+
+
+def harmonic_fit(t, y, w):
+    """(offset, a, b) of the least-squares fit y = offset + a sin(w t) + b cos(w t)."""
+    basis = np.column_stack((np.ones_like(t), np.sin(w * t), np.cos(w * t)))
+    return np.linalg.lstsq(basis, y, rcond=None)[0]
+
+
+def amplitude_and_period(t, y, period):
+    """Amplitude and period of a sine fitted to y by least squares (Gauss-Newton), `period` being near it."""
+    w = 2.0 * math.pi / period
+    middle = 0.5 * (t[0] + t[-1])
+    t = t - middle
+    for _ in range(20):
+        offset, a, b = harmonic_fit(t, y, w)
+        sine, cosine = np.sin(w * t), np.cos(w * t)
+        basis = np.column_stack((np.ones_like(t), sine, cosine, t * (a * cosine - b * sine)))
+        change = np.linalg.lstsq(basis, y - offset - a * sine - b * cosine, rcond=None)[0][3]
+        w += change
+        if abs(change) < 1e-13 * w:
+            break
+    _, a, b = harmonic_fit(t, y, w)
+    return math.hypot(a, b), 2.0 * math.pi / w
+
+
+def residual(t, y, period):
+    """What the fundamental leaves of y: y - offset - a sin - b cos."""
+    w = 2.0 * math.pi / period
+    offset, a, b = harmonic_fit(t, y, w)
+    return y - offset - a * np.sin(w * t) - b * np.cos(w * t)
+
+
+def rms(y):
+    return float(np.sqrt(np.mean(np.square(y))))
+
+
+def peak(y):
+    return float(np.max(np.abs(y)))
