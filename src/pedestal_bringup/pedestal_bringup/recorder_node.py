@@ -1,4 +1,7 @@
 """The recorder: every topic of the graph into a bag, raw, nothing lost unsaid."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import collections
 import hashlib
 import inspect

@@ -1,4 +1,5 @@
 """What every node is: parameters, topics of the table, diagnostics, waiting for its graph, `main`."""
+import contextlib
 import dataclasses
 import gc
 import json
@@ -18,7 +19,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from pedestal_common import messages, middleware, nodes, parameters
 from pedestal_common.compiled import compiled_once
@@ -41,6 +41,7 @@ class GraphParameters(parameters.Parameters):
     beams: int = parameters.parameter(0, 0, MAX_BEAMS, '', 'beams of an electronic array, each of several in '
                                       'its namespace beam_i; 0: a drive with motors')
     deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
+    start: int = parameters.parameter(0, 0, 2**62, 'ns', 'UTC at which the time of a realtime run is 0; 0: none')
 
     def check(self):
         for name in self._names:
@@ -307,6 +308,13 @@ class Shell(Node):
             publisher.wait_for_all_acked(Duration(seconds=PARTING))
 
 
+def _say(stream, line):
+    """A last line, past Python's buffer: what a full disk or a closed pipe does not take is no reason for another end
+    than the one it tells."""
+    with contextlib.suppress(OSError):
+        os.write(stream.fileno(), f'{line}\n'.encode())
+
+
 def main(make_node, args=None) -> int:
     """Run the node of make_node() until it is finished or told to stop.
 
@@ -315,11 +323,10 @@ def main(make_node, args=None) -> int:
     """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _on_signal)
-    middleware.set_defaults()
     node = None
     name = os.path.basename(sys.argv[0])
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        middleware.initialise(args)
         node = make_node()
         name = node.get_name()
         executor = middleware.make_executor()
@@ -331,14 +338,14 @@ def main(make_node, args=None) -> int:
         if node.failure is not None:
             raise node.failure
         if node.result:
-            print(json.dumps(node.result), flush=True)
+            _say(sys.stdout, json.dumps(node.result))
         return 0
     except Stopped:
         return 0
     except EXPECTED as error:
         result = node.result if node is not None else {}
-        print(json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}), flush=True)
-        print(f'{name}: error: {error}', file=sys.stderr)
+        _say(sys.stdout, json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}))
+        _say(sys.stderr, f'{name}: error: {error}')
         return 1
     finally:
         # It ends anyway; Python's own end would give a late signal its deadly default back.

@@ -1,4 +1,7 @@
 """ROS node of the INS: hears the IMU, publishes attitude and deck rate as the INS knows them."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import sys
 
 from pedestal_common import unit_node

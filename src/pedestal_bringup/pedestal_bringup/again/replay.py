@@ -10,7 +10,6 @@ import rclpy
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 
 from pedestal_bringup.again.playlist import Playlist, latched, reads, select, writes
 from pedestal_bringup.again.terminal import RIGHT, Keyboard, StatusLine
@@ -383,8 +382,7 @@ def replay(path, under_test, names, rate, start=0.0, duration=None, paused=False
     keyboard = Keyboard()
     if paused and not keyboard.there:
         raise ValueError('--paused: standard input is no terminal, no key could end the pause')
-    middleware.set_defaults()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    middleware.initialise([])
     try:
         with _stop_by_signal() as stopped, keyboard:
             player = Player(playlist, companion, under_test, rate, paused, deadline, keyboard, stopped)

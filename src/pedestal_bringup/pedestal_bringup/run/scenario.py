@@ -15,7 +15,7 @@ import re
 import numpy as np
 import yaml
 
-from pedestal_common import nodes, parameters
+from pedestal_common import nodes, parameters, topics
 from tracking_receiver_sim import receiver
 
 
@@ -27,6 +27,17 @@ class ProgramParameters(parameters.Parameters):
     time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
     azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
     elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
+
+
+@dataclasses.dataclass(frozen=True)
+class RestartParameters(parameters.Parameters):
+    """How `pedestal run` treats a node that dies in realtime; in lockstep it ends the run."""
+    attempts: int = parameters.parameter(5, 0, 1_000_000, '', 'a node is started again at most so often within '
+                                         '`within`; 0: never')
+    within: float = parameters.parameter(60.0, 1.0, 86400.0, 's', 'the time in which its deaths are counted')
+    delay: float = parameters.parameter(0.5, 0.0, 60.0, 's', 'from the death of a node to its next start')
+    silence: float = parameters.parameter(30.0, 0.0, 3600.0, 's', 'a node that publishes no diagnostics for so long '
+                                          'is killed and started again; 0: never')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,6 +53,7 @@ class ScenarioParameters(parameters.Parameters):
                                       'in a namespace beam_1 ...')
     deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
     program: ProgramParameters = parameters.group(ProgramParameters)
+    restart: RestartParameters = parameters.group(RestartParameters)
 
     def check(self):
         if self.beams > 1 and not self.beam:
@@ -130,6 +142,12 @@ class Scenario:
     def node_parameters(self, node):
         """The parameter dataclass of one node as this scenario sets it."""
         return parameters.build(self.row(node).parameters_type(), self.given(node))
+
+    def unit(self, node, parameters=None):
+        """The unit of one of its nodes; parameters: in the place of the scenario's."""
+        row, chosen = self.row(node), parameters or self.node_parameters(node)
+        flags = [flag for flag in topics.FLAGS if getattr(chosen, flag, False)]
+        return row.unit_type()(chosen, nodes.reads(row, self.nodes, flags))
 
     def as_yaml(self):
         """The scenario as a ROS 2 parameter file."""

@@ -1,4 +1,5 @@
 """run a scenario as separate nodes and record it"""
+import math
 import pathlib
 import sys
 
@@ -29,23 +30,27 @@ def main(options):
     bag = arguments.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
     with console.progress_of_run(chosen.header.duration) as progress:
-        try:
-            outcome = graph.run(chosen, bag, progress)
-        except KeyboardInterrupt:
-            print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+        outcome = graph.run(chosen, bag, progress)
+    if outcome.stopped:
+        print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+        if not outcome.recorder.get('messages'):
             return console.EXIT_STOPPED
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     of_beams = [summary.of_beam(recording.view(beam)) for beam in beams]
-    whole = {'lost_steps': (float(outcome.drive['lost_steps']), ''),
-             'realtime_factor': (outcome.drive['realtime_factor'], ''),
+    whole = {'lost_steps': (float(outcome.drive.get('lost_steps', math.nan)), ''),
+             'realtime_factor': (outcome.drive.get('realtime_factor', math.nan), ''),
              'messages': (float(outcome.recorder['messages']), '')}
+    if chosen.header.pacing == 'realtime':
+        whole['restarts'] = float(outcome.restarts), ''
     console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams, whole)
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                       'mcap_sha256': outcome.recorder['sha256']})
+    if outcome.stopped:
+        return console.EXIT_STOPPED
     check = verify(bag)
     if not check.complete:
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
