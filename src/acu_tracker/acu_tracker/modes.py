@@ -6,20 +6,32 @@ from pedestal_common.compiled import compiled
 
 
 class Mode(typing.NamedTuple):
-    """A row of TABLE. follows: it follows a target through the sky, for which the deck's attitude must be known;
-    fallback: the mode it falls back on when its target ends; handover: the mode it hands over to by itself, once that
-    can be entered. Both are names, '' for none."""
+    """A row of TABLE.
+
+    doc: what the axes do; entry: when it can be entered; exit: when it ends by itself. follows: it follows a target
+    through the sky, for which the deck's attitude must be known; fallback: the mode it falls back on when its target
+    ends; handover: the mode it hands over to by itself, once that can be entered. Both are names, '' for none.
+    """
     name: str
+    doc: str
+    entry: str
+    exit: str = ''
     follows: bool = False
     fallback: str = ''
     handover: str = ''
 
 
-TABLE = (Mode('standby'),
-         Mode('stow'),
-         Mode('preset'),
-         Mode('program', follows=True, handover='autotrack'),
-         Mode('autotrack', follows=True, fallback='program'))
+TABLE = (
+    Mode('standby', 'rate command 0', 'always; after a fault'),
+    Mode('stow', 'the stow angles', 'encoders valid, angles inside the limits'),
+    Mode('preset', 'the preset angles', 'encoders valid, angles inside the limits'),
+    Mode('program', 'the time-tagged table', 'the table is there, valid now and inside the limits',
+         'to `autotrack` after `lock_count` accepted errors; to `standby` past its end',
+         follows=True, handover='autotrack'),
+    Mode('autotrack', 'the filtered target, through short losses the prediction of the filter',
+         'receiver locked, filter converged',
+         'after `coast_time` without an error to `program`, or to `standby` without a program',
+         follows=True, fallback='program'))
 """Another mode is a row here, its entries in `situation`, and what it asks of the axes in control_unit."""
 
 MODES = tuple(row.name for row in TABLE)

@@ -7,6 +7,7 @@ from scipy.linalg import expm
 
 from acu_tracker.estimation import kalman, motion_models
 from acu_tracker.geometry.motion import AxisMotion
+from pedestal_common import topics
 
 CASES = [(0.1, 0.01), (0.5, 0.005), (0.5, 0.0999), (0.7, 0.3), (2.0, 0.24999), (2.0, 0.25001), (5.0, 0.4), (1.0, 3.0)]
 
@@ -122,3 +123,7 @@ def test_modified_rayleigh_variance_by_quadrature():
 def test_floor_holds_beyond_a_max():
     for abar in (2.9, 3.0, 10.0, -10.0):
         assert motion_models.acceleration_variance(abar, 3.0, 0.3) == pytest.approx(0.81)
+
+
+def test_every_model_has_its_column_in_the_filter_topic():
+    assert motion_models.MODELS == topics.MOTION_MODELS

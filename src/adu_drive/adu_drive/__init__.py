@@ -3,11 +3,11 @@
     drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
     drive_state   enable, brakes and faults: the state machine of both axes
     axis          one axis: sensors, speed loop, two current loops, plant, what it trips on
-    wire          the column between its messages: what the node and a recomputation share
-    timekeeper_node   the shell of both nodes that own the drive's time
+    unit          the unit of the drive: its messages in, its law, its messages out
+    timekeeper_node   the node that owns the drive's time
     speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    the controller's laws
     motor, thermal, brake, gear_train, friction, structure, wind                         the plant's laws
-    electronic_beam, beam_wire    in the drive's place: the beam of a phased array, delay and hold; its wire
+    electronic_beam, beam_unit    in the drive's place: the beam of a phased array, delay and hold; its unit
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
@@ -19,7 +19,7 @@ Symbols
     N                 ratio motor : load = planetary reducer x pinion on bull gear
     J_m, J            inertia of rotor + reducer + pinion on the motor shaft; of the load [kg m2]
     i_d, i_q          phase currents in rotor coordinates, amplitude invariant [A]
-    v_d, v_q          phase voltages likewise [V]
+    v_d, v_q          phase voltages in rotor coordinates [V]
     R, L, psi, p      phase resistance [ohm], inductance [H], flux linkage [Wb], pole pairs
     K_t               torque constant 1.5 p psi [Nm/A]; psi_hat, K_t_hat: as the controller believes
     K_p, K_i, K_d     gains of a PI controller; of the damping between the motors

@@ -6,7 +6,11 @@ import pathlib
 import re
 import sys
 
+from acu_tracker import modes
+from acu_tracker.estimation.kinds import KINDS
 from adu_drive import faults
+from pedestal_bringup.again import what_if
+from pedestal_bringup.analysis import results
 from pedestal_bringup.run import scenario
 from pedestal_common import nodes, parameters, topics
 
@@ -58,6 +62,17 @@ def service_table():
     return _table(('node', 'services (std_srvs/Trigger)'), rows)
 
 
+def mode_table():
+    """The modes of the control unit."""
+    return _table(('mode', 'the axes follow', 'entered', 'left by itself'),
+                  [(f'`{mode.name}`', mode.doc, mode.entry, mode.exit) for mode in modes.TABLE])
+
+
+def filter_table():
+    """The kinds of target filter."""
+    return _table(('`filter.kind`', 'what it is'), [(f'`{name}`', kind.doc) for name, kind in KINDS.items()])
+
+
 def fault_table():
     """What the drive trips on."""
     return _table(('fault, per axis', 'from', 'parameter'),
@@ -79,7 +94,16 @@ def parameter_table():
     return _table(('parameter', 'default', 'range', 'unit', 'meaning'), rows)
 
 
-TABLES = {'nodes': node_table, 'topics': topic_table, 'services': service_table, 'drive faults': fault_table,
+def result_table(table=results.RESULTS):
+    """The results of a run: name, unit, what it is, target."""
+    return _table(('result', 'unit', 'what it is', 'target'),
+                  [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
+                   results.documented(table)])
+
+
+TABLES = {'nodes': node_table, 'topics': topic_table, 'services': service_table, 'modes': mode_table,
+          'filter kinds': filter_table, 'drive faults': fault_table, 'results': result_table,
+          'recomputed results': lambda: result_table(what_if.NUMBERS),
           'first parameters': parameter_table}
 
 

@@ -1,17 +1,11 @@
-"""The kinds of target filter: one row each, which says of what an axis's bank of motion models is made.
-
-    alpha_beta, alpha_beta_gamma    cv or ca without process noise, corrected with constant gains
-    cv, ca, singer, current_statistical     a Kalman filter with that model of motion
-    imm             interacting models
-    imm_ukf         the Cartesian filter where the range is measured; without it the axes have what imm has
-"""
+"""The kinds of target filter: one row each, which says of what an axis's bank of motion models is made."""
 import functools
 import typing
 
 import numpy as np
 
 from acu_tracker.estimation import alpha_beta, motion_models
-from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.estimation.motion_models import MODELS, TABLE
 from pedestal_common.parameters import ParameterError
 
 
@@ -24,7 +18,9 @@ class Bank(typing.NamedTuple):
 
 
 class Kind(typing.NamedTuple):
-    """bank: function of FilterParameters that makes the Bank of an axis; cartesian: use the Cartesian filter too."""
+    """doc: what it is; bank: function of FilterParameters that makes the Bank of an axis; cartesian: use the Cartesian
+    filter too."""
+    doc: str
     bank: typing.Callable
     cartesian: bool = False
 
@@ -49,9 +45,13 @@ def _interacting(params):
     return Bank(np.concatenate(models), params.imm.dwell)
 
 
-KINDS = {'alpha_beta': Kind(_alpha_beta), 'alpha_beta_gamma': Kind(_alpha_beta_gamma),
-         **{name: Kind(functools.partial(_alone, name)) for name in MODELS},
-         'imm': Kind(_interacting), 'imm_ukf': Kind(_interacting, cartesian=True)}
+KINDS = {
+    'alpha_beta': Kind('constant gains on the model cv', _alpha_beta),
+    'alpha_beta_gamma': Kind('constant gains on the model ca', _alpha_beta_gamma),
+    **{model.name: Kind(f'Kalman filter: {model.doc}', functools.partial(_alone, model.name)) for model in TABLE},
+    'imm': Kind('interacting models, those of `imm.models`', _interacting),
+    'imm_ukf': Kind('interacting unscented filters of the position where the range is measured, otherwise `imm`',
+                    _interacting, cartesian=True)}
 
 
 def named_models(names) -> tuple:

@@ -1,10 +1,7 @@
 """How a target may move: F and Q of the motion models of one axis, X = (angle, rate, acceleration).
 
-    cv                      constant rate, disturbed by white acceleration; its third state stays 0
-    ca                      constant acceleration, disturbed by white jerk
-    singer                  an acceleration of mean 0 that lasts 1 / alpha (Singer 1970)
-    current_statistical     such an acceleration about a mean that is the estimate itself (paper 000, eq. 2, 4, 5)
-Another one is a row of TABLE, a law that `discretised` picks, and its group in params.py.
+Of cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. Another model is a row of TABLE, a law
+that `discretised` picks, its group in params.py, and its name in topics.MOTION_MODELS, a column of acu/filter.
 
 Corrected against the print of paper 000: q22 has 1/(2 alpha^3); sigma_a^2 goes with the square.
 The closed forms of Q lose all digits for small x = alpha T (q11 is a difference of terms ~1 of size x^5), so
@@ -22,16 +19,22 @@ from pedestal_common.compiled import compiled
 
 
 class MotionModel(typing.NamedTuple):
-    """A row of TABLE. states: 2 for a model without an acceleration, else 3; initial_sigma: its standard deviation of
-    the acceleration [rad/s2] at the start, a function of its parameters; NaN: that of the rate, per second."""
+    """A row of TABLE. doc: how the target moves; states: 2 for a model without an acceleration, else 3; initial_sigma:
+    its standard deviation of the acceleration [rad/s2] at the start, a function of its parameters; NaN: that of the
+    rate, per second."""
     name: str
+    doc: str
     states: int
     initial_sigma: typing.Callable
 
 
-TABLE = (MotionModel('cv', 2, lambda params: 0.0), MotionModel('ca', 3, lambda params: math.nan),
-         MotionModel('singer', 3, lambda params: params.sigma),
-         MotionModel('current_statistical', 3, lambda params: params.a_max))
+TABLE = (
+    MotionModel('cv', 'constant rate, disturbed by white acceleration', 2, lambda params: 0.0),
+    MotionModel('ca', 'constant acceleration, disturbed by white jerk', 3, lambda params: math.nan),
+    MotionModel('singer', 'an acceleration of mean 0 that lasts 1 / alpha (Singer 1970)', 3,
+                lambda params: params.sigma),
+    MotionModel('current_statistical', 'an acceleration that lasts 1 / alpha about a mean, the estimate itself '
+                '(paper 000)', 3, lambda params: params.a_max))
 MODELS = tuple(row.name for row in TABLE)
 CV, CA, SINGER, CURRENT_STATISTICAL = range(len(MODELS))
 

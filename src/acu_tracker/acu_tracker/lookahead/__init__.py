@@ -1,1 +1,6 @@
-"""What lies ahead of the deck: keyholes, hidden sectors."""
+"""What lies ahead of the deck: keyholes, hidden sectors.
+
+Symbols
+    W, E0           rate of a target along its great circle, its highest elevation      [rad/s], [rad]
+    t1, t2          a slew through the keyhole leaves the target, and meets it again    [s]
+"""

@@ -20,6 +20,6 @@ def main(options):
     with console.progress_of_run(chosen.header.duration) as progress:
         if graph.run(chosen, path, progress).stopped:
             raise KeyboardInterrupt
-    comparison = rerun.compare(recording, bag.read(path))
-    print('\n'.join(comparison.lines()))
-    return 0 if comparison.equal else 1
+    result = rerun.result(recording, bag.read(path))
+    print('\n'.join(result.lines()))
+    return 0 if result.equal else 1
