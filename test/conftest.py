@@ -62,12 +62,13 @@ def environment(domain_id, tmp_path):
 
 @pytest.fixture
 def start_process(environment, tmp_path):
-    """start(command, **changes of the environment) -> Popen with text pipes, the head of its own process group;
-    what still runs when the test ends is killed with its children."""
+    """start(command, **changes of the environment, None: not set) -> Popen with text pipes, the head of its own
+    process group; what still runs when the test ends is killed with its children."""
     started = []
 
     def start(command, **changes):
-        process = _popen(command, tmp_path, {**environment, **changes})
+        wanted = {name: value for name, value in {**environment, **changes}.items() if value is not None}
+        process = _popen(command, tmp_path, wanted)
         started.append(process)
         return process
 
