@@ -35,12 +35,13 @@ def command_line(node, module, file):
 
 @contextlib.contextmanager
 def uninterrupted():
-    """A second Ctrl-C does not cut the clean stop short."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """A second Ctrl-C, or whatever else ends `pedestal`, does not cut the clean stop short."""
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 class Graph:
