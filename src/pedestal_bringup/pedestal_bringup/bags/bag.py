@@ -29,7 +29,7 @@ _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 def _qos(rate):
     """The offered_qos_profiles of a topic of a rate."""
-    depth, latched = topics.QOS[rate]
+    depth, latched = topics.QOS[rate].lockstep, topics.QOS[rate].latched
     return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
              'durability': 'transient_local' if latched else 'volatile',
              'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',
@@ -276,6 +276,11 @@ class Bag:
         return self.metadata_records.get('pedestal', {})
 
     @property
+    def start(self):
+        """Where the time of the scenario is 0 in the stamps [ns]: UTC in realtime, else 0."""
+        return int(self.metadata.get('start', 0))
+
+    @property
     def beams(self):
         """Beams of the array that was recorded; 0: a drive with motors."""
         several = sum(1 for name in self.topics if nodes.plain(name) == 'joint_states' != name)
@@ -365,6 +370,7 @@ class Bag:
         """{column: array (n,)} of a topic, one row per message; see columns.table for their names."""
         rows = self.rows(topic)
         try:
-            return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log)
+            return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log,
+                                 self.start)
         except ValueError as error:
             raise BagError(f'{self.path}: {topic}: {error}') from None

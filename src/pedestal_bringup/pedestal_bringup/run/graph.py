@@ -21,6 +21,7 @@ from pedestal_bringup.bags import configuration
 from pedestal_bringup.run.program import program_messages
 from pedestal_common import messages, middleware, nodes, parameters
 from pedestal_common.shell import Shell
+from pedestal_common.steps import SECOND
 
 LOG_LINES = 8
 STOP_TIME = 20.0
@@ -124,11 +125,13 @@ def free_bag(scenario):
         number += 1
 
 
-def parameter_file(scenario, pacing, bag):
-    """The scenario as a ROS 2 parameter file, every node told of the graph it is in."""
+def parameter_file(scenario, pacing, bag, start=0):
+    """The scenario as a ROS 2 parameter file, every node told of the graph it is in; start: see GraphParameters."""
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     told = {'graph.pacing': pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
             'graph.deadline': scenario.header.deadline}
+    if start:
+        told['graph.start'] = start
     sections = {node: {**scenario.given(node), **told} for node in scenario.nodes if node != 'operator'}
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
     return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()})
@@ -186,9 +189,10 @@ class Graph:
         self.log = self.bag.with_name(self.bag.name + '.log')
         self.file = self.log / 'parameters.yaml'
         self.processes = {}
+        self.start = time.time_ns() // SECOND * SECOND + 12 * SECOND if scenario.header.pacing == 'realtime' else 0
         try:
             self.log.mkdir(parents=True, exist_ok=True)
-            self.file.write_text(parameter_file(scenario, scenario.header.pacing, self.bag))
+            self.file.write_text(parameter_file(scenario, scenario.header.pacing, self.bag, self.start))
         except OSError as error:
             raise RunError(f'cannot record to {self.bag}: {error.filename}: {error.strerror}') from None
 
@@ -321,7 +325,7 @@ def _run(graph, operator, tracks, progress):
         while graph.ended().get(nodes.DRIVE) != 0:
             executor.spin_once(timeout_sec=0.1 if sent else 0.02)
             sent = sent or operator.send_to(graph.scenario.nodes, tracks)
-            progress(operator.time)
+            progress(max(operator.time - graph.start / SECOND, 0.0))
             if any(code != 0 or node not in ENDING for node, code in graph.ended().items()):
                 raise graph.failure(stuck, operator.silent(header.deadline))
             mute = operator.silent(patience)
