@@ -7,7 +7,7 @@ import pytest
 from mcap.writer import Writer as McapWriter
 
 from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages, nodes, topics
 
 RECORDED = nodes.recorded(('tracking_receiver', 'acu', 'adu', 'recorder'))
@@ -21,7 +21,7 @@ def message(topic, stamp):
 
 def write(path, stamps, written=RECORDED, close=True):
     """A bag with the stamps [step of 5 ms] on every topic of the steps."""
-    writer = bags.Writer(path, written, {'scenario': 'test', 'pacing': 'lockstep'})
+    writer = Writer(path, written, {'scenario': 'test', 'pacing': 'lockstep'})
     for step in stamps:
         for index, topic in enumerate(written):
             if topic.rate == 'step':

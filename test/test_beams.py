@@ -10,12 +10,12 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup.again import recompute
-from pedestal_bringup.analysis import results
+from pedestal_bringup.again import difference, recompute
+from pedestal_bringup.analysis import tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import export
 from pedestal_bringup.bags.verify import verify
-from pedestal_bringup.report import report
+from pedestal_bringup.report.page import write as write_report
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_common import messages
 
@@ -49,7 +49,7 @@ def views(runs):
 
 
 def test_each_beam_tracks_its_own_target(views):
-    tracked = {beam: results.tracking(view) for beam, view in views.items()}
+    tracked = {beam: tracking.read(view) for beam, view in views.items()}
     for run in tracked.values():
         assert run.mode[-1] == 'autotrack' and run.tracking.any()
         error = np.column_stack((run.cross_elevation, run.elevation_error))[run.tracking]
@@ -93,13 +93,13 @@ def test_every_node_of_a_beam_recomputes_identically(runs, name, beam):
     assert set(nodes) >= {'tracking_receiver', 'acu', 'adu'}
     for node in nodes:
         done = recompute.recompute(recording, node, recompute.parameters_of(recording, node))
-        compared = recompute.compare(recording, done.outputs, done.unit, recompute.comparison.Tolerance())
+        compared = recompute.compare(recording, done.outputs, done.unit, difference.Tolerance())
         assert compared and all(topic.identical for topic in compared), [topic.lines() for topic in compared]
         assert recompute.idle(recording, done) == ''
 
 
 def test_report_and_export_of_one_beam(runs, tmp_path):
-    page = report.write(runs['four'].bag, tmp_path / 'report.html', beam='beam_2').read_text()
+    page = write_report(runs['four'].bag, tmp_path / 'report.html', beam='beam_2').read_text()
     assert f'Tracking run: {FOUR}/beam_2' in page and 'Not compared' not in page
     name = 'beam_3/tracking_receiver/angle_error'
     [(file, rows, _)] = export.export(runs['four'].bag, output=tmp_path, names=[name])

@@ -2,9 +2,9 @@
 import json
 import sys
 
-SHORT = ('import json; from pedestal_bringup.bench import bench; '
-         'bench.BAG_SECONDS = 2.0; bench.DISK_BYTES = 10_000_000; '
-         'rows = bench.bench_bag(); print(json.dumps(rows))')
+SHORT = ('import json; from pedestal_bringup.bench import recording; '
+         'recording.BAG_SECONDS = 2.0; recording.DISK_BYTES = 10_000_000; '
+         'rows = recording.run(); print(json.dumps(rows))')
 
 
 def test_rows_of_bags(run_process, reserve_domain):

@@ -8,7 +8,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
 from pedestal_bringup import cli
-from pedestal_bringup.analysis import consistency, results
+from pedestal_bringup.analysis import consistency, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import export
 from pedestal_bringup.bags.verify import verify
@@ -51,7 +51,7 @@ def runs(start_run, connect):
 def told(runs):
     """(Bag, Consistency) of the run with rate and range."""
     bag = bags.read(runs['measured'].bag)
-    return bag, consistency.read(bag, results.tracking(bag))
+    return bag, consistency.read(bag, tracking.read(bag))
 
 
 def test_every_topic_is_recorded(runs):
@@ -114,10 +114,10 @@ def test_rows_and_report(runs, told, run_process):
 
 def test_a_filter_changed_while_it_tracks_makes_no_bump(runs):
     bag = bags.read(runs['switched'].bag)
-    found = consistency.read(bag, results.tracking(bag))
+    found = consistency.read(bag, tracking.read(bag))
     changed = np.flatnonzero(np.isfinite(found.probability[:, 0, topics.MOTION_MODELS.index('cv')]))[0]
     assert bag.table('acu/mode')['data'] == ['program', 'autotrack']
-    assert np.all(results.modes(bag, found.t)[changed - 1:] == 'autotrack')
+    assert np.all(tracking.modes(bag, found.t)[changed - 1:] == 'autotrack')
     change = np.abs(np.diff(np.column_stack([bag.table('acu/rate_command')[f'{axis}.velocity']
                                              for axis in topics.AXES]), axis=0))
     # 0.05 s: what comes later is what the new models make of the measurements

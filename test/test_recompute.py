@@ -9,9 +9,10 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from pedestal_bringup import cli
-from pedestal_bringup.again import comparison, recompute, recompute_report
-from pedestal_bringup.analysis import results
+from pedestal_bringup.again import difference, recompute, recompute_report
+from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.writer import Writer as BagWriter
 from pedestal_common import messages, topics
 from pedestal_common import nodes as graph
 
@@ -54,7 +55,7 @@ def rewrite(tmp_path):
         named = [topic for topic in topics.TOPICS if topic.name in bag.topics]
         index = {topic.name: number for number, topic in enumerate(named)}
         path = tmp_path / f'changed-{len(list(tmp_path.iterdir()))}'
-        writer = bags.Writer(path, named, {**bag.metadata, **({'pacing': pacing} if pacing else {})},
+        writer = BagWriter(path, named, {**bag.metadata, **({'pacing': pacing} if pacing else {})},
                              {name: content for name, content in bag.metadata_records.items() if name != 'pedestal'})
         for topic, log, publish, data in change(list(bag.raw())):
             writer.write(index[topic], log, publish, data)
@@ -147,7 +148,7 @@ def test_a_wrong_frame_is_named(runs, rewrite, pedestal):
         message.header.frame_id = 'mars'
     code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(ESTIMATE, 7, change)), '--node', 'acu')
     assert code == 1
-    assert lines_of(said, ESTIMATE)[1].split() == [*comparison.REST.split(), '1', '1', 'other', '0.035000']
+    assert lines_of(said, ESTIMATE)[1].split() == [*difference.REST.split(), '1', '1', 'other', '0.035000']
 
 
 def test_a_wrong_mode_is_named(runs, rewrite, pedestal):
@@ -214,9 +215,9 @@ def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     from pedestal_bringup.again import what_if
     recording = recompute.Recording(runs['leo'].bag)
     old = {name: recording.output(name) for name in OUTPUTS}
-    late = comparison.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
+    late = difference.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
     numbers = what_if.numbers(recording.bag, [old, {**old, ESTIMATE: late}])
-    summary = results.summary(results.tracking(recording.bag))
+    summary = results.measured(results.of_tracking(tracking.read(recording.bag)))
     for name, theirs in (('noise_reduction', 'noise_reduction'), ('recorded_pointing_rms_deg', 'pointing_rms_deg')):
         assert numbers[name][0][0] == pytest.approx(summary[theirs][0], rel=1e-9)
     (before, after), unit = numbers['estimate_lag_s']

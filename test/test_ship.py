@@ -12,8 +12,8 @@ import pynmea2
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup.again import comparison, recompute
-from pedestal_bringup.analysis import isolation, known_attitude, results
+from pedestal_bringup.again import difference, recompute
+from pedestal_bringup.analysis import isolation, known_attitude, results, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_common import messages
@@ -26,13 +26,13 @@ def track(name, *overrides):
     chosen = scenario.load(name, overrides)
     run = closed_loop.Loop(chosen).run()
     automatic = run['acu/mode'] == modes.AUTOTRACK
-    return chosen, run, automatic & (run.t >= run.t[automatic][0] + results.SETTLING)
+    return chosen, run, automatic & (run.t >= run.t[automatic][0] + tracking.SETTLING)
 
 
 def pointing(name, *overrides):
     """Pointing error [deg] rms of a scenario."""
     _, run, on = track(name, *overrides)
-    return math.degrees(results.rms(run.truth['error'][on]))
+    return math.degrees(tracking.rms(run.truth['error'][on]))
 
 
 def isolated(name, *overrides):
@@ -89,9 +89,9 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     off = np.hypot(*run.truth['error'].T)
     t = run.t
     lost = off > 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
-    loss = np.sum(lost[first:] & (t[first:] > t[first] + results.SETTLING)) * 0.005
+    loss = np.sum(lost[first:] & (t[first:] > t[first] + tracking.SETTLING)) * 0.005
     assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 10.0
-    assert math.degrees(results.rms(off[t > plan['t2'] + 3.0])) < 0.02
+    assert math.degrees(tracking.rms(off[t > plan['t2'] + 3.0])) < 0.02
     rate = run['acu/rate_command']['velocity'][first:, 0]
     assert abs(rate).max() <= chosen.node_parameters('acu').azimuth.limits.rate + 1e-12
 
@@ -127,10 +127,11 @@ def test_announced_losses_are_counted_once():
     second = array(('keyhole_begins_s', '900.1'), ('keyhole_ends_s', '905.5'), ('keyhole_loss_s', '0.4'))
     said = [array(('mode', 'program')), first, first, second]
     bag = types.SimpleNamespace(topics={'diagnostics': ''}, messages=lambda topic: ((topic, 0, 0, m) for m in said))
-    assert results.keyholes(bag) == [(45.8, 63.1, 12.6), (900.1, 905.5, 0.4)]
-    assert results.announced_losses(bag) == {'keyhole_loss_predicted_s': (pytest.approx(13.0), 's')}
+    assert tracking.keyholes(bag) == [(45.8, 63.1, 12.6), (900.1, 905.5, 0.4)]
+    assert results.measured({'keyholes': tracking.keyholes(bag)}) == {
+        'keyhole_loss_predicted_s': (pytest.approx(13.0), 's')}
     del said[1:]
-    assert results.announced_losses(bag) == {}
+    assert results.measured({'keyholes': tracking.keyholes(bag)}) == {}
 
 
 @dataclasses.dataclass
@@ -199,7 +200,7 @@ def test_the_chain_from_power_up_to_autotrack(told):
 
 
 def test_the_rows_of_a_run_say_its_isolation(told):
-    found = isolation.read(told.bag, results.tracking(told.bag))
+    found = isolation.read(told.bag, tracking.read(told.bag))
     assert told.rows['isolation_db']['value'] == found.isolation and told.rows['isolation_db']['target'] == '>= 60'
     assert told.rows['isolation_limit_db']['value'] == found.limit
 
@@ -210,7 +211,7 @@ def test_the_chain_is_recomputed_from_its_recording(told):
     for node in ('ins', 'acu'):
         done = recompute.recompute(recording, node, recompute.parameters_of(recording, node))
         assert not done.requests and not done.feed.problem
-        for topic in recompute.compare(recording, done.outputs, done.unit, comparison.Tolerance()):
+        for topic in recompute.compare(recording, done.outputs, done.unit, difference.Tolerance()):
             assert topic.identical, topic.lines()
 
 

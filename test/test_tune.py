@@ -12,6 +12,7 @@ from rcl_interfaces.srv import GetParameters
 from pedestal_bringup import cli
 from pedestal_bringup.again import recompute
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run import scenario
 from pedestal_bringup.trials import tune
 from pedestal_common import parameters, topics
@@ -161,7 +162,7 @@ def silent(folder):
     named = [topic for topic in topics.TOPICS if topic.name in bag.topics and topic.name.split('/')[0] !=
              'tracking_receiver']
     index = {topic.name: number for number, topic in enumerate(named)}
-    writer = bags.Writer(folder / 'silent', named, bag.metadata,
+    writer = Writer(folder / 'silent', named, bag.metadata,
                          {name: content for name, content in bag.metadata_records.items() if name != 'pedestal'})
     for topic, log, publish, data in bag.raw():
         if topic in index:

@@ -7,8 +7,9 @@ import time
 from rclpy.qos import HistoryPolicy
 
 from pedestal_bringup.bags import configuration
-from pedestal_bringup.bags.bag import BagError, Writer
+from pedestal_bringup.bags.bag import BagError
 from pedestal_bringup.bags.step_order import OrderError, StepOrder
+from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run.recorder_params import RecorderParameters
 from pedestal_common import listening, messages, middleware, nodes, parameters, shell, topics
 from pedestal_common.cdr import STAMPED

@@ -9,6 +9,8 @@ import sys
 from acu_tracker import modes
 from acu_tracker.estimation.kinds import KINDS
 from adu_drive import faults
+from pedestal_bringup.again import what_if
+from pedestal_bringup.analysis import results
 from pedestal_bringup.run import scenario
 from pedestal_common import nodes, parameters, topics
 
@@ -92,8 +94,16 @@ def parameter_table():
     return _table(('parameter', 'default', 'range', 'unit', 'meaning'), rows)
 
 
+def result_table(table=results.RESULTS):
+    """The results of a run: name, unit, what it is, target."""
+    return _table(('result', 'unit', 'what it is', 'target'),
+                  [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
+                   results.documented(table)])
+
+
 TABLES = {'nodes': node_table, 'topics': topic_table, 'services': service_table, 'modes': mode_table,
-          'filter kinds': filter_table, 'drive faults': fault_table,
+          'filter kinds': filter_table, 'drive faults': fault_table, 'results': result_table,
+          'recomputed results': lambda: result_table(what_if.NUMBERS),
           'first parameters': parameter_table}
 
 

@@ -17,7 +17,7 @@ import time
 
 import numpy as np
 
-from pedestal_bringup.bags import bag
+from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages
 
 _spec = importlib.util.spec_from_file_location('bag_test_messages', pathlib.Path(__file__).with_name('test_bag.py'))
@@ -47,7 +47,7 @@ def rows():
 def write(directory, made, counters):
     """Write a bag, counting in shared memory the rows written and those that were written before the last flush (in
     whole words: struct.pack_into clears its place first, so that a kill could leave a 0)."""
-    writer = bag.Writer(directory, _bag_test.RECORDED, _bag_test.METADATA)
+    writer = Writer(directory, _bag_test.RECORDED, _bag_test.METADATA)
     flush = writer.flush
     done = 0
 

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_bringup.analysis import results
+from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.studies import phased_array
 from pedestal_bringup.studies.rigs.angle_loop import Paper
@@ -29,7 +29,7 @@ def test_a_ramp_is_met_in_the_middle_of_the_hold_with_every_smoothing(smoothing,
                    f'tracking_receiver.receiver.smoothing_samples={n}', duration=5.0)
     hold = 0.5 * math.pi / 6 * 0.01 * math.cos(0.6)
     error = run.truth['error'][-50:]
-    end, begin = error[1:, 0], results.began(run['joint_states']['position'][-50:], error)[1:, 0]
+    end, begin = error[1:, 0], tracking.began(run['joint_states']['position'][-50:], error)[1:, 0]
     assert np.abs(0.5 * (end + begin)).max() < 0.01 * hold
     assert end == pytest.approx(np.full(49, hold), rel=0.02) and begin == pytest.approx(np.full(49, -hold), rel=0.02)
 
@@ -38,18 +38,19 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
     """On the target at every stamp, so early by a whole period at the beginnings."""
     t = np.arange(300) * 0.01
     beam = np.column_stack((0.3 + 0.5 * t, np.full_like(t, 0.7)))
-    begun = results.began(beam, np.zeros_like(beam))
+    begun = tracking.began(beam, np.zeros_like(beam))
     assert np.isnan(begun[0]).all()
     assert begun[1:, 0] == pytest.approx(np.full(299, -0.005 * math.cos(0.7)), rel=1e-4)
     nothing, on = np.zeros_like(t), np.ones_like(t, bool)
     mode, noise = np.full(t.size, 'autotrack'), 1e-4 * (-1.0)**np.arange(600).reshape(300, 2)
     for_all = (t, *beam.T, np.full_like(beam, np.nan), nothing, nothing, 0.5 * begun + noise, nothing, noise, beam,
                beam, nothing, mode, on, on, math.radians(1.0))
-    values = results.summary(results.Tracking(*for_all, begun=begun))
+    values = results.measured(results.of_tracking(tracking.Tracking(*for_all, begun=begun)))
     assert values['pointing_max_deg'][0] == pytest.approx(math.degrees(0.005 * math.cos(0.7)), rel=1e-4)
     assert values['cross_elevation_rms_deg'][0] == pytest.approx(values['cross_elevation_max_deg'][0], rel=1e-6)
     assert values['single_sample_noise_deg'][0] == pytest.approx(math.degrees(1e-4))
-    moving = results.summary(results.Tracking(*for_all, begun=np.full_like(begun, np.nan)))
+    moving = results.measured(results.of_tracking(
+        tracking.Tracking(*for_all, begun=np.full_like(begun, np.nan))))
     assert moving['pointing_max_deg'][0] == 0.0
     assert not any('following' in name for name in values) and 'azimuth_following_rms_deg' in moving
 

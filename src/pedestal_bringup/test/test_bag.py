@@ -11,6 +11,7 @@ from rosbags.highlevel import AnyReader
 
 from pedestal_bringup.bags import bag, columns
 from pedestal_bringup.bags.verify import verify
+from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages, nodes, topics
 
 T = 5_000_000
@@ -87,7 +88,7 @@ def rows():
 
 
 def write(directory, rows):
-    writer = bag.Writer(directory, RECORDED, METADATA)
+    writer = Writer(directory, RECORDED, METADATA)
     for name, stamp, data in rows:
         writer.write(NAMES.index(name), stamp, stamp, data)
     writer.close()
@@ -155,7 +156,7 @@ def test_mcap_and_mcap_ros2_support_read_what_was_written(recording, rows):
 
 def test_configuration_comes_back_and_is_indexed(tmp_path):
     more = {'scenario': {'yaml': 'scenario: {}\n'}, 'parameters': {'acu': yaml.safe_dump({'a.b': 1e-7, 'c': '12:30'})}}
-    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA, more)
+    writer = Writer(tmp_path / 'b', RECORDED, METADATA, more)
     writer.close()
     content = bag.read(tmp_path / 'b')
     assert content.metadata == {key: str(value) for key, value in METADATA.items()}
@@ -320,18 +321,18 @@ def test_any_cut_reads_up_to_its_last_chunk(tmp_path, recording, rows):
 def test_existing_directory_is_never_overwritten(recording):
     before = (recording / 'whole_0.mcap').read_bytes()
     with pytest.raises(bag.BagError, match='exists already'):
-        bag.Writer(recording, RECORDED, METADATA)
+        Writer(recording, RECORDED, METADATA)
     assert (recording / 'whole_0.mcap').read_bytes() == before
 
 
 def test_directory_that_cannot_be_made(tmp_path):
     (tmp_path / 'file').write_text('')
     with pytest.raises(bag.BagError, match='Not a directory'):
-        bag.Writer(tmp_path / 'file' / 'bag', RECORDED, METADATA)
+        Writer(tmp_path / 'file' / 'bag', RECORDED, METADATA)
 
 
 def test_flush_leaves_every_message_so_far_in_the_file(tmp_path, rows):
-    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
+    writer = Writer(tmp_path / 'b', RECORDED, METADATA)
     for name, stamp, data in rows[:100]:
         writer.write(NAMES.index(name), stamp, stamp, data)
     assert copied(writer).index.size == 0
@@ -348,7 +349,7 @@ def copied(writer):
 
 
 def test_a_bag_that_is_being_written_is_refused(tmp_path):
-    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
+    writer = Writer(tmp_path / 'b', RECORDED, METADATA)
     with pytest.raises(bag.BagError, match='b_0.mcap: is being written; wait until its recorder has ended'):
         bag.load(tmp_path / 'b')
     writer.close()
@@ -402,7 +403,7 @@ def test_verify_finds_swapped_messages(tmp_path, rows):
 
 
 def test_verify_finds_what_the_recorder_lost(tmp_path, rows):
-    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
+    writer = Writer(tmp_path / 'b', RECORDED, METADATA)
     for i, (name, stamp, data) in enumerate(rows):
         if i == 200:
             writer.skip(NAMES.index('clock'), 3)
@@ -450,8 +451,8 @@ def test_a_disk_that_takes_a_chunk_partly_leaves_a_whole_bag_without_a_hole(tmp_
         def __getattr__(self, name):
             return getattr(self.stream, name)
 
-    writer = bag.Writer(tmp_path / 'b', RECORDED, METADATA)
-    writer._container._stream = Disk(writer._container._stream, 300_000)
+    writer = Writer(tmp_path / 'b', RECORDED, METADATA)
+    writer._disk.stream = Disk(writer._disk.stream, 300_000)
     errors = []
     for name, stamp, data in rows:
         try:
@@ -463,3 +464,7 @@ def test_a_disk_that_takes_a_chunk_partly_leaves_a_whole_bag_without_a_hole(tmp_
     assert [row[:2] + row[3:] for row in bag.read(tmp_path / 'b').raw()] == [
         row for row in rows if row[1] < 1_000_000_000]
     assert not verify(tmp_path / 'b').problems
+    with open(writer.file, 'rb') as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        assert len(list(reader.iter_messages())) == reader.get_summary().statistics.message_count == writer.messages
+        assert reader.get_summary().statistics.metadata_count == len(list(reader.iter_metadata())) == 1

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.estimation import motion_models
 from acu_tracker.estimation.measurement import error_variance
 from acu_tracker.estimation.params import ReceiverModelParameters
-from pedestal_bringup.analysis import consistency
+from pedestal_bringup.analysis import consistency, results
 from pedestal_common import line_of_sight, topics
 from pedestal_common.parameters import build, record
 from tracking_receiver_sim import receiver, target
@@ -53,7 +53,7 @@ def test_a_filter_is_what_it_was_made(factor, words, freedoms):
         assert judged.nis_inside == pytest.approx(
             np.diff(stats.chi2.cdf(np.array([low, high]) / factor**2, freedoms))[0], abs=0.01)
         assert judged.nees == pytest.approx(2.0 * factor**2, rel=0.35)
-    values = consistency.summary(found)
+    values = results.measured({'filter': found})
     assert values['azimuth_nis_mean'] == (consistency.axis(found, 0).nis, '')
     assert values['elevation_nees_mean'] == (consistency.axis(found, 1).nees, '')
 
@@ -88,7 +88,7 @@ def test_nothing_evaluated():
     judged = consistency.axis(found, 0)
     assert judged.verdict == 'nothing was evaluated'
     assert math.isnan(judged.nis) and math.isnan(judged.nees)
-    assert consistency.summary(None) == {}
+    assert results.measured({'filter': None}) == {}
 
 
 def test_true_rates_seen_from_a_sailing_ship():

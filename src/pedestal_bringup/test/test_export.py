@@ -9,7 +9,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from pedestal_bringup import cli
-from pedestal_bringup.bags import bag
+from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages, topics
 
 T = 5_000_000
@@ -53,7 +53,7 @@ def run():
 def recording(tmp_path_factory):
     path = tmp_path_factory.mktemp('bags') / 'made'
     names = [topic.name for topic in topics.TOPICS]
-    writer = bag.Writer(path, topics.TOPICS, {'scenario': 'test', 'pacing': 'lockstep'})
+    writer = Writer(path, topics.TOPICS, {'scenario': 'test', 'pacing': 'lockstep'})
     for name, stamp, message in run():
         writer.write(names.index(name), stamp, stamp, messages.serialize(message))
     writer.close()
@@ -176,7 +176,7 @@ def test_a_table_that_is_there_is_not_replaced_unasked(recording, tmp_path, caps
 def foreign(path):
     """A bag with a topic whose type nobody here knows and one that is."""
     known = topics.BY_NAME['acu/mode']
-    writer = bag.Writer(path, [known, known._replace(name='other', type='std_msgs/msg/Header')], {})
+    writer = Writer(path, [known, known._replace(name='other', type='std_msgs/msg/Header')], {})
     writer.write(0, 0, 0, messages.serialize(messages.String(data='stow')))
     writer.write(1, 0, 0, b'\0\1\0\0\0\0\0\0')
     writer.close()
@@ -219,7 +219,7 @@ def test_a_bag_that_is_none(verb, what, tmp_path, capsys):
 
 @pytest.mark.parametrize('verb', ['export', 'replay'])
 def test_a_bag_that_is_being_written(verb, tmp_path, capsys):
-    writer = bag.Writer(tmp_path / 'bag', topics.TOPICS, {})
+    writer = Writer(tmp_path / 'bag', topics.TOPICS, {})
     assert cli.main([verb, str(tmp_path / 'bag')]) == 1
     error = capsys.readouterr().err
     assert f'{writer.file}: is being written' in error and error.count('\n') == 1

@@ -13,6 +13,7 @@ from rosbags.highlevel import AnyReader
 from pedestal_bringup.bags import bag
 from pedestal_bringup.bags.recover import recover
 from pedestal_bringup.bags.verify import verify
+from pedestal_bringup.bags.writer import Writer
 
 _spec = importlib.util.spec_from_file_location('killed_writer', pathlib.Path(__file__).with_name('killed_writer.py'))
 killed_writer = importlib.util.module_from_spec(_spec)
@@ -66,7 +67,7 @@ def test_fifty_deaths_lose_at_most_the_last_second(tmp_path, made):
 def whole(made, tmp_path_factory):
     """A bag of 7 chunks, and where they are in its bytes: [(start, stop)]."""
     path = tmp_path_factory.mktemp('bags') / 'whole'
-    writer = bag.Writer(path, RECORDED, {**METADATA, 'scenario': 'leo_pass'},
+    writer = Writer(path, RECORDED, {**METADATA, 'scenario': 'leo_pass'},
                         {'parameters': {'recorder': 'duration: 20.0'}})
     for name, stamp, data in made:
         if stamp >= 7 * SECOND:
@@ -198,7 +199,7 @@ def test_channels_declared_nowhere_are_said(tmp_path, made):
 def test_what_cannot_be_recovered_leaves_nothing_behind(whole, tmp_path):
     with pytest.raises(bag.BagError, match='exists already'):
         recover(whole[0], whole[0])
-    writer = bag.Writer(tmp_path / 'live', RECORDED, METADATA)
+    writer = Writer(tmp_path / 'live', RECORDED, METADATA)
     with pytest.raises(bag.BagError, match='is being written'):
         recover(tmp_path / 'live')
     writer.close()

@@ -7,6 +7,7 @@ pytest.importorskip('rclpy')
 from pedestal_bringup import cli
 from pedestal_bringup.again import playlist
 from pedestal_bringup.bags import bag
+from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages, topics  # noqa: E402
 
 T = 5_000_000
@@ -29,7 +30,7 @@ def write(path, rows):
     """A bag of (topic, stamp, log time, text of acu/mode or number of the message) in this order."""
     table = (*topics.TOPICS, OTHER)
     names = [topic.name for topic in table]
-    writer = bag.Writer(path, table, {})
+    writer = Writer(path, table, {})
     for name, stamp, log, content in rows:
         if name == 'acu/mode':
             data = messages.serialize(messages.String(data=content))
@@ -126,7 +127,7 @@ def test_refused_in_one_line(case, tmp_path, capsys, monkeypatch):
 
 def test_a_node_whose_topics_are_not_there(tmp_path, capsys):
     path = tmp_path / 'bag'
-    writer = bag.Writer(path, [topics.BY_NAME['clock']], {})
+    writer = Writer(path, [topics.BY_NAME['clock']], {})
     writer.write(0, 0, 0, messages.serialize(messages.Clock(clock=messages.Time(sec=0, nanosec=0))))
     writer.close()
     assert cli.main(['replay', str(path), '--node', 'adu']) == 1
@@ -135,7 +136,7 @@ def test_a_node_whose_topics_are_not_there(tmp_path, capsys):
 
 def test_a_type_that_is_not_the_topics(tmp_path, capsys):
     path = tmp_path / 'bag'
-    writer = bag.Writer(path, [topics.BY_NAME['clock']._replace(type='std_msgs/msg/String')], {})
+    writer = Writer(path, [topics.BY_NAME['clock']._replace(type='std_msgs/msg/String')], {})
     writer.write(0, 0, 0, messages.serialize(messages.String(data='noon')))
     writer.close()
     assert cli.main(['replay', str(path)]) == 1

@@ -7,9 +7,11 @@ import shutil
 import numpy as np
 import pytest
 
-from pedestal_bringup.analysis import consistency, results
+from pedestal_bringup.analysis import consistency, results, tracking
 from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.report import figures, filter_figures, report
+from pedestal_bringup.bags.writer import Writer
+from pedestal_bringup.report import figures, filter_figures, run_data, run_figures
+from pedestal_bringup.report.page import write as write_report
 from pedestal_common import messages, topics
 
 T = 5_000_000
@@ -62,7 +64,7 @@ def status(k, node, level, text):
 def make_bag(path, names=ASHORE, steps=STEPS, locked=True, skip=(), effort=True, **metadata):
     """A bag of a short run with some of the topics."""
     kept = [topics.BY_NAME[name] for name in names]
-    writer = bags.Writer(path, kept, {'scenario': 'short <run>', 'pacing': 'lockstep', 'seed': 3, **metadata})
+    writer = Writer(path, kept, {'scenario': 'short <run>', 'pacing': 'lockstep', 'seed': 3, **metadata})
     rng = np.random.default_rng(1)
 
     def put(name, k, message, late=0):
@@ -126,7 +128,7 @@ class Page(html.parser.HTMLParser):
 
 
 def page_of(bag, **options):
-    return Page(report.write(bag, **options).read_text())
+    return Page(write_report(bag, **options).read_text())
 
 
 @pytest.fixture(scope='module')
@@ -142,7 +144,7 @@ def page(whole, tmp_path_factory):
 
 def test_every_figure_and_section_is_there(page):
     page, folder = page
-    keys = [spec.key for spec in (*figures.FIGURES, *filter_figures.FIGURES)]
+    keys = [spec.key for spec in (*run_figures.FIGURES, *filter_figures.FIGURES)]
     assert page.drawn == keys
     assert {'results', 'figures', 'filter', 'diagnostics', *keys} <= set(page.ids)
     assert page.open == []
@@ -162,7 +164,8 @@ def test_file_needs_nothing_else(page):
 
 
 def test_numbers_are_those_of_the_summary(page, whole):
-    values = {key: value for key, (value, _) in results.summary(results.tracking(bags.read(whole))).items()}
+    parts = results.of_tracking(tracking.read(bags.read(whole)))
+    values = {key: value for key, (value, _) in results.measured(parts).items()}
     rows = page[0].rows
 
     def read(name):
@@ -190,7 +193,7 @@ def test_numbers_are_those_of_the_summary(page, whole):
 
 
 def test_the_filter_is_judged(page, whole):
-    found = consistency.read(bags.read(whole), results.tracking(bags.read(whole)))
+    found = consistency.read(bags.read(whole), tracking.read(bags.read(whole)))
     for axis, i in (('azimuth', 0), ('elevation', 1)):
         judged = consistency.axis(found, i)
         assert f'{axis.capitalize()}: {judged.verdict}.' in page[0].text
@@ -208,7 +211,7 @@ def test_text_of_the_bag_is_escaped_and_repeats_are_one_row(page):
 
 def test_same_bag_gives_same_bytes(page, whole, tmp_path):
     first = page[1]
-    again = report.write(whole, tmp_path / 'b.html', tmp_path)
+    again = write_report(whole, tmp_path / 'b.html', tmp_path)
     assert again.read_bytes() == (first / 'sub' / 'r.html').read_bytes()
     for path in tmp_path.glob('*.png'):
         assert path.read_bytes() == (first / path.name).read_bytes()
@@ -216,9 +219,9 @@ def test_same_bag_gives_same_bytes(page, whole, tmp_path):
 
 def test_where_it_is_written(tmp_path):
     bag = make_bag(tmp_path / 'bag', ('clock',), steps=3)
-    assert report.write(bag) == bag / 'report.html'
+    assert write_report(bag) == bag / 'report.html'
     bare = shutil.copy(bag / 'bag_0.mcap', tmp_path / 'bare.mcap')
-    assert report.write(bare) == tmp_path / 'report.html'
+    assert write_report(bare) == tmp_path / 'report.html'
 
 
 @pytest.mark.parametrize('names, drawn, said', [
@@ -244,7 +247,7 @@ def test_never_locked(tmp_path):
 @pytest.mark.parametrize('steps', [0, 1, 2])
 def test_hardly_anything_recorded(tmp_path, steps):
     page = page_of(make_bag(tmp_path / 'short', steps=steps))
-    assert len(page.ids) >= 2 + len(figures.FIGURES)
+    assert len(page.ids) >= 2 + len(run_figures.FIGURES)
     if steps == 0:
         assert page.drawn == []
         assert 'no message of joint_states and target/truth' in page.text
@@ -263,8 +266,8 @@ def test_lost_steps_are_shown(tmp_path):
 
 
 def test_labels_in_the_page_are_those_drawn(whole):
-    recording = report._recording(bags.read(whole))
-    spec = figures.FIGURES[0]
+    recording = run_data.read(bags.read(whole))
+    spec = run_figures.FIGURES[0]
     stream = io.StringIO()
     figures.render(spec, recording, stream)
     plain, inlined = (re.findall('<text[^>]*>([^<]*)</text>', text)
@@ -281,9 +284,9 @@ def test_wall_jitter_of_realtime(tmp_path):
 
 def test_beamwidth_lines_only_when_known(whole, tmp_path):
     def dashed(path):
-        recording = report._recording(bags.read(path))
+        recording = run_data.read(bags.read(path))
         with figures.matplotlib.rc_context(figures.STYLE):
-            panels = figures.pointing(recording).axes
+            panels = run_figures.pointing(recording).axes
         return [line.get_ydata()[0] for axes in panels for line in axes.lines if line.get_linestyle() == '--']
     assert dashed(whole) == []
     known = make_bag(tmp_path / 'known', steps=700, beamwidth=math.radians(1.0))
@@ -292,11 +295,11 @@ def test_beamwidth_lines_only_when_known(whole, tmp_path):
 
 def test_broken_bags(tmp_path, whole):
     with pytest.raises(bags.BagError, match='No such file'):
-        report.write(tmp_path / 'none.mcap')
+        write_report(tmp_path / 'none.mcap')
     cut = tmp_path / 'cut.mcap'
     cut.write_bytes((whole / 'whole_0.mcap').read_bytes()[:-500])
     with pytest.raises(bags.BagError, match='the file ends'):
-        report.write(cut)
+        write_report(cut)
     assert not (tmp_path / 'report.html').exists()
 
 
@@ -319,5 +322,5 @@ def test_azimuth_is_unwrapped():
     angle = np.radians(np.linspace(170.0, 190.0, 50))
     wrapped = (angle + np.pi) % (2.0 * np.pi) - np.pi
     wrapped[20] = math.nan
-    out = figures._continuous(wrapped)
+    out = run_figures._continuous(wrapped)
     assert np.isnan(out[20]) and np.nanmax(np.abs(out - np.degrees(angle))) < 1e-9

@@ -6,6 +6,7 @@ import yaml
 
 from pedestal_bringup.again import rerun
 from pedestal_bringup.bags import bag, configuration
+from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run import scenario
 from pedestal_common import messages, nodes
 
@@ -38,7 +39,7 @@ def rows(steps=20, **changed):
 
 
 def write(path, made, more=(), **metadata):
-    writer = bag.Writer(path, RECORDED, {'scenario': 'leo_pass', 'pacing': 'lockstep', 'git': 'abc', **metadata}, more)
+    writer = Writer(path, RECORDED, {'scenario': 'leo_pass', 'pacing': 'lockstep', 'git': 'abc', **metadata}, more)
     for name, stamp, message in made:
         writer.write(NAMES.index(name), stamp, stamp, messages.serialize(message))
     writer.close()
@@ -46,33 +47,33 @@ def write(path, made, more=(), **metadata):
 
 
 def compared(tmp_path, now, **metadata):
-    comparison = rerun.compare(write(tmp_path / 'was', rows()), write(tmp_path / 'now', now, **metadata))
-    *lines, verdict = comparison.lines()
+    result = rerun.result(write(tmp_path / 'was', rows()), write(tmp_path / 'now', now, **metadata))
+    *lines, verdict = result.lines()
     assert verdict.startswith(f'{tmp_path / "now"}: ')
-    return comparison, lines, verdict.partition(': ')[2]
+    return result, lines, verdict.partition(': ')[2]
 
 
 def test_equal_bytes(tmp_path):
-    comparison, lines, verdict = compared(tmp_path, rows())
-    assert comparison.same and comparison.equal and lines == []
-    assert verdict == f'equal to the last byte, sha256 {comparison.sha256}'
+    result, lines, verdict = compared(tmp_path, rows())
+    assert result.same and result.equal and lines == []
+    assert verdict == f'equal to the last byte, sha256 {result.sha256}'
 
 
 def test_another_version_with_equal_messages_is_named_as_such(tmp_path):
-    comparison, lines, verdict = compared(tmp_path, rows(), git='def-dirty', **{'version.numpy': '2.4.6'})
-    assert comparison.equal and not comparison.same
+    result, lines, verdict = compared(tmp_path, rows(), git='def-dirty', **{'version.numpy': '2.4.6'})
+    assert result.equal and not result.same
     assert lines == ['pedestal.git: abc -> def-dirty', 'pedestal.version.numpy: none -> 2.4.6']
     assert verdict == 'messages equal, made by another version'
 
 
 def test_other_metadata_is_no_other_version(tmp_path):
-    comparison, lines, verdict = compared(tmp_path, rows(), seed='9')
-    assert comparison.equal and lines == ['pedestal.seed: none -> 9'] and verdict == 'messages equal, metadata not'
+    result, lines, verdict = compared(tmp_path, rows(), seed='9')
+    assert result.equal and lines == ['pedestal.seed: none -> 9'] and verdict == 'messages equal, metadata not'
 
 
 def test_the_first_difference_is_told_by_topic_stamp_and_field(tmp_path):
-    comparison, lines, verdict = compared(tmp_path, rows(velocity=(7, 1, 0.25), effort=(9, 0, 3.0)))
-    assert not comparison.equal and verdict == 'NOT equal'
+    result, lines, verdict = compared(tmp_path, rows(velocity=(7, 1, 0.25), effort=(9, 0, 3.0)))
+    assert not result.equal and verdict == 'NOT equal'
     assert lines == ['joint_states: 20 messages, 2 differ, the first at 0.035000 s: velocity[1] 0.0 -> 0.25']
 
 
@@ -80,8 +81,8 @@ def test_missing_and_more_messages_come_in_the_order_of_their_stamps(tmp_path):
     now = [row for row in rows() if not (row[0] == 'clock' and row[1] == 19 * T)]
     now.append(('acu/mode', 19 * T, messages.String(data='preset')))
     now[1][2].name[1] = 'tilt'
-    comparison, lines, _ = compared(tmp_path, now)
-    assert not comparison.equal
+    result, lines, _ = compared(tmp_path, now)
+    assert not result.equal
     assert lines == ["joint_states: 20 messages, 1 differ, the first at 0.000000 s: name[1] 'elevation' -> 'tilt'",
                      'clock: 20 messages, now 19, 1 differ, the first at 0.095000 s: not there any more',
                      'acu/mode: 2 messages, now 3, 1 differ, the first at 0.095000 s: not recorded']
@@ -90,16 +91,16 @@ def test_missing_and_more_messages_come_in_the_order_of_their_stamps(tmp_path):
 def test_another_order_in_the_file_is_a_difference(tmp_path):
     now = rows()
     now[4], now[5] = now[5], now[4]
-    comparison, lines, _ = compared(tmp_path, now)
-    assert not comparison.equal
+    result, lines, _ = compared(tmp_path, now)
+    assert not result.equal
     assert lines == ['clock: 20 messages, 0 differ, the first at 0.005000 s: its place in the file, '
                      'now joint_states at 0.005000 s comes there']
 
 
 def test_a_recording_that_breaks_off_is_equal_up_to_its_end(tmp_path):
-    comparison = rerun.compare(write(tmp_path / 'was', rows(12)), write(tmp_path / 'now', rows()))
-    assert not comparison.equal
-    assert comparison.lines() == [f'{tmp_path}/now: NOT equal, but equal up to 0.055000 s, where the recording ends']
+    result = rerun.result(write(tmp_path / 'was', rows(12)), write(tmp_path / 'now', rows()))
+    assert not result.equal
+    assert result.lines() == [f'{tmp_path}/now: NOT equal, but equal up to 0.055000 s, where the recording ends']
 
 
 @pytest.fixture

@@ -71,6 +71,13 @@ def put_stamp(stamp, ns):
     stamp.sec, stamp.nanosec = divmod(ns, 1_000_000_000)
 
 
+def since(message, epoch):
+    """The message with its header's stamp counted from an epoch [ns]; a stamp 0 is the epoch itself."""
+    stamp = nanoseconds(message.header.stamp)
+    put_stamp(message.header.stamp, stamp - epoch if stamp else 0)
+    return message
+
+
 def header(frame_id) -> Header:
     """A Header at stamp 0."""
     return Header(stamp=Time(sec=0, nanosec=0), frame_id=frame_id)

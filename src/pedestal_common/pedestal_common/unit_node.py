@@ -111,10 +111,8 @@ class UnitNode(shell.Shell):
     def _once_taker(self, port, name):
         def take(message):
             stamp = messages.nanoseconds(message.header.stamp)
-            if stamp:    # 0: its times count from the epoch, as in lockstep
-                messages.put_stamp(message.header.stamp, stamp - self.epoch(stamp))
             try:
-                port.unit.decode(name, message)
+                port.unit.decode(name, messages.since(message, self.epoch(stamp) if stamp else 0))
                 self.refused = ''
             except ValueError as error:
                 self.refused = f'{name} refused: {error}'

@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from pedestal_bringup.again import comparison, recompute
+from pedestal_bringup.again import difference, recompute
 from pedestal_bringup.run.graph import Operator, RunError, command_line, sole_run
 from pedestal_common import middleware, nodes, parameters, records
 from pedestal_common.steps import SECOND
@@ -182,4 +182,4 @@ def _due(done, name):
 
 def _output(name, data, done, steps):
     log = done.feed.stamps[np.array(steps[:len(data)], np.int64)]
-    return comparison.recorded([bytes(message) for message in data[:len(log)]], log, name)
+    return difference.recorded([bytes(message) for message in data[:len(log)]], log, name)

@@ -1,8 +1,8 @@
 """What a replay publishes, and in which order. No ROS here.
 
 The order is that of the stamps (`header.stamp`; the log time of a type that has none). Of equal stamps latched topics
-go first, and have arrived everywhere before anything follows, as nodes send them (Shell.announce); then the order of
-the table of topics, topics that are not in it last; then the order of the file.
+go first and have arrived everywhere before anything follows, for so do nodes send them (Shell.announce); then comes
+the order of the table of topics, topics that are not in it last; then the order of the file.
 """
 import difflib
 import itertools
@@ -22,18 +22,20 @@ def reads(graph, node, name):
 
 
 def writes(graph, node, name):
+    """Whether a node of the graph {name: Link} writes a topic."""
     return name in graph and node in graph[name].writers
 
 
 def latched(graph, name):
-    """Whether a topic holds until its next message."""
+    """Whether a topic of the graph {name: Link} holds until its next message."""
     return name in graph and topics.QOS[graph[name].rate].latched
 
 
 def select(bag, of, names):
-    """The topics of a bag to publish: those named, else those the nodes `of` read and none of them writes, else all.
+    """The topics of a bag.Bag to publish: those named, else those that the nodes `of` read and none of
+    them writes, else all.
 
-    Raises BagError for a topic the bag has not, a node there is not, and a node that reads nothing of the bag.
+    Raises BagError for a topic that is not in the bag, an unknown node, and a node that reads nothing of the bag.
     """
     if names:
         return bags.chosen_topics(bag, names)
@@ -55,11 +57,12 @@ def select(bag, of, names):
 
 
 class Playlist:
-    """Messages in the order of this module.
+    """Messages of a bag.Bag in the order of this module.
 
-    names: topics. start, duration [s] from the first message on (of a topic that is not latched); the last message
-    before the start of each latched topic still holds there and goes first. first, last, end: stamps [ns] of the first
-    and last message and of the bag's last one. Raises BagError when there is none.
+    names: topics. start, duration [s]: counted from the first message of a topic that is not latched, duration None to
+    the end; the last message before the start of each latched topic still holds there and goes first. origin, end:
+    stamps [ns] of the first message that counts and of the last one in the bag; first, last: of those published.
+    Raises BagError when there is none.
     """
 
     def __init__(self, bag, names, start, duration):
@@ -67,11 +70,11 @@ class Playlist:
         where, stamps, ranks = [], [], []
         rank = {name: number - len(bag.graph) * latched(bag.graph, name) for number, name in enumerate(bag.graph)}
         for name in names:
-            found = bag.where(name)
-            where.append(found)
+            rows = bag.where(name)
+            where.append(rows)
             stamps.append(columns.stamps([data[:12] for _, _, _, data in bag.raw(name)], bag.topics[name],
-                                         bag.index.log[found]))
-            ranks.append(np.full(found.size, rank.get(name, len(rank))))
+                                         bag.index.log[rows]))
+            ranks.append(np.full(rows.size, rank.get(name, len(rank))))
         where, stamps, ranks = map(np.concatenate, (where, stamps, ranks))
         if not where.size:
             raise bags.BagError(f'{bag.path}: no message of {", ".join(names)}')

@@ -17,7 +17,7 @@ import time
 import numpy as np
 import yaml
 
-from pedestal_bringup.again import comparison
+from pedestal_bringup.again import difference
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import scenario
 from pedestal_common import messages, nodes, parameters, records, topics
@@ -77,13 +77,13 @@ class Recording:
             self._data[topic] = [data for _, _, _, data in self.bag.raw(topic)]
         return self._data[topic]
 
-    def output(self, topic) -> comparison.Output:
+    def output(self, topic) -> difference.Output:
         """Its messages as numbers."""
         if topic not in self._outputs:
             try:
-                output = comparison.recorded(self.data(topic), self.rows(topic).log, topic)
-                self._outputs[topic] = output if output.texts is None else dataclasses.replace(
-                    output, stamps=self.steps(topic))
+                output = difference.recorded(self.data(topic), self.rows(topic).log, topic)
+                self._outputs[topic] = dataclasses.replace(output, stamps=(
+                    output.stamps - self.bag.start if output.texts is None else self.steps(topic)))
             except ValueError as error:
                 raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
         return self._outputs[topic]
@@ -92,7 +92,7 @@ class Recording:
         """Stamps [ns] of the steps that messages without one belong to: in our lockstep recordings their log says, in
         others they came before the answer to that step; AFTER_ALL where none came any more, their log where no answer
         was recorded."""
-        log = self.rows(topic).log
+        log = self.rows(topic).log - self.bag.start
         answer = writer_of(topic).writes[0]
         if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(answer):
             return log
@@ -227,7 +227,8 @@ def compute(recording, unit, fed, states=None, requests=None):
             break
         for topic, row in events.get(step, ()):
             try:
-                unit.decode(topic, messages.deserialize(recording.data(topic)[row], topics.BY_NAME[topic].type))
+                message = messages.deserialize(recording.data(topic)[row], topics.BY_NAME[topic].type)
+                unit.decode(topic, messages.since(message, recording.bag.start))
             except ValueError:
                 pass  # refused, as the node does
         if step in requests:
@@ -249,10 +250,10 @@ def outputs_of(unit, fed, outputs):
     for name in unit.NODE.writes:
         if not records.is_text(name):
             sent = outputs[name]['stamp'] != records.NEVER
-            written[name] = comparison.Output(outputs[name]['stamp'][sent], records.numbers(outputs, name)[sent])
+            written[name] = difference.Output(outputs[name]['stamp'][sent], records.numbers(outputs, name)[sent])
         elif name not in unit.MOMENTARY:
             stamps, texts = announced(unit, name, fed.stamps, outputs)
-            written[name] = comparison.Output(stamps, np.zeros((len(stamps), 0)), texts)
+            written[name] = difference.Output(stamps, np.zeros((len(stamps), 0)), texts)
     return {name: output for name, output in written.items() if name in unit.messages or output.texts is not None}
 
 
@@ -297,12 +298,12 @@ def idle(recording, done) -> str:
 
 
 def compare(recording, outputs, unit, tolerance) -> list:
-    """TopicComparison of every output that was recorded."""
+    """TopicDifference of every output that was recorded."""
     compared = []
     for name, output in outputs.items():
         if recording.has(name) and not tolerance.ignores(name):
             template = unit.messages.get(name)
-            compared.append(comparison.compare(name, recording.output(name), output, tolerance,
+            compared.append(difference.compare(name, recording.output(name), output, tolerance,
                                                recording.data(name) if template else None, template))
     return compared
 
@@ -385,7 +386,7 @@ def measure(path, node='acu'):
     def run():
         recording = Recording(path)
         done = recompute(recording, node, parameters_of(recording, node))
-        compare(recording, done.outputs, done.unit, comparison.Tolerance())
+        compare(recording, done.outputs, done.unit, difference.Tolerance())
         return (done.feed.stamps[-1] - done.feed.stamps[0]) / SECOND
 
     run()

@@ -1,16 +1,32 @@
 """The verb `pedestal recompute`: what it prints, writes and answers."""
+import dataclasses
 import math
 
 import numpy as np
 
-from pedestal_bringup.again import comparison, recompute, what_if
-from pedestal_bringup.bags.bag import Writer
+from pedestal_bringup.again import difference, recompute, what_if
+from pedestal_bringup.analysis.results import row
+from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages, records, topics
 from pedestal_common.steps import SECOND
 
 
+@dataclasses.dataclass
+class NodeReport:
+    """One node: lines to print, rows of --json, the outputs {topic: Output} it has now, a message of each as the node
+    makes it {topic: message}, whether they are as they must be."""
+    lines: list
+    rows: list
+    outputs: dict
+    templates: dict
+    well: bool = True
+
+
 def main(options):
-    """(lines to print, rows, whether all is well) of the verb's options. Raises ValueError for what fits nothing."""
+    """(lines to print, rows of --json, whether all is well) of the verb's options.
+
+    Raises ValueError for an option that fits nothing, RunError when a live node does not answer.
+    """
     recording = recompute.Recording(options.bag, {None: None, 'lockstep': True}.get(options.pacing, False),
                                     options.beam)
     given = recompute.file_parameters(options.params_file, recording.bag.beam) if options.params_file else None
@@ -18,114 +34,113 @@ def main(options):
     changes = recompute.overrides(options.param, nodes)
     if changes:
         nodes = list(changes)
-    tolerance = comparison.Tolerance(options.absolute, options.relative, tuple(options.ignore))
     if changes and options.live:
         raise recompute.RecomputeError('--live compares with what was recorded; --param does not go with it')
     if options.output and options.output.exists():
         raise recompute.RecomputeError(f'--output {options.output} exists already; a recording is never overwritten')
-    origin = _origin(recording, options.params_file)
-    lines, rows, well, outputs = [], [], True, {}
-    for node in nodes:
-        params = recompute.parameters_of(recording, node, given)
-        done = recompute.recompute(recording, node, params)
-        why = '' if options.allow_idle else recompute.idle(recording, done)
-        lines += ['' if lines else None, _title(recording, done, origin), *_remarks(recording, done)]
-        if changes:
-            new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes[node]),
-                                      {step: [service for service, _ in made] for step, made in
-                                       done.requests.items()})
-            more, found = _old_against_new(recording, done, new, tolerance, changes[node])
-            outputs.update(new.outputs)
-        else:
-            heard = done.outputs
-            if options.live:
-                from pedestal_bringup.again import live
-                heard = live.outputs(recording, done, params)
-                lines.append(f'compared is what the process of {node} published, fed in lockstep')
-            more, found, equal = _against_recorded(recording, heard, done, tolerance)
-            well = well and equal and not done.feed.problem
-            outputs.update(heard)
-        lines += more
-        rows += found
-        if why:
-            lines.append(f'{node}: NOT exercised: {why} (--allow-idle lets it pass)')
-            well = False
+    reports = [_node_report(recording, node, given, changes.get(node), options) for node in nodes]
+    lines = []
+    for report in reports:
+        lines += [*([''] if lines else []), *report.lines]
     if options.output:
-        write(options.output, recording, outputs, done.unit.messages if len(nodes) == 1 else
-              _messages(recording, nodes, given), changes)
+        outputs = {topic: output for report in reports for topic, output in report.outputs.items()}
+        templates = {topic: message for report in reports for topic, message in report.templates.items()}
+        write(options.output, recording, outputs, templates, changes)
         lines.append(f'written: {options.output}')
-    return [line for line in lines if line is not None], rows, well
+    return lines, [row for report in reports for row in report.rows], all(report.well for report in reports)
 
 
-def _origin(recording, file):
-    if file:
-        return f'parameters of {file}'
-    if recording.bag.configuration['parameters']:
-        return 'parameters as recorded'
-    return 'DEFAULT parameters, for the recording does not say how it was made (--params-file)'
+def _node_report(recording, node, given, changes, options):
+    """The NodeReport of a node with the parameters given; changes: {key: value} of parameters, None to compare with
+    what was recorded."""
+    params = recompute.parameters_of(recording, node, given)
+    done = recompute.recompute(recording, node, params)
+    tolerance = difference.Tolerance(options.absolute, options.relative, tuple(options.ignore))
+    if changes:
+        new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes),
+                                  {step: [service for service, _ in made] for step, made in done.requests.items()})
+        report = _old_against_new(recording, done, new, tolerance, changes)
+    elif options.live:
+        from pedestal_bringup.again import live
+        report = _against_recorded(recording, live.outputs(recording, done, params), done, tolerance)
+        report.lines.insert(0, f'compared is what the process of {node} published, fed in lockstep')
+    else:
+        report = _against_recorded(recording, done.outputs, done, tolerance)
+    report.lines[:0] = [_title(recording, done, options.params_file), *_input_problems(done), *_requests(done)]
+    idle = '' if options.allow_idle else recompute.idle(recording, done)
+    if idle:
+        report.lines.append(f'{node}: NOT exercised: {idle} (--allow-idle lets it pass)')
+        report.well = False
+    return report
 
 
-def _title(recording, done, origin):
+def _title(recording, done, params_file):
     stamps = done.feed.stamps / SECOND
     span = f'{stamps[0]:g} to {stamps[-1]:g} s' if len(stamps) else 'no step'
     pacing = 'lockstep' if recording.lockstep else 'realtime'
+    if params_file:
+        origin = f'parameters of {params_file}'
+    elif recording.bag.configuration['parameters']:
+        origin = 'parameters as recorded'
+    else:
+        origin = 'DEFAULT parameters, for the recording does not say how it was made (--params-file)'
     return f'{recording.bag.path}: {recording.bag.beam}{done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
 
 
-def _remarks(recording, done):
-    """What is to be known about the inputs."""
-    said = []
+def _input_problems(done):
+    lines = []
     if done.feed.problem:
-        said.append(f'NOT recomputed to the end: {done.feed.problem}')
+        lines.append(f'NOT recomputed to the end: {done.feed.problem}')
     if done.feed.refused:
-        said.append(f'{done.feed.refused} inputs refused: their stamps go back')
-    for step, made in done.requests.items():
-        said += [f'{service} asked for at {done.feed.stamps[step] / SECOND:.6f} s{"" if granted else ", and refused"}'
-                 for service, granted in made]
-    if done.requests:
-        said.append(f'{sum(map(len, done.requests.values()))} requests fed')
-    return said
+        lines.append(f'{done.feed.refused} inputs refused: their stamps go back')
+    return lines
 
 
-def _row(node, metric, value, unit=''):
-    return {'case': node, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
-            'paper': None, 'target': None}
+def _requests(done):
+    """Lines on the services that were asked for."""
+    lines = [line for step, made in done.requests.items() for line in _requests_of_step(done, step, made)]
+    return lines + ([f'{len(lines)} requests fed'] if lines else [])
+
+
+def _requests_of_step(done, step, made):
+    return [f'{service} asked for at {done.feed.stamps[step] / SECOND:.6f} s{"" if granted else ", and refused"}'
+            for service, granted in made]
 
 
 def _against_recorded(recording, outputs, done, tolerance):
-    """(lines, rows, whether equal) of what a node says now against what it said."""
+    """The NodeReport of outputs {topic: Output} against those that were recorded."""
     compared = recompute.compare(recording, outputs, done.unit, tolerance)
     if not compared:
-        return _new_numbers(recording, done)
-    lines, rows = comparison.lines(compared), []
+        return _new_numbers(recording, outputs, done)
+    rows = []
     for topic in compared:
-        rows += [_row(done.node, f'{topic.name} recorded', topic.recorded),
-                 _row(done.node, f'{topic.name} recomputed', topic.recomputed),
-                 _row(done.node, f'{topic.name} problems', len(topic.problems))]
-        rows.append(_row(done.node, f'{topic.name} differences', sum(field.different for field in topic.fields)))
+        rows += [row(done.node, f'{topic.name} recorded', topic.was),
+                 row(done.node, f'{topic.name} recomputed', topic.now),
+                 row(done.node, f'{topic.name} problems', len(topic.problems)),
+                 row(done.node, f'{topic.name} differences', sum(field.different for field in topic.fields))]
         for field in topic.fields:
             name = f'{topic.name} {field.name}'
-            rows += [_row(done.node, f'{name} different', field.different),
-                     _row(done.node, f'{name} beyond tolerance', field.beyond),
-                     _row(done.node, f'{name} largest', field.largest),
-                     _row(done.node, f'{name} first', field.first, 's')]
+            rows += [row(done.node, f'{name} different', field.different),
+                     row(done.node, f'{name} beyond tolerance', field.beyond),
+                     row(done.node, f'{name} largest', field.largest),
+                     row(done.node, f'{name} first', field.first, 's')]
     equal = all(topic.equal for topic in compared)
-    if all(topic.identical for topic in compared):
-        lines.append(f'{done.node}: identical')
-    else:
-        lines.append(f'{done.node}: {"equal within tolerance" if equal else "DIFFERS"}')
-    return lines, rows, equal
+    verdict = 'identical' if all(topic.identical for topic in compared) else \
+        'equal within tolerance' if equal else 'DIFFERS'
+    return NodeReport([*difference.lines(compared), f'{done.node}: {verdict}'], rows, outputs, done.unit.messages,
+                      equal and not done.feed.problem)
 
 
-def _new_numbers(recording, done):
+def _new_numbers(recording, outputs, done):
+    """The NodeReport where no output was recorded."""
     lines = [f'{done.node}: none of its outputs is in the recording: nothing to compare']
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
-    rows = [_row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
+    rows = [row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
     if done.node == 'acu' and len(done.feed.stamps):
         numbers = what_if.numbers(recording.bag, [done.outputs])
         lines += [f'{name:42} {_text(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
-        rows += [_row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
-    return lines, rows, True
+        rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
+    return NodeReport(lines, rows, outputs, done.unit.messages, not done.feed.problem)
 
 
 def _text(value):
@@ -133,28 +148,21 @@ def _text(value):
 
 
 def _old_against_new(recording, old, new, tolerance, changes):
-    """(lines, rows) of a node recomputed with changed parameters: numbers of both, and how far its messages moved."""
+    """The NodeReport of a node recomputed with changed parameters: numbers of both, and how far its messages moved."""
     before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
     whose = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with the parameters unchanged'
     lines = [f'changed: {", ".join(f"{key} = {value}" for key, value in changes.items())}; old is {whose}']
-    lines += [line for line in _remarks(recording, new) if 'asked for' in line]
+    lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
     rows = []
     if new.node == 'acu' and len(new.feed.stamps):
         lines += [f'note: {what_if.NOTE}', f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']
         for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
             ratio = f'{b / a:9.4g}' if a and math.isfinite(b / a) else f'{"":9}'
             lines.append(f'{name:42} {_text(a):>12} {_text(b):>12} {ratio} {unit}'.rstrip())
-            rows += [_row(new.node, f'{name} old', a, unit), _row(new.node, f'{name} new', b, unit)]
-    return lines + comparison.lines([comparison.compare(name, before[name], output, tolerance)
-                                     for name, output in new.outputs.items() if not tolerance.ignores(name)]), rows
-
-
-def _messages(recording, nodes, given):
-    found = {}
-    for node in nodes:
-        params = recompute.parameters_of(recording, node, given)
-        found.update(recompute.unit_of(recording, node, params).messages)
-    return found
+            rows += [row(new.node, f'{name} old', a, unit), row(new.node, f'{name} new', b, unit)]
+    lines += difference.lines([difference.compare(name, before[name], output, tolerance)
+                               for name, output in new.outputs.items() if not tolerance.ignores(name)])
+    return NodeReport(lines, rows, new.outputs, new.unit.messages)
 
 
 def write(path, recording, outputs, templates, changes):
@@ -170,8 +178,8 @@ def write(path, recording, outputs, templates, changes):
         logs = output.stamps if recording.lockstep else _logged(recording, output.stamps)
         rows += [(log, index, log, data) for log, data in zip(logs.tolist(), _bytes(topic.name, output, templates))]
     rows.sort(key=lambda row: row[:2])
-    said = ', '.join(f'{node}.{key}={value}' for node, values in changes.items() for key, value in values.items())
-    writer = Writer(path, named, {**recording.bag.metadata, 'recomputed': ' '.join(outputs), 'changed': said},
+    changed = ', '.join(f'{node}.{key}={value}' for node, values in changes.items() for key, value in values.items())
+    writer = Writer(path, named, {**recording.bag.metadata, 'recomputed': ' '.join(outputs), 'changed': changed},
                     {name: content for name, content in recording.bag.metadata_records.items() if name != 'pedestal'})
     for log, index, published, data in rows:
         writer.write(index, log, published, data)

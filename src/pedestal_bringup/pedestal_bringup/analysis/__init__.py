@@ -1,1 +1,1 @@
-"""What a recording says of the run: pointing, honesty of the filter, isolation from the ship, attitude."""
+"""What a recorded run achieved: pointing, honesty of the filter, isolation from the ship, attitude."""

@@ -13,7 +13,7 @@ from scipy import special
 
 from acu_tracker.geometry.motion import motion_of_position
 from acu_tracker.geometry.vector import Vector, minus, rotated, vector
-from pedestal_bringup.analysis import results
+from pedestal_bringup.analysis import tracking
 from pedestal_common import line_of_sight, topics
 from pedestal_common.compiled import compiled
 
@@ -27,10 +27,11 @@ NAMES = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correla
 
 @dataclasses.dataclass
 class Consistency:
-    """What acu/filter told, on the steps of a results.Tracking: arrays (n, 2) of azimuth and elevation, NaN: none.
+    """The numbers of acu/filter on the steps of a Tracking: arrays (n, 2) of azimuth and elevation, NaN where none.
 
-    innovation, rate_innovation, nis; sigma, rate_sigma, correlation of the estimate; probability (n, 2, 4) of
-    topics.MOTION_MODELS; error, rate_error: estimate less truth [rad, rad/s]; nees of the two; tracking (n,) bool.
+    innovation [rad], rate_innovation [rad/s], nis; sigma [rad], rate_sigma [rad/s] and correlation that the filter
+    states of its estimate; probability (n, 2, 4) of topics.MOTION_MODELS; error, rate_error: estimate less truth [rad,
+    rad/s]; nees of the two; tracking (n,) bool: the evaluated part.
     """
     t: np.ndarray
     innovation: np.ndarray
@@ -65,12 +66,13 @@ def _rates(relative, velocity, attitude, ship_velocity, rates):
 
 
 def read(bag, run):
-    """The Consistency of a bag (bag.Bag) whose results.Tracking is `run`; None when it has no acu/filter."""
+    """The Consistency of a bag.Bag whose tracking.Tracking is `run`; None when it has no acu/filter."""
     if 'acu/filter' not in bag.topics or not bag.rows('acu/filter').size:
         return None
     t = run.t
-    at_steps = functools.partial(results.on_grid, bag, t)
-    told = at_steps('acu/filter', [f'{axis}_{name}.position' for name in NAMES for axis in topics.AXES])
+    at_steps = functools.partial(tracking.on_grid, bag, t)
+    numbers = at_steps('acu/filter', [f'{axis}_{name}.position' for name in NAMES for axis in topics.AXES])
+    numbers = dict(zip(NAMES, np.split(numbers, len(NAMES), axis=1)))
     probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in topics.AXES
                                          for model in topics.MOTION_MODELS]).reshape(t.size, 2, -1)
     estimate = at_steps('acu/estimate', [f'{axis}.{field}' for field in ('position', 'velocity')
@@ -86,21 +88,20 @@ def read(bag, run):
     _rates(relative, velocity, attitude, ship_velocity, true_rate)
     error = (estimate[:, :2] - run.target_earth + math.pi) % (2.0 * math.pi) - math.pi
     rate_error = estimate[:, 2:] - true_rate
-    innovation, rate_innovation, nis, sigma, rate_sigma, correlation = np.split(told, len(NAMES), axis=1)
-    a, b = error / sigma, rate_error / rate_sigma
+    a, b, correlation = error / numbers['sigma'], rate_error / numbers['rate_sigma'], numbers['correlation']
     nees = (a * a - 2.0 * correlation * a * b + b * b) / (1.0 - correlation * correlation)
-    return Consistency(t, innovation, rate_innovation, nis, sigma, rate_sigma, correlation, probability, error,
-                       rate_error, nees, run.tracking)
+    return Consistency(t, **numbers, probability=probability, error=error, rate_error=rate_error, nees=nees,
+                       tracking=run.tracking)
 
 
 def independent(values):
     """How many independent samples a correlated series (n,) is worth for its mean: n / (1 + 2 sum of its
     autocorrelations), summed while two neighbours together are positive (Geyer 1992, initial positive sequence)."""
     n = values.size
-    off = values - values.mean()
-    if n < 4 or not off.any():
+    deviation = values - values.mean()
+    if n < 4 or not deviation.any():
         return float(n)
-    spectrum = np.fft.rfft(off, 2 * n)
+    spectrum = np.fft.rfft(deviation, 2 * n)
     correlation = np.fft.irfft(spectrum * spectrum.conj())[:n]
     pairs = (correlation[:n - n % 2] / correlation[0]).reshape(-1, 2).sum(axis=1)
     stop = np.argmax(pairs <= 0.0) if (pairs <= 0.0).any() else pairs.size
@@ -151,10 +152,10 @@ class Axis:
         return f'honest: its errors are what it states ({where})'
 
 
-def axis(found, i) -> Axis:
-    """The Axis i of a Consistency."""
-    on = found.tracking
-    nis, freedoms, nees = found.nis[on, i], found.freedoms[on, i], found.nees[on, i]
+def axis(known, i) -> Axis:
+    """The Axis i (0 azimuth, 1 elevation) of a Consistency."""
+    on = known.tracking
+    nis, freedoms, nees = known.nis[on, i], known.freedoms[on, i], known.nees[on, i]
     freedoms, nis, nees = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)], nees[np.isfinite(nees)]
     inside, count, nees_band = math.nan, math.nan, (math.nan, math.nan)
     if nis.size:
@@ -164,18 +165,9 @@ def axis(found, i) -> Axis:
         count = independent(nees)
         nees_band = band(FREEDOMS, count)
     return Axis(_mean(nis), _mean(freedoms), inside, _mean(nees), nees_band, count,
-                *(results.rms(values[on, i]) for values in (found.error, found.rate_error, found.sigma,
-                                                            found.rate_sigma)))
+                *(tracking.rms(values[on, i]) for values in (known.error, known.rate_error, known.sigma,
+                                                             known.rate_sigma)))
 
 
 def _mean(values):
     return float(np.mean(values)) if values.size else math.nan
-
-
-def summary(found) -> dict:
-    """{metric: (value, unit)}, of nothing where `found` is None."""
-    values = {}
-    for i, name in enumerate(topics.AXES if found is not None else ()):
-        judged = axis(found, i)
-        values[f'{name}_nis_mean'], values[f'{name}_nees_mean'] = (judged.nis, ''), (judged.nees, '')
-    return values

@@ -32,17 +32,19 @@ PEAK = 0.004
 
 @dataclasses.dataclass(frozen=True)
 class RateLoop:
-    """What was found of one axis: W (n,) complex at w (n,) [rad/s]; f: the series of 1 / W; k_v [-], k_a [s]."""
+    """One axis: W (n,) complex at w (n,) [rad/s]; f (TERMS,): the series of 1 / W."""
     w: np.ndarray
     W: np.ndarray
     f: np.ndarray
 
     @property
     def k_v(self):
+        """Gain of the rate of the reference [-]."""
         return float(self.f[0])
 
     @property
     def k_a(self):
+        """Gain of the acceleration of the reference [s]."""
         return float(self.f[1])
 
     def error(self, k_v, k_a):
@@ -61,8 +63,8 @@ def series(w, W, terms=TERMS):
 def response(commanded, position, T, delay, w):
     """W (n,) at w (n,) [rad/s] of a rate loop, less its delay and the hold.
 
-    commanded (m,): rates [rad/s], each held for T [s] from t_k + delay on; position (m,): the angle [rad] at t_k.
-    Whole periods of every w; what is linear in time is left out.
+    commanded (m,): rates [rad/s], each held for T [s] from t_k + delay [s] on; position (m,): the angle [rad] at t_k.
+    The record holds whole periods of every w; what is linear in time is left out.
     """
     t = T * (np.arange(len(commanded)) - 0.5 * (len(commanded) - 1))
     waves = np.cos(w * t[:, np.newaxis]), np.sin(w * t[:, np.newaxis])
@@ -73,20 +75,21 @@ def response(commanded, position, T, delay, w):
 
 
 @compiled
-def _drive(state, constants, inputs, outputs, rate, acceleration, c_azimuth, c_elevation, torque, position):
-    """position (n, 2): encoders before each step with the commands rate (n, 2) and, if torque, acceleration's."""
+def _drive(state, constants, inputs, outputs, rate, torque, position):
+    """Fill position (n, 2) [rad]: the encoders before each step with the commands rate and torque (n, 2)."""
     u, y = inputs[0], outputs[0]
     for k in range(len(rate)):
         position[k, 0], position[k, 1] = y.azimuth.position, y.elevation.position
         u.azimuth.rate, u.elevation.rate = rate[k, 0], rate[k, 1]
-        if torque:
-            u.azimuth.torque = feedforward.torque(rate[k, 0], acceleration[k, 0], c_azimuth)
-            u.elevation.torque = feedforward.torque(rate[k, 1], acceleration[k, 1], c_elevation)
+        u.azimuth.torque, u.elevation.torque = torque[k, 0], torque[k, 1]
         drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 def identify(scenario, torque=True) -> dict:
-    """{axis: RateLoop} of a scenario's drive in still air; torque: with the ACU's torque feed-forward, or without."""
+    """{axis: RateLoop} of a scenario's drive in still air; torque: with the ACU's torque feed-forward, or without.
+
+    Raises ValueError for a period that does not divide PERIOD, and for travel that is too short.
+    """
     acu, drive = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     axes = [getattr(drive, name) for name in topics.AXES]
     duration = (DROPPED + KEPT) * PERIOD
@@ -105,18 +108,20 @@ def identify(scenario, torque=True) -> dict:
     k = np.arange(len(w))
     angle = w * drive.period * np.arange(steps)[:, np.newaxis] - math.pi * k * (k + 1) / len(k)
     v, a = PEAK * np.cos(angle).sum(axis=1), -PEAK * (w * np.sin(angle)).sum(axis=1)
-    rate = np.tile(v, DROPPED + KEPT)[:, np.newaxis] + RATE
-    acceleration = np.repeat(np.tile(a, DROPPED + KEPT)[:, np.newaxis], 2, axis=1)
+    rate, acceleration = np.tile(v, DROPPED + KEPT)[:, np.newaxis] + RATE, np.tile(a, DROPPED + KEPT)
+    torques = np.zeros_like(rate)
+    for i, name in enumerate(topics.AXES if torque else ()):
+        known = record(getattr(acu, name).feedforward)[0]
+        torques[:, i] = [feedforward.torque(*motion, known) for motion in zip(rate[:, i], acceleration)]
     state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
     inputs, outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
     inputs['enable'] = 1
     drive_unit.read(state[0], constants[0], outputs[0])
     position = np.empty_like(rate)
-    believed = [record(getattr(acu, name).feedforward)[0] for name in topics.AXES]
-    _drive(state, constants, inputs, outputs, rate, acceleration, *believed, torque, position)
+    _drive(state, constants, inputs, outputs, rate, torques, position)
     kept = slice(DROPPED * steps, None)
-    found = {}
+    loops = {}
     for i, name in enumerate(topics.AXES):
         W = response(rate[kept, i], position[kept, i], drive.period, drive.transport_delay, w)
-        found[name] = RateLoop(w, W, series(w, W))
-    return found
+        loops[name] = RateLoop(w, W, series(w, W))
+    return loops

@@ -1,6 +1,6 @@
 """How much of the ship's rotation is left in the pointing error of a recorded run.
 
-isolation = 20 log10(motion / coherent), over the evaluated part of the run (results.Tracking.tracking) as far as the
+isolation = 20 log10(motion / coherent), over the evaluated part of the run (Tracking.tracking) as far as the
 target was within half a beamwidth and no slew through a keyhole under way, from the recorded truth; each rms is per
 axis and sample, cross-elevation and elevation together.
 
@@ -12,11 +12,11 @@ coherent  the part of the true pointing error that a linear law of the ship's ro
           velocity stands between turn and acceleration, so leads and lags are in it; and in the axes of the beam,
           because there a wrong attitude, a delay or friction acts while the target moves across the deck.
 
-Noise that knows nothing of the ship fits nine series a little as well, by chance. `floor` is what that is expected
-to be: noise with the power spectrum of what the regression leaves over, smoothed over SMOOTHED, in random phases.
-`limit`, 20 log10(motion / floor), is therefore the isolation that a run of this length and noise can show: one near
-the limit (or above, by chance) says that the ship is not to be seen in the error, and no more. A run with less noise
-shows more (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
+Noise that is independent of the ship fits nine series a little as well, by chance. `floor` is the rms of that fit
+which is expected of noise with the power spectrum of what the regression leaves over, smoothed over SMOOTHED, in
+random phases. `limit`, 20 log10(motion / floor), is therefore the isolation that a run of this length and noise can
+show: where the isolation is near the limit (or above, by chance), the ship cannot be told from noise in the error, and
+a run with less noise shows more (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
 """
 import dataclasses
 import math
@@ -25,7 +25,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
-from pedestal_bringup.analysis import results
+from pedestal_bringup.analysis import tracking
 
 SMOOTHED = 0.02
 """Half the width [Hz] over which the power spectrum of the remainder is averaged."""
@@ -78,8 +78,8 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     def in_beam(vectors):
         return np.einsum('nij,nj->ni', axes, vectors)
 
-    seen = in_beam(turns.inv().apply(target))
-    moved = np.arctan2(np.hypot(seen[:, 0], seen[:, 1]), seen[:, 2])
+    direction = in_beam(turns.inv().apply(target))
+    moved = np.arctan2(np.hypot(direction[:, 0], direction[:, 1]), direction[:, 2])
     series = np.column_stack([in_beam(vectors) for vectors in (
         (mean.inv() * turns).as_rotvec(), deck_rate, np.gradient(deck_rate, dt, axis=0))])
     series -= series.mean(axis=0)
@@ -98,11 +98,11 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
 
 
 def read(bag, run):
-    """The Isolation of a bag (bag.Bag) whose results.Tracking is `run`; None ashore or when too little was tracked."""
+    """The Isolation of a bag.Bag whose tracking.Tracking is `run`; None ashore or when less than LEAST was tracked."""
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None
-    ship = results.on_grid(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),
-                                                      *(f'twist.angular.{letter}' for letter in 'xyz')])
+    ship = tracking.on_grid(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),
+                                                       *(f'twist.angular.{letter}' for letter in 'xyz')])
     azimuth, elevation = run.target_earth.T
     target = np.column_stack((np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation),
                               np.sin(elevation)))
@@ -110,19 +110,9 @@ def read(bag, run):
     on = run.tracking & np.isfinite(np.column_stack((ship, target, error))).all(axis=1)
     if math.isfinite(run.beamwidth):
         on &= np.hypot(*error.T) <= 0.5 * run.beamwidth
-    for begin, end, _ in results.keyholes(bag):
-        on &= (run.t < begin) | (run.t > end + results.SETTLING)
+    for begin, end, _ in tracking.keyholes(bag):
+        on &= (run.t < begin) | (run.t > end + tracking.SETTLING)
     dt = float(np.median(np.diff(run.t)))
     if np.sum(on) * dt < LEAST:
         return None
     return measure(dt, error[on], target[on], ship[on, :4], ship[on, 4:])
-
-
-def summary(found) -> dict:
-    """{metric: (value, unit)}, of nothing where `found` is None."""
-    if found is None:
-        return {}
-    degrees = math.degrees(1.0)
-    return {'ship_line_of_sight_rms_deg': (found.motion * degrees, 'deg'),
-            'ship_coherent_error_rms_deg': (found.coherent * degrees, 'deg'),
-            'isolation_db': (found.isolation, 'dB'), 'isolation_limit_db': (found.limit, 'dB')}

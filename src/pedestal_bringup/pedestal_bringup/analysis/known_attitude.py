@@ -1,23 +1,23 @@
-"""What the INS of a recorded run knew of the deck's attitude, against the truth and against what it says of itself."""
+"""What the INS of a recorded run knew of the deck's attitude, against the truth and against the error it stated."""
 import dataclasses
 import math
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pedestal_bringup.analysis import results
+from pedestal_bringup.analysis import tracking
 
 TOPIC, STATE = 'ship/imu/data', 'ins/state'
 
 
 @dataclasses.dataclass
 class KnownAttitude:
-    """Rows at the stamps t (n,) [s] of the INS.
+    """The INS at its stamps t (n,) [s].
 
-    error (n, 3) [rad]: the small rotation from the true attitude to the known one about east and north (level) and,
-    turned round so that it counts clockwise, about up (heading); any size up to half a turn. sigma (n, 2) [rad]: what
-    the INS says of level and heading, 1 sigma. aligned: stamp [s] at which it said so, NaN when it says `aligning` to
-    the end, the first stamp when it never says anything.
+    error (n, 3) [rad]: the rotation from the true attitude to the known one about east and north (level) and,
+    clockwise, about up (heading); any size up to half a turn. sigma (n, 2) [rad]: standard deviations of level and
+    heading that the INS stated. aligned: stamp [s] at which ins/state became `aligned`; NaN when it never did, the
+    first stamp in a bag without ins/state.
     """
     t: np.ndarray
     error: np.ndarray
@@ -34,15 +34,26 @@ class KnownAttitude:
         """Heading error (n,) [rad], clockwise."""
         return self.error[:, 2]
 
+    @property
+    def after(self):
+        """Which rows (n,) bool are from alignment on."""
+        return self.t >= self.aligned
+
+    @property
+    def at_alignment(self):
+        """(heading error, its stated standard deviation) [rad] when it was aligned; NaN when it never was."""
+        first = np.argmax(self.after)
+        return (float(self.heading[first]), float(self.sigma[first, 1])) if self.after.any() else (math.nan, math.nan)
+
 
 def read(bag):
-    """The KnownAttitude of a bag (bag.Bag); None ashore."""
+    """The KnownAttitude of a bag.Bag; None ashore."""
     if any(topic not in bag.topics or not bag.rows(topic).size for topic in ('ship/truth', TOPIC)):
         return None
     table = bag.table(TOPIC)
     t = table['t']
     quaternion = [f'orientation.{letter}' for letter in 'xyzw']
-    true = results.on_grid(bag, t, 'ship/truth', quaternion)
+    true = tracking.on_grid(bag, t, 'ship/truth', quaternion)
     both = np.isfinite(true).all(axis=1)
     if not both.any():
         return None
@@ -56,25 +67,6 @@ def read(bag):
 def _aligned(bag, first):
     if STATE not in bag.topics or not bag.rows(STATE).size:
         return float(first)
-    said = bag.table(STATE)
-    times = said['t'][np.array(said['data']) == 'aligned']
+    states = bag.table(STATE)
+    times = states['t'][np.array(states['data']) == 'aligned']
     return float(times[0]) if times.size else math.nan
-
-
-def summary(found) -> dict:
-    """{metric: (value, unit)}, of nothing where `found` is None.
-
-    aligned_s: when the INS said `aligned`; heading_at_alignment_deg: its heading error then, with its 1 sigma beside;
-    heading_error_rms_deg, level_error_rms_deg (per axis): from then on.
-    """
-    if found is None:
-        return {}
-    degrees = math.degrees(1.0)
-    after = found.t >= found.aligned
-    at = np.argmax(after)
-    then = (found.heading[at], found.sigma[at, 1]) if after.any() else (math.nan, math.nan)
-    return {'aligned_s': (found.aligned, 's'),
-            'heading_at_alignment_deg': (float(then[0]) * degrees, 'deg'),
-            'heading_sigma_at_alignment_deg': (float(then[1]) * degrees, 'deg'),
-            'heading_error_rms_deg': (results.rms(found.heading[after]) * degrees, 'deg'),
-            'level_error_rms_deg': (results.rms(found.error[after, :2]) * degrees, 'deg')}

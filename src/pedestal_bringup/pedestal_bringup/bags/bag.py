@@ -1,4 +1,4 @@
-"""Bags: a rosbag2 directory (metadata.yaml version 9) with one MCAP file, written and read. No ROS here."""
+"""Reads a bag: a rosbag2 directory with one MCAP file, or the file. No ROS here."""
 import copy
 import difflib
 import fcntl
@@ -13,104 +13,28 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.stream_reader import get_chunk_data_stream
+from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from pedestal_bringup.bags import columns
-from pedestal_bringup.bags.container import MAGIC, MESSAGE, BagError, Container, compressed, reason
-from pedestal_common import messages, nodes, topics
-
-CHUNK_SIZE = 1_000_000
-CHUNK_SPAN = 1_000_000_000
-"""A chunk ends after this many bytes or ns of log time, so that a crash loses at most the last second."""
+from pedestal_common import messages, nodes
 
 SQLITE = b'SQLite format 3'
 _RECORD = struct.Struct('<BQ')
-_INFINITE = {'sec': 9223372036, 'nsec': 854775807}
+MESSAGE = struct.Struct('<xQHIQQ')
+"""Length, channel, sequence, log and publish time: the head of a message record after its opcode."""
 
 
-def _qos(rate):
-    """The offered_qos_profiles of a topic of a rate."""
-    depth, latched = topics.QOS[rate].lockstep, topics.QOS[rate].latched
-    return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
-             'durability': 'transient_local' if latched else 'volatile',
-             'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',
-             'liveliness_lease_duration': dict(_INFINITE), 'avoid_ros_namespace_conventions': False}]
+class BagError(ValueError):
+    """A bag cannot be written or read; one line that names the file and what is wrong with it."""
 
 
-class Writer:
-    """Writes a bag.
-
-    directory: must not exist. rows: of topics.TOPICS, or nodes.Links; a message names its topic by the index in them.
-    metadata: {text: text} of the run, kept as the MCAP metadata record `pedestal` and custom_data of metadata.yaml.
-    more: {name: {text: text}} of further metadata records.
-    Raises BagError, naming the file, when the disk does not take a chunk. What was written by then stays readable;
-    nothing is written after it but the summary, so that a bag has no hole.
-    """
-
-    def __init__(self, directory, rows, metadata, more=()):
-        self._container = Container(directory)
-        self.path, self.file = self._container.path, self._container.file
-        self._chunk = bytearray()
-        self._chunk_start = 0
-        self._index = [[] for _ in rows]
-        self._sequences = [0] * len(rows)
-        schema_ids = {}
-        for topic in rows:
-            schema_ids.setdefault(topic.type, len(schema_ids) + 1)
-        self._container.add(
-            *(records.Schema(id=number, name=name, encoding='ros2msg',
-                             data=messages.TYPESTORE.generate_msgdef(name, ros_version=2)[0].encode())
-              for name, number in schema_ids.items()),
-            *(records.Channel(id=number, topic='/' + topic.name, message_encoding='cdr',
-                              schema_id=schema_ids[topic.type],
-                              metadata={'offered_qos_profiles': yaml.safe_dump(_qos(topic.rate), sort_keys=False),
-                                        'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)})
-              for number, topic in enumerate(rows, 1)),
-            *(records.Metadata(name=name, metadata={str(key): str(value) for key, value in content.items()})
-              for name, content in (('pedestal', metadata), *dict(more).items())))
-
-    def write(self, topic, log_time, publish_time, data):
-        """Add one message: index of its topic, times [ns], CDR bytes."""
-        chunk = self._chunk
-        if not chunk:
-            self._chunk_start = log_time
-        elif log_time - self._chunk_start >= CHUNK_SPAN or len(chunk) >= CHUNK_SIZE:
-            self.flush()
-            chunk = self._chunk
-            self._chunk_start = log_time
-        self._sequences[topic] = sequence = self._sequences[topic] + 1
-        self._index[topic] += (log_time, len(chunk))
-        chunk += MESSAGE.pack(5, 22 + len(data), topic + 1, sequence & 0xffffffff, log_time, publish_time)
-        chunk += data
-
-    def skip(self, topic, count):
-        """Leave a gap in the topic's sequence numbers: messages that were lost before they came here."""
-        self._sequences[topic] += count
-
-    def flush(self):
-        """End the chunk: everything written is in the file when this returns."""
-        if not self._chunk:
-            return
-        raw, self._chunk = bytes(self._chunk), bytearray()
-        index = {channel: places for channel, places in enumerate(self._index, 1) if places}
-        self._index = [[] for _ in self._index]
-        times = [time for places in index.values() for time in places[::2]]
-        self._container.add_chunk(compressed(raw, min(times), max(times)), index)
-
-    @property
-    def messages(self):
-        """How many messages were written."""
-        return self._container.counts.total() + sum(map(len, self._index)) // 2
-
-    def close(self):
-        """Write what is left, the summary and metadata.yaml; on a full disk whatever of it fits, then BagError."""
-        try:
-            self.flush()
-        finally:
-            self._container.close()
+def reason(error):
+    """What an OSError says, without the path."""
+    return error.strerror or str(error)
 
 
 def read(path, beam=None):
-    """The Bag in a directory or an .mcap file; beam: as that beam of an array sees it, '' for the first.
+    """The Bag in a directory or an .mcap file; of several beams the view of one, '' for the first; None: all.
 
     Raises BagError when it is missing, empty, damaged or foreign, or has no such beam.
     """
@@ -121,7 +45,10 @@ def read(path, beam=None):
 
 
 def chosen_topics(bag, names):
-    """The topics of these names, without the leading '/', each once; BagError with the nearest for one it has not."""
+    """The topics of a Bag with these names, without the leading '/', each once.
+
+    Raises BagError, with the most similar name, for a topic that is not in it.
+    """
     chosen = list(dict.fromkeys(name.lstrip('/') for name in names))
     for name in chosen:
         if name not in bag.topics:
@@ -132,7 +59,8 @@ def chosen_topics(bag, names):
 
 
 def load(path):
-    """The Bag as far as it can be read; its `damage` says in one line where and why it ends, '' if it is whole."""
+    """The Bag in a directory or an .mcap file as far as it can be read: `damage` is a line on where and why it ends,
+    '' if it is whole. Raises BagError when there is nothing to read."""
     file = locate(path)
     try:
         return Bag(pathlib.Path(path), file, file.read_bytes())
@@ -168,6 +96,7 @@ def locate(path):
 
 
 def foreign_encoding(file, channel):
+    """The BagError for a channel that is not encoded as ROS 2 messages are."""
     return BagError(f'{file}: {channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
 
 
@@ -182,9 +111,9 @@ class Bag:
     """A recording.
 
     topics: {name without the leading '/': type}; metadata_records: {name: {text: text}};
-    index: record array in the order of the file, one row per message: channel, sequence, log, publish [ns], chunk,
-    start, stop (where its bytes are); statistics: {name: count} as the file's summary says, None without one;
-    beam: the prefix of the beam of several that it is a view of, ''.
+    index: record array (n,) in the order of the file, one row per message: channel, sequence, log, publish [ns],
+    chunk, start, stop (where its bytes are); statistics: {name: count} in the file's summary, None without one;
+    damage: why it ends before its end, ''; beam: the prefix of the beam that it is a view of, ''.
     """
 
     def __init__(self, path, file, data):
@@ -237,8 +166,8 @@ class Bag:
         unpack, add = MESSAGE.unpack_from, rows.append
         while at < end:
             if data[at] == Opcode.MESSAGE:
-                _, length, channel, sequence, log, publish = unpack(data, at)
-                add((channel, sequence, log, publish, chunk, at + 31, at + 9 + length))
+                length, channel, sequence, log, publish = unpack(data, at)
+                add((channel, sequence, log, publish, chunk, at + MESSAGE.size, at + 9 + length))
             else:
                 opcode, length = _RECORD.unpack_from(data, at)
                 self._declare(opcode, data[at + 9:at + 9 + length])
@@ -292,40 +221,41 @@ class Bag:
         return nodes.links(self.beams)
 
     def view(self, beam=''):
-        """The Bag as one beam of several sees it, '' for the first: what is its own under the plain names, what is
-        shared, and nothing of the others. A Bag of one beam is its own view. Raises BagError for no beam of it."""
-        known = nodes.prefixes(self.beams)
-        if known == ('',) and beam:
+        """The Bag of one beam of several, '' for the first: the beam's own topics under their plain names and those
+        that all beams share. A Bag of one beam is its own view. Raises BagError for a beam that is not in it."""
+        prefixes = nodes.prefixes(self.beams)
+        if prefixes == ('',) and beam:
             raise BagError(f'{self.path}: beam {beam!r}: there is only one in it')
-        prefix = f'{beam}/' if beam else known[0]
-        if prefix not in known:
-            raise BagError(f'{self.path}: beam {beam!r}: must be one of {", ".join(name[:-1] for name in known)}')
+        prefix = f'{beam}/' if beam else prefixes[0]
+        if prefix not in prefixes:
+            raise BagError(f'{self.path}: beam {beam!r}: must be one of {", ".join(name[:-1] for name in prefixes)}')
         if not prefix:
             return self
-        seen = copy.copy(self)
-        seen.beam = prefix
 
         def own(content):
             return {nodes.plain(name): value for name, value in content.items()
                     if nodes.beam_of(name) in ('', prefix[:-1])}
-        seen.topics = own(self.topics)
-        seen._channels = {channel: nodes.plain(name) for channel, name in self._channels.items()
+
+        view = copy.copy(self)
+        view.beam = prefix
+        view.topics = own(self.topics)
+        view._channels = {channel: nodes.plain(name) for channel, name in self._channels.items()
                           if nodes.beam_of(name) in ('', prefix[:-1])}
-        seen.index = self.index[np.isin(self.index.channel, list(seen._channels))]
-        seen.statistics = None if self.statistics is None else own(self.statistics)
-        seen.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}
+        view.index = self.index[np.isin(self.index.channel, list(view._channels))]
+        view.statistics = None if self.statistics is None else own(self.statistics)
+        view.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}
         if 'parameters' in self.metadata_records:
-            seen.metadata_records['parameters'] = own(self.metadata_records['parameters'])
-        seen.__dict__.pop('configuration', None)
-        tracking = seen.configuration['parameters'].get('tracking_receiver', {})
-        if 'antenna.beamwidth' in tracking:
-            seen.metadata['beamwidth'] = str(tracking['antenna.beamwidth'])
-        return seen
+            view.metadata_records['parameters'] = own(self.metadata_records['parameters'])
+        view.__dict__.pop('configuration', None)
+        receiver = view.configuration['parameters'].get('tracking_receiver', {})
+        if 'antenna.beamwidth' in receiver:
+            view.metadata['beamwidth'] = str(receiver['antenna.beamwidth'])
+        return view
 
     @functools.cached_property
     def configuration(self):
         """How the run was made: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}; '' and {} in a bag
-        that does not say."""
+        without a configuration. Raises BagError where that is no YAML."""
         try:
             return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''),
                     'parameters': {node: yaml.safe_load(text)
@@ -335,7 +265,7 @@ class Bag:
             raise BagError(f'{self.file}: its record `parameters` is no YAML: {reason}') from None
 
     def where(self, topic):
-        """Where in `index` the rows of one topic are."""
+        """Where in `index` the rows (m,) of one topic are. Raises BagError for a topic that is not in the bag."""
         name = topic.lstrip('/')
         if name not in self.topics:
             raise BagError(f'{self.path}: no topic {name} in it; there are {", ".join(self.topics)}')
@@ -351,14 +281,18 @@ class Bag:
         return self.take(self.index if topic is None else self.rows(topic))
 
     def take(self, rows):
-        """The same of any rows of `index`, in their order."""
+        """Iterator of (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
         names = self._channels
-        for channel, _, log, publish, chunk, start, stop in rows.tolist():
+        heads, places = rows[['channel', 'log', 'publish']].tolist(), rows[['chunk', 'start', 'stop']].tolist()
+        for (channel, log, publish), (chunk, start, stop) in zip(heads, places):
             data = self._data if chunk < 0 else self._chunk(chunk)
             yield names[channel], log, publish, data[start:stop]
 
     def messages(self, topic=None):
-        """Iterator of (topic, log time, publish time [ns], message) in the order of the file."""
+        """Iterator of (topic, log time, publish time [ns], message) in the order of the file.
+
+        Raises BagError for bytes that are no message of the topic's type.
+        """
         for name, log, publish, data in self.raw(topic):
             try:
                 message = messages.deserialize(data, self.topics[name])
@@ -367,7 +301,10 @@ class Bag:
             yield name, log, publish, message
 
     def table(self, topic):
-        """{column: array (n,)} of a topic, one row per message; see columns.table for their names."""
+        """{column: array (n,)} of a topic, one row per message; columns.table says their names.
+
+        Raises BagError for bytes that are no message of the topic's type.
+        """
         rows = self.rows(topic)
         try:
             return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log,

@@ -2,6 +2,7 @@
 
 Nothing here depends on the path, the host or the wall clock, so that equal runs still give equal bytes.
 """
+import contextlib
 import importlib.metadata
 import pathlib
 import platform
@@ -38,17 +39,15 @@ def git_revision():
 
 def versions():
     """{'version.NAME': version} of Python, of our packages and of those that make the numbers."""
-    found = {'version.python': platform.python_version()}
+    versions = {'version.python': platform.python_version()}
     for package in PACKAGES:
-        try:
-            found[f'version.{package}'] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            pass
-    return found
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            versions[f'version.{package}'] = importlib.metadata.version(package)
+    return versions
 
 
 def recorder_parameters(scenario):
-    """What the recorder is told of the run it records: {name of its parameter: text}."""
+    """The recorder's parameters {name: text} that describe a scenario.Scenario."""
     values = {node: parameters.as_dict(scenario.node_parameters(node))
               for node in scenario.nodes if node != 'operator'}
     values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OWN}
@@ -56,26 +55,26 @@ def recorder_parameters(scenario):
 
 
 def records(scenario_yaml, parameters_yaml):
-    """The metadata records {name: {text: text}} of what recorder_parameters made; none of an empty text."""
-    made = {}
+    """The metadata records {name: {text: text}} of the texts that recorder_parameters gave; none of an empty one."""
+    content = {}
     if scenario_yaml:
-        made['scenario'] = {'yaml': scenario_yaml}
+        content['scenario'] = {'yaml': scenario_yaml}
     if parameters_yaml:
-        made['parameters'] = {node: yaml.safe_dump(values)
-                              for node, values in yaml.safe_load(parameters_yaml).items()}
-    return made
+        content['parameters'] = {node: yaml.safe_dump(values)
+                                 for node, values in yaml.safe_load(parameters_yaml).items()}
+    return content
 
 
 def line(bag):
-    """One line on how a bag was made."""
-    said = bag.metadata
-    made = ['not said in the bag, it holds no configuration']
+    """One line on how a bag.Bag was made."""
+    run = bag.metadata
+    parts = ['not said in the bag, it holds no configuration']
     if bag.configuration['scenario']:
-        made = [f'scenario {said.get("scenario", "")}', said.get('pacing', ''), f'seed {said.get("seed", "")}',
-                f'git {said.get("git") or "unknown"}']
-        made += [f'{key.removeprefix("version.")} {value}' for key, value in said.items()
-                 if key.startswith('version.')]
+        parts = [f'scenario {run.get("scenario", "")}', run.get('pacing', ''), f'seed {run.get("seed", "")}',
+                 f'git {run.get("git") or "unknown"}']
+        parts += [f'{key.removeprefix("version.")} {value}' for key, value in run.items()
+                  if key.startswith('version.')]
     recovered = bag.metadata_records.get('recovered')
     if recovered:
-        made.append(f'recovered ({recovered.get("messages_lost")} messages lost in the middle)')
-    return 'made by: ' + ', '.join(made)
+        parts.append(f'recovered ({recovered.get("messages_lost")} messages lost in the middle)')
+    return 'made by: ' + ', '.join(parts)

@@ -1,8 +1,8 @@
 """`pedestal export`: a recording as one table per topic, for MATLAB, pandas and whoever else reads CSV or Parquet.
 
 A row is a message, a column a number of it (columns.table), after its stamp in seconds and in integer nanoseconds.
-Where that would leave something out, the rows are finer: one per point of a trajectory of several points, one per
-status of a diagnostics message.
+Where a row for each message would leave something out, there is one for each point of a trajectory of several points,
+one for each status of a diagnostics message.
 """
 import contextlib
 import csv
@@ -21,18 +21,20 @@ STAMP, NANOSECONDS = 't [s]', 'stamp [ns]'
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
     """Write the topics of a bag as tables; iterator of (file, rows, columns), or (None, why, topic) of one left out.
 
-    names: topics to write, all when empty; one that cannot be read is then an error, else it is left out.
-    output: folder, default `export` in the bag (beside a bare .mcap). A file is `acu.rate_command.csv` and so on.
-    Raises bag.BagError, or FileExistsError before anything is written when a file is there and may not be replaced.
+    file_format: of FORMATS. names: topics to write, all when empty; of those named each must be readable, of all the
+    unreadable ones are left out. output: folder, default `export` in the bag (beside a bare .mcap). overwrite: replace
+    files. A file is `acu.rate_command.csv` and so on.
+    Raises bag.BagError, ValueError where Parquet cannot be written, or, before anything is written, FileExistsError.
     """
     write = _parquet_writer() if file_format == 'parquet' else _write_csv
     bag = bags.read(path)
     chosen = bags.chosen_topics(bag, names) if names else list(bag.topics)
     folder = pathlib.Path(output) if output is not None else bag.file.parent / 'export'
     files = {name: folder / f'{name.replace("/", ".")}.{file_format}' for name in chosen}
-    there = [file for file in files.values() if file.exists()]
-    if there and not overwrite:
-        raise FileExistsError(f'{there[0]} exists already{_and_more(there)}; --overwrite replaces')
+    existing = [file for file in files.values() if file.exists()]
+    if existing and not overwrite:
+        more = f' and {len(existing) - 1} more' if len(existing) > 1 else ''
+        raise FileExistsError(f'{existing[0]} exists already{more}; --overwrite replaces')
     folder.mkdir(parents=True, exist_ok=True)
     for name, file in files.items():
         if bag.topics[name] not in messages.TYPESTORE.fielddefs:
@@ -45,10 +47,6 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
         with _whole(file) as part:
             write(part, content, {'topic': name, 'type': bag.topics[name], **bag.metadata})
         yield file, len(content[NANOSECONDS]), len(content)
-
-
-def _and_more(there):
-    return f' and {len(there) - 1} more' if len(there) > 1 else ''
 
 
 @contextlib.contextmanager
@@ -106,10 +104,9 @@ def _tracks(bag, name, stamps):
                                   ('acceleration', point.accelerations), ('effort', point.effort)):
                 row.update({f'{joint}.{field}': value for joint, value in zip(message.joint_names, values)})
             points.append((stamp, row))
-    found = dict.fromkeys(column for _, row in points for column in row)
     return {**_times(np.array([stamp for stamp, _ in points], np.int64)),
             **{_header(name, type_name, column): np.array([row.get(column, np.nan) for _, row in points], float)
-               for column in found}}
+               for column in dict.fromkeys(column for _, row in points for column in row)}}
 
 
 def _diagnostics(bag, name, stamps):
@@ -145,8 +142,8 @@ def _parquet_writer():
                          "'pedestal_bringup[parquet]'") from None
 
     def write(file, content, description):
-        made = pyarrow.table({
-            header: pyarrow.array(values, pyarrow.string()) if isinstance(values, list) else values
-            for header, values in content.items()})
-        pyarrow.parquet.write_table(made.replace_schema_metadata(description), file, compression='zstd')
+        arrays = {header: pyarrow.array(values, pyarrow.string()) if isinstance(values, list) else values
+                  for header, values in content.items()}
+        pyarrow.parquet.write_table(pyarrow.table(arrays).replace_schema_metadata(description), file,
+                                    compression='zstd')
     return write

@@ -1,7 +1,7 @@
 """Makes a readable bag of what is there in a damaged one: killed recorder, full disk, cut or corrupted file.
 
-The file is read through mmap, chunk after chunk, and each chunk whose checksum holds is copied as it is: the memory
-taken is that of one chunk and of the index, whatever the size of the recording.
+The file is read through mmap, chunk after chunk, and the messages of each chunk whose checksum holds are written anew:
+the memory taken is that of one chunk and of the index, whatever the size of the recording.
 """
 import collections
 import dataclasses
@@ -20,7 +20,8 @@ from mcap.opcode import Opcode
 from mcap.stream_reader import get_chunk_data_stream
 
 from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags.container import MAGIC, MESSAGE, BagError, Container, compressed, reason
+from pedestal_bringup.bags.bag import MAGIC, MESSAGE, BagError, reason
+from pedestal_bringup.bags.writer import BagFile
 from pedestal_common import nodes, topics
 
 _RECORD = struct.Struct('<BQ')
@@ -36,7 +37,8 @@ _FOOTER = 9 + 20 + len(MAGIC)
 
 @dataclasses.dataclass
 class Gap:
-    """Bytes [start, stop) of the file that cannot be used, why, and the log times [ns] around (None where none)."""
+    """Bytes [start, stop) of the file that cannot be used, why, and the log times [ns] before and after them; None
+    where no message is there."""
     start: int
     stop: int
     why: str
@@ -44,18 +46,19 @@ class Gap:
     after: int | None = None
 
     def line(self):
-        said = f'bytes {self.start} to {self.stop} unused ({self.why})'
-        said += f', after {self.before / 1e9:.6f} s' if self.before is not None else ''
-        return said + (f', before {self.after / 1e9:.6f} s' if self.after is not None else '')
+        """The gap as text."""
+        return (f'bytes {self.start} to {self.stop} unused ({self.why})'
+                + (f', after {self.before / 1e9:.6f} s' if self.before is not None else '')
+                + (f', before {self.after / 1e9:.6f} s' if self.after is not None else ''))
 
 
 @dataclasses.dataclass
 class Recovered:
-    """What was recovered, and what is missing.
+    """What was recovered into the bag at `path`, and what is missing.
 
     counts: {topic: messages}; first, last: log times [ns]; ended: whether the recorder came to its end; duration: how
-    long the run was to be [s], None when the bag does not say; lost: {topic: messages missing between those that are
-    there, by the recorder's sequence numbers}.
+    long the run was to be [s], None when the bag does not say; gaps: [Gap]; lost: {topic: messages missing between
+    those that are there, by the recorder's sequence numbers}.
     """
     path: pathlib.Path
     counts: dict
@@ -100,23 +103,24 @@ def recover(path, output=None) -> Recovered:
     if output is None:
         whole = pathlib.Path(path).absolute()
         output = whole.with_name((whole.name if whole.is_dir() else whole.stem) + '-recovered')
-    container = Container(output)
+    bag = BagFile(output)
     try:
         with open(file, 'rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            salvage = _Salvage(file, container)
+            salvage = _Salvage(file, bag)
             salvage.take_all(data)
-        if not container.counts:
+        if not bag.messages:
             raise BagError(f'{file}: not one message in it can be read')
-        found = salvage.found()
-        container.add(records.Metadata(name='recovered', metadata={
-            'messages_lost': str(sum(found.lost.values())), 'bytes_unused': str(found.unused)}))
-        container.close()
+        bag.flush()
+        recovered = salvage.recovered()
+        bag.add_metadata('recovered', {'messages_lost': str(sum(recovered.lost.values())),
+                                       'bytes_unused': str(recovered.unused)})
+        bag.close()
     except BaseException as error:
         shutil.rmtree(output, ignore_errors=True)
         if isinstance(error, OSError):
             raise BagError(f'{file}: {reason(error)}') from None
         raise
-    return found
+    return recovered
 
 
 def _frame(data, at):
@@ -139,7 +143,7 @@ def _follows(data, at):
 
 
 def _read(opcode, content):
-    """The record, None of a kind that is not kept; (record, bytes unpacked) of a chunk, whose checksum must hold."""
+    """The record, None of a kind that is not kept; of a chunk its records as bytes, whose checksum must hold."""
     if opcode not in _READ:
         return None
     record = _READ[opcode](ReadDataStream(io.BytesIO(content)))
@@ -149,13 +153,13 @@ def _read(opcode, content):
         stream, size = get_chunk_data_stream(record, validate_crc=True)
     except Exception:  # a wrong checksum, or whatever the decompressor says
         raise ValueError('a corrupted chunk') from None
-    return record, stream.read(size)
+    return stream.read(size)
 
 
 def _next_chunk(data, start):
     """Where the next chunk begins whose checksum holds; the end of the data when there is none."""
-    for found in _COMPRESSION.finditer(data, start):
-        at = found.start() - _BEFORE_COMPRESSION
+    for name in _COMPRESSION.finditer(data, start):
+        at = name.start() - _BEFORE_COMPRESSION
         try:
             if at >= start and data[at] == Opcode.CHUNK:
                 opcode, stop = _frame(data, at)
@@ -167,7 +171,8 @@ def _next_chunk(data, start):
 
 
 def _pieces(data):
-    """(opcode, start, stop, record or why not) of each record of the data section; opcode 0: not to be used.
+    """Iterator of (opcode, start, stop, record) of the records of the data section; of bytes that cannot be used
+    (0, start, stop, why).
 
     After a broken record comes the one behind it if there is one, else the next whole chunk behind everything that
     was good.
@@ -178,7 +183,7 @@ def _pieces(data):
         try:
             opcode, stop = _frame(data, at)
             record = _read(opcode, data[at + 9:stop])
-        except Exception as error:  # as above
+        except Exception as error:  # whatever a decoder makes of broken bytes
             if stop is None or not _follows(data, stop):
                 stop = _next_chunk(data, good)
             if stop > at:
@@ -208,22 +213,27 @@ def _summary(data):
 
 
 class _Salvage:
-    """What is good of a file goes into a container, what is not into `gaps`."""
+    """Adds the messages of a damaged file to a new BagFile and keeps count of what cannot be used.
 
-    def __init__(self, file, container):
-        self._file, self._container = file, container
-        self._loose = bytearray()
+    _schemas, _channels: {number in the file: number in the bag}; _names: {channel in the file: topic}; _counts:
+    {topic: messages added}; _first, _last: their log times [ns]; _sequence: {channel: number of its last message};
+    _unsure: channels without a message since the last gap.
+    """
+
+    def __init__(self, file, bag):
+        self._file, self._bag = file, bag
+        self._schemas, self._channels, self._names = {}, {}, {}
         self._metadata = {}
-        self._sequence = {}
-        self._unsure = set()
-        self._lost = collections.Counter()
+        self._counts, self._lost = {}, collections.Counter()
         self._first = self._last = None
+        self._sequence, self._unsure = {}, set()
         self._gaps = []
         self._ended = False
 
     def take_all(self, data):
         """One pass over the bytes of a file."""
-        self._declare(_summary(data), self._container.add)
+        for record in _summary(data):
+            self._declare(record)
         for opcode, start, stop, record in _pieces(data):
             try:
                 self._take(opcode, record, data[start:stop] if opcode == Opcode.MESSAGE else b'')
@@ -231,91 +241,80 @@ class _Salvage:
                 raise
             except (ValueError, struct.error) as error:
                 self._skip(start, stop, str(error))
-        self._put_loose()
 
-    def _take(self, opcode, record, loose):
+    def _take(self, opcode, record, message):
         if opcode == 0:
             raise ValueError(record)
         if opcode == Opcode.MESSAGE:
-            self._loose += loose
-            if len(self._loose) >= bags.CHUNK_SIZE:
-                self._put_loose()
+            self._add_messages(message)
         elif opcode == Opcode.CHUNK:
-            self._put_loose()
-            self._put(*record)
+            self._add_messages(record)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            self._declare([record], self._container.add)
+            self._declare(record)
         elif opcode == Opcode.METADATA and record.name != 'recovered':
             self._metadata[record.name] = record.metadata
-            self._container.add(record)
+            self._bag.add_metadata(record.name, record.metadata)
         elif opcode == Opcode.ATTACHMENT:
             raise ValueError('an attachment')
         self._ended = opcode in _END
 
-    def _declare(self, declared, keep):
-        for record in declared:
-            known = self._container.schemas if isinstance(record, records.Schema) else self._container.channels
-            if isinstance(record, records.Channel) and record.message_encoding != 'cdr':
-                raise bags.foreign_encoding(self._file, record)
-            if record.id not in known:
-                keep(record)
+    def _declare(self, record):
+        """Take over a schema or channel that is new."""
+        if isinstance(record, records.Schema):
+            if record.id not in self._schemas:
+                self._schemas[record.id] = self._bag.add_schema(record.name, record.encoding, record.data)
+        elif record.message_encoding != 'cdr':
+            raise bags.foreign_encoding(self._file, record)
+        elif record.id not in self._channels and record.schema_id in self._schemas:
+            self._channels[record.id] = self._bag.add_channel(record.topic, self._schemas[record.schema_id],
+                                                              record.metadata)
+            self._names[record.id] = record.topic.lstrip('/')
+            self._counts.setdefault(self._names[record.id], 0)
 
     def _skip(self, start, stop, why):
-        self._put_loose()
         if self._gaps and self._gaps[-1].stop == start:
             self._gaps[-1].stop = stop
             return
         self._gaps.append(Gap(start, stop, why, self._last))
-        self._unsure = set(self._container.channels)
+        self._unsure = set(self._channels)
 
-    def _put_loose(self):
-        """Messages outside a chunk become one."""
-        if self._loose:
-            raw, self._loose = bytes(self._loose), bytearray()
-            self._put(None, raw)
-
-    def _put(self, chunk, raw):
-        """Append a chunk; ValueError when a message in it belongs to no known channel."""
-        index, sequences, at = collections.defaultdict(list), collections.defaultdict(list), 0
+    def _add_messages(self, raw):
+        """Add the messages of a chunk's bytes; ValueError, and none added, when one belongs to no known channel."""
+        rows, at = [], 0
         while at < len(raw):
             opcode, stop = _frame(raw, at)
             if opcode == Opcode.MESSAGE:
-                _, _, channel, sequence, log, _ = MESSAGE.unpack_from(raw, at)
-                index[channel] += (log, at)
-                sequences[channel].append(sequence)
+                rows.append((*MESSAGE.unpack_from(raw, at)[1:], raw[at + MESSAGE.size:stop]))
             else:
-                self._declare([_read(opcode, raw[at + 9:stop])], self._container.know)
+                self._declare(_read(opcode, raw[at + 9:stop]))
             at = stop
-        unknown = set(index) - set(self._container.channels)
+        unknown = {channel for channel, *_ in rows} - set(self._channels)
         if unknown:
             raise ValueError(f'channel {min(unknown)} is declared nowhere')
-        if not index:
+        if not rows:
             return
-        first = min(min(places[::2]) for places in index.values())
-        last = max(max(places[::2]) for places in index.values())
-        if chunk is None:
-            chunk = compressed(raw, first, last)
-        self._container.add_chunk(dataclasses.replace(chunk, message_start_time=first, message_end_time=last), index)
-        self._count(sequences)
+        for channel, sequence, log, publish, data in rows:
+            self._bag.add_message(self._channels[channel], sequence, log, publish, data)
+            self._count(channel, sequence)
+        first, last = min(log for _, _, log, _, _ in rows), max(log for _, _, log, _, _ in rows)
         for gap in self._gaps:
             gap.after = first if gap.after is None else gap.after
         self._first = first if self._first is None else min(self._first, first)
         self._last = last if self._last is None else max(self._last, last)
 
-    def _count(self, sequences):
+    def _count(self, channel, sequence):
         """Where the recorder numbers its messages from 1, the first after a gap says how many were in it."""
-        for channel, numbers in sequences.items():
-            if channel in self._unsure:
-                self._lost[channel] += numbers[0] - self._sequence.get(channel, 0) - 1
-            self._sequence[channel] = numbers[-1]
-        self._unsure -= set(sequences)
+        if channel in self._unsure:
+            self._lost[channel] += sequence - self._sequence.get(channel, 0) - 1
+            self._unsure.remove(channel)
+        self._sequence[channel] = sequence
+        self._counts[self._names[channel]] += 1
 
-    def found(self):
-        names = {number: channel.topic.lstrip('/') for number, channel in self._container.channels.items()}
+    def recovered(self):
+        """The Recovered of the bag, once a message was added."""
         ours = 'pacing' in self._metadata.get('pedestal', {})
-        counts = {name: self._container.counts[number] for number, name in names.items()}
-        lost = {names[number]: count for number, count in self._lost.items() if ours and count > 0}
-        return Recovered(self._container.path, counts, self._first, self._last, self._ended, self._duration(),
+        lost = {self._names[channel]: count for channel, count in self._lost.items() if ours and count > 0}
+        return Recovered(self._bag.path, self._counts, self._first, self._last, self._ended, self._duration(),
                          self._gaps, lost)
 
     def _duration(self):

@@ -16,11 +16,12 @@ class StepOrder:
     """Collects the messages of each step and writes the step when it is complete and all before it are written.
 
     topics: the recorded rows of topics.TOPICS. nodes: names of the nodes in the graph. write(index of the topic,
-    log time, publish time [ns], bytes) is called in canonical order, both times being the stamp of the step.
+    log time, publish time [ns], bytes) is called in canonical order; both times are the stamp of the step.
 
     A step is complete with one message of every step topic; at every whole second also with the diagnostics of every
     node of the graph, and the first step also with the `once` topics. A message that fits in no step that is still to
-    be written (doubled, late, without stamp) is written after the next step and counted in `odd`.
+    be written (doubled, late, without stamp) is written after the next step and counted in `odd`. written: stamp [ns]
+    of the last step that was written, -1 before the first.
     """
 
     def __init__(self, topics, nodes, write):
@@ -35,15 +36,15 @@ class StepOrder:
         self._needed = {rate: [slot for slot, (_, topic, _) in enumerate(self._slots, 1) if topic.rate == rate]
                         for rate in ('step', 'once', 'second')}
         self._steps = len(self._needed['step'])
-        self._answered, self._answer = {}, {}
+        self._last_answer, self._answer_slot = {}, {}
         for index, topic in enumerate(topics):
             if topic.rate == 'change':
                 answers = [slot for slot in self._needed['step'] if self._slots[slot - 1][1].writers == topic.writers]
-                self._answer[index] = answers[0] if answers else None
-                self._answered[self._answer[index]] = -1
+                self._answer_slot[index] = answers[0] if answers else None
+                self._last_answer[self._answer_slot[index]] = -1
         self._buckets = {}
         self._stamps = []
-        self._changes = {index: [] for index in self._answer}
+        self._changes = {index: [] for index in self._answer_slot}
         self._odd = []
         self.written = -1
         self.odd = 0
@@ -54,11 +55,12 @@ class StepOrder:
         return len(self._buckets)
 
     def slot(self, name, node=None):
-        """The number by which `take` knows a topic, or a node's messages on a topic with many writers."""
+        """The number that `take` wants for a topic, or for a node's messages on a topic of many writers; None for one
+        that is not recorded."""
         return self._slot_of.get((name, node))
 
     def take(self, slot, stamp, data):
-        """One stamped message."""
+        """Take a message of a slot: its stamp [ns] and bytes. Raises OrderError when too many steps wait."""
         bucket = self._buckets.get(stamp)
         if bucket is None:
             if stamp <= self.written:
@@ -69,19 +71,20 @@ class StepOrder:
             self.take_odd(self._slots[slot - 1][0], data)
             return
         bucket[slot] = data
-        if slot in self._answered:
-            self._answered[slot] = stamp
+        if slot in self._last_answer:
+            self._last_answer[slot] = stamp
         if self._slots[slot - 1][1].rate == 'step':
             bucket[0] -= 1
         if not bucket[0] and stamp == self._stamps[0]:
             self._advance()
 
     def take_change(self, index, data):
-        """A message of a `change` topic: it belongs to the step after the last that its writer has answered."""
-        self._changes[index].append((self._answered[self._answer[index]], data))
+        """Take the bytes of a message of a `change` topic, by the topic's index: it belongs to the step after the last
+        one that its writer has answered."""
+        self._changes[index].append((self._last_answer[self._answer_slot[index]], data))
 
     def take_odd(self, index, data):
-        """A message that belongs to no step."""
+        """Take the bytes of a message that belongs to no step, by the index of its topic."""
         self.odd += 1
         self._odd.append((index, data))
 
@@ -105,7 +108,7 @@ class StepOrder:
         return [slot for slot in needed if bucket[slot] is None]
 
     def missing(self, stamp):
-        """What a step waits for, as text."""
+        """Names of what the step with a stamp [ns] waits for."""
         names = [(topic.name, node) for slot in self._lacks(stamp) for _, topic, node in [self._slots[slot - 1]]]
         return [f'{name} of {node}' if node else name for name, node in names]
 

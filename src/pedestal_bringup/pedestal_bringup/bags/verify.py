@@ -1,5 +1,7 @@
 """Is a recording complete? Every step of every topic there, once, in order; counts and sequence numbers agree."""
+import collections
 import dataclasses
+import typing
 
 import numpy as np
 import yaml
@@ -26,8 +28,8 @@ class TopicCheck:
 
 @dataclasses.dataclass
 class Report:
-    """What verify found. steps: how many the run has; period [s], NaN when there are fewer than two; made: how the bag
-    was made, a line."""
+    """What verify found. topics: [TopicCheck]; problems: of the whole bag, texts; steps: how many the run has; period
+    [s], NaN when there are fewer than two; made: how the bag was made, a line."""
     path: str
     topics: list
     problems: list
@@ -37,6 +39,7 @@ class Report:
 
     @property
     def complete(self):
+        """Whether there is no problem."""
         return not self.problems and not any(check.problems for check in self.topics)
 
     def lines(self):
@@ -54,6 +57,18 @@ class Report:
         return [*lines, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
 
 
+class _Grid(typing.NamedTuple):
+    """First and last step of a run and their period [ns]; period 0 with fewer than two steps."""
+    first: int
+    last: int
+    period: int
+
+    @property
+    def steps(self):
+        """How many there are."""
+        return (self.last - self.first) // self.period + 1 if self.period else 0
+
+
 def verify(path) -> Report:
     """Judge a bag. The steps are the stamps of joint_states (else of the first step topic that has any).
 
@@ -64,62 +79,68 @@ def verify(path) -> Report:
     stamps = {name: columns.stamps([data for _, _, _, data in bag.raw(name)], bag.topics[name], rows[name].log)
               for name in bag.topics}
     graph = bag.graph
-    rates = {name: graph[name].rate if name in graph else '' for name in bag.topics}
-    first, last, period = _grid(stamps, rates)
-    ours = 'pacing' in bag.metadata
-    checks = []
-    for name, stamp in stamps.items():
-        problems = _order(stamp) if rates[name] and len(graph[name].writers) == 1 else []
-        if rates[name] == 'step':
-            problems += _steps(stamp, 'adu' in graph[name].writers, first, last, period)
-            if ours and not np.array_equal(stamp, rows[name].log):
-                problems.append(f'{np.sum(stamp != rows[name].log)} messages logged at a time that is not their stamp')
-        elif rates[name] == 'once' and stamp.size != 1:
-            problems.append(f'{stamp.size} messages where one is due')
-        elif rates[name] == 'second' and bag.metadata.get('pacing') == 'lockstep' and period:
-            problems += _seconds(bag, name, stamp, first, last, period)
-        if name in graph and bag.topics[name] != graph[name].type:
-            problems.append(f'of type {bag.topics[name]}, where the graph has {graph[name].type}')
-        if ours:
-            problems += _sequence(rows[name].sequence)
-        checks.append(TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,
-                                 stamp[-1] / 1e9 if stamp.size else np.nan, problems))
+    of_steps = {name: stamp for name, stamp in stamps.items()
+                if name in graph and graph[name].rate == 'step' and stamp.size}
+    grid = _grid(of_steps)
+    checks = [TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,
+                         stamp[-1] / 1e9 if stamp.size else np.nan, _problems(bag, rows[name], name, stamp, grid))
+              for name, stamp in stamps.items()]
     problems = [bag.damage] if bag.damage else []
-    if not any(rate == 'step' and stamps[name].size for name, rate in rates.items()):
+    if not of_steps:
         problems.append("no topic of the drive's steps has a message")
     counts = {check.name: check.count for check in checks}
     if bag.statistics is not None and bag.statistics != counts:
         problems.append(f'the summary counts {_differences(bag.statistics, counts)}')
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
-    return Report(str(path), checks, problems, (last - first) // period + 1 if period else 0,
-                  period / 1e9 if period else np.nan, configuration.line(bag))
+    return Report(str(path), checks, problems, grid.steps, grid.period / 1e9 if grid.period else np.nan,
+                  configuration.line(bag))
 
 
-def _differences(said, counts):
-    return ', '.join(f'{said.get(name, 0)} of {name} where {counts.get(name, 0)} are'
-                     for name in dict.fromkeys((*said, *counts)) if said.get(name, 0) != counts.get(name, 0))
+def _problems(bag, rows, name, stamp, grid):
+    """What is wrong with a topic, its rows of the index (n,) and its stamps (n,) [ns] given."""
+    topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
+    rate = topic.rate if topic else ''
+    if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
+        # Steps that nobody made, and what strangers said, are no fault of the recording.
+        return ([] if stamp.size else ['no message']) + _sequence(rows.sequence)
+    problems = _order(stamp) if topic and len(topic.writers) == 1 else []
+    if rate == 'step':
+        problems += _steps(stamp, 'adu' in topic.writers, grid)
+        if ours and not np.array_equal(stamp, rows.log):
+            problems.append(f'{np.sum(stamp != rows.log)} messages logged at a time that is not their stamp')
+    elif rate == 'once' and stamp.size != 1:
+        problems.append(f'{stamp.size} messages where one is due')
+    elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
+        problems += _seconds(bag, name, stamp, grid)
+    if topic and bag.topics[name] != topic.type:
+        problems.append(f'of type {bag.topics[name]}, where the graph has {topic.type}')
+    if ours:
+        problems += _sequence(rows.sequence)
+    return problems
 
 
-def _grid(stamps, rates):
-    """First and last step and their period [ns]; period 0 when there is no telling."""
-    steps = {name: stamp for name, stamp in stamps.items() if rates[name] == 'step' and stamp.size}
-    if not steps:
-        return 0, 0, 0
-    grid = np.unique(next((stamp for name, stamp in steps.items() if nodes.plain(name) == 'joint_states'),
-                          next(iter(steps.values()))))
-    period = int(np.median(np.diff(grid))) if grid.size > 1 else 0
-    return int(grid[0]), int(max(grid[-1], *(stamp.max() for stamp in steps.values()))), period
+def _differences(claimed, counts):
+    """Where the counts {topic: messages} that a file claims are not those that are there, as text."""
+    return ', '.join(f'{claimed.get(name, 0)} of {name} where {counts.get(name, 0)} are'
+                     for name in dict.fromkeys((*claimed, *counts)) if claimed.get(name, 0) != counts.get(name, 0))
+
+
+def _grid(stamps):
+    """The _Grid of the stamps {topic: (n,) [ns]} of the topics that have one message for each step."""
+    if not stamps:
+        return _Grid(0, 0, 0)
+    steps = np.unique(next((stamp for name, stamp in stamps.items() if nodes.plain(name) == 'joint_states'),
+                           next(iter(stamps.values()))))
+    period = int(np.median(np.diff(steps))) if steps.size > 1 else 0
+    return _Grid(int(steps[0]), int(max(steps[-1], *(stamp.max() for stamp in stamps.values()))), period)
 
 
 def _order(stamp):
-    """Stamps that do not go on."""
-    problems = []
+    """Stamps that go back."""
     back = np.flatnonzero(np.diff(stamp) < 0)
-    if back.size:
-        problems.append(f'{back.size} stamps go back, the first from {stamp[back[0]] / 1e9:.6f} '
-                        f'to {stamp[back[0] + 1] / 1e9:.6f} s')
-    return problems
+    return [f'{back.size} stamps go back, the first from {stamp[back[0]] / 1e9:.6f} '
+            f'to {stamp[back[0] + 1] / 1e9:.6f} s'] if back.size else []
 
 
 def _ranges(numbers):
@@ -130,8 +151,9 @@ def _ranges(numbers):
     return list(zip(numbers[np.r_[0, cuts + 1]].tolist(), numbers[np.r_[cuts, numbers.size - 1]].tolist()))
 
 
-def _steps(stamp, of_drive, first, last, period):
-    """Steps that are missing, doubled or none; of_drive: written by the drive, which makes them."""
+def _steps(stamp, of_drive, grid):
+    """Steps that are missing or doubled, stamps that are none. of_drive: written by the drive, which makes the steps.
+    """
     if not stamp.size:
         return ['no message']
     problems = []
@@ -139,18 +161,17 @@ def _steps(stamp, of_drive, first, last, period):
     doubled = unique[count > 1]
     if doubled.size:
         problems.append(f'{np.sum(count[count > 1] - 1)} doubled, the first at {doubled[0] / 1e9:.6f} s')
-    if not period:
+    if not grid.period:
         return problems
-    off = np.sum((unique - first) % period != 0)
-    if off:
-        problems.append(f'{off} stamps are no step')
-    expected = np.arange((last - first) // period + 1)
-    missing = _ranges(np.setdiff1d(expected, (unique - first) // period))
-    if not of_drive and missing and missing[-1][1] == expected[-1] \
-            and (missing[-1][1] - missing[-1][0] + 1) * period <= MAX_LATENCY:
+    between = np.sum((unique - grid.first) % grid.period != 0)
+    if between:
+        problems.append(f'{between} stamps are no step')
+    missing = _ranges(np.setdiff1d(np.arange(grid.steps), (unique - grid.first) // grid.period))
+    if not of_drive and missing and missing[-1][1] == grid.steps - 1 \
+            and (missing[-1][1] - missing[-1][0] + 1) * grid.period <= MAX_LATENCY:
         missing.pop()
     for start, stop in missing[:SHOWN]:
-        at, to = (first + start * period) / 1e9, (first + stop * period) / 1e9
+        at, to = (grid.first + start * grid.period) / 1e9, (grid.first + stop * grid.period) / 1e9
         problems.append(f'missing 1 step at {at:.6f} s' if start == stop else
                         f'missing {stop - start + 1} steps from {at:.6f} to {to:.6f} s')
     if len(missing) > SHOWN:
@@ -159,33 +180,33 @@ def _steps(stamp, of_drive, first, last, period):
     return problems
 
 
-def _seconds(bag, name, stamp, first, last, period):
-    """Diagnostics of every node whose topics are in the bag, at the first step of every second."""
-    seconds = np.arange(-(-first // 1_000_000_000), last // 1_000_000_000 + 1) * 1_000_000_000
-    expected = first - (first - seconds) // period * period
-    expected = expected[expected <= last]
-    heard = {}
+def _seconds(bag, name, stamp, grid):
+    """Diagnostics that are missing: every node with a topic in the bag owes one at the first step of every second."""
+    seconds = np.arange(-(-grid.first // 1_000_000_000), grid.last // 1_000_000_000 + 1) * 1_000_000_000
+    expected = grid.first - (grid.first - seconds) // grid.period * grid.period
+    expected = expected[expected <= grid.last]
+    stamps_of = collections.defaultdict(list)
     for at, (_, _, _, data) in zip(stamp, bag.raw(name)):
         try:
             status = messages.deserialize(data, bag.topics[name]).status
         except ValueError as error:
             return [f'unreadable at {at / 1e9:.6f} s: {error}']
-        heard.setdefault(status[0].name if status else '', []).append(at)
+        stamps_of[status[0].name if status else ''].append(at)
     nodes = [node for node in bag.graph[name].writers
              if any(topic.name in bag.topics for topic in bag.graph.values() if topic.writers == (node,))]
     problems = []
     for node in nodes:
-        missing = np.setdiff1d(expected, heard.get(node, []))
+        missing = np.setdiff1d(expected, stamps_of[node])
         if missing.size:
             problems.append(f'{missing.size} of {expected.size} of {node} missing, '
                             f'the first at {missing[0] / 1e9:.6f} s')
-        if len(heard.get(node, [])) > expected.size:
-            problems.append(f'{len(heard[node]) - expected.size} too many of {node}')
+        if len(stamps_of[node]) > expected.size:
+            problems.append(f'{len(stamps_of[node]) - expected.size} too many of {node}')
     return problems
 
 
 def _sequence(sequence):
-    """The recorder numbers from 1 and leaves a gap for what was lost on the way."""
+    """Numbers that are missing or repeated: the recorder counts from 1, with a gap for what was lost on its way."""
     if not sequence.size:
         return []
     steps = np.diff(sequence, prepend=0)
@@ -197,11 +218,12 @@ def _sequence(sequence):
 
 
 def _metadata_file(bag, counts):
+    """What metadata.yaml claims otherwise than it is."""
     file = bag.path / 'metadata.yaml'
     try:
         information = yaml.safe_load(file.read_text())['rosbag2_bagfile_information']
-        said = {row['topic_metadata']['name'].lstrip('/'): row['message_count']
-                for row in information['topics_with_message_count']}
+        claimed = {row['topic_metadata']['name'].lstrip('/'): row['message_count']
+                   for row in information['topics_with_message_count']}
         files, total = information['relative_file_paths'], information['message_count']
     except FileNotFoundError:
         return ['metadata.yaml is missing']
@@ -210,8 +232,8 @@ def _metadata_file(bag, counts):
     problems = []
     if files != [bag.file.name]:
         problems.append(f'metadata.yaml names the files {", ".join(files)}')
-    if said != counts:
-        problems.append(f'metadata.yaml counts {_differences(said, counts)}')
+    if claimed != counts:
+        problems.append(f'metadata.yaml counts {_differences(claimed, counts)}')
     if total != sum(counts.values()):
         problems.append(f'metadata.yaml counts {total} messages where {sum(counts.values())} are')
     return problems

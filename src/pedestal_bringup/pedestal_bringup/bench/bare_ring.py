@@ -33,6 +33,7 @@ def _filled(topic):
 
 
 class Ring(Node):
+    """A node of the ring: it passes on what comes on its trigger and drops everything else."""
 
     def __init__(self, role, steps):
         super().__init__(role)
@@ -53,21 +54,24 @@ class Ring(Node):
             self.start_timer = self.create_timer(0.01, self.start)
 
     def start(self):
+        """Send the first lap when every reader is there."""
         if all(publisher.get_subscription_count() >= readers for publisher, _, readers in self.writers):
             self.start_timer.cancel()
             time.sleep(1.0)
             self.send()
 
     def ignore(self, _message):
-        pass
+        """Read a message, no more."""
 
     def draining(self):
+        """Nothing is waited for at the end."""
         return False
 
     def close(self):
-        pass
+        """Nothing is left to do at the end."""
 
     def pass_on(self, _message):
+        """Send what this node writes in a lap; the drive prints the time of a lap [us] after the last."""
         self.lap += 1
         if self.lap == WARM_UP:
             self.begun = time.perf_counter()
@@ -78,11 +82,13 @@ class Ring(Node):
         self.send()
 
     def send(self):
+        """Publish every message of this node once."""
         for publisher, message, _ in self.writers:
             publisher.publish(message)
 
 
 def main(args=None) -> int:
+    """ROLE STEPS of the command line; the exit code."""
     role, steps = (args or sys.argv[1:])[:2]
     return shell.main(lambda: Ring(role, int(steps)), args=[])
 

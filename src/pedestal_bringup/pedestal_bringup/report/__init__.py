@@ -1,1 +1,1 @@
-"""Pictures, and the report of a recording as one HTML file."""
+"""Figures, and the report of a recording as one HTML file."""

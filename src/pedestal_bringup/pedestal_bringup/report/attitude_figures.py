@@ -1,4 +1,4 @@
-"""The figures of a report about the INS: how wrong its attitude was, beside what it said of it."""
+"""The figures of a report about the INS: the error of its attitude beside the one it stated."""
 import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, TRUTH, Spec, draw_line, new_panels, outside_legend
@@ -7,17 +7,18 @@ LEAST = 1e-4
 """Smallest error [deg] drawn on the logarithmic scale."""
 
 
-def attitude(recording):
-    found = recording.attitude
+def attitude(data):
+    """Heading and level error of the INS [deg] and their standard deviations as it states them."""
+    known = data.attitude
     figure, panels = new_panels(2, sharex=True)
     for axes, name, error, sigma in zip(panels[:, 0], ('heading', 'level, both axes'),
-                                        (np.abs(found.heading), found.level),
-                                        (found.sigma[:, 1], np.sqrt(2.0) * found.sigma[:, 0])):
-        draw_line(axes, found.t, np.maximum(np.degrees(error), LEAST), color=TRUTH, linewidth=0.8, label='error')
-        draw_line(axes, found.t, np.maximum(np.degrees(sigma), LEAST), color=FILTERED,
+                                        (np.abs(known.heading), known.level),
+                                        (known.sigma[:, 1], np.sqrt(2.0) * known.sigma[:, 0])):
+        draw_line(axes, known.t, np.maximum(np.degrees(error), LEAST), color=TRUTH, linewidth=0.8, label='error')
+        draw_line(axes, known.t, np.maximum(np.degrees(sigma), LEAST), color=FILTERED,
                   label='1 sigma, as the INS says')
-        if np.isfinite(found.aligned) and found.aligned > found.t[0]:
-            axes.axvline(found.aligned, color=INK, linewidth=0.8, linestyle='--', label='aligned')
+        if np.isfinite(known.aligned) and known.aligned > known.t[0]:
+            axes.axvline(known.aligned, color=INK, linewidth=0.8, linestyle='--', label='aligned')
         axes.set_yscale('log')
         axes.set_title(name)
         axes.set_ylabel('error [deg]')

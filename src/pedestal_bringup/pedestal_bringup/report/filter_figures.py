@@ -19,18 +19,19 @@ SPAN = 1.0
 """Seconds over which the NIS is averaged for its figure."""
 
 
-def estimate(recording):
-    found = recording.filter
+def estimate(data):
+    """Estimate less truth and twice the sigma that the filter states, angle [deg] and rate [deg/s]."""
+    known = data.filter
     figure, panels = new_panels(2, 2, sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
-        for axes, error, sigma, unit in ((row[0], found.error, found.sigma, 'deg'),
-                                         (row[1], found.rate_error, found.rate_sigma, 'deg/s')):
+        for axes, error, sigma, unit in ((row[0], known.error, known.sigma, 'deg'),
+                                         (row[1], known.rate_error, known.rate_sigma, 'deg/s')):
             error, sigma = np.degrees(error[:, i]), np.degrees(sigma[:, i])
             for sign in (-2.0, 2.0):
-                draw_line(axes, found.t, sign * sigma, color=FILTERED, linewidth=1.0,
+                draw_line(axes, known.t, sign * sigma, color=FILTERED, linewidth=1.0,
                           label='2 sigma, as the filter states' if sign > 0.0 else None)
-            draw_line(axes, found.t, error, color=TRUTH, linewidth=0.8, label='estimate less truth')
-            shown = np.abs(np.concatenate((error[found.tracking], 2.0 * sigma[found.tracking])))
+            draw_line(axes, known.t, error, color=TRUTH, linewidth=0.8, label='estimate less truth')
+            shown = np.abs(np.concatenate((error[known.tracking], 2.0 * sigma[known.tracking])))
             shown = shown[np.isfinite(shown)]
             if shown.size and shown.max() > 0.0:
                 axes.set_ylim(-1.25 * shown.max(), 1.25 * shown.max())
@@ -43,14 +44,15 @@ def estimate(recording):
     return figure
 
 
-def innovations(recording):
-    found = recording.filter
+def innovations(data):
+    """Innovations [deg] and the mean NIS of SPAN seconds in its band."""
+    known = data.filter
     figure, panels = new_panels(2, 2, sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
-        draw_line(row[0], found.t, np.degrees(found.innovation[:, i]), color=RAW, linewidth=0.7)
+        draw_line(row[0], known.t, np.degrees(known.innovation[:, i]), color=RAW, linewidth=0.7)
         row[0].set_ylabel('[deg]')
         row[0].set_title(f'{axis}: innovation')
-        t, nis, expected, low, high = _averaged(found.t, found.nis[:, i], found.freedoms[:, i])
+        t, nis, expected, low, high = _averaged(known.t, known.nis[:, i], known.freedoms[:, i])
         row[1].fill_between(t, low, high, color=FILTERED, alpha=0.2, linewidth=0.0,
                             label=f'{100.0 * PART:g} % of an honest filter')
         draw_line(row[1], t, expected, color=INK, linewidth=0.8, linestyle='--', label='expected')
@@ -76,14 +78,15 @@ def _averaged(t, nis, freedoms):
         return t[0] + SPAN * (np.arange(count.size) + 0.5), mean, total / count, low, high
 
 
-def probabilities(recording):
-    found = recording.filter
+def probabilities(data):
+    """Probability of each motion model."""
+    known = data.filter
     figure, panels = new_panels(2, sharex=True)
     for axes, axis, i in zip(panels[:, 0], topics.AXES, range(2)):
         for number, model in enumerate(topics.MOTION_MODELS):
-            values = found.probability[:, i, number]
+            values = known.probability[:, i, number]
             if np.isfinite(values).any():
-                draw_line(axes, found.t, values, color=MODELS[model], label=model.replace('_', ' '))
+                draw_line(axes, known.t, values, color=MODELS[model], label=model.replace('_', ' '))
         axes.set_ylim(-0.02, 1.02)
         axes.set_ylabel('probability')
         axes.set_title(axis)

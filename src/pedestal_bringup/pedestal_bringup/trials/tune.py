@@ -23,7 +23,8 @@ from acu_tracker.modes import AUTOTRACK, STANDBY
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import RANGE
 from pedestal_bringup.again import recompute, what_if
-from pedestal_bringup.analysis import identification, results
+from pedestal_bringup.analysis import identification
+from pedestal_bringup.analysis.tracking import SETTLING
 from pedestal_bringup.bags import configuration
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.trials import tuning
@@ -134,7 +135,7 @@ class Simulated:
         self._scenarios = {seed: load(seed) for seed in (*self.seeds, *self.kept_seeds)}
         if not np.isfinite(self.criterion(self.params)).all():
             mode = 'out of standby' if any_mode else 'in autotrack'
-            raise TuneError(f'scenario {chosen.name}: never {mode} for more than {results.SETTLING:g} s')
+            raise TuneError(f'scenario {chosen.name}: never {mode} for more than {SETTLING:g} s')
 
     def runs(self, params, seeds):
         """(steps, truth) of the settled parts of all runs, records of closed_loop.STEP and TRUTH."""
@@ -142,7 +143,7 @@ class Simulated:
         for seed in seeds:
             run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
             on = run['acu/mode'] != STANDBY if self.any_mode else run['acu/mode'] == AUTOTRACK
-            start = run.t[on][0] + results.SETTLING if on.any() else math.inf
+            start = run.t[on][0] + SETTLING if on.any() else math.inf
             settled = on & (run.t >= start)
             parts.append((run.steps[settled], run.truth[settled]))
         return tuple(map(np.concatenate, zip(*parts)))

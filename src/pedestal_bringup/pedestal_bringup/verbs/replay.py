@@ -19,10 +19,11 @@ def add_arguments(parser):
 
 
 def main(options):
-    from pedestal_bringup.again.replay import replay
-    outcome = replay(options.bag, options.node, options.topics, None if options.lockstep else options.rate,
-                     options.start, options.duration, options.paused, options.deadline)
-    print('\n'.join(outcome.lines()))
-    if outcome.ended == 'stopped':
+    from pedestal_bringup.again.replay import ReplayOptions, replay
+    result = replay(options.bag, ReplayOptions(
+        options.node, options.topics, None if options.lockstep else options.rate, options.start, options.duration,
+        options.paused, options.deadline))
+    print('\n'.join(result.lines()))
+    if result.ended == 'stopped':
         raise KeyboardInterrupt
     return 0

@@ -12,6 +12,6 @@ def add_arguments(parser):
 
 
 def main(options):
-    from pedestal_bringup.report import report
-    print(report.write(options.bag, options.output, options.png, options.beam))
+    from pedestal_bringup.report import page
+    print(page.write(options.bag, options.output, options.png, options.beam))
     return 0

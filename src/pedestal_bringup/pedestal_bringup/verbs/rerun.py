@@ -19,6 +19,6 @@ def main(options):
     path = arguments.new_bag(options.bag, chosen.name)
     with console.progress_of_run(chosen.header.duration) as progress:
         graph.run(chosen, path, progress)
-    comparison = rerun.compare(recording, bag.read(path))
-    print('\n'.join(comparison.lines()))
-    return 0 if comparison.equal else 1
+    result = rerun.result(recording, bag.read(path))
+    print('\n'.join(result.lines()))
+    return 0 if result.equal else 1

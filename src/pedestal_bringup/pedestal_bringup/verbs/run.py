@@ -20,7 +20,7 @@ def add_arguments(parser):
 
 
 def main(options):
-    from pedestal_bringup.analysis import results, summary
+    from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read
     from pedestal_bringup.bags.verify import verify
     from pedestal_bringup.run import graph, scenario
@@ -36,10 +36,8 @@ def main(options):
             return console.EXIT_STOPPED
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
-    of_beams = [summary.of_beam(recording.view(beam)) for beam in beams]
-    whole = {'lost_steps': (float(outcome.drive['lost_steps']), ''),
-             'realtime_factor': (outcome.drive['realtime_factor'], ''),
-             'messages': (float(outcome.recorder['messages']), '')}
+    of_beams = [results.measured(results.of_bag(recording.view(beam))) for beam in beams]
+    whole = results.measured({'run': outcome})
     console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams, whole)
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)

@@ -1,0 +1,25 @@
+"""How a benchmark is shown, and how a function is timed."""
+import time
+
+from rich.console import Console
+from rich.table import Table
+
+
+def show(title, rows):
+    """Print rows of results.row as a table."""
+    table = Table(title=title, title_justify='left')
+    for column in ('case', 'metric', 'value', 'unit', 'target'):
+        table.add_column(column, justify='right' if column in ('value', 'target') else 'left')
+    for r in rows:
+        table.add_row(r['case'], r['metric'], f'{r["value"]:.4g}', r['unit'], r['target'] or '')
+    Console().print(table)
+
+
+def best_of(function, repeats=5):
+    """Shortest wall time [s] of some calls."""
+    times = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - begun)
+    return min(times)
