@@ -14,12 +14,14 @@ PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
 """{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
 
 
-def qos(rate) -> QoSProfile:
-    """The profile of topics of a rate, for writers and readers."""
-    depth, latched = topics.QOS[rate]
+def qos(rate, role='lockstep') -> QoSProfile:
+    """The profile of topics of a rate: in lockstep for writers and readers, in realtime of a role `written`, `read` or
+    `recorded` (see topics.Qos)."""
+    row = topics.QOS[rate]
+    depth, reliable = getattr(row, role), role != 'read' or row.reliable
     return QoSProfile(history=HistoryPolicy.KEEP_LAST if depth else HistoryPolicy.KEEP_ALL, depth=depth or 1,
-                      reliability=ReliabilityPolicy.RELIABLE,
-                      durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE)
+                      reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+                      durability=DurabilityPolicy.TRANSIENT_LOCAL if row.latched else DurabilityPolicy.VOLATILE)
 
 
 def message_class(type_name):

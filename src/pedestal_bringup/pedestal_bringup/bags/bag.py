@@ -205,6 +205,11 @@ class Bag:
         return self.metadata_records.get('pedestal', {})
 
     @property
+    def start(self):
+        """Where the time of the scenario is 0 in the stamps [ns]: UTC in realtime, else 0."""
+        return int(self.metadata.get('start', 0))
+
+    @property
     def beams(self):
         """Beams of the array that was recorded; 0: a drive with motors."""
         several = sum(1 for name in self.topics if nodes.plain(name) == 'joint_states' != name)
@@ -302,6 +307,7 @@ class Bag:
         """
         rows = self.rows(topic)
         try:
-            return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log)
+            return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log,
+                                 self.start)
         except ValueError as error:
             raise BagError(f'{self.path}: {topic}: {error}') from None

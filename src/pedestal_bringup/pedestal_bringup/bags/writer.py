@@ -29,7 +29,7 @@ _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 def _qos(rate):
     """The offered_qos_profiles of a topic of a rate."""
-    depth, latched = topics.QOS[rate]
+    depth, latched = topics.QOS[rate].lockstep, topics.QOS[rate].latched
     return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
              'durability': 'transient_local' if latched else 'volatile',
              'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',

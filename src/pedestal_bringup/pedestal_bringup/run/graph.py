@@ -17,7 +17,7 @@ from pedestal_bringup.run import lockstep, supervisor
 from pedestal_bringup.run.operator_node import Operator, another_graph
 from pedestal_bringup.run.processes import Graph, log_folder
 from pedestal_bringup.run.program import program_messages
-from pedestal_common import messages, middleware, nodes, parameters
+from pedestal_common import messages, middleware, nodes
 from pedestal_common.steps import SECOND
 
 START_TIME = 3.0
@@ -56,7 +56,7 @@ def parameter_file(scenario, bag, start):
             'graph.deadline': scenario.header.deadline, 'graph.start': start}
     sections = {node: {**scenario.given(node), **told} for node in scenario.nodes if node != 'operator'}
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
-    if start and 'state_file' in parameters.defaults(scenario.row(nodes.DRIVE).parameters_type()):
+    if start and not scenario.header.beam:
         sections[nodes.DRIVE].setdefault('state_file', str(log_folder(bag) / f'{nodes.DRIVE}.state'))
     return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()})
 

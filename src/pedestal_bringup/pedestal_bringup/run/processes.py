@@ -36,7 +36,8 @@ def command_line(node, module, file):
 @contextlib.contextmanager
 def uninterrupted():
     """A second Ctrl-C, or whatever else ends `pedestal`, does not cut the clean stop short."""
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    before = {number: signal.signal(number, signal.SIG_IGN)
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
         yield
     finally:
@@ -175,10 +176,11 @@ class Graph:
         log = '\n'.join(f'  | {line}' for line in self.last_lines(node)) or '  | (it logged nothing)'
         return f'{node} {reason}; its last log lines ({self._log_of(node)}):\n{log}'
 
-    def told_in_a_line(self, node, reason):
-        """The same with the last line of its log only."""
+    def cause(self, node, code):
+        """Why a node that ended by itself with this exit code did, as it said, in brackets; '' of one that was
+        killed."""
         said = self.last_lines(node)
-        return f'{node} {reason}' + (f' ({said[-1]})' if said else '')
+        return f' ({said[-1]})' if said and code > 0 else ''
 
 
 def how(code):

@@ -110,8 +110,8 @@ class Supervisor:
         if not number:
             raise RunError(self._graph.told(node, f'{reason}, after {limits.attempts} starts within '
                                             f'{limits.within:g} s'))
-        tell(f'{self._graph.told_in_a_line(node, reason)}: starting it again, {number} of {limits.attempts} within '
-             f'{limits.within:g} s')
+        tell(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
+             f'within {limits.within:g} s')
 
     def _hear(self, node, now):
         self._silence.heard(node, now)
