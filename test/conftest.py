@@ -102,6 +102,16 @@ def _finished(process, timeout):
     return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
 
 
+def _complaints(errors):
+    return ''.join(line for line in errors.splitlines(keepends=True) if not line.startswith('[INFO]'))
+
+
+@pytest.fixture(scope='session')
+def complaints():
+    """complaints(stderr of a node) -> it without what is mere information."""
+    return _complaints
+
+
 def _kill_group(process):
     try:
         os.killpg(process.pid, signal.SIGKILL)
@@ -182,7 +192,10 @@ class NodeProcess:
     domain_id: int
 
     def finish(self, timeout=START):
-        return _finished(self.process, timeout)
+        """CompletedProcess; of stderr what is no mere information."""
+        done = _finished(self.process, timeout)
+        done.stderr = _complaints(done.stderr)
+        return done
 
 
 @pytest.fixture(scope='module')
@@ -310,7 +323,7 @@ def one_line():
     """one_line(errors) -> the single line a refused command prints; fails the test on a traceback or more lines."""
     def check(errors):
         assert 'Traceback' not in errors, errors
-        lines = errors.strip().splitlines()
+        lines = _complaints(errors).strip().splitlines()
         assert len(lines) == 1, errors
         return lines[0]
     return check

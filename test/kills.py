@@ -33,6 +33,9 @@ FRESH = 0.1
 STEADY = 0.3
 """Time [s] for which all must be well before a graph counts as recovered."""
 
+LAST_WORDS = 0.2
+"""Time [s] after a kill in which what the dead node had sent still comes in."""
+
 PATIENCE = 60.0
 """Time [s] after which it counts as not recovered, or a run that does not end as hung."""
 
@@ -83,7 +86,7 @@ class Watcher:
         own = begun = None
         while time.monotonic() - since < PATIENCE:
             self.spin()
-            if own is None and (not node or self.heard[node] > since):
+            if own is None and (not node or self.heard[node] > since + LAST_WORDS):
                 own = time.monotonic() - since
             if not self.well(since):
                 begun = None
@@ -144,12 +147,12 @@ def ended(process, counts):
         return process.communicate()[1]
 
 
-def realtime(kills, seed, folder, duration=120.0):
+def realtime(kills, seed, folder, victims=NODES, duration=120.0):
     """Kill after kill in runs of `duration` [s]; (counts, {node: [recovery]})."""
     chance, counts, outages = random.Random(seed), collections.Counter(), collections.defaultdict(list)
     middleware.initialise([])
     watcher = Watcher()
-    order = [node for _ in range(-(-kills // len(NODES))) for node in chance.sample(NODES, len(NODES))][:kills]
+    order = [node for _ in range(kills) for node in chance.sample(victims, len(victims))][:kills]
     while order:
         process, bag, log = started(folder, 'realtime', '--duration', str(duration), '--param',
                                     'scenario.restart.attempts=1000000')
@@ -190,11 +193,11 @@ def realtime(kills, seed, folder, duration=120.0):
     return counts, outages
 
 
-def lockstep(kills, seed, folder):
+def lockstep(kills, seed, folder, victims=NODES):
     """A run for each kill: (counts, {})."""
     chance, counts = random.Random(seed), collections.Counter()
     for number in range(kills):
-        node = NODES[number % len(NODES)]
+        node = victims[number % len(victims)]
         process, bag, log = started(folder, 'lockstep')
         begun = time.monotonic()
         while node not in children(process.pid):
@@ -226,12 +229,13 @@ def main():
     parser.add_argument('pacing', choices=('realtime', 'lockstep'))
     parser.add_argument('--kills', type=int, default=200)
     parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--nodes', nargs='+', choices=NODES, default=NODES, help='that are killed')
     parser.add_argument('--folder', help='keep the recordings there')
     options = parser.parse_args()
     with contextlib.ExitStack() as stack:
         folder = options.folder or stack.enter_context(tempfile.TemporaryDirectory())
         counts, outages = {'realtime': realtime, 'lockstep': lockstep}[options.pacing](
-            options.kills, options.seed, folder)
+            options.kills, options.seed, folder, options.nodes)
     print(f'{options.pacing}: ' + ', '.join(f'{name} {count}' for name, count in counts.items()))
     for node, recoveries in sorted(outages.items()):
         for what, key in (('it speaks again', 'own'), ('all is well', 'graph')):

@@ -1,8 +1,17 @@
 """What a node opens to the network, and a graph on two hosts: network namespaces, each with its own /dev/shm."""
+import os
 import pathlib
 import signal
+import subprocess
+import sys
+import time
 
+import numpy as np
 import pytest
+
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.run import graph, processes, scenario, supervisor
+from pedestal_common.steps import SECOND
 
 
 def sockets(pid):
@@ -26,3 +35,129 @@ def test_a_node_listens_to_its_own_machine_only(start_node, connect, node):
     assert sockets(alone.process.pid) == {('udp', '127.0.0.1')}
     alone.process.send_signal(signal.SIGINT)
     assert alone.finish(15.0).returncode == 0
+
+
+class Hosts:
+    """Two hosts on one switch: network namespaces, each with its own /dev/shm, whose cables can be pulled."""
+    NAMES = 'near', 'far'
+
+    def __init__(self):
+        self._prefix = f'pedestal-{os.getpid()}-'
+        self._started = []
+        try:
+            self._ip('netns', 'add', self._of('switch'))
+            self._in('switch', 'link', 'add', 'bridge', 'type', 'bridge')
+            self._in('switch', 'link', 'set', 'bridge', 'up')
+            for number, name in enumerate(self.NAMES, 1):
+                self._ip('netns', 'add', self._of(name))
+                self._in(name, 'link', 'add', 'eth0', 'type', 'veth', 'peer', 'name', name, 'netns',
+                         self._of('switch'))
+                self._in('switch', 'link', 'set', name, 'master', 'bridge', 'up')
+                self._in(name, 'address', 'add', f'10.77.0.{number}/24', 'dev', 'eth0')
+                for device in ('lo', 'eth0'):
+                    self._in(name, 'link', 'set', device, 'up')
+        except (OSError, subprocess.CalledProcessError) as error:
+            self.close()
+            pytest.skip(f'this machine makes no network namespaces: {getattr(error, "stderr", error)}')
+
+    def _of(self, name):
+        return self._prefix + name
+
+    @staticmethod
+    def _ip(*arguments):
+        subprocess.run(['ip', *arguments], check=True, capture_output=True, text=True, timeout=30)
+
+    def _in(self, name, *arguments):
+        self._ip('-netns', self._of(name), *arguments)
+
+    def start(self, name, command, log, **environment):
+        """A process on a host, its output in a file."""
+        inherited = {name: value for name, value in os.environ.items() if name != 'FASTRTPS_DEFAULT_PROFILES_FILE'}
+        shell = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
+        with open(log, 'wb') as output:
+            process = subprocess.Popen(
+                ['ip', 'netns', 'exec', self._of(name), 'unshare', '--mount', 'sh', '-c', shell, 'sh', *command],
+                env={**inherited, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', **environment}, stdout=output,
+                stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True)
+        self._started.append(process)
+        return process
+
+    def cut(self, seconds):
+        """Pull the cable of the far host for a while; when that was [ns UTC], begin and end."""
+        self._in('switch', 'link', 'set', 'far', 'down')
+        begun = time.time_ns()
+        time.sleep(seconds)
+        self._in('switch', 'link', 'set', 'far', 'up')
+        return begun, time.time_ns()
+
+    def close(self):
+        for process in self._started:
+            process.kill()
+            process.wait()
+        for name in (*self.NAMES, 'switch'):
+            subprocess.run(['ip', 'netns', 'delete', self._of(name)], capture_output=True, timeout=30)
+
+
+@pytest.fixture(scope='module')
+def hosts():
+    hosts = Hosts()
+    yield hosts
+    hosts.close()
+
+
+CUTS = (0.05, 1.0, 10.0)
+"""Seconds."""
+
+FOLLOWED = 8.0
+"""Seconds from one cut to the next, in which the target is found again."""
+
+
+@pytest.fixture(scope='module')
+def cut(hosts, tmp_path_factory, reserve_domain):
+    """(Bag of a pass recorded on the near host while the control unit ran on the far one, [(begin, end)] of the CUTS
+    [s of the run])."""
+    folder, domain = tmp_path_factory.mktemp('hosts'), {'ROS_DOMAIN_ID': str(reserve_domain())}
+    chosen = scenario.load('leo_pass', pacing='realtime')
+    supervisor.prepare(chosen)
+    start, bag, file = graph.begins(chosen), folder / 'bag', folder / 'parameters.yaml'
+    file.write_text(graph.parameter_file(chosen, bag, start))
+    (folder / 'bag.log').mkdir()
+    started = [hosts.start('far' if node == 'acu' else 'near',
+                           processes.command_line(node, chosen.row(node).module, file), folder / f'{node}.log',
+                           **domain)
+               for node in chosen.nodes if node != 'operator']
+
+    def wait_until(condition):
+        deadline = time.monotonic() + 120.0
+        while not condition():
+            assert time.monotonic() < deadline and not any(process.poll() for process in started), ''.join(
+                log.read_text() for log in folder.glob('*.log'))
+            time.sleep(0.1)
+    wait_until(lambda: 'runs' in (folder / 'acu.log').read_text())
+    hosts.start('far', [sys.executable, '-m', 'pedestal_bringup.cli', 'program', 'leo_pass'], folder / 'program.log',
+                **domain)
+    time.sleep(FOLLOWED)
+    times = []
+    for seconds in CUTS:
+        times.append([(moment - start) / SECOND for moment in hosts.cut(seconds)])
+        time.sleep(FOLLOWED)
+    for process in started:
+        process.terminate()
+    assert [process.wait(30.0) for process in started] == [0] * len(started), ''.join(
+        log.read_text() for log in folder.glob('*.log'))
+    return bags.read(bag), times
+
+
+def test_a_cut_stops_the_axes_until_it_is_over(cut):
+    bag, times = cut
+    joints, modes = bag.table('joint_states'), bag.table('acu/mode')
+    rate = np.hypot(joints['azimuth.velocity'], joints['elevation.velocity'])
+
+    def during(begin, end):
+        return rate[(joints['t'] > begin) & (joints['t'] < end)]
+    for begin, end in times:
+        assert during(begin - 0.5, begin).min() > 2e-3
+        assert during(end + FOLLOWED - 1.0, end + FOLLOWED).min() > 2e-3
+        if end - begin > 0.5:
+            assert during(begin + 0.5, end).max() < 1e-3
+    assert modes['data'][-1] == 'autotrack'

@@ -1,6 +1,7 @@
 """`pedestal run` in realtime: who dies is started again, the run ends in order, and nobody is left behind."""
 import re
 import signal
+import subprocess
 import time
 
 import pytest
@@ -66,3 +67,13 @@ def test_a_node_that_always_dies_is_given_up(start_run):
     assert said[2].startswith('pedestal: error: recorder ended with exit code 1, after 2 starts within 60 s; its last '
                               'log lines')
     assert run.pids() == {}
+
+
+def test_the_cause_of_an_end_is_kept_on_a_full_disk(start_run, tmp_path):
+    """A log has its room in advance: the disk is full because of the recording."""
+    small = ('unshare', '--mount', 'sh', '-c', 'mount -t tmpfs -o size=2m tmpfs "$0" && exec "$@"', tmp_path)
+    if subprocess.run([*small, 'true'], capture_output=True, timeout=30).returncode != 0:
+        pytest.skip('this machine mounts nothing')
+    result = start_run('leo_pass', bag=tmp_path / 'bag', prefix=small).finish()
+    assert result.returncode == 1
+    assert re.search(r'^  \| recorder: error: .*bag_0.mcap: No space left on device$', result.stderr, re.MULTILINE)

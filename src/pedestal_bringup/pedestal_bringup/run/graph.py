@@ -20,8 +20,9 @@ from pedestal_bringup.run.program import program_messages
 from pedestal_common import messages, middleware, nodes
 from pedestal_common.steps import SECOND
 
-START_TIME = 3.0
-"""Seconds from the start of the nodes of a realtime run to the beginning of its time: a warm start takes two."""
+START_TIME = 5.0
+"""Seconds from the start of the nodes of a realtime run to the beginning of its time: a warm start takes two, more on a
+busy machine. Who comes later has lost steps, no more."""
 
 
 @dataclasses.dataclass
