@@ -108,6 +108,13 @@ def hosts():
 CUTS = (0.05, 1.0, 10.0)
 """Seconds."""
 
+TIMEOUT = 60
+"""Periods until a command is stale: a busy machine may hold the control unit up for longer than the 10 of the
+default."""
+
+DECELERATION = 0.5
+"""[rad/s2] of a drive whose commands are stale."""
+
 FOLLOWED = 8.0
 """Seconds from one cut to the next, in which the target is found again."""
 
@@ -117,7 +124,9 @@ def cut(hosts, tmp_path_factory, reserve_domain):
     """(Bag of a pass recorded on the near host while the control unit ran on the far one, [(begin, end)] of the CUTS
     [s of the run])."""
     folder, domain = tmp_path_factory.mktemp('hosts'), {'ROS_DOMAIN_ID': str(reserve_domain())}
-    chosen = scenario.load('leo_pass', pacing='realtime')
+    chosen = scenario.load('leo_pass', pacing='realtime', overrides=[
+        f'adu.command_timeout={TIMEOUT}', f'adu.azimuth.limits.deceleration={DECELERATION}',
+        f'adu.elevation.limits.deceleration={DECELERATION}'])
     supervisor.prepare(chosen)
     start, bag, file = graph.begins(chosen), folder / 'bag', folder / 'parameters.yaml'
     file.write_text(graph.parameter_file(chosen, bag, start))
@@ -127,15 +136,18 @@ def cut(hosts, tmp_path_factory, reserve_domain):
                            **domain)
                for node in chosen.nodes if node != 'operator']
 
+    def said():
+        return '\n'.join(log.read_text() for log in folder.glob('[a-z]*.log') if log.is_file())
+
     def wait_until(condition):
         deadline = time.monotonic() + 120.0
         while not condition():
-            assert time.monotonic() < deadline and not any(process.poll() for process in started), ''.join(
-                log.read_text() for log in folder.glob('*.log'))
+            assert time.monotonic() < deadline and not any(process.poll() for process in started), said()
             time.sleep(0.1)
     wait_until(lambda: 'runs' in (folder / 'acu.log').read_text())
     hosts.start('far', [sys.executable, '-m', 'pedestal_bringup.cli', 'program', 'leo_pass'], folder / 'program.log',
                 **domain)
+    wait_until(lambda: 'sent' in (folder / 'program.log').read_text())
     time.sleep(FOLLOWED)
     times = []
     for seconds in CUTS:
@@ -143,8 +155,7 @@ def cut(hosts, tmp_path_factory, reserve_domain):
         time.sleep(FOLLOWED)
     for process in started:
         process.terminate()
-    assert [process.wait(30.0) for process in started] == [0] * len(started), ''.join(
-        log.read_text() for log in folder.glob('*.log'))
+    assert [process.wait(30.0) for process in started] == [0] * len(started), said()
     return bags.read(bag), times
 
 
@@ -153,11 +164,11 @@ def test_a_cut_stops_the_axes_until_it_is_over(cut):
     joints, modes = bag.table('joint_states'), bag.table('acu/mode')
     rate = np.hypot(joints['azimuth.velocity'], joints['elevation.velocity'])
 
-    def during(begin, end):
-        return rate[(joints['t'] > begin) & (joints['t'] < end)]
+    def fastest(begin, end):
+        return rate[(joints['t'] > begin) & (joints['t'] < end)].max(initial=0.0)
     for begin, end in times:
-        assert during(begin - 0.5, begin).min() > 2e-3
-        assert during(end + FOLLOWED - 1.0, end + FOLLOWED).min() > 2e-3
-        if end - begin > 0.5:
-            assert during(begin + 0.5, end).max() < 1e-3
-    assert modes['data'][-1] == 'autotrack'
+        stopped = begin + TIMEOUT * 0.005 + fastest(begin - 1.0, begin + 1.0) / DECELERATION + 0.3
+        assert fastest(begin - FOLLOWED, begin) > 2e-3
+        assert fastest(stopped, end) < 1e-3
+        assert fastest(end, end + FOLLOWED) > 2e-3
+        assert modes['data'][np.searchsorted(modes['t'], end + FOLLOWED) - 1] in ('program', 'autotrack')

@@ -143,6 +143,7 @@ def send_program(scenario, start=None) -> int:
         for track in tracks.values():
             messages.put_stamp(track.header.stamp, start)
         operator.send(tracks)
+        print(f'{", ".join(tracks) or "nothing to be"} sent; kept for who comes later until Ctrl-C', flush=True)
         while True:
             executor.spin_once(timeout_sec=0.2)
     except KeyboardInterrupt:
