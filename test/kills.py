@@ -218,9 +218,11 @@ def lockstep(kills, seed, folder, victims=NODES):
         if not named:
             print(f'{log}: {node}: exit code {process.returncode}: {said}', flush=True)
         counts['orphans'] += len(orphans(log))
-        with contextlib.suppress(bags.BagError):
-            bags.load(bag)
-            counts['bags that can be read'] += 1
+        if any(file.stat().st_size for file in bag.glob('*.mcap')):
+            counts['bags'] += 1
+            with contextlib.suppress(bags.BagError):
+                bags.load(bag)
+                counts['bags that can be read'] += 1
     return counts, {}
 
 

@@ -69,11 +69,17 @@ def test_a_node_that_always_dies_is_given_up(start_run):
     assert run.pids() == {}
 
 
+FULL = """mount -t tmpfs -o size=4m tmpfs "$0" || exit
+(until [ -s "$0/bag/bag_0.mcap" ]; do sleep 0.1; done; cat /dev/zero > "$0/filler") 2> /dev/null &
+exec "$@"
+"""
+"""A disk of its own for a run, which is full to the last byte as soon as something is recorded."""
+
+
 def test_the_cause_of_an_end_is_kept_on_a_full_disk(start_run, tmp_path):
-    """A log has its room in advance: the disk is full because of the recording."""
-    small = ('unshare', '--mount', 'sh', '-c', 'mount -t tmpfs -o size=2m tmpfs "$0" && exec "$@"', tmp_path)
-    if subprocess.run([*small, 'true'], capture_output=True, timeout=30).returncode != 0:
+    alone = ('unshare', '--mount', 'sh', '-c', FULL, tmp_path)
+    if subprocess.run([*alone[:4], 'mount -t tmpfs tmpfs "$0"', tmp_path], capture_output=True).returncode != 0:
         pytest.skip('this machine mounts nothing')
-    result = start_run('leo_pass', bag=tmp_path / 'bag', prefix=small).finish()
+    result = start_run('leo_pass', bag=tmp_path / 'bag', prefix=alone).finish()
     assert result.returncode == 1
     assert re.search(r'^  \| recorder: error: .*bag_0.mcap: No space left on device$', result.stderr, re.MULTILINE)
