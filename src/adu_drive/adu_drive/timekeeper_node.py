@@ -80,6 +80,7 @@ class Timekeeper(unit_node.UnitNode):
             self.await_acknowledged()
         for port in self.ports:
             port.publish()
+        self.look_after()
 
     def tick(self):
         """Realtime: make the step whose time it is, if it was not made, and wait for the next."""

@@ -194,6 +194,12 @@ class Adu(Unit):
             return Diagnosis(WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values)
         return Diagnosis(OK, 'following', values)
 
+    @property
+    def alarm(self):
+        outputs, link = self.parts['outputs'], self.parts['link']
+        return bool(outputs['emergency'] or link['stale'] or link['invalid']
+                    or outputs['azimuth']['faults'] | outputs['elevation']['faults'])
+
     @staticmethod
     def idle(numbers):
         return '' if (numbers[COMMAND][:, 2:4] != 0.0).any() else 'the drive was never told to move'

@@ -26,7 +26,7 @@ from pedestal_common.compiled import compiled_once
 from pedestal_common.listening import Listener
 from pedestal_common.nodes import MAX_BEAMS
 from pedestal_common.steps import SECOND, GraphError
-from pedestal_common.unit import WARN, Diagnosis
+from pedestal_common.unit import OK, WARN, Diagnosis
 
 START_DEADLINE = 300.0
 """Seconds a node waits for its graph: the others may be compiling their laws for the first time."""
@@ -65,6 +65,8 @@ class GraphParameters(parameters.Parameters):
                                       '0; 0: the day begins')
     future: float = parameters.parameter(0.05, 1e-3, 10.0, 's', 'realtime: a stamp further ahead of the time of this '
                                          'node is refused')
+    silence: float = parameters.parameter(0.2, 0.02, 60.0, 's', 'realtime: a node without its first input for this '
+                                          'long says so')
 
     def check(self):
         for name in self._names:
@@ -310,7 +312,7 @@ class Shell(Node):
 
     def _with_findings(self, diagnosis, now):
         """A Diagnosis with what the shell of a realtime node has found, the worst first."""
-        findings = [diagnosis[:2], *filter(None, (listener.finding(now) for listener in self._listeners))]
+        findings = [*filter(None, (listener.finding(now) for listener in self._listeners))]
         if self._away > AWAY:
             findings.append((WARN, f'was held up for {self._away * 1e-9:.1f} s'))
         steps, since = self._steps_told
@@ -321,10 +323,12 @@ class Shell(Node):
         if self._utc.ahead > self.graph.future * SECOND:
             findings.append((WARN, f'goes on {self._utc.ahead * 1e-9:.3f} s ahead of UTC, whose clock was '
                              'set back: nodes that start now refuse its stamps until it is started again'))
-        level = max(level for level, _ in findings)
+        if diagnosis.level != OK or not findings:
+            findings.insert(0, diagnosis[:2])
+        findings.sort(key=lambda finding: -finding[0])
         values = [*diagnosis.values, ('deadline_s', f'{SILENT:g}'), ('clock_steps', str(self._utc.steps)),
                   *(value for listener in self._listeners for value in listener.values())]
-        return Diagnosis(level, '; '.join(text for at, text in findings if at == level), values)
+        return Diagnosis(findings[0][0], '; '.join(text for _, text in findings), values)
 
     def begin_step(self, stamp):
         """To be called with t_k [ns] before anything of step k is published. In lockstep the first call waits for the

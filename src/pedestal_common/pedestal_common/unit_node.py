@@ -85,6 +85,10 @@ class UnitNode(shell.Shell):
         self.steps = None
         self.refused = ''
         self._waiting_for_once, self._held = set(), None
+        self._alarming = False
+        self._clients = {} if self.graph.lockstep else {
+            name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
+        self._called = set()
         for port in self.ports:
             self._listen(port)
         for name in unit_type.REQUESTS:
@@ -145,6 +149,9 @@ class UnitNode(shell.Shell):
         self._progress = (None, time.monotonic())
         if self.graph.lockstep:
             self.every(0.2, self._watch)
+        else:
+            self._answered = self._watched = self._begun = time.monotonic_ns()
+            self.every(0.05, self._watch_trigger)
 
     def _step_taker(self, name):
         steps = self.steps
@@ -173,6 +180,33 @@ class UnitNode(shell.Shell):
         self.begin_step(stamp)
         for port in self.ports:
             port.publish()
+        self.look_after()
+
+    def look_after(self):
+        """Realtime, after a step: tell what has become wrong, call for what a unit wants of others."""
+        if self.graph.lockstep:
+            return
+        alarming = any([port.unit.alarm for port in self.ports])
+        if alarming and not self._alarming:
+            self.alarm()
+        self._alarming = alarming
+        self._answered = time.monotonic_ns()
+        if self._clients:
+            calls = {name for port in self.ports for name in port.unit.calls}
+            for name in calls - self._called:
+                self._clients[name].call_async(Trigger.Request())
+            self._called = calls
+
+    def _watch_trigger(self):
+        """Realtime: whether the trigger stays away; unless it was this node that was held up."""
+        now, limit = time.monotonic_ns(), self.graph.silence * SECOND
+        held_up, self._watched = now - self._watched > limit, now
+        silent = now - self._answered > limit and not held_up
+        if silent != self.unit.silent:
+            for port in self.ports:
+                port.unit.silent = silent
+            if silent:
+                self.alarm()
 
     def _watch(self):
         pending = self.steps.pending_stamp
@@ -203,8 +237,14 @@ class UnitNode(shell.Shell):
         return self.unit.diagnose()
 
     def diagnose(self):
-        """A refused input comes before anything but an error of the unit."""
+        """A silent trigger and a refused input come before anything but an error of the unit."""
         diagnosis = self.diagnosed()
+        if self.unit.silent:
+            since = (time.monotonic_ns() - self._answered) * 1e-9
+            text = (f'no {self.steps.trigger} so far' if self._answered == self._begun else
+                    f'no {self.steps.trigger} for {since:.1f} s')
+            told = f'{text}; {diagnosis.message}' if diagnosis.level == ERROR else text
+            return diagnosis._replace(level=ERROR, message=told)
         refusal = self.refused or (self.steps.refusal if self.steps else '')
         if refusal and diagnosis.level < ERROR:
             return diagnosis._replace(level=WARN, message=refusal)
