@@ -38,13 +38,15 @@ def main(options):
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     of_beams = [results.measured(results.of_bag(recording.view(beam))) for beam in beams]
     whole = results.measured({'run': outcome})
-    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams, whole)
+    lost, steps = whole['lost_steps'][0], outcome.drive['steps']
+    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
+                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost else '')})
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                       'mcap_sha256': outcome.recorder['sha256']})
     check = verify(bag)
-    if not check.complete:
+    if not check.finished:
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     return 0
