@@ -287,6 +287,9 @@ def _earlier_files(directory, metadata):
     files = locate(path)
     if not files[-1].stat().st_size:  # its recorder died before the first byte
         files.pop().unlink()
+        if not files:
+            path.rmdir()
+            return []
     McapFile(files[-1])
     told = _Content(files[0]).metadata.get('pedestal', {})
     if any(told.get(key) != str(metadata[key]) for key in RUN if key in metadata):
