@@ -11,7 +11,7 @@ from pedestal_bringup.bags import bag
 from pedestal_bringup.bags.recover import recover
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.bags.writer import Writer
-from pedestal_common import plain_yaml
+from pedestal_common import messages, plain_yaml
 
 _spec = importlib.util.spec_from_file_location('killed_writer', pathlib.Path(__file__).with_name('killed_writer.py'))
 killed_writer = importlib.util.module_from_spec(_spec)
@@ -146,3 +146,20 @@ def test_a_run_that_came_to_its_end_is_finished(rows, tmp_path, capsys):
     assert verify(tmp_path / 'run').finished
     assert cli.main(['verify', str(tmp_path / 'run')]) == 0
     assert 'abort' not in capsys.readouterr().out
+
+
+def test_steps_that_the_drive_lost_are_said(tmp_path):
+    def diagnostics(node, **values):
+        return messages.serialize(messages.DiagnosticArray(header=messages.header(''), status=[
+            messages.DiagnosticStatus(level=0, name=node, message='', hardware_id='', values=[
+                messages.KeyValue(key=key, value=value) for key, value in values.items()])]))
+    writer = Writer(tmp_path / 'run', RECORDED, METADATA)
+    for k in range(101):
+        message = messages.template('joint_states')
+        messages.put_stamp(message.header.stamp, k * 5_000_000)
+        writer.write(NAMES.index('joint_states'), k * 5_000_000, 0, messages.serialize(message))
+    for values in ({'lost_steps': '7'}, {'lost_steps': '53', 'step': '100'}):
+        writer.write(NAMES.index('diagnostics'), 500_000_000, 0, diagnostics('adu', **values))
+    writer.write(NAMES.index('diagnostics'), 500_000_000, 0, diagnostics('acu', lost_steps='9'))
+    writer.close()
+    assert 'lost steps: 53 of 101, made by the drive without the command for them' in verify(tmp_path / 'run').lines()

@@ -25,8 +25,9 @@ def test_keys_are_texts():
     ('a: &x 1\nb: *x', r'alias \*x: must be written out'), ('a: !!int 5', 'tag tag:yaml.org,2002:int'),
     ('a: 1\na: 2', "'a' is said twice"), ('? [1]\n: 2', 'a key must be a text'),
     ('[' * 100_000, 'sections in sections'), ('- ' * 100_000, 'sections in sections'),
-    ('a: ' + '9' * 20, 'more than 64 bits'), ('a: ' + '9' * 5000, 'more than 64 bits'), ('a: 9223372036854775808', 'more than 64 bits'), ('a: [', 'a'),
-    ('--- 1\n--- 2', 'document'), ('a: \0', 'character')])
+    ('a: ' + '9' * 20, 'more than 64 bits'), ('a: ' + '9' * 5000, 'more than 64 bits'),
+    ('a: 9223372036854775808', 'more than 64 bits'), ('a: [', 'a'), ('--- 1\n--- 2', 'document'),
+    ('a: \0', 'character')])
 def test_what_hides_or_grows_is_refused(text, problem):
     with pytest.raises(yaml.YAMLError, match=problem) as error:
         plain_yaml.parse(text)
