@@ -3,6 +3,7 @@ import importlib.util
 import itertools
 import os
 import pathlib
+import struct
 
 import pytest
 
@@ -163,3 +164,20 @@ def test_steps_that_the_drive_lost_are_said(tmp_path):
     writer.write(NAMES.index('diagnostics'), 500_000_000, 0, diagnostics('acu', lost_steps='9'))
     writer.close()
     assert 'lost steps: 53 of 101, made by the drive without the command for them' in verify(tmp_path / 'run').lines()
+
+
+def test_times_are_those_of_the_scenario(rows, tmp_path):
+    """In realtime stamps are UTC, and the bag says where the time of the scenario is 0 in them."""
+    start = 1_790_000_000 * SECOND
+    writer = Writer(tmp_path / 'run', RECORDED, {**METADATA, 'start': start})
+    for index, stamp, data in rows:
+        if stamp < 2 * SECOND and RECORDED[index].rate == 'step':
+            data = data[:4] + struct.pack('<iI', *divmod(start + stamp, SECOND)) + data[12:]
+            writer.write(index, start + stamp, start + stamp, data)
+    writer.close()
+    content, report = bag.read(tmp_path / 'run'), verify(tmp_path / 'run')
+    assert (content.start, content.planned_end) == (start, start + 4 * SECOND)
+    assert content.table('joint_states')['t'][-1] == 1.995
+    assert report.ending == 'aborted: ends at 1.995000 s, planned end 4.000000 s'
+    assert {check.last for check in report.topics if check.name == 'clock'} == {1.995}
+    assert 'ends after 1.995000 s, the run was to go on to 4.000000 s' in recover(tmp_path / 'run').lines()[0]

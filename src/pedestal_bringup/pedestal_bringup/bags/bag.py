@@ -21,6 +21,9 @@ CACHE = 64_000_000
 LOOKED_AT = 100
 """Diagnostics at the end of a bag among which the last of a node is looked for."""
 
+CHANNELS = 2000
+"""Channels of a file at the most."""
+
 BLOCK = 65_536
 """Rows of the index that are made at once."""
 
@@ -86,14 +89,23 @@ def locate(path) -> list:
     return sorted(found, key=lambda file: int(numbered[file][2]))
 
 
+def start(metadata_records) -> int:
+    """Where the time of the scenario is 0 in the stamps [ns] of a bag, by its metadata records: UTC in realtime."""
+    return _nanoseconds(metadata_records.get('pedestal', {}).get('start')) or 0
+
+
 def planned_end(metadata_records):
     """When a run was to end, a stamp [ns], by the metadata records of its bag; None where they do not say."""
-    told = metadata_records.get('pedestal', {}).get('planned_end_ns')
+    told = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
     if told is None:  # made before bags said so
         with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError, yaml.YAMLError):
-            duration = plain_yaml.parse(metadata_records['parameters']['recorder'])['duration']
-            told = str(round(duration * 1e9)) if duration else None
-    return int(told) if told and told.isdecimal() and len(told) < 20 else None
+            told = round(plain_yaml.parse(metadata_records['parameters']['recorder'])['duration'] * 1e9) or None
+    return None if told is None else start(metadata_records) + told
+
+
+def _nanoseconds(text):
+    """The time in a text of a bag's metadata, None where it is none."""
+    return int(text) if text and text.isdecimal() and len(text) < 20 else None
 
 
 def foreign_encoding(file, channel):
@@ -202,6 +214,8 @@ class Bag:
             name = record.topic.lstrip('/')
             if not name.isprintable() or not name:
                 raise ValueError(f'a topic of the name {record.topic!r}')
+            if len(self._channels) >= CHANNELS * len(self.files):
+                raise ValueError(f'more than {CHANNELS} channels')
             self._channels[base | record.id] = name
             self.topics[name] = self._schemas[base | record.schema_id]
             if self.topics[name] in STAMPED:
@@ -239,6 +253,11 @@ class Bag:
         if not (told.isdecimal() and max(several, int(told[:9])) <= nodes.MAX_BEAMS):
             raise BagError(f'{self.file}: beams = {told}: must be 0 to {nodes.MAX_BEAMS}')
         return several or int(told)
+
+    @property
+    def start(self):
+        """Where the time of the scenario is 0 in the stamps [ns]: UTC in realtime, else 0."""
+        return start(self.metadata_records)
 
     @property
     def planned_end(self):
@@ -348,6 +367,7 @@ class Bag:
         """
         rows = self.rows(topic)
         try:
-            return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log)
+            return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log,
+                                 self.start)
         except ValueError as error:
             raise BagError(f'{self.path}: {topic}: {error}') from None

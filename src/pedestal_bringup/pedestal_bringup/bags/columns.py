@@ -26,10 +26,10 @@ def stamps(data, type_name, log):
     return pairs[:, 0].astype(np.int32).astype(np.int64) * 1_000_000_000 + pairs[:, 1]
 
 
-def table(data, type_name, log):
+def table(data, type_name, log, start=0):
     """The columns of CDR messages of one type, log times [ns] given.
 
-    `t` [s] is the header stamp, or the log time of a type without one. Then one float array per number:
+    `t` [s] is the header stamp, or the log time of a type without one, after start [ns]. Then one array per number:
     JointState     azimuth.position, azimuth.velocity, azimuth.effort, elevation.position, ...
     JointTrajectory  the first point: azimuth.position, azimuth.velocity, azimuth.acceleration, ...
     Vector3Stamped x, y, z
@@ -39,7 +39,7 @@ def table(data, type_name, log):
     others         the path of the field. Covariances and header are left out; a DiagnosticArray has `t` only.
     A number that a message lacks is NaN in its row. Raises ValueError when bytes are no such message.
     """
-    out = {'t': stamps(data, type_name, log) / 1e9}
+    out = {'t': (stamps(data, type_name, log) - start) / 1e9}
     if type_name == 'std_msgs/msg/String':
         out['data'] = [cdr.Places(message, type_name).texts['data'] for message in data]
     elif type_name not in ('diagnostic_msgs/msg/DiagnosticArray', 'rosgraph_msgs/msg/Clock'):

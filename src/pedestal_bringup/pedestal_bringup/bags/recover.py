@@ -42,11 +42,11 @@ class Gap:
     after: int | None = None
     file: str = ''
 
-    def line(self):
-        """The gap as text."""
+    def line(self, start=0):
+        """The gap as text, in time after start [ns]."""
         return (f'bytes {self.start} to {self.stop}{self.file and f" of {self.file}"} unused ({self.why})'
-                + (f', after {self.before / 1e9:.6f} s' if self.before is not None else '')
-                + (f', before {self.after / 1e9:.6f} s' if self.after is not None else ''))
+                + (f', after {(self.before - start) / 1e9:.6f} s' if self.before is not None else '')
+                + (f', before {(self.after - start) / 1e9:.6f} s' if self.after is not None else ''))
 
 
 @dataclasses.dataclass
@@ -54,8 +54,8 @@ class Recovered:
     """What was recovered into the bag at `path`, and what is missing.
 
     counts: {topic: messages}; first, last: log times [ns]; ended: whether the recorder came to its end;
-    planned_end: of the run [ns], None when the bag does not say; gaps: [Gap]; lost: {topic: messages missing between
-    those that are there, by the recorder's sequence numbers}.
+    planned_end: of the run [ns], None when the bag does not say; start: of the scenario's time [ns]; gaps: [Gap];
+    lost: {topic: messages missing between those that are there, by the recorder's sequence numbers}.
     """
     path: pathlib.Path
     counts: dict
@@ -63,6 +63,7 @@ class Recovered:
     last: int
     ended: bool
     planned_end: int | None
+    start: int
     gaps: list
     lost: dict
 
@@ -73,7 +74,8 @@ class Recovered:
 
     def lines(self):
         """The report as text: the gaps, what is lost by them and at the end, the new bag last."""
-        lines = [gap.line() for gap in self.gaps]
+        lines = [gap.line(self.start) for gap in self.gaps]
+        first, last = self.first - self.start, self.last - self.start
         if self.lost:
             steps = max((count for name, count in self.lost.items()
                          if nodes.plain(name) in topics.BY_NAME
@@ -82,12 +84,13 @@ class Recovered:
                          + ', '.join(f'{count} of {name}' for name, count in self.lost.items()))
         planned = self.planned_end is not None and self.last < self.planned_end
         if planned or not self.ended:
-            lines.append(f'the recording {"ends" if self.ended else "breaks off"} after {self.last / 1e9:.6f} s'
-                         + (f', the run was to go on to {self.planned_end / 1e9:.6f} s' if planned else ''))
+            lines.append(f'the recording {"ends" if self.ended else "breaks off"} after {last / 1e9:.6f} s'
+                         + (f', the run was to go on to {(self.planned_end - self.start) / 1e9:.6f} s'
+                            if planned else ''))
         total = sum(self.counts.values())
         return [*(lines or ['nothing is missing']),
-                f'{self.path}: {total} messages, {len(self.counts)} topics, {self.first / 1e9:.6f} to '
-                f'{self.last / 1e9:.6f} s; {self.unused} bytes unused']
+                f'{self.path}: {total} messages, {len(self.counts)} topics, {first / 1e9:.6f} to '
+                f'{last / 1e9:.6f} s; {self.unused} bytes unused']
 
 
 def recover(path, output=None) -> Recovered:
@@ -326,4 +329,4 @@ class _Salvage:
         ours = 'pacing' in self._metadata.get('pedestal', {})
         lost = {self._names[channel]: count for channel, count in self._lost.items() if ours and count > 0}
         return Recovered(self._bag.path, self._counts, self._first, self._last, self._ended,
-                         bags.planned_end(self._metadata), self._gaps, lost)
+                         bags.planned_end(self._metadata), bags.start(self._metadata), self._gaps, lost)

@@ -33,8 +33,8 @@ class TopicCheck:
 @dataclasses.dataclass
 class Report:
     """What verify found. topics: [TopicCheck]; problems: of the whole bag, texts; steps: how many the run has; period
-    [s], NaN when there are fewer than two; made: how the bag was made, a line; end, planned_end: stamp [ns] of the
-    last step, and of the one the run was to go on to, None when the bag does not say; lost: steps that the drive made
+    [s], NaN when there are fewer than two; made: how the bag was made, a line; end, planned_end: time [ns] of the last
+    step, and of the one the run was to go on to, None when the bag does not say; lost: steps that the drive made
     without the command for them, as its last diagnostics say, None without one."""
     path: str
     topics: list
@@ -116,13 +116,14 @@ def verify(path) -> Report:
     """
     bag = bags.load(path)
     rows = {name: bag.rows(name) for name in bag.topics}
-    graph = bag.graph
-    of_steps = {name: row.stamp for name, row in rows.items()
-                if name in graph and graph[name].rate == 'step' and row.size}
+    stamps = {name: row.stamp - bag.start for name, row in rows.items()}
+    graph, planned = bag.graph, bag.planned_end
+    of_steps = {name: stamp for name, stamp in stamps.items()
+                if name in graph and graph[name].rate == 'step' and stamp.size}
     grid = _grid(of_steps)
-    checks = [TopicCheck(name, row.size, row.stamp[0] / 1e9 if row.size else np.nan,
-                         row.stamp[-1] / 1e9 if row.size else np.nan, _problems(bag, row, name, grid))
-              for name, row in rows.items()]
+    checks = [TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,
+                         stamp[-1] / 1e9 if stamp.size else np.nan, _problems(bag, rows[name], name, stamp, grid))
+              for name, stamp in stamps.items()]
     problems = [bag.damage] if bag.damage else []
     if not of_steps:
         problems.append("no topic of the drive's steps has a message")
@@ -132,20 +133,21 @@ def verify(path) -> Report:
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
     lost = bag.last_values(nodes.DRIVE).get('lost_steps', '')
+    planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(path), checks, bag.breaks + problems, grid.steps, grid.period / 1e9 if grid.period else np.nan,
-                  configuration.line(bag), grid.last, bag.planned_end if of_steps else None,
+                  configuration.line(bag), grid.last, planned,
                   int(lost) if lost.isdecimal() and len(lost) < 20 else None)
 
 
-def _problems(bag, rows, name, grid):
-    """What is wrong with a topic, its rows of the index (n,) given."""
-    topic, ours, stamp = bag.graph.get(name), 'pacing' in bag.metadata, rows.stamp
+def _problems(bag, rows, name, stamp, grid):
+    """What is wrong with a topic, its rows of the index (n,) and its stamps (n,) [ns] since the start given."""
+    topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
     rate = topic.rate if topic else ''
     problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
-        if ours and not np.array_equal(stamp, rows.log):
-            problems.append(f'{np.sum(stamp != rows.log)} messages logged at a time that is not their stamp')
+        if ours and not np.array_equal(rows.stamp, rows.log):
+            problems.append(f'{np.sum(rows.stamp != rows.log)} messages logged at a time that is not their stamp')
     elif rate == 'once' and not 1 <= stamp.size <= len(bag.files):  # each recorder hears what is latched
         problems.append(f'{stamp.size} messages where one is due')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
