@@ -21,8 +21,8 @@ from pedestal_common import messages, middleware, nodes
 from pedestal_common.steps import SECOND
 
 START_TIME = 5.0
-"""Seconds from the start of the nodes of a realtime run to the beginning of its time: a warm start takes two, more on a
-busy machine. Who comes later has lost steps, no more."""
+"""Seconds from the start of the nodes of a realtime run to the beginning of its time: a warm start takes two of them.
+Who comes later has lost steps, no more."""
 
 
 @dataclasses.dataclass

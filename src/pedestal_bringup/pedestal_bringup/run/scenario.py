@@ -10,12 +10,11 @@ import difflib
 import importlib.resources
 import json
 import pathlib
-import re
 
 import numpy as np
 import yaml
 
-from pedestal_common import nodes, parameters, topics
+from pedestal_common import files, nodes, parameters, plain_yaml, topics
 from tracking_receiver_sim import receiver
 
 
@@ -63,18 +62,6 @@ class ScenarioParameters(parameters.Parameters):
     def graph_beams(self):
         """Beams of the graph as nodes.links counts them."""
         return self.beams if self.beam else 0
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML's plain values, but a date and `on`, `off`, `yes`, `no` stay the texts they were written as."""
-
-
-_Loader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers
-            if tag not in ('tag:yaml.org,2002:timestamp', 'tag:yaml.org,2002:bool')]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
-_Loader.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^(?:true|True|TRUE|false|False|FALSE)$'),
-                              list('tTfF'))
 
 
 RUN = tuple(node.name for node in nodes.NODES if node.module)
@@ -164,7 +151,7 @@ def available():
     found = {}
     for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
         if entry.name.endswith('.yaml'):
-            sections = yaml.safe_load(entry.read_text())
+            sections = plain_yaml.parse(entry.read_text())
             found[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
     return found
 
@@ -173,11 +160,9 @@ def _text(name_or_path):
     path = pathlib.Path(name_or_path)
     if path.suffix in ('.yaml', '.yml'):
         try:
-            return path.stem, path.read_text()
-        except OSError as error:
-            raise ScenarioError(f'scenario file {path}: {error.strerror}') from None
-        except UnicodeDecodeError as error:
-            raise ScenarioError(f'scenario file {path}: no valid UTF-8 text at byte {error.start}') from None
+            return path.stem, files.read_text(path, plain_yaml.LARGEST)
+        except (OSError, UnicodeDecodeError) as error:
+            raise ScenarioError(f'scenario file {path}: {plain_yaml.problem(error)}') from None
     entry = _folder() / f'{name_or_path}.yaml'
     if not entry.is_file():
         names = list(available())
@@ -209,9 +194,9 @@ def _is_node(name):
 
 def _sections(name, content):
     try:
-        tree = yaml.load(content, Loader=_Loader)
+        tree = plain_yaml.parse(content)
     except yaml.YAMLError as error:
-        raise ScenarioError(f'scenario {name}: no valid YAML: {" ".join(str(error).split())}') from None
+        raise ScenarioError(f'scenario {name}: {plain_yaml.problem(error)}') from None
     if not isinstance(tree, dict) or 'scenario' not in tree:
         raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
     sections = {}
@@ -244,24 +229,25 @@ def parse_override(text):
         raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.feedforward.bandwidth=20')
     parameters_of(node)
     try:
-        return node, key, yaml.load(right, Loader=_Loader)
+        return node, key, plain_yaml.parse(right)
     except yaml.YAMLError as error:
-        raise ScenarioError(f'--param {text!r}: no valid YAML value: {" ".join(str(error).split())}') from None
+        raise ScenarioError(f'--param {text!r}: {plain_yaml.problem(error)}') from None
 
 
 def file_overrides(path):
     """Texts 'node.key=value' of a ROS 2 parameter file."""
     try:
-        tree = yaml.load(path.read_text(), Loader=_Loader)
+        tree = plain_yaml.read(path)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ScenarioError(f'--params-file {path}: {" ".join(str(error).split())}') from None
+        raise ScenarioError(f'--params-file {path}: {plain_yaml.problem(error)}') from None
     if not isinstance(tree, dict) or not tree:
         raise ScenarioError(f'--params-file {path}: must hold a section for a node')
     texts = []
     for node, body in tree.items():
         if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
             raise ScenarioError(f'--params-file {path}: section {node} must hold ros__parameters')
-        texts += [f'{node}.{key}={json.dumps(value)}' for key, value in dotted(body['ros__parameters']).items()]
+        texts += [f'{node}.{key}={json.dumps(value, ensure_ascii=False)}'
+                  for key, value in dotted(body['ros__parameters']).items()]
     return texts
 
 

@@ -39,7 +39,9 @@ def main(options):
     of_beams = [results.measured(results.of_bag(recording.view(beam))) for beam in beams]
     realtime = chosen.header.pacing == 'realtime'
     whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
-    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams, whole)
+    lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
+    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
+                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else '')})
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
@@ -48,6 +50,6 @@ def main(options):
     if outcome.stopped:
         return console.EXIT_STOPPED
     check = verify(bag)
-    if not check.complete:
+    if not check.finished:
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     return 0

@@ -1,8 +1,8 @@
 """Metrics of steps and sines. Angles [rad], times [s], arrays (n,) on one even grid of time.
 
-Not by libraries, which give other numbers: control.step_info takes a settling time from the grid instead of between its
-points; scipy.optimize.curve_fit gives amplitude and period of a sine that differ by 7e-13 from those of the published
-rows.
+Not by libraries, which give other numbers: control.step_info takes a settling time from the grid instead of between
+its points; scipy.optimize.curve_fit gives amplitude and period of a sine that differ by 7e-13 from those of the
+published rows.
 """
 import math
 
