@@ -1,4 +1,7 @@
 """ROS node of the antenna control unit: answers every receiver error with a rate command; modes by service."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import sys
 
 from pedestal_common import unit_node

@@ -16,7 +16,7 @@ from acu_tracker.geometry.vector import vector
 from acu_tracker.lookahead import levelled_deck, planner
 from acu_tracker.params import AxisParameters, SharedParameters
 from acu_tracker.program import bridge, program_track
-from acu_tracker.servo import notch, position_loop
+from acu_tracker.servo import notch, position_loop, unasked
 from acu_tracker.servo.position_loop import Feedback, Instants
 from pedestal_common import blockage, line_of_sight
 from pedestal_common.compiled import compiled
@@ -30,6 +30,9 @@ INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'at
 
 ON_TARGET = 0.5
 """Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""
+
+DRIVE_RESTART = 0.3
+"""Silence [s] in which a drive may have been started again: a mode that it then ends for a while is resumed."""
 
 INPUTS = np.dtype([
     ('stamp', 'f8'),                                                            # t_k [s]
@@ -64,6 +67,8 @@ OUTPUTS = np.dtype([
 
 STATE = np.dtype([
     ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'),
+    ('kept', 'i8'), ('kept_until', 'f8'),          # mode before a silence, stamp until which it is resumed [s]
+    ('unasked', unasked.ENVELOPE),
     ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('aligning', 'i8'),
     ('target', target.TARGET), ('error', 'f8', (2,)),                           # of this step, azimuth, elevation
     ('preset', 'f8', (2,)),
@@ -103,8 +108,9 @@ def constants(params) -> np.ndarray:
 def initial_state(params) -> np.ndarray:
     """State (1,) before the first step of AcuParameters: standby, the initial mode pending."""
     s = np.zeros(1, STATE)
-    s['stamp'] = s['outage'] = -math.inf
+    s['stamp'] = s['outage'] = s['kept_until'] = -math.inf
     s['pending'] = modes.MODES.index(params.initial_mode)
+    s['unasked']['since'] = -math.inf
     s['preset'] = params.azimuth.preset, params.elevation.preset
     target.initialise(s['target'])
     planner.initialise(s['lookahead'])
@@ -249,7 +255,8 @@ def _situation(s, c, drive_ready, program, t_m, request):
 @compiled
 def _change_mode(s, c, o, drive_ready, program, request):
     """Run the mode machine at s.stamp with a `request` or NO_REQUEST: (result, flags of the program)."""
-    now, flags = _situation(s, c, drive_ready, program, s.stamp + c.lead, request)
+    obeyed = drive_ready != 0 and s.unasked.moves == 0
+    now, flags = _situation(s, c, obeyed, program, s.stamp + c.lead, request)
     o.locked = now.obstacle[modes.AUTOTRACK] == modes.NONE
     mode, reason, result = modes.next_mode(s.mode, request, now, c.p.tracker.handover)
     if result == modes.ACCEPTED:
@@ -257,12 +264,33 @@ def _change_mode(s, c, o, drive_ready, program, request):
         if mode == modes.PROGRAM:
             s.target.tracker.accepted_in_a_row = 0
     if reason != modes.NONE:
-        s.reason = reason
+        s.reason = modes.MOVES_UNASKED if reason == modes.DRIVE_NOT_READY and s.unasked.moves else reason
     if s.mode == modes.AUTOTRACK and now.end[modes.AUTOTRACK] != modes.NONE:
         s.target.tracker.running = 0
     if mode != s.mode:
         s.mode, s.entered = mode, 1
     return result, flags
+
+
+@compiled
+def _bridge_silence(s, c, stamp):
+    """After a silence the axes stand. The mode goes on, from where they are, if it was short enough."""
+    if s.mode != modes.STANDBY:
+        until = s.stamp + c.p.resume_time
+        if stamp > until:
+            s.mode, s.reason = modes.STANDBY, modes.SILENCE
+        elif stamp - s.stamp > DRIVE_RESTART:
+            s.kept, s.kept_until = s.mode, until
+    unasked.restart(s.unasked, stamp)
+
+
+@compiled
+def _resume(s, o):
+    """A drive that was started again is not ready at first: the mode of before is pending, as the initial one was."""
+    if s.stamp > s.kept_until:
+        s.kept_until, s.pending = -math.inf, modes.NO_REQUEST
+    elif s.mode == modes.STANDBY and s.reason == modes.DRIVE_NOT_READY:
+        s.pending = modes.PROGRAM if s.kept == modes.AUTOTRACK and not o.locked else s.kept
 
 
 @compiled
@@ -450,17 +478,27 @@ def step(s, c, u, o, program):
         return
     clear(o)
     jumped = dt > c.p.step_gap
-    flags = _STEP_GAP if jumped and math.isfinite(s.stamp) else 0
+    flags = 0
+    if jumped and math.isfinite(s.stamp):
+        flags = _STEP_GAP
+        _bridge_silence(s, c, u.stamp)
     now = Instants(u.stamp, u.stamp + c.lead, c.p.period if jumped else dt)
     s.stamp = u.stamp
 
     tracker.transfer(s.target.tracker, c.p.tracker, c.tracker)
     flags |= _take_encoders(s, u) | _take_attitude(s, c, u) | _take_error(s, c, u, o) | _take_preset(s, u)
 
+    if not u.drive_ready or not math.isfinite(s.unasked.since):
+        unasked.restart(s.unasked, s.stamp)
+    unasked.watch(s.unasked, s.stamp, u.velocity, c.p.unasked_rate)
     rested = s.mode == modes.STANDBY
     _, program_flags = _change_mode(s, c, o, u.drive_ready, program, s.pending if rested else modes.NO_REQUEST)
+    if math.isfinite(s.kept_until):
+        _resume(s, o)
     if (rested or jumped) and encoders.taken(s.encoders, s.stamp):
         for i in range(2):
+            if flags & _STEP_GAP:
+                s.axis[i].command = u.velocity[i]
             position_loop.initialise(s.axis[i], c.axis[i].p, s.stamp, u.position[i], u.velocity[i])
         s.azimuth = u.position[0]
 
@@ -474,6 +512,8 @@ def step(s, c, u, o, program):
         o.blocked = s.blocked
         o.coasting = s.mode == modes.AUTOTRACK and _coasting(s, c)
 
+    for i in range(2):
+        unasked.command(s.unasked, i, o.rate[i], now.dt, c.p.command_delay)
     t = s.target.tracker
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.gated, o.rates_gated, o.ranges_gated = t.gated, t.rates_gated, t.ranges_gated

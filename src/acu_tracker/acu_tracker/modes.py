@@ -43,10 +43,11 @@ _HANDOVER = tuple(MODES.index(row.handover) if row.handover else NEVER for row i
 
 REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'attitude invalid', 'no program track',
            'before program track', 'after program track', 'receiver not locked', 'outside limits', 'unknown mode',
-           'stamp does not advance', 'drive not ready', 'INS aligning', 'blocked', 'keyhole')
+           'stamp does not advance', 'drive not ready', 'INS aligning', 'blocked', 'keyhole', 'silence',
+           'moves unasked')
 (NONE, REQUESTED, LOCKED, SIGNAL_LOST, ENCODER_INVALID, ATTITUDE_INVALID, NO_PROGRAM, BEFORE_PROGRAM,
  AFTER_PROGRAM, NOT_LOCKED, OUTSIDE_LIMITS, UNKNOWN_MODE, BAD_STAMP, DRIVE_NOT_READY, INS_ALIGNING,
- BLOCKED, KEYHOLE) = range(len(REASONS))
+ BLOCKED, KEYHOLE, SILENCE, MOVES_UNASKED) = range(len(REASONS))
 
 NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 

@@ -68,6 +68,10 @@ class SharedParameters(Parameters):
 
     period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')
     step_gap: float = parameter(0.05, 1e-3, 10.0, 's', 'gap between drive steps after which targets := actual')
+    resume_time: float = parameter(10.0, 0.0, 3600.0, 's', 'a mode is kept through a silence of the drive, or of the '
+                                   'control unit, of up to this; 0: never')
+    unasked_rate: float = parameter(0.05, 1e-4, 10.0, 'rad/s', 'rate beyond those commanded lately at which '
+                                    'the antenna moves unasked')
     command_delay: float = parameter(0.0, 0.0, 1.0, 's', 'known delay from t_k until the command is in force')
     receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', "known latency of the receiver's errors")
     attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: latency of the attitude')

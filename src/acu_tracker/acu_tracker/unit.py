@@ -111,6 +111,7 @@ class Acu(Unit):
     NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
     LIVE = ('tracker', 'azimuth', 'elevation')
     REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/reset_faults')
+    CALLS = ('adu/emergency_stop',)
     MOMENTARY = (KEYHOLE, BLOCKAGE)
 
     def __init__(self, parameters, reads):
@@ -157,9 +158,12 @@ class Acu(Unit):
     def request(self, name):
         """The Reply to a mode or reset_faults; a refusal names the reason."""
         mode = name.removeprefix('acu/')
-        if mode == 'reset_faults':
-            return Reply(True, 'cleared')
         m, outputs = self.parts, self.parts['outputs']
+        if mode == 'reset_faults':
+            m['state']['unasked']['moves'] = 0
+            return Reply(True, 'cleared')
+        if self.silent and mode != 'standby':
+            return Reply(False, f'refused: no {JOINTS}, the drive is silent; mode is {modes.MODES[outputs["mode"]]}')
         m['inputs']['drive_ready'] = self.inputs[0][DRIVE] <= READY
         granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, self.memory.program,
                                        modes.MODES.index(mode))
@@ -177,7 +181,8 @@ class Acu(Unit):
         invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
         self.parts['invalid'] = 0
         values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
-                  ('coasting', str(int(outputs['coasting']))), ('drive', self.drive_state),
+                  ('coasting', str(int(outputs['coasting']))),
+                  ('drive', 'silent' if self.silent else self.drive_state),
                   ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
                   ('rates gated', str(int(outputs['rates_gated']))),
                   ('ranges gated', str(int(outputs['ranges_gated'])))]
@@ -187,6 +192,8 @@ class Acu(Unit):
         for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
         values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead'])]
+        if state['unasked']['moves']:
+            return Diagnosis(ERROR, 'the antenna moves unasked: acu/reset_faults once it is known why', values)
         if invalid == ['error_gated']:
             return Diagnosis(WARN, 'an error of the receiver was too far off to be believed', values)
         if invalid:
@@ -195,6 +202,15 @@ class Acu(Unit):
             return Diagnosis(WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit',
                              values)
         return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
+
+    @property
+    def calls(self):
+        return self.CALLS if self.parts['state']['unasked']['moves'] else ()
+
+    @property
+    def alarm(self):
+        outputs = self.parts['outputs']
+        return bool(self.parts['state']['unasked']['moves']) or outputs['reason'] == modes.SILENCE
 
     @staticmethod
     def idle(numbers):

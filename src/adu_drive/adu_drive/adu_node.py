@@ -1,12 +1,65 @@
 """ROS node of the antenna drive unit: owns the drive's time, publishes the encoders, obeys rate commands."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import sys
 
+from adu_drive import resting
 from adu_drive.timekeeper_node import Timekeeper
 from pedestal_common import shell
+from pedestal_common.unit import WARN
+
+
+class AduNode(Timekeeper):
+    """A drive that remembers where its plant was left."""
+
+    def __init__(self):
+        self.unsaved = ''
+        self.saved = None
+        super().__init__('adu_drive.adu_node')
+
+    def prepare(self, unit):
+        super().prepare(unit)
+        left = resting.read(self.parameters.state_file) if self.parameters.state_file else None
+        if left is not None:
+            unit.resume(left)
+
+    def begin(self):
+        super().begin()
+        if self.parameters.state_file:
+            self.every(1.0, self.save)
+
+    def save(self):
+        """Note where the plant is. A run that ends disables the drive, which is nothing to go on with."""
+        left = self.unit.left()
+        if self.stopping:
+            left = left._replace(enabled=self.saved.enabled if self.saved else False)
+        self.saved = left
+        try:
+            resting.write(self.parameters.state_file, left)
+            self.unsaved = ''
+        except OSError as error:
+            self.unsaved = f'{self.parameters.state_file}: {error.strerror}'
+
+    def draining(self):
+        if self.parameters.state_file and not self.stopping:
+            self.save()
+        return super().draining()
+
+    def close(self):
+        if self.parameters.state_file:
+            self.save()
+        super().close()
+
+    def diagnosed(self):
+        diagnosis = super().diagnosed()
+        if self.unsaved and diagnosis.level < WARN:
+            return diagnosis._replace(level=WARN, message=self.unsaved)
+        return diagnosis
 
 
 def main(args=None):
-    return shell.main(lambda: Timekeeper('adu_drive.adu_node'), args)
+    return shell.main(AduNode, args)
 
 
 if __name__ == '__main__':

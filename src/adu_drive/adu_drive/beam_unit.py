@@ -97,6 +97,9 @@ class Beam(Unit):
     def latency(self, topic):
         return self.parameters.period
 
+    rests = True
+    """An array has nothing that turns."""
+
     def encode(self, topic, code):
         return CONDITIONS[code]
 

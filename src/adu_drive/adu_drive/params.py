@@ -4,7 +4,7 @@ import dataclasses
 import math
 
 from adu_drive import electronic_beam
-from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter
+from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 SPEED_PERIOD = 0.5e-3
 """Period of the speed loop [s]; five current-loop periods."""
@@ -266,6 +266,8 @@ class RunParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class AduNodeParameters(RunParameters, AduParameters):
     """Parameters of adu_node: the drive and its run."""
+    state_file: str = text('', 'where the simulated plant notes its angles, to go on there after a restart; empty: it '
+                           'begins at the initial angles')
 
 
 @dataclasses.dataclass(frozen=True)

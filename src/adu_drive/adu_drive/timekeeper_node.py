@@ -11,9 +11,13 @@ ACKNOWLEDGED_STEPS = 1000
 """Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so
 a slow recorder slows the run and loses nothing."""
 
+LONGEST_WAIT = SECOND // 10
+"""Time [ns] after which the clock is looked at again, however far away the next step is: it may be stepped."""
+
 
 class Timekeeper(unit_node.UnitNode):
-    """Step k begins when step k - 1 has been answered (lockstep) or every period (realtime).
+    """Step k begins when step k - 1 has been answered (lockstep), or when it is its time: k T after the epoch, UTC
+    (realtime).
 
     In it the units obey what was said of step k - 1, and tell where they are at t_k.
     """
@@ -25,108 +29,129 @@ class Timekeeper(unit_node.UnitNode):
         p = self.parameters
         self.period_ns = round(p.period * SECOND)
         self.last_step = round(p.duration / p.period) if p.duration > 0.0 else None
-        self.k = -1
-        self.lost_steps = self.late_ticks = 0
+        self.k, self.made = -1, 0
+        self.lost_steps = self.missed_steps = self.late_ticks = 0
         self.newest, self.command_stamps = {}, {}
-        self.tick_timer = None
-        self.ticking = False
-        self.begun = self.ticked = time.monotonic()
+        self.begun = self.ticked = time.monotonic_ns()
+        self.stopping = False
         latencies = {port.named(name): latency for port in self.ports
                      for name, latency in port.unit.latencies.items()}
         self.commands = [port.named(port.unit.COMMAND) for port in self.ports]
         if self.graph.lockstep:
             self.follow(self.unit.trigger, latencies)
+            self.timer = self.every(0.001, self.start)
         else:
             for port in self.ports:
                 for name, decoder in port.decoders.items():
                     if name != self.unit.trigger:
-                        self.reader(name, self._newest_taker(name, decoder))
-        self.start_timer = self.every(0.001, self.start)
+                        self.reader(name, unit_node.decoding(decoder), self._newest_taker(name))
+            self.timer = self.every(0.001, self.tick)
+
+    @property
+    def awaits(self):
+        if self.graph.lockstep:
+            return 'the readers of what it writes'
+        _, now = self.clock()
+        return f'its time to begin, in {max(self.epoch(now) - now, 0) / SECOND:.1f} s'
 
     def start(self):
-        """Step 0, once the graph is complete. In realtime the steady timer begins with the first command, when the
-        others have found each other; without an ACU at once, and with a mute one after the deadline."""
-        self.start_timer.cancel()
+        """Lockstep: step 0, once the graph is complete."""
+        self.timer.cancel()
         self.await_graph()
-        self.ticked = time.monotonic()
-        if self.graph.lockstep:
-            self.steps.take(self.unit.trigger, 0, (0, ()))
-        else:
-            self.answer(0, {})
-            commanded = any(name.rpartition('/')[2] == 'acu' for name in self.graph.members)
-            self.tick_timer = self.every(self.graph.deadline if commanded else self.parameters.period,
-                                         self.begin_ticking)
-
-    def begin_ticking(self):
-        """Realtime: from now on a step every period."""
-        self.tick_timer.cancel()
-        self.tick_timer = self.every(self.parameters.period, self.tick)
-        self.ticked = time.monotonic()
-        self.ticking = True
+        self.steps.take(self.unit.trigger, 0, (0, ()))
 
     def answer(self, stamp, values):
-        """Make step k of the stamp k T [ns]; in lockstep the next one begins at once."""
+        """Lockstep: make step k of the stamp k T [ns]; the next one begins at once."""
         if self.k == self.last_step:
             self.end()
             return
+        if self.k == 0:
+            self.begun = time.monotonic_ns()
         self.k += 1
-        if self.k == 1:
-            self.begun = time.monotonic()
+        self._make(stamp, values)
+        self.steps.take(self.unit.trigger, stamp + self.period_ns, (stamp + self.period_ns, ()))
+
+    def _make(self, stamp, values):
         for port in self.ports:
             port.step(stamp, values)
         self.begin_step(stamp)
+        self.made += 1
         if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
             self.await_acknowledged()
         for port in self.ports:
             port.publish()
-        if self.graph.lockstep:
-            self.steps.take(self.unit.trigger, stamp + self.period_ns, (stamp + self.period_ns, ()))
+        self.look_after()
 
     def tick(self):
-        """Realtime: one period has passed on the steady clock."""
-        if self.finished:
-            return
-        before = self.k * self.period_ns
-        self.lost_steps += any(before > self.command_stamps.get(name, 0) for name in self.commands)
-        self.late_ticks += time.monotonic() - self.ticked > 1.5 * self.parameters.period
-        self.ticked = time.monotonic()
-        values, self.newest = self.newest, {}
-        self.answer(before + self.period_ns, values)
+        """Realtime: make the step whose time it is, if it was not made, and wait for the next."""
+        now, utc = self.clock()
+        start = self.epoch(utc)
+        k = (utc - start) // self.period_ns
+        if k >= 0 and k > self.k:
+            self._tick(k, start + k * self.period_ns, now)
+        _, utc = self.clock()
+        wait = start + (max(k, self.k) + 1) * self.period_ns - utc
+        self.timer.timer_period_ns = min(max(wait, 1), LONGEST_WAIT)
+        self.timer.reset()
 
-    def _newest_taker(self, name, decoder):
-        """Realtime: takes the messages of a topic; the newest wins. A command that is not newer than the last one, or
-        from the future, is refused."""
-        def take(data):
-            message = decoder.decoded(data)
-            if name not in self.commands:
-                self.newest[name] = message
-                return
-            stamp, now = message[0], self.k * self.period_ns
-            last = self.command_stamps.get(name)
-            if last is not None and stamp <= last:
-                self.refused = (f'{name} refused: stamp went back from {last / SECOND:.3f} to {stamp / SECOND:.3f} s')
-            elif stamp > now:
-                self.refused = (f'{name} refused: stamp {stamp / SECOND:.3f} s lies ahead of the drive '
-                                f'({now / SECOND:.3f} s)')
-            else:
-                self.command_stamps[name] = stamp
-                self.newest[name] = message
-                if self.tick_timer is not None and not self.ticking and len(self.command_stamps) == len(self.ports):
-                    self.begin_ticking()
+    def _tick(self, k, stamp, now):
+        """Make step k of a stamp [ns] at the time now of the steady clock [ns]. Steps whose time has passed are not
+        made up for: they are missed, and lost."""
+        before = stamp - self.period_ns
+        if self.made:
+            periods = (now - self.ticked) / self.period_ns
+            missed = max(round(periods) - 1, 0)
+            self.missed_steps += missed
+            self.late_ticks += periods > 1.5
+            self.lost_steps += missed + any(before > stamp for stamp in self.command_stamps.values())
+        else:
+            self.begun = now
+        self.k, self.ticked = k, now
+        values, self.newest = self.newest, {}
+        self._make(stamp, values)
+        if self.last_step is not None and k >= self.last_step:
+            self.finished = True
+
+    def _newest_taker(self, name):
+        """Realtime: takes the messages of a topic; the newest wins."""
+        def take(message, anew):
+            self.newest[name] = message
+            if name in self.commands:
+                self.command_stamps[name] = message[0]
         return take
 
+    def draining(self):
+        """In realtime whoever ends the run, the axes stop first and stand on their brakes."""
+        if self.graph.lockstep or self.failure or not self.made:
+            return False
+        if not self.stopping:
+            self.stopping = True
+            for port in self.ports:
+                port.unit.request('adu/disable')
+        return not all(port.unit.rests for port in self.ports)
+
     def end(self):
-        """The last step has been answered: say how it went and finish. The clock ran from the first answer on, when
-        everyone had found everyone."""
-        wall = time.monotonic() - self.begun
+        """Lockstep: the last step has been answered: say how it went and finish. The clock ran from the first answer
+        on, when everyone had found everyone."""
+        self.result = self._outcome(self.k - 1)
         self.await_acknowledged()
-        self.result = {'steps': self.k, 'wall_s': wall,
-                       'realtime_factor': (self.k - 1) * self.parameters.period / wall,
-                       'lost_steps': int(self.lost_steps), 'late_ticks': int(self.late_ticks)}
         self.finished = True
+
+    def close(self):
+        if not self.graph.lockstep:
+            self.result = self._outcome(self.made)
+        super().close()
+
+    def _outcome(self, made):
+        wall = max(time.monotonic_ns() - self.begun, 1) * 1e-9
+        return {'steps': self.k, 'wall_s': wall, 'realtime_factor': made * self.parameters.period / wall,
+                'lost_steps': int(self.lost_steps), 'missed_steps': int(self.missed_steps),
+                'late_ticks': int(self.late_ticks)}
 
     def diagnose(self):
         diagnosis = super().diagnose()
-        return diagnosis._replace(values=[*diagnosis.values, ('step', str(self.k)),
-                                          ('lost_steps', str(int(self.lost_steps))),
-                                          ('late_ticks', str(int(self.late_ticks)))])
+        values = [*diagnosis.values, ('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
+                  ('late_ticks', str(int(self.late_ticks)))]
+        if not self.graph.lockstep:
+            values.append(('missed_steps', str(self.missed_steps)))
+        return diagnosis._replace(values=values)

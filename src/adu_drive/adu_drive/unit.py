@@ -1,10 +1,11 @@
 """The unit of the drive: rate commands and the ship's motion in, encoders and motors out, enable and faults."""
+import dataclasses
 import math
 import typing
 
 import numpy as np
 
-from adu_drive import drive_state, drive_unit, faults, thermal
+from adu_drive import drive_state, drive_unit, faults, resting, thermal
 from pedestal_common import nodes, topics
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
@@ -17,9 +18,9 @@ INVALID = ('', COMMAND, SHIP)
 """Topics that can hold what the drive does not believe."""
 
 LINK = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
-                 ('timeout', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
+                 ('timeout', 'i8'), ('period', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
 """Stamps [ns] of the last step, of the last command and of the last truth with a finite rate (FLU, rad/s); age [ns] at
-which a command is stale; stale: 1 while it is; invalid: of INVALID, since the last diagnosis."""
+which a command is stale; period T [ns]; stale: 1 while it is; invalid: of INVALID, since the last diagnosis."""
 
 
 RECORD = np.dtype([('state', drive_unit.STATE), ('constants', drive_unit.CONSTANTS), ('inputs', drive_unit.INPUTS),
@@ -84,7 +85,9 @@ def encode(y, stamp, outputs):
 def law(memory, stamp, inputs, outputs):
     """Step k: from t_k-1 to t_k, obeying what was said of step k - 1."""
     m = memory.record[0]
-    if m.link.stamp != NEVER:
+    if m.link.stamp == NEVER:
+        m.state.k = stamp // m.link.period
+    else:
         decode(m.inputs, m.link, inputs[COMMAND], inputs[SHIP])
         drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
         if m.outputs.invalid_command:
@@ -110,12 +113,34 @@ class Adu(Unit):
         link = np.zeros(1, LINK)
         link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NEVER
         link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
+        link['period'] = round(parameters.period * 1e9)
         self.memory = Memory(joined(RECORD, state=drive_unit.initial_state(parameters),
                                     constants=drive_unit.constants(parameters), link=link))
         drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
 
     def latency(self, topic):
         return self.parameters.period
+
+    @property
+    def rests(self):
+        """Whether it stands on its brakes, without torque."""
+        return bool(self.parts['outputs']['phase'] == drive_state.DISABLED)
+
+    def resume(self, left):
+        """Stand on the brakes where a plant was left (resting.Left), before the first step; enabled from there if it
+        was."""
+        angles = {f'initial_{axis}': min(max(getattr(left, axis), limits.lower), limits.upper) for axis, limits in (
+            (axis, getattr(self.parameters, axis).limits) for axis in topics.AXES)}
+        parameters = dataclasses.replace(self.parameters, initially_enabled=False, **angles)
+        self.memory.record['state'] = drive_unit.initial_state(parameters)
+        self.parts['state']['wanted'] = left.enabled
+        drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
+
+    def left(self):
+        """Where it is and whether it is enabled, as `resume` takes it."""
+        o = self.parts['outputs']
+        enabled = o['wanted'] and not (o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults'])
+        return resting.Left(*(float(o[axis]['position']) for axis in topics.AXES), bool(enabled))
 
     def encode(self, topic, code):
         return drive_state.described(code)
@@ -168,6 +193,12 @@ class Adu(Unit):
         if hottest > thermal.WARM:
             return Diagnosis(WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values)
         return Diagnosis(OK, 'following', values)
+
+    @property
+    def alarm(self):
+        outputs, link = self.parts['outputs'], self.parts['link']
+        return bool(outputs['emergency'] or link['stale'] or link['invalid']
+                    or outputs['azimuth']['faults'] | outputs['elevation']['faults'])
 
     @staticmethod
     def idle(numbers):

@@ -22,7 +22,8 @@ def main(args=None) -> int:
     options = _parser().parse_args(args)
     options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: signal.raise_signal(signal.SIGINT))
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
     try:
         return options.main(options)
     except (ParameterError, ValueError, RuntimeError, OSError) as error:

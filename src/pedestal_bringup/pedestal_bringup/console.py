@@ -66,7 +66,8 @@ def show_results(title, columns, results, whole):
     whole: {metric: (value, unit)} of the run."""
     from rich.console import Console
     from rich.table import Table
-    table = Table(title=title, title_justify='left')
+    from rich.text import Text
+    table = Table(title=Text(title), title_justify='left')
     table.add_column('metric')
     for column in columns:
         table.add_column(column or 'value', justify='right')

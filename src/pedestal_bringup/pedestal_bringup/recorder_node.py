@@ -1,8 +1,8 @@
 """The recorder: every topic of the graph into a bag, raw, nothing lost unsaid."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import collections
-import hashlib
-import inspect
-import struct
 import sys
 import time
 
@@ -13,9 +13,11 @@ from pedestal_bringup.bags.bag import BagError
 from pedestal_bringup.bags.step_order import OrderError, StepOrder
 from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run.recorder_params import RecorderParameters
-from pedestal_common import messages, middleware, nodes, parameters, shell, topics
+from pedestal_common import files, listening, messages, middleware, nodes, parameters, shell, topics
 from pedestal_common.cdr import STAMPED
+from pedestal_common.intake import Intake
 from pedestal_common.steps import SECOND, GraphError
+from pedestal_common.streams import Streams
 from pedestal_common.unit import ERROR, OK, WARN, Diagnosis
 
 QUIET = 0.5
@@ -24,7 +26,8 @@ DRAIN = 4.0
 when others were heard but a topic of every step was not: Fast DDS repeats what a reader missed while it was being
 discovered with the next heartbeat of the writer, by default every 3 s."""
 
-_stamp_of = struct.Struct('<iI').unpack_from
+FAR = 3600 * SECOND
+"""Time [ns] from the drive's beyond which no stamp is believed."""
 
 
 class RecorderNode(shell.Shell):
@@ -37,14 +40,18 @@ class RecorderNode(shell.Shell):
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
         beams, flags = self.graph.beams, [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
         recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
+        self._end = round(self.parameters.duration * SECOND) or None
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
+            **({} if self.graph.lockstep else {'start': self.epoch(self.clock()[1])}),
+            **({'planned_end_ns': self._end} if self._end else {}),
             'git': configuration.git_revision(), **configuration.versions()},
             configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
         self._order = StepOrder(recorded, names, self._bag.write)
-        self._end = round(self.parameters.duration * SECOND) or None
         self._lost = collections.Counter()
+        self._writers = {}
+        self._stamp = self.graph.start
         self._broken = 0
         self._taken = [0] * len(recorded)
         self._of_every_step = [index for index, topic in enumerate(recorded) if topic.rate == 'step']
@@ -57,50 +64,59 @@ class RecorderNode(shell.Shell):
             self.every(1.0, self._flush)
 
     def _record(self, index, topic):
-        """Subscribe with unlimited history, whatever the writer keeps: a reader's own queue must drop nothing."""
-        profile = middleware.qos(topic.rate)
-        profile.history = HistoryPolicy.KEEP_ALL
+        """Subscribe with a history that drops nothing in lockstep, whatever the writer keeps, and holds seconds in
+        realtime."""
+        profile = middleware.qos(topic.rate, 'lockstep' if self.graph.lockstep else 'recorded')
+        if self.graph.lockstep:
+            profile.history = HistoryPolicy.KEEP_ALL
         self.create_subscription(middleware.message_class(topic.type), topic.name, self._callback(index, topic),
                                  profile, raw=True)
 
     def _callback(self, index, topic):
         put = self._in_step(index, topic) if self.graph.lockstep else self._as_it_comes(index, topic)
+        counted = self._unbroken(index, topic) if self.graph.lockstep else self._by_writer(index, topic)
         checked = len(topic.writers) == 1
-        expected = 1 if topic.rate == 'step' and self.graph.members else 0
         taken = self._taken
 
-        def take(data, info=None):
-            nonlocal expected
-            if info is None:
-                data, info = data
+        def take(data, info):
             taken[index] += 1
             try:
                 if checked:
-                    number = info['publication_sequence_number']
-                    if number != expected:
-                        self._gap(index, topic, number, expected)
-                        expected = number or 0
-                    expected += 1
+                    counted(info)
                 put(data, info)
             except (BagError, OrderError) as error:
                 self._fail(str(error))
+        return listening.pair(take)
 
-        # EventsExecutor (rclpy 7.1.6) hands a callback of two arguments one pair; SingleThreadedExecutor hands it two.
-        take.__signature__ = inspect.signature(lambda data, info: None)
-        return take
+    def _unbroken(self, index, topic):
+        """Lockstep: the numbers of the one writer go up by one. A topic that is always there begins with the first."""
+        expected = 1 if topic.rate == 'step' and self.graph.members else 0
 
-    def _gap(self, index, topic, number, expected):
-        """The writer's sequence number is not the next one; expected 0: nothing was heard of this writer so far."""
-        if number is None or expected == 0 or number == 1:
-            return
-        if number < expected:
-            self._fail(f'{topic.name} has more than one writer: another graph runs on ROS_DOMAIN_ID '
-                       f'{self.context.get_domain_id()}; set a free one')
-            return
-        self._lost[topic.name] += number - expected
-        self._bag.skip(index, number - expected)
-        if self.graph.lockstep:
-            self._fail(self._losses())
+        def counted(info):
+            nonlocal expected
+            number = info['publication_sequence_number']
+            if number is not None and expected != 0 and number not in (1, expected):
+                if number < expected:
+                    self._fail(f'{topic.name} has more than one writer: another graph runs on ROS_DOMAIN_ID '
+                               f'{self.context.get_domain_id()}; set a free one')
+                else:
+                    self._lost[topic.name] += number - expected
+                    self._bag.skip(index, number - expected)
+                    self._fail(self._losses())
+            expected = (number or 0) + 1
+        return counted
+
+    def _by_writer(self, index, topic):
+        """Realtime: what is missing in the numbers of each writer; writers come and go."""
+        writers = self._writers[topic.name] = Streams()
+
+        def counted(info):
+            before = writers.lost
+            writers.of(info['publication_sequence_number'], info['source_timestamp'], time.monotonic_ns())
+            if writers.lost > before:
+                self._lost[topic.name] = writers.lost
+                self._bag.skip(index, writers.lost - before)
+        return counted
 
     def _losses(self):
         return 'lost ' + ', '.join(f'{count} of {name}' for name, count in self._lost.items())
@@ -112,12 +128,11 @@ class RecorderNode(shell.Shell):
 
     def _stamp_in(self, data):
         """The stamp in a message's bytes; None when there is none."""
-        if len(data) >= 12:
-            seconds, nanoseconds = _stamp_of(data, 4)
-            if seconds >= 0 and nanoseconds < SECOND:
-                return seconds * SECOND + nanoseconds
-        self._broken += 1
-        return None
+        try:
+            return messages.stamp_of(data)
+        except ValueError:
+            self._broken += 1
+            return None
 
     def _sender(self, data):
         """Whose diagnostics these are; '' when they cannot be read."""
@@ -157,16 +172,26 @@ class RecorderNode(shell.Shell):
             return put_change
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
+    def _log_time(self, stamp):
+        """Where a message of this stamp is laid: at its stamp, but at the drive's time where that is none, is of the
+        future, or is FAR from it."""
+        if stamp is not None:
+            now = self._stamp or stamp
+            if abs(stamp - now) < FAR and stamp <= self.clock()[1] + self.graph.future * SECOND:
+                return stamp
+            self._broken += 1
+        return self._stamp
+
     def _as_it_comes(self, index, topic):
-        write, stamp_in = self._bag.write, self._stamp_in
+        write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
+        clock = Intake(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * SECOND))
 
         def put(data, info):
-            stamp = stamp_in(data)
-            write(index, self._stamp if stamp is None else stamp, info['source_timestamp'], data)
-            return stamp
+            write(index, log_time(stamp_in(data)), info['source_timestamp'], data)
 
         def put_clock(data, info):
-            self._tick(put(data, info))
+            self._tick(clock.take(data, info['publication_sequence_number'], info['source_timestamp'], *self.clock()))
+            put(data, info)
 
         def put_unstamped(data, info):
             write(index, self._stamp, info['source_timestamp'], data)
@@ -186,7 +211,7 @@ class RecorderNode(shell.Shell):
         if self.graph.lockstep and stamp // SECOND > self._stamp // SECOND:
             self._publish_diagnostics()
         self._stamp = stamp
-        if self._end is not None and stamp >= self._end:
+        if self._end is not None and stamp - self.epoch(stamp) >= self._end:
             self.finished = True
 
     def _flush(self):
@@ -199,6 +224,9 @@ class RecorderNode(shell.Shell):
         level, message = OK, 'recording'
         if self._broken or self._order.odd:
             level, message = WARN, 'recording; some messages have no valid or no proper stamp'
+        others = [name for name, writers in self._writers.items() if writers.several(time.monotonic_ns())]
+        if others:
+            level, message = WARN, f'recording; {", ".join(others)}: more than one writer'
         if self._lost:
             level, message = ERROR, self._losses()
         return Diagnosis(level, message, [
@@ -229,14 +257,9 @@ class RecorderNode(shell.Shell):
             self._bag.close()
         except BagError as error:
             self._fail(str(error))
-        digest = hashlib.sha256()
-        with open(self._bag.file, 'rb') as file:
-            while block := file.read(1 << 20):
-                digest.update(block)
-            size = file.tell()
         self.result = {'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),
-                       'sha256': digest.hexdigest(), 'bytes': size}
-        if self._error is None and self._lost:
+                       'sha256': files.sha256(self._bag.file), 'bytes': self._bag.file.stat().st_size}
+        if self._error is None and self._lost and self.graph.lockstep:
             self._error = self._losses()
         if self._error is not None:
             raise GraphError(self._error)

@@ -4,6 +4,8 @@ Nodes publish bytes that rosbags serialised. rclpy's own serialiser leaves the a
 undefined (measured: stale bytes of earlier messages, in 297 of 300 diagnostics), so that no recording of
 it could be the same twice; rosbags writes zeros there, and reads a JointState in half the time.
 """
+import struct
+
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
@@ -11,6 +13,10 @@ from pedestal_common import layouts, topics
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 _TYPES = TYPESTORE.types
+_STAMP = struct.Struct('<iI')
+
+LARGEST = 8_000_000
+"""Bytes of a message at the most; a program track of a whole day has 7 million."""
 
 Clock = _TYPES['rosgraph_msgs/msg/Clock']
 DiagnosticArray = _TYPES['diagnostic_msgs/msg/DiagnosticArray']
@@ -41,7 +47,9 @@ def serialize(message) -> bytes:
 
 
 def deserialize(data, type_name):
-    """The message in CDR bytes; raises ValueError naming the type when they do not hold one."""
+    """The message in CDR bytes; raises ValueError naming the type when they do not hold one, or are over LARGEST."""
+    if len(data) > LARGEST:
+        raise ValueError(f'{len(data)} bytes of a {type_name}, must be at most {LARGEST}')
     try:
         return TYPESTORE.deserialize_cdr(data, type_name)
     except Exception as error:
@@ -53,9 +61,26 @@ def nanoseconds(stamp) -> int:
     return stamp.sec * 1_000_000_000 + stamp.nanosec
 
 
+def stamp_of(data) -> int:
+    """The stamp [ns] in the CDR bytes of a message that begins with one; raises ValueError when there is none."""
+    if len(data) >= 12:
+        seconds, nanosec = _STAMP.unpack_from(data, 4)
+        if seconds >= 0 and nanosec < 1_000_000_000:
+            return seconds * 1_000_000_000 + nanosec
+        raise ValueError(f'{seconds} s {nanosec} ns is no stamp')
+    raise ValueError(f'{len(data)} bytes hold no stamp')
+
+
 def put_stamp(stamp, ns):
     """Write integer nanoseconds into a Time."""
     stamp.sec, stamp.nanosec = divmod(ns, 1_000_000_000)
+
+
+def since(message, epoch):
+    """The message with its header's stamp counted from an epoch [ns]; a stamp 0 is the epoch itself."""
+    stamp = nanoseconds(message.header.stamp)
+    put_stamp(message.header.stamp, stamp - epoch if stamp else 0)
+    return message
 
 
 def header(frame_id) -> Header:

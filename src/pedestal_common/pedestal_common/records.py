@@ -169,9 +169,9 @@ class Encoder:
         """Whether the record holds a message."""
         return self._stamp[0] != NEVER
 
-    def encoded(self) -> bytes:
-        """The message with the numbers of the record."""
-        return self.bytes_of(self._stamp.item(), self._numbers)
+    def encoded(self, epoch=0) -> bytes:
+        """The message with the numbers of the record, its stamp counted from the epoch [ns]."""
+        return self.bytes_of(self._stamp.item() + epoch, self._numbers)
 
     def bytes_of(self, stamp, values) -> bytes:
         """The message with a stamp [ns] and numbers (columns,)."""

@@ -1,6 +1,8 @@
-"""What every node is: parameters, topics of the table, diagnostics, waiting for its graph, `main`."""
+"""What every node is: parameters, clock, topics of the table, diagnostics, waiting for its graph, `main`."""
+import contextlib
 import dataclasses
 import gc
+import inspect
 import json
 import os
 import signal
@@ -18,18 +20,36 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
-from pedestal_common import messages, middleware, nodes, parameters
+from pedestal_common import messages, middleware, nodes, parameters, utc
 from pedestal_common.compiled import compiled_once
+from pedestal_common.listening import Listener
 from pedestal_common.nodes import MAX_BEAMS
 from pedestal_common.steps import SECOND, GraphError
+from pedestal_common.unit import OK, WARN, Diagnosis
 
 START_DEADLINE = 300.0
 """Seconds a node waits for its graph: the others may be compiling their laws for the first time."""
 
 PARTING = 1.0
 """Seconds a node that ends waits for readers to take what it published."""
+
+DAY = 86_400 * SECOND
+
+DIAGNOSTICS = 1.0
+"""Seconds between two diagnostics in realtime."""
+
+SILENT = 2.5
+"""Seconds without its diagnostics after which a node counts as silent: they tell it as `deadline_s`."""
+
+AWAY = 1_500_000_000
+"""Time [ns] between two diagnostics beyond which a node was held up, and says so."""
+
+ALARM_PAUSE = 100_000_000
+"""Time [ns] between two diagnostics that do not wait for their second."""
+
+STEPPED = 60 * SECOND
+"""Time [ns] for which the diagnostics speak of a step of the system's clock."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,6 +61,12 @@ class GraphParameters(parameters.Parameters):
     beams: int = parameters.parameter(0, 0, MAX_BEAMS, '', 'beams of an electronic array, each of several in '
                                       'its namespace beam_i; 0: a drive with motors')
     deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
+    start: int = parameters.parameter(0, 0, 2**31 * SECOND, 'ns', 'realtime: UTC at which the time of the scenario is '
+                                      '0; 0: the day begins')
+    future: float = parameters.parameter(0.05, 1e-3, 10.0, 's', 'realtime: a stamp further ahead of the time of this '
+                                         'node is refused')
+    silence: float = parameters.parameter(0.2, 0.02, 60.0, 's', 'realtime: a node without its first input for this '
+                                          'long says so')
 
     def check(self):
         for name in self._names:
@@ -82,6 +108,15 @@ def _on_signal(*_):
     _stop.append(True)
     if _compiling:
         raise Stopped
+
+
+def readings():
+    """(steady, system) clock [ns] at one moment: read anew where something came between."""
+    for _ in range(3):
+        steady, system = time.monotonic_ns(), time.time_ns()
+        if time.monotonic_ns() - steady < 100_000:
+            break
+    return steady, system
 
 
 def node_of(info, root='/'):
@@ -126,6 +161,12 @@ class Shell(Node):
         self._stamp = 0
         self._started = False
         self._publish_diagnosis = None
+        self._utc = utc.Utc(*readings())
+        self._epoch = 0 if self.graph.lockstep else self.graph.start or None
+        self._listeners = []
+        self._told = None
+        self._away = 0
+        self._steps_told = 0, None
 
     def _place(self, name):
         """(namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their end."""
@@ -180,23 +221,52 @@ class Shell(Node):
         link = self.links.get(self.beam + name) or self.links[name]
         return link, self._root + link.name if self.beam else link.name
 
+    def clock(self):
+        """(steady clock, UTC) of now [ns]."""
+        steady, system = readings()
+        return steady, self._utc.at(steady, system)
+
+    def epoch(self, stamp):
+        """The stamp [ns] at which the time of the units is 0: 0 in lockstep, `graph.start`, or the day's beginning
+        of the first stamp that is asked for."""
+        if self._epoch is None:
+            self._epoch = stamp // DAY * DAY
+        return self._epoch
+
     def writer(self, name):
         """A function that publishes the CDR bytes of a message on a topic of the graph."""
         link, ros_name = self._link(name)
-        publisher = self.create_publisher(middleware.message_class(link.type), ros_name, middleware.qos(link.rate))
+        publisher = self.create_publisher(middleware.message_class(link.type), ros_name,
+                                          middleware.qos(link.rate, 'lockstep' if self.graph.lockstep else 'written'))
         self.publishers_by_link[link] = publisher
         return publisher.publish
 
-    def reader(self, name, take):
-        """Call take(CDR bytes) for every message on a topic of the graph."""
+    def reader(self, name, decode, take):
+        """Call take(message, anew) for every message on a topic of the graph that decode(CDR bytes) -> (stamp [ns] or
+        None, message) can read; it raises ValueError for others. In lockstep these end the node. In realtime they are
+        dropped, as is all that an Intake does not take; anew: it does not continue the one before."""
         link, ros_name = self._link(name)
-        self.create_subscription(middleware.message_class(link.type), ros_name, self._guarded(take),
-                                 middleware.qos(link.rate), raw=True)
+        role = 'lockstep'
+        if self.graph.lockstep:
+            def callback(data):
+                take(decode(data)[1], False)
+        else:
+            role = 'read'
+            listener = Listener(self, link, ros_name, decode, take)
+            self._listeners.append(listener)
+            callback = listener.callback
+        self.create_subscription(middleware.message_class(link.type), ros_name, self._guarded(callback),
+                                 middleware.qos(link.rate, role), raw=True)
+
+    def writers_of(self, ros_name):
+        """Names of the nodes that write a topic now."""
+        return [node_of(info, self._root) for info in self.get_publishers_info_by_topic(ros_name)]
 
     def message_reader(self, name, take):
-        """Call take(message) for every message on a topic; broken bytes end the node with a reason."""
+        """Call take(message) for every message on a topic."""
         type_name = self._link(name)[0].type
-        self.reader(name, lambda data: take(messages.deserialize(data, type_name)))
+        self.reader(name, lambda data: (None, messages.deserialize(data, type_name)),
+                    lambda message, anew: take(message))
 
     def every(self, period, function):
         """A timer on the steady wall clock [s]."""
@@ -210,32 +280,66 @@ class Shell(Node):
             except EXPECTED as error:
                 self.failure = self.failure or error
                 self.finished = True
+        call.__signature__ = inspect.signature(function)
         return call
 
     def diagnose_with(self, diagnose):
         """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time,
-        in realtime at every second of the wall."""
+        in realtime at every second of the wall and when it becomes worse."""
         self._diagnose = diagnose
         self._publish_diagnosis = self.writer('diagnostics')
         if not self.graph.lockstep:
-            self.every(1.0, self._publish_diagnostics)
+            self._told = time.monotonic_ns()
+            self.every(DIAGNOSTICS, self._publish_diagnostics)
+
+    def alarm(self):
+        """Realtime: something has become worse, which its diagnostics tell before their second."""
+        if self._publish_diagnosis and not self.graph.lockstep and time.monotonic_ns() - self._told > ALARM_PAUSE:
+            self._publish_diagnostics()
 
     def _publish_diagnostics(self):
-        level, message, values = self._diagnose()
+        diagnosis, stamp = self._diagnose(), self._stamp
+        if not self.graph.lockstep:
+            now, stamp = self.clock()
+            self._away, self._told = now - self._told, now
+            diagnosis = self._with_findings(Diagnosis(*diagnosis), now)
+        level, message, values = diagnosis
         array = messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
             level=level, name=self.name, message=message, hardware_id='pedestal',
             values=[messages.KeyValue(key=key, value=value) for key, value in values])])
-        messages.put_stamp(array.header.stamp, self._stamp)
+        messages.put_stamp(array.header.stamp, stamp)
         self._publish_diagnosis(messages.serialize(array))
 
+    def _with_findings(self, diagnosis, now):
+        """A Diagnosis with what the shell of a realtime node has found, the worst first."""
+        findings = [*filter(None, (listener.finding(now) for listener in self._listeners))]
+        if self._away > AWAY:
+            findings.append((WARN, f'was held up for {self._away * 1e-9:.1f} s'))
+        steps, since = self._steps_told
+        if self._utc.steps != steps:
+            steps, since = self._steps_told = self._utc.steps, now
+        if since is not None and now - since < STEPPED:
+            findings.append((WARN, f'the clock of this host was stepped by {self._utc.last_step * 1e-9:+.3f} s'))
+        if self._utc.ahead > self.graph.future * SECOND:
+            findings.append((WARN, f'goes on {self._utc.ahead * 1e-9:.3f} s ahead of UTC, whose clock was '
+                             'set back: nodes that start now refuse its stamps until it is started again'))
+        if diagnosis.level != OK or not findings:
+            findings.insert(0, diagnosis[:2])
+        findings.sort(key=lambda finding: -finding[0])
+        values = [*diagnosis.values, ('deadline_s', f'{SILENT:g}'), ('clock_steps', str(self._utc.steps)),
+                  *(value for listener in self._listeners for value in listener.values())]
+        return Diagnosis(findings[0][0], '; '.join(text for _, text in findings), values)
+
     def begin_step(self, stamp):
-        """To be called with t_k [ns] before anything of step k is published. The first call waits for the graph; in
-        lockstep every whole second publishes diagnostics."""
-        if not self._started:
-            self.await_graph()
-            self._started = True
-            self._next_second = -(-stamp // SECOND) * SECOND
+        """To be called with t_k [ns] before anything of step k is published. In lockstep the first call waits for the
+        graph, and every whole second publishes diagnostics; in realtime nobody is waited for."""
         self._stamp = stamp
+        if not self._started:
+            self._started = True
+            if self.graph.lockstep:
+                self.await_graph()
+                self._next_second = -(-stamp // SECOND) * SECOND
+            self.get_logger().info('runs')
         if self.graph.lockstep and stamp >= self._next_second:
             self._next_second = (stamp // SECOND + 1) * SECOND
             self._publish_diagnostics()
@@ -296,6 +400,11 @@ class Shell(Node):
         missing = [name for name in wanted if name not in names and nodes.STAND_IN not in names]
         return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
+    @property
+    def awaits(self):
+        """What a node that is ready waits for, as a person calls it; overridden by who begins otherwise."""
+        return 'messages'
+
     def draining(self):
         """Asked after the end: True while a node must go on receiving before `close`; overridden by the recorder."""
         return False
@@ -303,8 +412,16 @@ class Shell(Node):
     def close(self):
         """Called once before the node ends; overridden by a node that has something to put away. What was published
         and is still on its way would die with the node, so it waits a little for the readers."""
+        deadline = time.monotonic() + PARTING
         for publisher in self.publishers_by_link.values():
-            publisher.wait_for_all_acked(Duration(seconds=PARTING))
+            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+
+
+def _say(stream, line):
+    """A last line, past Python's buffer: what a full disk or a closed pipe does not take is no reason for another end
+    than the one it tells."""
+    with contextlib.suppress(OSError):
+        os.write(stream.fileno(), f'{line}\n'.encode())
 
 
 def main(make_node, args=None) -> int:
@@ -315,30 +432,30 @@ def main(make_node, args=None) -> int:
     """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _on_signal)
-    middleware.set_defaults()
     node = None
     name = os.path.basename(sys.argv[0])
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        middleware.initialise(args)
         node = make_node()
         name = node.get_name()
         executor = middleware.make_executor()
         executor.add_node(node)
         gc.freeze()
+        node.get_logger().info(f'ready, waits for {node.awaits}')
         while not (_stop or node.finished) or node.draining():
             executor.spin_once(timeout_sec=0.1)
         node.close()
         if node.failure is not None:
             raise node.failure
         if node.result:
-            print(json.dumps(node.result), flush=True)
+            _say(sys.stdout, json.dumps(node.result))
         return 0
     except Stopped:
         return 0
     except EXPECTED as error:
         result = node.result if node is not None else {}
-        print(json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}), flush=True)
-        print(f'{name}: error: {error}', file=sys.stderr)
+        _say(sys.stdout, json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}))
+        _say(sys.stderr, f'{name}: error: {error}')
         return 1
     finally:
         # It ends anyway; Python's own end would give a late signal its deadly default back.

@@ -67,6 +67,18 @@ class Steps:
         if self._pending is not None and (self._prompt or all(map(self._ready, self._due))):
             self._close()
 
+    def begin_anew(self, topic):
+        """Realtime: the next message of this topic does not continue those before; of the trigger, no message does."""
+        for name in (topic,) if topic != self.trigger else self._last:
+            self._last[name] = None
+            for queue in (self._awaited, self._arrived):
+                if name in queue:
+                    queue[name].clear()
+            if name in self._due:
+                self._due[name] = None
+        if topic == self.trigger:
+            self._pending = None
+
     def _refuse(self, reason):
         if self._lockstep:
             raise GraphError(reason)

@@ -23,12 +23,28 @@ SILENT = -1
 
 
 class Qos(typing.NamedTuple):
-    """Quality of service, always reliable. depth: messages kept; 0: all."""
-    depth: int
+    """Quality of service of a rate: a row of QOS. Writers are reliable, and so are readers in lockstep.
+
+    latched     who comes late gets the last message
+    lockstep    messages kept by writers and readers in lockstep; 0: all
+    written     by a writer in realtime, which never waits for a reader
+    read        by a node that obeys them: those of a few steps, the newest of which stay, so that it never works
+                through what is old, and a stranger who writes much faster does not push out what belongs here
+    reliable    whether that node has lost ones sent again
+    recorded    by a recorder: those of seconds, it may be held up by its disk
+    """
     latched: bool
+    lockstep: int
+    written: int
+    read: int
+    reliable: bool
+    recorded: int
 
 
-QOS = {'step': Qos(0, False), 'once': Qos(1, True), 'change': Qos(1, True), 'second': Qos(10, False)}
+QOS = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reliable=False, recorded=4000),
+       'once': Qos(latched=True, lockstep=1, written=1, read=1, reliable=True, recorded=100),
+       'change': Qos(latched=True, lockstep=1, written=1, read=8, reliable=True, recorded=1000),
+       'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000)}
 
 
 class Topic(typing.NamedTuple):

@@ -51,6 +51,7 @@ class Unit(typing.Protocol):
     LAWS         {type of its memory: (law, the same over arrays of stamps and records)}, compiled
     LIVE         prefixes of the parameters that may change while it runs
     REQUESTS     names of the services it answers
+    CALLS        names of the services of others that it may call for
     MOMENTARY    texts that `encode` knows only right after the step that says them; a recomputation of many steps
                  leaves them out
 
@@ -60,14 +61,17 @@ class Unit(typing.Protocol):
                  records of its law, then what is no record (noise, a track)
     inputs, outputs     records (1,) of one step in a node
     messages     {topic: message} of the stamped topics it writes, of which only the numbers change
+    silent       whether its trigger stays away; told by a realtime node
     """
     NODE: nodes.Node
     LAWS: typing.Mapping
     LIVE: tuple = ()
     REQUESTS: tuple = ()
+    CALLS: tuple = ()
     MOMENTARY: tuple = ()
     parameters: object
     memory: tuple
+    silent: bool = False
 
     def __init__(self, parameters, reads):
         self.parameters, self.reads = parameters, tuple(reads)
@@ -144,6 +148,16 @@ class Unit(typing.Protocol):
 
     def diagnose(self) -> Diagnosis:
         """How it is now, and what happened since the last diagnosis."""
+
+    @property
+    def alarm(self) -> bool:
+        """Whether something is so wrong that its diagnosis should not wait; asked after every step in realtime."""
+        return False
+
+    @property
+    def calls(self) -> tuple:
+        """Those of CALLS that it calls for now."""
+        return ()
 
     @staticmethod
     def idle(numbers) -> str:

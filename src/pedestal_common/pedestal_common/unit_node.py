@@ -8,7 +8,7 @@ import time
 import numpy as np
 from std_srvs.srv import Trigger
 
-from pedestal_common import nodes, records, shell, topics
+from pedestal_common import messages, nodes, records, shell, topics
 from pedestal_common.steps import SECOND, Steps
 from pedestal_common.unit import ERROR, WARN
 
@@ -21,24 +21,34 @@ class Port:
         self.decoders = {self.named(name): records.Decoder(name, unit.inputs)
                          for name in (unit.trigger, *unit.latencies)}
         self.stamps = np.zeros(1, np.int64)
+        self._initial = unit.memory.record.copy()
         written = [name for name in unit.NODE.writes if not prefix or name in nodes.OF_BEAM
                    or prefix == nodes.prefixes(node.graph.beams)[0]]
         self._encoders = [(records.Encoder(name, message, unit.outputs), node.writer(self.named(name)))
                           for name, message in unit.messages.items() if name in written]
         self._texts = {name: [node.writer(self.named(name)), topics.SILENT, '']
                        for name in written if records.is_text(name)}
-        self._announce = node.announce
+        self._announce, self._epoch_of = node.announce, node.epoch
+        self._epoch = 0
 
     def named(self, topic):
         """The topic as the graph names it."""
         return self.prefix + topic if topic in nodes.OF_BEAM else topic
 
     def step(self, stamp, values):
-        """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing came}."""
+        """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing came}. The unit counts
+        its time from the epoch on: its numbers keep their places however late it is."""
+        self._epoch = self._epoch_of(stamp)
         for name, decoder in self.decoders.items():
-            decoder.put(*(values.get(name) or (records.NEVER, None)))
-        self.stamps[0] = stamp
+            came, numbers = values.get(name) or (records.NEVER, None)
+            decoder.put(came - self._epoch, numbers)
+        self.stamps[0] = stamp - self._epoch
         self.unit.step(self.stamps, self.unit.inputs, self.unit.outputs)
+
+    def begin_anew(self):
+        """Forget what the unit knows of the steps so far, not what it was told once."""
+        self.unit.memory.record[...] = self._initial
+        self.unit.configure(self.unit.parameters)
 
     def publish(self):
         """The texts that have changed, then every message that is due."""
@@ -53,14 +63,11 @@ class Port:
                     self._announce(last[0], text)
         for encoder, publish in self._encoders:
             if encoder.due:
-                publish(encoder.encoded())
+                publish(encoder.encoded(self._epoch))
 
 
 class UnitNode(shell.Shell):
-    """Runs the unit of a module (nodes.Node.module).
-
-    A message that is no message of its topic ends the node with a reason.
-    """
+    """Runs the unit of a module (nodes.Node.module)."""
 
     def __init__(self, module, serves_beams=False):
         self.row = nodes.of_executable(module)
@@ -78,6 +85,10 @@ class UnitNode(shell.Shell):
         self.steps = None
         self.refused = ''
         self._waiting_for_once, self._held = set(), None
+        self._alarming = False
+        self._clients = {} if self.graph.lockstep else {
+            name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
+        self._called = set()
         for port in self.ports:
             self._listen(port)
         for name in unit_type.REQUESTS:
@@ -103,8 +114,9 @@ class UnitNode(shell.Shell):
 
     def _once_taker(self, port, name):
         def take(message):
+            stamp = messages.nanoseconds(message.header.stamp)
             try:
-                port.unit.decode(name, message)
+                port.unit.decode(name, messages.since(message, self.epoch(stamp) if stamp else 0))
                 self.refused = ''
             except ValueError as error:
                 self.refused = f'{name} refused: {error}'
@@ -114,6 +126,10 @@ class UnitNode(shell.Shell):
                 step, self._held = self._held, None
                 self.answer(*step)
         return take
+
+    @property
+    def awaits(self):
+        return ', '.join((self.unit.trigger, *sorted(self._waiting_for_once)))
 
     def begin(self):
         """Start to follow the trigger of the unit; overridden by who makes the time."""
@@ -129,18 +145,25 @@ class UnitNode(shell.Shell):
         decoders = {name: decoder for port in self.ports for name, decoder in port.decoders.items()}
         for name in (trigger, *latencies):
             if nodes.plain(name) not in self.row.writes:
-                self.reader(name, self._step_taker(name, decoders[name]))
+                self.reader(name, decoding(decoders[name]), self._step_taker(name))
         self._progress = (None, time.monotonic())
         if self.graph.lockstep:
             self.every(0.2, self._watch)
+        else:
+            self._answered = self._watched = self._begun = time.monotonic_ns()
+            self.every(0.05, self._watch_trigger)
 
-    def _step_taker(self, name, decoder):
-        take, decoded = self.steps.take, decoder.decoded
+    def _step_taker(self, name):
+        steps = self.steps
 
-        def taker(data):
-            message = decoded(data)
-            take(name, message[0], message)
-        return taker
+        def take(message, anew):
+            if anew:
+                steps.begin_anew(name)
+                if name == steps.trigger and message[0] <= self._stamp:
+                    for port in self.ports:
+                        port.begin_anew()
+            steps.take(name, message[0], message)
+        return take
 
     def _answer(self, stamp, trigger, values):
         """A step is complete; in lockstep the first one waits for what comes once."""
@@ -157,6 +180,33 @@ class UnitNode(shell.Shell):
         self.begin_step(stamp)
         for port in self.ports:
             port.publish()
+        self.look_after()
+
+    def look_after(self):
+        """Realtime, after a step: tell what has become wrong, call for what a unit wants of others."""
+        if self.graph.lockstep:
+            return
+        alarming = any([port.unit.alarm for port in self.ports])
+        if alarming and not self._alarming:
+            self.alarm()
+        self._alarming = alarming
+        self._answered = time.monotonic_ns()
+        if self._clients:
+            calls = {name for port in self.ports for name in port.unit.calls}
+            for name in calls - self._called:
+                self._clients[name].call_async(Trigger.Request())
+            self._called = calls
+
+    def _watch_trigger(self):
+        """Realtime: whether the trigger stays away; unless it was this node that was held up."""
+        now, limit = time.monotonic_ns(), self.graph.silence * SECOND
+        held_up, self._watched = now - self._watched > limit, now
+        silent = now - self._answered > limit and not held_up
+        if silent != self.unit.silent:
+            for port in self.ports:
+                port.unit.silent = silent
+            if silent:
+                self.alarm()
 
     def _watch(self):
         pending = self.steps.pending_stamp
@@ -187,12 +237,28 @@ class UnitNode(shell.Shell):
         return self.unit.diagnose()
 
     def diagnose(self):
-        """A refused input comes before anything but an error of the unit."""
+        """A silent trigger and a refused input come before anything but an error of the unit."""
         diagnosis = self.diagnosed()
+        if self.unit.silent:
+            since = (time.monotonic_ns() - self._answered) * 1e-9
+            text = (f'no {self.steps.trigger} so far' if self._answered == self._begun else
+                    f'no {self.steps.trigger} for {since:.1f} s')
+            told = f'{text}; {diagnosis.message}' if diagnosis.level == ERROR else text
+            return diagnosis._replace(level=ERROR, message=told)
         refusal = self.refused or (self.steps.refusal if self.steps else '')
         if refusal and diagnosis.level < ERROR:
             return diagnosis._replace(level=WARN, message=refusal)
         return diagnosis
+
+
+def decoding(decoder):
+    """decode(CDR bytes) -> (stamp [ns], what the Decoder makes of them), for Shell.reader."""
+    decoded = decoder.decoded
+
+    def decode(data):
+        message = decoded(data)
+        return message[0], message
+    return decode
 
 
 def main(module, args=None) -> int:

@@ -81,3 +81,22 @@ def test_realtime_refuses_stamps_that_go_back_and_says_so():
         steps.take('trigger', stamp * MS, stamp)
     assert [answer[0] for answer in answers] == [0, 5, 10]
     assert steps.refused == 1 and 'went back' in steps.refusal
+
+
+def test_realtime_a_trigger_that_begins_anew_is_answered_whatever_its_stamp():
+    steps, answers = collect({'a': 0}, lockstep=False)
+    for topic in ('trigger', 'a'):
+        steps.take(topic, 3600_000 * MS, topic)
+    steps.begin_anew('trigger')
+    for topic in ('a', 'trigger'):
+        steps.take(topic, 5 * MS, topic)
+    assert answers == [(3600_000, 'trigger', {'a': 'a'}), (5, 'trigger', {'a': 'a'})]
+
+
+def test_realtime_a_follower_that_begins_anew_is_heard_whatever_its_stamp():
+    steps, answers = collect({'a': 0}, lockstep=False)
+    steps.take('a', 3600_000 * MS, 'ahead')
+    steps.begin_anew('a')
+    steps.take('trigger', 5 * MS, 0)
+    steps.take('a', 5 * MS, 'a')
+    assert answers == [(5, 0, {'a': 'a'})] and not steps.refused

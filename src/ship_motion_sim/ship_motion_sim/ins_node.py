@@ -1,4 +1,7 @@
 """ROS node of the INS: subscribes to the IMU, publishes measured attitude and deck rate."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import sys
 
 from pedestal_common import unit_node

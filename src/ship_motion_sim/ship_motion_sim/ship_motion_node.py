@@ -1,4 +1,7 @@
 """ROS node of the ship: its truth and what its IMU feels at every tick of the drive's clock; NMEA for equipment."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import socket
 import sys
 

@@ -1,4 +1,7 @@
 """ROS node of the tracking receiver: answers every joint state with the receiver's channels."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import sys
 
 from pedestal_common import unit_node

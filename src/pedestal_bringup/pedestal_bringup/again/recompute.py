@@ -20,7 +20,7 @@ import yaml
 from pedestal_bringup.again import difference
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import scenario
-from pedestal_common import messages, nodes, parameters, records, topics
+from pedestal_common import messages, nodes, parameters, plain_yaml, records, topics
 from pedestal_common.steps import SECOND, GraphError, Steps
 from pedestal_common.unit import announced
 
@@ -82,8 +82,8 @@ class Recording:
         if topic not in self._outputs:
             try:
                 output = difference.recorded(self.data(topic), self.rows(topic).log, topic)
-                self._outputs[topic] = output if output.texts is None else dataclasses.replace(
-                    output, stamps=self.steps(topic))
+                self._outputs[topic] = dataclasses.replace(output, stamps=(
+                    output.stamps - self.bag.start if output.texts is None else self.steps(topic)))
             except ValueError as error:
                 raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
         return self._outputs[topic]
@@ -92,7 +92,7 @@ class Recording:
         """Stamps [ns] of the steps that messages without one belong to: in our lockstep recordings their log says, in
         others they came before the answer to that step; AFTER_ALL where none came any more, their log where no answer
         was recorded."""
-        log = self.rows(topic).log
+        log = self.rows(topic).log - self.bag.start
         answer = writer_of(topic).writes[0]
         if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(answer):
             return log
@@ -227,7 +227,8 @@ def compute(recording, unit, fed, states=None, requests=None):
             break
         for topic, row in events.get(step, ()):
             try:
-                unit.decode(topic, messages.deserialize(recording.data(topic)[row], topics.BY_NAME[topic].type))
+                message = messages.deserialize(recording.data(topic)[row], topics.BY_NAME[topic].type)
+                unit.decode(topic, messages.since(message, recording.bag.start))
             except ValueError:
                 pass  # refused, as the node does
         if step in requests:
@@ -336,9 +337,9 @@ def file_parameters(path, beam=''):
     Raises ScenarioError.
     """
     try:
-        tree = yaml.safe_load(path.read_text())
+        tree = plain_yaml.read(path)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise RecomputeError(f'--params-file {path}: {" ".join(str(error).split())}') from None
+        raise RecomputeError(f'--params-file {path}: {plain_yaml.problem(error)}') from None
     if not isinstance(tree, dict):
         raise RecomputeError(f'--params-file {path}: must hold a section for a node')
     if 'scenario' in tree and 'recorder' not in tree:

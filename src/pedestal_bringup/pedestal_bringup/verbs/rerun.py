@@ -20,7 +20,8 @@ def main(options):
     chosen = rerun.configured(recording)
     path = arguments.new_bag(options.bag, chosen.name)
     with console.progress_of_run(chosen.header.duration) as progress:
-        graph.run(chosen, path, progress)
+        if graph.run(chosen, path, progress).stopped:
+            raise KeyboardInterrupt
     result = rerun.result(recording, bag.read(path))
     print('\n'.join(result.lines()))
     return 0 if result.equal else 1

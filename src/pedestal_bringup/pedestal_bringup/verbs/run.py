@@ -31,22 +31,27 @@ def main(options):
     bag = arguments.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
     with console.progress_of_run(chosen.header.duration) as progress:
-        try:
-            outcome = graph.run(chosen, bag, progress)
-        except KeyboardInterrupt:
-            print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+        outcome = graph.run(chosen, bag, progress)
+    if outcome.stopped:
+        print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+        if not outcome.recorder.get('messages'):
             return console.EXIT_STOPPED
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     of_beams = [results.measured(results.of_bag(recording.view(beam))) for beam in beams]
-    whole = results.measured({'run': outcome})
-    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams, whole)
+    realtime = chosen.header.pacing == 'realtime'
+    whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
+    lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
+    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
+                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else '')})
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                       'mcap_sha256': outcome.recorder['sha256']})
+    if outcome.stopped:
+        return console.EXIT_STOPPED
     check = verify(bag)
-    if not check.complete:
+    if not check.finished:
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     return 0

@@ -1,4 +1,4 @@
-"""prove that a recording is complete; exit code 1 with the gaps if not"""
+"""prove that a recording is complete up to the planned end of its run; exit code 1 with the gaps if not"""
 import pathlib
 
 
@@ -12,4 +12,4 @@ def main(options):
     from pedestal_bringup.bags.verify import verify
     check = verify(options.bag)
     print('\n'.join(check.lines()))
-    return 0 if check.complete else 1
+    return 0 if check.finished else 1

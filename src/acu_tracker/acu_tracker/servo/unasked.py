@@ -1,0 +1,59 @@
+"""Whether the antenna moves as it was told: its rates against the envelope of the commands of late.
+
+    h_k = max(u_k, h_k-1 + a (u_k - h_k-1)),    l_k = min(u_k, l_k-1 + a (u_k - l_k-1)),    a = dt / tau
+
+An axis may lag behind its commands and overshoot them, so that any rate between 0 and the envelope is expected, and a
+part of the envelope's width beyond it.
+"""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+ENVELOPE = np.dtype([('high', 'f8', (2,)), ('low', 'f8', (2,)),      # h, l of azimuth and elevation [rad/s]
+                     ('since', 'f8'), ('beyond', 'f8'), ('moves', 'i8')], align=True)
+"""since: stamp from which the axes are watched; beyond: stamp since which a rate is beyond the envelope [s]; moves: 1
+since it was for TIME, until it is told to forget."""
+
+TAU = 0.05
+"""Time in which the envelope shrinks [s]: three times the settling of a speed loop; longer where commands are delayed.
+"""
+
+OVERSHOOT = 0.25
+"""Part of the envelope's width by which a rate may be beyond it."""
+
+SETTLING = 0.3
+"""Time after a silence, or after the drive became ready, in which nothing is expected of the axes [s]."""
+
+TIME = 0.009
+"""Time for which a rate must be beyond the envelope [s]: three steps of 5 ms."""
+
+
+@compiled
+def restart(s, t):
+    """Watch anew from t [s] on: what was commanded before is not in force any more."""
+    s.since, s.beyond = t, t
+    s.high[:] = 0.0
+    s.low[:] = 0.0
+
+
+@compiled
+def watch(s, t, velocity, threshold):
+    """Take the rates (2,) [rad/s] of a step at t [s], that obey the commands of the steps before; whether the antenna
+    moves unasked."""
+    beyond = False
+    for i in range(2):
+        allowed = threshold + OVERSHOOT * (s.high[i] - s.low[i])
+        beyond |= velocity[i] > max(s.high[i], 0.0) + allowed or velocity[i] < min(s.low[i], 0.0) - allowed
+    if not beyond or t - s.since < SETTLING:
+        s.beyond = t
+    elif t - s.beyond >= TIME:
+        s.moves = 1
+    return s.moves != 0
+
+
+@compiled
+def command(s, i, rate, dt, delay):
+    """Take the command [rad/s] of axis i in a step dt [s] after the one before; delay [s]: until it is in force."""
+    a = min(dt / (TAU + 4.0 * delay), 1.0)
+    s.high[i] = max(rate, s.high[i] + a * (rate - s.high[i]))
+    s.low[i] = min(rate, s.low[i] + a * (rate - s.low[i]))

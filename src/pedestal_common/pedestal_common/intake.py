@@ -1,0 +1,126 @@
+"""Which messages of a topic a node of a realtime graph takes: of the writer in charge, sound and newer than the last.
+
+The first writer is in charge. Another one is dropped and named, whatever it says. A writer that begins anew is taken
+up once the one in charge was silent for SILENCE; it had been another one if the two had spoken at the same time. Where
+nobody can say which is which, nothing is taken: what the topic commands comes to a stop. No ROS and no clock here.
+"""
+import collections
+
+from pedestal_common.streams import Streams
+
+SILENCE = 200_000_000
+"""Time [ns] after which the writer in charge is taken for gone, and after which stamps that went back are believed."""
+
+LOOK = 50_000_000
+"""Time [ns] between two looks at who else may write the topic, while somebody wants to be in charge."""
+
+UNDECODABLE, STALE, FUTURE, ANOTHER_WRITER, UNCLEAR_WRITER = (
+    'undecodable', 'stale', 'future', 'another writer', 'writers not told apart')
+"""Why a message is dropped."""
+
+ALARMING = ANOTHER_WRITER, UNCLEAR_WRITER
+"""Reasons that somebody should look after."""
+
+
+class Intake:
+    """The intake of one topic.
+
+    decode(data) -> (stamp [ns], or None of a topic without stamps, message); raises ValueError for what is none.
+    future: how far a stamp may be ahead of this node's UTC [ns].
+    strangers() -> how many writers the graph shows that should not write this topic; asked when somebody wants to be
+    in charge: as many must be known by what they wrote, or the candidate may be one of them. None: the topic is
+    everybody's, who is not told apart.
+
+    dropped: {reason: count}; reason: of the last message that was dropped, detail: in numbers; dropped_at: when [ns];
+    anew: whether the message just taken does not continue the one taken before it.
+    """
+
+    def __init__(self, decode, future, strangers=lambda: 0):
+        self._decode, self._future, self._strangers = decode, future, strangers
+        self.writers = Streams()
+        self.in_charge = None
+        self.dropped = collections.Counter()
+        self.reason = self.detail = ''
+        self.dropped_at = None
+        self.anew = False
+        self.offset = None
+        self._stamp = None
+        self._back_since = self._back = None
+        self._looked = None
+
+    def take(self, data, number, source, now, utc):
+        """What decode made of a message, None where it is dropped. number: its sequence number; source: when its
+        writer sent it [ns UTC]; now, utc: this moment [ns], steady and UTC."""
+        self.anew = False
+        if self._strangers and not self._of_charge(self.writers.of(number, source, now), now):
+            return None
+        try:
+            stamp, message = self._decode(data)
+        except ValueError as error:
+            return self._drop(UNDECODABLE, str(error), now)
+        if stamp is not None and not self._in_order(stamp, now, utc):
+            return None
+        self._note_offset(utc - source)
+        return message
+
+    def _of_charge(self, stream, now):
+        """Whether the writer of a message, which may be unclear, is in charge."""
+        charge = self.in_charge
+        if stream is None:
+            self._drop(UNCLEAR_WRITER, '', now)
+        elif stream is charge:
+            others = [other for other in self.writers.streams if other is not charge]
+            for other in others:
+                other.known = other.known or now - other.heard < SILENCE
+            if not stream.mixed:
+                return True
+            stream.mixed = any(other.mixed and now - other.heard < SILENCE for other in others)
+            if not stream.mixed:
+                return True
+            self._drop(UNCLEAR_WRITER, '', now)
+        elif self._may_take_over(stream, now):
+            self.in_charge, self.anew = stream, charge is not None
+            self._stamp = self._back_since = self.offset = None
+            return True
+        else:
+            self._drop(ANOTHER_WRITER, '', now)
+        return False
+
+    def _may_take_over(self, stream, now):
+        """Whether a writer that is not in charge is from now on."""
+        charge = self.in_charge
+        if charge is not None and (stream.known or stream.mixed or now - charge.heard < SILENCE):
+            return False
+        if self._looked is not None and now - self._looked < LOOK:
+            return False
+        known = [other for other in self.writers.streams if other.known and now - other.heard < SILENCE]
+        if self._strangers() > len(known):
+            self._looked = now
+            return False
+        self._looked = None
+        return True
+
+    def _in_order(self, stamp, now, utc):
+        """Whether a stamp is later than the last one and not ahead of the time. One that goes back is believed once
+        those that came instead went on for SILENCE."""
+        if stamp > utc + self._future:
+            self._drop(FUTURE, f'{(stamp - utc) * 1e-9:.3f} s ahead', now)
+            return False
+        if self._stamp is None or stamp > self._stamp:
+            self._stamp, self._back_since = stamp, None
+            return True
+        if self._back_since is None or stamp <= self._back:
+            self._back_since = now
+        self._back = stamp
+        if now - self._back_since >= SILENCE:
+            self._stamp, self._back_since, self.anew = stamp, None, True
+            return True
+        self._drop(STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
+        return False
+
+    def _note_offset(self, offset):
+        self.offset = offset if self.offset is None else min(self.offset, offset)
+
+    def _drop(self, reason, detail, now):
+        self.dropped[reason] += 1
+        self.reason, self.detail, self.dropped_at = reason, detail, now

@@ -1,0 +1,72 @@
+"""How a node of a realtime graph hears its topics: what it takes of them, and what it says of the rest."""
+import inspect
+
+from pedestal_common import intake, nodes
+from pedestal_common.unit import ERROR, WARN
+
+FRESH = 2_000_000_000
+"""Time [ns] for which the diagnostics speak of a message that was dropped."""
+
+UNKNOWN = '_NODE_NAME_UNKNOWN_'
+"""What rmw calls a node that is not discovered yet."""
+
+
+def pair(function):
+    """function(data, info) as a callback of a subscription: EventsExecutor (rclpy 7.1.6) hands a callback of two
+    arguments one pair, SingleThreadedExecutor hands it two."""
+    def call(data, info=None):
+        function(*(data if info is None else (data, info)))
+    call.__signature__ = inspect.signature(lambda data, info: None)
+    return call
+
+
+class Listener:
+    """Hears one topic and hands on what its Intake takes: take(message, whether it begins anew).
+
+    node: the shell.Shell that listens; link: nodes.Link of the topic, which ROS calls ros_name; decode: see Intake
+    """
+
+    def __init__(self, node, link, ros_name, decode, take):
+        self.link, self._node, self._ros_name, self._take = link, node, ros_name, take
+        everybodys = len(link.writers) > 1 or link.rate == 'once'
+        self._expected = any(writer in node.graph.members for writer in link.writers)
+        self.intake = intake.Intake(decode, round(node.graph.future * 1e9), None if everybodys else self._count)
+        self.callback = pair(self._hear)
+
+    def _hear(self, data, info):
+        taker = self.intake
+        now, utc = self._node.clock()
+        message = taker.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
+        if message is not None:
+            self._take(message, taker.anew)
+        elif taker.reason in intake.ALARMING:
+            self._node.alarm()
+
+    def strangers(self):
+        """Names of the nodes that write this topic and should not; none in a graph without those that should."""
+        if not self._expected:
+            return []
+        return [name for name in self._node.writers_of(self._ros_name)
+                if name not in self.link.writers and name != nodes.STAND_IN and UNKNOWN not in name]
+
+    def _count(self):
+        return len(self.strangers())
+
+    def finding(self, now):
+        """(level, text) of what was dropped lately; None where nothing was."""
+        taker = self.intake
+        if taker.dropped_at is None or now - taker.dropped_at > FRESH:
+            return None
+        reason, count = taker.reason, taker.dropped[taker.reason]
+        if reason not in intake.ALARMING:
+            return WARN, f'{self.link.name}: {count} dropped: {reason}: {taker.detail}'
+        who = ', '.join(self.strangers()) or ', '.join(self._node.writers_of(self._ros_name))
+        return ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
+
+    def values(self):
+        """[(key, text)] for the diagnostics: what was dropped so far, the smallest time from sent to heard."""
+        taker = self.intake
+        values = [(f'dropped {self.link.name}: {reason}', str(count)) for reason, count in taker.dropped.items()]
+        if taker.offset is not None:
+            values.append((f'offset {self.link.name}_ms', f'{taker.offset * 1e-6:.3f}'))
+        return values

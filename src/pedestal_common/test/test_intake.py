@@ -1,0 +1,159 @@
+"""Which messages a realtime node takes: writers told apart by their numbers, stamps in order, what is dropped."""
+import numpy as np
+import pytest
+
+from pedestal_common import intake
+from pedestal_common.intake import Intake
+
+MS, S = 1_000_000, 1_000_000_000
+T = 5 * MS
+UTC = 1_790_000_000 * S
+FUTURE = 50 * MS
+
+
+def decode(data):
+    if data is None:
+        raise ValueError('no message')
+    return data, data
+
+
+class Writer:
+    """Sends every `period` from `begin` on, its first number `number`; what it says is its stamp, ahead by `ahead`."""
+
+    def __init__(self, name, begin=0, end=10 * S, period=T, number=1, ahead=0, jitter=0.0, seed=1):
+        self.name, self.ahead, self.number = name, ahead, number
+        count = (end - begin) // period
+        rng = np.random.default_rng(seed)
+        self.times = begin + period * np.arange(count) + (jitter * rng.random(count)).astype(int)
+
+    def messages(self):
+        return [(int(time), self.number + i, UTC + int(time) + self.ahead, self.name)
+                for i, time in enumerate(self.times)]
+
+
+def run(*writers, strangers=lambda: 0):
+    """(Intake, {writer: times at which it was taken}, times at which a stream began anew) of writers together."""
+    taken = {writer.name: [] for writer in writers}
+    anew = []
+    taker = Intake(decode, FUTURE, strangers)
+    for time, number, stamp, name in sorted(message for writer in writers for message in writer.messages()):
+        if taker.take(stamp, number, UTC + time, time, UTC + time) is not None:
+            taken[name].append(time)
+            if taker.anew:
+                anew.append(time)
+    return taker, taken, anew
+
+
+def test_one_writer_is_taken_whole():
+    taker, taken, anew = run(Writer('acu', jitter=4 * MS))
+    assert len(taken['acu']) == 2000 and not anew and not taker.dropped
+
+
+@pytest.mark.parametrize('period', [T // 50, T, T + 1, 100 * MS, S])
+@pytest.mark.parametrize('number', [1, 350, 1_000_000])
+def test_a_second_writer_is_dropped_however_fast_it_is(period, number):
+    stranger = Writer('stranger', begin=2 * S + 2 * MS, period=period, number=number)
+    taker, taken, anew = run(Writer('acu', jitter=MS), stranger)
+    assert not taken['stranger'] and not anew
+    assert len(taken['acu']) > 1980
+    assert taker.dropped[intake.ANOTHER_WRITER] >= 0.95 * len(stranger.times)
+
+
+def test_two_writers_that_cannot_be_told_apart_are_both_dropped():
+    """A second control unit, started with the first: the same numbers at the same times."""
+    taker, taken, _ = run(Writer('acu'), Writer('twin', begin=S, number=201 + 0, period=T))
+    assert taken['twin'] == [] or max(taken['twin']) < S + 10 * MS
+    assert max(taken['acu']) < S + 10 * MS
+    assert taker.reason in intake.ALARMING
+
+
+def test_twins_that_part_are_told_apart_again():
+    taker, taken, _ = run(Writer('acu'), Writer('twin', begin=S, end=2 * S, number=201))
+    assert len([time for time in taken['acu'] if time > 2 * S + intake.SILENCE]) >= 1500
+
+
+@pytest.mark.parametrize('pause', [250 * MS, 3 * S])
+def test_a_writer_that_begins_anew_is_taken_at_once(pause):
+    _, taken, anew = run(Writer('old', end=2 * S), Writer('new', begin=2 * S + pause))
+    assert taken['new'][0] == anew[0] == 2 * S + pause and len(anew) == 1
+
+
+def test_a_writer_that_begins_anew_without_a_pause_is_taken_after_the_silence():
+    _, taken, anew = run(Writer('old', end=2 * S), Writer('new', begin=2 * S))
+    assert 2 * S + intake.SILENCE - 2 * T <= taken['new'][0] <= 2 * S + intake.SILENCE + T
+    assert anew == taken['new'][:1]
+
+
+def test_a_stranger_that_spoke_before_is_never_in_charge():
+    """The writer in charge dies, the stranger goes on, the writer is started again."""
+    _, taken, anew = run(Writer('old', end=2 * S), Writer('stranger', begin=S), Writer('new', begin=4 * S))
+    assert not taken['stranger'] and taken['new'][0] == anew[0] == 4 * S
+
+
+def test_who_may_be_a_stranger_is_not_taken():
+    """The graph shows one writer that should not be there: it may not begin in the place of the one in charge, and
+    nobody else may before it has spoken."""
+    _, taken, _ = run(Writer('old', end=2 * S), Writer('stranger', begin=3 * S), strangers=lambda: 1)
+    assert not taken['stranger'] and not taken['old']
+    seen = []
+    _, taken, _ = run(Writer('old', end=2 * S), Writer('stranger', begin=3 * S), strangers=lambda: len(seen))
+    assert taken['stranger']
+
+
+def test_a_cut_cable_is_no_other_writer():
+    taker = Intake(decode, FUTURE)
+    for k in [*range(400), *range(2400, 3000)]:
+        assert taker.take(UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) is not None
+        assert not taker.anew
+    assert taker.writers.lost == 2000
+
+
+def test_a_frozen_reader_takes_up_where_the_writer_is():
+    """It finds what its queue kept, all at one time."""
+    taker = Intake(decode, FUTURE)
+    for k in range(400):
+        taker.take(UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T)
+    wake = 4400 * T
+    for k in range(4392, 4400):
+        assert taker.take(UTC + k * T, k + 1, UTC + k * T, wake, UTC + wake) is not None and not taker.anew
+
+
+def test_stamps_of_the_future_are_dropped_and_do_no_harm():
+    taker = Intake(decode, FUTURE)
+    for k in range(1000):
+        wrong = k in (300, 500)
+        stamp = UTC + k * T + (3600 * S if wrong else 0)
+        assert (taker.take(stamp, k + 1, UTC + k * T, k * T, UTC + k * T) is None) == wrong
+    assert taker.dropped == {intake.FUTURE: 2}
+    assert '3600.000 s ahead' in taker.detail
+
+
+def test_a_future_within_the_limit_costs_no_more_than_its_time():
+    taker = Intake(decode, FUTURE)
+    taken = [taker.take(UTC + k * T + (45 * MS if k == 300 else 0), k + 1, UTC + k * T, k * T, UTC + k * T) is not None
+             for k in range(400)]
+    assert taken == [True] * 301 + [False] * 9 + [True] * 90
+    assert taker.dropped == {intake.STALE: 9}
+
+
+def test_stamps_that_went_back_for_good_are_believed_after_the_silence():
+    """The clock of the writer's host was set back by an hour."""
+    taker = Intake(decode, FUTURE)
+    taken = {}
+    for k in range(1000):
+        stamp = UTC + k * T - (3600 * S if k >= 500 else 0)
+        taken[k] = taker.take(stamp, k + 1, UTC + k * T, k * T, UTC + k * T) is not None
+        assert taker.anew == (k == 540)
+    assert [k for k in taken if not taken[k]] == list(range(500, 540))
+
+
+def test_what_is_no_message_is_dropped_and_counted():
+    taker = Intake(decode, FUTURE)
+    taken = [taker.take(None if k % 3 else UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) for k in range(300)]
+    assert sum(one is not None for one in taken) == 100
+    assert taker.dropped == {intake.UNDECODABLE: 200} and taker.detail == 'no message'
+
+
+def test_losses_of_two_writers_are_those_of_each():
+    taker, _, _ = run(Writer('acu'), Writer('stranger', begin=S, period=3 * MS, number=5000))
+    assert taker.writers.lost == 0
