@@ -79,4 +79,5 @@ def problem(error) -> str:
         return error.strerror or str(error)
     if isinstance(error, UnicodeDecodeError):
         return f'no valid UTF-8 text at byte {error.start}'
-    return f'no valid YAML: {" ".join(str(error).split())}'
+    where = str(error).replace('in "<unicode string>", ', 'at ')
+    return f'no valid YAML: {" ".join(where.split())}'

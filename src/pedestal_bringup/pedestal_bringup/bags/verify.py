@@ -130,6 +130,7 @@ def verify(path) -> Report:
     counts = {check.name: check.count for check in checks}
     if bag.statistics is not None and bag.statistics != counts:
         problems.append(f'the summary counts {_differences(bag.statistics, counts)}')
+    problems += _away(bag, grid)
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
     lost = bag.last_values(nodes.DRIVE).get('lost_steps', '')
@@ -145,7 +146,7 @@ def _problems(bag, rows, name, stamp, grid):
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Steps that nobody made, and what strangers said, are no fault of the recording.
-        return ([] if stamp.size else ['no message']) + _sequence(rows.sequence)
+        return ([] if stamp.size else ['no message']) + _numbering(rows)
     problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
@@ -158,8 +159,7 @@ def _problems(bag, rows, name, stamp, grid):
     if topic and bag.topics[name] != topic.type:
         problems.append(f'of type {bag.topics[name]}, where the graph has {topic.type}')
     if ours:
-        for file in np.unique(rows.channel >> 16):
-            problems += _sequence(rows.sequence[rows.channel >> 16 == file])
+        problems += _numbering(rows)
     return problems
 
 
@@ -246,6 +246,21 @@ def _seconds(bag, name, stamp, grid):
         if at.size > count:
             problems.append(f'{at.size - count} too many of {node}')
     return problems
+
+
+def _away(bag, grid):
+    """Where nothing was recorded between two files: the recorder of the first was killed, and another one started."""
+    number, log = bag.index.channel >> 16, bag.index.log
+    spans = [(int(log[number == k].min()) - bag.start, int(log[number == k].max()) - bag.start)
+             for k in np.unique(number)]
+    return [f'nothing recorded from {before / 1e9:.6f} to {after / 1e9:.6f} s, between two files'
+            for (_, before), (after, _) in zip(spans, spans[1:]) if after - before > max(grid.period, 1)]
+
+
+def _numbering(rows):
+    """What is wrong with the sequence numbers of a topic; in each file they begin with 1."""
+    file = rows.channel >> 16
+    return [problem for number in np.unique(file) for problem in _sequence(rows.sequence[file == number])]
 
 
 def _sequence(sequence):
