@@ -158,9 +158,9 @@ def test_steps_that_the_drive_lost_are_said(tmp_path):
         message = messages.template('joint_states')
         messages.put_stamp(message.header.stamp, k * 5_000_000)
         writer.write(NAMES.index('joint_states'), k * 5_000_000, 0, messages.serialize(message))
-    for values in ({'lost_steps': '7'}, {'lost_steps': '53', 'step': '100'}):
+    for values in ({'lost_steps': '7', 'step': '50'}, {'lost_steps': '53', 'step': '101'}):
         writer.write(NAMES.index('diagnostics'), 500_000_000, 0, diagnostics('adu', **values))
-    writer.write(NAMES.index('diagnostics'), 500_000_000, 0, diagnostics('acu', lost_steps='9'))
+    writer.write(NAMES.index('diagnostics'), 500_000_000, 0, diagnostics('acu', lost_steps='9', step='9'))
     writer.close()
     assert 'lost steps: 53 of 101, made by the drive without the command for them' in verify(tmp_path / 'run').lines()
 
