@@ -180,3 +180,9 @@ def test_times_are_those_of_the_scenario(rows, tmp_path):
     assert report.ending == 'aborted: ends at 1.995000 s, planned end 4.000000 s'
     assert {check.last for check in report.topics if check.name == 'clock'} == {1.995}
     assert 'ends after 1.995000 s, the run was to go on to 4.000000 s' in recover(tmp_path / 'run').lines()[0]
+
+
+@pytest.mark.parametrize('name', ['leo_pass', 'servo_sine', 'servo_step', 'ship_pass', 'uav_flyby'])
+def test_a_recording_of_an_earlier_version_is_finished(name):
+    report = verify(pathlib.Path(__file__).parents[3] / 'bags' / 'reference' / name)
+    assert report.finished and report.planned_end == report.end, report.lines()

@@ -255,8 +255,10 @@ def _away(of_steps, start, grid):
 
     of_steps: rows of the index of each topic of the steps.
     """
-    rows = np.concatenate([np.zeros((2, 0), np.int64), *((row.channel >> 16, row.stamp - start) for row in of_steps)], 1)
-    spans = [(int(rows[1][rows[0] == file].min()), int(rows[1][rows[0] == file].max())) for file in np.unique(rows[0])]
+    none = np.zeros(0, np.int64)
+    number = np.concatenate([none, *(row.channel >> 16 for row in of_steps)])
+    stamp = np.concatenate([none, *(row.stamp - start for row in of_steps)])
+    spans = [(int(stamp[number == file].min()), int(stamp[number == file].max())) for file in np.unique(number)]
     return [f'nothing recorded from {before / 1e9:.6f} to {after / 1e9:.6f} s, between two files'
             for (_, before), (after, _) in zip(spans, spans[1:]) if after - before > max(grid.period, 1)]
 
