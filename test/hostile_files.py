@@ -440,23 +440,22 @@ def _do_all(output):
 def attack(folder, names, seed=1, verbs=None):
     """Make the files (of CRAFTED by their names, None: a damaged one) and give each to its verbs, or those named.
 
-    [(file, verb, what went wrong or '', seconds of a core, bytes)].
+    Iterator of (file, verb, what went wrong or '', seconds of a core, bytes).
     """
     folder = pathlib.Path(folder)
     folder.mkdir(exist_ok=True)
-    files, rows = Files(folder, random.Random(seed)), []
+    files = Files(folder, random.Random(seed))
     for number, name in enumerate(names):
         name, path = crafted(files, name) if name else damaged(files)
         for verb, arguments in commands(path, folder / 'out').items():
             if verbs is None or verb in verbs:
                 (folder / 'out').mkdir(exist_ok=True)
-                rows.append((f'{number:03} {name}', verb, *outcome(verb, arguments, folder / 'errors')))
+                yield f'{number:03} {name}', verb, *outcome(verb, arguments, folder / 'errors')
                 shutil.rmtree(folder / 'out')
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:
             path.unlink()
-    return rows
 
 
 def main(folder, count=300, seed=1):
@@ -467,17 +466,17 @@ def main(folder, count=300, seed=1):
     rng, names = random.Random(seed), list(CRAFTED)
     rng.shuffle(names)
     chosen = [names[k // 2 % len(names)] if k % 2 == 0 else None for k in range(count)]
-    rows = attack(folder / 'files', chosen, seed)
     by_verb = collections.defaultdict(list)
-    for file, verb, wrong, seconds, memory in rows:
+    for file, verb, wrong, seconds, memory in attack(folder / 'files', chosen, seed):
         by_verb[verb].append((wrong, seconds, memory))
         if wrong:
-            print(f'{file}: {verb} {wrong}')
-    print(f'{count} files, {len(rows)} calls\n{"verb":26} {"calls":>6} {"wrong":>6} {"most s":>10} {"most MB":>8}')
+            print(f'{file}: {verb} {wrong}', flush=True)
+    print(f'{count} files, {sum(map(len, by_verb.values()))} calls')
+    print(f'{"verb":26} {"calls":>6} {"wrong":>6} {"most s":>10} {"most MB":>8}')
     for verb, of_verb in by_verb.items():
         wrongs, times, sizes = zip(*of_verb)
         print(f'{verb:26} {len(of_verb):6} {sum(map(bool, wrongs)):6} {max(times):10.1f} {max(sizes) / 1e6:8.0f}')
-    return int(any(wrong for _, _, wrong, _, _ in rows))
+    return int(any(wrong for of_verb in by_verb.values() for wrong, _, _ in of_verb))
 
 
 if __name__ == '__main__':
