@@ -145,7 +145,7 @@ def _problems(bag, rows, name, stamp, grid):
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Steps that nobody made, and what strangers said, are no fault of the recording.
-        return ([] if stamp.size else ['no message']) + _sequence(rows.sequence)
+        return ([] if stamp.size else ['no message']) + _sequences(rows)
     problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
@@ -157,10 +157,13 @@ def _problems(bag, rows, name, stamp, grid):
         problems += _seconds(bag, name, stamp, grid)
     if topic and bag.topics[name] != topic.type:
         problems.append(f'of type {bag.topics[name]}, where the graph has {topic.type}')
-    if ours:
-        for file in np.unique(rows.channel >> 16):
-            problems += _sequence(rows.sequence[rows.channel >> 16 == file])
-    return problems
+    return problems + (_sequences(rows) if ours else [])
+
+
+def _sequences(rows):
+    """What is wrong with the numbers of a topic's messages, which begin anew in each file."""
+    files = rows.channel >> 16
+    return [problem for file in np.unique(files) for problem in _sequence(rows.sequence[files == file])]
 
 
 def _differences(claimed, counts):
