@@ -8,6 +8,7 @@ from pedestal_common import unit_node
 
 
 def main(args=None):
+    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
     return unit_node.main('tracking_receiver_sim.tracking_receiver_node', args)
 
 

@@ -86,8 +86,8 @@ TOLD = (
 """(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
 
 
-MEASURED = (('receiver.rate.measured', 'receiver_rate'), ('receiver.ranging.measured', 'receiver_range'))
-"""(parameter of the receiver, what its readers are told): whether one of its topics is there at all."""
+MEASURED = tuple((topic.measured, topic.flag) for topic in topics.TOPICS if topic.measured)
+"""(parameter of the receiver, that of its readers): whether one of its topics is there at all."""
 
 
 class ScenarioError(ValueError):

@@ -5,6 +5,7 @@ from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Scenario, duration, parameters."""
     parser.add_argument('scenario')
     parser.add_argument('--duration', type=float, metavar='S', help='of the run it is for')
     parser.add_argument('--start', type=_utc, metavar='UTC', help='when its time is 0, as 2026-11-22T12:00:00 or now; '
@@ -24,6 +25,7 @@ def _utc(text):
 
 
 def main(options):
+    """Send the program track; exit code of graph.send_program."""
     from pedestal_bringup.run import graph, scenario
     chosen = scenario.load(options.scenario, options.param, duration=options.duration)
     return graph.send_program(chosen, options.start)

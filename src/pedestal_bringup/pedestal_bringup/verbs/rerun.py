@@ -6,11 +6,13 @@ from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Recording and bag of the new run."""
     parser.add_argument('recording', type=pathlib.Path)
     arguments.add_new_bag(parser)
 
 
 def main(options):
+    """Make the run and print the comparison; exit code 1 where a message differs."""
     from pedestal_bringup.again import rerun
     from pedestal_bringup.bags import bag
     from pedestal_bringup.run import graph

@@ -7,6 +7,7 @@ from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Scenario, pacing, duration, seed, bag, parameters."""
     parser.add_argument('scenario', help='name (see `pedestal scenarios`) or path of a .yaml')
     parser.add_argument('--pacing', choices=('lockstep', 'realtime'), help='default: what the scenario says')
     parser.add_argument('--duration', type=float, metavar='S', help="length of the run in the drive's time")
@@ -15,11 +16,12 @@ def add_arguments(parser):
     console.add_json(parser)
     arguments.add_param(parser)
     parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
-                        help='ROS 2 parameter file whose values replace those of the scenario, as `pedestal tune` '
-                        'writes')
+                        help='ROS 2 parameter file whose values replace those of the scenario, for example one of '
+                        '`pedestal tune`')
 
 
 def main(options):
+    """Run, record and print the results; raises RuntimeError where the recording is not complete."""
     from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read
     from pedestal_bringup.bags.verify import verify

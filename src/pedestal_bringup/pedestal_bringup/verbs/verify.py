@@ -3,10 +3,12 @@ import pathlib
 
 
 def add_arguments(parser):
+    """The bag."""
     parser.add_argument('bag', type=pathlib.Path)
 
 
 def main(options):
+    """Print the check; exit code 1 where the bag is not complete."""
     from pedestal_bringup.bags.verify import verify
     check = verify(options.bag)
     print('\n'.join(check.lines()))
