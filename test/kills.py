@@ -159,7 +159,8 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
         counts['runs'] += 1
         since = time.monotonic()
         if watcher.recovery(since) is None and watcher.recovery(since + PATIENCE) is None:
-            raise RuntimeError(f'the graph did not begin: {log}')
+            process.terminate()
+            raise RuntimeError(f'the graph did not begin: {log}: {ended(process, counts)}')
         last = time.monotonic() + duration - 30.0
         while order and time.monotonic() < last and process.poll() is None:
             watcher.spin(chance.uniform(0.0, 2.0))
@@ -202,7 +203,8 @@ def lockstep(kills, seed, folder, victims=NODES):
         begun = time.monotonic()
         while node not in children(process.pid):
             if process.poll() is not None or time.monotonic() - begun > PATIENCE:
-                raise RuntimeError(f'the graph did not begin: {log}')
+                process.terminate()
+                raise RuntimeError(f'the graph did not begin: {log}: {ended(process, counts)}')
             time.sleep(0.01)
         time.sleep(chance.uniform(0.0, 8.0))
         victim = children(process.pid).get(node)
