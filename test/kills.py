@@ -43,12 +43,11 @@ PATIENCE = 60.0
 class Watcher:
     """Hears a graph: when each node spoke last and what mode the ACU is in. Times are those of time.monotonic."""
 
-    def __init__(self):
+    def __init__(self, node, executor):
+        """node: of rclpy, in the executor."""
         self.heard = dict.fromkeys(NODES, -1e9)
         self.mode = ''
-        self._node = rclpy.create_node('watcher')
-        self._executor = middleware.make_executor()
-        self._executor.add_node(self._node)
+        self._node, self._executor = node, executor
         for node, topic in ANSWERS.items():
             self._listen(topic, lambda _, node=node: self.heard.__setitem__(node, time.monotonic()))
         self._listen('acu/mode', self._on_mode)
@@ -101,10 +100,6 @@ class Watcher:
         if node == 'acu':
             self.mode = ''
 
-    def close(self):
-        self._executor.shutdown()
-        self._node.destroy_node()
-
 
 def children(pid):
     """{node: pid} of the nodes that `pedestal run` runs: direct children, named by their module."""
@@ -151,11 +146,13 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
     """Kill after kill in runs of `duration` [s]; (counts, {node: [recovery]})."""
     chance, counts, outages = random.Random(seed), collections.Counter(), collections.defaultdict(list)
     middleware.initialise([])
-    watcher = Watcher()
+    executor = middleware.make_executor()
+    executor.add_node(observer := rclpy.create_node('watcher'))
+    watcher = Watcher(observer, executor)
     order = [node for _ in range(kills) for node in chance.sample(victims, len(victims))][:kills]
     while order:
         process, bag, log = started(folder, 'realtime', '--duration', str(duration), '--param',
-                                    'scenario.restart.attempts=1000000')
+                                    'scenario.restart.within=1')
         counts['runs'] += 1
         since = time.monotonic()
         if watcher.recovery(since) is None and watcher.recovery(since + PATIENCE) is None:
@@ -189,7 +186,7 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
             print(f'{log}: exit code {process.returncode}: {said}', flush=True)
         counts['orphans'] += len(orphans(log))
         print(dict(counts), flush=True)
-    watcher.close()
+    observer.destroy_node()
     rclpy.try_shutdown()
     return counts, outages
 
