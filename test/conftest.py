@@ -62,12 +62,13 @@ def environment(domain_id, tmp_path):
 
 @pytest.fixture
 def start_process(environment, tmp_path):
-    """start(command, **changes of the environment) -> Popen with text pipes, the head of its own process group;
-    what still runs when the test ends is killed with its children."""
+    """start(command, **changes of the environment, None: not set) -> Popen with text pipes, the head of its own
+    process group; what still runs when the test ends is killed with its children."""
     started = []
 
     def start(command, **changes):
-        process = _popen(command, tmp_path, {**environment, **changes})
+        wanted = {name: value for name, value in {**environment, **changes}.items() if value is not None}
+        process = _popen(command, tmp_path, wanted)
         started.append(process)
         return process
 
@@ -99,6 +100,16 @@ def _finished(process, timeout):
         output, errors = process.communicate()
         pytest.fail(f'{" ".join(map(str, process.args))} ran longer than {timeout:g} s\n{output}\n{errors}')
     return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
+
+
+def _complaints(errors):
+    return ''.join(line for line in errors.splitlines(keepends=True) if not line.startswith('[INFO]'))
+
+
+@pytest.fixture(scope='session')
+def complaints():
+    """complaints(stderr of a node) -> it without what is mere information."""
+    return _complaints
 
 
 def _kill_group(process):
@@ -181,7 +192,10 @@ class NodeProcess:
     domain_id: int
 
     def finish(self, timeout=START):
-        return _finished(self.process, timeout)
+        """CompletedProcess; of stderr what is no mere information."""
+        done = _finished(self.process, timeout)
+        done.stderr = _complaints(done.stderr)
+        return done
 
 
 @pytest.fixture(scope='module')
@@ -309,7 +323,7 @@ def one_line():
     """one_line(errors) -> the single line a refused command prints; fails the test on a traceback or more lines."""
     def check(errors):
         assert 'Traceback' not in errors, errors
-        lines = errors.strip().splitlines()
+        lines = _complaints(errors).strip().splitlines()
         assert len(lines) == 1, errors
         return lines[0]
     return check

@@ -86,7 +86,7 @@ def other_profile(path):
 
 def several(path):
     path.mkdir()
-    for name in ('a_0.mcap', 'a_1.mcap'):
+    for name in ('a_0.mcap', 'b_0.mcap'):
         (path / name).write_bytes(b'')
 
 
@@ -129,7 +129,7 @@ CASES = {
     encrypted: {'': ('x.mcap: not an MCAP file',)},
     sqlite: {'': ('x_0.db3: an SQLite bag, not an MCAP file', '`ros2 bag convert`')},
     other_profile: {'': ("/pose is encoded as 'json': not a ROS 2 recording",)},
-    several: {'': ('2 .mcap files in it where one belongs',)},
+    several: {'': ('2 .mcap files in it where one belongs, or NAME_0.mcap, NAME_1.mcap ...',)},
     no_bag: {'': ('0 .mcap files in it where one belongs',)},
     missing: {'': ('No such file or directory',)},
     wrong_type: {'verify': 'of type geometry_msgs/msg/Vector3Stamped, where the graph has sensor_msgs/msg/JointState',

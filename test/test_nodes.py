@@ -1,5 +1,8 @@
 """Each executable alone: it starts, and ends without a word when told to; the parameter doors of a node."""
 import importlib.resources
+import pathlib
+import random
+import re
 import signal
 import sys
 import time
@@ -50,6 +53,39 @@ def test_a_node_that_compiles_ends_at_once(start_process, reserve_domain, tmp_pa
         time.sleep(0.1)
     process.send_signal(number)
     assert process.communicate(timeout=15.0) == ('', '')
+    assert process.returncode == 0
+
+
+def listens(pid):
+    """Whether a process has a handler for SIGTERM: Python itself is up, and the executable's first line has run."""
+    caught = re.search('^SigCgt:\\s*(\\w+)', pathlib.Path(f'/proc/{pid}/status').read_text(), re.M)[1]
+    return int(caught, 16) >> (signal.SIGTERM - 1) & 1
+
+
+@pytest.mark.parametrize('node', (*NODES, 'beam_steering'))
+def test_ctrl_c_at_any_moment_ends_a_node_in_silence(start_node, node):
+    """Also while it imports, compiles, or opens its topics."""
+    for delay in random.Random(node).sample(range(1500), 3):
+        alone = start_node(node)
+        deadline = time.monotonic() + 60.0
+        while not listens(alone.process.pid):
+            assert time.monotonic() < deadline
+            time.sleep(0.001)
+        time.sleep(delay * 1e-3)
+        alone.process.send_signal(signal.SIGINT)
+        result = alone.finish(60.0)
+        assert (result.returncode, result.stderr) == (0, ''), delay
+
+
+@pytest.mark.parametrize('changes', [{'HOME': None}, {'ROS_LOG_DIR': '/proc/none'}], ids=['HOME', 'ROS_LOG_DIR'])
+def test_a_node_needs_neither_a_home_nor_a_folder_for_logs(start_process, reserve_domain, connect, complaints,
+                                                          changes):
+    domain_id = reserve_domain()
+    process = start_process([sys.executable, '-m', 'adu_drive.adu_node'], ROS_DOMAIN_ID=str(domain_id), **changes)
+    client = connect(domain_id)
+    client.until(lambda: client.node.count_publishers('diagnostics'))
+    process.send_signal(signal.SIGTERM)
+    assert complaints(process.communicate(timeout=15.0)[1]) == ''
     assert process.returncode == 0
 
 

@@ -15,7 +15,7 @@ setup(
         ('share/' + package_name + '/config', glob('pedestal_bringup/scenarios/*.yaml')),
         ('share/' + package_name + '/launch', glob('launch/*.launch.py')),
     ],
-    install_requires=['numpy', 'numba', 'mcap', 'rosbags', 'matplotlib', 'rich', 'PyYAML', 'scipy',
+    install_requires=['numpy', 'numba', 'mcap', 'zstandard', 'lz4', 'rosbags', 'matplotlib', 'rich', 'PyYAML', 'scipy',
                       'joblib', 'filterpy'],
     extras_require={'cluster': ['dask', 'distributed'], 'parquet': ['pyarrow'],
                     'test': ['pytest', 'mcap-ros2-support', 'pyarrow', 'control', 'dask', 'distributed']},

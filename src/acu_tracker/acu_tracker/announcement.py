@@ -1,4 +1,4 @@
-"""What the operator is told of what lies ahead, and its numbers for the diagnostics.
+"""Texts of the look-ahead for the operator, and its numbers for the diagnostics.
 
 `h` is the record of lookahead.planner.PLANNER.
 """
@@ -8,7 +8,7 @@ from acu_tracker.lookahead import planner
 
 
 def keyhole(h, beamwidth):
-    """The text of acu/keyhole; beamwidth [rad]."""
+    """The text of acu/keyhole: the planned slew, or that no azimuth wrap fits; beamwidth [rad]."""
     if h['forecast'] == planner.NO_WRAP:
         return 'keyhole ahead: no turn of the azimuth holds the pass, the axis will stop at the end of its travel'
     slew = h['slew']
@@ -22,25 +22,25 @@ def keyhole(h, beamwidth):
             f'meets it at {slew["t2"]:.1f} s; expected loss {slew["loss"]:.1f} s, at most '
             f'{_deg(slew["worst"]):.2f} deg off; {other}')
     if h['deck_motion'] > 0.25 * beamwidth:
-        text += f'; rough, as the deck moves by {_deg(h["motion"]):.2f} deg rms'
+        text += f'; rough, as the deck moves by {_deg(h["deck_motion"]):.2f} deg rms'
     return text
 
 
 def hidden(h):
-    """The text of acu/blockage."""
+    """The text of acu/blockage: from when until when [s] the target will be hidden."""
     begin, end = h['hidden']
     return f'target hidden from {begin:.1f} s to {end:.1f} s'
 
 
 def numbers(h):
-    """[(key, value text)] of what is planned; nothing where nothing is."""
+    """[(key, value text)] of the forecast; of a slew and of a hidden sector only where there is one."""
     values = [('keyhole', planner.FORECASTS[h['forecast']])]
     if h['forecast'] == planner.KEYHOLE:
         slew = h['slew']
         values += [('keyhole_begins_s', f'{slew["t1"]:.3f}'), ('keyhole_ends_s', f'{slew["t2"]:.3f}'),
                    ('keyhole_loss_s', f'{slew["loss"]:.3f}'), ('keyhole_worst_deg', f'{_deg(slew["worst"]):.3f}'),
                    ('keyhole_needed_deg_s', f'{_deg(slew["needed"]):.3g}'),
-                   ('deck_motion_deg', f'{_deg(h["motion"]):.3f}')]
+                   ('deck_motion_deg', f'{_deg(h["deck_motion"]):.3f}')]
     if h['hidden'][0] == h['hidden'][0]:
         values += [('hidden_from_s', f'{h["hidden"][0]:.1f}'), ('hidden_to_s', f'{h["hidden"][1]:.1f}')]
     return values

@@ -29,7 +29,7 @@ INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'at
  _STEP_GAP) = (1 << i for i in range(len(INVALID_INPUTS)))
 
 ON_TARGET = 0.5
-"""Beamwidths by which the beam may be meant to be off the target for the receiver's error still to be taken."""
+"""Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""
 
 DRIVE_RESTART = 0.3
 """Silence [s] in which a drive may have been started again: a mode that it then ends for a while is resumed."""
@@ -44,7 +44,7 @@ INPUTS = np.dtype([
     ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
-    ('aligning', 'i8'),                                                         # 1: the INS does not know it yet
+    ('aligning', 'i8'),                                                         # 1: the INS is still aligning
     ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
 ], align=True)
@@ -72,11 +72,11 @@ STATE = np.dtype([
     ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('aligning', 'i8'),
     ('target', target.TARGET), ('error', 'f8', (2,)),                           # of this step, azimuth, elevation
     ('preset', 'f8', (2,)),
-    ('azimuth', 'f8'), ('seen', 'f8', (2,)),      # raw azimuth last asked for; deck angles of the target then
-    ('pointing_offset', 'f8'),                                  # by which the beam is meant to be off the target [rad]
+    ('azimuth', 'f8'), ('target_angles', 'f8', (2,)),  # raw azimuth of the last reference; deck angles of its target
+    ('pointing_offset', 'f8'),                                  # intended angle between beam and target [rad]
     ('overtravel', 'i8'),                                       # 1: no azimuth wrap held the whole program
     ('outage', 'f8'), ('blocked', 'i8'),                        # stamp at which an outage had a reason last [s]
-    ('bridge', bridge.BRIDGE),                                  # program where the target was last seen
+    ('bridge', bridge.BRIDGE),                                  # program where the target was last tracked
     ('lookahead', planner.PLANNER), ('axis', position_loop.AXIS, (2,)),
 ], align=True)
 
@@ -119,13 +119,14 @@ def initial_state(params) -> np.ndarray:
 
 @compiled
 def _take_encoders(s, u):
-    """Take the encoders of this step; its flag where they are not to be used."""
+    """Take the encoders of this step; _ENCODER where they are not valid, else 0."""
     return 0 if u.encoder_valid and encoders.take(s.encoders, u.stamp, u.position, u.velocity) else _ENCODER
 
 
 @compiled
 def _take_attitude(s, c, u):
-    """Take the attitude of this step, and into the mean of the look-ahead; its flag where it is unusable."""
+    """Take the attitude of this step, also into the mean of the look-ahead; _ATTITUDE where it is not valid, else
+    0."""
     s.aligning = u.aligning
     if u.stabilised != s.attitude.stabilised:
         s.attitude.stabilised, s.target.tracker.running = u.stabilised, 0
@@ -138,7 +139,7 @@ def _take_attitude(s, c, u):
     if outcome == attitude.NEW:
         deck = s.lookahead.deck
         if s.aligning:
-            # Its heading is still being looked for: the mean begins with the one that is found.
+            # Its heading is not known yet: the mean begins with the first one after the alignment.
             levelled_deck.restart(deck)
         h = s.attitude.history
         levelled_deck.take(deck, u.attitude_stamp, h.sample[h.newest], c.p.keyhole.mean_time)
@@ -147,12 +148,11 @@ def _take_attitude(s, c, u):
 
 @compiled
 def _take_error(s, c, u, o):
-    """Filter y = encoder at the instant of the error, displaced by the error; its flag where it is not accepted.
+    """Filter y = encoder at the instant of the error, displaced by the error; a flag where it is not accepted, else 0.
 
-    The error is the mean of samples that were taken while a beam jumped from step to step: target and beam each have
-    an instant that they are the mean of. Between two steps the mean moves as a straight line does, so that it is exact
-    of a ramp, whatever the weights of the samples are. While the beam is meant to be off the target the receiver's
-    reading is none.
+    The error is a mean of samples that were taken while a beam jumped from step to step, so that target and beam each
+    have an instant that the mean belongs to. Linear interpolation between two steps is exact for a ramp, whatever the
+    weights of the samples are. No error is used while the beam is intentionally off the target.
     """
     s.error[0] = s.error[1] = math.nan
     receiver = c.p.tracker.receiver
@@ -165,10 +165,10 @@ def _take_error(s, c, u, o):
     known, at = encoders.at(s.encoders, u.error_stamp - receiver.beam_age)
     if not known:
         return _ERROR_STAMP
-    seen = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
-    s.error[0], s.error[1] = seen[0] - at.A, seen[1] - at.E
+    measured = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
+    s.error[0], s.error[1] = measured[0] - at.A, measured[1] - at.E
     restart_gap = math.inf if _outage_permitted(s, c) else c.p.tracker.restart_gap
-    outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, seen, restart_gap)
+    outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, measured, restart_gap)
     for i in range(2):
         one = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
@@ -182,7 +182,7 @@ def _take_error(s, c, u, o):
 
 @compiled
 def _take_preset(s, u):
-    """Take a new preset; its flag where it is not finite."""
+    """Take a new preset; _PRESET where it is not finite, else 0."""
     if not u.preset_valid:
         return 0
     if not math.isfinite(u.preset[0] + u.preset[1]):
@@ -205,7 +205,7 @@ def _coasting(s, c):
 
 @compiled
 def _outage_permitted(s, c):
-    """Whether the receiver has, or had until lately, a reason to be without signal: a keyhole or a hidden sector."""
+    """Whether a keyhole or a hidden sector explains an outage of the receiver, now or within the last coast_time."""
     return s.stamp - s.outage <= c.p.tracker.coast_time
 
 
@@ -218,11 +218,13 @@ def _outside(c, A, E):
 
 @compiled
 def _program_obstacle(s, c, program, t_m):
-    """(NONE or why the program cannot be followed, by its times or where it is at t_m [s]; _PROGRAM if it is bad)."""
+    """(NONE or why the program cannot be followed, by its times or its place at t_m [s]; _PROGRAM if it is bad, else
+    0).
+    """
     obstacle = program_track.status(program, s.stamp)
     if obstacle != modes.NONE:
         return obstacle, 0
-    source = target.Followed(0, program_track.motion_at(program, t_m))
+    source = target.Source(0, program_track.motion_at(program, t_m))
     motion = target.on_deck(s.target, c.p, s.attitude, t_m, source)
     A, E, limits = motion.azimuth.angle, motion.elevation.angle, c.axis[0].p.limits
     if not math.isfinite(A + E):
@@ -232,10 +234,10 @@ def _program_obstacle(s, c, program, t_m):
 
 @compiled
 def _situation(s, c, drive_ready, program, t_m, request):
-    """(modes.Situation at s.stamp, flags of the program); the program is only looked at where it matters."""
+    """(modes.Situation at s.stamp, flags of the program); the program is evaluated only where it matters."""
     unstable = modes.NONE
     if s.attitude.stabilised:
-        # Before the first attitude it is not determined whether the INS has said how it is.
+        # Before the first attitude the state of the INS may not have arrived yet.
         unstable = (modes.INS_ALIGNING if s.aligning and s.attitude.history.count > 0 else
                     modes.NONE if attitude.at(s.attitude, c.p, t_m) else modes.ATTITUDE_INVALID)
     since = _since_accepted(s, c)
@@ -252,7 +254,7 @@ def _situation(s, c, drive_ready, program, t_m, request):
 
 @compiled
 def _change_mode(s, c, o, drive_ready, program, request):
-    """Let the mode machine decide at s.stamp, asked for `request` or NO_REQUEST: (result, flags of the program)."""
+    """Run the mode machine at s.stamp with a `request` or NO_REQUEST: (result, flags of the program)."""
     obeyed = drive_ready != 0 and s.unasked.moves == 0
     now, flags = _situation(s, c, obeyed, program, s.stamp + c.lead, request)
     o.locked = now.obstacle[modes.AUTOTRACK] == modes.NONE
@@ -293,9 +295,9 @@ def _resume(s, o):
 
 @compiled
 def request(s, c, u, o, program, mode):
-    """Ask for a mode (its code) between two steps; True when granted. outputs.mode and .reason tell what is now.
+    """Request a mode (its code) between two steps; True when granted. Sets outputs.mode and outputs.reason.
 
-    It is decided on what the last step knew, and takes effect on the command of the next step. Arguments as of `step`.
+    The decision uses the inputs of the last step; it takes effect on the command of the next. Arguments as of `step`.
     """
     result, _ = _change_mode(s, c, o, u.drive_ready, program, mode)
     o.mode, o.reason = s.mode, s.reason
@@ -303,13 +305,13 @@ def request(s, c, u, o, program, mode):
 
 
 @compiled
-def _followed(s, c, program, t):
-    """The Followed of program or autotrack at t [s]. An outage that has a reason is bridged by the program."""
+def _source(s, c, program, t):
+    """The target.Source of program or autotrack at t [s]; the program bridges an outage that has a reason."""
     if s.mode == modes.PROGRAM:
-        return target.Followed(0, program_track.motion_at(program, t))
+        return target.Source(0, program_track.motion_at(program, t))
     if (s.bridge.valid and _coasting(s, c) and _outage_permitted(s, c)
             and program_track.status(program, t) == modes.NONE):
-        return target.Followed(0, bridge.motion_at(s.bridge, program, t))
+        return target.Source(0, bridge.motion_at(s.bridge, program, t))
     return target.outlook(s.target, c.tracker, t)
 
 
@@ -322,14 +324,14 @@ def _pointed(s, A, E):
 
 @compiled
 def _reference(s, c, program, t):
-    """Motion on the deck at t [s] that the mode asks of the axes: its target, on the wrap that fits, or a slew."""
+    """Reference Motion on the deck at t [s] of the mode: its target, on the azimuth wrap that fits, or a slew."""
     if s.mode == modes.STOW:
         return _pointed(s, c.axis[0].p.stow, c.axis[1].p.stow)
     if s.mode == modes.PRESET:
         return _pointed(s, s.preset[0], s.preset[1])
-    source = _followed(s, c, program, t)
+    source = _source(s, c, program, t)
     motion = target.on_deck(s.target, c.p, s.attitude, t, source)
-    s.seen[0], s.seen[1] = motion.azimuth.angle, motion.elevation.angle
+    s.target_angles[0], s.target_angles[1] = motion.azimuth.angle, motion.elevation.angle
     s.pointing_offset = 0.0
     if planner.slewing(s.lookahead, t):
         level = motion.azimuth
@@ -343,7 +345,7 @@ def _reference(s, c, program, t):
 
 @compiled
 def _wrapped(s, c, program, t, azimuth):
-    """AxisMotion of the azimuth at t [s] on the wrap that fits; a program that begins, on one that holds all of it."""
+    """AxisMotion of the azimuth at t [s] on the wrap that fits; when a program begins, on one that holds all of it."""
     limits, travel = c.axis[0].p.limits, Travel(0.0, 0.0)
     begins = s.entered and s.mode == modes.PROGRAM
     if begins:
@@ -356,7 +358,7 @@ def _wrapped(s, c, program, t, azimuth):
 
 @compiled
 def _reference_of_axes(s, c, program, now):
-    """`_reference` of each axis at the instant when its controller wants to know it."""
+    """`_reference` of each axis at the instant that its controller needs."""
     t_azimuth, t_elevation = (position_loop.instant(c.axis[0].p, now.t_k, now.t_m),
                               position_loop.instant(c.axis[1].p, now.t_k, now.t_m))
     motion = _reference(s, c, program, t_azimuth)
@@ -367,8 +369,8 @@ def _reference_of_axes(s, c, program, now):
 
 @compiled
 def _deck_rates(s, c):
-    """(azimuth, elevation) rate [rad/s] at which a fixed target where the beam is seems to move because the deck does;
-    0 where nobody compensates for it."""
+    """(azimuth, elevation) rate [rad/s] at which the deck's motion moves an earth-fixed direction at the beam; 0 where
+    no axis compensates for it."""
     wanted = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
     if wanted and s.attitude.stabilised and attitude.at(s.attitude, c.p, s.stamp):
         return deck_reference.fixed_rates(vector(s.attitude.w), s.axis[0].reference.angle, s.axis[1].reference.angle)
@@ -377,7 +379,7 @@ def _deck_rates(s, c):
 
 @compiled
 def _follow(s, c, u, o, motion, now):
-    """Let the axes follow a Motion."""
+    """Run the position loops of both axes towards a Motion."""
     V, closed = _deck_rates(s, c), s.mode == modes.AUTOTRACK
     for i in range(2):
         feedback = Feedback(u.position[i], u.velocity[i], s.error[i], V[i], closed)
@@ -395,9 +397,9 @@ def _write(o, i, command):
 
 @compiled
 def _watch_outage(s, c, program):
-    """Note why the receiver is without signal: the target is hidden, or the beam on its way through the keyhole."""
+    """Note why the receiver may be without signal: the target is hidden, or the beam slews through the keyhole."""
     follows = modes.FOLLOWS[s.mode]
-    s.blocked = follows and blockage.blocked(c.lookahead.sectors, s.seen[0], s.seen[1])
+    s.blocked = follows and blockage.blocked(c.lookahead.sectors, s.target_angles[0], s.target_angles[1])
     reason = (modes.BLOCKED if s.blocked else
               modes.KEYHOLE if follows and planner.slewing(s.lookahead, s.stamp) else modes.NONE)
     if reason != modes.NONE:
@@ -410,7 +412,7 @@ def _watch_outage(s, c, program):
 
 @compiled
 def _read_estimate(s, c, o):
-    """What is known of the target now, in earth angles of the antenna."""
+    """Put the estimate of the target at s.stamp, in earth angles of the antenna, into the outputs."""
     estimate = target.read(s.target, c.p, c.tracker, s.attitude, s.stamp)
     for i in range(2):
         o.estimate[i, 0], o.estimate[i, 1], o.estimate[i, 2] = estimate.motion[i]
@@ -420,14 +422,14 @@ def _read_estimate(s, c, o):
 
 @compiled
 def _look_ahead(s, c, program):
-    """Now and then: what the target will ask of the axes."""
+    """Plan ahead once in planner.INTERVAL: keyholes and hidden sectors on the path of the target."""
     h = s.lookahead
     if not modes.FOLLOWS[s.mode]:
         planner.forget(h)
         s.overtravel, s.pointing_offset = 0, 0.0
         return
     if planner.another_program(h, program):
-        # What was planned for the last one means nothing; this one begins as a mode does.
+        # The plan was for the previous program; this one begins as a mode does.
         planner.forget(h)
         s.bridge.valid, s.entered = 0, 1
     if not planner.due(h, s.stamp):
@@ -447,7 +449,7 @@ def _look_ahead(s, c, program):
 
 @compiled
 def clear(o):
-    """Outputs of a step in which nothing has happened yet."""
+    """Reset the outputs at the start of a step."""
     o.coasting, o.blocked, o.invalid_input = 0, 0, 0
     o.torque[:] = 0.0
     o.innovation[:] = math.nan
@@ -465,7 +467,7 @@ def clear(o):
 
 @compiled
 def step(s, c, u, o, program):
-    """One drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and a ProgramTrack.
+    """Run one drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and a ProgramTrack.
 
     A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
     """

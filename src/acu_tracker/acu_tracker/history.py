@@ -1,4 +1,4 @@
-"""Stamped samples of the last steps, and where an instant lies among them."""
+"""Stamped samples of the last steps, and their interpolation at an instant."""
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -14,7 +14,7 @@ def history_type(width) -> np.dtype:
 
 @compiled
 def push(history, stamp):
-    """The row for a sample that is newer than all others; the caller fills it."""
+    """Append a stamp [s] newer than all others: the row of its sample, which the caller fills."""
     history.newest = (history.newest + 1) % LENGTH
     history.stamp[history.newest] = stamp
     history.count = min(history.count + 1, LENGTH)
@@ -39,7 +39,7 @@ def bracket(history, t):
 
 @compiled
 def interpolated(history, rows, column):
-    """A column of the samples between two rows, as `bracket` gives them."""
+    """A column of the samples, interpolated linearly; rows: as of `bracket`, valid."""
     i, j, f = rows
     a, b = history.sample[i, column], history.sample[j, column]
     return a + f * (b - a)

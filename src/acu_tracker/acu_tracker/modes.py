@@ -1,4 +1,4 @@
-"""The mode machine: which target the antenna follows, and why. One pure transition function over one table."""
+"""The mode machine: which target the antenna follows, and why. A pure transition function over one table."""
 import typing
 from collections import namedtuple
 
@@ -53,20 +53,20 @@ NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 
 
 Situation = namedtuple('Situation', 'encoder_valid drive_ready attitude obstacle end')
-"""What decides.
+"""The conditions of a change of mode.
 
 drive_ready: the drive follows commands; a mode that runs ends with it, and none begins without it. attitude: NONE
-or why it is not known; obstacle: for each mode NONE or what stands against entering it; end: for each mode NONE or
-why it cannot go on."""
+or why it is not known; obstacle: for each mode NONE or the reason that it cannot be entered; end: for each mode NONE
+or the reason that it ends."""
 
 
 @compiled
 def situation(encoder_valid, drive_ready, attitude, stow, preset, program, locked, lost):
-    """The Situation of these facts.
+    """The Situation of these conditions.
 
-    attitude, stow, preset, program: NONE or what stands against each; locked: the receiver has delivered long enough
-    and the filter has converged; lost: no measurement for longer than permitted. A program that leads outside the
-    limits cannot be entered, but goes on.
+    attitude, stow, preset, program: NONE or the reason against each; locked: enough errors were accepted and the
+    filter has converged; lost: no measurement for longer than permitted. A program that leads outside the limits
+    cannot be entered, but is not ended by that.
     """
     ends = program if program != OUTSIDE_LIMITS else NONE
     return Situation(encoder_valid, drive_ready, attitude,
@@ -96,8 +96,8 @@ def obstacle(request, now):
 
 @compiled
 def next_mode(mode, request, now, handover):
-    """The Decision of one step in a Situation; request: mode asked for, NO_REQUEST for none; handover: modes may hand
-    over by themselves."""
+    """The Decision of one step in a Situation; request: a mode or NO_REQUEST; handover: whether a mode may hand over
+    by itself."""
     why, result = NONE, NO_REQUEST
     if request != NO_REQUEST:
         why = obstacle(request, now)

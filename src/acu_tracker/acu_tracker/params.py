@@ -40,6 +40,7 @@ class AxisParameters(Parameters):
     limits: LimitsParameters = group(LimitsParameters)
 
     def check(self):
+        """Raise ParameterError where stow or preset is outside the limits, or the shaper exceeds them."""
         for name in ('stow', 'preset'):
             if not self.limits.low <= getattr(self, name) <= self.limits.high:
                 raise ParameterError(f'{name} = {getattr(self, name):g} rad: must be limits.low to limits.high, '
@@ -93,7 +94,8 @@ class AcuParameters(SharedParameters):
     elevation: ElevationParameters = group(ElevationParameters)
 
     def check_graph(self, beams):
-        """Both controllers steer a beam where the drive is an array, else none."""
+        """Raise ParameterError unless both controllers are `beam` where the drive is an array (beams > 0), else
+        neither."""
         array = beams > 0
         for axis in ('azimuth', 'elevation'):
             controller = getattr(self, axis).controller
@@ -103,6 +105,8 @@ class AcuParameters(SharedParameters):
                                         f'be one of {", ".join(CONTROLLERS[:-1])}: the drive has motors'))
 
     def check(self):
+        """Raise ParameterError for a delay longer than the histories, a notch beyond half the step rate, an attitude
+        that times out before it is used, or a step_gap that every step would exceed."""
         sectors(self.blockage)
         kept = ['receiver_latency', 'attitude_latency']
         if {self.azimuth.controller, self.elevation.controller} != {'beam'}:  # which keeps no reference until then

@@ -18,11 +18,11 @@ MODE, KEYHOLE, BLOCKAGE = 'acu/mode', 'acu/keyhole', 'acu/blockage'
 PROGRAM, DRIVE, INS = 'acu/program_track', 'adu/state', 'ins/state'
 
 FILTER_SIZE, MODELS = len(topics.FILTER), len(topics.MOTION_MODELS)
-"""Numbers that acu/filter tells of an axis; the last of them are the probabilities of the motion models."""
+"""Numbers of an axis on acu/filter; the last of them are the probabilities of the motion models."""
 
 READY = topics.BY_NAME[DRIVE].texts.index('enabled')
 ALIGNING = topics.BY_NAME[INS].texts.index('aligning')
-"""Codes of what they tell; one that never tells anything, topics.SILENT, counts as ready and as aligned."""
+"""Codes of these states; a drive or an INS that has not sent one, topics.SILENT, counts as ready or aligned."""
 
 
 RECORD = np.dtype([('state', control_unit.STATE), ('constants', control_unit.CONSTANTS),
@@ -39,7 +39,7 @@ class Memory(typing.NamedTuple):
 @compiled
 def decode(u, stamp, inputs):
     """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next. A rate or a
-    range belongs to the error that was measured with it, or to none."""
+    range is used only with the error of its own stamp."""
     joints, error, attitude = inputs[JOINTS], inputs[ERRORS], inputs[ATTITUDE]
     rate, distance = inputs[RATE], inputs[RANGE]
     u.stamp = stamp * 1e-9
@@ -69,7 +69,7 @@ def decode(u, stamp, inputs):
 
 @compiled
 def encode(o, lookahead, stamp, outputs):
-    """Outputs of the control unit, and what lies ahead -> records of its messages."""
+    """Outputs of the control unit and counts of the look-ahead -> records of its messages."""
     command, estimate, reference = outputs[COMMAND], outputs[ESTIMATE], outputs[REFERENCE]
     command.stamp = estimate.stamp = reference.stamp = outputs[FILTER].stamp = stamp
     for i in range(2):
@@ -107,7 +107,7 @@ def laws(memory, stamps, inputs, outputs):
 
 
 class Acu(Unit):
-    """The control unit of an AcuParameters. Its deck moves where an attitude is heard."""
+    """The control unit of an AcuParameters, on a ship where its graph has ship/imu/data."""
     NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
     LIVE = ('tracker', 'azimuth', 'elevation')
     REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/reset_faults')
@@ -124,9 +124,11 @@ class Acu(Unit):
         self.drive_state = 'unknown'
 
     def latency(self, topic):
+        """Age [s] of a topic's stamp at a step: attitude_latency or receiver_latency."""
         return self.parameters.attitude_latency if topic == ATTITUDE else self.parameters.receiver_latency
 
     def configure(self, parameters):
+        """Take other values of LIVE parameters into the constants; the state stays."""
         super().configure(parameters)
         self.memory.record['constants'] = control_unit.constants(parameters)
 
@@ -141,17 +143,20 @@ class Acu(Unit):
             self.memory = self.memory._replace(program=program_track.checked(times + start, angles))
 
     def take_text(self, topic, text):
+        """Take a text topic; the drive's state is kept for the diagnosis."""
         super().take_text(topic, text)
         if topic == DRIVE:
             self.drive_state = text
 
     def encode(self, topic, code):
+        """The text of a code on acu/mode, acu/keyhole or acu/blockage."""
         lookahead = self.parts['state']['lookahead']
         if topic == KEYHOLE:
             return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
         return announcement.hidden(lookahead) if topic == BLOCKAGE else modes.MODES[code]
 
     def request(self, name):
+        """The Reply to a mode or reset_faults; a refusal names the reason."""
         mode = name.removeprefix('acu/')
         m, outputs = self.parts, self.parts['outputs']
         if mode == 'reset_faults':
@@ -166,9 +171,11 @@ class Acu(Unit):
         return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
 
     def requests_for(self, topic, text):
+        """[the mode's service] for a text on acu/mode, else []."""
         return [f'acu/{text}'] if topic == MODE and text in modes.MODES else []
 
     def diagnose(self):
+        """ERROR for invalid inputs since the last diagnosis, WARN for gated errors, overtravel or coasting."""
         state, outputs = self.parts['state'], self.parts['outputs']
         mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
         invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
@@ -207,13 +214,15 @@ class Acu(Unit):
 
     @staticmethod
     def idle(numbers):
+        """Not exercised where the receiver never locked or the mode was never autotrack."""
         if not np.isfinite(numbers[ERRORS][:, 0]).any():
             return 'the receiver never locked'
         return '' if 'autotrack' in numbers[MODE] else 'the ACU was never in autotrack'
 
 
 def rows(message):
-    """(times after the stamp (n,) [s], angles (n, 2) [rad]) of a JointTrajectory; ValueError when not there."""
+    """(times after the stamp (n,) [s], angles (n, 2) [rad]) of a JointTrajectory; raises ValueError where an axis or a
+    position is missing."""
     if not set(topics.AXES) <= set(message.joint_names):
         raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(topics.AXES)}')
     columns = [message.joint_names.index(axis) for axis in topics.AXES]

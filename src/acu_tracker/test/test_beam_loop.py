@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker.estimation import alpha_beta
+from acu_tracker.estimation import constant_gain
 from acu_tracker.geometry import attitude, deck_reference
 from acu_tracker.geometry.vector import Vector
 from acu_tracker.servo import beam_loop
@@ -16,19 +16,19 @@ T = 0.01
 
 def step_response(law, alpha, delay, steps):
     """Beam (steps,) that sees a step of 1 from the start on, a command in force `delay` periods late."""
-    beta = alpha_beta.benedict_bordner(alpha)
-    R, v, commands, seen = 0.0, 0.0, [0.0] * (delay + 1), []
+    beta = constant_gain.benedict_bordner(alpha)
+    R, v, commands, beams = 0.0, 0.0, [0.0] * (delay + 1), []
     for _ in range(steps):
-        seen.append(commands[-1 - delay])
-        R, v = law(R, v, 1.0 - seen[-1], alpha, beta, T, 0.0)
+        beams.append(commands[-1 - delay])
+        R, v = law(R, v, 1.0 - beams[-1], alpha, beta, T, 0.0)
         commands.append(R)
-    return np.array(seen)
+    return np.array(beams)
 
 
 @pytest.mark.parametrize('alpha, delay', [(0.1, 0), (0.3, 0), (0.1, 4), (0.05, 10)])
 def test_step_responses_are_those_of_the_closed_transfer_functions(alpha, delay):
     """By hand from eq. (3): R = z^-1 (R + v T) + alpha nu, nu = e - T z^-1 v, and so on, e = 1 - z^-(1 + delay) R."""
-    beta = alpha_beta.benedict_bordner(alpha)
+    beta = constant_gain.benedict_bordner(alpha)
     # v T (1 - z^-1 (1 - beta)) = beta e;  R (1 - z^-1) = (1 - alpha) z^-1 v T + alpha e
     one = np.polymul([1.0, -1.0], [1.0, beta - 1.0])
     type_1 = np.polyadd(alpha * np.array([1.0, beta - 1.0]), [(1.0 - alpha) * beta]), one
@@ -52,7 +52,7 @@ def test_a_ramp_is_met_late_by_one_period_or_not_at_all(law, lag, delay):
         R, v, commands = 0.0, 0.0, [0.0] * (delay + 1)
         for k in range(4000):
             error = 0.2 * k * T - commands[-1 - delay]
-            R, v = law(R, v, error, 0.05, alpha_beta.benedict_bordner(0.05), T, compensation)
+            R, v = law(R, v, error, 0.05, constant_gain.benedict_bordner(0.05), T, compensation)
             commands.append(R)
         assert error == pytest.approx(expected, abs=1e-11)
 
@@ -64,25 +64,25 @@ def test_rates_of_a_fixed_direction_by_turning_the_deck():
     moved = []
     for sign in (-1.0, 1.0):
         mat = np.zeros((3, 3))
-        line_of_sight.rotation(*attitude.turned(np.array([0.0, 0.0, 0.0, 1.0]), tuple(sign * h * w)), mat)
+        line_of_sight.rotation(*attitude.rotated(np.array([0.0, 0.0, 0.0, 1.0]), tuple(sign * h * w)), mat)
         moved.append(line_of_sight.angles(*line_of_sight.to_deck(mat, *line_of_sight.direction(A, E))))
     np.testing.assert_allclose(rates, np.subtract(moved[1], moved[0]) / (2.0 * h), atol=1e-8)
 
 
 @pytest.fixture(name='beam')
 def beam_rig(Rig):
-    """The unit on a beam that is where it was told, `delay` late; the receiver measures with the beam that stood."""
+    """The unit on a beam that follows its command after `delay`; the receiver measures with the beam in force."""
     class BeamRig(Rig):
         def __init__(self, *args, at=(0.5, 0.6), delay=0.0, both=None, **parameters):
             axes = {f'{axis}.{name}': value for axis in ('azimuth', 'elevation')
                     for name, value in {'controller': 'beam', **(both or {})}.items()}
             super().__init__(*args, at=at, delay=delay, **{**Rig.QUICK, **axes, **parameters})
-            self.told = [tuple(at)] * (1 + round(delay / self.T))
+            self.commanded = [tuple(at)] * (1 + round(delay / self.T))
 
         def step(self, **changes):
             o = super().step(**changes)
-            self.told.append(tuple(o['reference'][:, 0]))
-            self.angle, self.velocity = np.array(self.told[-1 - round(self.delay / self.T)]), np.zeros(2)
+            self.commanded.append(tuple(o['reference'][:, 0]))
+            self.angle, self.velocity = np.array(self.commanded[-1 - round(self.delay / self.T)]), np.zeros(2)
             return o
 
         def middle(self, rows):
@@ -186,6 +186,6 @@ def test_an_error_that_is_a_mean_over_several_steps_is_met_with_the_mean_of_thei
     rig = beam(lambda t: (0.5 + rate * t, 0.0), at=(0.5, 0.0), **of_beam)
     for k in range(400):
         rig.angle = np.array([0.5 + rate * k * rig.T - 0.001, 0.0])
-        off = 0.001 + rate * np.average(stairs * rig.T - ages, weights=weights)
-        o = rig.step(cross_elevation=off, elevation=0.0)
+        error = 0.001 + rate * np.average(stairs * rig.T - ages, weights=weights)
+        o = rig.step(cross_elevation=error, elevation=0.0)
     assert o['estimate'][0, 0] == pytest.approx(0.5 + rate * 399 * rig.T, abs=1e-6)

@@ -29,15 +29,15 @@ def overhead(E0):
     return target
 
 
-def heard(rig, seconds, visible=lambda deck: True):
-    """Run with a receiver that loses a target 0.7 beamwidths off or not visible; (n, 2) stamp, angle off [rad]."""
+def pointing_errors(rig, seconds, visible=lambda deck: True):
+    """Run with a receiver that loses a target beyond 0.7 beamwidths or not visible: (n, 2) stamp [s], error [rad]."""
     rows = []
     for _ in range(round(seconds / rig.T)):
         t = rig.k * rig.T
-        off = math.hypot(*rig.error(t, rig.angle))
-        rig.receiver_on = off < 0.7 * BEAMWIDTH and visible(rig.deck(t))
+        error = math.hypot(*rig.error(t, rig.angle))
+        rig.receiver_on = error < 0.7 * BEAMWIDTH and visible(rig.deck(t))
         rig.step()
-        rows.append((t, off))
+        rows.append((t, error))
     return np.array(rows)
 
 
@@ -47,23 +47,28 @@ def test_through_the_keyhole(Rig, mode, with_program):
     rig = Rig(overhead(math.radians(88.0)), at=overhead(math.radians(88.0))(0.0), initial_mode='program', sigma=2e-4,
               **SLOW, **{'tracker.handover': mode == 'autotrack', 'tracker.receiver.sigma_floor': 2e-4})
     rig.program(start=-2.0, rows=90)
-    heard(rig, 2.0)
+    pointing_errors(rig, 2.0)
     rig.track = rig.track if with_program else NO_TRACK
-    before = heard(rig, 18.0)
-    said = announcement.keyhole(rig.state[0]['lookahead'], BEAMWIDTH)
+    before = pointing_errors(rig, 18.0)
+    text = announcement.keyhole(rig.state[0]['lookahead'], BEAMWIDTH)
+    numbers = dict(announcement.numbers(rig.state[0]['lookahead']))
     plan = rig.state['lookahead']['slew'][0].copy()
     assert before[:, 1].max() < 1e-3 and plan['t1'] > before[-1, 0]
-    during = heard(rig, 25.0)
+    during = pointing_errors(rig, 25.0)
     assert rig.mode == mode
-    after = heard(rig, 5.0)
+    after = pointing_errors(rig, 5.0)
     loss = np.sum(during[:, 1] > 0.5 * BEAMWIDTH) * rig.T
-    print(f'{mode}: predicted {plan["loss"]:.2f} s, lost {loss:.2f} s; {said}')
+    print(f'{mode}: predicted {plan["loss"]:.2f} s, lost {loss:.2f} s; {text}')
     assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 5.0
     assert plan['worst'] == pytest.approx(during[:, 1].max(), rel=0.2)
     assert after[:, 1].max() < 1e-3 and rig.mode == mode
     A, E = rig.target((rig.k - 1) * rig.T)
     np.testing.assert_allclose(rig.outputs['estimate'][0, :, 0], [A, E], atol=2e-3)
-    assert f'expected loss {plan["loss"]:.1f} s' in said and 'clockwise' in said
+    assert f'expected loss {plan["loss"]:.1f} s' in text and 'clockwise' in text and 'rough' not in text
+    assert numbers['keyhole_loss_s'] == f'{plan["loss"]:.3f}' and float(numbers['deck_motion_deg']) == 0.0
+    moving = rig.state[0]['lookahead'].copy()
+    moving['deck_motion'] = 0.5 * BEAMWIDTH
+    assert f'the deck moves by {math.degrees(0.5 * BEAMWIDTH):.2f} deg rms' in announcement.keyhole(moving, BEAMWIDTH)
 
 
 def slewing(Rig, **parameters):
@@ -103,19 +108,19 @@ def test_a_mast_hides_the_target(Rig):
     rig = Rig(lambda t: (0.5 + 0.03 * t, 0.5), at=(0.5, 0.5), initial_mode='autotrack', sigma=2e-5, **Rig.QUICK,
               **{'tracker.receiver.sigma_floor': 2e-5, 'blockage': f'{sector[0]} {sector[1]} 0.8',
                  'azimuth.filter.current_statistical.a_max': 0.002})
-    heard(rig, 3.5)
+    pointing_errors(rig, 3.5)
     begin, end = rig.state['lookahead']['hidden'][0]
     assert (begin, end) == (pytest.approx(4.0, abs=0.2), pytest.approx(32.0 / 3.0, abs=0.2))
     assert announcement.hidden(rig.state[0]['lookahead']).startswith('target hidden from')
     rig.run(0.1)
     for _ in range(2):
-        off = heard(rig, 3.4, lambda deck: not sector[0] <= deck[0] <= sector[1])
+        errors = pointing_errors(rig, 3.4, lambda deck: not sector[0] <= deck[0] <= sector[1])
         assert (rig.mode, rig.reason) == ('autotrack', 'blocked') and rig.outputs['blocked'][0] == 1
-        assert off[:, 1].max() < 0.5 * BEAMWIDTH
-    heard(rig, 2.0, lambda deck: not sector[0] <= deck[0] <= sector[1])
-    off = heard(rig, 2.0)
+        assert errors[:, 1].max() < 0.5 * BEAMWIDTH
+    pointing_errors(rig, 2.0, lambda deck: not sector[0] <= deck[0] <= sector[1])
+    errors = pointing_errors(rig, 2.0)
     assert (rig.mode, rig.reason) == ('autotrack', 'none') and not rig.outputs['blocked'][0]
-    assert off[:, 1].max() < 1e-3
+    assert errors[:, 1].max() < 1e-3
     rig.receiver_on = False
     rig.run(4.0)
     assert rig.mode == 'standby'
@@ -126,13 +131,13 @@ def test_every_sector_on_the_way_is_announced(Rig):
     rig = Rig(lambda t: (0.5 + 0.03 * t, 0.5), at=(0.5, 0.5), initial_mode='program',
               **{'blockage': '0.65 0.7 0.8; 0.76 0.85 0.8', 'tracker.handover': False})
     rig.program(rows=60)
-    told = []
+    intervals = []
     for _ in range(12):
         rig.run(1.0)
         h = rig.state[0]['lookahead']
-        if h['blockages'] > len(told):
-            told.append(h['hidden'].tolist())
-    np.testing.assert_allclose(told, [[5.0, 20.0 / 3.0], [26.0 / 3.0, 35.0 / 3.0]], atol=0.07)
+        if h['blockages'] > len(intervals):
+            intervals.append(h['hidden'].tolist())
+    np.testing.assert_allclose(intervals, [[5.0, 20.0 / 3.0], [26.0 / 3.0, 35.0 / 3.0]], atol=0.07)
     assert h['blockages'] == 2
 
 
@@ -174,23 +179,23 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
     """A buoy 400 m away seen from a mast of 30 m that rolls: with a range the estimate does not see the mast swing."""
     place, arm = np.array([300.0, 250.0, 80.0]), np.array([5.0, -3.0, 30.0])
 
-    def seen(t):
+    def direction(t):
         e, n, u = place - Rig.rolling(t).apply(arm)
         return line_of_sight.earth_angles(e, n, u)
-    rig = Rig(seen, attitude=Rig.rolling, stabilised=True, initial_mode='autotrack', at=(0.5, 0.2), **Rig.QUICK,
+    rig = Rig(direction, attitude=Rig.rolling, stabilised=True, initial_mode='autotrack', at=(0.5, 0.2), **Rig.QUICK,
               **{f'lever_arm.{axis}': value for axis, value in zip('xyz', arm)})
     rig.angle = rig.deck(0.0)
     worst, swing = 0.0, []
     for k in range(2400):
         t = rig.k * rig.T
         distance = np.linalg.norm(place - rig.attitude(t).apply(arm)) if ranged else math.nan
-        off = math.hypot(*rig.error(t, rig.angle))
+        error = math.hypot(*rig.error(t, rig.angle))
         rig.step(range=distance, range_variance=1.0)
         if k > 1400:
-            worst = max(worst, off)
+            worst = max(worst, error)
             estimate = rig.outputs['estimate'][0]
             azimuth = rig.state[0]['target']['tracker']['filter']['axis'][0]
-            swing.append((*(estimate[:, 0] - seen(t)), azimuth['x'][0, 1]))
+            swing.append((*(estimate[:, 0] - direction(t)), azimuth['x'][0, 1]))
     swing = np.array(swing)
     print(f'range measured {ranged}: off {worst:.2e} rad, filtered rate {np.ptp(swing[:, 2]):.2e} rad/s')
     assert rig.mode == 'autotrack'
@@ -209,6 +214,6 @@ def test_the_levelled_deck_is_the_mean_of_its_attitudes():
         attitude = Rotation.from_euler('ZYX', [0.7, 0.03 * math.sin(0.9 * t), 0.05 * math.sin(0.6 * t)])
         levelled_deck.take(h[0], t, attitude.as_quat() * (-1.0 if int(t) % 2 else 1.0), 60.0)
         tilts.append(math.acos(attitude.as_matrix()[2, 2]))
-    off = Rotation.from_quat(h['mean'][0]).inv() * Rotation.from_euler('Z', 0.7)
-    assert off.magnitude() < 3e-3
+    difference = Rotation.from_quat(h['mean'][0]).inv() * Rotation.from_euler('Z', 0.7)
+    assert difference.magnitude() < 3e-3
     assert math.sqrt(h['spread'][0]) == pytest.approx(np.sqrt(np.mean(np.square(tilts))), rel=0.1)

@@ -66,7 +66,7 @@ def test_turned_is_the_rotation_by_a_vector():
     rng = np.random.default_rng(1)
     for size in (0.0, 1e-9, 0.1, 2.0):
         q, r = Rotation.from_rotvec(rng.normal(size=3)), size * rng.normal(size=3)
-        got = Rotation.from_quat(attitudes.turned(q.as_quat(), tuple(r)))
+        got = Rotation.from_quat(attitudes.rotated(q.as_quat(), tuple(r)))
         assert (got.inv() * q * Rotation.from_rotvec(r)).magnitude() < 1e-14
 
 
@@ -98,12 +98,12 @@ def test_the_end_of_a_lever_arm_sees_the_target_from_there(t):
     """Place and motion of a direction less r / range, against differences."""
     arm = np.array([0.02, -0.05, 0.3])
 
-    def seen(t):
+    def direction_at(t):
         A, E = earth(t)
         u = attitude(t).inv().apply([math.cos(E) * math.sin(A), math.cos(E) * math.cos(A), math.sin(E)])
         return u, (u - arm) / np.linalg.norm(u - arm)
     h = 1e-3
-    (u0, n0), (u1, n1), (u2, n2) = (seen(t + d) for d in (-h, 0.0, h))
+    (u0, n0), (u1, n1), (u2, n2) = (direction_at(t + d) for d in (-h, 0.0, h))
     state = np.zeros(1, lever_arm.LEVER_ARM)
     state['arm'] = arm
     sight = LineOfSight(Vector(*u1), Vector(*(u2 - u0) / (2 * h)), Vector(*(u2 - 2 * u1 + u0) / h**2))

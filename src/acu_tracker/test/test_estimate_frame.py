@@ -53,23 +53,23 @@ def test_variances_turn_with_the_frame():
     rng = np.random.default_rng(5)
     sigma = 1e-4, 3e-4
     A, E = 0.05 + sigma[0] * rng.normal(size=4000), 0.02 + sigma[1] * rng.normal(size=4000)
-    seen = np.column_stack((np.cos(E) * np.sin(A), np.cos(E) * np.cos(A), np.sin(E))) @ frame['mat'].T
-    azimuth, elevation = np.arctan2(seen[:, 0], seen[:, 1]), np.arcsin(seen[:, 2])
-    told = estimate_frame.earth_variances(frame, standing(0.05, 0.02), standing(azimuth.mean(), elevation.mean()),
-                                          sigma[0]**2, sigma[1]**2)
-    np.testing.assert_allclose(told, [azimuth.var(), elevation.var()], rtol=0.1)
+    framed = np.column_stack((np.cos(E) * np.sin(A), np.cos(E) * np.cos(A), np.sin(E))) @ frame['mat'].T
+    azimuth, elevation = np.arctan2(framed[:, 0], framed[:, 1]), np.arcsin(framed[:, 2])
+    variances = estimate_frame.earth_variances(frame, standing(0.05, 0.02), standing(azimuth.mean(), elevation.mean()),
+                                               sigma[0]**2, sigma[1]**2)
+    np.testing.assert_allclose(variances, [azimuth.var(), elevation.var()], rtol=0.1)
 
 
 def test_the_bridge_is_the_program_turned_to_the_target():
     times = np.arange(0.0, 40.0)
     program = ProgramTrack(times, np.column_stack((0.5 + 0.03 * times, 0.4 + 0.01 * times)))
-    seen = np.array([math.cos(0.515) * math.sin(0.83), math.cos(0.515) * math.cos(0.83), math.sin(0.515)])
+    estimated = np.array([math.cos(0.515) * math.sin(0.83), math.cos(0.515) * math.cos(0.83), math.sin(0.515)])
     b = np.zeros(1, bridge.BRIDGE)
-    bridge.begin(b[0], program, 10.0, Vector(*seen))
+    bridge.begin(b[0], program, 10.0, Vector(*estimated))
     assert b['valid'][0] == 1
     was = np.array(program_track.direction(program, 10.0))
-    turn = Rotation.align_vectors([seen], [was])[0]
-    assert turn.magnitude() == pytest.approx(math.acos(was @ seen), rel=1e-9)
+    turn = Rotation.align_vectors([estimated], [was])[0]
+    assert turn.magnitude() == pytest.approx(math.acos(was @ estimated), rel=1e-9)
     h = 1e-3
     A, E = np.array([(math.atan2(v[0], v[1]), math.asin(v[2])) for v in
                      (turn.apply(program_track.direction(program, 17.5 + d)) for d in (-h, 0.0, h))]).T
@@ -80,5 +80,5 @@ def test_the_bridge_is_the_program_turned_to_the_target():
         assert acceleration == pytest.approx((x[2] - 2 * x[1] + x[0]) / h**2, abs=1e-6)
     bridge.begin(b[0], program, 10.0, Vector(0.0, 0.0, 1.0))
     assert b['valid'][0] == 0
-    bridge.begin(b[0], program, 50.0, Vector(*seen))
+    bridge.begin(b[0], program, 50.0, Vector(*estimated))
     assert b['valid'][0] == 0

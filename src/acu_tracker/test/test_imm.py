@@ -94,8 +94,8 @@ def test_a_far_measurement_keeps_its_evidence(distance):
     expected = np.log(f['mu_prior'][:3] / np.sqrt(S)) - 0.5 * nu**2 / S
     mu = f['mu'][:3]
     assert mu.sum() == pytest.approx(1.0) and np.argmax(mu) == np.argmax(expected)
-    seen = mu > 1e-300
-    np.testing.assert_allclose(np.log(mu[seen]), (expected - expected.max())[seen] - math.log(
+    possible = mu > 1e-300
+    np.testing.assert_allclose(np.log(mu[possible]), (expected - expected.max())[possible] - math.log(
         np.exp(expected - expected.max()).sum()), rtol=1e-9, atol=1e-9)
     # And the next measurements bring the others back.
     for _ in range(2000):

@@ -135,18 +135,18 @@ def test_no_bump_when_the_range_is_lost_or_the_kind_changes():
 
 
 def test_a_direction_is_compared_with_what_was_told_in_the_coast():
-    """The unscented transform of the gate against the linearised one that is told."""
+    """The unscented transform of the gate against the linearised one of the estimate."""
     tracked = Pass()
     tracked.take(15.0)
     tracked.k += round(0.8 / T)
     stamp, (A, E) = tracked.t[tracked.k], tracked.truth[tracked.k]
-    told = tracked.now(stamp)
+    estimate = tracked.now(stamp)
     azimuth, elevation = tracker.read(tracked.state[0], tracked.c, stamp).variances
     _, innovation = tracked.observe(stamp, A, E, (1e-9, 1e-9), math.nan, math.nan, tracked.p['restart_gap'])
     (nu_a, S_a, *_), (nu_e, S_e, *_) = innovation.axis
     sigma = np.sqrt((S_a, S_e))
     assert sigma == pytest.approx(np.sqrt((azimuth.p11 + 1e-9, elevation.p11 + 1e-9)), rel=0.01)
-    assert np.abs([nu_a - (A - told[0]), nu_e - (E - told[3])]).max() < 0.05 * sigma.min()
+    assert np.abs([nu_a - (A - estimate[0]), nu_e - (E - estimate[3])]).max() < 0.05 * sigma.min()
 
 
 @pytest.mark.parametrize('ranged', [True, False])

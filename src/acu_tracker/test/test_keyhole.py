@@ -27,7 +27,7 @@ def azimuth(t, E0):
 
 
 def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.0, tilt=0.0):
-    """(what was found, the plan); turn: whole turns of the axis at the start."""
+    """(outcome, plan); turn: whole turns of the axis at the start."""
     path = Path(np.zeros((ROWS, 6)), start, H)
     path.rows[:, :3] = target(start + H * np.arange(ROWS), E0)
     complete(path, Travel(0.0, above))
@@ -39,8 +39,8 @@ def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.
 @pytest.mark.parametrize('E0_deg, keyhole_ahead', [(80.0, False), (84.9, False), (85.1, True), (89.0, True)])
 def test_a_keyhole_is_where_W_over_cos_E0_is_too_fast(E0_deg, keyhole_ahead):
     E0 = math.radians(E0_deg)
-    found, plan = planned(E0)
-    assert (W / math.cos(E0) > RATE) == keyhole_ahead == (found == keyhole.PLANNED)
+    outcome, plan = planned(E0)
+    assert (W / math.cos(E0) > RATE) == keyhole_ahead == (outcome == keyhole.PLANNED)
     if keyhole_ahead:
         assert plan['needed'] == pytest.approx(W / math.cos(E0), rel=0.02)
         assert plan['highest'] == pytest.approx(E0, abs=1e-4)
@@ -50,11 +50,11 @@ def test_a_keyhole_is_where_W_over_cos_E0_is_too_fast(E0_deg, keyhole_ahead):
 @pytest.mark.parametrize('E0_deg', [86.0, 88.0, 89.5, 90.0])
 def test_the_slew_leaves_and_meets_the_target_within_its_limits(E0_deg):
     E0 = math.radians(E0_deg)
-    found, plan = planned(E0)
-    assert found == keyhole.PLANNED and plan['long_way'] == 0
+    outcome, plan = planned(E0)
+    assert outcome == keyhole.PLANNED and plan['long_way'] == 0
     for end in ('1', '2'):
-        off = plan['azimuth' + end] - azimuth(plan['t' + end], E0)
-        assert abs(off - 2.0 * math.pi * round(off / (2.0 * math.pi))) < 2e-4
+        difference = plan['azimuth' + end] - azimuth(plan['t' + end], E0)
+        assert abs(difference - 2.0 * math.pi * round(difference / (2.0 * math.pi))) < 2e-4
         at = np.array(slew.azimuth_at(plan, plan['t' + end]))
         np.testing.assert_allclose(at[:2], [plan['azimuth' + end], plan['rate' + end]], atol=1e-5)
     t = np.linspace(plan['t1'], plan['t2'], 4001)
@@ -88,10 +88,10 @@ def loss(t1, E0, way, rate=RATE):
     a = azimuth(t1, E0) + way * np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * (t[1] - t[0])))
     elevations = np.linspace(0.5, HIGHEST, 600)
     u = target(t, E0)
-    seen = (np.outer(np.cos(a) * u[:, 0] - np.sin(a) * u[:, 1], np.cos(elevations))
+    cosines = (np.outer(np.cos(a) * u[:, 0] - np.sin(a) * u[:, 1], np.cos(elevations))
             + np.outer(u[:, 2], np.sin(elevations)))
-    off = np.arccos(np.minimum(seen.max(axis=1), 1.0))
-    return np.mean(off > HALF_BEAM) * (t2 - t1)
+    offset = np.arccos(np.minimum(cosines.max(axis=1), 1.0))
+    return np.mean(offset > HALF_BEAM) * (t2 - t1)
 
 
 @pytest.mark.parametrize('E0_deg', [87.0, 89.0])
@@ -111,8 +111,8 @@ def test_the_limits_choose_the_side_and_the_other_way_costs_more():
     """From the turn at the limit there is no room clockwise; the target's own way is clockwise."""
     E0 = math.radians(89.0)
     _, free = planned(E0, low=-5.5)
-    found, forced = planned(E0, low=-5.5, high=0.5)
-    assert found == keyhole.PLANNED
+    outcome, forced = planned(E0, low=-5.5, high=0.5)
+    assert outcome == keyhole.PLANNED
     assert free['peak'] > 0.0 > forced['peak'] and forced['long_way'] == 1 and forced['other_cost'] == math.inf
     assert forced['cost'] == pytest.approx(free['other_cost'], rel=1e-2) and forced['loss'] > 1.2 * free['loss']
     assert forced['loss'] == pytest.approx(loss(forced['t1'], E0, -1.0), rel=0.02)
@@ -137,7 +137,7 @@ def test_a_deck_that_tilts_by_more_than_the_beam_loses_all_of_the_slew():
 
 def test_begun_late_or_not_seen_to_its_end():
     E0 = math.radians(89.0)
-    found, plan = planned(E0, start=CENTRE - 1.0)
-    assert found == keyhole.PLANNED and plan['t1'] >= CENTRE - 1.0
+    outcome, plan = planned(E0, start=CENTRE - 1.0)
+    assert outcome == keyhole.PLANNED and plan['t1'] >= CENTRE - 1.0
     assert planned(E0, start=CENTRE - SPAN + 3.0)[0] == keyhole.BEYOND
     assert planned(E0, start=CENTRE + 20.0)[0] == keyhole.NOTHING

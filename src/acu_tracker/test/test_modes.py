@@ -34,8 +34,8 @@ def next_mode(mode, request=NO_REQUEST, encoder_ok=True, drive_ready=True, attit
     return modes.next_mode(mode, request, now, handover)
 
 
-@pytest.mark.parametrize('mode', range(5))
-@pytest.mark.parametrize('request_', range(5))
+@pytest.mark.parametrize('mode', range(len(modes.MODES)))
+@pytest.mark.parametrize('request_', range(len(modes.MODES)))
 def test_every_mode_is_reached_from_every_mode(mode, request_):
     assert next_mode(mode, request_) == (request_, REQUESTED, ACCEPTED)
 
@@ -57,7 +57,7 @@ def test_every_mode_is_reached_from_every_mode(mode, request_):
     (PRESET, dict(drive_ready=False), DRIVE_NOT_READY),
     (PROGRAM, dict(drive_ready=False), DRIVE_NOT_READY),
     (AUTOTRACK, dict(drive_ready=False), DRIVE_NOT_READY),
-    (5, {}, UNKNOWN_MODE),
+    (len(modes.MODES), {}, UNKNOWN_MODE),
     (-2, {}, UNKNOWN_MODE),
 ])
 def test_refusals_name_the_reason_and_change_nothing(request_, changes, reason):

@@ -97,12 +97,12 @@ def test_every_model_against_van_loan(kind, T):
     block = expm(np.block([[-A, np.outer(g, g)], [np.zeros((3, 3)), A.T]]) * T)
     phi = block[3:, 3:].T
     m = model(kind, noise=0.3, alpha=0.7, sigma=0.2)
-    found = motion_models.discretised(m, 5.0, T)
-    f13, f23, f33 = found.F
+    discrete = motion_models.discretised(m, 5.0, T)
+    f13, f23, f33 = discrete.F
     np.testing.assert_allclose([[1, T, f13], [0, 1, f23]], phi[:2], rtol=1e-12, atol=1e-15)
     assert f33 == (0.0 if kind == 'cv' else pytest.approx(phi[2, 2], rel=1e-12))
-    assert found.mean == found.F
-    np.testing.assert_allclose(symmetric(*found.Q), phi @ block[:3, 3:], rtol=1e-7, atol=1e-18)
+    assert discrete.mean == discrete.F
+    np.testing.assert_allclose(symmetric(*discrete.Q), phi @ block[:3, 3:], rtol=1e-7, atol=1e-18)
 
 
 def test_modified_rayleigh_variance_by_quadrature():

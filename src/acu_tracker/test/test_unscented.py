@@ -50,14 +50,14 @@ def run(y, constants, state=None):
     return out, variances, mu, s[0]
 
 
-def told(s, c, T):
+def read_estimate(s, c, T):
     """(angles, rates, accelerations (6,), variances (7,)) T after the last measurement."""
     unscented.predict(s, c, T)
     axes, variance = unscented.variances(s)
     return np.ravel(unscented.expected(s)), np.append(axes, variance)
 
 
-def seen(p):
+def spherical(p):
     """(n, 3) azimuth (unwrapped), elevation, range of positions (n, 3) in ENU."""
     return np.column_stack((np.unwrap(np.arctan2(p[:, 0], p[:, 1])), np.arctan2(p[:, 2], np.hypot(p[:, 0], p[:, 1])),
                             np.linalg.norm(p, axis=1)))
@@ -98,12 +98,12 @@ def filterpy_imm(params, x, P):
         points = MerweScaledSigmaPoints(9, unscented.ALPHA, unscented.BETA, unscented.KAPPA)
 
         def measured(x, count=3):
-            return seen(x[np.newaxis, :3])[0, :count]
+            return spherical(x[np.newaxis, :3])[0, :count]
 
         def mean(points, weights):
-            off = points - points[0]
-            off[:, 0] = wrapped(off[:, 0])
-            return points[0] + weights @ off
+            deviations = points - points[0]
+            deviations[:, 0] = wrapped(deviations[:, 0])
+            return points[0] + weights @ deviations
 
         def difference(a, b):
             d = a - b
@@ -123,7 +123,7 @@ def test_equals_filterpy(dropped):
     """A pass through south, where the azimuth wraps, with and without a gap in the range."""
     params = UkfParameters(cv_noise=0.3, ca_noise=3.0, dwell=2.0)
     t, p = flyby(distance=-60.0, seconds=3.0)
-    y = noisy(seen(p), 1)
+    y = noisy(spherical(p), 1)
     y[:, 0] = wrapped(y[:, 0])
     assert np.ptp(y[:, 0]) > 6.0
     y[dropped, 2] = math.nan
@@ -139,7 +139,7 @@ def test_equals_filterpy(dropped):
         count = 3 if np.isfinite(row[2]) else 2
         for one in oracle.filters:
             one.R = np.diag(R * [1.0 / math.cos(row[1])**2, 1.0, 1.0])[:count, :count]
-            one.hx = lambda x, count=count: seen(x[np.newaxis, :3])[0, :count]
+            one.hx = lambda x, count=count: spherical(x[np.newaxis, :3])[0, :count]
         oracle.update(row[:count])
         assert mu[0] == pytest.approx(oracle.mu, abs=1e-8)
         for j, one in enumerate(oracle.filters):
@@ -155,7 +155,7 @@ def test_rates_and_accelerations_are_derivatives_of_the_angles():
     c = unscented.constants(UkfParameters())
     c['dwell'] = 1e9
     h = 1e-3
-    before, now, after = (told(s[0], c[0], 1.0 + k * h)[0] for k in (-1, 0, 1))
+    before, now, after = (read_estimate(s[0], c[0], 1.0 + k * h)[0] for k in (-1, 0, 1))
     for angle in (0, 3):
         assert now[angle + 1] == pytest.approx((after[angle] - before[angle]) / (2 * h), rel=1e-5)
         assert now[angle + 2] == pytest.approx((after[angle] - 2 * now[angle] + before[angle]) / h**2, rel=1e-4)
@@ -170,7 +170,7 @@ def test_variances_are_those_of_many_targets():
     root = rng.normal(size=(2, 9, 9)) * np.repeat([0.02, 0.05, 0.1], 3)[:, np.newaxis]
     s['p'] = root @ np.swapaxes(root, 1, 2)
     c = unscented.constants(UkfParameters(cv_noise=1e-6, ca_noise=1e-6))
-    _, found = told(s[0], c[0], 0.5)
+    _, variances = read_estimate(s[0], c[0], 0.5)
     # Of the targets that were of mode i some are of mode j by then, which moved them.
     stay, samples = 0.5 * (1.0 + math.exp(-2.0 * 0.5 / UkfParameters().dwell)), []
     for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
@@ -179,9 +179,10 @@ def test_variances_are_those_of_many_targets():
         a = x[:, 6:] * j
         p, v = x[:, :3] + 0.5 * x[:, 3:6] + 0.125 * a, x[:, 3:6] + 0.5 * a
         h = 1e-4
-        samples.append(np.column_stack((seen(p), (seen(p + h * v) - seen(p - h * v)) / (2 * h))))
+        samples.append(np.column_stack((spherical(p), (spherical(p + h * v) - spherical(p - h * v)) / (2 * h))))
     C = np.cov(np.concatenate(samples).T)
-    assert found == pytest.approx((C[0, 0], C[0, 3], C[3, 3], C[1, 1], C[1, 4], C[4, 4], C[2, 2]), rel=0.05, abs=1e-7)
+    assert variances == pytest.approx((C[0, 0], C[0, 3], C[3, 3], C[1, 1], C[1, 4], C[4, 4], C[2, 2]), rel=0.05,
+                                      abs=1e-7)
 
 
 def test_starts_where_the_angles_were():
@@ -189,7 +190,7 @@ def test_starts_where_the_angles_were():
     before = Motion(AxisMotion(2.0, 0.11, -0.03), AxisMotion(0.7, -0.05, 0.02))
     known = AxisVariances(1e-6, 2e-7, 1e-6), AxisVariances(2e-6, -3e-7, 2e-6)
     unscented.start(s[0], c[0], Estimate(before, known), 800.0, 4.0)
-    motion, variances = told(s[0], c[0], 0.0)
+    motion, variances = read_estimate(s[0], c[0], 0.0)
     assert motion == pytest.approx(np.ravel(before), rel=1e-12)
     assert variances[:6] == pytest.approx(np.ravel(known), rel=1e-3)
     assert variances[6] == pytest.approx(4.0)
@@ -199,7 +200,7 @@ def rates_rms(p, params, seeds, kinds=unscented.MODES):
     """rms [deg/s] of the azimuth's rate over passes after 3 s; kinds: the models of both modes."""
     c = unscented.constants(params)
     c['models']['kind'] = kinds
-    y = seen(p)
+    y = spherical(p)
     true = np.gradient(y[:, 0], T)
     errors = [run(noisy(y, seed), c)[0][150:-1, 1] - true[150:-1] for seed in seeds]
     return float(np.sqrt(np.mean(np.square(errors)))) / DEG
@@ -223,10 +224,10 @@ def test_rate_on_the_near_flyby():
 
 def test_goes_on_without_a_range_and_says_how_sure_it_is():
     t, p = flyby(distance=500.0, height=100.0, heading=0.4)
-    y = noisy(seen(p), 7)
+    y = noisy(spherical(p), 7)
     y[1500:2000, 2] = math.nan
     out, variances, _, _ = run(y, unscented.constants(UkfParameters()))
-    true = seen(p)
+    true = spherical(p)
     sigma = np.sqrt(variances[:, [0, 2, 3, 5, 6]])
     assert (sigma[1999] > sigma[1499])[4] and sigma[1999, 4] > 3.0 * sigma[1499, 4]
     error = np.column_stack((wrapped(out[:, 0] - true[:, 0]), out[:, 1] - np.gradient(true[:, 0], T),
@@ -241,7 +242,7 @@ def test_a_turn_is_noticed():
     heading = np.cumsum(np.where((t > 12.0) & (t < 16.0), 3.0 / 15.0, 0.0) * T)
     v = 15.0 * np.column_stack((np.cos(heading), np.sin(heading), np.zeros_like(t)))
     p = np.array([-150.0, 200.0, 60.0]) + np.cumsum(v, axis=0) * T
-    _, _, mu, _ = run(noisy(seen(p), 3), unscented.constants(UkfParameters()))
+    _, _, mu, _ = run(noisy(spherical(p), 3), unscented.constants(UkfParameters()))
     assert mu[400:590, 1].mean() < 0.3 and mu[650:800, 1].mean() > 0.6
     straight = dataclasses.replace(UkfParameters(), ca_noise=1e-6, initial_acceleration=1e-6)
     assert rates_rms(p, UkfParameters(), (3,)) < 0.7 * rates_rms(p, straight, (3,))

@@ -1,4 +1,7 @@
 """ROS node of the antenna drive unit: owns the drive's time, publishes the encoders, obeys rate commands."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import sys
 
 from adu_drive import resting

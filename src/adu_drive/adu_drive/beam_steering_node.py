@@ -1,4 +1,7 @@
 """ROS node of an electronically steered array: owns the time, publishes the beams in force, obeys references."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import sys
 
 from adu_drive.timekeeper_node import Timekeeper

@@ -47,6 +47,13 @@ class Timekeeper(unit_node.UnitNode):
                         self.reader(name, unit_node.decoding(decoder), self._newest_taker(name))
             self.timer = self.every(0.001, self.tick)
 
+    @property
+    def awaits(self):
+        if self.graph.lockstep:
+            return 'the readers of what it writes'
+        _, now = self.clock()
+        return f'its time to begin, in {max(self.epoch(now) - now, 0) / SECOND:.1f} s'
+
     def start(self):
         """Lockstep: step 0, once the graph is complete."""
         self.timer.cancel()

@@ -1,7 +1,7 @@
 """The command line `pedestal`.
 
-A verb is a module of the room `verbs`: its help is the module's docstring, its arguments `add_arguments(parser)`, what
-it does `main(options)`, which returns the exit code.
+A verb is a module of the room `verbs`: its help is the module's docstring, `add_arguments(parser)` adds its arguments,
+and `main(options)` does the work and returns the exit code.
 """
 import argparse
 import importlib
@@ -18,11 +18,12 @@ VERBS = ('run', 'scenarios', 'parameters', 'program', 'verify', 'recover', 'reru
 
 
 def main(args=None) -> int:
-    """Exit code 0; 1 with one line on stderr for anything that went wrong; 2 for a wrong command line."""
+    """Run a verb: exit code 0; 1 with one line on stderr for an error; 2 for a wrong command line; 130 if stopped."""
     options = _parser().parse_args(args)
     options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: signal.raise_signal(signal.SIGINT))
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
     try:
         return options.main(options)
     except (ParameterError, ValueError, RuntimeError, OSError) as error:

@@ -1,4 +1,4 @@
-"""What the verbs show on a terminal and write as JSON: progress, tables of results, rows."""
+"""Output of the verbs: progress and tables of results on a terminal, rows as JSON."""
 import contextlib
 import json
 import math
@@ -14,7 +14,7 @@ TABLE_WIDTH = 120
 
 @contextlib.contextmanager
 def progress_of_run(duration):
-    """A function progress(seconds of the run): a bar on a terminal, nothing in a pipe. duration [s]."""
+    """Context with a function progress(seconds of the run): a bar on a terminal, nothing in a pipe. duration [s]."""
     if not sys.stderr.isatty():
         yield lambda seconds: None
         return
@@ -32,7 +32,7 @@ def progress_of_run(duration):
 
 @contextlib.contextmanager
 def progress_of_share():
-    """A function progress(share done 0 to 1, what comes next): a bar on a terminal, nothing in a pipe."""
+    """Context with a function progress(fraction done, what comes next): a bar on a terminal, nothing in a pipe."""
     if not sys.stderr.isatty():
         yield lambda share, text: None
         return
@@ -56,17 +56,18 @@ def check_json(path):
 
 
 def write_json(path, content):
-    """Write what --json asks for; nothing where path is None."""
+    """Write content as JSON to the path of --json; nothing where that is None."""
     if path:
         path.write_text(json.dumps(content, indent=1) + '\n')
 
 
 def show_results(title, columns, results, whole):
-    """A table of metrics. columns: heads, '' for a single one; results: {metric: (value, unit)} of each column; whole:
-    the same of what belongs to the run."""
+    """Print a table of metrics. columns: heads, '' for a single one; results: {metric: (value, unit)} of each column;
+    whole: {metric: (value, unit)} of the run."""
     from rich.console import Console
     from rich.table import Table
-    table = Table(title=title, title_justify='left')
+    from rich.text import Text
+    table = Table(title=Text(title), title_justify='left')
     table.add_column('metric')
     for column in columns:
         table.add_column(column or 'value', justify='right')
@@ -83,7 +84,7 @@ def _measured(value):
 
 
 def show_study(title, rows, missed):
-    """The table of a study; missed(row) -> whether its target is not met."""
+    """Print the table of a study's rows; missed(row) -> whether its target is not met."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table

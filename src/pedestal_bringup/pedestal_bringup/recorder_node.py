@@ -1,6 +1,8 @@
 """The recorder: every topic of the graph into a bag, raw, nothing lost unsaid."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import collections
-import hashlib
 import sys
 import time
 
@@ -11,7 +13,7 @@ from pedestal_bringup.bags.bag import BagError
 from pedestal_bringup.bags.step_order import OrderError, StepOrder
 from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run.recorder_params import RecorderParameters
-from pedestal_common import listening, messages, middleware, nodes, parameters, shell, topics
+from pedestal_common import files, listening, messages, middleware, nodes, parameters, shell, topics
 from pedestal_common.cdr import STAMPED
 from pedestal_common.intake import Intake
 from pedestal_common.steps import SECOND, GraphError
@@ -38,14 +40,15 @@ class RecorderNode(shell.Shell):
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
         beams, flags = self.graph.beams, [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
         recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
+        self._end = round(self.parameters.duration * SECOND) or None
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
             **({} if self.graph.lockstep else {'start': self.epoch(self.clock()[1])}),
+            **({'planned_end_ns': self._end} if self._end else {}),
             'git': configuration.git_revision(), **configuration.versions()},
             configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
         self._order = StepOrder(recorded, names, self._bag.write)
-        self._end = round(self.parameters.duration * SECOND) or None
         self._lost = collections.Counter()
         self._writers = {}
         self._stamp = self.graph.start
@@ -254,13 +257,8 @@ class RecorderNode(shell.Shell):
             self._bag.close()
         except BagError as error:
             self._fail(str(error))
-        digest = hashlib.sha256()
-        with open(self._bag.file, 'rb') as file:
-            while block := file.read(1 << 20):
-                digest.update(block)
-            size = file.tell()
         self.result = {'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),
-                       'sha256': digest.hexdigest(), 'bytes': size}
+                       'sha256': files.sha256(self._bag.file), 'bytes': self._bag.file.stat().st_size}
         if self._error is None and self._lost and self.graph.lockstep:
             self._error = self._losses()
         if self._error is not None:

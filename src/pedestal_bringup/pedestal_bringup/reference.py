@@ -9,6 +9,7 @@ import sys
 from acu_tracker import modes
 from acu_tracker.estimation.kinds import KINDS
 from adu_drive import faults
+from pedestal_bringup import studies
 from pedestal_bringup.again import what_if
 from pedestal_bringup.analysis import results
 from pedestal_bringup.run import scenario
@@ -26,7 +27,7 @@ FIRST = (
     'acu.azimuth.shaper.acceleration', 'acu.initial_mode', 'tracking_receiver.receiver.cn0_dbhz',
     'tracking_receiver.antenna.beamwidth', 'tracking_receiver.receiver.latency', 'ship_motion.ship.motion',
     'ship_motion.ship.sea_state', 'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
-"""Parameters that one touches first."""
+"""The parameters in the table of README.md."""
 
 RATES = {'step': 'step', 'once': 'once, latched', 'second': '1 Hz', 'change': 'on change, latched'}
 
@@ -74,10 +75,16 @@ def filter_table():
 
 
 def fault_table():
-    """What the drive trips on."""
+    """The faults on which the drive trips."""
     return _table(('fault, per axis', 'from', 'parameter'),
                   [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
                    for fault in faults.FAULTS])
+
+
+def study_table():
+    """The studies."""
+    return _table(('study', 'what it measures'),
+                  [(f'`{name}`', line) for name, line in studies.descriptions().items()])
 
 
 def parameter_table():
@@ -101,14 +108,15 @@ def result_table(table=results.RESULTS):
                    results.documented(table)])
 
 
-TABLES = {'nodes': node_table, 'topics': topic_table, 'services': service_table, 'modes': mode_table,
+TABLES = {'nodes': node_table, 'studies': study_table, 'topics': topic_table, 'services': service_table,
+          'modes': mode_table,
           'filter kinds': filter_table, 'drive faults': fault_table, 'results': result_table,
           'recomputed results': lambda: result_table(what_if.NUMBERS),
           'first parameters': parameter_table}
 
 
 def written(text):
-    """A file's text with its tables made anew. Raises KeyError for a table that is not known."""
+    """A file's text with its tables written again. Raises KeyError for an unknown table."""
     def table(match):
         return '\n'.join((f'<!-- table {match[1]} -->', *TABLES[match[1]](), '<!-- end -->'))
     return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)

@@ -146,22 +146,22 @@ def turning(p, f):
     return 1.0 / (1.0 + m.pole_pairs * m.flux_linkage / (m.inductance * s + m.resistance) * M(s) * (1.0 - D))
 
 
-def agrees(found, loop, low, high, gain, phase, factor=None):
+def agrees(measured, loop, low, high, gain, phase, factor=None):
     """Whether L is within gain (relative) and phase [deg] (and 50 us) of the model from low to high [Hz]."""
-    band = (low <= found.frequency) & (found.frequency <= high)
-    f = found.frequency[band]
-    ratio = found.open_loop[band] / model_at(loop, f) / (factor(f) if factor else 1.0)
+    band = (low <= measured.frequency) & (measured.frequency <= high)
+    f = measured.frequency[band]
+    ratio = measured.open_loop[band] / model_at(loop, f) / (factor(f) if factor else 1.0)
     early = 360.0 * f * PLANT_PERIOD
     turned = np.degrees(np.angle(ratio))
     return np.all(np.abs(np.abs(ratio) - 1.0) < gain) and np.all((-phase < turned) & (turned < early + phase))
 
 
-def margins_agree(found, loop, lowest):
+def margins_agree(measured, loop, lowest):
     """Margins within 1 dB and 3 deg of python-control's on a fine grid of the model from `lowest` [Hz]."""
     f = np.geomspace(lowest, 0.45 / loop.dt, 20000)
     gm, pm, _, _, w_pm, _ = control.stability_margins(
         control.frd(model_at(loop, f), 2.0 * math.pi * f, smooth=True), returnall=True)
-    ours = {metric: value for metric, (value, _) in bode.margins(found).items()}
+    ours = {metric: value for metric, (value, _) in bode.margins(measured).items()}
     return (ours['crossover_hz'] == pytest.approx(np.min(w_pm) / (2.0 * math.pi), rel=0.01)
             and ours['gain_margin_db'] == pytest.approx(20.0 * math.log10(np.min(gm[gm > 1.0])), abs=1.0)
             and ours['phase_margin_deg'] == pytest.approx(np.min(np.abs(pm)), abs=3.0))
@@ -170,21 +170,21 @@ def margins_agree(found, loop, lowest):
 def test_current_loops():
     """Around 70 Hz, where rotors swing in the meshes, their voltage is met late: up to 8 % and 3 deg, in the model."""
     p = AduParameters()
-    for name, found in bode.current(p, dataclasses.replace(bode.CURRENT, kept=3)).items():
+    for name, measured in bode.current(p, dataclasses.replace(bode.CURRENT, kept=3)).items():
         m = getattr(p.azimuth, name.partition('/')[2])
         loop = open_current_loop(m, p.azimuth.current_loop.bandwidth)
-        assert agrees(found, loop, 20.0, 4000.0, 0.015, 0.7, lambda f: turning(p.azimuth, f))
-        ours = bode.margins(found)
+        assert agrees(measured, loop, 20.0, 4000.0, 0.015, 0.7, lambda f: turning(p.azimuth, f))
+        ours = bode.margins(measured)
         assert ours['crossover_hz'][0] == pytest.approx(p.azimuth.current_loop.bandwidth, rel=0.01)
         assert ours['phase_margin_deg'][0] == pytest.approx(control.margin(loop)[1], abs=3.0)
 
 
 def test_speed_loops():
     p = AduParameters()
-    for name, found in bode.speed(p, dataclasses.replace(bode.SPEED, points=60, kept=3)).items():
+    for name, measured in bode.speed(p, dataclasses.replace(bode.SPEED, points=60, kept=3)).items():
         loop = open_speed_loop(getattr(p, name.partition('/')[2]))
-        assert agrees(found, loop, 2.0, 300.0, 0.015, 0.7)
-        assert margins_agree(found, loop, 1.0)
+        assert agrees(measured, loop, 2.0, 300.0, 0.015, 0.7)
+        assert margins_agree(measured, loop, 1.0)
 
 
 QUICK = dataclasses.replace(bode.POSITION, points=80)
@@ -194,12 +194,12 @@ def test_position_loops():
     case, axes = bode.CASES['feedforward']
     loaded = case.loaded()
     drive, acu, T = loaded.node_parameters('adu'), loaded.node_parameters('acu'), 5e-3
-    found = bode.position(case, axes, QUICK)
-    assert set(found) == {'position/azimuth/feedforward', 'position/elevation/feedforward'}
+    measured = bode.position(case, axes, QUICK)
+    assert set(measured) == {'position/azimuth/feedforward', 'position/elevation/feedforward'}
     for name in axes:
         loop = open_position_loop(getattr(drive, name), pi_controller(getattr(acu, name).feedforward, T), T)
-        assert agrees(found[f'position/{name}/feedforward'], loop, 0.25, 40.0, 0.025, 0.7)
-        assert margins_agree(found[f'position/{name}/feedforward'], loop, 0.25)
+        assert agrees(measured[f'position/{name}/feedforward'], loop, 0.25, 40.0, 0.025, 0.7)
+        assert margins_agree(measured[f'position/{name}/feedforward'], loop, 0.25)
 
 
 def test_position_loop_of_the_paper():
@@ -209,9 +209,9 @@ def test_position_loop_of_the_paper():
     assert c.integral == 0.0
     loop = open_position_loop(loaded.node_parameters('adu').azimuth,
                               pd_controller(c.bandwidth, c.derivative, c.derivative_time, T), T)
-    found = bode.position(case, axes, QUICK)['position/azimuth/paper-r1']
-    assert agrees(found, loop, 0.5, 40.0, 0.02, 0.7)
-    assert margins_agree(found, loop, 0.25)
+    measured = bode.position(case, axes, QUICK)['position/azimuth/paper-r1']
+    assert agrees(measured, loop, 0.5, 40.0, 0.02, 0.7)
+    assert margins_agree(measured, loop, 0.25)
 
 
 def test_flexible_structure_and_the_notch_against_it():
@@ -224,10 +224,10 @@ def test_flexible_structure_and_the_notch_against_it():
         loop = open_position_loop(loaded.node_parameters('adu').azimuth, pi_controller(acu.feedforward, T), T)
         if acu.notch.frequency > 0.0:
             loop = loop * notch_filter(acu.notch, T)
-        found = bode.position(case, axes)[f'position/azimuth/{name}']
-        assert agrees(found, loop, 0.25, 40.0, 0.04, 2.0)
-        assert margins_agree(found, loop, 0.25)
-        ours[name] = {metric: value for metric, (value, _) in bode.margins(found).items()}
+        measured = bode.position(case, axes)[f'position/azimuth/{name}']
+        assert agrees(measured, loop, 0.25, 40.0, 0.04, 2.0)
+        assert margins_agree(measured, loop, 0.25)
+        ours[name] = {metric: value for metric, (value, _) in bode.margins(measured).items()}
     assert ours['structure']['phase_margin_deg'] < 20.0 and ours['structure']['gain_margin_db'] < 5.0
     assert ours['structure-notch']['phase_margin_deg'] > 40.0 and ours['structure-notch']['gain_margin_db'] > 10.0
 
@@ -264,9 +264,9 @@ def test_response_of_a_known_filter_and_its_deviation():
     for k in range(1, len(x)):
         y[k] = 0.5 * y[k - 1] + 0.25 * x[k]
     y += 1e-3 * np.random.default_rng(1).standard_normal(len(x))
-    found = bode.response(sweep, x, y)
-    off = np.abs(found.open_loop / (0.25 / (1.0 - 0.5 * np.exp(-2j * np.pi * found.frequency * 1e-3))) - 1.0)
-    assert off.max() < 0.02 and 0.5 < metrics.rms(off) / metrics.rms(found.deviation) < 2.0
+    measured = bode.response(sweep, x, y)
+    error = np.abs(measured.open_loop / (0.25 / (1.0 - 0.5 * np.exp(-2j * np.pi * measured.frequency * 1e-3))) - 1.0)
+    assert error.max() < 0.02 and 0.5 < metrics.rms(error) / metrics.rms(measured.deviation) < 2.0
 
 
 def test_study_through_the_command_line(tmp_path):

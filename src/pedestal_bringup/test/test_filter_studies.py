@@ -131,10 +131,10 @@ def test_tuning_finds_the_least_criterion(kind, least):
         given = as_dict(params)
         return sum((i + 1) * math.log(given[name] / value)**2 for i, (name, value) in enumerate(least.items()))
 
-    found, value = tuning.tuned(FilterParameters(kind=kind), criterion)
-    assert value == criterion(found)
+    optimum, value = tuning.tuned(FilterParameters(kind=kind), criterion)
+    assert value == criterion(optimum)
     for name, best in least.items():
-        assert as_dict(found)[name] == pytest.approx(best, rel=0.05)
+        assert as_dict(optimum)[name] == pytest.approx(best, rel=0.05)
 
 
 def test_tuning_of_many_parameters_begins_where_they_are():
@@ -145,9 +145,9 @@ def test_tuning_of_many_parameters_begins_where_they_are():
         return (math.log(imm.dwell / best.dwell)**2 + math.log(imm.cv.noise / best.cv.noise)**2
                 + math.log(imm.ca.noise / best.ca.noise)**2)
 
-    found, value = tuning.tuned(FilterParameters(kind='imm'), criterion)
+    optimum, value = tuning.tuned(FilterParameters(kind='imm'), criterion)
     assert value < criterion(FilterParameters(kind='imm')) / 20.0
-    assert found.imm.dwell == pytest.approx(3.0, rel=0.15)
+    assert optimum.imm.dwell == pytest.approx(3.0, rel=0.15)
 
 
 def test_a_criterion_that_never_works_is_refused():

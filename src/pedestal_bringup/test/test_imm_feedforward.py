@@ -39,7 +39,7 @@ def test_the_gains_leave_only_the_jerk():
     assert 1.0 - W * W * (k_v + k_a * s) / (s * s + 2.0 * ZETA * W * s + W * W) == pytest.approx((s / W)**2, rel=0.03)
 
 
-def followed(angle, late):
+def steady_miss(angle, late):
     """Miss after 8 s, no noise, of a target with a polynomial angle; its true state fed forward, `late` [s]."""
     t = T * np.arange(800)
     target = np.column_stack([angle.deriv(i)(t) if i else angle(t) for i in range(3)])
@@ -56,7 +56,7 @@ def followed(angle, late):
     ([0.0, 0.1, 0.0, 0.01], 0.0, 0.06 * (1.0 / W**2 - T * T / 24.0) / loop.K_P)])
 def test_what_a_polynomial_leaves(coefficients, late, left):
     """Of a delay a * late / K_p; of jerk j what W lacks, j / w^2, less what holding a rate over T adds, j T^2 / 24."""
-    assert followed(np.polynomial.Polynomial(coefficients), late) == pytest.approx(left, rel=1e-4, abs=1e-9)
+    assert steady_miss(np.polynomial.Polynomial(coefficients), late) == pytest.approx(left, rel=1e-4, abs=1e-9)
 
 
 def test_one_run_is_what_filterpy_and_scipy_make_of_it():
@@ -94,20 +94,20 @@ def test_noise_of_the_rate_is_the_steady_states():
     P = solve_discrete_are(F.T, H.T, q * q * np.array([[T**3 / 3.0, T * T / 2.0], [T * T / 2.0, T]]), R)
     K = P @ H.T / (P[0, 0] + R)
     expected = math.degrees(math.sqrt(solve_discrete_lyapunov((np.eye(2) - K @ H) @ F, K @ K.T * R)[1, 1]))
-    found = loop.outcomes({'cv': ('azimuth', loop.cv(0.5))}, 50, monte_carlo.Pool(1))['cv']
-    assert found.measures()['rate_noise_deg_s'][0] == pytest.approx(expected, rel=0.03)
+    result = loop.statistics({'cv': ('azimuth', loop.cv(0.5))}, 50, monte_carlo.Pool(1))['cv']
+    assert result.measures()['rate_noise_deg_s'][0] == pytest.approx(expected, rel=0.03)
 
 
 def test_an_outcome_is_that_of_all_its_runs():
     """More than one batch, against one array of all runs."""
     case = ('azimuth', study.SOURCES['imm-predicted'])
     count = loop.BATCH + 3
-    found = loop.outcomes({'case': case}, count, monte_carlo.Pool(1))['case']
+    result = loop.statistics({'case': case}, count, monte_carlo.Pool(1))['case']
     miss = loop.steps_of(*case, 0, count)['miss']
     t, _, period = loop.motion('azimuth')
-    assert found.miss_mean == pytest.approx(miss.mean(axis=0), abs=1e-12)
+    assert result.miss_mean == pytest.approx(miss.mean(axis=0), abs=1e-12)
     counts = t >= 0.5 * period
-    values = found.measures()
+    values = result.measures()
     assert values['miss_rms_deg'][0] == pytest.approx(math.degrees(metrics.rms(miss[:, counts])))
     assert values['miss_peak_deg'][0] == pytest.approx(np.degrees(np.abs(miss[:, counts]).max(axis=1).mean()))
     assert values['miss_rms_deg'][0] < values['miss_worst_second_deg'][0] < values['miss_peak_deg'][0]
@@ -149,6 +149,6 @@ def test_batches_are_added_as_they_come():
                 yield sums, 1.0
 
     runs = 12 * loop.BATCH
-    outcome = loop.outcomes({'case': ('azimuth', loop.cv(0.1))}, runs, Pool())['case']
+    outcome = loop.statistics({'case': ('azimuth', loop.cv(0.1))}, runs, Pool())['case']
     assert most <= 3
     assert outcome.miss_mean == pytest.approx(66.0 / runs) and outcome.peak == pytest.approx(12.0 / runs)

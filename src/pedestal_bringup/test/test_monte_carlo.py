@@ -23,9 +23,9 @@ def numbers(pool, count=5):
         return np.random.default_rng(seed).standard_normal(3)
 
     shares = []
-    found = list(pool.map(drawn, range(count), lambda share, text: shares.append(share)))
+    results = list(pool.map(drawn, range(count), lambda share, text: shares.append(share)))
     assert shares == [(i + 1) / count for i in range(count)]
-    return np.array(found)
+    return np.array(results)
 
 
 def test_results_come_in_order_from_every_number_of_workers():

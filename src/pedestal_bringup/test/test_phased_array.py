@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from acu_tracker.estimation.alpha_beta import benedict_bordner
+from acu_tracker.estimation.constant_gain import benedict_bordner
 from pedestal_bringup.studies import phased_array
 from pedestal_bringup.studies.phased_array import instants, settled
 from pedestal_bringup.studies.rigs import drawing, metrics, rows
-from pedestal_bringup.studies.rigs.angle_loop import GRID, LENGTH, Better, Paper, received
+from pedestal_bringup.studies.rigs.angle_loop import GRID, LENGTH, Better, Paper, Receiver, received
 from tracking_receiver_sim import monopulse
 
 
@@ -127,12 +127,12 @@ def test_with_the_ins_only_what_the_attitude_is_late_is_left():
 def test_receiver_is_the_monopulse_pattern():
     width = math.radians(1.0)
     v = np.linspace(-0.7, 0.7, 29)
-    seen = np.array([received(x * width, 1.0, width, 0.4) for x in v])
+    errors = np.array([received(x * width, Receiver(1.0, width, 0.4)) for x in v])
     S = np.array([monopulse.sum_pattern(x) for x in v])
     expected = np.array([monopulse.difference_pattern(x, 1.0) for x in v]) / S
-    np.testing.assert_allclose(seen[S * S >= 0.4], np.clip(expected, -0.7, 0.7)[S * S >= 0.4] * width, atol=1e-15)
-    assert np.all(np.isnan(seen[S * S < 0.4])) and np.sum(S * S < 0.4) > 2
-    assert received(0.3, 1.5, 0.0, 0.5) == pytest.approx(0.45)
+    np.testing.assert_allclose(errors[S * S >= 0.4], np.clip(expected, -0.7, 0.7)[S * S >= 0.4] * width, atol=1e-15)
+    assert np.all(np.isnan(errors[S * S < 0.4])) and np.sum(S * S < 0.4) > 2
+    assert received(0.3, Receiver(1.5, 0.0, 0.5)) == pytest.approx(0.45)
 
 
 @pytest.mark.parametrize('smoothing', ['S0', 'S1', 'S2'])
@@ -142,10 +142,10 @@ def test_paper_loop_against_its_equations_written_out(smoothing):
     rng = np.random.default_rng(3)
     target, noise = np.cumsum(1e-4 * rng.standard_normal(600)), 1e-4 * rng.standard_normal(600)
     beams, errors, x, R, v = [0.0] * 14, [], 0.0, 0.0, 0.0
-    met = []
+    in_force = []
     for i in range(600):
-        met.append(beams[-14])
-        errors.append(1.3 * (target[i] - met[-1]) + noise[i])
+        in_force.append(beams[-14])
+        errors.append(1.3 * (target[i] - in_force[-1]) + noise[i])
         x = (LENGTH - 1) / LENGTH * x + errors[-1] / LENGTH
         if i % 5 == 0:
             e = {'S0': errors[-1], 'S1': x, 'S2': np.mean(errors[-LENGTH:])}[smoothing]
@@ -153,4 +153,4 @@ def test_paper_loop_against_its_equations_written_out(smoothing):
             nu = R + e - predicted
             R, v = predicted + 0.2 * nu, v + 0.04 / 1.8 / 0.005 * nu
         beams.append(R)
-    np.testing.assert_allclose(loop.run(target, noise=noise)[0], met, atol=1e-13)
+    np.testing.assert_allclose(loop.run(target, noise=noise)[0], in_force, atol=1e-13)

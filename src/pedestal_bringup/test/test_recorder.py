@@ -70,7 +70,8 @@ class Recorder:
         self.started.append(self.process)
 
     def end(self, number=signal.SIGINT):
-        """(exit code, JSON of the last line of stdout, stderr) after the signal; None sends none."""
+        """(exit code, JSON of the last line of stdout, stderr but for mere information) after the signal; None sends
+        none."""
         if number is not None:
             self.process.send_signal(number)
         try:
@@ -79,7 +80,8 @@ class Recorder:
             self.process.kill()
             out, err = self.process.communicate()
             pytest.fail(f'the recorder did not end: {out} {err}')
-        return self.process.returncode, json.loads(out.splitlines()[-1]) if out else None, err
+        return self.process.returncode, json.loads(out.splitlines()[-1]) if out else None, ''.join(
+            line for line in err.splitlines(keepends=True) if not line.startswith('[INFO]'))
 
 
 class Graph:

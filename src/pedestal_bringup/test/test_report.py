@@ -324,3 +324,11 @@ def test_azimuth_is_unwrapped():
     wrapped[20] = math.nan
     out = run_figures._continuous(wrapped)
     assert np.isnan(out[20]) and np.nanmax(np.abs(out - np.degrees(angle))) < 1e-9
+
+
+def test_an_aborted_run_and_lost_steps_stand_on_the_first_page(tmp_path):
+    path = make_bag(tmp_path / 'aborted', planned_end_ns=10_000_000_000)
+    page = page_of(path)
+    first = page.text[:page.text.index('Results')]
+    assert f'Aborted: ends at {(STEPS - 1) * T / 1e9:.6f} s, planned end 10.000000 s.' in first
+    assert 'Aborted' not in page_of(make_bag(tmp_path / 'whole', planned_end_ns=(STEPS - 1) * T)).text

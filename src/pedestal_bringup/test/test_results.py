@@ -4,6 +4,7 @@ import pathlib
 
 import pytest
 
+from pedestal_bringup import console
 from pedestal_bringup.again import what_if
 from pedestal_bringup.analysis import results
 from pedestal_bringup.bags import bag
@@ -29,3 +30,11 @@ def test_the_parts_of_a_recording_decide_its_rows():
     assert [(row['metric'], row['unit'], row['target']) for row in rows] == [
         (result.name, result.unit, result.target) for result in results.RESULTS if result.name in ashore]
     assert {row['metric'] for row in rows if row['value'] is None} == {'loss_s'}
+
+
+def test_a_title_is_no_markup(capsys):
+    console.show_results('run: [/bold] [red]', [''], [{'x': (1.0, 'deg')}], {'lost_steps': (5309.0, 'of 12001')})
+    printed = capsys.readouterr().out
+    assert 'run: [/bold] [red]' in printed
+    assert [line.split() for line in printed.splitlines() if 'lost_steps' in line] == [
+        ['\u2502', 'lost_steps', '\u2502', '5309', '\u2502', 'of', '12001', '\u2502']]

@@ -97,9 +97,9 @@ def test_rows_are_written_and_printed_one_a_line(done):
 
 def test_a_figure_is_a_png_in_the_default_folder_and_is_named(done):
     name, folder, result = done
-    found = sorted((folder / 'studies' / name).iterdir())
-    assert len(found) >= 4
-    for path in found:
+    files = sorted((folder / 'studies' / name).iterdir())
+    assert len(files) >= 4
+    for path in files:
         assert path.read_bytes().startswith(PNG)
         assert path.name in result.stdout
 

@@ -66,12 +66,12 @@ def test_residual_keeps_all_but_offset_and_fundamental():
     assert metrics.residual(t, y, 1.0) == pytest.approx(rest, abs=1e-12)
 
 
-@pytest.mark.parametrize('value, target, met', [
+@pytest.mark.parametrize('value, target, expected', [
     (0.15, '<= 0.15', True), (0.16, '<= 0.15', False), (5e-4, '> 5e-4', False), (6e-4, '> 5e-4', True),
     (1.0, '>= 1', True), (1.0, '< 1', False), (13.4, '12 +- 1.5', True), (13.6, '12 +- 1.5', False),
     (0.8683, '0.868 to 0.8695', True), (0.87, '0.868 to 0.8695', False), (None, '<= 1', False)])
-def test_targets(value, target, met):
-    assert rows.meets(value, target) is met
+def test_targets(value, target, expected):
+    assert rows.meets(value, target) is expected
 
 
 def test_a_row_without_a_number_is_null_and_misses():

@@ -19,6 +19,9 @@ STAMPED.update(name for name, (_, fields) in TYPESTORE.fielddefs.items()
                if fields and fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header')))
 """Types whose bytes 4 to 12 are their stamp."""
 
+NUMBERS = 400_000
+"""Numbers in one message at the most; a program track of a whole day has 350,000."""
+
 PADDING = 4
 """Bytes that DDS may add behind a message, less than this."""
 
@@ -71,6 +74,8 @@ class Places:
         elif kind == Nodetype.BASE:
             size = _SIZES[what[0]]
             self.numbers.append((path, self._take(size, size, path), self.order + _DTYPES[what[0]]))
+            if len(self.numbers) > NUMBERS:
+                raise ValueError(f'a {len(self.data)} bytes long message has more than {NUMBERS} numbers')
         else:
             count = what[1] if kind == Nodetype.ARRAY else self._length(path)
             for i in range(count):

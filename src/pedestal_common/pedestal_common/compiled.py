@@ -14,6 +14,7 @@ import importlib.util
 import os
 import pathlib
 import shutil
+import tempfile
 import time
 
 import numba
@@ -22,6 +23,9 @@ from numba.misc.appdirs import user_cache_dir
 COLUMNS = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
 KEPT_DAYS = 7.0
 _ROOT = pathlib.Path(numba.config.CACHE_DIR or user_cache_dir()) / 'pedestal'
+if not _ROOT.is_absolute():
+    # A user without a home, as in a container: '~' stays as it is.
+    _ROOT = pathlib.Path(tempfile.gettempdir()) / f'pedestal-{os.getuid()}'
 
 
 def digest(packages) -> str:

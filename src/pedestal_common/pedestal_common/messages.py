@@ -15,6 +15,9 @@ TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 _TYPES = TYPESTORE.types
 _STAMP = struct.Struct('<iI')
 
+LARGEST = 8_000_000
+"""Bytes of a message at the most; a program track of a whole day has 7 million."""
+
 Clock = _TYPES['rosgraph_msgs/msg/Clock']
 DiagnosticArray = _TYPES['diagnostic_msgs/msg/DiagnosticArray']
 DiagnosticStatus = _TYPES['diagnostic_msgs/msg/DiagnosticStatus']
@@ -44,7 +47,9 @@ def serialize(message) -> bytes:
 
 
 def deserialize(data, type_name):
-    """The message in CDR bytes; raises ValueError naming the type when they do not hold one."""
+    """The message in CDR bytes; raises ValueError naming the type when they do not hold one, or are over LARGEST."""
+    if len(data) > LARGEST:
+        raise ValueError(f'{len(data)} bytes of a {type_name}, must be at most {LARGEST}')
     try:
         return TYPESTORE.deserialize_cdr(data, type_name)
     except Exception as error:

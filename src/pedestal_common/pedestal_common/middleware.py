@@ -2,10 +2,16 @@
 import importlib
 import os
 import pathlib
+import sys
 
+import rclpy
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 
 from pedestal_common import topics
+
+PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
+"""{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
 
 
 def qos(rate, role='lockstep') -> QoSProfile:
@@ -25,11 +31,28 @@ def message_class(type_name):
 
 
 def set_defaults():
-    """What DDS of this process and its children does unless the user says otherwise: it talks to this machine only, on
-    loopback sockets, and acknowledges promptly (fastdds.xml). To be called before rclpy.init."""
-    if os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST') == 'LOCALHOST':
-        profiles = pathlib.Path(__file__).with_name('fastdds.xml')
-        os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(profiles))
+    """What DDS of this process and its children does, by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
+    profile of his own.
+
+    Not set, or LOCALHOST: the graph stays on this machine and on its loopback (fastdds.xml). rclpy is then told
+    SYSTEM_DEFAULT, because under LOCALHOST rmw_fastrtps opens transports of its own on every interface.
+    SUBNET: the graph may spread over several hosts, by UDP (fastdds_subnet.xml).
+    """
+    scope = os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    if scope in PROFILES:
+        profile = str(pathlib.Path(__file__).with_name(PROFILES[scope]))
+        chosen = os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', profile)
+        if (scope, chosen) == ('LOCALHOST', profile):
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SYSTEM_DEFAULT'
+
+
+def initialise(args=None):
+    """rclpy in this process, its arguments those of the command line unless given: DDS as in set_defaults, signals
+    left to the caller, and logs on stderr only, for which neither a home nor a disk is needed."""
+    set_defaults()
+    given = sys.argv if args is None else args
+    rclpy.init(args=[*given, '--ros-args', '--disable-external-lib-logs'],
+               signal_handler_options=SignalHandlerOptions.NO)
 
 
 def make_executor():

@@ -13,9 +13,11 @@ class ParameterError(ValueError):
     """A parameter is unknown or outside its range; the message names it, its value and what is allowed."""
 
 
-def parameter(default, low, high, unit, doc):
-    """A number (float or int, as annotated) between low and high inclusive."""
-    return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc})
+def parameter(default, low, high, unit, doc, grid=None):
+    """A number (float or int, as annotated) between low and high inclusive. grid: (lowest, highest, points), even in
+    its logarithm, on which a search for its best value begins; None: it is not searched for."""
+    return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc,
+                                                        'grid': grid})
 
 
 def choice(default, options, doc):

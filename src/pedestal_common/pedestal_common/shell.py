@@ -1,4 +1,5 @@
 """What every node is: parameters, clock, topics of the table, diagnostics, waiting for its graph, `main`."""
+import contextlib
 import dataclasses
 import gc
 import inspect
@@ -19,7 +20,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from pedestal_common import messages, middleware, nodes, parameters, utc
 from pedestal_common.compiled import compiled_once
@@ -334,13 +334,13 @@ class Shell(Node):
         """To be called with t_k [ns] before anything of step k is published. In lockstep the first call waits for the
         graph, and every whole second publishes diagnostics; in realtime nobody is waited for."""
         self._stamp = stamp
-        if not self.graph.lockstep:
-            return
         if not self._started:
-            self.await_graph()
             self._started = True
-            self._next_second = -(-stamp // SECOND) * SECOND
-        if stamp >= self._next_second:
+            if self.graph.lockstep:
+                self.await_graph()
+                self._next_second = -(-stamp // SECOND) * SECOND
+            self.get_logger().info('runs')
+        if self.graph.lockstep and stamp >= self._next_second:
             self._next_second = (stamp // SECOND + 1) * SECOND
             self._publish_diagnostics()
 
@@ -400,6 +400,11 @@ class Shell(Node):
         missing = [name for name in wanted if name not in names and nodes.STAND_IN not in names]
         return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
+    @property
+    def awaits(self):
+        """What a node that is ready waits for, as a person calls it; overridden by who begins otherwise."""
+        return 'messages'
+
     def draining(self):
         """Asked after the end: True while a node must go on receiving before `close`; overridden by the recorder."""
         return False
@@ -412,6 +417,13 @@ class Shell(Node):
             publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
 
+def _say(stream, line):
+    """A last line, past Python's buffer: what a full disk or a closed pipe does not take is no reason for another end
+    than the one it tells."""
+    with contextlib.suppress(OSError):
+        os.write(stream.fileno(), f'{line}\n'.encode())
+
+
 def main(make_node, args=None) -> int:
     """Run the node of make_node() until it is finished or told to stop.
 
@@ -420,30 +432,30 @@ def main(make_node, args=None) -> int:
     """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _on_signal)
-    middleware.set_defaults()
     node = None
     name = os.path.basename(sys.argv[0])
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        middleware.initialise(args)
         node = make_node()
         name = node.get_name()
         executor = middleware.make_executor()
         executor.add_node(node)
         gc.freeze()
+        node.get_logger().info(f'ready, waits for {node.awaits}')
         while not (_stop or node.finished) or node.draining():
             executor.spin_once(timeout_sec=0.1)
         node.close()
         if node.failure is not None:
             raise node.failure
         if node.result:
-            print(json.dumps(node.result), flush=True)
+            _say(sys.stdout, json.dumps(node.result))
         return 0
     except Stopped:
         return 0
     except EXPECTED as error:
         result = node.result if node is not None else {}
-        print(json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}), flush=True)
-        print(f'{name}: error: {error}', file=sys.stderr)
+        _say(sys.stdout, json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}))
+        _say(sys.stderr, f'{name}: error: {error}')
         return 1
     finally:
         # It ends anyway; Python's own end would give a late signal its deadly default back.

@@ -55,7 +55,8 @@ class Topic(typing.NamedTuple):
     frame    header.frame_id; child: child_frame_id
     units    {column: unit} where the type alone does not tell (see layouts)
     texts    of a text: those that a reader tells apart, in the order of their codes
-    flag     the parameter of its readers that says whether something measures it; '': it is always there
+    measured  the parameter of its writer that says whether it is measured; flag: that of its readers; '': it is always
+             there
     """
     name: str
     type: str
@@ -66,6 +67,7 @@ class Topic(typing.NamedTuple):
     child: str = ''
     units: typing.Mapping = {}
     texts: tuple = ()
+    measured: str = ''
     flag: str = ''
 
 
@@ -98,10 +100,12 @@ TOPICS = (
     Topic('tracking_receiver/angle_rate', 'geometry_msgs/msg/Vector3Stamped', 'step',
           'x cross-elevation, y elevation: rate of the error [rad/s], NaN while unlocked; z their 1-sigma [rad/s], '
           'tachometer and receiver together; `latency` late', frame='beam',
-          units={'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'}, flag='receiver_rate'),
+          units={'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'}, measured='receiver.rate.measured',
+          flag='receiver_rate'),
     Topic('tracking_receiver/range', 'sensor_msgs/msg/Range', 'step',
           'range of the target [m], NaN while unlocked, and its variance [m2]; `latency` late', frame='beam',
-          units={'field_of_view': 'rad', 'min_range': 'm', 'max_range': 'm'}, flag='receiver_range'),
+          units={'field_of_view': 'rad', 'min_range': 'm', 'max_range': 'm'}, measured='receiver.ranging.measured',
+          flag='receiver_range'),
     Topic('target/truth', 'nav_msgs/msg/Odometry', 'step',
           'target position [m] and velocity [m/s], ENU of the station', frame='earth', child='target'),
     Topic('acu/rate_command', 'sensor_msgs/msg/JointState', 'step',

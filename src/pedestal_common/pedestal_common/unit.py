@@ -9,6 +9,7 @@ import typing
 import numpy as np
 
 from pedestal_common import messages, nodes, records, topics
+from pedestal_common.parameters import as_dict
 
 OK, WARN, ERROR = 0, 1, 2
 
@@ -76,7 +77,9 @@ class Unit(typing.Protocol):
         self.parameters, self.reads = parameters, tuple(reads)
         self.inputs = records.empty(self.inputs_type(), 1)
         self.outputs = records.empty(self.outputs_type(), 1)
-        self.messages = {name: messages.template(name) for name in self.NODE.writes if not records.is_text(name)}
+        values = as_dict(parameters)
+        self.messages = {name: messages.template(name) for name in self.NODE.writes if not records.is_text(name)
+                         and values.get(topics.BY_NAME[name].measured, True)}
 
     @classmethod
     def inputs_type(cls) -> np.dtype:

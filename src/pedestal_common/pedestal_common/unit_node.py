@@ -127,6 +127,10 @@ class UnitNode(shell.Shell):
                 self.answer(*step)
         return take
 
+    @property
+    def awaits(self):
+        return ', '.join((self.unit.trigger, *sorted(self._waiting_for_once)))
+
     def begin(self):
         """Start to follow the trigger of the unit; overridden by who makes the time."""
         self.follow(self.unit.trigger, self.unit.latencies)

@@ -1,16 +1,16 @@
-"""How a ship moves on a seaway, what an IMU on it feels and what its INS reports.
+"""How a ship moves on a seaway, what its IMU measures and what its INS reports.
 
 recording       a recorded motion as piecewise polynomials, where motion.step is not to make waves
 motion.step     time -> the ship's truth (stateless: the same seed and time give the same bits in any order)
-imu.step        truth -> specific force and angular rate as REP 145 wants them
+imu.step        truth -> specific force and angular rate by REP 145
 strapdown.step  increments of angle and velocity -> attitude and velocity in a computed frame
-ins.step        stamp of an IMU message -> attitude and deck rate as a late and imperfect INS knows them
-aligning_ins.step   an IMU message -> the same by an INS that integrates it: alignment, then navigation (navigator)
+ins.step        stamp of an IMU message -> attitude and deck rate of an INS with stated errors and latency
+aligning_ins.step   stamp and data of an IMU message -> attitude and deck rate of an INS that aligns and navigates
 
 Frames
     earth   ENU tangent plane at the place where the ship is at t = 0.
     deck    FLU: x to the bow, y to port, z up. roll about x (port side up), pitch about y (bow down), yaw
-            about z (to port) as fixed axes of REP 103; yaw 0 is east. A compass heading turns the other way:
+            about z (to port) as fixed axes of REP 103; yaw 0 is east. A compass heading counts the other way:
             yaw = 90 deg - heading, converted where the parameter is read.
     mu      where a wave travels to, seen from the bow, clockwise: 0 following, 90 from port to starboard,
             180 head sea.
@@ -27,7 +27,7 @@ Symbols
     U               speed through the water along the mean heading                  [m/s]
     w, dw           angular velocity of the deck against the earth, FLU, and its derivative  [rad/s, rad/s2]
     f               specific force, FLU: at rest +g along z                         [m/s2]
-    n'              the frame a strapdown computer takes for ENU, turned by w_c
-    w_ie, w_c       rotation of the earth; rate at which an alignment turns n'      [rad/s]
+    n'              the strapdown computer's frame for ENU, rotated by w_c
+    w_ie, w_c       rotation of the earth; rate at which an alignment rotates n'    [rad/s]
     mat_ed          rotation deck -> earth; quaternions are x, y, z, w and rotate the same way
 """

@@ -1,7 +1,7 @@
-"""The INS that integrates its IMU: it aligns by itself, navigates, and knows how well. The node's methods but `model`.
+"""The INS that integrates its IMU, of every method but `model`: it aligns, navigates and knows its accuracy.
 
-It hears `ship/imu/data_raw` and gives out attitude and deck rate after a latency as ins does; of the ship's parameters
-it takes the latitude, and the velocity that an aid measures, with noise.
+It reads `ship/imu/data_raw` and puts out attitude and deck rate after a latency, like `ins`. Of the ship's parameters
+it uses the latitude, and the velocity that an aid measures with noise.
 """
 import math
 
@@ -42,7 +42,8 @@ STATE = np.dtype([
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS. Raises ParameterError where it could never call itself aligned."""
+    """The record (1,) of CONSTANTS. Raises ParameterError where the azimuth can never become as good as
+    alignment.aligned_sigma demands."""
     record, latitude = np.zeros(1, CONSTANTS), math.radians(params.ship.latitude_deg)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(latitude)
@@ -69,7 +70,7 @@ def initial_state(constants) -> np.ndarray:
 
 @compiled
 def measure_aid(c, s, stamp_ns, normals):
-    """What the aid says of the velocity at stamp_ns into s.aid."""
+    """Put the velocity [m/s] that the aid measures at stamp_ns, with noise, into s.aid; normals: three or more."""
     if c.navigator.aid == navigator.NO_AID:
         return
     motion.truth(c.ship, 1e-9 * stamp_ns, s.truth)
@@ -80,9 +81,10 @@ def measure_aid(c, s, stamp_ns, normals):
 
 @compiled
 def integrate(c, s, stamp_ns, rate, force):
-    """Take an IMU message into the navigator: mean rates are the increments, rates at the stamps make trapezes. The
-    first one ends an interval that began before power-up and is not integrated, nor is one after a gap, which is a
-    new power-up. False after a gap."""
+    """Integrate an IMU message, rate (3,) [rad/s] and force (3,) [m/s2]; False after a gap, which is a new power-up.
+
+    Mean rates are the increments themselves; rates at the stamps are integrated by the trapezoidal rule. The first
+    message after a power-up ends an interval that began before it, and is not integrated."""
     dt = 1e-9 * (stamp_ns - s.imu_stamp_ns) if s.imu_stamp_ns != NEVER else 0.0
     if dt > LONGEST_GAP:
         s.navigator, s.imu_stamp_ns = c.power_up, NEVER
@@ -100,7 +102,7 @@ def integrate(c, s, stamp_ns, rate, force):
 
 @compiled
 def measure(c, s, stamp_ns, rate, force):
-    """Put attitude and rate as the navigator knows them at stamp_ns into the ring."""
+    """Put the navigator's attitude and deck rate at stamp_ns into the ring; rate, force (3,): of the IMU message."""
     n = s.measured % RING
     q, w = s.quaternion, s.angular_velocity
     q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(s.navigator, c.navigator)
@@ -109,7 +111,7 @@ def measure(c, s, stamp_ns, rate, force):
     ex, ey, ez = to_deck(s.mat_ed, e[0], e[1], e[2])
     first = s.imu_stamp_ns == NEVER
     for i in range(3):
-        # a mean rate is that of half an interval ago: carried on to the stamp
+        # A mean rate is valid half an interval ago: extrapolate it to the stamp.
         half = 0.5 * (rate[i] - s.last_rate[i]) if c.increment == 1 and not first else 0.0
         w[n, i] = rate[i] + half - (ex if i == 0 else ey if i == 1 else ez)
         s.last_rate[i], s.last_force[i] = rate[i], force[i]
@@ -123,7 +125,7 @@ def measure(c, s, stamp_ns, rate, force):
 
 @compiled
 def step(s, c, i, out, normals):
-    """One IMU message: as ins.step. Of the normals the first three are the aid's noise."""
+    """Take one IMU message, as ins.step does; the first three of the normals (NORMALS,) are the aid's noise."""
     out.status, out.due = ins.OK, 0
     if i.stamp_ns <= s.last_stamp_ns:
         out.status = ins.BAD_STAMP

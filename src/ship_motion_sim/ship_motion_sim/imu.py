@@ -1,4 +1,4 @@
-"""What a strapdown IMU at the deck's origin reports: specific force and angular rate as REP 145 wants them.
+"""What a strapdown IMU at the deck's origin reports: specific force and angular rate by REP 145.
 
     inputs['t'], inputs['dt'] = time, step [s]; step(state, constants, ship, inputs, truth, outputs, normals)
 
@@ -86,7 +86,7 @@ def specific_force(truth, earth_rate, gravity):
     """mat_ed^T (a + 2 w_ie x v - g), FLU [m/s2]; earth_rate (3,) = w_ie in ENU.
 
     The earth is the rotating tangent plane in which the truth is given, with g constant along -z: gravity does not
-    turn with the ship's place (v/R = 1e-6 rad/s at 7 m/s), and the rate above holds no transport rate either.
+    turn with the ship's place (v/R = 1e-6 rad/s at 7 m/s), and `inertial_rate` has no transport rate either.
     """
     a, v, e = truth.acceleration, truth.velocity, earth_rate
     return to_deck(truth.mat_ed,
@@ -97,7 +97,8 @@ def specific_force(truth, earth_rate, gravity):
 
 @compiled
 def mean_rates(s, c, ship, t, dt, rate, force):
-    """Fill rate and force (3,) with their means over [t - dt, t]; ship a record motion.CONSTANTS."""
+    """Fill rate (3,) [rad/s] and force (3,) [m/s2] with their means over [t - dt, t] [s]; ship: record of
+    motion.CONSTANTS."""
     for i in range(3):
         rate[i] = force[i] = 0.0
     for node in range(3):
@@ -115,7 +116,7 @@ def mean_rates(s, c, ship, t, dt, rate, force):
 
 @compiled
 def spoil(errors, dt, values, normals, first, left):
-    """Put the errors of three sensors on their true rates (3,), which were measured over dt.
+    """Add the errors of three gyros or accelerometers to their true rates (3,), measured over dt [s].
 
     White noise is given as a density, so a sample carries density / sqrt(dt). left (3,): the part of the increment
     that was no whole quantum, kept for the next.
@@ -135,8 +136,8 @@ def spoil(errors, dt, values, normals, first, left):
 
 @compiled
 def step(s, c, ship, u, truth, out, normals):
-    """One sample. Records STATE, CONSTANTS, motion.CONSTANTS, INPUTS, motion.OUTPUTS at the instant of the sample,
-    OUTPUTS; normals (NORMALS,) standard normals."""
+    """Take one sample. Records STATE, CONSTANTS, motion.CONSTANTS, INPUTS, motion.OUTPUTS at its instant, OUTPUTS;
+    normals (NORMALS,) standard normals."""
     rate, force = out.angular_velocity, out.linear_acceleration
     if truth.status != motion.OK:
         out.status = BAD_TRUTH

@@ -1,9 +1,9 @@
-"""The INS as its user meets it: the true attitude with parametrised errors, released after a latency (method `model`).
+"""The INS of method `model`: the true attitude with parametrised errors, released after a latency.
 
-The node hears `ship/imu/data_raw` only. Attitude does not come through that door (REP 145 leaves it to `imu/data`),
-so the INS evaluates the stateless motion law with the same `ship` parameters at the stamp of each IMU message and
-adds its errors: nothing else is in its attitude, and aligning_ins, which integrates the IMU, takes its place. The
-IMU's rate is compared with the ship's: other ship parameters here than in ship_motion_node are a named status.
+The node reads `ship/imu/data_raw` only, which carries no attitude (REP 145 leaves that to `imu/data`). So the INS
+evaluates the stateless law of the ship's motion, with the same `ship` parameters, at the stamp of each IMU message and
+adds its errors. It compares the IMU's rate with the ship's: where the `ship` parameters differ from those of
+ship_motion_node, its status says so. `aligning_ins` integrates the IMU instead.
 """
 import math
 
@@ -106,7 +106,8 @@ def initial_state() -> np.ndarray:
 
 @compiled
 def wander(c, s, stamp_ns, normals):
-    """Advance the slow errors to stamp_ns: first-order Gauss-Markov, exact for any step, stationary from the start."""
+    """Advance the slow errors [rad] to stamp_ns: first-order Gauss-Markov, exact for any step, stationary from the
+    start; normals: three or more."""
     kept = 0.0
     if s.last_stamp_ns != NEVER:
         kept = math.exp(-1e-9 * (stamp_ns - s.last_stamp_ns) / c.wander_time)
@@ -118,14 +119,14 @@ def wander(c, s, stamp_ns, normals):
 
 @compiled
 def disagrees(truth, c, measured):
-    """Whether a measured rate (3,) is further than imu_tolerance from the ship's."""
+    """Whether a measured rate (3,) [rad/s] differs by more than imu_tolerance from the ship's."""
     wx, wy, wz = imu.inertial_rate(truth, c.earth_rate)
     return max(abs(measured[0] - wx), abs(measured[1] - wy), abs(measured[2] - wz)) > c.imu_tolerance
 
 
 @compiled
 def measure(c, s, stamp_ns, force, normals):
-    """Put attitude and rate at stamp_ns, errors added, into the ring, beside the IMU's specific force (3,)."""
+    """Put attitude and rate at stamp_ns, errors added, into the ring, with the IMU's specific force (3,) [m/s2]."""
     n, truth = s.measured % RING, s.truth
     roll = truth.roll + c.bias[0] + s.wander[0] + c.noise[0] * normals[3]
     pitch = truth.pitch + c.bias[1] + s.wander[1] + c.noise[1] * normals[4]
@@ -143,7 +144,7 @@ def measure(c, s, stamp_ns, force, normals):
 
 @compiled
 def release(c, s, now_ns, out):
-    """Give out the newest sample that is at least latency old; due = 0 where it was given out before."""
+    """Release the newest sample that is at least the latency old at now_ns; due = 0 where it was released before."""
     out.due = 0
     while s.released < s.measured and s.stamp_ns[s.released % RING] <= now_ns - c.latency_ns:
         s.released += 1
@@ -162,9 +163,10 @@ def release(c, s, now_ns, out):
 
 @compiled
 def step(s, c, i, out, normals):
-    """One IMU message. Records STATE, CONSTANTS, INPUTS, OUTPUTS; normals (NORMALS,) standard normals.
+    """Take one IMU message. Records STATE, CONSTANTS, INPUTS, OUTPUTS; normals (NORMALS,) standard normals.
 
-    A stamp that does not advance changes nothing; a message that is not finite is not measured. Both still say so.
+    A stamp that does not advance changes nothing, and a message that is not finite is not measured; the status names
+    either.
     """
     out.status, out.due, out.stage = OK, 0, NO_STAGE
     if i.stamp_ns <= s.last_stamp_ns:

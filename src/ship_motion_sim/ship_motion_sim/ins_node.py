@@ -1,10 +1,14 @@
-"""ROS node of the INS: hears the IMU, publishes attitude and deck rate as the INS knows them."""
+"""ROS node of the INS: subscribes to the IMU, publishes measured attitude and deck rate."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import sys
 
 from pedestal_common import unit_node
 
 
 def main(args=None):
+    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
     return unit_node.main('ship_motion_sim.ins_node', args)
 
 

@@ -1,6 +1,6 @@
-"""The unit of the INS: its IMU in, attitude and deck rate as the INS knows them out, and whether it is aligned.
+"""The unit of the INS: IMU data in; attitude, deck rate and the state of the alignment out.
 
-Method `model` knows the true attitude with stated errors and never tells a state; the others align by themselves.
+Method `model` has the true attitude with stated errors and never publishes a state; the others align by themselves.
 """
 import math
 import typing
@@ -34,7 +34,7 @@ class ModelMemory(typing.NamedTuple):
 
 
 class AligningMemory(typing.NamedTuple):
-    """All an INS that aligns works on. A type of its own, so that a run with the model does not compile it."""
+    """All an aligning INS works on; a type of its own, so that a run with the model does not compile its law."""
     record: np.ndarray
     normals: np.ndarray
 
@@ -117,10 +117,12 @@ class Ins(Unit):
         self.messages[DATA].angular_velocity_covariance = (np.eye(3) * rate_noise**2).ravel()
 
     def block(self, steps):
+        """The memory with noise (steps, NORMALS) drawn for the next steps."""
         self.parts['row'] = 0
         return self.memory._replace(normals=self._noise.standard_normal((steps, ins.NORMALS)))
 
     def diagnose(self):
+        """ERROR with the worst status since the last diagnosis, WARN while it aligns; values: its own 1 sigmas."""
         outputs, status = self.parts['outputs'], int(self.parts['worst'])
         self.parts['worst'] = 0
         stage, sigma, p = int(outputs['stage']), outputs['variance']**0.5, self.parameters
@@ -145,5 +147,6 @@ class Ins(Unit):
 
     @staticmethod
     def idle(numbers):
+        """Not exercised where the attitude never changed."""
         moved = DATA in numbers and len(numbers[DATA]) and np.ptp(numbers[DATA], axis=0).any()
         return '' if moved else 'the ship never moved'

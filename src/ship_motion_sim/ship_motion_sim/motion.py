@@ -120,9 +120,10 @@ def sum_components(ship, t, freedoms):
 
 @compiled
 def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
-    """(w, dw/dt) as six floats, FLU, of fixed-axis roll, pitch, yaw with their first and second derivatives.
+    """(w [rad/s], dw [rad/s2]), three floats each, FLU, of fixed-axis roll, pitch [rad] and their first and second
+    derivatives and those of yaw.
 
-    mat_ed = Rz(yaw) Ry(pitch) Rx(roll): reference/nav.md section 3.2, the same in FLU as in FRD, differentiated.
+    mat_ed = Rz(yaw) Ry(pitch) Rx(roll): reference/nav.md section 3.2 (in FLU as in FRD), differentiated.
     """
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     wx = roll_1 - yaw_1 * sp
@@ -131,13 +132,13 @@ def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
     dwx = roll_2 - yaw_2 * sp - yaw_1 * pitch_1 * cp
     dwy = pitch_2 * cr + yaw_2 * sr * cp - yaw_1 * pitch_1 * sr * sp + roll_1 * wz
     dwz = -pitch_2 * sr + yaw_2 * cr * cp - yaw_1 * pitch_1 * cr * sp - roll_1 * wy
-    return wx, wy, wz, dwx, dwy, dwz
+    return (wx, wy, wz), (dwx, dwy, dwz)
 
 
 @compiled
-def course_to_earth(ship, ahead, port):
-    """(east, north) of a horizontal vector along and to port of the mean course."""
-    return ship.cos_yaw * ahead - ship.sin_yaw * port, ship.sin_yaw * ahead + ship.cos_yaw * port
+def course_to_earth(ship, along, port):
+    """(east, north) of a horizontal vector given along the mean course and to port of it, any unit."""
+    return ship.cos_yaw * along - ship.sin_yaw * port, ship.sin_yaw * along + ship.cos_yaw * port
 
 
 @compiled
@@ -160,6 +161,6 @@ def truth(ship, t, out):
     q[0], q[1], q[2], q[3] = quaternion(roll, pitch, yaw)
     rotation(q[0], q[1], q[2], q[3], out.mat_ed)
     w, dw, u = out.angular_velocity, out.angular_acceleration, out.velocity_deck
-    w[0], w[1], w[2], dw[0], dw[1], dw[2] = body_rates(
+    (w[0], w[1], w[2]), (dw[0], dw[1], dw[2]) = body_rates(
         roll, pitch, x[1, ROLL], x[1, PITCH], x[1, YAW], x[2, ROLL], x[2, PITCH], x[2, YAW])
     u[0], u[1], u[2] = to_deck(out.mat_ed, v[0], v[1], v[2])

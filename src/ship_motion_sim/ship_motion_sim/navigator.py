@@ -1,9 +1,9 @@
-"""A strapdown INS from power-up on: it aligns by the selected method, then navigates.
+"""A strapdown INS from power-up on: alignment by the selected method, then navigation.
 
-aligning    strapdown at the IMU's rate, the method's step every `step` seconds: its commands turn n'. oba commands
-            nothing and integrates the gyros in inertial space.
+aligning    strapdown at the IMU's rate, the method's step every `step` seconds: its commands rotate n'. oba
+            commands nothing and integrates the gyros in inertial space.
 navigating  from the moment the 1-sigma of azimuth is small enough. Without aid free inertial; with one, riccati_eso
-            goes on from there with the velocity less the aid's, so level and azimuth keep improving.
+            continues with the velocity less the aid's, so level and azimuth keep improving.
 
 An aid is a velocity in deck axes (log) or ENU (gnss).
 """
@@ -61,7 +61,7 @@ def constants(p, method, aid, latitude) -> np.ndarray:
 
 
 def least_azimuth_sigma(c):
-    """1 sigma [rad] of azimuth after any time; c CONSTANTS."""
+    """The 1 sigma [rad] of azimuth that the method approaches after a long time; c: record of CONSTANTS."""
     if c['method'] == CLASSICAL:
         return float(c['classical']['azimuth'])
     k = c['conditions']
@@ -88,9 +88,10 @@ def begin(s, c, qx, qy, qz, qw):
 
 @compiled
 def aided_velocity(s, c, aid):
-    """(E, N) in n' of what the aid (3,) says; a GNSS is only asked once n' is n within what alignment left.
+    """(E, N) components in n' [m/s] of the velocity (3,) the aid measures; a GNSS is used once n' is aligned with n.
 
-    That is not turned by the azimuth found since: 7 m/s that turn with it would come back as an azimuth, larger.
+    A GNSS velocity is not rotated by the azimuth estimated since: 7 m/s that rotate with the estimate would feed back
+    into it, enlarged.
     """
     if c.aid == LOG:
         east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
@@ -102,7 +103,7 @@ def aided_velocity(s, c, aid):
 
 @compiled
 def take(s, m):
-    """What the method's record m commands and knows."""
+    """Copy the commands, azimuth and 1 sigmas of the method's record m into the state."""
     for i in range(3):
         s.command[i] = m.command[i]
     s.azimuth, s.azimuth_sigma, s.level_sigma = m.azimuth, m.azimuth_sigma, m.level_sigma
@@ -110,21 +111,23 @@ def take(s, m):
 
 @compiled
 def align_in_inertial_space(s, c, aid, h):
-    """One step of oba."""
+    """One step of oba, h [s] after the last; aid (3,) [m/s]."""
     a, k = s.strapdown.velocity, c.conditions
     ux = uy = uz = vx = vy = vz = 0.0
     if c.aid == LOG:
         ux, uy, uz = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
     elif c.aid == GNSS:
         vx, vy, vz = aid[0], aid[1], aid[2]
-    oba.step(s.oba, k, a[0] - ux, a[1] - uy, a[2] - uz, vx, vy, vz, h)
+    oba.step(s.oba, k, (a[0] - ux, a[1] - uy, a[2] - uz), (vx, vy, vz), h)
     s.azimuth_sigma, s.level_sigma = s.oba.azimuth_sigma, s.oba.level_sigma
 
 
 @compiled
 def doubt_the_opposite(s, c, h):
-    """The gyrocompass turns nothing back at 180 deg of azimuth either, but there the level command to the north takes
-    back twice the earth's rate: (19) of paper 001, cos az = 1 + w_cN / w_N. Beyond 60 deg its azimuth is not known."""
+    """Declare the gyrocompass's azimuth unknown where the level command shows that az is beyond 60 deg.
+
+    At 180 deg of azimuth its loop is at rest too, but the level command to the north is twice the earth's rate there:
+    (19) of paper 001, cos az = 1 + w_cN / w_N."""
     s.levelling += c.classical.s0 * h * (s.command[1] - s.levelling)
     if 1.0 + s.levelling / c.conditions.earth_rate[1] < 0.5:
         s.azimuth_sigma = SIGMA_UNKNOWN
@@ -132,7 +135,7 @@ def doubt_the_opposite(s, c, h):
 
 @compiled
 def follow(s, c, method, aid, h):
-    """One step of a method that commands n'."""
+    """One step, h [s] after the last, of a method that commands n'; aid (3,) [m/s]."""
     v, k = s.strapdown.velocity, c.conditions
     east, north = aided_velocity(s, c, aid)
     if s.begun == 0:
@@ -159,7 +162,7 @@ def follow(s, c, method, aid, h):
 
 @compiled
 def attitude(s, c):
-    """Quaternion (x, y, z, w) deck -> earth as it is known now."""
+    """Estimated quaternion (x, y, z, w) deck -> earth."""
     q = s.strapdown.quaternion
     if c.method == OBA and s.stage == ALIGNING:
         if s.oba.count < 2.0:
@@ -170,7 +173,7 @@ def attitude(s, c):
 
 @compiled
 def error_velocity(s, c):
-    """(E, N) in n' of the velocity that the method takes for an error of the INS."""
+    """(E, N) components in n' [m/s] of the velocity that the method attributes to an error of the INS."""
     if c.method == ADRC:
         return s.adrc.observer.z[0, 0], s.adrc.observer.z[1, 0]
     if c.method == ADRC_SCHEDULED:
@@ -182,8 +185,8 @@ def error_velocity(s, c):
 
 @compiled
 def begin_navigation(s, c, aid):
-    """Turn n' onto n. The velocity becomes the aid's; without one, what alignment did not take for an error, and zero
-    after oba, whose velocity counts from an unknown start."""
+    """Rotate n' onto n and start to navigate. The velocity becomes the aid's (3,) [m/s]; without an aid, the part that
+    alignment did not attribute to an error, and zero after oba, whose velocity has an unknown origin."""
     k, v = c.conditions, s.strapdown.velocity
     qx, qy, qz, qw = attitude(s, c)
     wrong_east, wrong_north = error_velocity(s, c)
@@ -208,8 +211,8 @@ def begin_navigation(s, c, aid):
 
 @compiled
 def fly_free(s, k, h):
-    """What an INS without aid still knows: the random walk and the bias of the gyros, and a heading that is wrong by
-    its 1 sigma takes that of the earth's rate for level."""
+    """Grow the 1 sigmas of an INS without aid over h [s]: random walk and bias of the gyros, and the earth's rate
+    resolved with a heading that is wrong by its 1 sigma, which tilts the level."""
     s.free += h
     walk = k.gyro_noise**2 * s.free
     s.azimuth_sigma = math.sqrt(s.aligned_azimuth_sigma**2 + walk + (k.gyro_bias * s.free)**2)
@@ -219,7 +222,7 @@ def fly_free(s, k, h):
 
 @compiled
 def step(s, c, angle, force, dt, aid):
-    """One IMU interval of dt [s]; records STATE, CONSTANTS.
+    """Process one IMU interval of dt [s]; records STATE, CONSTANTS.
 
     angle, force (3,): its increments, FLU [rad, m/s]; aid (3,) [m/s], finite.
     """

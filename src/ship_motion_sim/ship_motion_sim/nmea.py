@@ -1,4 +1,4 @@
-"""Attitude as NMEA 0183 sentences for equipment that speaks nothing else: HEHDT (heading) and PASHR (attitude).
+"""Attitude as NMEA 0183 sentences for third-party equipment: HEHDT (heading) and PASHR (attitude).
 
 Signs of PASHR: roll positive with the port side up, pitch positive with the bow up, heave positive upwards. In FLU a
 positive pitch has the bow down, so it changes its sign.
@@ -9,7 +9,7 @@ DAY = 86_400_000        # [ms]
 
 
 def sentence(body):
-    """The body between its $ and its checksum, CR LF at the end: ASCII bytes."""
+    """The sentence of a body, between $ and checksum, with CR LF: ASCII bytes."""
     checksum = 0
     for byte in body.encode('ascii'):
         checksum ^= byte

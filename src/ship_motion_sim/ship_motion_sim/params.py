@@ -72,6 +72,8 @@ class ShipParameters(Parameters):
     recorded: RecordedParameters = group(RecordedParameters)
 
     def check(self):
+        """Raise ParameterError where `motion`, `spectrum` or `sea_state` lacks a file or a wave height that it needs,
+        or does not use one that is given."""
         if (self.motion == 'recorded') != bool(self.recorded.path):
             raise ParameterError(f"recorded.path = '{self.recorded.path}': must name a CSV file with motion = "
                                  'recorded, and be empty otherwise')
@@ -139,7 +141,7 @@ class AdrcParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class AlignmentParameters(Parameters):
-    """How an INS with gyros aligns itself, and what it is told of them and of the sea."""
+    """The alignment of an INS: its laws, and the sensors and sea that they assume."""
     step: float = parameter(0.02, 0.001, 1.0, 's', 'of the alignment laws; at least the period of the IMU')
     initial_heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'taken for true at power-up; may be any')
     aligned_sigma: float = parameter(0.0035, 1e-5, 0.5, 'rad', 'it navigates once the 1-sigma of heading is below')
@@ -147,11 +149,12 @@ class AlignmentParameters(Parameters):
                                             'rms of the velocity of sea and aid per step and axis, taken for white')
     gyro_noise: float = parameter(1.45e-6, 1e-9, 0.01, 'rad/sqrt(s)', 'angle random walk of the gyros')
     gyro_bias: float = parameter(4.85e-8, 0.0, 0.1, 'rad/s', '1-sigma of what the bias of a level gyro may be')
-    accelerometer_bias: float = parameter(3e-4, 0.0, 1.0, 'm/s2', 'the same of an accelerometer')
+    accelerometer_bias: float = parameter(3e-4, 0.0, 1.0, 'm/s2', '1-sigma of the bias of an accelerometer')
     classical_bandwidth: float = parameter(0.025, 0.005, 0.2, 'rad/s', 'method classical: s0 of its four poles')
     adrc: AdrcParameters = group(AdrcParameters)
 
     def check(self):
+        """Raise ParameterError where the level control of adrc would be unstable at this step."""
         if self.adrc.control * self.step > 1.0:
             raise ParameterError(f'adrc.control = {self.adrc.control:g} rad/s: must be at most 1 / step = '
                                  f'{1.0 / self.step:g} rad/s, or the loop is unstable')
@@ -189,6 +192,7 @@ class InsParameters(Parameters):
     ship: ShipParameters = group(ShipParameters)
 
     def check(self):
+        """Raise ParameterError for a GNSS velocity with a method that needs the heading before it can use one."""
         if self.aid.source == 'gnss' and self.method not in ('model', 'oba'):
             raise ParameterError("aid.source = 'gnss': must be none or log unless method = oba, for its velocity is "
                                  'of no use before the heading is known')

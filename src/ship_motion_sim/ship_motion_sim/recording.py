@@ -4,7 +4,7 @@
     roll_deg    positive with the port side up
     pitch_deg   positive with the bow up: the signs of a ship's instruments (PASHR), where FLU has the bow down
     heading_deg clockwise from north, 0 to 360 or -180 to 180
-    surge_m     ahead along the mean heading; this and the next two may be left out and are 0 then
+    surge_m     forward along the mean heading; this and the next two columns are optional, 0 without
     sway_m      to port
     heave_m     up
 
@@ -39,14 +39,15 @@ def read(params):
     rows = csv_table.read(params.path, COLUMNS, 4, params.max_gap, 'ship.recorded.max_gap', DISPLACEMENTS)
     if len(rows) > ROWS:
         raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {ROWS}; cut or thin it out')
-    time, roll, pitch, heading, surge, sway, heave = rows.T
+    column = dict(zip((*COLUMNS, *DISPLACEMENTS), rows.T))
+    time = column['time_s']
     length = time[-1] - time[0]
     if params.start >= length:
         raise csv_table.TableError(f'{params.path}: ship.recorded.start = {params.start:g} s: must be below the '
                                    f'length of the record, {length:.10g} s')
-    yaw = np.unwrap(np.radians(90.0 - heading))
-    return time - time[0] - params.start, np.column_stack((surge, sway, heave, np.radians(roll), -np.radians(pitch),
-                                                           yaw))
+    return time - time[0] - params.start, np.column_stack((
+        *(column[name] for name in DISPLACEMENTS), np.radians(column['roll_deg']), -np.radians(column['pitch_deg']),
+        np.unwrap(np.radians(90.0 - column['heading_deg']))))
 
 
 def pieces(times, freedoms):

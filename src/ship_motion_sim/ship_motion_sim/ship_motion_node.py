@@ -1,4 +1,7 @@
 """ROS node of the ship: its truth and what its IMU feels at every tick of the drive's clock; NMEA for equipment."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
 import socket
 import sys
 
@@ -9,8 +12,10 @@ from ship_motion_sim import nmea
 
 
 class ShipMotionNode(unit_node.UnitNode):
+    """The node of the ship's unit, which also sends NMEA datagrams where nmea.port is set."""
 
     def begin(self):
+        """Open the socket, then begin as every unit does. Raises ParameterError for a host that cannot be reached."""
         self.unsent = ''
         self.next_datagram = 0
         if self.parameters.nmea.port:
@@ -20,7 +25,7 @@ class ShipMotionNode(unit_node.UnitNode):
         super().begin()
 
     def connect(self, equipment):
-        """Look the host up, once; what cannot be reached from here is said at the start."""
+        """Look the host of NmeaParameters up, once. Raises ParameterError where it is not the name of one host."""
         try:
             self.socket.connect((equipment.host, equipment.port))
         except OSError as error:
@@ -28,13 +33,16 @@ class ShipMotionNode(unit_node.UnitNode):
                                  f'{error.strerror}') from None
 
     def answer(self, stamp, values):
+        """Publish the step at a stamp [ns]; then send the attitude, if the next datagram is due."""
         super().answer(stamp, values)
         if self.parameters.nmea.port and stamp >= self.next_datagram:
             self.send_attitude(stamp)
 
     def send_attitude(self, stamp):
-        """One datagram; equipment that is not there costs nothing but a word in the next diagnostics. The system tells
-        of a datagram that nobody took when the next is sent, which then is not, so that every other one succeeds."""
+        """Send one datagram; missing equipment costs nothing but a warning in the next diagnostics.
+
+        The system reports a datagram that nobody received when the next one is sent, which then fails: every other
+        one succeeds."""
         period = round(1e9 / self.parameters.nmea.rate)
         self.next_datagram = stamp - stamp % period + period
         truth = self.unit.parts['truth']
@@ -44,12 +52,14 @@ class ShipMotionNode(unit_node.UnitNode):
             self.unsent = f'NMEA to {self.parameters.nmea.host}:{self.parameters.nmea.port}: {error.strerror}'
 
     def diagnose(self):
+        """The unit's diagnosis; WARN instead of OK where a datagram could not be sent."""
         diagnosis = super().diagnose()
         unsent, self.unsent = self.unsent, ''
         return diagnosis._replace(level=WARN, message=unsent) if unsent and diagnosis.level == OK else diagnosis
 
 
 def main(args=None):
+    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
     return shell.main(lambda: ShipMotionNode('ship_motion_sim.ship_motion_node'), args)
 
 

@@ -72,6 +72,7 @@ class ShipMotion(Unit):
                                     imu=imu.constants(parameters), last=NEVER), np.zeros((1, imu.NORMALS)))
 
     def block(self, steps):
+        """The memory with the IMU's noise (steps, NORMALS) drawn for the next steps."""
         self.parts['row'] = 0
         return self.memory._replace(normals=self._noise.standard_normal((steps, imu.NORMALS)))
 
@@ -82,6 +83,7 @@ class ShipMotion(Unit):
         return ship['pieces'] > 0 and self.parts['last'] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
 
     def diagnose(self):
+        """ERROR where truth or IMU is not valid, WARN past the end of a recorded motion; values: roll and pitch."""
         truth, felt = self.parts['truth'], self.parts['felt']
         values = [(f'{name}_deg', f'{np.degrees(truth[name]):.3f}') for name in ('roll', 'pitch')]
         for status, names in ((truth['status'], motion.STATUS), (felt['status'], imu.STATUS)):
@@ -93,6 +95,7 @@ class ShipMotion(Unit):
 
     @staticmethod
     def idle(numbers):
+        """Not exercised where neither the truth nor the IMU ever changed."""
         moved = any(len(numbers[name]) and np.ptp(numbers[name], axis=0).any() for name in (TRUTH, RAW)
                     if name in numbers)
         return '' if moved else 'the ship never moved'

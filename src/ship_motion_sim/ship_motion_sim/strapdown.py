@@ -3,9 +3,9 @@
     step(state, angle, force, dt, earth_rate, command, gravity)
 
 C' = C [w_ib x] - [(w_ie + w_c) x] C (reference/nav.md section 1.1), v' = C f - (2 w_ie + w_c) x v - g u; w_c is the
-rate an alignment turns n' with, and the velocity's components with it. Position is held, so there is no transport
-rate: the tangent plane in which the truth is given (see imu.specific_force) has none either. Coning and sculling from
-the increment before, as in Savage 1998, "Strapdown Inertial Navigation Integration Algorithm Design".
+rate at which an alignment rotates n', and the velocity's components with it. Position is held, so there is no
+transport rate: the tangent plane in which the truth is given (see imu.specific_force) has none either. Coning and
+sculling from the increment before, as in Savage 1998, "Strapdown Inertial Navigation Integration Algorithm Design".
 """
 import math
 
@@ -25,13 +25,13 @@ STATE = np.dtype([
 
 @compiled
 def product(ax, ay, az, aw, bx, by, bz, bw):
-    """Quaternion a b: first b turns, then a."""
+    """Quaternion product a b of (x, y, z, w): the rotation b, then the rotation a."""
     return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
             aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
 
 
 @compiled
-def turn(x, y, z):
+def from_rotvec(x, y, z):
     """Unit quaternion (x, y, z, w) of a rotation vector [rad]."""
     square = x * x + y * y + z * z
     half = 0.5 * math.sqrt(square)
@@ -49,47 +49,48 @@ def set_attitude(s, qx, qy, qz, qw):
 
 
 @compiled
-def coning(ax, ay, az, bx, by, bz):
-    """Rotation vector of an angle increment a that came after b."""
-    cx, cy, cz = cross(bx, by, bz, ax, ay, az)
-    return ax + cx / 12.0, ay + cy / 12.0, az + cz / 12.0
+def coning(a, b):
+    """Rotation vector [rad] of an angle increment a (3,) [rad] that follows b (3,): a + b x a / 12."""
+    cx, cy, cz = cross(b[0], b[1], b[2], a[0], a[1], a[2])
+    return a[0] + cx / 12.0, a[1] + cy / 12.0, a[2] + cz / 12.0
 
 
 @compiled
-def sculling(ax, ay, az, fx, fy, fz, bx, by, bz, ex, ey, ez):
-    """Velocity increment in the deck axes at its start: of increments a (angle), f (force) that came after b, e.
+def sculling(a, f, b, e):
+    """Velocity increment [m/s] in the deck axes at the start of an interval, of the increments of angle a [rad] and
+    force f [m/s], each (3,), that follow b and e.
 
-    f + a x f / 2 + a x (a x f) / 6 for steady rates: without the last term, 1 ug of the vertical under quick sway.
+    f + a x f / 2 + a x (a x f) / 6 for steady rates; the last term is worth 1 ug of the vertical under quick sway.
     """
-    rx, ry, rz = cross(ax, ay, az, fx, fy, fz)
-    ux, uy, uz = cross(ax, ay, az, rx, ry, rz)
-    sx, sy, sz = cross(bx, by, bz, fx, fy, fz)
-    tx, ty, tz = cross(ex, ey, ez, ax, ay, az)
-    return (fx + 0.5 * rx + ux / 6.0 + (sx + tx) / 12.0, fy + 0.5 * ry + uy / 6.0 + (sy + ty) / 12.0,
-            fz + 0.5 * rz + uz / 6.0 + (sz + tz) / 12.0)
+    rx, ry, rz = cross(a[0], a[1], a[2], f[0], f[1], f[2])
+    ux, uy, uz = cross(a[0], a[1], a[2], rx, ry, rz)
+    sx, sy, sz = cross(b[0], b[1], b[2], f[0], f[1], f[2])
+    tx, ty, tz = cross(e[0], e[1], e[2], a[0], a[1], a[2])
+    return (f[0] + 0.5 * rx + ux / 6.0 + (sx + tx) / 12.0, f[1] + 0.5 * ry + uy / 6.0 + (sy + ty) / 12.0,
+            f[2] + 0.5 * rz + uz / 6.0 + (sz + tz) / 12.0)
 
 
 @compiled
 def step(s, angle, force, dt, earth_rate, command, gravity):
-    """One IMU interval of dt [s]; s a STATE record.
+    """Integrate one IMU interval of dt [s]; s: record of STATE.
 
     angle, force (3,): integrals of w_ib and f over it, FLU [rad, m/s]; earth_rate, command (3,): w_ie, w_c in n'.
     """
-    a, f, b, e, v, q = angle, force, s.last_angle, s.last_force, s.velocity, s.quaternion
-    dx, dy, dz = sculling(a[0], a[1], a[2], f[0], f[1], f[2], b[0], b[1], b[2], e[0], e[1], e[2])
+    v, q = s.velocity, s.quaternion
+    dx, dy, dz = sculling(angle, force, s.last_angle, s.last_force)
     gx, gy, gz = to_earth(s.mat, dx, dy, dz)
     tx, ty, tz = (-dt * (earth_rate[0] + command[0]), -dt * (earth_rate[1] + command[1]),
                   -dt * (earth_rate[2] + command[2]))
-    hx, hy, hz = cross(0.5 * tx, 0.5 * ty, 0.5 * tz, gx, gy, gz)        # n' turns meanwhile
+    hx, hy, hz = cross(0.5 * tx, 0.5 * ty, 0.5 * tz, gx, gy, gz)        # n' rotates meanwhile
     cx, cy, cz = cross(2.0 * earth_rate[0] + command[0], 2.0 * earth_rate[1] + command[1],
                        2.0 * earth_rate[2] + command[2], v[0], v[1], v[2])
     v[0] += gx + hx - dt * cx
     v[1] += gy + hy - dt * cy
     v[2] += gz + hz - dt * cz - dt * gravity
-    ux, uy, uz = coning(a[0], a[1], a[2], b[0], b[1], b[2])
-    px, py, pz, pw = turn(ux, uy, uz)
+    ux, uy, uz = coning(angle, s.last_angle)
+    px, py, pz, pw = from_rotvec(ux, uy, uz)
     px, py, pz, pw = product(q[0], q[1], q[2], q[3], px, py, pz, pw)
-    nx, ny, nz, nw = turn(tx, ty, tz)
+    nx, ny, nz, nw = from_rotvec(tx, ty, tz)
     px, py, pz, pw = product(nx, ny, nz, nw, px, py, pz, pw)
     set_attitude(s, px, py, pz, pw)
     for i in range(3):

@@ -1,4 +1,4 @@
-"""A seaway as a sum of sine waves, and how the hull answers each of them. Plain numpy, run once at the start.
+"""A seaway as a sum of sine waves, and the response of the hull to each. Plain numpy, run once at the start.
 
 reference/nav.md section 3.1. The surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}); a wave that travels
 along the deck's unit vector (d_x, d_y) (FLU) is zeta ~ e^{-j k (d_x x + d_y y)}, so the slope along x is -j k d_x a.
@@ -79,11 +79,11 @@ def _slope_over(u):
 
 
 def transfer(hull: HullParameters, w, mu, speed, gravity):
-    """(w_e, RAO): encounter frequency [rad/s] and complex answer (..., 6) to 1 m of wave at w [rad/s] from mu [rad].
+    """(w_e, RAO): encounter frequency [rad/s] and complex response (..., 6) to 1 m of wave at w [rad/s] from mu [rad].
 
     Pressure fades with depth (Smith e^{-k d/2}) and averages out over length and beam; roll, pitch and yaw follow
     the slope along the hull. Surge and sway are the orbital motion of the water, which at a crest moves the way the
-    wave travels, so it is -j times the elevation; yaw is the turn of that sway along the hull.
+    wave travels, so it is -j times the elevation; yaw follows the change of that sway along the hull.
     """
     k = w ** 2 / gravity
     d_x, d_y = np.cos(mu), -np.sin(mu)
@@ -121,7 +121,7 @@ def density(params: ShipParameters):
 
 
 def seaway(params: ShipParameters):
-    """The waves themselves: (w, amplitude [m], phase, mu), each (COMPONENTS,).
+    """The waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (COMPONENTS,).
 
     One wave in each of equal bins, at a random place in its bin (equal spacing would repeat after 2 pi / dw), with
     the bin's whole energy: sum a^2/2 = Hs^2/16 for every seed.

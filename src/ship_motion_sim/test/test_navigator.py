@@ -29,8 +29,8 @@ def answers(unit, stamps, raw=None):
 def sailed(seconds, sea=SEA, **imu):
     """(IMU messages, true attitude (n, 4), true deck rate (n, 3)) of a ship on sea state 4."""
     unit = ShipMotion(parameters.build(ShipMotionParameters, {**sea, **{f'imu.{k}': v for k, v in imu.items()}}), ())
-    said = answers(unit, STEP * np.arange(round(seconds * 1e9 / STEP)))
-    return said[RAW], said[TRUTH]['orientation'], said[TRUTH]['twist_angular']
+    outputs = answers(unit, STEP * np.arange(round(seconds * 1e9 / STEP)))
+    return outputs[RAW], outputs[TRUTH]['orientation'], outputs[TRUTH]['twist_angular']
 
 
 @functools.cache
@@ -43,14 +43,14 @@ def answered(raw, **values):
     return answers(Ins(parameters.build(InsParameters, {**SEA, 'latency': 0.0, **values}), (RAW,)), raw['stamp'], raw)
 
 
-def errors(said, truth):
+def errors(outputs, truth):
     """(n, 3) about east, north, up [rad]."""
-    return (Rotation.from_quat(said[DATA]['orientation']) * Rotation.from_quat(truth).inv()).as_rotvec()
+    return (Rotation.from_quat(outputs[DATA]['orientation']) * Rotation.from_quat(truth).inv()).as_rotvec()
 
 
-def aligned_at(said):
+def aligned_at(outputs):
     """Step at which `aligned` is first said."""
-    return int(np.argmax(said[STATE] == navigator.NAVIGATING))
+    return int(np.argmax(outputs[STATE] == navigator.NAVIGATING))
 
 
 @pytest.mark.parametrize('method, aid, output', [
@@ -58,37 +58,37 @@ def aligned_at(said):
     ('oba', 'log', 'sample'), ('adrc_scheduled', 'log', 'increment')])
 def test_it_aligns_under_way_from_180_deg_wrong_and_knows_how_well(method, aid, output):
     raw, truth, rate = ordinary(output)
-    said = answered(raw, method=method, imu_output=output, **WRONG, **{'aid.source': aid})
-    e, sigma, aligned = errors(said, truth), np.sqrt(said[DATA]['orientation_variance']), aligned_at(said)
+    outputs = answered(raw, method=method, imu_output=output, **WRONG, **{'aid.source': aid})
+    e, sigma, aligned = errors(outputs, truth), np.sqrt(outputs[DATA]['orientation_variance']), aligned_at(outputs)
     assert abs(e[2, 2]) > 2.0 or method == 'oba'
-    assert 100.0 < aligned * STEP * 1e-9 < 250.0 and (said[STATE][:aligned] == navigator.ALIGNING).all()
-    assert (said[STATE][aligned:] == navigator.NAVIGATING).all()
+    assert 100.0 < aligned * STEP * 1e-9 < 250.0 and (outputs[STATE][:aligned] == navigator.ALIGNING).all()
+    assert (outputs[STATE][aligned:] == navigator.NAVIGATING).all()
     assert (sigma[aligned:, 2] < 0.0036).all() and (sigma[:aligned - 1, 2] > 0.0035).all()
     assert (np.abs(e[aligned:, 2]) < 3.0 * sigma[aligned:, 2]).all()
     assert (np.abs(e[aligned:, :2]) < 4.0 * sigma[aligned:, :2] + 1e-4).all()
-    np.testing.assert_allclose(said[DATA]['angular_velocity'][aligned:], rate[aligned:], atol=2e-4)
+    np.testing.assert_allclose(outputs[DATA]['angular_velocity'][aligned:], rate[aligned:], atol=2e-4)
 
 
 @pytest.mark.parametrize('method', ['adrc', 'adrc_scheduled', 'riccati_eso', 'oba'])
 def test_the_level_is_as_good_as_it_says_while_it_is_still_being_levelled(method):
     """Power-up on a deck that is taken for level; 1 s later and until the end."""
     raw, truth, _ = ordinary('increment')
-    said = answered(raw, method=method, imu_output='increment', **WRONG, **{'aid.source': 'log'})
-    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
+    outputs = answered(raw, method=method, imu_output='increment', **WRONG, **{'aid.source': 'log'})
+    e, sigma = errors(outputs, truth), np.sqrt(outputs[DATA]['orientation_variance'])
     assert np.abs(e[0, :2]).max() > 2e-3 or method == 'oba'
     for first, last in ((1.0, 5.0), (5.0, 20.0), (20.0, 60.0), (60.0, 260.0)):
         part = slice(round(first * 1e9 / STEP), round(last * 1e9 / STEP))
-        off = np.sqrt(np.mean(e[part, :2]**2, axis=1))
-        assert np.sqrt(np.mean(off**2)) < 2.0 * np.sqrt(np.mean(sigma[part, 0]**2))
+        error = np.sqrt(np.mean(e[part, :2]**2, axis=1))
+        assert np.sqrt(np.mean(error**2)) < 2.0 * np.sqrt(np.mean(sigma[part, 0]**2))
 
 
 def test_a_ship_that_swell_moves_calls_itself_aligned_later():
     """Without aid the velocity of sea state 6 is no white noise of 0.05 m/s: the sigma widens."""
     raw, _, _ = sailed(260.0, {**SEA, 'ship.sea_state': 6}, output='increment')
-    said = answered(raw, method='riccati_eso', imu_output='increment', **WRONG, **{'ship.sea_state': 6})
+    outputs = answered(raw, method='riccati_eso', imu_output='increment', **WRONG, **{'ship.sea_state': 6})
     aided = answered(raw, method='riccati_eso', imu_output='increment', **WRONG,
                      **{'ship.sea_state': 6, 'aid.source': 'log'})
-    assert (said[STATE] == navigator.ALIGNING).all() and 0 < aligned_at(aided) < 8000
+    assert (outputs[STATE] == navigator.ALIGNING).all() and 0 < aligned_at(aided) < 8000
 
 
 def test_a_gyrocompass_that_dwells_at_180_deg_is_not_aligned():
@@ -98,20 +98,20 @@ def test_a_gyrocompass_that_dwells_at_180_deg_is_not_aligned():
                  for name in ('bias_x', 'bias_y', 'bias_z', 'noise')}
     raw, truth, _ = sailed(420.0, still, output='increment', **errorless)
     for heading, dwells in ((179.84, True), (2.0, False)):
-        said = answered(raw, **still, method='classical', imu_output='increment',
+        outputs = answered(raw, **still, method='classical', imu_output='increment',
                         **{'alignment.initial_heading_deg': heading, 'alignment.aligned_sigma': 0.006})
-        off, stage = abs(errors(said, truth)[-1, 2]), said[STATE][-1]
+        error, stage = abs(errors(outputs, truth)[-1, 2]), outputs[STATE][-1]
         assert stage == (navigator.ALIGNING if dwells else navigator.NAVIGATING)
-        assert off > 3.1 if dwells else off < 1e-3
+        assert error > 3.1 if dwells else error < 1e-3
 
 
 def test_free_inertial_keeps_the_attitude():
     """Aligned with a loose sigma it goes on without the sea's velocity; level and heading stay within theirs."""
     raw, truth, _ = ordinary('increment')
-    said = answered(raw, method='oba', imu_output='increment', **WRONG, **{'alignment.aligned_sigma': 0.0045})
-    aligned = aligned_at(said)
+    outputs = answered(raw, method='oba', imu_output='increment', **WRONG, **{'alignment.aligned_sigma': 0.0045})
+    aligned = aligned_at(outputs)
     assert aligned > 0
-    e = errors(said, truth)
+    e = errors(outputs, truth)
     assert (np.abs(e[-1] - e[aligned]) < [5e-4, 5e-4, 1e-4]).all()
 
 
@@ -120,9 +120,9 @@ def test_with_a_gnss_it_navigates_on_any_course(heading):
     """A velocity turned by the azimuth that it is to improve runs away on westerly courses."""
     sea = {'ship.sea_state': 5, 'ship.heading_deg': heading, 'ship.speed': 10.0}
     raw, truth, _ = sailed(400.0, sea, output='increment')
-    said = answered(raw, method='oba', imu_output='increment', **sea, **WRONG, **{'aid.source': 'gnss'})
-    aligned = aligned_at(said)
-    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
+    outputs = answered(raw, method='oba', imu_output='increment', **sea, **WRONG, **{'aid.source': 'gnss'})
+    aligned = aligned_at(outputs)
+    e, sigma = errors(outputs, truth), np.sqrt(outputs[DATA]['orientation_variance'])
     assert aligned > 0 and (np.abs(e[aligned:, 2]) < 3.0 * sigma[aligned:, 2]).all()
 
 
@@ -139,10 +139,10 @@ def test_a_message_that_is_not_finite_is_bridged():
     raw, truth, _ = ordinary('increment')
     broken = raw.copy()
     broken['angular_velocity'][3000] = math.nan
-    said = answered(broken, method='riccati_eso', imu_output='increment', **WRONG, **{'aid.source': 'log'})
-    assert said[DATA]['stamp'][3000] == records.NEVER
-    assert np.isfinite(said[DATA]['orientation']).all()
-    assert abs(errors(said, truth)[-1, 2]) < 3.0 * math.sqrt(said[DATA]['orientation_variance'][-1, 2])
+    outputs = answered(broken, method='riccati_eso', imu_output='increment', **WRONG, **{'aid.source': 'log'})
+    assert outputs[DATA]['stamp'][3000] == records.NEVER
+    assert np.isfinite(outputs[DATA]['orientation']).all()
+    assert abs(errors(outputs, truth)[-1, 2]) < 3.0 * math.sqrt(outputs[DATA]['orientation_variance'][-1, 2])
 
 
 @pytest.mark.parametrize('how', ['missing', 'not finite'])
@@ -157,17 +157,17 @@ def test_after_a_long_silence_of_the_imu_it_aligns_anew(how):
         raw['linear_acceleration'][~there] = math.nan
     unit = Ins(parameters.build(InsParameters, {**SEA, **WRONG, 'latency': 0.0, 'method': 'riccati_eso',
                                                 'imu_output': 'increment', 'aid.source': 'log'}), (RAW,))
-    said, statuses = records.empty(unit.outputs_type(), len(raw)), []
+    outputs, statuses = records.empty(unit.outputs_type(), len(raw)), []
     for k in range(len(raw)):
         unit.inputs[RAW] = raw[k]
-        unit.step(raw['stamp'][k:k + 1], unit.inputs, said[k:k + 1])
+        unit.step(raw['stamp'][k:k + 1], unit.inputs, outputs[k:k + 1])
         statuses.append(ins.STATUS[unit.parts['outputs']['status']])
     back = statuses.index('IMU was silent for too long, the attitude is lost: it aligns anew')
     assert back == (9000 if how == 'missing' else 9200)
-    assert said[STATE][back - 1 if how == 'missing' else 8999] == navigator.NAVIGATING
-    assert (said[STATE][back:back + 5000] == navigator.ALIGNING).all()
-    e, sigma = errors(said, truth), np.sqrt(said[DATA]['orientation_variance'])
-    assert sigma[back, 2] > 1.0 and said[STATE][-1] == navigator.NAVIGATING
+    assert outputs[STATE][back - 1 if how == 'missing' else 8999] == navigator.NAVIGATING
+    assert (outputs[STATE][back:back + 5000] == navigator.ALIGNING).all()
+    e, sigma = errors(outputs, truth), np.sqrt(outputs[DATA]['orientation_variance'])
+    assert sigma[back, 2] > 1.0 and outputs[STATE][-1] == navigator.NAVIGATING
     assert abs(e[-1, 2]) < 3.0 * sigma[-1, 2] < 0.01
 
 

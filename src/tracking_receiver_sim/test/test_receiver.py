@@ -87,8 +87,8 @@ def test_noise_in_the_sum_channel_does_not_lower_the_slope():
     bench = Bench(FIXED | {'receiver.cn0_dbhz': 40.0, 'receiver.acquire_level_dbhz': 30.0,
                            'receiver.lose_level_dbhz': 30.0})
     bench.point(0.3, 0.6 - 0.2 * BEAMWIDTH)
-    seen = bench.run(20000, np.random.default_rng(11))[200:]['elevation'].mean() / BEAMWIDTH
-    assert seen == pytest.approx(monopulse.difference_pattern(0.2, 1.6) / monopulse.sum_pattern(0.2) / 1.6, rel=0.03)
+    error = bench.run(20000, np.random.default_rng(11))[200:]['elevation'].mean() / BEAMWIDTH
+    assert error == pytest.approx(monopulse.difference_pattern(0.2, 1.6) / monopulse.sum_pattern(0.2) / 1.6, rel=0.03)
 
 
 def test_recursion_noise_as_predicted():
@@ -101,11 +101,11 @@ def test_recursion_noise_as_predicted():
 @pytest.mark.parametrize('elevation', [0.0, 1.0, 1.4])
 def test_azimuth_error_is_seen_as_cross_elevation(elevation):
     bench = Bench(QUIET | {'target.angle.elevation': elevation})
-    off = 2e-3
-    bench.point(0.3 - off, elevation)
+    offset = 2e-3
+    bench.point(0.3 - offset, elevation)
     out = bench.run(300)[-1]
-    assert out['true_cross_elevation'] == pytest.approx(off * math.cos(elevation), rel=1e-4)
-    assert out['cross_elevation'] == pytest.approx(off * math.cos(elevation), rel=0.01)
+    assert out['true_cross_elevation'] == pytest.approx(offset * math.cos(elevation), rel=1e-4)
+    assert out['cross_elevation'] == pytest.approx(offset * math.cos(elevation), rel=0.01)
 
 
 def test_error_signs_and_slope_factor():
@@ -288,8 +288,8 @@ def test_age_of_the_beam_is_that_of_the_steps_its_samples_were_taken_in(kind, n,
         smoothing.begin(state)
         for _ in range(samples):
             smoothing.put(state, float(step), 1.0 / n)
-    seen = smoothing.smoothed(state, smoothing.SMOOTHINGS.index(kind), samples, n)
-    expected = (steps - 1 - seen) * PERIOD if beam == 'held' else 0.0
+    smoothed = smoothing.smoothed(state, smoothing.SMOOTHINGS.index(kind), samples, n)
+    expected = (steps - 1 - smoothed) * PERIOD if beam == 'held' else 0.0
     params = build(TrackingReceiverParameters, {'receiver.beam': beam, 'receiver.smoothing': kind,
                                                 'receiver.smoothing_samples': n, 'receiver.samples_per_step': samples})
     assert receiver.beam_age(params, PERIOD) == pytest.approx(expected, abs=1e-12)
@@ -447,9 +447,9 @@ def test_the_antenna_stands_at_the_end_of_its_arm():
     def deck(t):
         return Rotation.from_euler('ZYX', [1.4 + 0.02 * t, 0.05 * math.sin(t), 0.1 * math.cos(0.8 * t)])
 
-    def seen(t):
+    def on_deck(t):
         return deck(t).inv().apply(place - velocity * t) - arm
-    x, y, z = seen(2.0)
+    x, y, z = on_deck(2.0)
     beam = math.atan2(-y, x), math.atan2(z, math.hypot(x, y)) - 0.002
     bench.point(*beam)
     bench.inputs['mat_ed'], bench.inputs['position'] = deck(2.0).as_matrix(), velocity * 2.0
@@ -458,7 +458,7 @@ def test_the_antenna_stands_at_the_end_of_its_arm():
     out = bench.run(100)[-1]
     np.testing.assert_allclose([out['true_cross_elevation'], out['true_elevation']], [0.0, 0.002], atol=1e-9)
     assert out['range'] == pytest.approx(np.linalg.norm([x, y, z]), abs=1e-3)
-    before, after = (np.array(receiver.offsets(*beam, *seen(2.0 + d))) for d in (-h, h))
+    before, after = (np.array(receiver.offsets(*beam, *on_deck(2.0 + d))) for d in (-h, h))
     np.testing.assert_allclose(out['rate'], (after - before) / (2 * h), atol=1e-6)
 
 

@@ -20,7 +20,9 @@ def built(duration=120.0, **values):
 
 
 def states(made, times):
-    return np.array([target.state(made.constants[0], made.breaks, made.coefficients, t) for t in times])
+    """(valid, ENU position [m], velocity [m/s]) at times [s], (n, 7)."""
+    made_states = (target.state(made.constants[0], made.breaks, made.coefficients, t) for t in times)
+    return np.array([(state.valid, *state.position, *state.velocity) for state in made_states])
 
 
 def vectors(azimuth, elevation):
@@ -64,10 +66,10 @@ def test_leo_pass_agrees_with_skyfield(leo, ut1_is_utc, allowed_mdeg, allowed_m)
 
 def test_hermite_pieces_agree_with_sgp4(leo):
     params = TargetParameters()
-    found = target.satellite(params.leo_pass)
-    julian, fraction = target._start(params, found, 120.0)
+    satrec = target.satellite(params.leo_pass)
+    julian, fraction = target._start(params, satrec, 120.0)
     times = np.random.default_rng(1).uniform(-5.0, 125.0, 500)
-    position, velocity = target._satellite_enu(found, params.station, julian, fraction, times)
+    position, velocity = target._satellite_enu(satrec, params.station, julian, fraction, times)
     got = states(leo, times)
     assert np.linalg.norm(got[:, 1:4] - position, axis=1).max() < 2e-3
     assert np.linalg.norm(got[:, 4:7] - velocity, axis=1).max() < 0.03
@@ -82,8 +84,8 @@ def test_run_is_centred_on_the_culmination(leo):
 
 def test_pass_finder_takes_the_first_that_fits():
     params = build(TargetParameters, {'leo_pass.culmination_low_deg': 40.0, 'leo_pass.culmination_high_deg': 60.0})
-    found = target.satellite(params.leo_pass)
-    when = target.culmination(params, found)
+    satrec = target.satellite(params.leo_pass)
+    when = target.culmination(params, satrec)
     scale = load.timescale(builtin=True)
     sky = EarthSatellite(LINE_1, LINE_2, 'ISS', scale)
     station = wgs84.latlon(47.4, 8.5, 500.0)

@@ -1,7 +1,7 @@
-"""Targets and the monopulse tracking receiver that sees them.
+"""Targets and the monopulse receiver that tracks them.
 
 receiver.py composes the column and owns `step`; below it target.py (where the target is), smoothing.py and
-monopulse.py (what the receiver's channels make of an error); params.py holds every number.
+monopulse.py (the voltages of the channels for an error); params.py holds every number.
 
 Frames: the station's ENU frame for targets (axes fixed to the earth at the station), deck FLU and the
 beam's offsets as in pedestal_common. Time of a target runs from the start of the run (stamp 0).

@@ -4,17 +4,16 @@ from pedestal_common.line_of_sight import offset_rates, to_deck
 
 
 @compiled
-def error_rate(mat_ed, position, twist_linear, twist_angular, azimuth, elevation, azimuth_rate, elevation_rate,
-               e, n, u, v_e, v_n, v_u):
-    """(d dX/dt, d dE/dt) [rad/s] of a target at ENU [m], moving with v [m/s], off a beam at deck angles.
+def error_rate(i, position, velocity, target):
+    """(d dX/dt, d dE/dt) [rad/s] of a TargetState off the beam; i: record of receiver.INPUTS, the beam and the deck.
 
-    mat_ed (3, 3) deck -> earth; position (3,) ENU of the antenna [m]; twist_linear, twist_angular (3,) its velocity
-    [m/s] and the rate [rad/s] of the deck, FLU. Exact: the target's place in the deck frame is
-    r = M' (p - position), and r' = M' v - v_deck - w x r.
+    position (3,): of the antenna, ENU [m]; velocity (3,): of the antenna, FLU [m/s]. Exact: in the deck frame the
+    target is at r = M' (p - position), and r' = M' v - velocity - w x r.
     """
-    x, y, z = to_deck(mat_ed, e - position[0], n - position[1], u - position[2])
-    vx, vy, vz = to_deck(mat_ed, v_e, v_n, v_u)
-    wx, wy, wz = twist_angular[0], twist_angular[1], twist_angular[2]
-    return offset_rates(azimuth, elevation, azimuth_rate, elevation_rate, x, y, z,
-                        vx - twist_linear[0] - (wy * z - wz * y), vy - twist_linear[1] - (wz * x - wx * z),
-                        vz - twist_linear[2] - (wx * y - wy * x))
+    (e, n, u), (v_e, v_n, v_u) = target.position, target.velocity
+    x, y, z = to_deck(i.mat_ed, e - position[0], n - position[1], u - position[2])
+    vx, vy, vz = to_deck(i.mat_ed, v_e, v_n, v_u)
+    wx, wy, wz = i.twist_angular[0], i.twist_angular[1], i.twist_angular[2]
+    return offset_rates(i.azimuth, i.elevation, i.azimuth_rate, i.elevation_rate, x, y, z,
+                        vx - velocity[0] - (wy * z - wz * y), vy - velocity[1] - (wz * x - wx * z),
+                        vz - velocity[2] - (wx * y - wy * x))

@@ -1,4 +1,4 @@
-"""Monopulse channels: the voltages a target off the beam axis makes.
+"""Monopulse channels: the voltages that a target off the beam axis causes.
 
 Sum and differences have illuminations of their own, as a multimode feed gives them: a cosine taper for the
 sum, one period of a sine across the aperture for a difference. Both far fields are closed forms with their
@@ -55,7 +55,8 @@ def channels(v_x, v_e, k_m, cos_beta, sin_beta):
 
 @compiled
 def detect(d, s_real, s_imag, cos_phi, sin_phi, d_noise_real, d_noise_imag):
-    """Re(d conj(s)) of a real difference voltage d that the receiver turned by phi and added noise to."""
+    """Re(d conj(s)) of a real difference voltage d that the receiver rotated by phi and added noise to; voltages with
+    unit noise power."""
     return (d * cos_phi + d_noise_real) * s_real + (d * sin_phi + d_noise_imag) * s_imag
 
 

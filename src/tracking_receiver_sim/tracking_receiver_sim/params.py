@@ -36,6 +36,7 @@ class LeoPassParameters(Parameters):
     search_days: float = parameter(3.0, 0.1, 30.0, 'd', 'how far past the TLE epoch the pass finder looks')
 
     def check(self):
+        """Raise ParameterError where the limits of the culmination are not in order."""
         if self.culmination_low_deg >= self.culmination_high_deg:
             raise ParameterError(f'culmination_low_deg = {self.culmination_low_deg:g} deg: must be below '
                                  f'culmination_high_deg = {self.culmination_high_deg:g} deg')
@@ -131,6 +132,7 @@ class ReceiverParameters(Parameters):
     ranging: RangingParameters = group(RangingParameters)
 
     def check(self):
+        """Raise ParameterError for a moving average that is too long, or lock levels that are not in order."""
         if self.smoothing == 'moving_average' and self.smoothing_samples > WINDOW:
             raise ParameterError(f'smoothing_samples = {self.smoothing_samples}: a moving average takes 1 to {WINDOW}')
         if self.lose_level_dbhz > self.acquire_level_dbhz:
@@ -149,6 +151,7 @@ class TrackingReceiverParameters(Parameters):
     seed: int = parameter(1, 0, 2**31 - 1, '1', 'of the receiver noise')
 
     def check(self):
+        """Raise ParameterError for hidden sectors that cannot be read."""
         sectors(self.blockage)
 
 

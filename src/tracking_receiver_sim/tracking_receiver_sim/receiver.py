@@ -1,17 +1,18 @@
-"""The monopulse tracking receiver: where the target is, what the channels see of it, what is published.
+"""The monopulse tracking receiver: where the target is, what the channels measure of it, what is published.
 
 One `step` per drive step. Between the previous step and this one the true error runs in a straight line, along which
 `samples_per_step` samples of sum and difference voltages are taken, the last one at the stamp. Where the beam is held
-(an electronic beam jumps at the steps) the line begins at what the target of then would be off the beam of now. Each
-sample is turned into an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the detector's full
-scale, then smoothed.
+(an electronic beam jumps at the steps) the line begins at the offset of the previous target from the present beam.
+Each sample is converted to an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the
+detector's full scale, then smoothed.
 
 Where they are measured, the rate of the error at the stamp and the range come with each result, with white noise.
 
 Voltages are scaled so that one channel's noise has unit power in one sample: the carrier power on axis is
-C/N0 tau, and the receiver, which knows its own noise floor, takes 1 off the sum power it measures.
+C/N0 tau, and the receiver, which knows its own noise floor, subtracts 1 from the sum power it measures.
 """
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -35,6 +36,11 @@ RING = 512
 """Results that can be on their way to the output at once."""
 POWER_FLOOR = 0.01
 """Least carrier power over noise power in one sample that the C/N0 estimate reports (-20 dB)."""
+
+Result = namedtuple('Result', 'error cn0_dbhz rates range')
+"""What is published of one step: error and rates (cross-elevation, elevation) [rad, rad/s], C/N0 [dB-Hz], range [m];
+NaN for what is not locked or not measured."""
+NOT_MEASURED = (math.nan, math.nan)
 
 STATE = np.dtype([
     ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),
@@ -141,8 +147,10 @@ def angle_noise(params, cn0_dbhz, period):
 
 
 def age(params, period):
-    """How long before its stamp [s] an error was measured in the mean, off a beam that stands; 0 off one that moves,
-    where the error of the stamp and the mean of a step differ as little as the error itself does within it."""
+    """Mean age [s] of an error at its stamp, of a beam that is held between two steps; 0 for one that moves, where the
+    mean over a step differs from the error at the stamp by no more than the error changes within the step.
+
+    params: TrackingReceiverParameters; period: drive step [s]."""
     receiver = params.receiver
     if BEAMS.index(receiver.beam) != HELD:
         return 0.0
@@ -151,8 +159,10 @@ def age(params, period):
 
 
 def beam_age(params, period):
-    """How long before its stamp [s] the beam that an error was measured off belongs in the mean, by the stamps of the
-    joint states: of a beam that stands through a step, those at its end."""
+    """How long before the stamp of an error [s] the joint states were stamped, in the mean, that its beam had.
+
+    A beam that is held through a step has the joint states of the step's end. params: TrackingReceiverParameters;
+    period: drive step [s]."""
     receiver = params.receiver
     if BEAMS.index(receiver.beam) != HELD:
         return 0.0
@@ -174,7 +184,7 @@ def inputs_known(i):
 
 @compiled
 def place_antenna(s, c, i):
-    """Where the antenna stands and how it moves: p + M r, v + w x r with the lever arm r."""
+    """Set the antenna's position p + M r [m] and velocity v + w x r [m/s] in the state; r: the lever arm, FLU [m]."""
     x, y, z = c.lever_arm[0], c.lever_arm[1], c.lever_arm[2]
     wx, wy, wz = i.twist_angular[0], i.twist_angular[1], i.twist_angular[2]
     e, n, u = to_earth(i.mat_ed, x, y, z)
@@ -196,7 +206,9 @@ def carrier_amplitude(c, e, n, u, hidden):
 
 @compiled
 def sample(s, c, amplitude, v_x, v_e, normals, first):
-    """One sample of the channels: (cross-elevation, elevation) error [rad]; moves the AGC and level filters."""
+    """Take one sample of the channels: (cross-elevation, elevation) error [rad]; updates the AGC and level filters.
+
+    amplitude: of the carrier on axis [-]; v_x, v_e: offsets in beamwidths; normals: from index `first` on."""
     half = math.sqrt(0.5)
     S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
     s_real, s_imag = amplitude * S + half * normals[first], half * normals[first + 1]
@@ -214,7 +226,8 @@ def sample(s, c, amplitude, v_x, v_e, normals, first):
 
 @compiled
 def measure(s, c, amplitude, dX, dE, normals):
-    """(cross-elevation, elevation) [rad] of one step, true error running from the state's to (dX, dE)."""
+    """(cross-elevation, elevation) [rad] measured in one step, while the true error goes from the state's to dX,
+    dE."""
     from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (dX, dE)
     smooth_x, smooth_e = s.smooth_cross_elevation, s.smooth_elevation
     smoothing.begin(smooth_x)
@@ -231,7 +244,8 @@ def measure(s, c, amplitude, dX, dE, normals):
 
 @compiled
 def lock(s, c, elapsed_ns):
-    """Lock with two levels: gained after acquire_ns above the upper one, lost after lose_ns below the lower."""
+    """Lock with two levels: gained after acquire_ns above the upper one, lost after lose_ns below the lower;
+    elapsed_ns since the last step."""
     power = s.level_power - 1.0
     if s.locked != 0:
         crossed, wait = power < c.lose_power, c.lose_ns
@@ -243,31 +257,30 @@ def lock(s, c, elapsed_ns):
 
 
 @compiled
-def rate_and_range(s, c, i, e, n, u, v_e, v_n, v_u, normals):
-    """(cross-elevation rate, elevation rate [rad/s], range [m]) of a target at ENU [m], moving with v [m/s], as
-    measured; NaN for what is not."""
-    rate_x, rate_e, distance = math.nan, math.nan, math.nan
+def rate_and_range(s, c, i, target_state, normals):
+    """((cross-elevation rate, elevation rate) [rad/s], range [m]) of a TargetState as measured; NaN for what is
+    not."""
+    rates, distance = NOT_MEASURED, math.nan
     first = NORMALS_PER_SAMPLE * c.samples
     if c.rate_measured != 0:
-        rate_x, rate_e = error_rate(i.mat_ed, s.antenna, s.antenna_velocity, i.twist_angular, i.azimuth, i.elevation,
-                                    i.azimuth_rate, i.elevation_rate, e, n, u, v_e, v_n, v_u)
-        rate_x += c.rate_sigma * normals[first]
-        rate_e += c.rate_sigma * normals[first + 1]
+        rate_x, rate_e = error_rate(i, s.antenna, s.antenna_velocity, target_state)
+        rates = rate_x + c.rate_sigma * normals[first], rate_e + c.rate_sigma * normals[first + 1]
         first += 2
     if c.range_measured != 0:
+        e, n, u = target_state.position
         e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
         distance = float(np.float32(math.sqrt(e * e + n * n + u * u) + c.range_sigma * normals[first]))
-    return rate_x, rate_e, distance
+    return rates, distance
 
 
 @compiled
-def delay(s, c, o, stamp_ns, cross_elevation, elevation, cn0_dbhz, rate_x, rate_e, distance):
-    """Put a result into the ring and release the newest measured at or before stamp_ns - latency."""
+def delay(s, c, o, stamp_ns, result):
+    """Put a Result into the ring and release the newest one measured at or before stamp_ns - latency."""
     slot = s.written % RING
     s.ring_stamp_ns[slot], s.ring_locked[slot] = stamp_ns, s.locked
-    s.ring_cross_elevation[slot], s.ring_elevation[slot] = cross_elevation, elevation
-    s.ring_cn0_dbhz[slot] = cn0_dbhz
-    s.ring_rate[slot, 0], s.ring_rate[slot, 1], s.ring_range[slot] = rate_x, rate_e, distance
+    s.ring_cross_elevation[slot], s.ring_elevation[slot] = result.error
+    s.ring_rate[slot, 0], s.ring_rate[slot, 1] = result.rates
+    s.ring_cn0_dbhz[slot], s.ring_range[slot] = result.cn0_dbhz, result.range
     s.written += 1
     s.released = max(s.released, s.written - RING)
     while s.released < s.written and s.ring_stamp_ns[s.released % RING] <= stamp_ns - c.latency_ns:
@@ -281,7 +294,7 @@ def delay(s, c, o, stamp_ns, cross_elevation, elevation, cn0_dbhz, rate_x, rate_
 
 @compiled
 def forget(o):
-    """Outputs of a step that knows nothing yet."""
+    """Reset the outputs at the start of a step: nothing measured, nothing known."""
     o.due, o.stamp_ns, o.locked = 0, 0, 0
     o.cross_elevation, o.elevation, o.cn0_dbhz = math.nan, math.nan, math.nan
     o.rate[0], o.rate[1], o.range = math.nan, math.nan, math.nan
@@ -294,7 +307,7 @@ def forget(o):
 @compiled
 def step(s, c, i, o, breaks, coefficients, normals):
     """One drive step: records STATE, CONSTANTS, INPUTS, OUTPUTS, breaks and coefficients of the Target, normals
-    (normals_per_step,). Never raises: OUTPUTS' status says what is missing."""
+    (normals_per_step,). Never raises: the status in OUTPUTS names what is missing."""
     forget(o)
     if i.stamp_ns <= s.stamp_ns:
         o.status = STAMP_ORDER
@@ -302,20 +315,19 @@ def step(s, c, i, o, breaks, coefficients, normals):
     elapsed_ns = i.stamp_ns - s.stamp_ns if s.stamp_ns >= 0 else c.period_ns
     s.stamp_ns = i.stamp_ns
 
-    valid, e, n, u, v_e, v_n, v_u = target.state(c.target, breaks, coefficients, 1e-9 * i.stamp_ns)
-    o.target_valid = valid
-    o.target_position[0], o.target_position[1], o.target_position[2] = e, n, u
-    o.target_velocity[0], o.target_velocity[1], o.target_velocity[2] = v_e, v_n, v_u
+    true = target.state(c.target, breaks, coefficients, 1e-9 * i.stamp_ns)
+    o.target_valid = true.valid
+    o.target_position[0], o.target_position[1], o.target_position[2] = true.position
+    o.target_velocity[0], o.target_velocity[1], o.target_velocity[2] = true.velocity
 
-    known = inputs_known(i)
-    cross_elevation, elevation = math.nan, math.nan
-    rate_x, rate_e, distance = math.nan, math.nan, math.nan
-    if known:
+    error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
+    if inputs_known(i):
         dX, dE, amplitude = 0.0, 0.0, 0.0
         hidden = False
-        if valid:
+        if true.valid:
             place_antenna(s, c, i)
-            rate_x, rate_e, distance = rate_and_range(s, c, i, e, n, u, v_e, v_n, v_u, normals)
+            rates, distance = rate_and_range(s, c, i, true, normals)
+            e, n, u = true.position
             e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
             x, y, z = to_deck(i.mat_ed, e, n, u)
             if c.held and s.error_known:
@@ -326,17 +338,16 @@ def step(s, c, i, o, breaks, coefficients, normals):
             hidden = blockage.blocked(c.sectors, *angles(x, y, z))
             amplitude = carrier_amplitude(c, e, n, u, hidden)
             o.true_cross_elevation, o.true_elevation = dX, dE
-        cross_elevation, elevation = measure(s, c, amplitude, dX, dE, normals)
+        error = measure(s, c, amplitude, dX, dE, normals)
         s.cross_elevation, s.elevation = dX, dE
-        s.error_known = valid
+        s.error_known = true.valid
         lock(s, c, elapsed_ns)
-        o.status = (NO_TARGET if valid == 0 else HIDDEN if hidden else BELOW_HORIZON if amplitude == 0.0 else
+        o.status = (NO_TARGET if true.valid == 0 else HIDDEN if hidden else BELOW_HORIZON if amplitude == 0.0 else
                     LOCKED if s.locked != 0 else NO_LOCK)
     else:
         s.error_known, s.locked, s.timer_ns = 0, 0, 0
         o.status = NO_JOINTS
     if s.locked == 0:
-        cross_elevation, elevation = math.nan, math.nan
-        rate_x, rate_e, distance = math.nan, math.nan, math.nan
+        error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
     cn0_dbhz = 10.0 * math.log10(max(s.level_power - 1.0, POWER_FLOOR) / c.tau)
-    delay(s, c, o, i.stamp_ns, cross_elevation, elevation, cn0_dbhz, rate_x, rate_e, distance)
+    delay(s, c, o, i.stamp_ns, Result(error, cn0_dbhz, rates, distance))

@@ -3,7 +3,7 @@
     none            the mean of the samples of one step
     recursion       eq. (1) as printed: a first-order low-pass, x = (n - 1) / n x + 1 / n y. Its bandwidth (eq. 2) is
                     1 / ((n - 1) T) rad/s, its mean delay n - 1 samples
-    moving_average  what the text says and eq. (1) is not: the mean of the last n samples, delay (n - 1) / 2 samples
+    moving_average  the text of the paper, not its eq. (1): the mean of the last n samples, delay (n - 1) / 2 samples
 """
 import numpy as np
 
@@ -21,13 +21,13 @@ SMOOTHER = np.dtype([('low_pass', 'f8'), ('sum', 'f8'), ('samples', 'f8', (WINDO
 
 @compiled
 def begin(s):
-    """Begin a step."""
+    """Begin a drive step: its sum of samples starts at 0."""
     s.sum = 0.0
 
 
 @compiled
 def put(s, y, gain):
-    """Take one sample y; gain = 1/n of the recursion."""
+    """Take one sample y [rad]; gain: 1/n of the recursion [-]."""
     s.sum += y
     s.low_pass += gain * (y - s.low_pass)
     s.samples[s.count % WINDOW] = y
@@ -36,7 +36,7 @@ def put(s, y, gain):
 
 @compiled
 def smoothed(s, kind, samples, n):
-    """What comes out at the end of a step of `samples`; n: of the moving average, which is shorter at the start."""
+    """The smoothed error [rad] at the end of a step of `samples`; n: of the moving average, shorter at the start."""
     if kind == RECURSION:
         return s.low_pass
     if kind == NO_SMOOTHING:
@@ -49,13 +49,12 @@ def smoothed(s, kind, samples, n):
 
 
 def delay(kind, samples, n):
-    """Mean delay in samples of a kind of SMOOTHINGS: how long before the newest sample the result belongs."""
+    """Mean delay of a kind of SMOOTHINGS, in samples before the newest."""
     return {'none': 0.5 * (samples - 1), 'recursion': n - 1.0, 'moving_average': 0.5 * (n - 1)}[kind]
 
 
 def steps_back(kind, samples, n):
-    """How many steps before the last one the samples in the result were taken in the mean: `delay` in whole steps of
-    `samples`."""
+    """Mean age, in drive steps of `samples`, of the steps whose samples are in the result: 0 for the last step."""
     if kind == 'none':
         return 0.0
     if kind == 'recursion':

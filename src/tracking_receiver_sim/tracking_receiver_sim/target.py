@@ -1,4 +1,4 @@
-"""Where the target is: every kind as one thing the compiled receiver can evaluate at any time.
+"""Where the target is: every kind in one form that the compiled receiver evaluates at any time.
 
 Trajectories (leo_pass, track_file, flyby) become piecewise cubics in the station's ENU frame when they are
 built, so a step needs neither SGP4 nor a file; angle targets (sine, step, ramp) are closed forms. Before
@@ -16,6 +16,7 @@ a 3 m/s^2 turn its velocity is right to 1e-4 m/s where PCHIP, flattening every e
 import datetime
 import math
 import typing
+from collections import namedtuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
@@ -40,9 +41,9 @@ KNOT_SPACING = 1.0
 SEARCH_SPACING = 20.0
 """Between the pass finder's looks [s]; a LEO pass lasts minutes."""
 MARGIN = 5.0
-"""How far all but a track_file is laid out before and past the run [s], for a program track that looks ahead."""
+"""Time before and after the run [s] that every kind but a track_file covers, for a program track."""
 TLE_AGE = 30.0
-"""Largest time between TLE epoch and start_time [days]: past it SGP4 says nothing about the satellite."""
+"""Largest time between TLE epoch and start_time [days]: beyond it SGP4 is useless."""
 COLUMNS = {'time_s': (-1e12, 1e12), 'latitude_deg': (-90.0, 90.0), 'longitude_deg': (-180.0, 360.0),
            'altitude_m': (-1000.0, 1e8)}
 """Of a track file, with the range of each."""
@@ -51,6 +52,9 @@ TLE_NUMBERS = (
     {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
      'mean anomaly': (43, 51), 'mean motion': (52, 63)})
 """Columns of the fields of both TLE lines that must be numbers."""
+
+TargetState = namedtuple('TargetState', 'valid position velocity')
+"""valid: 0 or 1; position: ENU of the station [m], velocity [m/s], three floats each, NaN where it is not valid."""
 
 TARGET = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))], align=True)
 
@@ -73,23 +77,24 @@ class Target(typing.NamedTuple):
 
 @compiled
 def on_track(breaks, coefficients, t):
-    """(valid, e, n, u, ve, vn, vu) [m, m/s] of a piecewise cubic; NaN and 0 outside its breaks."""
+    """TargetState of a piecewise cubic (breaks and coefficients as in Target) at t [s]; not valid outside its breaks.
+    """
     if not breaks[0] <= t <= breaks[-1]:
-        return 0, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
+        return TargetState(0, (math.nan, math.nan, math.nan), (math.nan, math.nan, math.nan))
     i = interval(breaks, t)
     x, c = t - breaks[i], coefficients[:, i]
-    return (1,
-            ((c[0, 0] * x + c[1, 0]) * x + c[2, 0]) * x + c[3, 0],
-            ((c[0, 1] * x + c[1, 1]) * x + c[2, 1]) * x + c[3, 1],
-            ((c[0, 2] * x + c[1, 2]) * x + c[2, 2]) * x + c[3, 2],
-            (3.0 * c[0, 0] * x + 2.0 * c[1, 0]) * x + c[2, 0],
-            (3.0 * c[0, 1] * x + 2.0 * c[1, 1]) * x + c[2, 1],
-            (3.0 * c[0, 2] * x + 2.0 * c[1, 2]) * x + c[2, 2])
+    return TargetState(1, (((c[0, 0] * x + c[1, 0]) * x + c[2, 0]) * x + c[3, 0],
+                           ((c[0, 1] * x + c[1, 1]) * x + c[2, 1]) * x + c[3, 1],
+                           ((c[0, 2] * x + c[1, 2]) * x + c[2, 2]) * x + c[3, 2]),
+                       ((3.0 * c[0, 0] * x + 2.0 * c[1, 0]) * x + c[2, 0],
+                        (3.0 * c[0, 1] * x + 2.0 * c[1, 1]) * x + c[2, 1],
+                        (3.0 * c[0, 2] * x + 2.0 * c[1, 2]) * x + c[2, 2]))
 
 
 @compiled
 def in_angles(kind, angle, t):
-    """(1, e, n, u, ve, vn, vu) [m, m/s] of a sine, step or ramp in earth azimuth and elevation."""
+    """TargetState at t [s] of a sine, step or ramp in earth azimuth and elevation; angle: record of
+    AngleParameters."""
     tau = t - angle.start
     A, E, A_dot, E_dot = angle.azimuth, angle.elevation, 0.0, 0.0
     if tau >= 0.0:
@@ -106,15 +111,14 @@ def in_angles(kind, angle, t):
     r = angle.range
     e, n, u = earth_direction(A, E)
     sin_A, cos_A, sin_E, cos_E = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
-    return (1, r * e, r * n, r * u,
-            r * (A_dot * cos_E * cos_A - E_dot * sin_E * sin_A),
-            r * (-A_dot * cos_E * sin_A - E_dot * sin_E * cos_A),
-            r * E_dot * cos_E)
+    return TargetState(1, (r * e, r * n, r * u), (r * (A_dot * cos_E * cos_A - E_dot * sin_E * sin_A),
+                                                  r * (-A_dot * cos_E * sin_A - E_dot * sin_E * cos_A),
+                                                  r * E_dot * cos_E))
 
 
 @compiled
 def state(target, breaks, coefficients, t):
-    """(valid, e, n, u, ve, vn, vu): ENU position [m] and velocity [m/s] at t [s]; target is a TARGET record."""
+    """TargetState at t [s]; target: record of TARGET, breaks and coefficients as in Target."""
     if target.kind == SINE or target.kind == STEP or target.kind == RAMP:
         return in_angles(target.kind, target.angle, t)
     return on_track(breaks, coefficients, t)
@@ -123,7 +127,7 @@ def state(target, breaks, coefficients, t):
 @compiled
 def _look_angles(constants, breaks, coefficients, times, azimuth, elevation, distance):
     for i in range(len(times)):
-        valid, e, n, u, _, _, _ = state(constants[0], breaks, coefficients, times[i])
+        e, n, u = state(constants[0], breaks, coefficients, times[i]).position
         azimuth[i], elevation[i] = earth_angles(e, n, u)
         distance[i] = math.sqrt(e * e + n * n + u * u)
 
@@ -199,19 +203,19 @@ def satellite(leo_pass) -> Satrec:
                 raise TargetError(f'{name}: {field} {line[first:end]!r} is not a number')
     if lines[0][2:7] != lines[1][2:7]:
         raise TargetError(f'TLE line 2: satellite {lines[1][2:7]!r}, must be {lines[0][2:7]!r} as in line 1')
-    found = Satrec.twoline2rv(*lines, WGS72)
-    if found.error:
-        raise TargetError(f'TLE of satellite {lines[0][2:7]}: {SGP4_ERRORS[found.error]}')
-    return found
+    satrec = Satrec.twoline2rv(*lines, WGS72)
+    if satrec.error:
+        raise TargetError(f'TLE of satellite {lines[0][2:7]}: {SGP4_ERRORS[satrec.error]}')
+    return satrec
 
 
-def _satellite_enu(found, station, julian, fraction, times):
+def _satellite_enu(satrec, station, julian, fraction, times):
     """ENU position [m] and velocity against the earth [m/s], each (n, 3), at times [s] past julian + fraction."""
     fractions = fraction + times / 86400.0
-    error, position, velocity = found.sgp4_array(np.full(len(times), julian), fractions)
+    error, position, velocity = satrec.sgp4_array(np.full(len(times), julian), fractions)
     if error.any():
         i = int(np.argmax(error != 0))
-        raise TargetError(f'TLE of satellite {found.satnum_str}: {_iso(julian, fractions[i])}: '
+        raise TargetError(f'TLE of satellite {satrec.satnum_str}: {_iso(julian, fractions[i])}: '
                           f'{SGP4_ERRORS[int(error[i])]}')
     theta = gstime(julian) + EARTH_RATE * 86400.0 * fractions
     c, s = np.cos(theta), np.sin(theta)
@@ -223,23 +227,26 @@ def _satellite_enu(found, station, julian, fraction, times):
     return (r - origin) @ to_enu.T, v @ to_enu.T
 
 
-def _elevations(found, station, julian, fraction, times):
-    enu, _ = _satellite_enu(found, station, julian, fraction, times)
+def _elevations(satrec, station, julian, fraction, times):
+    enu, _ = _satellite_enu(satrec, station, julian, fraction, times)
     return np.degrees(np.arctan2(enu[:, 2], np.hypot(enu[:, 0], enu[:, 1])))
 
 
-def culmination(params, found):
-    """Time [s] past the TLE epoch of the first culmination between the two limits of LeoPassParameters."""
+def culmination(params, satrec):
+    """Time [s] past the TLE epoch of the first culmination between the two limits of LeoPassParameters.
+
+    params: TargetParameters; satrec: as of `satellite`. Raises TargetError where there is none within search_days.
+    """
     leo_pass, low, high = params.leo_pass, params.leo_pass.culmination_low_deg, params.leo_pass.culmination_high_deg
 
     def depth(t):
-        return -_elevations(found, params.station, found.jdsatepoch, found.jdsatepochF, np.array([t]))[0]
+        return -_elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, np.array([t]))[0]
 
     best = -math.inf
     for day in np.arange(0.0, leo_pass.search_days, 1.0):
         seconds = 86400.0 * min(1.0, leo_pass.search_days - day)
         times = 86400.0 * day + np.arange(-SEARCH_SPACING, seconds + 1.5 * SEARCH_SPACING, SEARCH_SPACING)
-        elevation = _elevations(found, params.station, found.jdsatepoch, found.jdsatepochF, times)
+        elevation = _elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, times)
         for i in range(1, len(times) - 1):
             if elevation[i] > max(0.0, elevation[i - 1]) and elevation[i] >= elevation[i + 1]:
                 peak = minimize_scalar(depth, bounds=(times[i - 1], times[i + 1]), method='bounded',
@@ -248,16 +255,16 @@ def culmination(params, found):
                     return peak.x
                 best = max(best, -peak.fun)
     reached = f'highest outside is {best:.1f} deg' if math.isfinite(best) else 'it never rises'
-    raise TargetError(f'satellite {found.satnum_str}: no culmination between {low:g} and {high:g} deg within '
+    raise TargetError(f'satellite {satrec.satnum_str}: no culmination between {low:g} and {high:g} deg within '
                       f'{leo_pass.search_days:g} days of the TLE epoch ({reached}) at latitude '
                       f'{params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg')
 
 
-def _start(params, found, duration):
+def _start(params, satrec, duration):
     """(Julian day, fraction) of stamp 0; the pass finder's is a whole second of UTC."""
     if not params.leo_pass.start_time:
-        start = culmination(params, found) - 0.5 * duration + 0.5
-        return _julian(_datetime(found.jdsatepoch, found.jdsatepochF + start / 86400.0).replace(microsecond=0))
+        start = culmination(params, satrec) - 0.5 * duration + 0.5
+        return _julian(_datetime(satrec.jdsatepoch, satrec.jdsatepochF + start / 86400.0).replace(microsecond=0))
     try:
         start = datetime.datetime.fromisoformat(params.leo_pass.start_time.replace('Z', '+00:00'))
     except ValueError:
@@ -266,10 +273,10 @@ def _start(params, found, duration):
     if start.tzinfo is not None:
         start = start.astimezone(datetime.timezone.utc)
     julian, fraction = _julian(start)
-    age = julian - found.jdsatepoch + fraction - found.jdsatepochF
+    age = julian - satrec.jdsatepoch + fraction - satrec.jdsatepochF
     if abs(age) > TLE_AGE:
         raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the TLE epoch '
-                          f'{_iso(found.jdsatepoch, found.jdsatepochF)}, must be within {TLE_AGE:g}')
+                          f'{_iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within {TLE_AGE:g}')
     return julian, fraction
 
 
@@ -288,12 +295,12 @@ def _iso(julian, fraction):
 
 
 def _leo_pass(params, duration):
-    found = satellite(params.leo_pass)
-    julian, fraction = _start(params, found, duration)
+    satrec = satellite(params.leo_pass)
+    julian, fraction = _start(params, satrec, duration)
     knots = np.arange(-MARGIN, duration + MARGIN + KNOT_SPACING, KNOT_SPACING)
-    position, velocity = _satellite_enu(found, params.station, julian, fraction, knots)
+    position, velocity = _satellite_enu(satrec, params.station, julian, fraction, knots)
     if position[:, 2].max() < 0.0:
-        raise TargetError(f'satellite {found.satnum_str}: below the horizon from {_iso(julian, fraction)} for '
+        raise TargetError(f'satellite {satrec.satnum_str}: below the horizon from {_iso(julian, fraction)} for '
                           f'{duration:g} s at latitude {params.station.latitude_deg:g}, longitude '
                           f'{params.station.longitude_deg:g} deg')
     spline = CubicHermiteSpline(knots, position, velocity)

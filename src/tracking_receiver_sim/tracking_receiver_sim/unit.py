@@ -1,4 +1,4 @@
-"""The unit of the tracking receiver: where the antenna points and where the ship is in, its channels out."""
+"""The unit of the tracking receiver: joint states and the ship's truth in, the receiver's channels out."""
 import math
 import typing
 
@@ -32,7 +32,7 @@ class Memory(typing.NamedTuple):
 
 @compiled
 def decode(u, stamp, joints, ship):
-    """Records of the messages of a step -> inputs of the receiver; the ship stays where it was until the next."""
+    """Records of the messages of a step -> inputs of the receiver; the last ship/truth stands until the next."""
     u.stamp_ns = stamp
     u.azimuth, u.elevation = joints.position[0], joints.position[1]
     u.azimuth_rate, u.elevation_rate = joints.velocity[0], joints.velocity[1]
@@ -94,17 +94,16 @@ class TrackingReceiver(Unit):
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         self.memory = Memory(record, self.target.breaks, self.target.coefficients,
                              np.zeros((1, receiver.normals_per_step(parameters))))
-        self.messages[RANGE].field_of_view = parameters.antenna.beamwidth
-        for topic, measured in ((RATE, parameters.receiver.rate.measured),
-                                (RANGE, parameters.receiver.ranging.measured)):
-            if not measured:
-                del self.messages[topic]
+        if RANGE in self.messages:
+            self.messages[RANGE].field_of_view = parameters.antenna.beamwidth
 
     def block(self, steps):
+        """The memory with noise (steps, normals_per_step) drawn for the next steps."""
         self.parts['row'] = 0
         return self.memory._replace(normals=self._noise.standard_normal((steps, self.memory.normals.shape[1])))
 
     def diagnose(self):
+        """ERROR with the last of FAULTS since the last diagnosis, WARN while not locked; values: C/N0, angle noise."""
         outputs, fault = self.parts['outputs'], int(self.parts['fault'])
         self.parts['fault'] = receiver.LOCKED
         status, p = int(outputs['status']), self.parameters
@@ -119,4 +118,5 @@ class TrackingReceiver(Unit):
 
     @staticmethod
     def idle(numbers):
+        """Not exercised where no error is finite."""
         return '' if np.isfinite(numbers[ERRORS][:, 0]).any() else 'the receiver never locked'

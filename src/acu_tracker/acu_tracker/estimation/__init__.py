@@ -11,6 +11,6 @@ Symbols
     sigma_a         standard deviation of the acceleration about abar                   [rad/s2]
     mu, cbar        `imm`: probability of a model; its prediction                       [-]
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
-In `alpha_beta` alone alpha, beta, gamma are the constant gains of angle, rate and acceleration, as its textbooks
+In `constant_gain` alone alpha, beta, gamma are the constant gains of angle, rate and acceleration, as its textbooks
 write them.
 """

@@ -16,27 +16,27 @@ def start(f, c, m, rate_sigma):
 
 @compiled
 def predict(f, c, T):
-    """Predict by T [s] >= 0 from the last measurement, for what follows."""
+    """Predict by T [s] >= 0 from the last measurement into the prior fields."""
     for i in range(2):
         axis_filter.predict(f[i], c[i], T)
 
 
 @compiled
 def innovation(f, m):
-    """Innovation of a Measurement against what `predict` left; they know nothing of the range."""
+    """Innovation of a Measurement against the prediction; its range is NaN, as these filters have none."""
     return Innovation((axis_filter.innovation(f[0], m.axis[0]), axis_filter.innovation(f[1], m.axis[1])), math.nan,
                       math.nan)
 
 
 @compiled
 def correct(f, c, m):
-    """Take a Measurement into what `predict` left."""
+    """Correct the prediction with a Measurement."""
     for i in range(2):
         axis_filter.correct(f[i], c[i], m.axis[i])
 
 
 @compiled
 def read(f):
-    """Estimate of what `predict` left."""
+    """Estimate at the instant of the last `predict`."""
     azimuth, elevation = axis_filter.expected(f[0]), axis_filter.expected(f[1])
     return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(azimuth), axis_filter.variances(elevation)))

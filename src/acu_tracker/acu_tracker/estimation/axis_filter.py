@@ -1,12 +1,12 @@
-"""The target filter of one axis, of any of `kinds`: all are a bank of motion models, so that everybody reads a bank.
+"""The target filter of one axis, of any of `kinds`: each is a bank of motion models, a single filter a bank of one.
 
-The state stays at the last measurement that was accepted; whoever needs it later predicts.
+The state stays at the last measurement that was accepted; `predict` and `outlook` extrapolate from there.
 """
 import math
 
 import numpy as np
 
-from acu_tracker.estimation import alpha_beta, imm, kalman, motion_models
+from acu_tracker.estimation import constant_gain, imm, kalman, motion_models
 from acu_tracker.estimation.kalman import Gaussian, Symmetric
 from acu_tracker.estimation.kinds import KINDS
 from acu_tracker.estimation.measurement import AxisInnovation, AxisMeasurement, AxisVariances
@@ -70,7 +70,7 @@ def _fill(f, c, g):
 
 @compiled
 def _open_acceleration(f, c, rate_sigma):
-    """Let the acceleration be as unknown as at the start."""
+    """Set the variance of the acceleration to that at the start."""
     for j in range(c.count):
         f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
 
@@ -84,9 +84,9 @@ def start(f, c, y, R, rate_sigma):
 
 @compiled
 def transfer(f, c, rate_sigma):
-    """If the bank is another than before: its models start from the combined estimate and covariance of the old.
+    """Where the bank has changed, start its models from the combined estimate and covariance of the old bank.
 
-    Of an acceleration that the old one does not know they know as much as at a `start` with rate_sigma [rad/s].
+    An acceleration that the old bank did not estimate has the variance of a `start` with rate_sigma [rad/s].
     """
     if f.bank != c.bank:
         unknown = f.states == 2
@@ -122,7 +122,7 @@ def predict(f, c, T):
 
 @compiled
 def expected(f):
-    """Gaussian of what `predict` left: mean and covariance of the bank."""
+    """Gaussian of the prediction: mean and covariance of the bank."""
     return imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
 
 
@@ -134,7 +134,7 @@ def variances(g):
 
 @compiled
 def innovation(f, m):
-    """AxisInnovation of an AxisMeasurement against what `predict` left."""
+    """AxisInnovation of an AxisMeasurement against the prediction."""
     x, P = expected(f)
     nu, nu_rate, S = m.angle - x.angle, m.rate - x.rate, P.p11 + m.variance
     # The rate given the angle.
@@ -144,7 +144,7 @@ def innovation(f, m):
 
 @compiled
 def correct(f, c, m):
-    """Take what `predict` left, corrected by an AxisMeasurement."""
+    """Correct the prediction with an AxisMeasurement."""
     for j in range(c.count):
         x, p = f.x_prior[j], f.p_prior[j]
         g = Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
@@ -152,7 +152,7 @@ def correct(f, c, m):
         f.weights[j] = kalman.log_likelihood(nu, S)
         # Constant gains, but for a start (or after a gap) that deserves more: a growing memory until alpha is reached.
         if g.P.p11 < c.alpha * S:
-            g = kalman.update_with_gain(g, nu, m.variance, alpha_beta.gain(c.alpha, c.beta, c.gamma, f.T))
+            g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
         else:
             g = kalman.update(g, nu, m.variance)
         if not math.isnan(m.rate):
@@ -165,7 +165,7 @@ def correct(f, c, m):
 
 @compiled
 def outlook(f, c, T):
-    """AxisMotion T [s] >= 0 after the last measurement: what a measurement then is compared with."""
+    """Predicted AxisMotion T [s] >= 0 after the last measurement."""
     predict(f, c, T)
     return expected(f).x
 

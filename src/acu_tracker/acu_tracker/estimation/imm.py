@@ -1,6 +1,6 @@
-"""Interacting multiple models: several filters whose models share the target by probability (Blom, Bar-Shalom 1988).
+"""Interacting multiple models: a bank of filters, each weighted by its probability (Blom, Bar-Shalom 1988).
 
-Paper 003, eq. 5 to 11. What its print lacks is here: the mixing before the prediction; in eq. 11 the weights are the
+Paper 003, eq. 5 to 11, with what its print lacks: the mixing before the prediction; in eq. 11 the weights are the
 probabilities and the spread of the models is added (its reversed second factor subtracts it). Probabilities are
 weighed by logarithms of likelihoods, so that a measurement far from all models still tells which is nearer.
 """

@@ -4,7 +4,7 @@ import typing
 
 import numpy as np
 
-from acu_tracker.estimation import alpha_beta, motion_models
+from acu_tracker.estimation import constant_gain, motion_models
 from acu_tracker.estimation.motion_models import MODELS, TABLE
 from pedestal_common.parameters import ParameterError
 
@@ -28,12 +28,12 @@ class Kind(typing.NamedTuple):
 def _alpha_beta(params):
     alpha = params.alpha_beta.alpha
     return Bank(motion_models.constants('cv', params.cv, noise=0.0),
-                gains=(alpha, alpha_beta.benedict_bordner(alpha), 0.0))
+                gains=(alpha, constant_gain.benedict_bordner(alpha), 0.0))
 
 
 def _alpha_beta_gamma(params):
     alpha = params.alpha_beta_gamma.alpha
-    return Bank(motion_models.constants('ca', params.ca, noise=0.0), gains=(alpha, *alpha_beta.kalata(alpha)))
+    return Bank(motion_models.constants('ca', params.ca, noise=0.0), gains=(alpha, *constant_gain.kalata(alpha)))
 
 
 def _alone(name, params):

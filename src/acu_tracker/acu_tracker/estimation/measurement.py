@@ -1,4 +1,4 @@
-"""What a target filter takes and gives: measurement, innovation, estimate. Index 0 is azimuth, 1 elevation."""
+"""Inputs and outputs of a target filter: measurement, innovation, estimate. Index 0 is azimuth, 1 elevation."""
 import math
 from collections import namedtuple
 
@@ -31,17 +31,17 @@ NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)
 
 @compiled
 def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
-    """Variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0: thermal noise, which grows off
-    the axis of the beam, and a floor. receiver: record of ReceiverModelParameters."""
+    """Variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0 [dB-Hz]: a floor and thermal
+    noise, which grows with the distance from the beam's axis. receiver: record of ReceiverModelParameters."""
     slope = receiver.slope / receiver.beamwidth
-    off = slope * math.hypot(cross_elevation, elevation)
-    thermal = (1.0 + off * off) / (slope * slope * 2.0 * 10.0**(0.1 * cn0_dbhz) * receiver.integration)
+    offset = slope * math.hypot(cross_elevation, elevation)
+    thermal = (1.0 + offset * offset) / (slope * slope * 2.0 * 10.0**(0.1 * cn0_dbhz) * receiver.integration)
     return thermal + receiver.sigma_floor * receiver.sigma_floor
 
 
 @compiled
 def with_azimuth_near(m, near):
-    """The Measurement, its azimuth on the turn that is nearest to `near` [rad]."""
+    """The Measurement, its azimuth on the wrap that is nearest to `near` [rad]."""
     a = m.axis[0]
     a = AxisMeasurement(near + wrap(a.angle - near), a.variance, a.rate, a.rate_variance)
     return Measurement(m.stamp, (a, m.axis[1]), m.range, m.range_variance)

@@ -1,4 +1,4 @@
-"""How a target may move: F and Q of the motion models of one axis, X = (angle, rate, acceleration).
+"""Motion models of a target: F and Q of one axis, X = (angle, rate, acceleration).
 
 Of cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. Another model is a row of TABLE, a law
 that `discretised` picks, its group in params.py, and its name in topics.MOTION_MODELS, a column of acu/filter.

@@ -13,43 +13,47 @@ _ALPHA = '1/s', 'manoeuvre frequency: one over the time an acceleration lasts'
 class AlphaBetaParameters(Parameters):
     """alpha_beta and alpha_beta_gamma: alpha sets the other gains (Benedict-Bordner; Kalata)."""
 
-    alpha: float = parameter(0.15, 1e-3, 0.999, '', 'share of an innovation that the angle takes')
+    alpha: float = parameter(0.15, 1e-3, 0.999, '', 'share of an innovation that the angle takes',
+                             grid=(0.003, 0.8, 8))
 
 
 @dataclasses.dataclass(frozen=True)
 class CvParameters(Parameters):
     """Constant rate."""
 
-    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s2/sqrt(Hz)', 'of the white acceleration')
+    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s2/sqrt(Hz)', 'of the white acceleration',
+                             grid=(1e-6, 1.0, 7))
 
 
 @dataclasses.dataclass(frozen=True)
 class CaParameters(Parameters):
     """Constant acceleration."""
 
-    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s3/sqrt(Hz)', 'of the white jerk')
+    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s3/sqrt(Hz)', 'of the white jerk', grid=(1e-6, 10.0, 8))
 
 
 @dataclasses.dataclass(frozen=True)
 class SingerParameters(Parameters):
-    """Acceleration of mean zero that lasts a while."""
+    """An acceleration of mean zero and limited duration."""
 
-    alpha: float = parameter(0.5, 1e-4, 100.0, *_ALPHA)
-    sigma: float = parameter(0.3 * _DEG, 1e-7, 100.0, 'rad/s2', 'standard deviation of the acceleration')
+    alpha: float = parameter(0.5, 1e-4, 100.0, *_ALPHA, grid=(0.03, 3.0, 3))
+    sigma: float = parameter(0.3 * _DEG, 1e-7, 100.0, 'rad/s2', 'standard deviation of the acceleration',
+                             grid=(1e-5, 1.0, 6))
 
 
 @dataclasses.dataclass(frozen=True)
 class CurrentStatisticalParameters(Parameters):
-    """An acceleration that lasts a while, about the one that is estimated now (paper 000)."""
+    """An acceleration of limited duration about its present estimate (paper 000)."""
 
-    alpha: float = parameter(0.1, 1e-4, 100.0, *_ALPHA)
-    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target')
+    alpha: float = parameter(0.1, 1e-4, 100.0, *_ALPHA, grid=(0.03, 3.0, 3))
+    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target',
+                             grid=(1e-4, 1.0, 5))
     floor: float = parameter(0.3, 0.0, 1.0, '', 'least sigma_a over a_max; without it the filter locks')
 
 
 @dataclasses.dataclass(frozen=True)
 class ImmParameters(Parameters):
-    """Several models at once, each with parameters of its own here."""
+    """Several interacting models, each with its own parameters."""
 
     models: str = text('cv ca current_statistical', 'two or more of cv, ca, singer, current_statistical')
     dwell: float = parameter(5.0, 1e-3, 1e6, 's', 'mean time that one model holds')
@@ -60,6 +64,7 @@ class ImmParameters(Parameters):
                                                               a_max=15.0 * _DEG)
 
     def check(self):
+        """Raise ParameterError unless `models` names two or more models, each once."""
         named_models(self.models)
 
 
@@ -94,7 +99,7 @@ class UkfParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ReceiverModelParameters(Parameters):
-    """The receiver's thermal noise as the control unit knows it: sigma = theta3 / (k_m sqrt(2 C/N0 tau))."""
+    """The control unit's model of the receiver's thermal noise: sigma = theta3 / (k_m sqrt(2 C/N0 tau))."""
 
     beamwidth: float = parameter(0.0175, 1e-5, 1.0, 'rad', '3 dB beamwidth theta3 of the sum pattern')
     slope: float = parameter(1.6, 0.1, 10.0, '', 'monopulse slope k_m: difference over sum per beamwidth')
@@ -108,7 +113,7 @@ class ReceiverModelParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class TrackerParameters(Parameters):
-    """The target filter and what it takes for a lock."""
+    """The target filter, its gates and the conditions of a lock."""
 
     gate: float = parameter(25.0, 1.0, 1e6, '', "largest nu' S^-1 nu of the two angles that is believed; of a rate or "
                             'a range the one as rarely exceeded')
@@ -124,6 +129,7 @@ class TrackerParameters(Parameters):
     ukf: UkfParameters = group(UkfParameters)
 
     def check(self):
+        """Raise ParameterError where autotrack would end before it coasts."""
         if self.coast_time < self.coast_after:
             raise ParameterError(f'coast_time = {self.coast_time:g} s: must be at least coast_after = '
                                  f'{self.coast_after:g} s')

@@ -28,10 +28,11 @@ TARGET = np.dtype([('tracker', tracker.TRACKER), ('frame', estimate_frame.FRAME)
                    ('lever_arm', lever_arm.LEVER_ARM)], align=True)
 
 GATED, STALE, NO_ATTITUDE = tracker.GATED, tracker.STALE, tracker.STALE + 1
-"""What `take` makes of an error: what the tracker does, or NO_ATTITUDE."""
+"""Outcomes of `take`: those of the tracker, or NO_ATTITUDE."""
 
-Followed = namedtuple('Followed', 'framed motion')
-"""A Motion to be pointed at: in the frame of the estimate (framed 1) or in earth angles (framed 0)."""
+Source = namedtuple('Source', 'framed motion')
+"""The Motion of the target that is pointed at: in the frame of the estimate (framed 1) or in earth angles (framed
+0)."""
 
 
 def initialise(g):
@@ -41,7 +42,7 @@ def initialise(g):
 
 @compiled
 def _measured_direction(g, p, deck, u, azimuth, elevation):
-    """(azimuth, elevation) in the frame of a direction given by deck angles [rad], the attitude last found."""
+    """(azimuth, elevation) [rad] in the frame of a direction given by deck angles [rad], at the current attitude."""
     x, y, z = pointing.direction(azimuth, elevation)
     v = lever_arm.from_ins(g.lever_arm, p.lever_arm, u.range if deck.stabilised else math.nan, g.tracker.running,
                            Vector(x, y, z))
@@ -54,13 +55,13 @@ def _measured_direction(g, p, deck, u, azimuth, elevation):
 
 @compiled
 def _measured_rates(g, deck, u, at):
-    """(azimuth, elevation) rates [rad/s] of the target in the frame: those of the antenna and of the error; the
-    attitude is the one last found."""
+    """(azimuth, elevation) rates [rad/s] of the target in the frame, from those of the antenna and of the error, at
+    the current attitude."""
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, u.cross_elevation, u.elevation, u.error_rate[0],
                                   u.error_rate[1])
     v, dv = Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5])
     if deck.stabilised or g.frame.tilted:
-        framed = estimate_frame.of_deck(g.frame, attitude.found(deck))
+        framed = estimate_frame.of_deck(g.frame, attitude.current(deck))
         v, dv = lever_arm.to_ins(g.lever_arm, v, dv)
         return deck_reference.earth_rates(framed, v, dv)
     motion = angles(LineOfSight(v, dv, STILL))
@@ -68,18 +69,18 @@ def _measured_rates(g, deck, u, at):
 
 
 @compiled
-def take(g, p, c, deck, u, at, seen, restart_gap):
+def take(g, p, c, deck, u, at, measured, restart_gap):
     """Filter the receiver's error of INPUTS u: (STARTED, ACCEPTED, GATED, STALE or NO_ATTITUDE; its Innovation).
 
     p, c: records of SharedParameters and of tracker.CONSTANTS; deck: ATTITUDE; at: Pointing of the antenna when the
-    error was measured; seen: deck angles (azimuth, elevation) of the target [rad], the antenna displaced by the error;
-    restart_gap: as in tracker.observe.
+    error was measured; measured: deck angles (azimuth, elevation) [rad] of the target, the antenna displaced by the
+    error; restart_gap: as in tracker.observe.
     """
     e = p.tracker.receiver
     t = u.error_stamp - e.age
     if not g.tracker.running:
         estimate_frame.level(g.frame)
-    azimuth, elevation = seen
+    azimuth, elevation = measured
     if deck.stabilised or g.frame.tilted:
         if not attitude.at(deck, p, t):
             return NO_ATTITUDE, NO_INNOVATION
@@ -101,7 +102,7 @@ def take(g, p, c, deck, u, at, seen, restart_gap):
 
 @compiled
 def _choose_frame(g, c):
-    """Let the filter go on in the frame that suits the elevation of the target."""
+    """Move the filter to the frame that suits the elevation of the target."""
     f = g.frame
     motion = tracker.outlook(g.tracker, c, g.tracker.stamp)
     if not (f.tilted or motion.elevation.angle > estimate_frame.RAISE):
@@ -118,35 +119,35 @@ def _choose_frame(g, c):
 
 @compiled
 def outlook(g, c, t):
-    """The Followed that the filter expects at t [s]."""
-    return Followed(1, tracker.outlook(g.tracker, c, t))
+    """The Source that the filter predicts for t [s]."""
+    return Source(1, tracker.outlook(g.tracker, c, t))
 
 
 @compiled
 def earth_outlook(g, c, t):
-    """LineOfSight in ENU that the filter expects at t [s]."""
+    """LineOfSight in ENU that the filter predicts for t [s]."""
     return estimate_frame.to_earth(g.frame, tracker.outlook(g.tracker, c, t))
 
 
 @compiled
-def on_deck(g, p, deck, t, target):
-    """Motion on the deck (ATTITUDE) at t [s] of a Followed."""
-    if target.framed and (g.frame.tilted or g.lever_arm.range != 0.0):
+def on_deck(g, p, deck, t, source):
+    """Motion on the deck (ATTITUDE) at t [s] of a Source; p: record of SharedParameters."""
+    if source.framed and (g.frame.tilted or g.lever_arm.range != 0.0):
         attitude.at(deck, p, t)
-        framed = estimate_frame.of_deck(g.frame, attitude.found(deck))
-        return angles(lever_arm.to_antenna(g.lever_arm, deck_reference.on_deck(framed, line_of_sight(target.motion))))
+        framed = estimate_frame.of_deck(g.frame, attitude.current(deck))
+        return angles(lever_arm.to_antenna(g.lever_arm, deck_reference.on_deck(framed, line_of_sight(source.motion))))
     if deck.stabilised and attitude.at(deck, p, t):
-        return angles(deck_reference.on_deck(attitude.found(deck), line_of_sight(target.motion)))
-    return target.motion
+        return angles(deck_reference.on_deck(attitude.current(deck), line_of_sight(source.motion)))
+    return source.motion
 
 
 @compiled
-def levelled_azimuth(g, level, target):
-    """AxisMotion of the azimuth of a Followed on a deck that stands still, level (3, 3) deck -> earth."""
+def levelled_azimuth(g, level, source):
+    """AxisMotion of the azimuth of a Source on a deck that stands still, level (3, 3) deck -> earth."""
     still = Attitude(level, STILL, STILL)
-    if target.framed:
+    if source.framed:
         still = estimate_frame.of_deck(g.frame, still)
-    return angles(deck_reference.on_deck(still, line_of_sight(target.motion))).azimuth
+    return angles(deck_reference.on_deck(still, line_of_sight(source.motion))).azimuth
 
 
 @compiled

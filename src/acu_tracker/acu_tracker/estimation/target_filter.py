@@ -1,8 +1,8 @@
-"""The target filter in use: that of the axes, and where a kind says so and a range is measured the Cartesian one.
+"""The target filter in use: that of the axes, or the Cartesian one where the kind has it and a range is measured.
 
-The Cartesian filter begins on the first range, where the axes' filters are, and is used once it knows the rates twice
-as well. They run on beside it, and go on where it was once it does not know the range any more. Measured rates are
-theirs alone.
+The Cartesian filter starts with the first range from the estimate of the axes' filters, and is used once its standard
+deviation of the rate is half of theirs. The axes' filters keep running beside it, and take over from its estimate when
+it has lost the range. Measured rates go to the axes' filters alone.
 """
 import math
 
@@ -21,8 +21,8 @@ CONSTANTS = np.dtype([('axis', axis_filter.CONSTANTS, (2,)), ('cartesian', unsce
 
 FILTER = np.dtype([('axis', axis_filter.FILTER, (2,)), ('cartesian', unscented.STATE), ('running', 'i8'),
                    ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
-"""running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate; predicted: by how long [s]
-the prior fields are ahead of what stands now, NaN where they are not of it."""
+"""running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate; predicted: time [s]
+by which the prior fields are predicted from the present estimate, NaN where they belong to an older one."""
 
 
 def constants(ukf, axes) -> np.ndarray:
@@ -44,7 +44,7 @@ def start(f, c, m, rate_sigma):
 
 @compiled
 def predict(f, c, T):
-    """Predict by T [s] >= 0 from the last measurement, for what follows; a second time costs nothing."""
+    """Predict by T [s] >= 0 from the last measurement into the prior fields; a repeated call costs nothing."""
     if f.predicted == T:
         return
     f.predicted = T
@@ -55,13 +55,13 @@ def predict(f, c, T):
 
 @compiled
 def axes_azimuth(f):
-    """Azimuth [rad] that the axis's own filter predicted: measured ones are counted on its turn."""
+    """Azimuth [rad] that the axis's own filter predicted; measured azimuths are unwrapped to it."""
     return axis_filter.expected(f.axis[0]).x.angle
 
 
 @compiled
 def innovation(f, m):
-    """Innovation of a Measurement against what `predict` left; rate_chi_square is always that of the axis's filter."""
+    """Innovation of a Measurement against the prediction; rate_chi_square is always that of the axis's filter."""
     axes = axes_filter.innovation(f.axis, m)
     if not f.running:
         return axes
@@ -80,7 +80,7 @@ def _chosen_innovation(used, own, cartesian):
 
 @compiled
 def correct(f, c, m):
-    """Take a Measurement into what `predict` and `innovation` left."""
+    """Correct the prediction with a Measurement that `innovation` was called with."""
     axes_filter.correct(f.axis, c.axis, m)
     if f.running:
         unscented.correct(f.cartesian, m)
@@ -89,7 +89,7 @@ def correct(f, c, m):
 
 @compiled
 def expected(f):
-    """Motion of what `predict` left; the azimuth on the turn of the axis's filter."""
+    """Motion at the instant of the last `predict`; the azimuth on the wrap of the axis's filter."""
     axes = axes_filter.read(f.axis).motion
     if not (f.used[0] or f.used[1]):
         return axes
@@ -102,7 +102,7 @@ def expected(f):
 
 @compiled
 def read(f):
-    """Estimate of what `predict` left."""
+    """Estimate at the instant of the last `predict`."""
     axes = axes_filter.read(f.axis)
     if not (f.used[0] or f.used[1]):
         return axes
@@ -121,7 +121,7 @@ def probabilities(f, c, mu):
 
 @compiled
 def usable(c, m):
-    """The Measurement without the rates that the kinds do not use, and without a range that is none."""
+    """The Measurement without the rates that the kinds do not use, and without a range that is not valid."""
     azimuth = with_rate(m.axis[0], m.axis[0].rate if c.axis[0].rate_measurement else math.nan)
     elevation = with_rate(m.axis[1], m.axis[1].rate if c.axis[1].rate_measurement else math.nan)
     ranged = m.range > 0.0 and m.range_variance > 0.0
@@ -130,7 +130,7 @@ def usable(c, m):
 
 @compiled
 def select(f, c, m):
-    """Begin, use or leave the Cartesian filter, after a correction or a start with a Measurement."""
+    """Start, use or leave the Cartesian filter, after a correction or a start with a Measurement."""
     if f.running:
         if unscented.range_known(f.cartesian, c.range_share_2):
             _use_cartesian(f, c)
@@ -145,7 +145,9 @@ def select(f, c, m):
 
 @compiled
 def _use_cartesian(f, c):
-    """Use the Cartesian estimate for an axis that wants it, from when on it knows the rate twice as well."""
+    """Use the Cartesian estimate for an axis of such a kind once its standard deviation of the rate is half the
+    axis's.
+    """
     if (f.used[0] or not c.wanted[0]) and (f.used[1] or not c.wanted[1]):
         return
     predict(f, c, 0.0)
@@ -157,8 +159,8 @@ def _use_cartesian(f, c):
 
 @compiled
 def _leave_cartesian(f, c, azimuth, elevation):
-    """The filters of these axes (1: of this one) go on where the Cartesian one is, which they use no more; one that is
-    nowhere any more (NaN) leaves them where they are."""
+    """Move the filters of these axes (azimuth, elevation: 1 for yes) to the Cartesian estimate and stop using it;
+    where that is NaN they stay where they are."""
     if not (azimuth or elevation):
         return
     predict(f, c, 0.0)
@@ -173,7 +175,7 @@ def _leave_cartesian(f, c, azimuth, elevation):
 
 @compiled
 def transfer(f, c, rate_sigma, running):
-    """The constants may have changed: a filter of another kind goes on from the estimate of the one before.
+    """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one.
 
     running: whether there is an estimate; rate_sigma: as in `start`.
     """
@@ -188,8 +190,8 @@ def transfer(f, c, rate_sigma, running):
 
 @compiled
 def move(f, c, motion):
-    """The angles are counted in another frame, where the target has this Motion now; the covariances stay. The
-    Cartesian filter, which lives in the old one, ends."""
+    """Change to a frame in which the target has this Motion now; the covariances stay. The Cartesian filter, which
+    works in the old frame, stops."""
     f.running = f.used[0] = f.used[1] = 0
     for i in range(2):
         axis_filter.move(f.axis[i], c.axis[i], motion[i])

@@ -1,6 +1,6 @@
-"""The target tracker: a target filter behind one gate; lock, restarts, and a coast where no measurement comes.
+"""The target tracker: a target filter behind one gate; lock, restarts, and coasting without measurements.
 
-Between accepted measurements the filter stays at the stamp of the last one; everybody who needs it later predicts.
+Between accepted measurements the filter stays at the stamp of the last one; `outlook` and `read` predict from there.
 """
 import math
 
@@ -25,13 +25,14 @@ TRACKER = np.dtype([('filter', target_filter.FILTER), ('stamp', 'f8'), ('running
 happened; rates_in_a_row: rates of an axis that agreed with its angles; gated, rates_gated, ranges_gated: in all."""
 
 STARTED, ACCEPTED, GATED, STALE = range(4)
-"""What `observe` makes of a measurement."""
+"""Outcomes of `observe`."""
 
 
 def gate_of_one(gate):
-    """What chi-square of one degree of freedom exceeds as rarely as `gate` is exceeded by that of two, e^(-gate/2).
+    """The gate of one degree of freedom with the false-alarm probability of `gate` at two, e^(-gate/2); chi-square
+    [-].
 
-    The tail is erfc(z) with z^2 = x/2; e^z^2 erfc(z), which does not underflow, falls short of the other's by gate.
+    The tail at x is erfc(z) with z^2 = x/2, so that x - 2 log(e^z^2 erfc(z)) = gate; e^z^2 erfc(z) does not underflow.
     """
     low, high = 0.0, gate
     for _ in range(100):
@@ -55,7 +56,7 @@ def constants(params, axes) -> np.ndarray:
 
 @compiled
 def transfer(t, p, c):
-    """The constants may have changed: a filter of another kind goes on from the estimate of the one before.
+    """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one.
 
     p: record of TrackerParameters, here and below.
     """
@@ -64,16 +65,16 @@ def transfer(t, p, c):
 
 @compiled
 def move(t, c, motion):
-    """The angles are counted in another frame, where the target has this Motion now."""
+    """Change to a frame in which the target has this Motion now."""
     target_filter.move(t.filter, c.filter, motion)
 
 
 @compiled
 def _accepted_rate(t, p, c, i, rate, chi_square):
-    """A rate measured on axis i as it is to be taken, else NaN; chi_square: of it, given the angle and all before.
+    """A rate [rad/s] measured on axis i where it is accepted, else NaN; chi_square: of the rate, given the angle.
 
-    A rate can only be told to be wrong by what the angles alone have made of it, so it is taken once lock_count in a
-    row agreed with them: a sensor that is stuck or off must not take along a filter that has just started.
+    Only the rate estimated from angles alone can show that a measured rate is wrong. So rates are used once lock_count
+    in a row agreed with it: a stuck or biased sensor must not mislead a filter that has just started.
     """
     if math.isnan(chi_square):
         return math.nan
@@ -87,7 +88,7 @@ def _accepted_rate(t, p, c, i, rate, chi_square):
 
 @compiled
 def _with_accepted_rates(t, p, c, m, innovation):
-    """The Measurement with the rates that are accepted by themselves."""
+    """The Measurement with the rates that pass their own gates."""
     (a, e), (i_a, i_e) = m.axis, innovation.axis
     a = with_rate(a, _accepted_rate(t, p, c, 0, a.rate, i_a.rate_chi_square))
     e = with_rate(e, _accepted_rate(t, p, c, 1, e.rate, i_e.rate_chi_square))
@@ -138,10 +139,10 @@ def observe(t, p, c, m, restart_gap):
 
 @compiled
 def _converged(f, k, m, initial_rate):
-    """Whether the rates across the line of sight are known four times as well as at the start.
+    """Whether the standard deviation of the rates across the line of sight is a quarter of that at the start.
 
-    The angle is no sign of it: a lively filter never knows that much better than its measurement. Its azimuth's
-    variance grows as 1/cos2 of the elevation does.
+    The angle is no criterion: a filter of high bandwidth never estimates it much better than it is measured. The
+    variance of the azimuth grows as 1/cos2 of the elevation.
     """
     target_filter.predict(f, k, 0.0)
     azimuth, elevation = target_filter.read(f).variances
@@ -160,13 +161,13 @@ def locked(t, p, since_accepted):
 
 @compiled
 def outlook(t, c, stamp):
-    """Motion at a stamp [s]: what an error of then is compared with; before the last one that of the last one."""
+    """Predicted Motion at a stamp [s]; before the last accepted measurement, the Motion at that measurement."""
     target_filter.predict(t.filter, c.filter, max(stamp - t.stamp, 0.0))
     return target_filter.expected(t.filter)
 
 
 @compiled
 def read(t, c, stamp):
-    """Estimate at a stamp [s], as `outlook`."""
+    """Estimate (Motion and variances) at a stamp [s], predicted as in `outlook`."""
     target_filter.predict(t.filter, c.filter, max(stamp - t.stamp, 0.0))
     return target_filter.read(t.filter)

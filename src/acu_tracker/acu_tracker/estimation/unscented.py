@@ -6,7 +6,7 @@ acceleration at zero. Without a range the two angles are taken alone, and the ra
 The unscented filter in general (Merwe's points; Wan and Van der Merwe 2000), and what is special about this one:
 the motion is linear, so that the transform of the prediction is F P F' + Q exactly; the points of the measurement are
 drawn from the predicted P, after Q. With P = L L' (L lower triangular) they are X +- sqrt(n + lambda) L_k, and only
-k = 1, 2, 3 move the position, which is all that is measured: 7 of the 19 points say everything, the other 12 count
+k = 1, 2, 3 move the position, which is all that is measured: 7 of the 19 points are evaluated, and the other 12 count
 with the one in the middle. Angles are taken relative to that one, so that the azimuth may wrap.
 With alpha = 1, kappa = 3 - n, beta = 2 no weight of the seven is negative, and S is positive whatever the geometry.
 """
@@ -57,7 +57,7 @@ def constants(params) -> np.ndarray:
 
 @compiled
 def _spread(p, along, onward, variances):
-    """Add to p what is not known of one coordinate and its rate, their AxisVariances.
+    """Add the AxisVariances of one coordinate and its rate to the covariance p.
 
     A unit of it moves the position by along (3,) and the velocity by onward (3,), a unit of its rate the velocity by
     along.
@@ -76,8 +76,8 @@ def _spread(p, along, onward, variances):
 def start(s, c, estimate, r, R_range):
     """Begin at an Estimate of the angles and a first range r [m] of variance R_range.
 
-    `expected` goes on where that was: in CA, with the acceleration of a target at a constant range; CV begins without.
-    The radial speed is 0 to within c.initial_speed, the acceleration known to within c.initial_acceleration.
+    `expected` continues from that Estimate: CA starts with the acceleration of a target at a constant range, CV
+    without. The radial speed is 0 to within c.initial_speed, the acceleration known to within c.initial_acceleration.
     """
     A, dA, _ = estimate.motion.azimuth
     E, dE, _ = estimate.motion.elevation
@@ -271,7 +271,8 @@ def _corrected(s, j, azimuth, elevation, range_):
 
 @compiled
 def correct(s, m):
-    """Take the Measurement that `innovation` was told of; one whose range is NaN now: the angles alone."""
+    """Correct with the Measurement that `innovation` was called with; where its range is NaN, with the angles
+    alone."""
     for j in range(2):
         s.weights[j] = _corrected(s, j, m.axis[0].angle, m.axis[1].angle, m.range)
     imm.weigh(s.mu_prior, s.weights, 2, s.mu)
@@ -302,7 +303,7 @@ def probabilities(s, mu):
 
 @compiled
 def expected(s):
-    """Motion in earth angles of what `predict` left, both modes together; the azimuth in (-pi, pi]."""
+    """Motion in earth angles of the prediction, both modes together; the azimuth in (-pi, pi]."""
     _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
     x = s.mean
     return motion_of_position(Vector(x[0], x[1], x[2]), Vector(x[3], x[4], x[5]), Vector(x[6], x[7], x[8]))
@@ -322,8 +323,8 @@ def _projected(p, g, h, v):
 
 @compiled
 def variances(s):
-    """(AxisVariances of both axes, variance of the range [m2]) of what `predict` left: both modes with their spread,
-    linearised."""
+    """(AxisVariances of both axes, variance of the range [m2]) of the prediction, linearised, both modes with their
+    spread."""
     _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
     x, p = s.mean, s.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]

@@ -1,4 +1,4 @@
-"""The attitude of the deck: what the INS measured lately, and what it is at any instant near that."""
+"""The attitude of the deck: the INS's last measurements, interpolated or extrapolated to any instant near them."""
 import math
 
 import numpy as np
@@ -12,7 +12,8 @@ from pedestal_common.line_of_sight import ASHORE, rotation
 ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)),
                      ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,))], align=True)
 """stabilised: 1 on a ship, 0 ashore, where the attitude never changes; history: quaternion (x, y, z, w) deck -> earth,
-w [rad/s], dw [rad/s2] of the last steps. mat_ed (deck -> earth), w, dw: those that `at` last found."""
+w [rad/s], dw [rad/s2] of the last steps. mat_ed (deck -> earth), w, dw: at the instant that `at` was last called for.
+"""
 
 INVALID, REPEATED, NEW = range(3)
 """What `take` makes of an attitude."""
@@ -20,20 +21,20 @@ INVALID, REPEATED, NEW = range(3)
 
 @compiled
 def smoothed_acceleration(before, w, w_before, T, tau):
-    """Angular acceleration [rad/s2] from two rates [rad/s] T [s] apart, low-passed with tau [s]; before: the last."""
+    """Angular acceleration [rad/s2] from two rates [rad/s] T [s] apart, low-passed with tau [s]; before: its value T
+    ago."""
     return before + T / (tau + T) * ((w - w_before) / T - before)
 
 
 @compiled
 def rotation_angle(w, dw, T):
-    """Angle [rad] by which a rate w [rad/s] and its derivative dw [rad/s2] turn the deck in T [s]."""
+    """Angle [rad] by which the deck rotates in T [s] at a rate w [rad/s] with its derivative dw [rad/s2]."""
     return T * w + 0.5 * T * T * dw
 
 
 @compiled
-def turned(q, r):
-    """Quaternion (x, y, z, w) of a deck of attitude q (4,) once it has turned by the rotation vector r [rad] (FLU):
-    q (x) exp(r/2)."""
+def rotated(q, r):
+    """Quaternion (x, y, z, w) of a deck of attitude q (4,) after the rotation vector r [rad] (FLU): q (x) exp(r/2)."""
     qx, qy, qz, qw = q[0], q[1], q[2], q[3]
     rx, ry, rz = r
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
@@ -75,7 +76,7 @@ def take(s, p, t_k, stamp, q, w):
 
 @compiled
 def at(s, p, t):
-    """Whether there is an attitude at t [s], between two samples or predicted from the last; `found` gives it."""
+    """Whether there is an attitude at t [s], between two samples or predicted from the last; `current` gives it."""
     if not s.stabilised:
         rotation(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3], s.mat_ed)
         s.w[:] = 0.0
@@ -90,8 +91,8 @@ def at(s, p, t):
         for i in range(3):
             s.dw[i] = last[7 + i]
             s.w[i] = last[4 + i] + T * last[7 + i]
-        x, y, z, w = turned(last, (rotation_angle(last[4], last[7], T), rotation_angle(last[5], last[8], T),
-                                   rotation_angle(last[6], last[9], T)))
+        x, y, z, w = rotated(last, (rotation_angle(last[4], last[7], T), rotation_angle(last[5], last[8], T),
+                                    rotation_angle(last[6], last[9], T)))
     else:
         i, j, f = bracket(h, t)
         if i < 0:
@@ -108,6 +109,6 @@ def at(s, p, t):
 
 
 @compiled
-def found(s):
-    """The Attitude, deck -> earth, that `at` found last."""
+def current(s):
+    """The Attitude, deck -> earth, at the instant that `at` was last called for."""
     return Attitude(s.mat_ed, vector(s.w), vector(s.dw))

@@ -1,4 +1,5 @@
-"""Which of the azimuths that are whole turns apart the axis takes: its travel is more than one turn."""
+"""The azimuth wrap: which of the angles that differ by whole revolutions an axis with more than one of travel
+takes."""
 import math
 from collections import namedtuple
 
@@ -6,12 +7,12 @@ from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import wrap
 
 Travel = namedtuple('Travel', 'below above')
-"""How far the azimuth of a target still goes below (<= 0) and above (>= 0) where it is now [rad]."""
+"""Future travel of a target's azimuth below (<= 0) and above (>= 0) its present value [rad]."""
 
 
 @compiled
 def nearest(azimuth, near, low, high, travel):
-    """The wrap of an azimuth [rad] from which a Travel stays inside low..high, nearest to `near`.
+    """The wrap of an azimuth [rad], nearest to `near`, from which a Travel stays inside low..high [rad].
 
     Where none holds the whole travel, one that holds the azimuth itself; otherwise simply the nearest.
     """

@@ -1,4 +1,4 @@
-"""The line of sight of an earth target as a turning deck sees it, and back.
+"""The line of sight of an earth target in the axes of a rotating deck, and back.
 
 Exact: the unit vector is differentiated twice, with M'_dot = -[w x] M',
 u_d = M' u,    u_d' = M' u' - w x u_d,    u_d'' = M' u'' - w x (2 M' u' - w x u_d) - dw x u_d.
@@ -29,8 +29,8 @@ def on_deck(attitude, sight):
 
 @compiled
 def fixed_rates(w, A, E):
-    """Rates (dA, dE) [rad/s] at which an earth-fixed direction, now at deck angles A, E [rad], seems to move while the
-    deck turns by w (FLU)."""
+    """Rates (dA, dE) [rad/s] of the deck angles of an earth-fixed direction, now at A, E [rad], while the deck rotates
+    at w [rad/s] (FLU)."""
     u = Vector(*line_of_sight.direction(A, E))
     motion = angles(LineOfSight(u, times(-1.0, cross(w, u)), STILL))
     return motion.azimuth.rate, motion.elevation.rate

@@ -1,4 +1,4 @@
-"""The encoders of both axes in the last steps, and where the antenna pointed at any instant among them."""
+"""The encoders of both axes in the last steps, and the pointing of the antenna at any instant among them."""
 import math
 from collections import namedtuple
 
@@ -14,7 +14,7 @@ Pointing = namedtuple('Pointing', 'A E dA dE')
 
 @compiled
 def take(s, stamp, position, velocity):
-    """Take angles (2,) and rates (2,) of a step into the history; False where they are not finite."""
+    """Take angles (2,) [rad] and rates (2,) [rad/s] of a step into the history; False where they are not finite."""
     valid = math.isfinite(position[0] + position[1] + velocity[0] + velocity[1])
     if valid:
         row = push(s, stamp)

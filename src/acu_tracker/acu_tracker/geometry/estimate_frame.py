@@ -1,7 +1,7 @@
-"""The frame the target is filtered in: the earth's, or near the zenith one whose equator lies along the target's way.
+"""The frame of the target filter: the earth's, or near the zenith one whose equator lies along the target's motion.
 
-Azimuth and elevation are singular at the zenith. Above RAISE the filter goes on in a frame in which the target runs
-along the equator, and comes back below LOWER. In it a great circle is an azimuth of constant rate.
+Azimuth and elevation are singular at the zenith. Above RAISE the filter changes to a frame in which the target moves
+along the equator, and back below LOWER. In it a great circle is an azimuth of constant rate.
 """
 import math
 
@@ -36,7 +36,7 @@ def tilt(f, u, du):
     if W > 0.0:
         along = Vector(du.x / W, du.y / W, du.z / W)
     else:
-        # It stands still: any way is as good, say east.
+        # It stands still: any direction is as good, so take east.
         rho = math.sqrt(u.y * u.y + u.z * u.z)
         along = Vector(rho, -u.x * u.y / rho, -u.x * u.z / rho) if rho > 0.0 else Vector(0.0, 0.0, 0.0)
     up = cross(along, u)
@@ -90,7 +90,7 @@ def earth_variances(f, framed, earth, p_A, p_E):
     """
     A, E = framed.azimuth.angle, framed.elevation.angle
     azimuth, elevation = earth.azimuth.angle, earth.elevation.angle
-    # Unit vectors across, the way azimuth grows, of both frames.
+    # Unit vectors of both frames in the direction of growing azimuth.
     across = rotated(f.mat, Vector(math.cos(A), -math.sin(A), 0.0))
     c = across.x * math.cos(azimuth) - across.y * math.sin(azimuth)
     p_across = p_A * math.cos(E)**2

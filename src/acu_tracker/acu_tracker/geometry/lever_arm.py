@@ -1,6 +1,6 @@
 """The arm r from the INS to the antenna, where the range is measured.
 
-The antenna of a rolling ship swings, and a near target with it: by r / range. The INS's own line of sight does not.
+The antenna of a rolling ship moves, so that a near target appears to move by r / range. Seen from the INS it does not.
 """
 import math
 
@@ -20,13 +20,13 @@ RANGE_SHARE = 0.05
 
 @compiled
 def from_ins(s, r, measured, running, v):
-    """The unit vector v (FLU), measured at the antenna, as the INS would see it: a Vector of length about 1.
+    """The direction from the INS of a unit vector v (FLU) measured at the antenna: a Vector of length about 1.
 
     r: the arm, record x, y, z [m]; measured: range of the antenna [m], NaN: none; running: whether a filter runs.
 
-    With a range the estimate is the line of sight of the INS, which the deck's turning does not move: R = |rho u + r|
-    is smoothed, and the arm put between. Only a filter that starts with a range does so, so that what it estimates
-    stays the same.
+    With a range the estimate is the line of sight from the INS, which the deck's rotation does not move: R = |rho u +
+    r| is smoothed, and the arm added. Only a filter that starts with a range does so, so that one estimate never mixes
+    both lines of sight.
     """
     along, r2 = v.x * r.x + v.y * r.y + v.z * r.z, r.x * r.x + r.y * r.y + r.z * r.z
     known = measured > 0.0

@@ -1,7 +1,7 @@
-"""How a direction moves: azimuth and elevation, or a unit vector, each with its first and second time derivative.
+"""The motion of a direction: azimuth and elevation, or a unit vector, with their first and second time derivatives.
 
-Azimuth is clockwise, from north in the earth's frame and from the bow on the deck, so that the same formulas hold of
-a vector in north-west-up and of one in FLU. Elsewhere earth vectors are ENU; `north_west_up` leads from there.
+Azimuth is clockwise, from north in the earth's frame and from the bow on the deck, so that the same formulas hold for
+a vector in north-west-up and one in FLU. Elsewhere earth vectors are ENU; `north_west_up` converts them.
 """
 import math
 from collections import namedtuple
@@ -36,7 +36,7 @@ def line_of_sight(motion):
 
 @compiled
 def north_west_up(v):
-    """A vector given in ENU; of deck angles that were taken for earth angles: in FLU."""
+    """North-west-up components of an ENU vector; FLU, where deck angles were passed as earth angles."""
     return Vector(v.y, -v.x, v.z)
 
 

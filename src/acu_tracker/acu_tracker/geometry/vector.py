@@ -1,11 +1,11 @@
-"""Vectors of three numbers, as the laws of the geometry write them."""
+"""Vectors of three components, and their products."""
 from collections import namedtuple
 
 from pedestal_common import line_of_sight
 from pedestal_common.compiled import compiled
 
 Vector = namedtuple('Vector', 'x y z')
-"""Components along the axes of a frame that the docstring of its user names."""
+"""Components along the axes of a frame, which the docstring of the caller names."""
 
 
 @compiled

@@ -1,7 +1,7 @@
-"""Through the zenith of the deck, where a target asks for more azimuth rate (W / cos E0) than the axis has.
+"""A pass through the zenith of the deck, which needs more azimuth rate (W / cos E0) than the axis has.
 
-The axis leaves the target at t1, turns as fast as it may, and meets it again at t2 on the other side. For each way
-round t1 is chosen so that least signal is lost; t2 follows from it.
+The axis leaves the target at t1, slews at its limits, and meets the target again at t2 on the other side. For each
+direction t1 is chosen for the least loss of signal; t2 follows from it.
 """
 import math
 from collections import namedtuple
@@ -21,22 +21,22 @@ half_beam: half the beamwidth [rad]."""
 CANDIDATES, LEVELS, SAMPLES, BISECTIONS = 48, 4, 160, 24
 
 NOTHING, PLANNED, NO_WRAP, BEYOND = range(4)
-"""What `plan` comes to: no keyhole, one that is planned for, one that no azimuth wrap lets through, one whose end lies
-beyond the path."""
+"""Outcomes of `plan`: no keyhole, a slew planned, no azimuth wrap that fits, a keyhole that ends beyond the path."""
 
 Passage = namedtuple('Passage', 'path azimuth limits after tilt')
 """A keyhole to be slewed through.
 
 path: a completed Path; azimuth: of the axis at its first row [rad]; limits: record of LIMITS; after: when
-following is possible again [s]; tilt: of the deck [rad rms about one axis], normally distributed, which a slew
-cannot follow."""
+following is possible again [s]; tilt: rms about one axis of the deck's tilt [rad], normally distributed, which a
+slew cannot follow."""
 
 
 @compiled
 def _lay(slew, passage, way, t1):
-    """Lay a slew from t1 [s] to the first instant, from passage.after on, when it meets the target: whether it can.
+    """Fit a slew from t1 [s] to the first instant, from passage.after on, at which it can meet the target: whether
+    there is one.
 
-    way: 1 clockwise, -1 the other way round. azimuth1 is within pi.
+    way: 1 clockwise, -1 counter-clockwise. azimuth1 is set within +-pi.
     """
     path, k = passage.path, passage.limits
     A1, v1 = paths.azimuth_at(path, t1, k.rate)
@@ -63,10 +63,10 @@ def _lay(slew, passage, way, t1):
 
 @compiled
 def _unwrap(slew, path, azimuth):
-    """Put a laid slew on the wrap of the axis, which is near `azimuth` [rad] at the first row of the path."""
+    """Put a fitted slew on the wrap of the axis, which is near `azimuth` [rad] at the first row of the path."""
     first = path.rows[int((slew.t1 - path.t0) / path.h), 3]
-    turns = math.floor((azimuth - path.rows[0, 3]) / (2.0 * math.pi) + 0.5)
-    start = 2.0 * math.pi * turns + first + wrap(slew.azimuth1 - first)
+    revolutions = math.floor((azimuth - path.rows[0, 3]) / (2.0 * math.pi) + 0.5)
+    start = 2.0 * math.pi * revolutions + first + wrap(slew.azimuth1 - first)
     slew.azimuth2 += start - slew.azimuth1
     slew.azimuth1 = start
 
@@ -82,8 +82,8 @@ def _fits(slew, path, low, high):
 
 @compiled
 def _judge(slew, passage, samples):
-    """Set what a laid slew costs: cost = integral of x^8 / (1 + x^8), x the pointing offset in half beamwidths (the
-    loss made smooth, and still a choice where nothing is lost); loss; worst."""
+    """Set cost, loss and worst of a fitted slew: cost = integral of x^8 / (1 + x^8), x the pointing offset in half
+    beamwidths, a smooth form of the loss that still ranks slews without one."""
     k = passage.limits
     T = (slew.t2 - slew.t1) / samples
     cost = loss = worst = 0.0
@@ -95,16 +95,16 @@ def _judge(slew, passage, samples):
         x8 = x2 * x2 * x2 * x2
         cost += T * x8 / (1.0 + x8)
         worst = max(worst, offset)
-        followed = slews.true_deck_share(slew, t).angle
-        sigma = math.sqrt(2.0) * max(passage.tilt * (1.0 - followed), 1e-9)
+        share = slews.true_deck_share(slew, t).angle
+        sigma = math.sqrt(2.0) * max(passage.tilt * (1.0 - share), 1e-9)
         loss += T * (1.0 - 0.5 * (math.erf((k.half_beam - offset) / sigma) + math.erf((k.half_beam + offset) / sigma)))
     slew.cost, slew.loss, slew.worst = cost, loss, worst
 
 
 @compiled
 def _attempt(slew, passage, way, t1, samples):
-    """Lay, unwrap and judge a slew that leaves at t1 [s]: (whether it can be laid at all, its cost, inf where it does
-    not fit the limits)."""
+    """Fit, unwrap and judge a slew that leaves at t1 [s]: (whether there is one, its cost, inf where it does not fit
+    the limits)."""
     if t1 < passage.path.t0 or not _lay(slew, passage, way, t1):
         return False, math.inf
     _unwrap(slew, passage.path, passage.azimuth)
@@ -116,8 +116,8 @@ def _attempt(slew, passage, way, t1, samples):
 
 @compiled
 def find(path, rate, acceleration):
-    """(first row, last row, largest rate [rad/s]) between which following a path takes more than rate or acceleration;
-    rows -1 for none. What comes later than half a turn at that rate after is another keyhole.
+    """(first row, last row, largest rate [rad/s]) between which following a path takes more than rate [rad/s] or
+    acceleration [rad/s2]; rows -1 for none. Excesses further apart than half a revolution takes are two keyholes.
     """
     first, last, needed, before = -1, -1, 0.0, 0.0
     for i in range(1, len(path.rows)):
@@ -136,7 +136,7 @@ def plan(slew, path, azimuth, limits, tilt):
     """Find the keyhole of a completed Path, and the best slew through it: NOTHING, PLANNED, NO_WRAP or BEYOND.
 
     slew: records (2,) of SLEW, the first for the best, the second to try; the other arguments as in Passage. Bounded:
-    two ways round, CANDIDATES + 9 LEVELS slews of SAMPLES each.
+    two directions, CANDIDATES + 9 LEVELS slews of SAMPLES each.
     """
     first, last, needed = find(path, limits.rate, limits.acceleration)
     if first < 0:
@@ -145,14 +145,14 @@ def plan(slew, path, azimuth, limits, tilt):
     t_in, t_out = path.t0 + first * path.h, path.t0 + last * path.h
     passage = Passage(path, azimuth, limits, t_out, tilt)
     natural = path.rows[last, 3] - path.rows[first, 3]
-    # Leaving earlier than a whole turn takes cannot help.
+    # Leaving earlier than a whole revolution takes cannot help.
     width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / CANDIDATES
     laid, least, other = False, math.inf, math.inf
     for side in range(2):
         way = math.copysign(1.0, natural) * (1.0 - 2.0 * side)
         centre, cost, step = t_in - 0.5 * CANDIDATES * width, math.inf, width
         for level in range(LEVELS + 1):
-            # All of it, then ever closer about the best so far, at last that one with more samples.
+            # The whole interval, then finer about the best so far, at last the best itself with more samples.
             around = 0 if level == LEVELS else CANDIDATES // 2 if level == 0 else 4
             middle = centre
             for k in range(-around, around + 1):
@@ -168,7 +168,7 @@ def plan(slew, path, azimuth, limits, tilt):
             return BEYOND
         if cost < math.inf:
             other = max(least, cost)
-            # Where both cost the same, the target's own way.
+            # Where both directions cost the same, the target's own.
             if trial.cost < 0.999 * least:
                 least = trial.cost
                 trial.long_way = side

@@ -41,7 +41,7 @@ def take(s, stamp, q, mean_time):
             norm += mean[i] * mean[i]
         for i in range(4):
             mean[i] /= math.sqrt(norm)
-        # The difference of what both have for the earth's vertical, in the two horizontal directions.
+        # The difference between the two decks' vertical axes, in the two horizontal directions.
         x = 2.0 * (q[0] * q[2] - q[3] * q[1] - mean[0] * mean[2] + mean[3] * mean[1])
         y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
         s.spread += T / (min(stamp - s.since, mean_time) + T) * (x * x + y * y - s.spread)
@@ -50,5 +50,5 @@ def take(s, stamp, q, mean_time):
 
 @compiled
 def restart(s):
-    """Begin the mean anew with the next attitude."""
+    """Restart the mean with the next attitude."""
     s.latest = -math.inf

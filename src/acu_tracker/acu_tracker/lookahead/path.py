@@ -13,12 +13,12 @@ ROWS, COLUMNS = 1025, 6
 
 Path = namedtuple('Path', 'rows t0 h')
 """rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), and set by `complete`
-the azimuth counted through all turns, the least and the largest azimuth from there to the end [rad]."""
+the unwrapped azimuth, the least and the largest azimuth from there to the end [rad]."""
 
 
 @compiled
 def along_program(path, mat, program, bridge):
-    """Lay out the path of a ProgramTrack, turned by its `bridge` where that is valid: how many rows it covers.
+    """Lay out the path of a ProgramTrack, rotated by its `bridge` where that is valid: how many rows it covers.
 
     mat (3, 3): levelled deck -> earth.
     """
@@ -28,7 +28,7 @@ def along_program(path, mat, program, bridge):
             return i
         u = program_track.direction(program, t)
         if bridge.valid:
-            u = program_bridge.turned(bridge, u)
+            u = program_bridge.rotated(bridge, u)
         path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(mat, u)
     return len(path.rows)
 

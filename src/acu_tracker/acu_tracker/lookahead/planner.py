@@ -1,7 +1,7 @@
-"""What lies ahead of the deck: a keyhole to be slewed through, sectors that hide the target.
+"""The look-ahead: a keyhole that the antenna must slew through, sectors of the deck that will hide the target.
 
-Once in INTERVAL the path of the target is laid out on the levelled deck, `horizon` seconds of it: from the program
-track, in autotrack turned so that it begins at the estimate, or along the great circle of the estimate where there is
+Once in INTERVAL the next `horizon` seconds of the target's path are laid out on the levelled deck: along the program
+track, in autotrack rotated so that it begins at the estimate, or along the great circle of the estimate where there is
 no program. The levelled deck is the mean attitude of the ship; a planned slew keeps the one it was made for.
 """
 import math
@@ -18,7 +18,7 @@ from pedestal_common.compiled import assign, compiled
 from pedestal_common.line_of_sight import angles, rotation
 
 INTERVAL = 1.0
-"""Seconds from one look ahead to the next."""
+"""Time between two look-aheads [s]."""
 
 FORECASTS = ('none', 'keyhole', 'no turn')
 NONE, KEYHOLE, NO_WRAP = range(len(FORECASTS))
@@ -32,7 +32,7 @@ PLANNER = np.dtype([
 """looked: when the path was last laid out [s]; forecast: one of FORECASTS, counted by forecasts; slew: while it is
 KEYHOLE, on the levelled deck `level` (levelled deck -> earth), deck_motion: the deck's tilt from there then [rad rms];
 hidden: from when until when [s] a sector will hide the target, NaN none, counted by blockages; program: what
-`another_program` knows the last one by; next_slew, next_level, rows: those of the look ahead that is made just now."""
+`another_program` compares the last one by; next_slew, next_level, rows: those of the look-ahead under way."""
 
 CONSTANTS = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyhole.LIMITS),
                       ('sectors', 'f8', (blockage.MOST, 3))], align=True)
@@ -56,7 +56,7 @@ def initialise(h):
 
 @compiled
 def forget(h):
-    """Nothing is planned any more."""
+    """Drop the plan; the next look-ahead is due at once."""
     h.forecast = NONE
     h.looked = -math.inf
     h.hidden[:] = math.nan
@@ -64,7 +64,7 @@ def forget(h):
 
 @compiled
 def another_program(h, program):
-    """Whether the program is another one than at the call before: by its number of rows, its first and its last."""
+    """Whether the program differs from that of the previous call, in its number of rows, its first or its last row."""
     last = len(program.times) - 1
     same = h.program[0] == last
     h.program[0] = last
@@ -78,13 +78,13 @@ def another_program(h, program):
 
 @compiled
 def due(h, t):
-    """Whether to look ahead at t [s]: not within INTERVAL of the last time, and not before a slew has ended."""
+    """Whether to look ahead at t [s]: INTERVAL after the last time, and not before a slew has ended."""
     return not (t - h.looked < INTERVAL or (h.forecast == KEYHOLE and t <= h.slew.t2))
 
 
 @compiled
 def look_along_program(h, c, t, azimuth, program, bridge):
-    """Look for a keyhole and hidden sectors from t [s] on, where the program leads, turned by its bridge where that is
+    """Look for a keyhole and hidden sectors from t [s] on along the program, rotated by its bridge where that is
     valid; azimuth: of the axis at t, on the deck [rad]."""
     path = _begin(h, c, t)
     count = paths.along_program(path, h.next_level, program, bridge)
@@ -96,7 +96,8 @@ def look_along_program(h, c, t, azimuth, program, bridge):
 
 @compiled
 def look_along_great_circle(h, c, t, azimuth, u, du):
-    """Look ahead from t [s] on, where the ENU unit vector u leads that moves by du [1/s]."""
+    """Look ahead from t [s] on along the great circle of an ENU unit vector u with its rate du [1/s]; azimuth as
+    above."""
     path = _begin(h, c, t)
     count = paths.along_great_circle(path, h.next_level, u, du)
     _look(h, c, path, count, azimuth, Travel(0.0, 0.0))
@@ -138,7 +139,8 @@ def _look(h, c, path, count, azimuth, travel):
 
 @compiled
 def _look_for_sectors(h, sectors, path):
-    """The first time that a path is hidden; counted when it begins after the last one has ended."""
+    """Find the first interval in which the path is hidden; it counts as new when it begins after the last has
+    ended."""
     first = last = -1
     for i in range(len(path.rows)):
         A, E = angles(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])

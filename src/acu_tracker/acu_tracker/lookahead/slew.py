@@ -1,5 +1,5 @@
-"""A slew through the keyhole: the azimuth leaves the target, turns as fast as it may and meets it again; the elevation
-takes the angle at which the beam is closest to the target."""
+"""A slew through the keyhole: the azimuth leaves the target, slews at its limits and meets the target again; the
+elevation takes the angle at which the beam is closest to the target."""
 import math
 
 import numpy as np
@@ -16,8 +16,8 @@ SLEW = np.dtype([('t1', 'f8'), ('t2', 'f8'), ('azimuth1', 'f8'), ('azimuth2', 'f
 """Leaves the target at t1 [s] with azimuth1 [rad], rate1 [rad/s], meets it at t2; peak: its largest rate, signed;
 acceleration [rad/s2] in which it is reached; culmination [s] and highest [rad]: elevation there on the levelled deck;
 needed: largest azimuth rate that following would take [rad/s]; loss: expected time [s] further than half a beamwidth
-off; worst: largest angle off [rad]; cost: share of signal lost, in seconds, other_cost: of the other way round, inf
-where the limits forbid it; long_way: 1 where the slew goes against the target's own way."""
+off; worst: largest pointing offset [rad]; cost: share of signal lost, in seconds, other_cost: of the other direction,
+inf where the limits forbid it; long_way: 1 where the slew goes against the target's own direction."""
 
 
 @compiled
@@ -47,9 +47,8 @@ def true_deck_share(slew, t):
 def best_elevation(azimuth, sight):
     """AxisMotion of the elevation at which a beam at an azimuth (AxisMotion) is closest to a LineOfSight in FLU.
 
-    Beyond pi/2 the beam has gone over the top.
-
-    E = atan2(z, b), where b = x cos a - y sin a is the part of the direction along the beam's azimuth.
+    An elevation beyond pi/2 is past the zenith. E = atan2(z, b), where b = x cos a - y sin a is the part of the
+    direction along the beam's azimuth.
     """
     a, da, dda = azimuth
     u, du, ddu = sight
@@ -80,7 +79,7 @@ def motion_at(slew, t, target, level, highest):
     """(Motion of the axes at t [s] on a slew, pointing offset [rad] from the target).
 
     target: Motion on the true deck; level: AxisMotion of its azimuth on the levelled one, on which the slew was
-    planned. At its ends the slew meets the target on the true deck; in between the difference of both means nothing.
+    planned. At its ends the slew meets the target on the true deck; in its middle the true deck has no share in it.
     highest: the largest elevation [rad].
     """
     azimuth, g = azimuth_at(slew, t), true_deck_share(slew, t)

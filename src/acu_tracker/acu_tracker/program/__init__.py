@@ -1,1 +1,1 @@
-"""The program track: a table of times and angles, and where it leads."""
+"""The program track: a table of times and angles, its interpolation and its use as a bridge over an outage."""

@@ -1,7 +1,7 @@
-"""The program track, turned by the smallest rotation that puts it where the target was last seen.
+"""The program track, rotated by the smallest angle that puts it where the target was last tracked.
 
-So it has the shape of the program and the place of the estimate: what an outage of the receiver is bridged with, for
-many seconds better than the filter's own rate and acceleration.
+It bridges an outage of the receiver with the shape of the program at the place of the estimate: for many seconds that
+is better than the filter's own rate and acceleration.
 """
 import math
 
@@ -16,12 +16,12 @@ BRIDGE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], align=
 """axis: ENU, of the length of the rotation's sine; cos: of its angle; valid: 0 where there is none."""
 
 LIKE_PROGRAM = math.cos(math.radians(3.0))
-"""The program is believed while it is closer to the estimate than this (cosine)."""
+"""Cosine of the largest angle between program and estimate at which the program is used."""
 
 
 @compiled
 def begin(b, program, t, u):
-    """Turn the program so that it is at the ENU unit vector u at t [s]; none where it is not nearly there."""
+    """Find the rotation that puts the program at the ENU unit vector u at t [s]; not valid beyond LIKE_PROGRAM."""
     b.valid = 0
     if program_track.status(program, t) == program_track.NONE:
         v = program_track.direction(program, t)
@@ -31,8 +31,8 @@ def begin(b, program, t, u):
 
 
 @compiled
-def turned(b, v):
-    """An ENU Vector of the program after the turn (Rodrigues)."""
+def rotated(b, v):
+    """An ENU Vector of the program after the rotation (Rodrigues)."""
     axis = vector(b.axis)
     d = cross(axis, v)
     k = dot(axis, v) / (1.0 + b.cos)
@@ -41,6 +41,6 @@ def turned(b, v):
 
 @compiled
 def motion_at(b, program, t):
-    """Motion in earth angles of the turned program at t [s]."""
+    """Motion in earth angles of the rotated program at t [s]."""
     sight = line_of_sight(program_track.motion_at(program, t))
-    return earth_angles(LineOfSight(turned(b, sight.u), turned(b, sight.du), turned(b, sight.ddu)))
+    return earth_angles(LineOfSight(rotated(b, sight.u), rotated(b, sight.du), rotated(b, sight.ddu)))

@@ -27,7 +27,7 @@ NO_TRACK = ProgramTrack(np.zeros(0), np.zeros((0, 2)))
 
 
 class ProgramTrackError(ValueError):
-    """A table that cannot be followed; the message names row, value and what is allowed."""
+    """A table that cannot be followed; the message names row, value and allowed range."""
 
 
 def checked(times, angles):
@@ -82,7 +82,9 @@ def _slope(program, i, axis):
 
 @compiled
 def _hermite(y0, d, m0, m1, x, T):
-    """AxisMotion a share x into an interval of T [s]: it begins at y0, grows by d, its slopes times T are m0, m1."""
+    """AxisMotion at the fraction x of an interval of T [s], from y0 to y0 + d with slopes m0 / T and m1 / T at its
+    ends.
+    """
     c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
     return AxisMotion(y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
                       (2.0 * c2 + 6.0 * x * c3) / (T * T))
@@ -128,8 +130,8 @@ def _interpolated_component(program, i, t, axis):
 
 @compiled
 def motion_at(program, t):
-    """Motion in earth angles at t [s]. Between two rows above STEEP, where the azimuth may turn by any amount from
-    one to the next, the unit vector is interpolated instead of the angles."""
+    """Motion in earth angles at t [s]. Between two rows above STEEP, where the azimuth may change by any amount,
+    the unit vector is interpolated instead of the angles."""
     i = interval(program.times, t)
     if min(program.angles[i, 1], program.angles[i + 1, 1]) < STEEP or len(program.times) < 3:
         return Motion(interpolated(program, t, 0), interpolated(program, t, 1))

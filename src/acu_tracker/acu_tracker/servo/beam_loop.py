@@ -20,8 +20,8 @@ TRACKED, TYPE_1, TYPE_2 = range(len(FORMS))
 def type_1(R, v, error, alpha, beta, T, compensation):
     """(beam R(k/k) [rad], its rate v [rad/s]) from those of the step before, T [s] ago.
 
-    error: of the receiver [rad]; compensation: delta V, V the rate at which a fixed target seems to move because the
-    carrier does [rad/s] (eq. 6).
+    error: of the receiver [rad]; compensation: delta V, V the rate [rad/s] at which the carrier's motion moves a fixed
+    target (eq. 6).
     """
     nu = error - v * T
     return R + v * T + alpha * nu + compensation * T, v + beta / T * nu
@@ -36,7 +36,7 @@ def type_2(R, v, error, alpha, beta, T, compensation):
 
 @compiled
 def coasted(R, v, T, compensation):
-    """(beam [rad], its rate [rad/s]) after T [s] without an error: the prediction stands."""
+    """(beam [rad], its rate [rad/s]) predicted over T [s] without an error; compensation as of type_1."""
     return R + v * T + compensation * T, v
 
 

@@ -45,7 +45,7 @@ class BeamParameters(Parameters):
     """The beam of a phased array (paper 002); alpha and rate_compensation belong to its own loops, type_1, type_2."""
 
     form: str = choice('tracked', FORMS, "tracked: the target's filter predicted to t_m; type_1: the paper's loop; "
-                       'type_2: the same with the beam at its prediction')
+                       'type_2: that loop with the beam at its prediction')
     alpha: float = parameter(0.1, 1e-3, 1.0, '', 'gain on the angle; beta by Benedict and Bordner')
     rate_compensation: float = parameter(0.0, 0.0, 2.0, '', "delta: share of the deck's rate fed forward")
 
@@ -61,7 +61,7 @@ class NotchParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ShaperParameters(Parameters):
-    """What the shaped reference may ask of the axis."""
+    """Limits of the shaped reference."""
 
     rate: float = parameter(2.3, 1e-4, 100.0, 'rad/s', 'largest rate')
     acceleration: float = parameter(30.0, 1e-4, 1000.0, 'rad/s2', 'largest acceleration')
@@ -69,6 +69,7 @@ class ShaperParameters(Parameters):
     h0: float = parameter(0.02, 1e-4, 10.0, 's', "filter step of Han's fhan; longer: smoother, more lag")
 
     def check(self):
+        """Raise ParameterError where h0 is too short for the jerk: the end of a move would ring."""
         if self.acceleration > 1.5 * self.jerk * self.h0:
             raise ParameterError(f'h0 = {self.h0:g} s: must be at least acceleration / (1.5 jerk) = '
                                  f'{self.acceleration / (1.5 * self.jerk):g} s, or the end of a move rings')
@@ -84,5 +85,6 @@ class LimitsParameters(Parameters):
     acceleration: float = parameter(40.0, 1e-4, 1e5, 'rad/s2', 'largest change of the rate command over time')
 
     def check(self):
+        """Raise ParameterError where low is not below high."""
         if self.low >= self.high:
             raise ParameterError(f'low = {self.low:g} rad: must be below high = {self.high:g} rad')

@@ -14,7 +14,7 @@ def gains(c):
 
 @compiled
 def integrated(integral, e, dt, K_p, K_i):
-    """The integral [rad/s] dt [s] later. Without a K_i what a handover left in it fades with the bandwidth."""
+    """The integral [rad/s] dt [s] later; without a K_i its value from a handover decays with the bandwidth K_p."""
     return integral + dt * K_i * e if K_i > 0.0 else integral / (1.0 + dt * K_p)
 
 

@@ -2,14 +2,14 @@
 
 `pid` acts on the raw target at t_k. `feedforward` and `adrc` act on the shaped reference as it was planned for t_k and
 feed the one of t_m forward.
-`beam` steers an electronic beam, there is nothing to control: the command is the raw target at t_m or, in autotrack of
-the forms type_1 and type_2, what paper 002's loop makes of the receiver's error.
+`beam` steers an electronic beam, which has no dynamics: the command is the raw target at t_m or, in autotrack of the
+forms type_1 and type_2, the beam of paper 002's loop on the receiver's error.
 """
 from collections import namedtuple
 
 import numpy as np
 
-from acu_tracker.estimation import alpha_beta
+from acu_tracker.estimation import constant_gain
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import adrc, beam_loop, feedforward, notch, pid, reference
 from pedestal_common.compiled import compiled
@@ -33,12 +33,12 @@ before [s]."""
 Feedback = namedtuple('Feedback', 'y dy error V closed')
 """Of one axis at t_k: encoder angle y [rad] and rate dy [rad/s].
 
-error: of the receiver in this angle [rad], NaN where none came; V: rate at which a fixed target seems to move
-because the deck does [rad/s]; closed: whether a beam closes its own loop on both."""
+error: of the receiver in this angle [rad], NaN where none came; V: rate [rad/s] at which the deck's motion moves a
+fixed target; closed: whether a beam closes its own loop on both."""
 
 Command = namedtuple('Command', 'rate torque reference angle_limited rate_limited acceleration_limited')
 """rate [rad/s] and load torque [Nm]; reference: the AxisMotion that is compared with the encoder at t_k, of a beam
-the command; what was limited."""
+the command; angle_limited, rate_limited, acceleration_limited: what was limited."""
 
 
 @compiled
@@ -55,7 +55,7 @@ def limited(wanted, before, dt, rate, acceleration):
 def initialise(axis, p, t_k, y, dy):
     """Targets := actual: the controller starts from the encoder's angle y [rad] and rate dy [rad/s] at t_k [s].
 
-    A beam stays where it was last told to be: what is in force comes a delay later and would go round for ever.
+    A beam keeps its last command: the beam in force lags it by the delay, and would feed back into it for ever.
     p: record of AxisParameters, here and below.
     """
     axis.controller = p.controller
@@ -70,7 +70,7 @@ def initialise(axis, p, t_k, y, dy):
 
 @compiled
 def _initialise_feedback(axis, t_k, y, dy):
-    """Integral and observer know of no disturbance."""
+    """Reset integral and observer: no disturbance."""
     axis.integral = 0.0
     axis.z[0], axis.z[1], axis.z[2] = y, dy, 0.0
     axis.observed = t_k
@@ -78,7 +78,8 @@ def _initialise_feedback(axis, t_k, y, dy):
 
 @compiled
 def stop(axis, p, dt):
-    """Command that brings the rate to zero within its acceleration; whoever comes next starts anew."""
+    """Command that brings the rate to zero within the acceleration limit, dt [s] after the last; resets the
+    integral."""
     axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, p.limits.rate, p.limits.acceleration)
     axis.integral = 0.0
     return Command(axis.command, 0.0, AxisMotion(axis.reference.angle, 0.0, 0.0), False, False, acceleration_limited)
@@ -86,7 +87,7 @@ def stop(axis, p, dt):
 
 @compiled
 def instant(p, t_k, t_m):
-    """When [s] the controller wants to know the raw target."""
+    """The instant [s] at which the controller needs the raw target: t_k for pid, else t_m."""
     return t_k if p.controller == PID else t_m
 
 
@@ -103,9 +104,9 @@ def follow(axis, c, target, feedback, now):
 
 @compiled
 def _steer(axis, p, target, feedback, T):
-    """The beam of one axis: the raw target at t_m is the command, or what its own loop makes of the error."""
+    """Command of an electronic beam: the raw target at t_m, or the beam of its own loop on the error."""
     b, r = p.beam, axis.reference
-    beta, compensation = alpha_beta.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
+    beta, compensation = constant_gain.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
     axis.controller = BEAM
     r.acceleration = 0.0
     if not feedback.closed or b.form == beam_loop.TRACKED:
@@ -197,7 +198,7 @@ def _update(axis, p, e, y, now):
     if p.controller == ADRC:
         h = now.t_k - axis.observed
         if h > 0.0:
-            # The command and the acceleration that were in force since the observer was last there.
+            # The command and the acceleration in force since the observer's last instant.
             u, v3 = reference.in_force(axis.reference, now.t_k - 0.5 * h)
             axis.z[0], axis.z[1], axis.z[2] = adrc.observed(axis.z, y, u, v3, p.adrc.observer_bandwidth,
                                                             p.adrc.rate_bandwidth, h)

@@ -1,7 +1,8 @@
-"""The reference of one axis, and its past: what was planned for an instant is what the encoder is compared with then.
+"""The shaped reference of one axis and its history: the encoder is compared with the reference planned for its
+instant.
 
-A controller of the raw target has none of its own: it rests on the antenna's own angle and rate, so that another one
-begins there.
+A controller of the raw target uses no reference: it is kept at the antenna's own angle and rate, so that another
+controller begins there.
 """
 import numpy as np
 
@@ -25,20 +26,20 @@ def now(r):
 
 @compiled
 def put(r, motion):
-    """The reference is this AxisMotion."""
+    """Set the reference to an AxisMotion."""
     r.angle, r.rate, r.acceleration = motion
 
 
 @compiled
 def _plan(r, stamp, command):
-    """Keep the reference for the instant when the encoder meets it."""
+    """Put the reference into the history at the stamp [s] at which the encoder is compared with it."""
     row = r.planned.sample[push(r.planned, stamp)]
     row[0], row[1], row[2], row[COMMAND] = r.angle, r.rate, r.acceleration, command
 
 
 @compiled
 def initialise(r, stamp, y, dy, command):
-    """Begin anew at an angle y [rad] and rate dy [rad/s] at a stamp [s]; command: rate command in force [rad/s]."""
+    """Restart at an angle y [rad] and rate dy [rad/s] at a stamp [s]; command: rate command in force [rad/s]."""
     r.planned.count = 0
     put(r, AxisMotion(y, dy, 0.0))
     _plan(r, stamp, command)
@@ -62,7 +63,7 @@ def follow(r, p, target, stamp, command):
 
 @compiled
 def commanded(r, command):
-    """Keep the rate command [rad/s] of this step with the reference it belongs to."""
+    """Put the rate command [rad/s] of this step beside its reference in the history."""
     r.planned.sample[r.planned.newest, COMMAND] = command
 
 

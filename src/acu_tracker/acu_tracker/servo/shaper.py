@@ -14,7 +14,7 @@ SUB_STEPS = 4
 
 @compiled
 def toward_rate_limit(gap, h, jerk):
-    """Largest acceleration [rad/s2] that jerk [rad/s3] can still take out before the rate has grown by gap [rad/s], in
+    """Largest acceleration [rad/s2] that jerk [rad/s3] can reduce to 0 before the rate has grown by gap [rad/s], in
     steps of h [s].
 
     a^2/(2 j) + a h/2 = gap; the last part of a step costs up to j h^2/8 more.
@@ -28,8 +28,8 @@ def toward_rate_limit(gap, h, jerk):
 
 @compiled
 def held_inside(raw, low, high, braking, lag):
-    """(AxisMotion, held): a raw one that could not stop before a limit low, high [rad] is set onto it; braking
-    [rad/s2], lag [s] until it begins."""
+    """(AxisMotion, whether it was changed): a raw one that could not stop before a limit low, high [rad] is set onto
+    the limit; braking [rad/s2], lag [s] until it begins."""
     stop = raw.angle + raw.rate * (abs(raw.rate) / (2.0 * braking) + lag)
     if raw.angle > high or (raw.rate > 0.0 and stop > high):
         return AxisMotion(high, 0.0, 0.0), True
@@ -46,7 +46,7 @@ def shape(before, raw, dt, limits):
     """
     p, v, a = before
     h = dt / SUB_STEPS
-    # What the target's own acceleration takes is not there for closing the gap.
+    # The acceleration of the target itself is not available for closing the gap.
     r = max(limits.acceleration - abs(raw.acceleration), 0.2 * limits.acceleration)
     rate_limited = acceleration_limited = False
     for i in range(SUB_STEPS):

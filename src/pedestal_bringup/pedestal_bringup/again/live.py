@@ -12,7 +12,6 @@ import rclpy
 import yaml
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from pedestal_bringup.again import difference, recompute
@@ -97,8 +96,7 @@ def outputs(recording, done, params):
     if not recording.lockstep:
         raise recompute.RecomputeError('--live feeds in lockstep: a realtime recording, whose steps may lack inputs, '
                                        'is recomputed without it')
-    middleware.set_defaults()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    middleware.initialise([])
     try:
         with tempfile.TemporaryDirectory() as folder:
             return _run(recording, done, params, pathlib.Path(folder))

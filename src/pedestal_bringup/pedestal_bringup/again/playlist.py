@@ -10,7 +10,6 @@ import itertools
 import numpy as np
 
 from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags import columns
 from pedestal_common import nodes, topics
 
 SECOND = 1_000_000_000
@@ -72,8 +71,7 @@ class Playlist:
         for name in names:
             rows = bag.where(name)
             where.append(rows)
-            stamps.append(columns.stamps([data[:12] for _, _, _, data in bag.raw(name)], bag.topics[name],
-                                         bag.index.log[rows]))
+            stamps.append(bag.index.stamp[rows])
             ranks.append(np.full(rows.size, rank.get(name, len(rank))))
         where, stamps, ranks = map(np.concatenate, (where, stamps, ranks))
         if not where.size:

@@ -20,7 +20,7 @@ import yaml
 from pedestal_bringup.again import difference
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import scenario
-from pedestal_common import messages, nodes, parameters, records, topics
+from pedestal_common import messages, nodes, parameters, plain_yaml, records, topics
 from pedestal_common.steps import SECOND, GraphError, Steps
 from pedestal_common.unit import announced
 
@@ -337,9 +337,9 @@ def file_parameters(path, beam=''):
     Raises ScenarioError.
     """
     try:
-        tree = yaml.safe_load(path.read_text())
+        tree = plain_yaml.read(path)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise RecomputeError(f'--params-file {path}: {" ".join(str(error).split())}') from None
+        raise RecomputeError(f'--params-file {path}: {plain_yaml.problem(error)}') from None
     if not isinstance(tree, dict):
         raise RecomputeError(f'--params-file {path}: must hold a section for a node')
     if 'scenario' in tree and 'recorder' not in tree:

@@ -6,7 +6,6 @@ import signal
 import time
 
 import rclpy
-from rclpy.signals import SignalHandlerOptions
 
 from pedestal_bringup.again.player import ANSWERS, Player, answer_of
 from pedestal_bringup.again.playlist import Playlist, select, writes
@@ -92,8 +91,7 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
     keyboard = Keyboard()
     if options.paused and not keyboard.there:
         raise ValueError('--paused: standard input is no terminal, no key could end the pause')
-    middleware.set_defaults()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    middleware.initialise([])
     try:
         with _stop_by_signal() as stopped, keyboard:
             player = Player(playlist, companion, options, keyboard, stopped)

@@ -1,12 +1,11 @@
 """Makes a run again from the configuration in its recording, and compares: bytes, then messages, then metadata."""
 import dataclasses
-import hashlib
 import pathlib
 
 from pedestal_bringup.again import difference
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import scenario
-from pedestal_common import parameters
+from pedestal_common import files, parameters
 
 SHOWN = 4
 """Fields shown of the first message that differs on a topic."""
@@ -105,7 +104,7 @@ def result(was, now) -> RerunResult:
         metadata[record] = {key: (old.get(key), new.get(key)) for key in dict.fromkeys((*old, *new))
                             if old.get(key) != new.get(key)}
     topics = [difference.compare_messages(name, was, now) for name in dict.fromkeys((*was.topics, *now.topics))]
-    before, sha256 = (hashlib.sha256(bag.file.read_bytes()).hexdigest() for bag in (was, now))
+    before, sha256 = (files.sha256(bag.file) for bag in (was, now))
     if not any(topics) and before != sha256:
         topics = [difference.compare_order(was, now)]
     return RerunResult(now.path, sorted(filter(None, topics), key=lambda topic: topic.first),

@@ -4,7 +4,7 @@ A result is measured on a part of what is known of a run; without that part it h
 motors      tracking.Tracking of a drive with motors    tracking    tracking.Tracking of any drive
 filter      consistency.Consistency                     isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
-run         graph.Outcome
+run         graph.Outcome                               supervised  graph.Outcome in realtime
 Errors are per axis and sample: both axes together are all samples of both, not the angle off the beam.
 """
 import math
@@ -104,11 +104,13 @@ RESULTS = (
     Result('level_error_rms_deg', 'deg', 'attitude', lambda ins: rms(ins.error[ins.after, :2]) * DEGREES,
            'Rms of the level error of the INS since it was aligned, per axis.',
            'level error from then on, rms per axis'),
-    Result('lost_steps', '', 'run', lambda run: float(run.drive['lost_steps']),
+    Result('lost_steps', '', 'run', lambda run: float(run.drive.get('lost_steps', math.nan)),
            'Steps that the drive made without the command for them.', target='0'),
-    Result('realtime_factor', '', 'run', lambda run: run.drive['realtime_factor'],
+    Result('realtime_factor', '', 'run', lambda run: run.drive.get('realtime_factor', math.nan),
            "The drive's time over wall time.", target='>= 4 in lockstep'),
     Result('messages', '', 'run', lambda run: float(run.recorder['messages']), 'Messages that were recorded.'),
+    Result('restarts', '', 'supervised', lambda run: float(run.restarts),
+           'How often `pedestal run` started a node again that had died, in realtime.'),
 )
 
 BY_NAME = {result.name: result for result in RESULTS}

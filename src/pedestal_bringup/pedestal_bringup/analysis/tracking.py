@@ -1,4 +1,5 @@
 """A recorded run on the drive's steps: beam, estimate and the receiver's errors against the recorded truth."""
+import contextlib
 import dataclasses
 import functools
 import math
@@ -158,7 +159,7 @@ def on_grid(bag, t, topic, columns):
 def _lever_arm(bag, attitude):
     """(n, 3) ENU [m] from base_link to the antenna, at attitudes (n, 4) of the deck; 0 when the bag does not say."""
     parameters = bag.configuration['parameters'].get('tracking_receiver', {})
-    arm = np.array([parameters.get(f'lever_arm.{axis}', 0.0) for axis in 'xyz'])
+    arm = np.array([parameters.get(f'lever_arm.{axis}', 0.0) for axis in 'xyz'], float)
     enu, mat_ed = np.zeros((len(attitude), 3)), np.empty((3, 3))
     if arm.any():
         for row, quaternion in zip(enu, attitude):
@@ -219,9 +220,9 @@ def keyholes(bag):
     for _, _, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
         for status in array.status:
             values = {value.key: value.value for value in status.values}
-            if 'keyhole_loss_s' in values:
-                slews[values['keyhole_begins_s']] = tuple(float(values[f'keyhole_{name}_s']) for name in (
-                    'begins', 'ends', 'loss'))
+            with contextlib.suppress(KeyError, ValueError):  # announces none, or is of another node
+                begin, end, loss = (float(values[f'keyhole_{name}_s']) for name in ('begins', 'ends', 'loss'))
+                slews[begin] = begin, end, loss
     return list(slews.values())
 
 

@@ -1,36 +1,35 @@
-"""Reads a bag: a rosbag2 directory with one MCAP file, or the file. No ROS here."""
+"""Reads a bag: a rosbag2 directory with its MCAP files, or one file. No ROS here."""
+import contextlib
 import copy
 import difflib
-import fcntl
 import functools
-import io
 import pathlib
-import struct
+import re
 
 import numpy as np
 import yaml
-from mcap import records
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.stream_reader import get_chunk_data_stream
-from mcap.writer import MCAP0_MAGIC as MAGIC
 
-from pedestal_bringup.bags import columns
-from pedestal_common import messages, nodes
+from pedestal_bringup.bags import columns, mcap_file
+from pedestal_bringup.bags.mcap_file import MESSAGE, BagError, McapFile
+from pedestal_common import messages, nodes, plain_yaml
+from pedestal_common.cdr import STAMPED
 
-SQLITE = b'SQLite format 3'
-_RECORD = struct.Struct('<BQ')
-MESSAGE = struct.Struct('<xQHIQQ')
-"""Length, channel, sequence, log and publish time: the head of a message record after its opcode."""
+CACHE = 64_000_000
+"""Bytes of unpacked chunks that are kept."""
 
+LOOKED_AT = 100
+"""Diagnostics at the end of a bag among which the last of a node is looked for."""
 
-class BagError(ValueError):
-    """A bag cannot be written or read; one line that names the file and what is wrong with it."""
+CHANNELS = 2000
+"""Channels of a file at the most."""
 
+BLOCK = 65_536
+"""Rows of the index that are made at once."""
 
-def reason(error):
-    """What an OSError says, without the path."""
-    return error.strerror or str(error)
+INDEX = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'chunk', 'start', 'stop')]
+_DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
+_NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')
 
 
 def read(path, beam=None):
@@ -40,7 +39,8 @@ def read(path, beam=None):
     """
     bag = load(path)
     if bag.damage:
-        raise BagError(f'{bag.file}: {bag.damage}; `pedestal recover` makes a bag of what is there')
+        where = bag.file if len(bag.files) == 1 else bag.path
+        raise BagError(f'{where}: {bag.damage}; `pedestal recover` makes a bag of what is there')
     return bag if beam is None else bag.view(beam)
 
 
@@ -61,38 +61,51 @@ def chosen_topics(bag, names):
 def load(path):
     """The Bag in a directory or an .mcap file as far as it can be read: `damage` is a line on where and why it ends,
     '' if it is whole. Raises BagError when there is nothing to read."""
-    file = locate(path)
+    opened = [McapFile(file) for file in locate(path)]
     try:
-        return Bag(pathlib.Path(path), file, file.read_bytes())
+        return Bag(pathlib.Path(path), opened)
     except OSError as error:
-        raise BagError(f'{path}: {reason(error)}') from None
+        raise BagError(f'{path}: {mcap_file.reason(error)}') from None
 
 
-def locate(path):
-    """The MCAP file of a bag, a directory or the file itself.
+def locate(path) -> list:
+    """The MCAP files of a bag in their order, a directory or a file itself.
 
-    Raises BagError when there is none, when it is foreign or empty, or while its recorder still writes it.
+    A bag that was recorded on by several recorders, one after the other, has NAME_0.mcap, NAME_1.mcap and so on.
+    Raises BagError when there is none, or when there are several that are not numbered so.
     """
     path = pathlib.Path(path)
     try:
-        file = _only_file(path) if path.is_dir() else path
-        with open(file, 'rb') as stream:
-            try:
-                fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise BagError(f'{file}: is being written; wait until its recorder has ended') from None
-            except OSError:  # a file system without locks
-                pass
-            head = stream.read(len(SQLITE))
+        if not path.is_dir():
+            return [path]
+        found = list(path.glob('*.mcap')) or list(path.glob('*.db3'))
     except OSError as error:
-        raise BagError(f'{path}: {reason(error)}') from None
-    if head.startswith(MAGIC):
-        return file
-    if not head:
-        raise BagError(f'{file}: empty file')
-    if head == SQLITE:
-        raise BagError(f'{file}: an SQLite bag, not an MCAP file; `ros2 bag convert` makes one of it')
-    raise BagError(f'{file}: not an MCAP file')
+        raise BagError(f'{path}: {mcap_file.reason(error)}') from None
+    if len(found) == 1:
+        return found
+    numbered = {file: _NUMBERED.fullmatch(file.name) for file in found}
+    if not found or not all(numbered.values()) or len({match[1] for match in numbered.values()}) > 1:
+        raise BagError(f'{path}: {len(found)} .mcap files in it where one belongs, or NAME_0.mcap, NAME_1.mcap ...')
+    return sorted(found, key=lambda file: int(numbered[file][2]))
+
+
+def start(metadata_records) -> int:
+    """Where the time of the scenario is 0 in the stamps [ns] of a bag, by its metadata records: UTC in realtime."""
+    return _nanoseconds(metadata_records.get('pedestal', {}).get('start')) or 0
+
+
+def planned_end(metadata_records):
+    """When a run was to end, a stamp [ns], by the metadata records of its bag; None where they do not say."""
+    told = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
+    if told is None:  # made before bags said so
+        with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError, yaml.YAMLError):
+            told = round(plain_yaml.parse(metadata_records['parameters']['recorder'])['duration'] * 1e9) or None
+    return None if told is None else start(metadata_records) + told
+
+
+def _nanoseconds(text):
+    """The time in a text of a bag's metadata, None where it is none."""
+    return int(text) if text and text.isdecimal() and len(text) < 20 else None
 
 
 def foreign_encoding(file, channel):
@@ -100,104 +113,132 @@ def foreign_encoding(file, channel):
     return BagError(f'{file}: {channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
 
 
-def _only_file(path):
-    files = sorted(path.glob('*.mcap')) or sorted(path.glob('*.db3'))
-    if len(files) != 1:
-        raise BagError(f'{path}: {len(files)} .mcap files in it where one belongs')
-    return files[0]
-
-
 class Bag:
     """A recording.
 
-    topics: {name without the leading '/': type}; metadata_records: {name: {text: text}};
-    index: record array (n,) in the order of the file, one row per message: channel, sequence, log, publish [ns],
-    chunk, start, stop (where its bytes are); statistics: {name: count} in the file's summary, None without one;
-    damage: why it ends before its end, ''; beam: the prefix of the beam that it is a view of, ''.
+    files: its MCAP files in their order, paths; file: the first of them; topics: {name without the leading '/': type};
+    metadata_records: {name: {text: text}} of the first file;
+    index: record array (n,) in the order of the files, one row per message: channel (its number, plus 65536 times that
+    of its file), sequence, log, publish, stamp [ns] (of its header; its log time where it has none), chunk, start,
+    stop (where its bytes are);
+    statistics: {name: count} in the summaries, None where a file has none;
+    breaks: lines on files that end without a summary while another follows: their recorder was killed, and one was
+    started again; damage: the file that is broken or ends before its end, where and why, ''; beam: the prefix of the
+    beam that it is a view of, ''.
     """
 
-    def __init__(self, path, file, data):
-        self.path, self.file, self.beam = path, file, ''
-        self.topics, self.metadata_records, self.statistics, self.damage = {}, {}, None, ''
-        self._data = data
-        self._schemas, self._channels, self._chunks = {}, {}, []
-        self._chunk = functools.lru_cache(maxsize=256)(self._decompress)
-        rows = []
-        try:
-            self._scan(rows)
-        except EOFError as error:
-            self.damage = str(error)
-        self.index = np.array(rows, [(name, 'i8') for name in
-                                     ('channel', 'sequence', 'log', 'publish', 'chunk', 'start', 'stop')])
-        self.index = self.index.view(np.recarray)
-
-    def _scan(self, rows):
-        data, at = self._data, 8
-        closed = False
-        while not closed:
-            if at + 9 > len(data):
-                raise EOFError(f'the file ends at byte {len(data)} without a summary (recorder killed, or disk full)')
-            opcode, length = _RECORD.unpack_from(data, at)
-            at += 9
-            if at + length > len(data):
-                raise EOFError(f'the file ends at byte {len(data)} inside a record that goes on to {at + length}')
+    def __init__(self, path, opened):
+        self.path, self.beam = path, ''
+        self.files = [file.path for file in opened]
+        self.file = self.files[0]
+        self.topics, self.metadata_records, self.statistics = {}, {}, {}
+        self.breaks, self.damage = [], ''
+        self._opened, self._cache, self._chunks = opened, {}, []
+        self._schemas, self._channels, self._stamped = {}, {}, []
+        blocks, ended = [np.zeros(0, INDEX)], True
+        for number, file in enumerate(opened):
             try:
-                closed = self._take(opcode, at, length, rows)
-            except (BagError, EOFError):
+                self._scan(number, file, blocks)
+            except EOFError as error:
+                ended = False
+                text = f'{file.path.name}: {error}' if len(opened) > 1 else str(error)
+                if file is opened[-1] or not str(error).startswith('the file ends'):
+                    self.damage = text
+                    break
+                self.breaks.append(text)
+        self.statistics = self.statistics if ended and self.statistics else None
+        self.index = np.concatenate(blocks).view(np.recarray)
+
+    def _scan(self, number, file, blocks):
+        """Add the messages of a file to the blocks of the index. Raises EOFError where it ends before its end."""
+        for opcode, start, stop in file.pieces():
+            try:
+                if opcode == Opcode.CHUNK:
+                    data = file.chunk(start, stop)
+                    self._chunks.append((file, start, stop))
+                    blocks += self._walk(number, data, 0, len(self._chunks) - 1)
+                elif opcode == Opcode.MESSAGE:
+                    blocks += self._walk(number, file.read(start, stop), start, -1 - number)
+                elif opcode in _DECLARED:
+                    self._declare(number, opcode, file.read(start + 9, stop))
+            except BagError:
                 raise
-            except Exception as error:
-                raise EOFError(f'broken record at byte {at - 9}: {error}') from None
-            at += length
-        if data[at:] != MAGIC:
-            raise EOFError(f'the file does not end where its footer does, at byte {at}')
+            except Exception as error:  # whatever a decoder makes of broken bytes
+                raise EOFError(f'broken record at byte {start}: {error}') from None
 
-    def _take(self, opcode, at, length, rows):
-        if opcode == Opcode.CHUNK:
-            self._chunks.append((at, length))
-            chunk = self._chunk(len(self._chunks) - 1)
-            self._walk(chunk, 0, len(chunk), len(self._chunks) - 1, rows)
-        elif opcode == Opcode.MESSAGE:
-            self._walk(self._data, at - 9, at + length, -1, rows)
-        elif opcode in (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA):
-            self._declare(opcode, self._data[at:at + length])
-        return opcode == Opcode.FOOTER
-
-    def _walk(self, data, at, end, chunk, rows):
-        unpack, add = MESSAGE.unpack_from, rows.append
-        while at < end:
+    def _walk(self, number, data, offset, chunk):
+        """Iterator of blocks of the index: the messages in the records `data`, which begin at this offset."""
+        unpack, base, at, rows = MESSAGE.unpack_from, number << 16, 0, []
+        add, file = rows.append, self._opened[number]
+        while at < len(data):
             if data[at] == Opcode.MESSAGE:
                 length, channel, sequence, log, publish = unpack(data, at)
-                add((channel, sequence, log, publish, chunk, at + MESSAGE.size, at + 9 + length))
+                add((base | channel, sequence, log, publish, log, chunk, at + MESSAGE.size, at + 9 + length))
+                if len(rows) == BLOCK:
+                    yield self._block(file, rows, data, offset)
+                    rows.clear()
+                at += 9 + length
             else:
-                opcode, length = _RECORD.unpack_from(data, at)
-                self._declare(opcode, data[at + 9:at + 9 + length])
-            at += 9 + length
+                opcode, stop = mcap_file.frame(data, at)
+                self._declare(number, opcode, data[at + 9:stop])
+                at = stop
+        if at > len(data):
+            raise ValueError('a message longer than its chunk')
+        if rows:
+            yield self._block(file, rows, data, offset)
 
-    def _declare(self, opcode, data):
-        stream = ReadDataStream(io.BytesIO(data))
-        if opcode == Opcode.HEADER:
-            records.Header.read(stream)
-        elif opcode == Opcode.SCHEMA:
-            schema = records.Schema.read(stream)
-            self._schemas[schema.id] = schema.name
+    def _block(self, file, rows, data, offset):
+        """Rows as a block of the index, each stamped where its header says when."""
+        file.count(len(rows))
+        block = np.array(rows, INDEX)
+        unknown = set(np.unique(block['channel']).tolist()) - set(self._channels)
+        if unknown:
+            raise ValueError(f'channel {min(unknown) & 0xffff} is declared nowhere')
+        if (block['stop'] < block['start']).any():
+            raise ValueError('a message that is shorter than its head')
+        stamped = np.isin(block['channel'], self._stamped) & (block['stop'] - block['start'] >= 12)
+        places = block['start'][stamped, np.newaxis] + np.arange(4, 12)
+        pairs = np.frombuffer(data, np.uint8)[places].view('<u4').astype(np.int64)
+        block['stamp'][stamped] = pairs[:, 0].astype(np.int32) * np.int64(1_000_000_000) + pairs[:, 1]
+        block['start'] += offset
+        block['stop'] += offset
+        return block
+
+    def _declare(self, number, opcode, content):
+        record, base = mcap_file.parsed(opcode, content), number << 16
+        if opcode == Opcode.SCHEMA:
+            self._schemas[base | record.id] = record.name
         elif opcode == Opcode.CHANNEL:
-            channel = records.Channel.read(stream)
-            if channel.message_encoding != 'cdr':
-                raise foreign_encoding(self.file, channel)
-            self._channels[channel.id] = channel.topic.lstrip('/')
-            self.topics[channel.topic.lstrip('/')] = self._schemas[channel.schema_id]
+            if record.message_encoding != 'cdr':
+                raise foreign_encoding(self.files[number], record)
+            name = record.topic.lstrip('/')
+            if not name.isprintable() or not name:
+                raise ValueError(f'a topic of the name {record.topic!r}')
+            if len(self._channels) >= CHANNELS * len(self.files):
+                raise ValueError(f'more than {CHANNELS} channels')
+            self._channels[base | record.id] = name
+            self.topics[name] = self._schemas[base | record.schema_id]
+            if self.topics[name] in STAMPED:
+                self._stamped.append(base | record.id)
         elif opcode == Opcode.METADATA:
-            record = records.Metadata.read(stream)
-            self.metadata_records[record.name] = record.metadata
+            self.metadata_records.setdefault(record.name, record.metadata)
         elif opcode == Opcode.STATISTICS:
-            counts = records.Statistics.read(stream).channel_message_counts
-            self.statistics = {name: counts.get(channel, 0) for channel, name in self._channels.items()}
+            for channel, name in self._channels.items():
+                if channel >> 16 == number:
+                    count = record.channel_message_counts.get(channel & 0xffff, 0)
+                    self.statistics[name] = self.statistics.get(name, 0) + count
 
-    def _decompress(self, number):
-        at, length = self._chunks[number]
-        chunk = records.Chunk.read(ReadDataStream(io.BytesIO(self._data[at:at + length])))
-        stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-        return stream.read(size)
+    def _bytes(self, chunk, start, stop):
+        """The bytes of a message, of a row of the index."""
+        if chunk < 0:
+            return self._opened[-1 - chunk].read(start, stop)
+        if chunk not in self._cache:
+            file, *place = self._chunks[chunk]
+            data = file.chunk(*place, again=True)
+            while self._cache and sum(map(len, self._cache.values())) + len(data) > CACHE:
+                del self._cache[next(iter(self._cache))]
+            self._cache[chunk] = data
+        return self._cache[chunk][start:stop]
 
     @property
     def metadata(self):
@@ -205,19 +246,27 @@ class Bag:
         return self.metadata_records.get('pedestal', {})
 
     @property
-    def start(self):
-        """Where the time of the scenario is 0 in the stamps [ns]: UTC in realtime, else 0."""
-        return int(self.metadata.get('start', 0))
-
-    @property
     def beams(self):
         """Beams of the array that was recorded; 0: a drive with motors."""
         several = sum(1 for name in self.topics if nodes.plain(name) == 'joint_states' != name)
-        return several or int(self.metadata.get('beams', 0))
+        told = self.metadata.get('beams', '0')
+        if not (told.isdecimal() and max(several, int(told[:9])) <= nodes.MAX_BEAMS):
+            raise BagError(f'{self.file}: beams = {told}: must be 0 to {nodes.MAX_BEAMS}')
+        return several or int(told)
+
+    @property
+    def start(self):
+        """Where the time of the scenario is 0 in the stamps [ns]: UTC in realtime, else 0."""
+        return start(self.metadata_records)
+
+    @property
+    def planned_end(self):
+        """When the run was to end, a stamp [ns]; None when the bag does not say."""
+        return planned_end(self.metadata_records)
 
     @property
     def graph(self):
-        """{name: Topic} of the graph that was recorded."""
+        """{name: Link} of the graph that was recorded."""
         return nodes.links(self.beams)
 
     def view(self, beam=''):
@@ -255,14 +304,16 @@ class Bag:
     @functools.cached_property
     def configuration(self):
         """How the run was made: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}; '' and {} in a bag
-        without a configuration. Raises BagError where that is no YAML."""
-        try:
-            return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''),
-                    'parameters': {node: yaml.safe_load(text)
-                                   for node, text in self.metadata_records.get('parameters', {}).items()}}
-        except yaml.YAMLError as error:
-            reason = ' '.join(str(error).split())
-            raise BagError(f'{self.file}: its record `parameters` is no YAML: {reason}') from None
+        without a configuration. Raises BagError where that is no YAML, or no section of parameters."""
+        parameters = {}
+        for node, text in self.metadata_records.get('parameters', {}).items():
+            try:
+                parameters[node] = plain_yaml.parse(text)
+            except yaml.YAMLError as error:
+                raise BagError(f'{self.file}: its record `parameters`: {plain_yaml.problem(error)}') from None
+            if not isinstance(parameters[node], dict):
+                raise BagError(f'{self.file}: its record `parameters`: {node} must hold a value for each parameter')
+        return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''), 'parameters': parameters}
 
     def where(self, topic):
         """Where in `index` the rows (m,) of one topic are. Raises BagError for a topic that is not in the bag."""
@@ -276,17 +327,26 @@ class Bag:
         """The rows of `index` of one topic."""
         return self.index[self.where(topic)]
 
+    def last_values(self, node):
+        """{key: value} of the last diagnostics of a node; {} where there is none that can be read."""
+        rows = self.rows('diagnostics') if 'diagnostics' in self.topics else self.index[:0]
+        for _, _, _, data in self.take(rows[:-LOOKED_AT - 1:-1]):
+            with contextlib.suppress(ValueError):
+                for status in messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticArray').status:
+                    if status.name == node:
+                        return {value.key: value.value for value in status.values}
+        return {}
+
     def raw(self, topic=None):
         """Iterator of (topic, log time, publish time [ns], CDR bytes) in the order of the file."""
         return self.take(self.index if topic is None else self.rows(topic))
 
     def take(self, rows):
         """Iterator of (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
-        names = self._channels
-        heads, places = rows[['channel', 'log', 'publish']].tolist(), rows[['chunk', 'start', 'stop']].tolist()
-        for (channel, log, publish), (chunk, start, stop) in zip(heads, places):
-            data = self._data if chunk < 0 else self._chunk(chunk)
-            yield names[channel], log, publish, data[start:stop]
+        names, take = self._channels, self._bytes
+        for begin in range(0, len(rows), BLOCK):
+            for channel, _, log, publish, _, *place in rows[begin:begin + BLOCK].tolist():
+                yield names[channel], log, publish, take(*place)
 
     def messages(self, topic=None):
         """Iterator of (topic, log time, publish time [ns], message) in the order of the file.

@@ -9,6 +9,13 @@ import numpy as np
 from pedestal_common import cdr, layouts
 from pedestal_common.cdr import STAMPED
 
+SHAPES = 100
+"""Kinds of messages of one length that are read all at once; what is left is read one by one."""
+
+CELLS = 4_000_000, 4
+"""Numbers in the columns at the most: so many, and one more for so many bytes of the messages. Messages that name
+other columns each time would fill a table as wide as it is long."""
+
 
 def stamps(data, type_name, log):
     """Header stamps [ns] (n,) of messages; the log times where the type has none or a message is too short."""
@@ -37,29 +44,35 @@ def table(data, type_name, log, start=0):
         out['data'] = [cdr.Places(message, type_name).texts['data'] for message in data]
     elif type_name not in ('diagnostic_msgs/msg/DiagnosticArray', 'rosgraph_msgs/msg/Clock'):
         lengths = np.array([len(message) for message in data], np.int64)
+        most = CELLS[0] + int(lengths.sum()) // CELLS[1]
         for length in np.unique(lengths):
             rows = np.flatnonzero(lengths == length)
             block = np.frombuffer(b''.join([data[row] for row in rows]), np.uint8).reshape(rows.size, length)
-            _fill(out, block, rows, type_name, len(data))
+            _fill(out, block, rows, type_name, len(data), most)
     return out
 
 
-def _fill(out, block, rows, type_name, count):
-    """Put the numbers of messages of one length (m, length) into rows of the columns."""
+def _fill(out, block, rows, type_name, count, most):
+    """Put the numbers of messages of one length (m, length) into rows of the columns, of at most so many numbers."""
+    shapes = 0
     while rows.size:
         walk = cdr.Places(block[0].tobytes(), type_name)
         fixed = np.concatenate([np.arange(start, stop) for start, stop in walk.fixed])
-        alike = (block[:, fixed] == block[0, fixed]).all(axis=1)
-        same = block[alike]
+        shapes += 1
+        tried = len(block) if shapes < SHAPES else 1
+        alike = (block[:tried, fixed] == block[0, fixed]).all(axis=1)
+        same, where = block[:tried][alike], rows[:tried][alike]
         for path, start, dtype in walk.numbers:
             name = layouts.column(type_name, path, walk.texts)
             if name is not None:
                 size = int(dtype[2:])
                 values = np.ascontiguousarray(same[:, start:start + size]).view(dtype)[:, 0]
                 if name not in out:
+                    if (len(out) + 1) * count > most:
+                        raise ValueError(f'more than {len(out)} columns in {count} messages')
                     out[name] = np.full(count, np.nan)
-                out[name][rows[alike]] = values
-        block, rows = block[~alike], rows[~alike]
+                out[name][where] = values
+        block, rows = (block[~alike], rows[~alike]) if tried == len(block) else (block[tried:], rows[tried:])
 
 
 def alike(data, type_name, template, names):

@@ -10,7 +10,7 @@ import subprocess
 
 import yaml
 
-from pedestal_common import parameters
+from pedestal_common import parameters, plain_yaml
 
 PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
             'pedestal_bringup', 'numpy', 'numba', 'rclpy')
@@ -61,7 +61,7 @@ def records(scenario_yaml, parameters_yaml):
         content['scenario'] = {'yaml': scenario_yaml}
     if parameters_yaml:
         content['parameters'] = {node: yaml.safe_dump(values)
-                                 for node, values in yaml.safe_load(parameters_yaml).items()}
+                                 for node, values in plain_yaml.parse(parameters_yaml).items()}
     return content
 
 

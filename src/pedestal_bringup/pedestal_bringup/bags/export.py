@@ -12,11 +12,11 @@ import pathlib
 import numpy as np
 
 from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags import columns
 from pedestal_common import layouts, messages, nodes
 
 FORMATS = ('csv', 'parquet')
 STAMP, NANOSECONDS = 't [s]', 'stamp [ns]'
+
 
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
     """Write the topics of a bag as tables; iterator of (file, rows, columns), or (None, why, topic) of one left out.
@@ -64,7 +64,7 @@ def table(bag, name):
     """{header: array or list} of a topic: `t [s]`, `stamp [ns]`, then its columns, each with its unit."""
     type_name = bag.topics[name]
     rows = bag.rows(name)
-    stamps = columns.stamps([data[:12] for _, _, _, data in bag.raw(name)], type_name, rows.log)
+    stamps = rows.stamp
     if type_name == 'diagnostic_msgs/msg/DiagnosticArray':
         return _diagnostics(bag, name, stamps)
     if type_name == 'trajectory_msgs/msg/JointTrajectory' and _has_tracks(bag, name):

@@ -1,4 +1,7 @@
-"""Is a recording complete? Every step of every topic there, once, in order; counts and sequence numbers agree."""
+"""Is a recording complete? Every step of every topic there, once, in order; counts and sequence numbers agree.
+
+And did its run come to the planned end? A recording can be complete up to where its run was aborted.
+"""
 import collections
 import dataclasses
 import typing
@@ -7,12 +10,13 @@ import numpy as np
 import yaml
 
 from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags import columns, configuration
-from pedestal_common import messages, nodes
+from pedestal_bringup.bags import configuration
+from pedestal_common import messages, nodes, plain_yaml
 
 MAX_LATENCY = 1_000_000_000
 """A topic may end this much [ns] before the last step: the next messages were still on their way (latency)."""
 
+SECOND = 1_000_000_000
 SHOWN = 10
 
 
@@ -29,18 +33,44 @@ class TopicCheck:
 @dataclasses.dataclass
 class Report:
     """What verify found. topics: [TopicCheck]; problems: of the whole bag, texts; steps: how many the run has; period
-    [s], NaN when there are fewer than two; made: how the bag was made, a line."""
+    [s], NaN when there are fewer than two; made: how the bag was made, a line; end, planned_end: time [ns] of the last
+    step, and of the one the run was to go on to, None when the bag does not say; lost: steps that the drive made
+    without the command for them, as its last diagnostics say, None without one."""
     path: str
     topics: list
     problems: list
     steps: int
     period: float
     made: str
+    end: int
+    planned_end: int | None
+    lost: int | None
 
     @property
     def complete(self):
-        """Whether there is no problem."""
+        """Whether there is no problem up to the end of the recording."""
         return not self.problems and not any(check.problems for check in self.topics)
+
+    @property
+    def aborted(self):
+        """Whether the recording ends before the planned end of its run."""
+        return self.planned_end is not None and self.end < self.planned_end
+
+    @property
+    def finished(self):
+        """Whether the recording is complete, up to the planned end of its run."""
+        return self.complete and not self.aborted
+
+    @property
+    def ending(self):
+        """How the run ended, a line; '' when it came to its planned end, or none is known."""
+        return (f'aborted: ends at {self.end / 1e9:.6f} s, planned end {self.planned_end / 1e9:.6f} s'
+                if self.aborted else '')
+
+    @property
+    def lost_steps(self):
+        """The steps that the drive lost, as text; '' where none is known of."""
+        return f'{self.lost} of {self.steps}' if self.lost else ''
 
     def lines(self):
         """The report as text: a row per topic, the gaps under it, the verdict last."""
@@ -50,10 +80,16 @@ class Report:
             lines.append(f'{check.name:{width}} {check.count:9} {check.first:14.6f} {check.last:14.6f}')
             lines += [f'  {problem}' for problem in check.problems]
         lines += [*self.problems, self.made]
+        if self.lost_steps:
+            lines.append(f'lost steps: {self.lost_steps}, made by the drive without the command for them')
+        if self.aborted:
+            lines.append(self.ending)
         total = sum(check.count for check in self.topics)
         count = len(self.problems) + sum(len(check.problems) for check in self.topics)
         steps = f'{self.steps} steps of {self.period * 1e3:g} ms'
         verdict = 'complete' if self.complete else f'NOT complete, {count} problem{"s" if count > 1 else ""}'
+        if self.aborted:
+            verdict = f'aborted; up to its end {verdict}'
         return [*lines, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
 
 
@@ -68,6 +104,10 @@ class _Grid(typing.NamedTuple):
         """How many there are."""
         return (self.last - self.first) // self.period + 1 if self.period else 0
 
+    def at(self, stamp):
+        """The first step at or after a stamp [ns], a number or an array."""
+        return self.first - (self.first - stamp) // self.period * self.period
+
 
 def verify(path) -> Report:
     """Judge a bag. The steps are the stamps of joint_states (else of the first step topic that has any).
@@ -76,9 +116,8 @@ def verify(path) -> Report:
     """
     bag = bags.load(path)
     rows = {name: bag.rows(name) for name in bag.topics}
-    stamps = {name: columns.stamps([data for _, _, _, data in bag.raw(name)], bag.topics[name], rows[name].log)
-              for name in bag.topics}
-    graph = bag.graph
+    stamps = {name: row.stamp - bag.start for name, row in rows.items()}
+    graph, planned = bag.graph, bag.planned_end
     of_steps = {name: stamp for name, stamp in stamps.items()
                 if name in graph and graph[name].rate == 'step' and stamp.size}
     grid = _grid(of_steps)
@@ -93,12 +132,15 @@ def verify(path) -> Report:
         problems.append(f'the summary counts {_differences(bag.statistics, counts)}')
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
-    return Report(str(path), checks, problems, grid.steps, grid.period / 1e9 if grid.period else np.nan,
-                  configuration.line(bag))
+    lost = bag.last_values(nodes.DRIVE).get('lost_steps', '')
+    planned = planned - bag.start if of_steps and planned is not None else None
+    return Report(str(path), checks, bag.breaks + problems, grid.steps, grid.period / 1e9 if grid.period else np.nan,
+                  configuration.line(bag), grid.last, planned,
+                  int(lost) if lost.isdecimal() and len(lost) < 20 else None)
 
 
 def _problems(bag, rows, name, stamp, grid):
-    """What is wrong with a topic, its rows of the index (n,) and its stamps (n,) [ns] given."""
+    """What is wrong with a topic, its rows of the index (n,) and its stamps (n,) [ns] since the start given."""
     topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
@@ -107,16 +149,17 @@ def _problems(bag, rows, name, stamp, grid):
     problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
-        if ours and not np.array_equal(stamp, rows.log):
-            problems.append(f'{np.sum(stamp != rows.log)} messages logged at a time that is not their stamp')
-    elif rate == 'once' and stamp.size != 1:
+        if ours and not np.array_equal(rows.stamp, rows.log):
+            problems.append(f'{np.sum(rows.stamp != rows.log)} messages logged at a time that is not their stamp')
+    elif rate == 'once' and not 1 <= stamp.size <= len(bag.files):  # each recorder hears what is latched
         problems.append(f'{stamp.size} messages where one is due')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
         problems += _seconds(bag, name, stamp, grid)
     if topic and bag.topics[name] != topic.type:
         problems.append(f'of type {bag.topics[name]}, where the graph has {topic.type}')
     if ours:
-        problems += _sequence(rows.sequence)
+        for file in np.unique(rows.channel >> 16):
+            problems += _sequence(rows.sequence[rows.channel >> 16 == file])
     return problems
 
 
@@ -132,7 +175,7 @@ def _grid(stamps):
         return _Grid(0, 0, 0)
     steps = np.unique(next((stamp for name, stamp in stamps.items() if nodes.plain(name) == 'joint_states'),
                            next(iter(stamps.values()))))
-    period = int(np.median(np.diff(steps))) if steps.size > 1 else 0
+    period = max(int(np.median(np.diff(steps))), 0) if steps.size > 1 else 0
     return _Grid(int(steps[0]), int(max(steps[-1], *(stamp.max() for stamp in stamps.values()))), period)
 
 
@@ -143,12 +186,11 @@ def _order(stamp):
             f'to {stamp[back[0] + 1] / 1e9:.6f} s'] if back.size else []
 
 
-def _ranges(numbers):
-    """[(first, last)] of the runs in ascending whole numbers."""
-    if not numbers.size:
-        return []
-    cuts = np.flatnonzero(np.diff(numbers) > 1)
-    return list(zip(numbers[np.r_[0, cuts + 1]].tolist(), numbers[np.r_[cuts, numbers.size - 1]].tolist()))
+def _missing(numbers, count):
+    """[(first, last)] of the gaps in ascending whole numbers (n,), repeated or not, that are to be 0 to count - 1."""
+    bounds = np.concatenate(([-1], numbers[(numbers >= 0) & (numbers < count)], [count]))
+    gaps = np.flatnonzero(np.diff(bounds) > 1)
+    return list(zip((bounds[gaps] + 1).tolist(), (bounds[gaps + 1] - 1).tolist()))
 
 
 def _steps(stamp, of_drive, grid):
@@ -166,7 +208,7 @@ def _steps(stamp, of_drive, grid):
     between = np.sum((unique - grid.first) % grid.period != 0)
     if between:
         problems.append(f'{between} stamps are no step')
-    missing = _ranges(np.setdiff1d(np.arange(grid.steps), (unique - grid.first) // grid.period))
+    missing = _missing((unique - grid.first) // grid.period, grid.steps)
     if not of_drive and missing and missing[-1][1] == grid.steps - 1 \
             and (missing[-1][1] - missing[-1][0] + 1) * grid.period <= MAX_LATENCY:
         missing.pop()
@@ -182,9 +224,8 @@ def _steps(stamp, of_drive, grid):
 
 def _seconds(bag, name, stamp, grid):
     """Diagnostics that are missing: every node with a topic in the bag owes one at the first step of every second."""
-    seconds = np.arange(-(-grid.first // 1_000_000_000), grid.last // 1_000_000_000 + 1) * 1_000_000_000
-    expected = grid.first - (grid.first - seconds) // grid.period * grid.period
-    expected = expected[expected <= grid.last]
+    first, last = -(-grid.first // SECOND), grid.last // SECOND
+    count = max(last - first + (grid.at(last * SECOND) <= grid.last), 0)
     stamps_of = collections.defaultdict(list)
     for at, (_, _, _, data) in zip(stamp, bag.raw(name)):
         try:
@@ -196,12 +237,14 @@ def _seconds(bag, name, stamp, grid):
              if any(topic.name in bag.topics for topic in bag.graph.values() if topic.writers == (node,))]
     problems = []
     for node in nodes:
-        missing = np.setdiff1d(expected, stamps_of[node])
-        if missing.size:
-            problems.append(f'{missing.size} of {expected.size} of {node} missing, '
-                            f'the first at {missing[0] / 1e9:.6f} s')
-        if len(stamps_of[node]) > expected.size:
-            problems.append(f'{len(stamps_of[node]) - expected.size} too many of {node}')
+        at = np.array(stamps_of[node], np.int64)
+        second = np.unique(at[at == grid.at(at // SECOND * SECOND)] // SECOND)
+        missing = _missing(second - first, count)
+        if missing:
+            problems.append(f'{sum(stop - start + 1 for start, stop in missing)} of {count} of {node} missing, '
+                            f'the first at {grid.at((first + missing[0][0]) * SECOND) / 1e9:.6f} s')
+        if at.size > count:
+            problems.append(f'{at.size - count} too many of {node}')
     return problems
 
 
@@ -221,17 +264,20 @@ def _metadata_file(bag, counts):
     """What metadata.yaml claims otherwise than it is."""
     file = bag.path / 'metadata.yaml'
     try:
-        information = yaml.safe_load(file.read_text())['rosbag2_bagfile_information']
+        information = plain_yaml.read(file)['rosbag2_bagfile_information']
         claimed = {row['topic_metadata']['name'].lstrip('/'): row['message_count']
                    for row in information['topics_with_message_count']}
         files, total = information['relative_file_paths'], information['message_count']
     except FileNotFoundError:
         return ['metadata.yaml is missing']
-    except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
-        return [f'metadata.yaml cannot be read: {type(error).__name__} {str(error).splitlines()[0]}']
+    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
+        return [f'metadata.yaml cannot be read: {plain_yaml.problem(error)}']
+    except (KeyError, TypeError, AttributeError) as error:
+        return [f'metadata.yaml cannot be read: {type(error).__name__} {error}']
     problems = []
-    if files != [bag.file.name]:
-        problems.append(f'metadata.yaml names the files {", ".join(files)}')
+    if files != [file.name for file in bag.files]:
+        names = ', '.join(map(str, files)) if isinstance(files, list) else files
+        problems.append(f'metadata.yaml names the files {names}')
     if claimed != counts:
         problems.append(f'metadata.yaml counts {_differences(claimed, counts)}')
     if total != sum(counts.values()):

@@ -1,30 +1,44 @@
-"""Writes a bag: a rosbag2 directory (metadata.yaml version 9) with one MCAP file. No ROS here.
+"""Writes a bag: a rosbag2 directory (metadata.yaml version 9) with an MCAP file. No ROS here.
 
 The mcap library's Writer makes the records. Added to it here: a chunk ends by log time, the file stays whole when the
 disk is full, it is locked while it is written, and every schema and channel also stands before the first chunk, so
 that a broken chunk takes none of them with it. Nothing in the file depends on its path, the host or the wall clock:
 equal messages give equal bytes.
+
+The recorder of a realtime run that died may be started again: it goes on in a new file of the bag, NAME_1.mcap and so
+on, until one has come to the planned end of the run.
 """
+import collections
 import contextlib
 import fcntl
 import pathlib
+import struct
 import sys
 
 import yaml
 from mcap import records, writer
 from mcap.data_stream import RecordBuilder
 from mcap.exceptions import EndOfFile
-from mcap.reader import make_reader
+from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from pedestal_bringup.bags.bag import BagError, reason
-from pedestal_common import messages, topics
+from pedestal_bringup.bags.bag import locate, planned_end
+from pedestal_bringup.bags.mcap_file import BagError, McapFile, parsed, reason
+from pedestal_common import messages, plain_yaml, topics
 
 CHUNK_SIZE = 1_000_000
 CHUNK_SPAN = 1_000_000_000
-"""A chunk ends after this many bytes or ns of log time, so that a crash loses at most the last second."""
+CHUNK_MESSAGES = 100_000
+"""A chunk ends after this many bytes, ns of log time (so that a crash loses at most the last second) or messages."""
+
+RUN = ('scenario', 'pacing', 'seed', 'planned_end_ns')
+"""What the metadata of all files of a bag say alike."""
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
+
+
+_PAIR, _INDEX = struct.Struct('<QQ'), struct.Struct('<HI')
+"""First and last log time of a chunk; channel and bytes of its message index, whose entries are pairs."""
 
 
 def _qos(rate):
@@ -71,16 +85,17 @@ class _Disk:
 class BagFile:
     """A bag in the making: `path` its directory, `file` the MCAP file in it.
 
-    directory: must not exist.
+    directory: must not exist; earlier: files of the bag in it, behind which this one comes.
     Raises BagError, naming the file, when the disk does not take a chunk. What was written by then stays readable;
     every message after it is dropped, so that a bag has no hole.
     """
 
-    def __init__(self, directory):
+    def __init__(self, directory, earlier=()):
         self.path = pathlib.Path(directory).absolute()
-        self.file = self.path / f'{self.path.name}_0.mcap'
+        self.file = self.path / f'{self.path.name}_{len(earlier)}.mcap'
+        self._earlier = list(earlier)
         try:
-            self.path.mkdir(parents=True)
+            self.path.mkdir(parents=True, exist_ok=bool(earlier))
             stream = open(self.file, 'xb', buffering=0)
         except FileExistsError:
             raise BagError(f'{directory} exists already; a recording is never overwritten') from None
@@ -125,7 +140,8 @@ class BagFile:
             return
         if not self._in_chunk:
             self._chunk_start = log_time
-        elif log_time - self._chunk_start >= CHUNK_SPAN or self._chunk_size >= CHUNK_SIZE:
+        elif (log_time - self._chunk_start >= CHUNK_SPAN or self._chunk_size >= CHUNK_SIZE
+              or self._in_chunk >= CHUNK_MESSAGES):
             self.flush()
             self._chunk_start = log_time
         self._in_chunk += 1
@@ -181,24 +197,29 @@ class BagFile:
         self._mcap.flush()
 
     def _write_metadata_file(self):
-        """metadata.yaml, from the summary of the finished file."""
-        with open(self.file, 'rb') as stream:
-            reader = make_reader(stream)
-            summary = reader.get_summary()
-            custom = {record.name: record.metadata for record in reader.iter_metadata()}.get('pedestal')
-        counts, total = summary.statistics.channel_message_counts, summary.statistics.message_count
-        start, end = summary.statistics.message_start_time, summary.statistics.message_end_time
-        times = {'duration': {'nanoseconds': end - start}, 'starting_time': {'nanoseconds_since_epoch': start}}
+        """metadata.yaml, from what is in the files."""
+        contents = [_Content(file) for file in (*self._earlier, self.file)]
+        files = [{'path': content.path.name, **_times([content]), 'message_count': content.total}
+                 for content in contents]
+        described, counts = {}, collections.Counter()
+        for content in contents:
+            for channel, schema, count in content.topics():
+                counts[channel.topic] += count
+                described[channel.topic] = {
+                    'name': channel.topic, 'type': schema, 'serialization_format': 'cdr',
+                    'offered_qos_profiles': _profiles(channel),
+                    'type_description_hash': channel.metadata.get('topic_type_hash', '')}
+        custom, last = dict(contents[0].metadata.get('pedestal', {})), max(content.last for content in contents)
+        planned = planned_end(contents[0].metadata)
+        if planned is not None:
+            custom['finished'] = str(last >= planned).lower()
         information = {
-            'version': 9, 'storage_identifier': 'mcap', **times, 'message_count': total,
-            'topics_with_message_count': [
-                {'topic_metadata': {'name': channel.topic, 'type': summary.schemas[channel.schema_id].name,
-                                    'serialization_format': 'cdr', 'offered_qos_profiles': _profiles(channel),
-                                    'type_description_hash': channel.metadata.get('topic_type_hash', '')},
-                 'message_count': counts.get(number, 0)}
-                for number, channel in summary.channels.items()],
-            'compression_format': '', 'compression_mode': '', 'relative_file_paths': [self.file.name],
-            'files': [{'path': self.file.name, **times, 'message_count': total}],
+            'version': 9, 'storage_identifier': 'mcap', **_times(contents),
+            'message_count': sum(content.total for content in contents),
+            'topics_with_message_count': [{'topic_metadata': topic, 'message_count': counts[name]}
+                                          for name, topic in described.items()],
+            'compression_format': '', 'compression_mode': '',
+            'relative_file_paths': [content.path.name for content in contents], 'files': files,
             'custom_data': custom or None, 'ros_distro': 'jazzy'}
         file = self.path / 'metadata.yaml'
         try:
@@ -208,23 +229,94 @@ class BagFile:
             raise BagError(f'{file}: {reason(error)}') from None
 
 
+class _Content:
+    """What is in an MCAP file of ours, without a look at its messages, also where its recorder was killed.
+
+    path; metadata: {record: {text: text}}; first, last: log times [ns], 0 without a message.
+    """
+
+    def __init__(self, path):
+        self.path, self.metadata = path, {}
+        self._channels, self._schemas, self._counts, times = {}, {}, collections.Counter(), []
+        file = McapFile(path, locked=True)
+        with contextlib.suppress(EOFError):
+            for opcode, start, stop in file.pieces():
+                if opcode == Opcode.CHUNK:
+                    times += _PAIR.unpack(file.read(start + 9, start + 9 + _PAIR.size))
+                elif opcode == Opcode.MESSAGE_INDEX:
+                    channel, size = _INDEX.unpack(file.read(start + 9, start + 9 + _INDEX.size))
+                    self._counts[channel] += size // _PAIR.size
+                elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA, Opcode.METADATA):
+                    self._declare(parsed(opcode, file.read(start + 9, stop)))
+        self.first, self.last, self.total = min(times, default=0), max(times, default=0), self._counts.total()
+
+    def _declare(self, record):
+        if isinstance(record, records.Metadata):
+            self.metadata[record.name] = record.metadata
+        elif isinstance(record, records.Schema):
+            self._schemas[record.id] = record.name
+        else:
+            self._channels[record.id] = record
+
+    def topics(self):
+        """Iterator of (records.Channel, name of its type, messages) of every topic."""
+        for number, channel in self._channels.items():
+            yield channel, self._schemas[channel.schema_id], self._counts[number]
+
+
+def _times(contents):
+    """The span of some _Contents as metadata.yaml says it."""
+    known = [content for content in contents if content.total] or contents[:1]
+    start, end = min(content.first for content in known), max(content.last for content in known)
+    return {'duration': {'nanoseconds': end - start}, 'starting_time': {'nanoseconds_since_epoch': start}}
+
+
 def _profiles(channel):
     try:
-        return yaml.safe_load(channel.metadata.get('offered_qos_profiles', '')) or []
+        return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', '')) or []
     except yaml.YAMLError:
         return []
+
+
+def _earlier_files(directory, metadata):
+    """The files of a bag that is to be gone on with: the one of a realtime run, with this metadata, that has not come
+    to its end; [] where there is none. Raises BagError for any other bag, and while its recorder still writes it."""
+    path = pathlib.Path(directory)
+    if metadata.get('pacing') != 'realtime' or not path.is_dir():
+        return []
+    files = locate(path)
+    if not files[-1].stat().st_size:  # its recorder died before the first byte
+        files.pop().unlink()
+        if not files:
+            path.rmdir()
+            return []
+    McapFile(files[-1])
+    told = _Content(files[0]).metadata.get('pedestal', {})
+    if any(told.get(key) != str(metadata[key]) for key in RUN if key in metadata):
+        raise BagError(f'{directory} exists already, of another run; a recording is never overwritten')
+    try:
+        information = plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information']
+        finished = information['custom_data'].get('finished') != 'false'
+    except FileNotFoundError:  # its recorder was killed
+        finished = False
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, AttributeError):
+        finished = True
+    if finished:
+        raise BagError(f'{directory} exists already; a recording is never overwritten')
+    return files
 
 
 class Writer(BagFile):
     """A bag of topics of the graph, whose messages it numbers from 1.
 
-    directory: must not exist. rows: of topics.TOPICS, or nodes.Links; a message names its topic by the index in them.
-    metadata: {text: text} of the run, kept as the metadata record `pedestal`. more: {name: {text: text}} of further
-    metadata records. Raises BagError as a BagFile does.
+    directory: must not exist, or be a bag that is to be gone on with (see this module). rows: of topics.TOPICS, or
+    nodes.Links; a message names its topic by the index in them. metadata: {text: text} of the run, kept as the
+    metadata record `pedestal`. more: {name: {text: text}} of further metadata records. Raises BagError as a BagFile
+    does.
     """
 
     def __init__(self, directory, rows, metadata, more=()):
-        super().__init__(directory)
+        super().__init__(directory, _earlier_files(directory, metadata))
         schemas = {name: self.add_schema(
             name, 'ros2msg', messages.TYPESTORE.generate_msgdef(name, ros_version=2)[0].encode())
             for name in dict.fromkeys(topic.type for topic in rows)}

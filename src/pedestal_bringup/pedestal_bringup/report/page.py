@@ -1,5 +1,4 @@
 """The page that `pedestal report` writes: a recording as one HTML file that needs nothing else, its figures as PNG."""
-import hashlib
 import html
 import io
 import itertools
@@ -14,6 +13,7 @@ from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.report import attitude_figures, figures, filter_figures, run_data, run_figures
 from pedestal_common import topics
+from pedestal_common.files import sha256
 from pedestal_common.topics import AXES
 
 SHOWN = 200
@@ -142,7 +142,7 @@ def _loop(bag, check):
     lost = max([check.steps - topic.count for topic in check.topics
                 if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],
                default=0)
-    return [*rows, ['steps', f'{check.steps}'], ['lost steps', f'{max(lost, 0)}'],
+    return [*rows, ['steps', f'{check.steps}'], ['lost steps', check.lost_steps or f'{max(lost, 0)}'],
             ['recording', 'complete, every step once and in order' if check.complete else
              'NOT complete, see below']]
 
@@ -181,6 +181,12 @@ def _gaps(bag, check):
     if absent:
         parts.append(f'<p class="soft">No message in this bag of: {", ".join(absent)}.</p>')
     return parts
+
+
+def _warnings(check):
+    """What a reader must know before any number: that the run was aborted, and that steps were lost."""
+    return [line for line in (check.ending, check.lost_steps and f'lost steps: {check.lost_steps}, made by the drive '
+                              'without the command for them') if line]
 
 
 def _figure(spec, data):
@@ -247,14 +253,15 @@ def _diagnostics(statuses):
 
 def _made(bag):
     """The table of how a bag was made and what its file is."""
-    stamps, content = bag.index.log, bag.file.read_bytes()
+    stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in bag.metadata.items()
                          if key.startswith('version.'))
     rows = [[key, value] for key, value in bag.metadata.items() if not key.startswith('version.')]
     rows += [['duration', f'{duration:g} s'], ['versions', versions or 'not in the bag'],
-             ['file', f'{bag.file.name}, {len(content) / 1e6:.2f} MB, {stamps.size} messages'],
-             ['sha256', hashlib.sha256(content).hexdigest()]]
+             ['file', f'{", ".join(file.name for file in bag.files)}, '
+              f'{sum(file.stat().st_size for file in bag.files) / 1e6:.2f} MB, {stamps.size} messages'],
+             ['sha256', ', '.join(map(sha256, bag.files))]]
     return _rows(None, rows, 'meta')
 
 
@@ -262,7 +269,9 @@ def _page(bag, data):
     check = verify(bag.path)
     name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     parts = [
-        f'<h1>Tracking run: {html.escape(name)}</h1>', _made(bag), *_results(bag, data, check), *_gaps(bag, check),
+        f'<h1>Tracking run: {html.escape(name)}</h1>',
+        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)), _made(bag),
+        *_results(bag, data, check), *_gaps(bag, check),
         '<h2 id="figures">Figures</h2><p class="soft">The paper: antenna tracking with a Kalman filter and a '
         'dual-motor anti-backlash drive, its UAV experiment. Grey: measured, blue: filtered or achieved, '
         'orange: truth.</p>',

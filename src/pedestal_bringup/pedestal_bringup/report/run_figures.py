@@ -1,8 +1,11 @@
 """The figures of a report about the run: pointing, errors, angles, torques, signal, sky, modes. Angles in degrees."""
+import itertools
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from acu_tracker import modes
 from pedestal_bringup.report.figures import (
     FILTERED,
     INK,
@@ -18,7 +21,9 @@ from pedestal_bringup.report.figures import (
     spans,
 )
 
-MODES = {'standby': '#9aa0a6', 'stow': '#a87b51', 'preset': '#8364c8', 'program': '#e0ac00', 'autotrack': '#2f9e5b'}
+MODES = dict(zip(modes.MODES, itertools.cycle((
+    '#9aa0a6', '#a87b51', '#8364c8', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#5b6abf', '#7a8b2a', '#c46aa8'))))
+"""{mode: colour}."""
 LEVELS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
 LOCKED = '#5f93c4'
 ZOOM = 2.0

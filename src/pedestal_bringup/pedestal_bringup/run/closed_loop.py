@@ -146,10 +146,7 @@ class Loop:
         for name in ORDER:
             full = prefix + name if nodes.row(name).of_beam else name
             if full in scenario.nodes:
-                parameters = dict(changed).get(name) or scenario.node_parameters(full)
-                node = nodes.row(name, scenario.header.beam)
-                flags = [flag for flag in topics.FLAGS if getattr(parameters, flag, False)]
-                self.units[name] = node.unit_type()(parameters, nodes.reads(node, scenario.nodes, flags))
+                self.units[name] = scenario.unit(full, dict(changed).get(name))
         for topic, message in program_messages(scenario).items():
             if topic.startswith(prefix):
                 self.units['acu'].decode(nodes.plain(topic), message)

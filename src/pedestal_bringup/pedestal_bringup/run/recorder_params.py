@@ -7,7 +7,7 @@ from pedestal_common.parameters import ParameterError, Parameters, flag, paramet
 @dataclasses.dataclass(frozen=True)
 class RecorderParameters(Parameters):
     """What is recorded where. All but `bag` and `duration` go into the bag, to say how it was made."""
-    bag: str = text('recording', 'directory of the bag; must not exist')
+    bag: str = text('recording', 'directory of the bag; must not exist, or be the unfinished one of this realtime run')
     duration: float = parameter(0.0, 0.0, 86400.0, 's', "end at this stamp of the drive's time; 0: when told to stop")
     scenario: str = text('', 'name of the scenario of the run')
     beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', "half-power beamwidth, for the report's scale")

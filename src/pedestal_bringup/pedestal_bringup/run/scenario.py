@@ -10,12 +10,11 @@ import difflib
 import importlib.resources
 import json
 import pathlib
-import re
 
 import numpy as np
 import yaml
 
-from pedestal_common import nodes, parameters
+from pedestal_common import files, nodes, parameters, plain_yaml, topics
 from tracking_receiver_sim import receiver
 
 
@@ -27,6 +26,17 @@ class ProgramParameters(parameters.Parameters):
     time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
     azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
     elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
+
+
+@dataclasses.dataclass(frozen=True)
+class RestartParameters(parameters.Parameters):
+    """How `pedestal run` treats a node that dies in realtime; in lockstep it ends the run."""
+    attempts: int = parameters.parameter(5, 0, 1_000_000, '', 'a node is started again at most so often within '
+                                         '`within`; 0: never')
+    within: float = parameters.parameter(60.0, 1.0, 86400.0, 's', 'the time in which its deaths are counted')
+    delay: float = parameters.parameter(0.5, 0.0, 60.0, 's', 'from the death of a node to its next start')
+    silence: float = parameters.parameter(30.0, 0.0, 3600.0, 's', 'a node that publishes no diagnostics for so long '
+                                          'is killed and started again; 0: never')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,6 +52,7 @@ class ScenarioParameters(parameters.Parameters):
                                       'in a namespace beam_1 ...')
     deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
     program: ProgramParameters = parameters.group(ProgramParameters)
+    restart: RestartParameters = parameters.group(RestartParameters)
 
     def check(self):
         if self.beams > 1 and not self.beam:
@@ -51,18 +62,6 @@ class ScenarioParameters(parameters.Parameters):
     def graph_beams(self):
         """Beams of the graph as nodes.links counts them."""
         return self.beams if self.beam else 0
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML's plain values, but a date and `on`, `off`, `yes`, `no` stay the texts they were written as."""
-
-
-_Loader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers
-            if tag not in ('tag:yaml.org,2002:timestamp', 'tag:yaml.org,2002:bool')]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
-_Loader.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^(?:true|True|TRUE|false|False|FALSE)$'),
-                              list('tTfF'))
 
 
 RUN = tuple(node.name for node in nodes.NODES if node.module)
@@ -87,8 +86,8 @@ TOLD = (
 """(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
 
 
-MEASURED = (('receiver.rate.measured', 'receiver_rate'), ('receiver.ranging.measured', 'receiver_range'))
-"""(parameter of the receiver, what its readers are told): whether one of its topics is there at all."""
+MEASURED = tuple((topic.measured, topic.flag) for topic in topics.TOPICS if topic.measured)
+"""(parameter of the receiver, that of its readers): whether one of its topics is there at all."""
 
 
 class ScenarioError(ValueError):
@@ -131,6 +130,12 @@ class Scenario:
         """The parameter dataclass of one node as this scenario sets it."""
         return parameters.build(self.row(node).parameters_type(), self.given(node))
 
+    def unit(self, node, parameters=None):
+        """The unit of one of its nodes; parameters: in the place of the scenario's."""
+        row, chosen = self.row(node), parameters or self.node_parameters(node)
+        flags = [flag for flag in topics.FLAGS if getattr(chosen, flag, False)]
+        return row.unit_type()(chosen, nodes.reads(row, self.nodes, flags))
+
     def as_yaml(self):
         """The scenario as a ROS 2 parameter file."""
         sections = {'scenario': parameters.as_dict(self.header), **self.values}
@@ -146,7 +151,7 @@ def available():
     found = {}
     for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
         if entry.name.endswith('.yaml'):
-            sections = yaml.safe_load(entry.read_text())
+            sections = plain_yaml.parse(entry.read_text())
             found[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
     return found
 
@@ -155,11 +160,9 @@ def _text(name_or_path):
     path = pathlib.Path(name_or_path)
     if path.suffix in ('.yaml', '.yml'):
         try:
-            return path.stem, path.read_text()
-        except OSError as error:
-            raise ScenarioError(f'scenario file {path}: {error.strerror}') from None
-        except UnicodeDecodeError as error:
-            raise ScenarioError(f'scenario file {path}: no valid UTF-8 text at byte {error.start}') from None
+            return path.stem, files.read_text(path, plain_yaml.LARGEST)
+        except (OSError, UnicodeDecodeError) as error:
+            raise ScenarioError(f'scenario file {path}: {plain_yaml.problem(error)}') from None
     entry = _folder() / f'{name_or_path}.yaml'
     if not entry.is_file():
         names = list(available())
@@ -191,9 +194,9 @@ def _is_node(name):
 
 def _sections(name, content):
     try:
-        tree = yaml.load(content, Loader=_Loader)
+        tree = plain_yaml.parse(content)
     except yaml.YAMLError as error:
-        raise ScenarioError(f'scenario {name}: no valid YAML: {" ".join(str(error).split())}') from None
+        raise ScenarioError(f'scenario {name}: {plain_yaml.problem(error)}') from None
     if not isinstance(tree, dict) or 'scenario' not in tree:
         raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
     sections = {}
@@ -226,24 +229,25 @@ def parse_override(text):
         raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.feedforward.bandwidth=20')
     parameters_of(node)
     try:
-        return node, key, yaml.load(right, Loader=_Loader)
+        return node, key, plain_yaml.parse(right)
     except yaml.YAMLError as error:
-        raise ScenarioError(f'--param {text!r}: no valid YAML value: {" ".join(str(error).split())}') from None
+        raise ScenarioError(f'--param {text!r}: {plain_yaml.problem(error)}') from None
 
 
 def file_overrides(path):
     """Texts 'node.key=value' of a ROS 2 parameter file."""
     try:
-        tree = yaml.load(path.read_text(), Loader=_Loader)
+        tree = plain_yaml.read(path)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ScenarioError(f'--params-file {path}: {" ".join(str(error).split())}') from None
+        raise ScenarioError(f'--params-file {path}: {plain_yaml.problem(error)}') from None
     if not isinstance(tree, dict) or not tree:
         raise ScenarioError(f'--params-file {path}: must hold a section for a node')
     texts = []
     for node, body in tree.items():
         if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
             raise ScenarioError(f'--params-file {path}: section {node} must hold ros__parameters')
-        texts += [f'{node}.{key}={json.dumps(value)}' for key, value in dotted(body['ros__parameters']).items()]
+        texts += [f'{node}.{key}={json.dumps(value, ensure_ascii=False)}'
+                  for key, value in dotted(body['ros__parameters']).items()]
     return texts
 
 

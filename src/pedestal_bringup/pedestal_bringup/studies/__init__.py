@@ -1,10 +1,10 @@
 """Studies: the compiled closed loop measured against what a paper claims and against our own targets.
 
-A study is a module of this folder. The first line of its docstring says what it is; `run(progress)` gives its
-rigs.rows.Result; in it progress(fraction, text) may be called with the share that is done and what comes next. A study
-of many runs has its default number as RUNS and is `run(progress, runs=RUNS, pool=None)`: pool is a monte_carlo.Pool;
-without one the runs are made in this process. `rigs` holds what several studies use. A case that is a scenario with
-parameters can be run through the nodes as well: `pedestal run SCENARIO --param ...`.
+A study is a module of this folder. The first line of its docstring says what it is; `run(progress)` returns its
+rigs.rows.Result and may call progress(fraction done, what comes next). A study of many runs has a default number RUNS
+and is `run(progress, runs=RUNS, pool=None)`: pool is a monte_carlo.Pool; without one the runs are made in this
+process. `rigs` holds what several studies use. A case that is a scenario with parameters can be run through the nodes
+as well: `pedestal run SCENARIO --param ...`.
 """
 import importlib
 import pkgutil
@@ -18,5 +18,5 @@ def study(name):
 
 
 def descriptions():
-    """{name: one line}."""
+    """{name of a study: one line}."""
     return {name: study(name).__doc__.partition('\n')[0] for name in NAMES}

@@ -1,13 +1,15 @@
 """Alignment of the INS: paper 001's figures 3 and 4 for five methods, over many seeds, beside the information limit.
 
 Paper 001's IMU and sway (section 5), misaligned by 3, 3 and 180 deg; a white velocity of 0.05 m/s per axis, one value
-per 0.02 s, which the paper does not say (results scale with it). Cases: method; limit, what the gyros and that
+per 0.02 s, which the paper does not state (results scale with it). Cases: method; limit, what the gyros and that
 velocity allow: covariance of riccati_eso and the gyros' bias over w_N; method/swell, 0.5 m/s at 0.1 Hz on every axis
 beside; method/quadrant-N, any heading of the ship and error of azimuth in quadrant N, biases drawn at random.
 """
 import dataclasses
 import math
 import time
+import typing
+from collections import namedtuple
 
 import numpy as np
 
@@ -36,7 +38,7 @@ BATCH = 5
 
 SEED, QUADRANT_SEED, SWELL_SEED = 1, 2, 3
 PERIOD, STEP, EVERY = 0.01, 0.02, 1.0
-"""Of the IMU, of the laws, of what is looked at [s]."""
+"""Step of the IMU, of the laws, of what is evaluated [s]."""
 
 DURATION, SHORT = 600.0, 300.0
 """Length of a run; of one in a quadrant or on swell [s]."""
@@ -61,17 +63,48 @@ VELOCITY_NOISE, SWELL, SWELL_FREQUENCY = 0.05, 0.5, 0.1
 
 SETTINGS = AlignmentParameters(step=STEP, aligned_sigma=1e-5, velocity_disturbance=VELOCITY_NOISE,
                                gyro_noise=GYRO_NOISE, gyro_bias=GYRO_BIAS, accelerometer_bias=ACCELEROMETER_BIAS)
-"""As the INS is told. It never ends its alignment, so that the error can be seen on."""
+"""Parameters of the INS. Its alignment never ends, so that its error can be evaluated to the end of a run."""
 
 CASES = {method.replace('_', '-'): method for method in METHODS if method != 'model'}
 COLOURS = dict(zip(CASES, (RAW, TRUTH, MOTOR_1, FILTERED, MOTOR_2)))
 SETTLED = 12.0
-"""Azimuth is called settled when the rms over the runs is below for good [arcmin]."""
+"""Azimuth has settled when the rms over the runs stays below this [arcmin]."""
 TIMES = (100, 250, 300, 600)
-"""Where the azimuth's rms is told [s]."""
+"""Instants of the rows of the azimuth's rms [s]."""
 SWELL_TIME = 200
 
-FOUND = np.dtype([('quaternion', 'f8', (4,)), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8')])
+ESTIMATE = np.dtype([('quaternion', 'f8', (4,)), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8')])
+"""Attitude deck -> earth (x, y, z, w) and 1 sigmas [rad] of a navigator."""
+
+Sensors = namedtuple('Sensors', 'state constants ship inputs truth outputs')
+"""Records (1,) of an IMU on its ship: imu.STATE, CONSTANTS, motion.CONSTANTS, imu.INPUTS, motion.OUTPUTS,
+imu.OUTPUTS."""
+
+Increments = namedtuple('Increments', 'angle force attitude')
+"""Increments of an IMU, angle (n, 3) [rad], force (n, 3) [m/s], FLU, and the true attitude (n, 4) at their ends."""
+
+
+class Sums(typing.NamedTuple):
+    """Sums over runs: squared errors (n, 3) about east, north, up [rad2]; squared ratio of the error in azimuth to its
+    1 sigma (n,); wall time [s]. first: errors (n, 3) [rad] of the first run, None where it is not among them."""
+    squares: np.ndarray = 0.0
+    ratios: np.ndarray = 0.0
+    first: np.ndarray | None = None
+    wall_time: float = 0.0
+
+    def plus(self, more):
+        """These sums and more Sums."""
+        return Sums(self.squares + more.squares, self.ratios + more.ratios,
+                    more.first if self.first is None else self.first, self.wall_time + more.wall_time)
+
+
+class Accuracy(typing.NamedTuple):
+    """Accuracy of a method over all runs: rms of the errors (n, 3) [arcmin]; rms ratio of the error in azimuth to its
+    1 sigma (n,); errors of the first run (n, 3) [rad], None in a batch without it; wall time of a step [us]."""
+    rms: np.ndarray
+    ratio: np.ndarray
+    first: np.ndarray | None
+    step_us: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,50 +116,53 @@ class Batch:
 
     @property
     def duration(self):
+        """Length of its runs [s]."""
         return SHORT if self.kind else DURATION
 
 
 @compiled
-def simulate(state, constants, ship, inputs, truth, felt, normals, velocity, angle, force, attitude):
-    """Fill the increments angle, force (n, 3) and the true attitude (n, 4) of an IMU; normals (n, NORMALS), velocity
-    (n + 1, 3): what is added to the ship's, ENU [m/s]."""
-    dt = inputs[0].dt
-    for k in range(len(angle)):
-        inputs[0].t = (k + 1) * dt
-        motion.truth(ship[0], inputs[0].t, truth[0])
-        imu.step(state[0], constants[0], ship[0], inputs[0], truth[0], felt[0], normals[k])
+def simulate(sensors, normals, velocity, out):
+    """Fill the Increments `out` of Sensors; normals (n, NORMALS); velocity (n + 1, 3): added to the ship's, ENU
+    [m/s]."""
+    u, truth, measured = sensors.inputs[0], sensors.truth[0], sensors.outputs[0]
+    dt = u.dt
+    for k in range(len(out.angle)):
+        u.t = (k + 1) * dt
+        motion.truth(sensors.ship[0], u.t, truth)
+        imu.step(sensors.state[0], sensors.constants[0], sensors.ship[0], u, truth, measured, normals[k])
         gained = velocity[k + 1] - velocity[k]
-        x, y, z = to_deck(truth[0].mat_ed, gained[0], gained[1], gained[2])
-        rate, push = felt[0].angular_velocity, felt[0].linear_acceleration
+        x, y, z = to_deck(truth.mat_ed, gained[0], gained[1], gained[2])
+        rate, push = measured.angular_velocity, measured.linear_acceleration
         for i in range(3):
-            angle[k, i] = rate[i] * dt
-            force[k, i] = push[i] * dt + (x if i == 0 else y if i == 1 else z)
+            out.angle[k, i] = rate[i] * dt
+            out.force[k, i] = push[i] * dt + (x if i == 0 else y if i == 1 else z)
         for i in range(4):
-            attitude[k, i] = truth[0].quaternion[i]
+            out.attitude[k, i] = truth.quaternion[i]
 
 
 @compiled
-def align(state, constants, angle, force, dt, every, found):
-    """Run a navigator on these increments; found: FOUND at every `every`-th."""
+def align(state, constants, angle, force, dt, every, estimates):
+    """Run a navigator on increments (n, 3) of dt [s]; estimates: ESTIMATE after every `every`-th of them."""
     aid = np.zeros(3)
     for k in range(len(angle)):
         navigator.step(state[0], constants[0], angle[k], force[k], dt, aid)
         if (k + 1) % every == 0:
-            s, out = state[0], found[(k + 1) // every - 1]
+            s, out = state[0], estimates[(k + 1) // every - 1]
             q = out.quaternion
             q[0], q[1], q[2], q[3] = navigator.attitude(s, constants[0])
             out.azimuth_sigma, out.level_sigma = s.azimuth_sigma, s.level_sigma
 
 
 def quaternion(axis, angle):
-    """Rotation about an axis of ENU (0, 1, 2) as x, y, z, w."""
+    """Quaternion (x, y, z, w) of a rotation by an angle [rad] about an axis of ENU (0, 1, 2)."""
     q = np.zeros(4)
     q[axis], q[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
     return q
 
 
 def misaligned(attitude, angles):
-    """The attitude deck -> n' of one deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T; angles a_x, a_y, a_z."""
+    """Attitude deck -> n' of an attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T; angles a_x, a_y, a_z
+    [rad]."""
     for axis in (2, 0, 1):
         attitude = strapdown.product(*quaternion(axis, -angles[axis]), *attitude)
     return attitude
@@ -135,7 +171,7 @@ def misaligned(attitude, angles):
 def circumstances(batch, random):
     """(heading [deg], misalignment (3,) [rad], signs or sizes of the six biases) of one run."""
     if not batch.kind.startswith('quadrant'):
-        # starboard and bow are positive in the paper; here x is the bow, y is port
+        # The paper's axes are starboard and bow; here x is to the bow, y to port.
         return 0.0, MISALIGNED, np.array((1.0, -1.0, 1.0, 1.0, -1.0, 1.0))
     azimuth = 0.5 * math.pi * (int(batch.kind[-1]) - 1 + random.random())
     return random.uniform(0.0, 360.0), np.array((*MISALIGNED[:2], azimuth)), random.standard_normal(6)
@@ -152,7 +188,7 @@ def disturbance(batch, random, n):
 
 
 def recorded(batch, run):
-    """(angle, force, attitude, misaligned attitude at 0 s) of one run of a batch."""
+    """(Increments, misaligned attitude (x, y, z, w) at 0 s) of one run of a batch."""
     seed = {'': SEED, 'swell': SWELL_SEED}.get(batch.kind, QUADRANT_SEED)
     random = np.random.default_rng((seed, *batch.kind.encode()[-1:], run))
     heading, angles, biases = circumstances(batch, random)
@@ -167,50 +203,49 @@ def recorded(batch, run):
     inputs['dt'] = PERIOD
     motion.truth(ship[0], 0.0, truth[0])
     start = misaligned(truth[0]['quaternion'].tolist(), angles)
-    angle, force, attitude = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4))
-    simulate(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS),
-             random.standard_normal((n, imu.NORMALS)), disturbance(batch, random, n), angle, force, attitude)
-    return angle, force, attitude, start
+    increments = Increments(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)))
+    simulate(Sensors(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS)),
+             random.standard_normal((n, imu.NORMALS)), disturbance(batch, random, n), increments)
+    return increments, start
 
 
-def errors(found, attitude):
-    """Error of an attitude (n, 4) against the true one, (n, 3) about east, north, up [rad]."""
-    x, y, z, w = strapdown.product(*found.T, *(attitude * (-1.0, -1.0, -1.0, 1.0)).T)
+def errors(estimated, attitude):
+    """Errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one (n, 4)."""
+    x, y, z, w = strapdown.product(*estimated.T, *(attitude * (-1.0, -1.0, -1.0, 1.0)).T)
     size = np.sqrt(x * x + y * y + z * z)
     angle = 2.0 * np.arctan2(size, np.abs(w)) * np.sign(np.where(w == 0.0, 1.0, w))
     return np.stack((x, y, z), axis=1) * (angle / np.where(size > 0.0, size, 1.0))[:, None]
 
 
 def aligned(batch):
-    """{case: (sum of squared errors (n, 3), sum of (error of azimuth / its 1 sigma)^2 (n,), errors of the first run
-    (n, 3) or None, wall time [s])} of a batch."""
+    """{case: Sums} of a batch."""
     every, latitude = round(EVERY / PERIOD), math.radians(SHIP.latitude_deg)
     n, sums = round(batch.duration / EVERY), {}
     for i in range(batch.count):
-        angle, force, attitude, start = recorded(batch, batch.first + i)
+        (angle, force, attitude), start = recorded(batch, batch.first + i)
         for case, method in CASES.items():
             constants = navigator.constants(SETTINGS, method, 'none', latitude)
-            state, found = navigator.initial_state(constants, start), np.zeros(n, FOUND)
-            align(state.copy(), constants, angle[:2], force[:2], PERIOD, every, found)      # compiled by now
+            state, estimates = navigator.initial_state(constants, start), np.zeros(n, ESTIMATE)
+            align(state.copy(), constants, angle[:2], force[:2], PERIOD, every, estimates)      # compiled by now
             begun = time.perf_counter()
-            align(state, constants, angle, force, PERIOD, every, found)
-            taken = time.perf_counter() - begun
-            e = errors(found['quaternion'], attitude[every - 1::every])
-            new = [e * e, (e[:, 2] / found['azimuth_sigma'])**2, e if batch.first + i == 0 else None, taken]
-            old = sums.setdefault(case, [0.0, 0.0, None, 0.0])
-            sums[case] = [old[0] + new[0], old[1] + new[1], new[2] if old[2] is None else old[2], old[3] + new[3]]
+            align(state, constants, angle, force, PERIOD, every, estimates)
+            wall_time = time.perf_counter() - begun
+            e = errors(estimates['quaternion'], attitude[every - 1::every])
+            sums[case] = sums.get(case, Sums()).plus(Sums(
+                e * e, (e[:, 2] / estimates['azimuth_sigma'])**2, e if batch.first + i == 0 else None, wall_time))
     return sums
 
 
 def limit():
-    """(azimuth, level) 1 sigma [rad] (n,) that no method beats: the Riccati covariance and the biases."""
+    """(azimuth, level) 1 sigma (n,) [rad] of the information limit: the Riccati covariance and the biases."""
     constants = navigator.constants(SETTINGS, 'riccati_eso', 'none', math.radians(SHIP.latitude_deg))
     state, n = navigator.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(DURATION / PERIOD)
-    found, still = np.zeros(round(DURATION / EVERY), FOUND), np.zeros((n, 3))
+    estimates, still = np.zeros(round(DURATION / EVERY), ESTIMATE), np.zeros((n, 3))
     k = constants[0]['conditions']
     still_force = np.tile((0.0, 0.0, float(k['gravity']) * PERIOD), (n, 1))
-    align(state, constants, still + k['earth_rate'] * PERIOD, still_force, PERIOD, round(EVERY / PERIOD), found)
-    return found['azimuth_sigma'], found['level_sigma']
+    align(state, constants, still + k['earth_rate'] * PERIOD, still_force, PERIOD, round(EVERY / PERIOD),
+          estimates)
+    return estimates['azimuth_sigma'], estimates['level_sigma']
 
 
 def settling_time(rms):
@@ -222,6 +257,7 @@ def settling_time(rms):
 
 
 def at(values, t):
+    """The value of a series (n,), one every EVERY, at t [s]."""
     return values[round(t / EVERY) - 1]
 
 
@@ -234,36 +270,39 @@ TARGETS = {
 PAPER = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
 
 
-def told(case, metric, value, unit):
+def case_row(case, metric, value, unit):
+    """The rows.row of a case and metric, with the paper's number and our target."""
     return row(case, metric, value, unit, PAPER.get((case, metric)), TARGETS.get((case, metric)))
 
 
-def rows(found, bound):
-    """found: {kind: {case: (rms of errors (n, 3) [arcmin], rms of azimuth error over sigma (n,), first run, us)}}."""
-    said = []
-    curves = {case: (rms[:, 2], math.sqrt(np.mean(rms[round(SHORT / EVERY):, :2]**2)))
-              for case, (rms, *_) in found[''].items()}
+def rows(accuracy, bound):
+    """The rows of accuracy {kind: {case: Accuracy}}; bound: as of `limit`."""
+    table = []
+    curves = {case: (a.rms[:, 2], math.sqrt(np.mean(a.rms[round(SHORT / EVERY):, :2]**2)))
+              for case, a in accuracy[''].items()}
     curves['limit'] = bound[0] / ARCMIN, math.sqrt(np.mean((bound[1][round(SHORT / EVERY):] / ARCMIN)**2))
     for case, (azimuth, level) in curves.items():
-        said.append(told(case, 'time_to_12arcmin_rms_s', settling_time(azimuth), 's'))
-        said += [told(case, f'azimuth_rms_arcmin_{t}s', at(azimuth, t), 'arcmin') for t in TIMES]
-        said.append(told(case, 'level_rms_arcmin', level, 'arcmin'))
-    for case, (_, ratio, _, cost) in found[''].items():
-        said.append(told(case, 'azimuth_error_over_sigma_300s', at(ratio, 300), '-'))
-        said.append(told(case, 'step_us', cost, 'us'))
-    for kind, cases in found.items():
+        table.append(case_row(case, 'time_to_12arcmin_rms_s', settling_time(azimuth), 's'))
+        table += [case_row(case, f'azimuth_rms_arcmin_{t}s', at(azimuth, t), 'arcmin') for t in TIMES]
+        table.append(case_row(case, 'level_rms_arcmin', level, 'arcmin'))
+    for case, a in accuracy[''].items():
+        table.append(case_row(case, 'azimuth_error_over_sigma_300s', at(a.ratio, 300), '-'))
+        table.append(case_row(case, 'step_us', a.step_us, 'us'))
+    for kind, cases in accuracy.items():
         if kind == 'swell':
-            said += [told(f'{case}/{kind}', f'azimuth_rms_arcmin_{SWELL_TIME}s', at(rms[:, 2], SWELL_TIME), 'arcmin')
-                     for case, (rms, *_) in cases.items()]
-            said += [told(f'{case}/{kind}', f'azimuth_error_over_sigma_{SWELL_TIME}s', at(ratio, SWELL_TIME), '-')
-                     for case, (_, ratio, *_) in cases.items()]
+            table += [case_row(f'{case}/{kind}', f'azimuth_rms_arcmin_{SWELL_TIME}s', at(a.rms[:, 2], SWELL_TIME),
+                               'arcmin') for case, a in cases.items()]
+            table += [case_row(f'{case}/{kind}', f'azimuth_error_over_sigma_{SWELL_TIME}s', at(a.ratio, SWELL_TIME),
+            '-')
+                      for case, a in cases.items()]
         elif kind:
-            said += [told(f'{case}/{kind}', 'azimuth_rms_arcmin_300s', at(rms[:, 2], 300), 'arcmin')
-                     for case, (rms, *_) in cases.items()]
-    return said
+            table += [case_row(f'{case}/{kind}', 'azimuth_rms_arcmin_300s', at(a.rms[:, 2], 300), 'arcmin')
+                      for case, a in cases.items()]
+    return table
 
 
 def remarks(runs):
+    """Sentences that the rows need, after this number of runs."""
     return [
         f'{runs} runs: an rms is known to {100.0 / math.sqrt(2.0 * runs):.0f} %, the last crossing of 12 arcmin to '
         'tens of seconds where the rms flattens out just below. What kicks the classical loop off 180 deg turns it by '
@@ -273,36 +312,40 @@ def remarks(runs):
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
+    """Align by every method, `runs` times; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     quarter = -(-runs // 4)
     kinds = {'': runs, 'swell': runs, **{f'quadrant-{n}': quarter for n in range(1, 5)}}
     batches = [Batch(kind, *part) for kind, count in kinds.items() for part in monte_carlo.batches(count, BATCH)]
-    totals = {}
+    totals = {kind: dict.fromkeys(CASES, Sums()) for kind in kinds}
     for batch, sums in zip(batches, pool.map(aligned, batches, progress)):
-        kind = totals.setdefault(batch.kind, {})
-        for case, new in sums.items():
-            old = kind.setdefault(case, [0.0, 0.0, None, 0.0])
-            kind[case] = [old[0] + new[0], old[1] + new[1], new[2] if old[2] is None else old[2], old[3] + new[3]]
-    found = {kind: {case: (np.sqrt(squares / kinds[kind]) / ARCMIN, np.sqrt(ratios / kinds[kind]), first,
-                           1e6 * taken / kinds[kind] / (DURATION if kind == '' else SHORT) * STEP)
-                    for case, (squares, ratios, first, taken) in cases.items()} for kind, cases in totals.items()}
+        total = totals[batch.kind]
+        for case, more in sums.items():
+            total[case] = total[case].plus(more)
+    accuracy = {}
+    for kind, cases in totals.items():
+        count, steps = kinds[kind], Batch(kind, 0, 1).duration / STEP
+        accuracy[kind] = {case: Accuracy(np.sqrt(sums.squares / count) / ARCMIN, np.sqrt(sums.ratios / count),
+                                         sums.first, 1e6 * sums.wall_time / count / steps)
+                          for case, sums in cases.items()}
     bound = limit()
-    return Result(rows(found, bound), figures(found, bound), remarks(runs))
+    return Result(rows(accuracy, bound), figures(accuracy, bound), remarks(runs))
 
 
-def figures(found, bound):
-    return {'azimuth': lambda: azimuth_figure(found, bound), 'level': lambda: level_figure(found, bound),
-            'swell': lambda: swell_figure(found, bound)}
+def figures(accuracy, bound):
+    """{name: function that draws it}; arguments as of `rows`."""
+    return {'azimuth': lambda: azimuth_figure(accuracy[''], bound), 'level': lambda: level_figure(accuracy[''], bound),
+            'swell': lambda: swell_figure(accuracy['swell'], bound)}
 
 
-def azimuth_figure(found, bound):
-    """Figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs."""
+def azimuth_figure(accuracy, bound):
+    """Figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs, {case: Accuracy}."""
     figure, axes = drawing.panels(3, size=(7.4, 9.0))
     t = EVERY * np.arange(1, len(bound[0]) + 1)
-    for case, (rms, _, first, _) in found[''].items():
-        axes[0, 0].plot(t, np.degrees(first[:, 2]), color=COLOURS[case], label=case)
-        axes[1, 0].plot(t, first[:, 2] / ARCMIN, color=COLOURS[case])
-        axes[2, 0].plot(t, rms[:, 2], color=COLOURS[case], label=case)
+    for case, a in accuracy.items():
+        axes[0, 0].plot(t, np.degrees(a.first[:, 2]), color=COLOURS[case], label=case)
+        axes[1, 0].plot(t, a.first[:, 2] / ARCMIN, color=COLOURS[case])
+        axes[2, 0].plot(t, a.rms[:, 2], color=COLOURS[case], label=case)
     axes[0, 0].set_title('azimuth error of one run (figure 3 of the paper)')
     axes[0, 0].set_ylabel('[deg]')
     axes[0, 0].legend(loc='upper right', ncols=3)
@@ -315,7 +358,7 @@ def azimuth_figure(found, bound):
 
 
 def finish(axes, bound, title):
-    """The limit, a logarithmic scale and the names of a panel of rms over time."""
+    """Add the limit, a logarithmic scale and labels to a panel of rms over time."""
     t = EVERY * np.arange(1, len(bound) + 1)
     axes.plot(t, bound / ARCMIN, color=INK, linestyle='--', linewidth=1.0, label='information limit')
     axes.set_yscale('log')
@@ -325,13 +368,13 @@ def finish(axes, bound, title):
     axes.legend(loc='upper right', ncols=2)
 
 
-def level_figure(found, bound):
+def level_figure(accuracy, bound):
     """Figure 4 of the paper for level: one run after 100 s; then the rms over all."""
     figure, axes = drawing.panels(2, size=(7.4, 6.4))
     t = EVERY * np.arange(1, len(bound[1]) + 1)
-    for case, (rms, _, first, _) in found[''].items():
-        axes[0, 0].plot(t, first[:, 0] / ARCMIN, color=COLOURS[case], linewidth=0.8, label=case)
-        axes[1, 0].plot(t, np.sqrt(np.mean(rms[:, :2]**2, axis=1)), color=COLOURS[case], label=case)
+    for case, a in accuracy.items():
+        axes[0, 0].plot(t, a.first[:, 0] / ARCMIN, color=COLOURS[case], linewidth=0.8, label=case)
+        axes[1, 0].plot(t, np.sqrt(np.mean(a.rms[:, :2]**2, axis=1)), color=COLOURS[case], label=case)
     axes[0, 0].set_title('level error about east of one run (figure 4 of the paper)')
     axes[0, 0].set_xlim(100.0, DURATION)
     axes[0, 0].set_ylim(-4.0, 4.0)
@@ -340,11 +383,11 @@ def level_figure(found, bound):
     return figure
 
 
-def swell_figure(found, bound):
-    """Azimuth on swell."""
+def swell_figure(accuracy, bound):
+    """Rms of the azimuth on swell, {case: Accuracy}, beside the limit."""
     figure, axes = drawing.panels(1, size=(7.4, 3.8))
-    for case, (rms, *_) in found['swell'].items():
-        axes[0, 0].plot(EVERY * np.arange(1, len(rms) + 1), rms[:, 2], color=COLOURS[case], label=case)
+    for case, a in accuracy.items():
+        axes[0, 0].plot(EVERY * np.arange(1, len(a.rms) + 1), a.rms[:, 2], color=COLOURS[case], label=case)
     finish(axes[0, 0], bound[0][:round(SHORT / EVERY)],
            f'azimuth on swell of {SWELL:g} m/s, {SWELL_FREQUENCY:g} Hz: rms over the runs')
     return figure

@@ -1,6 +1,6 @@
 """Backlash: standstill, reversal and fast moves under the bias schedules, two speed loops against one.
 
-With the paper's controller (the scenarios as they are): bias-off, bias-on (5 Nm, fading, as paper 000 has it),
+With the paper's controller (the scenarios as they are): bias-off, bias-on (5 Nm, fading, as in paper 000),
 hold-fade. With the controller `best` of the study servo: every schedule, sine and fast step. Every case is
 `pedestal run servo_step|servo_sine --param ...` too (Case.command).
 """
@@ -15,7 +15,7 @@ from pedestal_bringup.studies.rigs.cases import Case
 from pedestal_bringup.studies.rigs.rows import Result, row
 
 SETTLED = 2.0
-"""Standstill is what is left so long after a step [s]."""
+"""Standstill is evaluated from this time on after a step [s]."""
 
 REVERSAL_AMPLITUDE = 0.05
 """Sine of the reversals [rad]."""
@@ -48,24 +48,24 @@ TARGETS = {
 
 
 def standstill_case(name):
-    """The step, and what is left of it long after."""
+    """The Case of a step and the standstill after it."""
     return Case(name, 'servo_step', PAPER_CASES[name], SETTLED + 1.0)
 
 
 def reversal_case(kind, name):
-    """Three periods of a sine of REVERSALS."""
+    """The Case of three periods of a sine of REVERSALS."""
     return cases.sine_case(Case(name, 'servo_sine', {
         **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE}),
         REVERSALS[kind], 3)
 
 
 def fast_case(name):
-    """The step that needs all torque: 40 rad/s2."""
+    """The Case of a step at 40 rad/s2, which needs all torque."""
     return Case(name, 'servo_step', {**servo.FULL_TORQUE, 'acu.azimuth.shaper.acceleration': 40.0, **SCHEDULES[name]})
 
 
 def sine_case(name):
-    """The sine of 0.4 Hz."""
+    """The Case of the sine of 0.4 Hz."""
     return Case(name, 'servo_sine', {**servo.BEST, **SCHEDULES[name]})
 
 
@@ -74,18 +74,18 @@ MOVED = 0.5
 
 
 def structure_case(name):
-    """The step with one speed loop, or one for each motor."""
+    """The Case of a step with one speed loop, or one for each motor."""
     return Case(name, 'servo_step', STRUCTURES[name], SETTLED)
 
 
 def standstill(record):
-    """The load's position long after the step, and when [rad, s]."""
+    """(times [s], load angle [rad]) from SETTLED on."""
     late = record.t >= SETTLED
     return record.t[late], record.truth['load_position'][late, 0]
 
 
 def steady_residual(record, amplitude, w):
-    """Time [s] and error [rad] without its fundamental w [rad/s], over the whole periods after the first."""
+    """(times [s], error without its fundamental w [rad/s], (n,) [rad]) over the whole periods after the first."""
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record.truth['load_position'][:, 0]
     steady = metrics.whole_periods(t, period, period)
@@ -93,13 +93,13 @@ def steady_residual(record, amplitude, w):
 
 
 def fight(record):
-    """Torque with which the motors work against each other beyond the bias asked for [Nm]."""
+    """Torque (n,) [Nm] with which the motors oppose each other beyond the commanded bias."""
     motors = record['adu/motor_states']['effort'][:, :2]
     return 0.5 * (motors[:, 0] - motors[:, 1]) - record.truth['bias'][:, 0]
 
 
 def synchronism_error(record):
-    """Speed of motor 1 less that of motor 2 [rad/s], as their encoders see it."""
+    """Measured speed of motor 1 less that of motor 2 (n,) [rad/s]."""
     return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
 
@@ -131,20 +131,21 @@ def measured(kind, name, record):
 
 
 def rows(done):
-    """The rows of the records {(kind, case): record} that there are."""
-    found = []
+    """The rows of records {(kind, case): closed_loop.Run}, all or some."""
+    table = []
     for (kind, name), record in done.items():
         values = measured(kind, name, record)
         if kind in REVERSALS and name != 'bias-off' and (kind, 'bias-off') in done:
             without = measured(kind, 'bias-off', done[kind, 'bias-off'])[f'{kind}_error_rad'][0]
             values[f'{kind}_ratio_off_to_on'] = without / values[f'{kind}_error_rad'][0], ''
         case = f'schedule-{name}' if kind in ('sine', 'step') and name != 'hold-fade' else name
-        found += [row(case, metric, value, unit, target=TARGETS.get((name, metric)))
+        table += [row(case, metric, value, unit, target=TARGETS.get((name, metric)))
                   for metric, (value, unit) in values.items()]
-    return found
+    return table
 
 
 def run(progress) -> Result:
+    """Run all CASES."""
     done = {}
     for i, (key, case) in enumerate(CASES.items()):
         progress(i / len(CASES), f'{key[0]}: {key[1]}')
@@ -152,9 +153,9 @@ def run(progress) -> Result:
     return Result(rows(done), figures(done), remarks(rows(done)))
 
 
-def remarks(found):
-    """What the rows do not say by themselves."""
-    values = {(row['case'], row['metric']): row['value'] for row in found}
+def remarks(table):
+    """Sentences that the rows need; table: those rows."""
+    values = {(row['case'], row['metric']): row['value'] for row in table}
     return [
         f'reversal is the sine {REVERSAL_AMPLITUDE:g} rad sin({REVERSALS["reversal"]:g} t); fast_reversal goes '
         f'through it at up to {REVERSAL_AMPLITUDE * REVERSALS["fast_reversal"]:g} rad/s. What bias leaves of the fast '
@@ -205,13 +206,13 @@ def reversal_figure(done):
         panel.plot(t, 1e6 * left, color=TRUTH if name == 'bias-off' else FILTERED)
         panel.set_ylabel('error [\N{MICRO SIGN}rad]')
         panel.set_title(f'{name}: error without its fundamental')
-    axes[2, 0].set_xlim(*turning())
+    axes[2, 0].set_xlim(*reversal_window())
     axes[2, 0].set_xlabel('time [s]')
     return figure
 
 
-def turning():
-    """The 3 s about the first reversal of the second period of the slow sine."""
+def reversal_window():
+    """(begin, end) [s] of the 3 s about the first reversal in the second period of the slow sine."""
     at = 1.25 * 2.0 * math.pi / REVERSALS['reversal']
     return at - 1.0, at + 2.0
 
@@ -224,7 +225,7 @@ def torques_figure(done):
         drawing.draw_torques(panel, record)
         panel.set_title(name)
         panel.set_ylabel('torque [Nm]')
-    axes[2, 0].set_xlim(*turning())
+    axes[2, 0].set_xlim(*reversal_window())
     axes[2, 0].set_xlabel('time [s]')
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside upper right', ncols=2)
     return figure

@@ -1,15 +1,15 @@
 """Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
 
 A signal is added inside a loop at its break point while the axis moves at a constant rate, where friction is a
-constant and the bias keeps the teeth closed. What goes on from there is E, what comes back -Y; at the excited
-frequencies the open loop is L = Y / E, the closed loop T = L / (1 + L). No controller is known to the study:
+constant and the bias keeps the teeth closed. The signal sent on from there is E, the returned one -Y; at the excited
+frequencies the open loop is L = Y / E, the closed loop T = L / (1 + L). The study uses no model of a controller:
 
     current     added to i_ref, every 100 us        E = i_ref - i_q            Y = i_q
     speed       added to the rate command, 0.5 ms   E = rate - mean speed / N  Y = mean speed / N from the encoders
     position    added between ACU and drive, T      E = rate the drive gets    Y = -(rate the ACU commands)
 
-The grey line of a figure is what the gains were chosen by: w_c / s for the current, (K_p + K_i / s) / (J s) for the
-speed with everything rigid, K_p / s + K_i / s^2 for the position. What lies between is sampling, delay, elasticity.
+The grey line of a figure is the design of the gains: w_c / s for the current, (K_p + K_i / s) / (J s) for the
+speed of a rigid drive, K_p / s + K_i / s^2 for the position. The difference is sampling, delay, elasticity.
 """
 import dataclasses
 import functools
@@ -54,6 +54,7 @@ class Sweep:
         return np.unique(np.round(np.geomspace(self.lowest, self.highest, self.points) * self.period).astype(int))
 
     def frequencies(self):
+        """Excited frequencies (points,) [Hz], or fewer where two fall on one."""
         return self.bins() / self.period
 
     def signal(self, step):
@@ -79,18 +80,19 @@ POSITION = Sweep(8.0, 0.25, 95.0, 300, 2, 3, 0.012)
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """Open loop (n,) complex at the frequencies (n,) [Hz]; deviation (n,): standard deviation of it, relative."""
+    """Open loop (n,) complex at the frequencies (n,) [Hz]; deviation (n,): its relative standard deviation [-]."""
     frequency: np.ndarray
     open_loop: np.ndarray
     deviation: np.ndarray
 
     @property
     def closed_loop(self):
+        """T = L / (1 + L) (n,)."""
         return self.open_loop / (1.0 + self.open_loop)
 
 
 def response(sweep, sent, returned):
-    """Response of a loop from what went on from its break point and what came back, two records (n,)."""
+    """Response of a loop from the signals sent on from its break point and returned to it, two records (n,)."""
     E, Y = (np.fft.rfft(x.reshape(sweep.dropped + sweep.kept, -1)[sweep.dropped:], axis=1)[:, sweep.bins()]
             for x in (sent, returned))
     L = Y.mean(axis=0) / E.mean(axis=0)
@@ -127,7 +129,8 @@ def _elevation(state, constants, rate, current, speed, wanted, made):
 
 
 def _run_inner(drive, index, rate, current):
-    """(speed (n,), i_ref, i_q (5 n, 2)) of an axis of a drive (AduParameters) under what is added to its signals."""
+    """(speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of axis `index` of a drive (AduParameters), with signals added to
+    its rate command (n,) [rad/s] and current references (5 n,) [A]."""
     drive = dataclasses.replace(drive, initial_azimuth=START[0], initial_elevation=START[1])
     speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
     steps = (_azimuth, _elevation)[index]
@@ -146,11 +149,11 @@ def current(drive, sweep=CURRENT):
 
 def speed(drive, sweep=SPEED):
     """Responses of the speed loops of both axes: {name: Response}."""
-    added, found = sweep.signal(axis.SPEED_PERIOD), {}
+    added, responses = sweep.signal(axis.SPEED_PERIOD), {}
     for i, name in enumerate(AXES):
-        seen, _, _ = _run_inner(drive, i, added, np.zeros(len(added) * axis.CURRENT_TICKS))
-        found[f'speed/{name}'] = response(sweep, RATE[i] + added - seen, seen)
-    return found
+        measured, _, _ = _run_inner(drive, i, added, np.zeros(len(added) * axis.CURRENT_TICKS))
+        responses[f'speed/{name}'] = response(sweep, RATE[i] + added - measured, measured)
+    return responses
 
 
 MOVING = {
@@ -163,7 +166,7 @@ MOVING = {
 
 
 def case(name, scenario, parameters):
-    """A case of the position loop: the loop of a scenario, with parameters changed, moving at constant rates."""
+    """The Case of a position loop: a scenario with parameters changed, moving at constant rates."""
     return Case(name, scenario, {**MOVING, **parameters})
 
 
@@ -179,23 +182,24 @@ def position(case, axes=AXES, sweep=POSITION):
 
 
 def _crossings(f, y, angle):
-    """Where y (n,) goes through zero, and the angle [rad] there: both linear in log f, angle taken the short way."""
+    """(frequencies [Hz], angles [rad]) of the zeros of y (n,): both linear in log f, the angle along the short way."""
     i = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
     share = y[i] / (y[i] - y[i + 1])
-    turn = np.angle(np.exp(1j * (angle[i + 1] - angle[i])))
-    return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * turn
+    change = np.angle(np.exp(1j * (angle[i + 1] - angle[i])))
+    return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * change
 
 
-def margins(found):
-    """{metric: (value, unit)} of a Response; NaN: no such frequency in the band.
+def margins(measured):
+    """{metric: (value, unit)} of a Response; NaN where the band has no such frequency.
 
-    crossover: where |L| first falls below 1. phase_margin: the smallest turn, either way, that puts a point of |L| = 1
-    on -1. gain_margin: the smallest gain that does it. bandwidth: where |T| first falls below -3 dB. peak: of |T|.
+    crossover: where |L| first falls below 1. phase_margin: the smallest phase shift, of either sign, that puts a point
+    of |L| = 1 on -1. gain_margin: the smallest gain that puts a point on -1. bandwidth: where |T| first falls below
+    -3 dB. peak: of |T|.
     """
-    f, L, T = found.frequency, found.open_loop, np.abs(found.closed_loop)
+    f, L, T = measured.frequency, measured.open_loop, np.abs(measured.closed_loop)
     gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)
-    crossover, turn = _crossings(f, gain, from_minus_one)
-    turn = np.abs(np.angle(np.exp(1j * turn)))
+    crossover, margin = _crossings(f, gain, from_minus_one)
+    margin = np.abs(np.angle(np.exp(1j * margin)))
     near = np.where(np.abs(from_minus_one) < 0.5 * math.pi, from_minus_one, np.nan)
     _, at_minus = _crossings(f, near, gain)
     at_minus = at_minus[at_minus < 0.0]
@@ -203,12 +207,12 @@ def margins(found):
     return {'bandwidth_hz': (below[0] if below.size else math.nan, 'Hz'),
             'crossover_hz': (crossover[0] if crossover.size else math.nan, 'Hz'),
             'gain_margin_db': (-20.0 / math.log(10.0) * at_minus.max() if at_minus.size else math.nan, 'dB'),
-            'phase_margin_deg': (math.degrees(turn.min()) if turn.size else math.nan, 'deg'),
+            'phase_margin_deg': (math.degrees(margin.min()) if margin.size else math.nan, 'deg'),
             'peak_db': (20.0 * math.log10(T.max()), 'dB')}
 
 
 def controller(name):
-    """Both axes of the product's default loop with a position controller."""
+    """The Case of the default position loop with a position controller of this name on both axes."""
     return case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
@@ -230,22 +234,23 @@ CASES = {
 faster one with a rigid load, with a flexible one, and with a notch against that."""
 
 MARGIN_BAND = math.sqrt(10.0)
-"""Around crossover, where the margins are read: |L| within this of 1, 10 dB either way."""
+"""Band about crossover, in which the margins are read: |L| within this factor of 1, +-10 dB."""
 
 
-def nonlinearity(found, smaller):
+def nonlinearity(measured, smaller):
     """Largest relative change of L between two excitations, within MARGIN_BAND."""
-    change = np.abs(smaller.open_loop / found.open_loop - 1.0)
-    return float(change[np.abs(np.log(np.abs(found.open_loop))) < math.log(MARGIN_BAND)].max())
+    change = np.abs(smaller.open_loop / measured.open_loop - 1.0)
+    return float(change[np.abs(np.log(np.abs(measured.open_loop))) < math.log(MARGIN_BAND)].max())
 
 
 def rows(responses):
     """The rows of {name: Response}."""
-    return [row(name, metric, value, unit) for name, found in responses.items()
-            for metric, (value, unit) in margins(found).items()]
+    return [row(name, metric, value, unit) for name, measured in responses.items()
+            for metric, (value, unit) in margins(measured).items()]
 
 
 def run(progress) -> Result:
+    """Measure all loops, each also with half the excitation."""
     drive = AduParameters()
     parts = {'current loops': (functools.partial(current, drive), CURRENT),
              'speed loops': (functools.partial(speed, drive), SPEED)}
@@ -254,9 +259,9 @@ def run(progress) -> Result:
     responses, change = {}, {}
     for i, (text, (measure, sweep)) in enumerate(parts.items()):
         progress(i / len(parts), text)
-        found, smaller = measure(sweep), measure(dataclasses.replace(sweep, peak=0.5 * sweep.peak))
-        change |= {name: nonlinearity(found[name], smaller[name]) for name in found}
-        responses |= found
+        measured, smaller = measure(sweep), measure(dataclasses.replace(sweep, peak=0.5 * sweep.peak))
+        change |= {name: nonlinearity(measured[name], smaller[name]) for name in measured}
+        responses |= measured
     worst = max(change, key=change.get)
     remarks = [f'Linear: half the excitation changes no open loop by more than {100.0 * change[worst]:.1f} % within '
                f'10 dB of |L| = 1 ({worst}).']
@@ -270,7 +275,8 @@ def drawings(responses, drive):
     J = p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
 
     def chosen(curves, design=None):
-        return lambda: drawn({label: (responses[name], colour) for label, (name, colour) in curves.items()}, design)
+        measured = {label: (responses[name], colour) for label, (name, colour) in curves.items()}
+        return lambda: bode_figure(measured, design)
 
     return {
         'current': chosen({'motor 1': ('current/motor_1', MOTOR_1), 'motor 2': ('current/motor_2', MOTOR_2)},
@@ -288,6 +294,7 @@ def drawings(responses, drive):
 
 
 def decibel(x):
+    """Magnitude [dB] of x (n,) complex."""
     return 20.0 * np.log10(np.abs(x))
 
 
@@ -297,10 +304,10 @@ def degrees(x):
     return phase - 360.0 * math.ceil(phase[0] / 360.0)
 
 
-def drawn(curves, design):
+def bode_figure(curves, design):
     """Bode diagrams of the open and the closed loop: {label: (Response, colour)}, design(s) the open loop or None."""
     figure, axes = drawing.panels(2, 2, sharex=True)
-    believed = {label: found.deviation < 0.2 for label, (found, _) in curves.items()}
+    reliable = {label: measured.deviation < 0.2 for label, (measured, _) in curves.items()}
     for column, title in enumerate(('open loop', 'closed loop')):
         gain, phase = axes[:, column]
         if design:
@@ -309,11 +316,11 @@ def drawn(curves, design):
             x = L / (1.0 + L) if column else L
             gain.semilogx(f, decibel(x), color=RAW, lw=0.8, label='as designed')
             phase.semilogx(f, degrees(x), color=RAW, lw=0.8)
-        for label, (found, colour) in curves.items():
-            keep = believed[label]
-            x = (found.closed_loop if column else found.open_loop)[keep]
-            gain.semilogx(found.frequency[keep], decibel(x), '.-', color=colour, ms=3.0, lw=0.7, label=label)
-            phase.semilogx(found.frequency[keep], degrees(x), '.-', color=colour, ms=3.0, lw=0.7)
+        for label, (measured, colour) in curves.items():
+            keep = reliable[label]
+            x = (measured.closed_loop if column else measured.open_loop)[keep]
+            gain.semilogx(measured.frequency[keep], decibel(x), '.-', color=colour, ms=3.0, lw=0.7, label=label)
+            phase.semilogx(measured.frequency[keep], degrees(x), '.-', color=colour, ms=3.0, lw=0.7)
         gain.set_title(title)
         gain.axhline(-3.0 if column else 0.0, color=INK, lw=0.6, ls=':')
         gain.set_ylim(bottom=-40.0)

@@ -27,14 +27,14 @@ BATCH = 25
 SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
 
 SETTLED = 3.0
-"""What comes before is not counted [s]."""
+"""Moments are taken from here on [s]."""
 
 NOISES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
           for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
 """rms [deg]; coloured: through a first-order lag of 5 Hz."""
 
 RATES = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
-"""Filters with a rate measurement, its standard deviation [rad/s]."""
+"""Filters with a rate measurement: standard deviation of that [rad/s]."""
 
 FILTERS = {**{kind: FilterParameters(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
            **{name: FilterParameters(kind='current_statistical') for name in RATES}}
@@ -63,8 +63,8 @@ PAPER = {('flyby-500m', 'current_statistical', 'reduction'): 7.0,
          ('flyby-60m', 'current_statistical', 'reduction'): 3.0}
 """Paper 000, figures 7 to 10."""
 
-HONEST = (0.8, 1.25)
-"""Mean NIS per degree of freedom, and error over the sigma that the filter gives it, where it knows its errors."""
+CONSISTENT = (0.8, 1.25)
+"""Range of mean NIS per degree of freedom, and of rms error over the filter's own sigma, of a consistent filter."""
 
 
 def freedom(name):
@@ -73,11 +73,12 @@ def freedom(name):
 
 
 def times():
+    """Instants of the measurements of a record (n,) [s]."""
     return ensemble.PERIOD * np.arange(round(profiles.DURATION / ensemble.PERIOD))
 
 
 def measured(params, profile, noise, rate_sigma, seed, first, count):
-    """MOMENTS over time (n,) of one filter."""
+    """MOMENTS over time (n,) of one filter (FilterParameters), runs first ... first + count - 1."""
     t = times()
     noise = Noise(noise.sigma, noise.bandwidth, rate_sigma)
     truth = profiles.truth(profile, t)
@@ -90,15 +91,15 @@ def settled(sums):
 
 
 def tune(item):
-    """The filter of an item (profile, noise, filter), its parameters found on the tuning seeds."""
+    """FilterParameters of an item (profile, noise, filter), tuned on the records of TUNING_SEED."""
     profile, noise, name = item
     t = times()
-    told = Noise(NOISES[noise].sigma, NOISES[noise].bandwidth, RATES.get(name))
+    noise_known = Noise(NOISES[noise].sigma, NOISES[noise].bandwidth, RATES.get(name))
     truth = profiles.truth(profile, t)
-    records = ensemble.records(truth, told, TUNING_SEED, 0, TUNING_RUNS)
+    records = ensemble.records(truth, noise_known, TUNING_SEED, 0, TUNING_RUNS)
 
     def angle_rms(params):
-        return ensemble.rms(settled(ensemble.moments(params, t, truth, told, records)), 'angle').item()
+        return ensemble.rms(settled(ensemble.moments(params, t, truth, noise_known, records)), 'angle').item()
 
     return tuning.tuned(FILTERS[name], angle_rms)[0]
 
@@ -110,16 +111,16 @@ THINNED = 10
 def batch(item):
     """{filter: (total, MOMENTS over thinned time)} of an item (profile, noise, {filter: parameters}, first, count)."""
     profile, noise, filters, first, count = item
-    found = {}
+    sums_of = {}
     for name, params in filters.items():
         sums = measured(params, profile, NOISES[noise], RATES.get(name), SEED, first, count)
-        found[name] = settled(sums), sums[::THINNED].copy()
+        sums_of[name] = settled(sums), sums[::THINNED].copy()
     if profile == RANGED[0]:
         t = times()
-        sums = ensemble.unscented_moments(UkfParameters(), t, profiles.truth(profile, t),
-                                          profiles.distance(profile, t), NOISES[noise], RANGED[1], SEED, first, count)
-        found['imm_ukf'] = settled(sums), sums[::THINNED].copy()
-    return found
+        sums = ensemble.unscented_moments(UkfParameters(), profiles.truth(profile, t), profiles.distance(profile, t),
+                                          NOISES[noise], RANGED[1], (SEED, first, count))
+        sums_of['imm_ukf'] = settled(sums), sums[::THINNED].copy()
+    return sums_of
 
 
 def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISES)) -> Result:
@@ -133,9 +134,9 @@ def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE
         tuned[profile, noise][name] = params
     items = [(*key, tuned[key], first, count) for key in tuned for first, count in monte_carlo.batches(runs, BATCH)]
     totals, over_time = {}, {}
-    for (profile, noise, *_), found in zip(items, pool.map(
+    for (profile, noise, *_), sums_of in zip(items, pool.map(
             batch, items, lambda share, text: progress(0.5 + 0.5 * share, f'{runs} runs of each case, {text}'))):
-        for name, (sums, thinned) in found.items():
+        for name, (sums, thinned) in sums_of.items():
             case = profile, name, noise
             totals[case] = ensemble.added(totals[case], sums) if case in totals else sums
             over_time[case] = ensemble.added(over_time[case], thinned) if case in over_time else thinned
@@ -144,7 +145,8 @@ def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE
 
 
 def metrics(sums):
-    """{metric: (value, unit)}; where a filter knows its errors nis_mean is its freedom and both _over_sigma are 1."""
+    """{metric: (value, unit)} of MOMENTS (1,); a consistent filter has a nis_mean of its freedom and both _over_sigma
+    1."""
     angle, rate, raw = (ensemble.rms(sums, name).item() for name in ('angle', 'rate', 'raw'))
     runs = sums['runs'].item()
     return {'angle_rms_deg': (math.degrees(angle), 'deg'), 'rate_rms_deg_s': (math.degrees(rate), 'deg/s'),
@@ -158,55 +160,55 @@ def rows(values):
     return [row('/'.join(case), metric, value, unit,
                 PAPER.get((*case[:2], metric)) if case[2] == SHOWN else None,
                 TARGETS.get((*case[:2], metric)) if case[2] == SHOWN else None)
-            for case, found in values.items() for metric, (value, unit) in found.items()]
+            for case, measured in values.items() for metric, (value, unit) in measured.items()]
 
 
-def shown(found):
-    """The rows that are printed: too many for a terminal are left to the file."""
-    return [row for row in found if row['target']]
+def shown(table):
+    """The rows that are printed, those with a target: all are too many for a terminal."""
+    return [row for row in table if row['target']]
 
 
-def _cell(at):
-    if at is None:
+def _cell(measured):
+    if measured is None:
         return 34 * ' '
-    at = {metric: value for metric, (value, _) in at.items()}
-    return (f'{at["angle_rms_deg"]:.4f} ({at["reduction"]:.1f})  {at["rate_rms_deg_s"]:.4f}  '
-            f'{at["angle_over_sigma"]:.2f} {at["rate_over_sigma"]:.2f}').ljust(34)
+    value = {metric: value for metric, (value, _) in measured.items()}
+    return (f'{value["angle_rms_deg"]:.4f} ({value["reduction"]:.1f})  {value["rate_rms_deg_s"]:.4f}  '
+            f'{value["angle_over_sigma"]:.2f} {value["rate_over_sigma"]:.2f}').ljust(34)
 
 
 def remarks(values, tuned, runs):
-    """What the rows do not say by themselves."""
-    found = [f'{runs} runs of each case. Angle rms [deg] (reduction), rate rms [deg/s], error over own sigma of angle '
+    """Sentences that the rows need, with a table of the profiles."""
+    lines = [f'{runs} runs of each case. Angle rms [deg] (reduction), rate rms [deg/s], error over own sigma of angle '
              f'and rate, noise {SHOWN} deg; every case is in the rows of --json.']
     on = [profile for profile, noise in tuned if noise == SHOWN]
     if on:
-        found.append(f'{"":30}' + ''.join(f'{profile:34}' for profile in on).rstrip())
-        found += [f'{name:30}' + ''.join(_cell(values.get((profile, name, SHOWN))) for profile in on).rstrip()
+        lines.append(f'{"":30}' + ''.join(f'{profile:34}' for profile in on).rstrip())
+        lines += [f'{name:30}' + ''.join(_cell(values.get((profile, name, SHOWN))) for profile in on).rstrip()
                   for name in SHOWN_FILTERS]
     for colour in ('white', 'coloured'):
-        doubtful = {}
-        for (_, name, noise), at in values.items():
-            measures = {'NIS': at['nis_mean'][0] / freedom(name), 'angle': at['angle_over_sigma'][0],
-                        'rate': at['rate_over_sigma'][0]}
+        inconsistent = {}
+        for (_, name, noise), measured in values.items():
+            measures = {'NIS': measured['nis_mean'][0] / freedom(name), 'angle': measured['angle_over_sigma'][0],
+                        'rate': measured['rate_over_sigma'][0]}
             if noise.startswith(colour):
                 for what, value in measures.items():
-                    if not HONEST[0] <= value <= HONEST[1]:
-                        doubtful.setdefault(name, {}).setdefault(what, []).append(value)
+                    if not CONSISTENT[0] <= value <= CONSISTENT[1]:
+                        inconsistent.setdefault(name, {}).setdefault(what, []).append(value)
         listed = [f'    {name}: '
-                  + ', '.join(f'{what} {min(off):.2f} to {max(off):.2f}' for what, off in at.items())
-                  for name, at in doubtful.items()]
+                  + ', '.join(f'{what} {min(outside):.2f} to {max(outside):.2f}' for what, outside in ranges.items())
+                  for name, ranges in inconsistent.items()]
         if listed:
-            found += [f'Not honest under {colour} noise, NIS per degree of freedom or error over own sigma outside '
-                      f'{HONEST[0]:g} to {HONEST[1]:g} in some case:', *listed]
+            lines += [f'Not honest under {colour} noise, NIS per degree of freedom or error over own sigma outside '
+                      f'{CONSISTENT[0]:g} to {CONSISTENT[1]:g} in some case:', *listed]
     pairs = [(values[profile, name, noise]['reduction'][0],
               values[profile, name, noise.replace('white', 'coloured')]['reduction'][0])
              for profile, name, noise in values if noise == SHOWN
              and (profile, name, noise.replace('white', 'coloured')) in values and name == 'current_statistical']
     if pairs:
-        found.append('A reduction is one of white noise at 100 Hz: at the same rms within 5 Hz current_statistical '
+        lines.append('A reduction is one of white noise at 100 Hz: at the same rms within 5 Hz current_statistical '
                      f'comes down from {", ".join(f"{white:.1f}" for white, _ in pairs)} to '
                      f'{", ".join(f"{colour:.1f}" for _, colour in pairs)}. Filters take the noise for white.')
-    return found
+    return lines
 
 
 def figures(values, over_time):
@@ -225,7 +227,7 @@ COMPARED = {'current_statistical': RAW, 'current_statistical-rate-0.1': FILTERED
 
 
 def errors_figure(over_time, on, what='angle'):
-    """Ensemble of the error over time, mean +-1 sigma, and dashed the sigma that the filter itself believes."""
+    """Ensemble of the error over time, mean +-1 sigma, and dashed the filter's own sigma."""
     figure, axes = drawing.panels(len(on), len(COMPARED), size=(7.4, 1.0 + 1.4 * len(on)), sharex=True,
                                      sharey='row')
     t = times()[::THINNED]
@@ -236,11 +238,11 @@ def errors_figure(over_time, on, what='angle'):
             mean = np.degrees(sums[what] / sums['runs'])
             sigma = np.degrees(np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - (sums[what] / sums['runs']) ** 2,
                                                   0.0)))
-            believed = np.degrees(np.sqrt(sums['variance' if what == 'angle' else 'rate_variance'] / sums['runs']))
+            own_sigma = np.degrees(np.sqrt(sums['variance' if what == 'angle' else 'rate_variance'] / sums['runs']))
             panel.fill_between(t[after], mean - sigma, mean + sigma, color=colour, alpha=0.35, linewidth=0.0)
             panel.plot(t[after], mean, color=colour, linewidth=0.8)
             for side in (-1.0, 1.0):
-                panel.plot(t[after], side * believed, color=INK, linewidth=0.7, linestyle='--')
+                panel.plot(t[after], side * own_sigma, color=INK, linewidth=0.7, linestyle='--')
         line[0].set_ylabel(f'{profile}\n[deg{"" if what == "angle" else "/s"}]')
     for panel, name in zip(axes[0], COMPARED):
         panel.set_title(name)
@@ -250,13 +252,13 @@ def errors_figure(over_time, on, what='angle'):
 
 
 def bars(values, on, metric, label, colour, text):
-    """A panel of bars for each profile: figure, panels."""
+    """(figure, panels (n,)), a panel of bars for each profile; metric, text(filter, metrics), colour(filter)."""
     figure, axes = drawing.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
     for panel, profile in zip(axes[0], on):
-        found = {name: values.get((profile, name, SHOWN)) for name in SHOWN_FILTERS}
-        drawn = panel.barh(list(found), [metric(name, at) if at else 0.0 for name, at in found.items()],
-                           color=[colour(name) for name in found])
-        panel.bar_label(drawn, [text(name, at) if at else '' for name, at in found.items()], padding=2, fontsize=6)
+        measured = {name: values.get((profile, name, SHOWN)) for name in SHOWN_FILTERS}
+        drawn = panel.barh(list(measured), [metric(name, at) if at else 0.0 for name, at in measured.items()],
+                           color=[colour(name) for name in measured])
+        panel.bar_label(drawn, [text(name, at) if at else '' for name, at in measured.items()], padding=2, fontsize=6)
         panel.margins(x=0.35)
         panel.locator_params(axis='x', nbins=3)
         panel.grid(axis='y', visible=False)
@@ -277,7 +279,7 @@ def rms_figure(values, on):
 
 
 def nis_figure(values, on):
-    """Mean NIS per degree of freedom of every filter; 1: it knows its errors."""
+    """Mean NIS per degree of freedom of every filter; 1 for a consistent one."""
     def nis(name, at):
         return at['nis_mean'][0] / freedom(name)
 
@@ -285,7 +287,7 @@ def nis_figure(values, on):
                           lambda name, at: f'{nis(name, at):.2f}')
     for panel in panels:
         panel.axvline(1.0, color=INK, linewidth=0.8)
-        panel.axvspan(*HONEST, color=INK, alpha=0.12, linewidth=0.0)
+        panel.axvspan(*CONSISTENT, color=INK, alpha=0.12, linewidth=0.0)
     return figure
 
 
@@ -306,7 +308,7 @@ def probabilities_figure(over_time, on):
 
 
 def noise_figure(values, on):
-    """Reduction of every filter under each noise: what it owes to the bandwidth of the receiver."""
+    """Reduction of every filter under each noise: its dependence on the bandwidth of the receiver."""
     figure, axes = drawing.panels(1, len(on), size=(1.6 + 1.9 * len(on), 3.8), sharey=True)
     for panel, profile in zip(axes[0], on):
         for noise, colour, marker in zip(NOISES, (RAW, RAW, FILTERED, FILTERED), 'o^o^'):

@@ -1,12 +1,12 @@
 """Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter against the IMM.
 
 The loop is `feedforward_loop`: 20 deg to and fro at 3.5 deg/s, a miss every 10 ms that is 40 ms old. `imm` feeds
-forward rate and acceleration as they were at the time of the miss, `imm-predicted` as they will be in the middle of
-the interval in which the command is in force, d + T / 2 later; `perfect-state` is told the truth of that instant. All
-filters see the same noise.
+forward rate and acceleration at the time of the miss, `imm-predicted` those predicted for the middle of the interval
+in which the command is in force, d + T / 2 later. `perfect-state` feeds forward the truth of that instant. All filters
+get the same noise.
 
-`drive-...` is the same through the product: receiver with the same latency, control unit, motors and gears, one run.
-There the target does nothing but turn round, one half cosine after the other, which is a sine.
+`drive-...` is one run through the product: receiver with that latency, control unit, motors and gears. Its target
+makes one reversal after the other, which is a sine.
 """
 import dataclasses
 import math
@@ -27,14 +27,14 @@ from pedestal_bringup.studies.rigs.feedforward_loop import (
     cv,
     filter_of,
     imm,
-    outcomes,
+    statistics,
 )
 from pedestal_bringup.studies.rigs.rows import Result, row
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.parameters import as_dict
 
 RUNS = 50
-"""Of each case, the noise drawn anew."""
+"""Runs of each case, with independent noise."""
 
 DRIVE_SECONDS, DRIVE_START, DRIVE_ELEVATION = 36.0, 6.0, 0.5
 """Of the runs through the product: duration, what of it is left to the hand-over to autotrack [s], where [rad]."""
@@ -43,7 +43,7 @@ CV = (0.1, 0.2, 0.3, 0.5, 4.0)
 """Process noises of the conventional filter [deg/s2/sqrt(Hz)]."""
 
 USUAL_CV = {'azimuth': 0.1, 'elevation': 0.3}
-"""The one that is `kalman-cv`: what comes nearest to the paper, which prints none."""
+"""The process noise of `kalman-cv`: the nearest to the paper's results, which prints none."""
 
 SOURCES = {
     'imm': imm(40.0, False), 'imm-predicted': imm(40.0, True), 'perfect-state': Source(None, True),
@@ -52,6 +52,7 @@ SOURCES = {
 
 
 def cv_name(axis, q):
+    """Name of the case of a conventional filter, q [deg/s2/sqrt(Hz)]."""
     return f'{axis}/kalman-cv' if q == USUAL_CV[axis] else f'{axis}/kalman-cv-{q:g}'
 
 
@@ -80,7 +81,8 @@ DRIVE_CASES = {
 
 
 def driven(case):
-    """(t, true error of the axis, each (n,) [s, rad]) of a Case while it counts; NaN if autotrack was left."""
+    """(times [s], true error of the axis [rad]), each (n,), of a Case from DRIVE_START on; errors NaN if autotrack was
+    left."""
     record = case.run()
     record = record.where(record.t >= DRIVE_START)
     error = record.truth['error'][:, list(REVERSALS).index(case.name)]
@@ -103,54 +105,54 @@ RATIOS = {'azimuth/imm': ('>= 4', 0.17 / 0.035), 'azimuth/imm-predicted': ('>= 6
 """Target and paper of how often the miss of kalman-cv is that of a case."""
 
 
-def conventional(found, axis):
+def conventional(misses, axis):
     """(rate noise [deg/s], miss [deg]) of the conventional filter, an array (2, n) over CV."""
-    return np.array([[found[cv_name(axis, q)].measures()[metric][0] for q in CV]
+    return np.array([[misses[cv_name(axis, q)].measures()[metric][0] for q in CV]
                      for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 
-def at_rate_noise(found, axis, rate_noise):
+def at_rate_noise(misses, axis, rate_noise):
     """Miss [deg] of a conventional filter tuned to a rate noise [deg/s], between those of CV (log-log)."""
-    curve = conventional(found, axis)
+    curve = conventional(misses, axis)
     return math.exp(np.interp(math.log(rate_noise), *np.log(curve)))
 
 
-def rows(found):
-    """The rows of {case: Outcome} of all cases."""
-    result = []
-    for name, outcome in found.items():
-        values, axis = outcome.measures(), outcome.axis
+def rows(misses):
+    """The rows of {case: MissStatistics} of all cases."""
+    table = []
+    for name, case in misses.items():
+        values, axis = case.measures(), case.axis
         miss = values['miss_rms_deg'][0]
-        result.append(row(name, 'miss_rms_deg', miss, 'deg', PAPER.get(name), TARGETS.get(name)))
-        result += [row(name, metric, value, unit) for metric, (value, unit) in values.items()
-                   if metric == 'rate_noise_deg_s' or metric != 'miss_rms_deg' and name in MAIN]
+        table.append(row(name, 'miss_rms_deg', miss, 'deg', PAPER.get(name), TARGETS.get(name)))
+        table += [row(name, metric, value, unit) for metric, (value, unit) in values.items()
+                  if metric == 'rate_noise_deg_s' or metric != 'miss_rms_deg' and name in MAIN]
         if name in RATIOS:
             target, paper = RATIOS[name]
-            result.append(row(name, 'miss_ratio_to_kalman_cv',
-                              found[f'{axis}/kalman-cv'].measures()['miss_rms_deg'][0] / miss, '', paper, target))
-            result.append(row(name, 'miss_ratio_at_equal_rate_noise',
-                              at_rate_noise(found, axis, values['rate_noise_deg_s'][0]) / miss, '', None,
-                              '>= 5' if axis == 'azimuth' and name.endswith('predicted') else None))
-    return result
+            table.append(row(name, 'miss_ratio_to_kalman_cv',
+                             misses[f'{axis}/kalman-cv'].measures()['miss_rms_deg'][0] / miss, '', paper, target))
+            table.append(row(name, 'miss_ratio_at_equal_rate_noise',
+                             at_rate_noise(misses, axis, values['rate_noise_deg_s'][0]) / miss, '', None,
+                             '>= 5' if axis == 'azimuth' and name.endswith('predicted') else None))
+    return table
 
 
-def drive_rows(driven):
-    """The rows of {name of DRIVE_CASES: (t, error)}."""
-    result = []
-    for name, (_, error) in driven.items():
-        result += [row(name, 'miss_rms_deg', math.degrees(metrics.rms(error)), 'deg'),
-                   row(name, 'miss_peak_deg', math.degrees(metrics.peak(error)), 'deg')]
+def drive_rows(runs_of_drive):
+    """The rows of {name of DRIVE_CASES: (times, errors)}."""
+    table = []
+    for name, (_, error) in runs_of_drive.items():
+        table += [row(name, 'miss_rms_deg', math.degrees(metrics.rms(error)), 'deg'),
+                  row(name, 'miss_peak_deg', math.degrees(metrics.peak(error)), 'deg')]
         usual = f'{name.partition("/")[0]}/drive-kalman-cv'
         if name != usual:
-            ratio = metrics.rms(driven[usual][1]) / metrics.rms(error)
-            result.append(row(name, 'miss_ratio_to_kalman_cv', ratio, '', 3.0, '>= 3'))
-    return result
+            ratio = metrics.rms(runs_of_drive[usual][1]) / metrics.rms(error)
+            table.append(row(name, 'miss_ratio_to_kalman_cv', ratio, '', 3.0, '>= 3'))
+    return table
 
 
-def remarks(found):
-    """What the rows do not say by themselves."""
-    value = {(name, metric): value for name, outcome in found.items()
-             for metric, (value, _) in outcome.measures().items()}
+def remarks(misses):
+    """Sentences that the rows need."""
+    value = {(name, metric): value for name, case in misses.items()
+             for metric, (value, _) in case.measures().items()}
     late = (feedforward_loop.DELAY + 0.5) * T
     steepest = math.pi * math.degrees(profiles.RATE) / REVERSALS['azimuth']
     return [
@@ -181,33 +183,33 @@ def remarks(found):
 COLOURS = {'kalman-cv': TRUTH, 'imm': MOTOR_1, 'imm-predicted': FILTERED, 'perfect-state': INK}
 
 
-def figures(found, through):
-    """{name: function that draws it} of all Outcomes and of the runs through the product."""
-    return {'azimuth': lambda: miss_figure('azimuth', 'figures 8 and 9', found),
-            'elevation': lambda: miss_figure('elevation', 'figures 10 and 11', found),
+def figures(misses, runs_of_drive):
+    """{name: function that draws it} of {case: MissStatistics} and the runs through the product, as of `driven`."""
+    return {'azimuth': lambda: miss_figure('azimuth', 'figures 8 and 9', misses),
+            'elevation': lambda: miss_figure('elevation', 'figures 10 and 11', misses),
             'feedforward': feedforward_figure, 'probabilities': probability_figure,
-            'tunings': lambda: tuning_figure(found), 'drive': lambda: drive_figure(through)}
+            'tunings': lambda: tuning_figure(misses), 'drive': lambda: drive_figure(runs_of_drive)}
 
 
-def from_first_turn(axis):
-    """(time [s] from the first step that counts on, which steps (n,) those are, the target (n, 3))."""
+def from_first_reversal(axis):
+    """(times (m,) [s] since the first step that counts, mask (n,) of those steps, the target (n, 3))."""
     t, target, period = feedforward_loop.motion(axis)
     counts = t >= 0.5 * period
     return t[counts] - 0.5 * period, counts, target
 
 
-def miss_figure(axis, those, found):
-    """The paper's figures of the miss, one run of each and the mean over the runs."""
+def miss_figure(axis, those, misses):
+    """The miss (`those` figures of the paper), one run of each and the mean over the runs."""
     names = ('kalman-cv', 'imm', 'imm-predicted')
     figure, axes = drawing.panels(len(names), size=(7.4, 6.4), sharex=True, sharey=True)
-    t, counts, _ = from_first_turn(axis)
+    t, counts, _ = from_first_reversal(axis)
     for name, panel in zip(names, axes[:, 0]):
         case = f'{axis}/{name}'
         one = feedforward_loop.steps_of(*CASES[case], 0, 1)['miss'][0, counts]
         panel.plot(t, np.degrees(one), color=RAW, linewidth=0.7, label='one run')
-        panel.plot(t, np.degrees(found[case].miss_mean[counts]), color=COLOURS[name], linewidth=1.4,
+        panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=COLOURS[name], linewidth=1.4,
                    label='mean of the runs')
-        panel.set_title(f'{name}: {found[case].measures()["miss_rms_deg"][0]:.3f} deg rms')
+        panel.set_title(f'{name}: {misses[case].measures()["miss_rms_deg"][0]:.3f} deg rms')
         panel.set_ylabel('miss [deg]')
         panel.legend(loc='upper right', ncols=2)
     axes[0, 0].set_title(f'{axis}, {those} of the paper. {axes[0, 0].get_title(loc="left")}')
@@ -216,9 +218,9 @@ def miss_figure(axis, those, found):
 
 
 def feedforward_figure():
-    """What is fed forward through one reversal, one run, beside the truth."""
+    """Rate and acceleration fed forward through one reversal, one run, beside the truth."""
     figure, axes = drawing.panels(2, size=(7.4, 5.4), sharex=True)
-    t, counts, target = from_first_turn('azimuth')
+    t, counts, target = from_first_reversal('azimuth')
     for panel, field, column, label in ((axes[0, 0], 'rate', 1, 'rate [deg/s]'),
                                         (axes[1, 0], 'acceleration', 2, 'acceleration [deg/s2]')):
         panel.plot(t, np.degrees(target[counts, column]), color=INK, linestyle='--', label='truth')
@@ -226,8 +228,8 @@ def feedforward_figure():
             one = feedforward_loop.steps_of(*CASES[f'azimuth/{name}'], 0, 1)[field][0, counts]
             panel.plot(t, np.degrees(one), color=COLOURS[name], label=name)
         panel.set_ylabel(label)
-    turn = t[np.argmax(np.abs(target[counts, 2]))]
-    axes[0, 0].set_xlim(turn - 1.5, turn + 2.5)
+    reversal = t[np.argmax(np.abs(target[counts, 2]))]
+    axes[0, 0].set_xlim(reversal - 1.5, reversal + 2.5)
     axes[0, 0].set_title('fed forward through a reversal of the azimuth')
     axes[0, 0].legend()
     axes[1, 0].set_xlabel('time [s]')
@@ -235,9 +237,9 @@ def feedforward_figure():
 
 
 def probability_figure():
-    """Which model the IMM believes in while the target turns, mean of one BATCH."""
+    """Model probabilities of the IMM through reversals, mean of one BATCH."""
     figure, axes = drawing.panels(2, size=(7.4, 4.6), sharex=True, height_ratios=(1, 1.6))
-    t, counts, target = from_first_turn('azimuth')
+    t, counts, target = from_first_reversal('azimuth')
     mu = feedforward_loop.steps_of(*CASES['azimuth/imm'], 0, feedforward_loop.BATCH)['mu'][:, counts].mean(axis=0)
     axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=INK)
     axes[0, 0].set_ylabel('acceleration\n[deg/s2]')
@@ -251,16 +253,16 @@ def probability_figure():
     return figure
 
 
-def tuning_figure(found):
-    """Miss against the noise of the rate that it is bought with."""
+def tuning_figure(misses):
+    """Miss against noise of the rate fed forward, over the tunings."""
     figure, axes = drawing.panels(1, 2, size=(7.4, 3.8), sharex=True, sharey=True)
     for axis, panel in zip(REVERSALS, axes[0]):
-        panel.loglog(*conventional(found, axis), '.-', color=TRUTH, label='kalman-cv, q '
+        panel.loglog(*conventional(misses, axis), '.-', color=TRUTH, label='kalman-cv, q '
                      f'{CV[0]:g} to {CV[-1]:g}')
         for name, colour, marker in (('kalman-ca-0.1', RAW, 'v'), ('kalman-ca-40-predicted', RAW, '^'),
                                      ('imm', MOTOR_1, 'o'), ('imm-predicted', FILTERED, 'o'),
                                      ('imm-b-predicted', MOTOR_2, 's')):
-            values = found[f'{axis}/{name}'].measures()
+            values = misses[f'{axis}/{name}'].measures()
             panel.loglog(values['rate_noise_deg_s'][0], values['miss_rms_deg'][0], marker, color=colour, label=name)
         panel.set_title(axis)
         panel.set_xlim(0.015, 1.0)
@@ -271,12 +273,12 @@ def tuning_figure(found):
     return figure
 
 
-def drive_figure(through):
+def drive_figure(runs_of_drive):
     """Miss of the product in reversals without a pause, each filter."""
     figure, axes = drawing.panels(2, size=(7.4, 4.8), sharex=True)
     for axis, panel in zip(REVERSALS, axes[:, 0]):
         for name, colour in (('kalman-cv', TRUTH), ('imm', MOTOR_1), ('imm-default', FILTERED)):
-            t, miss = through[f'{axis}/drive-{name}']
+            t, miss = runs_of_drive[f'{axis}/drive-{name}']
             panel.plot(t, np.degrees(miss), color=colour, label=name)
         panel.set_xlim(DRIVE_START, DRIVE_START + 8.0)
         panel.set_ylabel('miss [deg]')
@@ -287,7 +289,8 @@ def drive_figure(through):
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
-    found = outcomes(CASES, runs, pool or monte_carlo.Pool(1), progress)
+    """Run CASES `runs` times and DRIVE_CASES once; pool: monte_carlo.Pool, None for this process."""
+    misses = statistics(CASES, runs, pool or monte_carlo.Pool(1), progress)
     progress(None, 'the whole chain')
-    through = {name: driven(case) for name, case in DRIVE_CASES.items()}
-    return Result(rows(found) + drive_rows(through), figures(found, through), remarks(found))
+    runs_of_drive = {name: driven(case) for name, case in DRIVE_CASES.items()}
+    return Result(rows(misses) + drive_rows(runs_of_drive), figures(misses, runs_of_drive), remarks(misses))

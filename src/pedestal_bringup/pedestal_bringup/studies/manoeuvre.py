@@ -1,8 +1,8 @@
 """Manoeuvre: rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
 
-A target goes to and fro through 20 deg at 3.5 deg/s and turns round in half a cosine of 4, 2, 1, 0.5, 0.35 s, one
-after the other; measured at 100 Hz with 0.02 deg. Cases reversal-<s>/<filter>: rms over all runs inside the reversal.
-cv and ca are conventional filters, imm-a and imm-b those of the study imm-feedforward.
+A target moves to and fro through 20 deg at 3.5 deg/s with reversals of half a cosine that last 4, 2, 1, 0.5 and
+0.35 s, one after the other; it is measured at 100 Hz with 0.02 deg. Cases reversal-<s>/<filter>: rms over all runs
+inside the reversal. cv and ca are conventional filters, imm-a and imm-b those of the study imm-feedforward.
 """
 import math
 
@@ -36,87 +36,89 @@ RATIO_TARGET = '>= 3'
 
 
 def motion():
-    """(t (n,) [s], (angle, rate, acceleration) (n,), {reversal: where (n,) the target turns}) of all reversals."""
+    """(times (n,) [s], truth (angle, rate, acceleration), each (n,), {reversal: mask (n,) of it}) of all reversals."""
     stroke, rate = profiles.STROKE, profiles.RATE
-    begin, starts, turns = LEAD, [], {}
+    begin, legs, starts = LEAD, [], {}
     for reversal in REVERSALS:
         uniform = stroke / rate - 2.0 * reversal / math.pi
-        starts.append(begin)
-        turns[reversal] = begin + 0.5 * uniform
+        legs.append(begin)
+        starts[reversal] = begin + 0.5 * uniform
         begin += uniform + reversal
     t = ensemble.PERIOD * np.arange(round(begin / ensemble.PERIOD))
     truth = np.array([rate * (t - LEAD), np.full(len(t), rate), np.zeros(len(t))])
-    for i, (reversal, begin) in enumerate(zip(REVERSALS, starts)):
+    for i, (reversal, begin) in enumerate(zip(REVERSALS, legs)):
         later = t >= begin
         truth[:, later] = (-1.0) ** i * np.array(profiles.s_motion(t[later] - begin, stroke, rate, reversal))
-    return t, tuple(truth), {reversal: (t >= turn) & (t <= turn + reversal) for reversal, turn in turns.items()}
+    return t, tuple(truth), {reversal: (t >= start) & (t <= start + reversal) for reversal, start in starts.items()}
 
 
 def batch(item):
-    """MOMENTS (n,) of an item (filter, first run, how many)."""
+    """MOMENTS (n,) of an item (filter, first run, number of runs)."""
     name, first, count = item
     t, truth, _ = motion()
     return ensemble.moments(FILTERS[name], t, truth, NOISE, ensemble.records(truth, NOISE, SEED, first, count))
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
+    """Filter `runs` noisy records with each of FILTERS; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH)]
-    found = {}
+    sums_of = {}
     for (name, *_), sums in zip(items, pool.map(batch, items, progress)):
-        found[name] = ensemble.added(found[name], sums) if name in found else sums
-    values = measured(found)
-    figures = {'figure-3': lambda: rate_figure(found), 'figure-4': lambda: acceleration_figure(found),
+        sums_of[name] = ensemble.added(sums_of[name], sums) if name in sums_of else sums
+    values = measured(sums_of)
+    figures = {'figure-3': lambda: rate_figure(sums_of), 'figure-4': lambda: acceleration_figure(sums_of),
                'sharpness': lambda: sharpness_figure(values)}
     return Result(rows(values), figures, remarks(values))
 
 
-def measured(found):
+def measured(sums_of):
     """{(reversal, filter): (rms of rate [deg/s], rms of acceleration [deg/s2])} inside the reversals."""
-    _, _, turning = motion()
+    _, _, reversals = motion()
     return {(reversal, name): tuple(math.degrees(ensemble.rms(ensemble.total(sums[inside]), what).item())
                                     for what in ('rate', 'acceleration'))
-            for reversal, inside in turning.items() for name, sums in found.items()}
+            for reversal, inside in reversals.items() for name, sums in sums_of.items()}
 
 
 def rows(values):
-    found = []
+    """The rows of values as of `measured`."""
+    table = []
     for (reversal, name), (rate, acceleration) in values.items():
         case = f'reversal-{reversal:g}s/{name}'
-        found += [row(case, 'rate_rms_deg_s', rate, 'deg/s'),
+        table += [row(case, 'rate_rms_deg_s', rate, 'deg/s'),
                   row(case, 'acceleration_rms_deg_s2', acceleration, 'deg/s2')]
         if name != 'cv':
             cv = values[reversal, 'cv']
-            found += [row(case, 'rate_ratio_of_cv', cv[0] / rate, '', None, RATIO_TARGET if name == 'imm-b' else None),
+            table += [row(case, 'rate_ratio_of_cv', cv[0] / rate, '', None, RATIO_TARGET if name == 'imm-b' else None),
                       row(case, 'acceleration_ratio_of_cv', cv[1] / acceleration, '')]
-    return found
+    return table
 
 
 def peak_acceleration(reversal):
-    """Of a reversal [deg/s2]."""
+    """Peak acceleration [deg/s2] of a reversal of this duration [s]."""
     return math.pi * math.degrees(profiles.RATE) / reversal
 
 
 def remarks(values):
-    """What the rows do not say by themselves."""
+    """Sentences that the rows need; values as of `measured`."""
     worse = [f'{peak_acceleration(reversal):.1f}' for reversal in REVERSALS
              if values[reversal, 'imm-a'][1] > values[reversal, 'cv'][1]]
-    found = ['_ratio_of_cv: how many times the error of cv is that of the filter. cv has no acceleration: its error '
+    lines = ['_ratio_of_cv: how many times the error of cv is that of the filter. cv has no acceleration: its error '
              'is the acceleration itself.']
     if worse:
-        found.append(f'The acceleration of imm-a, tuned for the miss, is worse than the zero of cv in reversals of '
+        lines.append(f'The acceleration of imm-a, tuned for the miss, is worse than the zero of cv in reversals of '
                      f'{", ".join(worse)} deg/s2: it is no estimate of the acceleration there.')
-    return found
+    return lines
 
 
-def _panels(found, what, label, names):
-    """Truth and mean estimates above, mean errors +-1 sigma below."""
-    t, truth, turning = motion()
+def _panels(sums_of, what, label, names):
+    """Truth and mean estimates above, mean errors +-1 sigma below; sums_of: {filter: MOMENTS (n,)}."""
+    t, truth, _ = motion()
     figure, axes = drawing.panels(2, size=(7.4, 5.4), sharex=True)
     of = truth[('angle', 'rate', 'acceleration').index(what)]
     axes[0, 0].plot(t, np.degrees(of), color=INK, linestyle='--', linewidth=0.8, label='truth')
     for name in names:
-        sums = found[name]
+        sums = sums_of[name]
         mean = sums[what] / sums['runs']
         sigma = np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - mean * mean, 0.0))
         axes[0, 0].plot(t, np.degrees(of + mean), color=COLOURS[name], label=name)
@@ -131,14 +133,14 @@ def _panels(found, what, label, names):
     return figure
 
 
-def rate_figure(found):
+def rate_figure(sums_of):
     """Rate through the reversals and its error, mean of the runs and +-1 sigma (paper 003, figure 3)."""
-    return _panels(found, 'rate', 'rate [deg/s]', ('cv', 'imm-b'))
+    return _panels(sums_of, 'rate', 'rate [deg/s]', ('cv', 'imm-b'))
 
 
-def acceleration_figure(found):
+def acceleration_figure(sums_of):
     """Acceleration through the reversals and its error (paper 003, figure 4)."""
-    return _panels(found, 'acceleration', 'acceleration [deg/s2]', ('cv', 'imm-b'))
+    return _panels(sums_of, 'acceleration', 'acceleration [deg/s2]', ('cv', 'imm-b'))
 
 
 def sharpness_figure(values):

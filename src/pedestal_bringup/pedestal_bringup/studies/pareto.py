@@ -1,8 +1,8 @@
 """Pareto: miss against rate noise over the tunings of every filter, the fair comparison of paper 003's feed-forward.
 
-The loop of the study imm-feedforward, azimuth, prediction over the delay for all. Any filter misses little if it may
-be noisy; so each is tuned from sluggish to lively, and what counts is its curve. Cases <filter>: the miss where the
-curve has the rate noise of imm, and the rate noise where it has the miss of imm.
+The loop of the study imm-feedforward, azimuth, prediction over the delay for all. Any filter has a small miss if its
+rate may be noisy; so each is tuned from low to high bandwidth, and the curves are compared. Cases <filter>: the miss
+where the curve has the rate noise of imm, and the rate noise where it has the miss of imm.
 """
 import dataclasses
 import math
@@ -48,20 +48,21 @@ TARGET = '>= 5'
 
 def cases():
     """{(filter, value): (axis, Source)}, and the reference."""
-    found = {(name, value): (AXIS, dataclasses.replace(source(value), predicted=True))
+    tunings = {(name, value): (AXIS, dataclasses.replace(source(value), predicted=True))
              for name, (_, values, source) in TUNINGS.items() for value in values}
-    return found | {('reference', 0.0): (AXIS, REFERENCE)}
+    return tunings | {('reference', 0.0): (AXIS, REFERENCE)}
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
-    found = feedforward_loop.outcomes(cases(), runs, pool or monte_carlo.Pool(1), progress)
-    points = {case: measured(outcome) for case, outcome in found.items()}
+    """Run every tuning `runs` times; pool: monte_carlo.Pool, None for this process."""
+    misses = feedforward_loop.statistics(cases(), runs, pool or monte_carlo.Pool(1), progress)
+    points = {case: measured(misses[case]) for case in misses}
     return Result(rows(points), {'miss': lambda: miss_figure(points)}, remarks(points))
 
 
-def measured(outcome):
-    """(noise of a uniform rate [deg/s], miss rms [deg])."""
-    values = outcome.measures()
+def measured(statistics):
+    """(noise of a uniform rate [deg/s], miss rms [deg]) of a MissStatistics."""
+    values = statistics.measures()
     return values['rate_noise_deg_s'][0], values['miss_rms_deg'][0]
 
 
@@ -71,62 +72,63 @@ def curve(points, name):
 
 
 def frontier(points, name):
-    """The part of the curve that is worth having: less miss for more rate noise, (2, n) by rising noise."""
-    found = []
+    """The Pareto frontier of the curve, (2, n) by rising noise: less miss for more rate noise."""
+    kept = []
     for noise, miss in sorted(map(tuple, curve(points, name).T)):
-        if not found or miss < found[-1][1]:
-            found.append((noise, miss))
-    return np.array(found).T
+        if not kept or miss < kept[-1][1]:
+            kept.append((noise, miss))
+    return np.array(kept).T
 
 
 def miss_at(front, noise):
-    """Miss on a frontier at a rate noise that it comes down to, log-log between its points."""
+    """Miss [deg] on a frontier at a rate noise [deg/s] inside it, log-log between its points."""
     return math.exp(np.interp(math.log(noise), *np.log(front)))
 
 
 def noise_at(front, miss):
-    """Rate noise on a frontier at a miss that it comes down to."""
+    """Rate noise [deg/s] on a frontier at a miss [deg] inside it, log-log between its points."""
     noises, misses = np.log(front)
     return math.exp(np.interp(math.log(miss), misses[::-1], noises[::-1]))
 
 
 def rows(points):
+    """The rows of points {(filter, value): (rate noise [deg/s], miss [deg])}."""
     noise, miss = points['reference', 0.0]
-    found = [row('imm-predicted', 'miss_rms_deg', miss, 'deg'),
+    table = [row('imm-predicted', 'miss_rms_deg', miss, 'deg'),
              row('imm-predicted', 'rate_noise_deg_s', noise, 'deg/s')]
     for name in TUNINGS:
         front = frontier(points, name)
-        found += [row(name, 'least_miss_deg', front[1, -1], 'deg'),
+        table += [row(name, 'least_miss_deg', front[1, -1], 'deg'),
                   row(name, 'rate_noise_at_least_miss_deg_s', front[0, -1], 'deg/s')]
         if front[0, 0] <= noise:
             equal = miss_at(front, noise)
-            found += [row(name, 'miss_at_equal_rate_noise_deg', equal, 'deg'),
+            table += [row(name, 'miss_at_equal_rate_noise_deg', equal, 'deg'),
                       row(name, 'miss_ratio_at_equal_rate_noise', equal / miss, '', None,
                           TARGET if name == 'cv' else None)]
         if front[1, -1] <= miss:
-            found.append(row(name, 'rate_noise_at_equal_miss_deg_s', noise_at(front, miss), 'deg/s'))
-    return found
+            table.append(row(name, 'rate_noise_at_equal_miss_deg_s', noise_at(front, miss), 'deg/s'))
+    return table
 
 
 def remarks(points):
-    """What the rows do not say by themselves."""
+    """Sentences that the rows need; points as of `rows`."""
     tuned = '; '.join(f'{name}: {what} {values[0]:g} to {values[-1]:g}'
                       for name, (what, values, _) in TUNINGS.items())
     noise, miss = points['reference', 0.0]
     loud = [name for name in TUNINGS if frontier(points, name)[0, 0] > noise]
     never = [name for name in TUNINGS if frontier(points, name)[1, -1] > miss]
-    found = [f'Every filter is predicted to the instant of its command; tuned are {tuned}. The rows read the curves '
+    lines = [f'Every filter is predicted to the instant of its command; tuned are {tuned}. The rows read the curves '
              'at the rate noise and the miss of imm-predicted (study imm-feedforward), straight between two tunings '
              'on logarithmic scales.']
     if loud:
-        found.append(f'No tuning of {", ".join(loud)} has as little rate noise as imm-predicted.')
+        lines.append(f'No tuning of {", ".join(loud)} has as little rate noise as imm-predicted.')
     if never:
-        found.append(f'No tuning of {", ".join(never)} misses as little as imm-predicted, whatever its rate noise.')
-    return found
+        lines.append(f'No tuning of {", ".join(never)} misses as little as imm-predicted, whatever its rate noise.')
+    return lines
 
 
 def miss_figure(points):
-    """Miss against the rate noise that it is bought with, a curve for every filter."""
+    """Miss against rate noise, a curve for every filter."""
     figure, axes = drawing.panels(1, size=(7.4, 4.8))
     panel = axes[0, 0]
     for name, colour in COLOURS.items():

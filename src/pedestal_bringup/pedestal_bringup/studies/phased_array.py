@@ -1,9 +1,9 @@
 """Paper 002's angle loop of a phased array: figures 3 to 7 and 9, where it becomes unstable or is lost, a better loop.
 
-Cases are of the kernels in `angle_loop`, but for graph/..., which are the scenario phased_array_sway through the
-composed cores. S0, S1, S2: without smoothing, with the paper's recursion, with a moving average, n = 20 at 1 kHz; a
-case that names none has S1. lag_deg is what the receiver reads (the paper's figures), true_lag_deg how far the beam is
-off where it is worst. Noise: 0.05 deg in each millisecond; max_error_deg is without it, jitter_rms_deg what it does.
+Cases run the kernels of `angle_loop`, except graph/..., which are the scenario phased_array_sway in the closed loop.
+S0, S1, S2: without smoothing, with the paper's recursion, with a moving average, n = 20 at 1 kHz; a case that names
+none has S1. lag_deg is the largest error the receiver reads (the paper's figures), true_lag_deg the largest true error
+of the beam. Noise: 0.05 deg in each millisecond; max_error_deg is without it, jitter_rms_deg is caused by it.
 """
 import dataclasses
 import functools
@@ -41,7 +41,7 @@ SWAY, SWAY_PERIOD = math.radians(10.0), 8.0
 
 DELTAS = (0.0, 0.85, 1.0)
 DELAY = 20
-"""Of figure 7 and of all that is compared with the better loop [ms]."""
+"""Delay of figure 7 and of all loops of LOOPS [ms]."""
 
 NOISE, INS_ANGLE, INS_RATE = math.radians(0.05), math.radians(0.005), math.radians(0.01)
 """1-sigma of one millisecond: the receiver's, the INS's attitude and rate [rad, rad/s]."""
@@ -50,7 +50,7 @@ LATE = 5
 """Stamp error of the INS [ms]."""
 
 SECONDS, SETTLED = 60.0, 30.0
-"""Length of a record of a moving target, and where what is measured begins [s]."""
+"""Length of a record of a moving target, and the time from which it is evaluated [s]."""
 
 BEAMWIDTH = math.radians(1.0)
 """Of the array where the loop is lost."""
@@ -68,7 +68,7 @@ LOOPS = {
     'fast': Better(jerk(1.0), NOISE), 'faster': Better(jerk(10.0), NOISE),
     'best-delay-150ms': Better(jerk(0.1), NOISE, delay=150),
     'best-told-10ms-less': Better(jerk(0.1), NOISE, known=DELAY - 10)}
-"""Loops on the same plant. The paper's filter with the ship's rate; its type-2 form; constant-acceleration filters on
+"""Loops on one plant. The paper's filter with the ship's rate; its type-2 form; constant-acceleration filters on
 beam in force + error, predicted to the middle of the interval, steered every 1 ms (tracked-10ms: every 10 ms)."""
 
 INS_LOOPS = {
@@ -119,44 +119,45 @@ def instants(seconds):
 
 
 def sine(t, amplitude, w):
-    """(angle, rate) of a sine (n,)."""
+    """(angle, rate), each (n,), of a sine at times t (n,) [s]; w [rad/s]."""
     return amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
 
 
 def ramp_target(rate):
+    """Angle (n,) [rad] of figure 6's ramp; rate [deg/s]."""
     return math.radians(rate) * instants(SECONDS)
 
 
 def sine_target(rate=SINE_RATE):
-    """Figure 7's, with another largest rate [deg/s] at the same frequency."""
+    """Angle (n,) [rad] of figure 7's sine, of any largest rate [deg/s] at its frequency."""
     w = SINE_ACCELERATION / SINE_RATE
     return sine(instants(SECONDS), math.radians(rate) / w, w)[0]
 
 
 def sway_target():
-    """(angle, rate) of the line of sight on the swaying deck."""
+    """(angle [rad], rate [rad/s]), each (n,), of the line of sight on the swaying deck."""
     return sine(instants(SECONDS), SWAY, 2.0 * math.pi / SWAY_PERIOD)
 
 
 def settled(x):
-    """What counts of a record."""
+    """The part of a record (n,) that is evaluated."""
     return x[round(SETTLED / GRID):]
 
 
 def isolation(error):
-    """Of the ship's sway [dB] where that much error [rad] is left."""
+    """Isolation [dB] from the ship's sway with a remaining error [rad]."""
     return -20.0 * math.log10(error / SWAY)
 
 
 def name(loop):
-    """The part of a step's case that says which loop."""
+    """The name of a Paper in the names of cases."""
     parts = [f'alpha={loop.alpha:g}', f'T={loop.period}ms', loop.smoothing]
     parts += [f'slope={loop.slope:g}'] * (loop.slope != 1.0) + [f'delay={loop.delay}ms'] * (loop.delay > 0)
     return '/'.join(parts)
 
 
 def steps():
-    """{Paper: beam (n,) over the size of the step} from rest; the step comes at sample 0."""
+    """{Paper: step response (n,) of the beam, over the size of the step} from rest; the step is at sample 0."""
     loops = [Paper(alpha, T, smoothing=S) for alpha in ALPHAS for T in PERIODS for S in SMOOTHINGS]
     loops += [Paper(delay=delay, smoothing=S) for delay in DELAYS[1:] for S in SMOOTHINGS]
     loops += [Paper(slope=slope) for slope in SLOPES if slope != 1.0]
@@ -166,6 +167,7 @@ def steps():
 
 
 def step_rows(done):
+    """Rows (case, metric, value, unit) of step responses {Paper: (n,)}."""
     rows = []
     for loop, y in done.items():
         case = f'step/{name(loop)}'
@@ -177,7 +179,7 @@ def step_rows(done):
 
 
 def eigenvalue_limit(loop, near):
-    """Largest delay in ms with all eigenvalues of the loop inside the unit circle, looked for from `near`."""
+    """Largest delay [ms] with all eigenvalues of a Paper inside the unit circle; the search starts at `near` [ms]."""
     def inside(delay):
         return spectral_radius(dataclasses.replace(loop, delay=delay)) < 1.0
 
@@ -192,23 +194,25 @@ def limits():
     """{Paper: (largest stable delay by bisection, by eigenvalues) [ms]}."""
     loops = [Paper(alpha, T, smoothing=S) for alpha in ALPHAS for T in PERIODS for S in SMOOTHINGS]
     loops += [Paper(slope=slope) for slope in SLOPES if slope != 1.0] + [Paper(form='type_2')]
-    found = {}
+    delays = {}
     for loop in loops:
         limit = delay_limit(loop)
-        found[loop] = limit, eigenvalue_limit(loop, limit)
-    return found
+        delays[loop] = limit, eigenvalue_limit(loop, limit)
+    return delays
 
 
-def limit_rows(found):
+def limit_rows(delays):
+    """Rows (case, metric, value, unit) of `limits`."""
     rows = []
-    for loop, (bisected, by_eigenvalues) in found.items():
+    for loop, (bisected, by_eigenvalues) in delays.items():
         case = f'delay-limit/{name(loop)}' + ('/type-2' if loop.form == 'type_2' else '')
         rows += [(case, 'delay_ms', bisected, 'ms'), (case, 'eigenvalue_delay_ms', by_eigenvalues, 'ms')]
     return rows
 
 
 def lag_rows(case, loop, target, rate=None):
-    """Reading of the receiver, and the beam's true error with each smoothing."""
+    """Rows of the error the receiver reads, and of the beam's true error with each smoothing; arguments of
+    Paper.run."""
     rows = [(case, 'lag_deg', math.degrees(peak(settled(loop.run(target, rate)[1]))), 'deg')]
     for S in SMOOTHINGS:
         beam, _ = dataclasses.replace(loop, smoothing=S).run(target, rate)
@@ -217,7 +221,7 @@ def lag_rows(case, loop, target, rate=None):
 
 
 def moving_rows():
-    """Figures 6, 7 and 9."""
+    """Rows of figures 6, 7 and 9."""
     rows = []
     for T, rates in zip(PERIODS, (RATES, (30,))):
         for rate in rates:
@@ -225,32 +229,33 @@ def moving_rows():
     rows += lag_rows('sine', Paper(delay=DELAY), sine_target())
     target, rate = sway_target()
     for delta in DELTAS:
-        found = lag_rows(f'sway/delta={delta:g}', Paper(delta=delta), target, rate)
-        rows += found
+        lags = lag_rows(f'sway/delta={delta:g}', Paper(delta=delta), target, rate)
+        rows += lags
         rows += [(case, 'isolation_db' if metric == 'lag_deg' else 'true_isolation_db', isolation(math.radians(lag)),
-                  'dB') for case, metric, lag, _ in found]
+                  'dB') for case, metric, lag, _ in lags]
     return rows
 
 
 def noises():
-    """(receiver, INS attitude, INS rate) (n,) of one seed."""
+    """Noise of the receiver [rad], of the INS's attitude [rad] and rate [rad/s], each (n,), of one seed."""
     rng = np.random.default_rng(1)
     return [sigma * rng.standard_normal(round(SECONDS / GRID)) for sigma in (NOISE, INS_ANGLE, INS_RATE)]
 
 
 def compared_targets():
+    """{name: angle (n,) [rad]} of the targets of LOOPS."""
     return {'ramp': ramp_target(30.0), 'sine': sine_target(), 'sway': sway_target()[0]}
 
 
 def at_ends(error, target):
-    """Largest error of a beam off a target (n,) at the ends of the milliseconds, from the error (n,) in their middles:
-    the target goes on half-way to its neighbours."""
+    """Largest error [rad] at the ends of the milliseconds, from the error (n,) in their middles: by then the target
+    (n,) has moved half-way to its neighbours."""
     half = 0.5 * np.diff(target)
     return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))
 
 
 def compared(progress):
-    """{case: (true error without noise (n,), jitter (n,)) [rad]} of all loops on all targets."""
+    """{case: (true error without noise, jitter), each (n,) [rad]} of all loops on all targets."""
     noise, ins_angle, ins_rate = noises()
     sway, rate = sway_target()
     targets, done = compared_targets(), {}
@@ -268,6 +273,7 @@ def compared(progress):
 
 
 def compared_rows(done):
+    """Rows (case, metric, value, unit) of `compared`."""
     rows, targets = [], compared_targets()
     for case, (error, jitter) in done.items():
         worst, at_the_ends = peak(settled(error)), at_ends(error, targets[case.split('/')[1].removesuffix('-ins')])
@@ -283,28 +289,28 @@ def compared_rows(done):
 RECEIVERS = {
     'half-beamwidth': 0.5,
     'pattern': 10.0**(0.1 * (ReceiverParameters().lose_level_dbhz - ReceiverParameters().cn0_dbhz))}
-"""What is left of the power where a receiver loses the signal: at half a beamwidth; where ours does as it comes."""
+"""Power, over that on axis, at which a receiver loses the signal: at half a beamwidth; at ours with its defaults."""
 
 
 def losing(kind, form):
-    """The paper's loop with a kind of RECEIVERS."""
+    """The Paper of a form with a kind of RECEIVERS."""
     return Paper(delay=DELAY, form=form, beamwidth=BEAMWIDTH, lost=RECEIVERS[kind])
 
 
 def from_rest(rate):
-    """The sine target of a largest rate [deg/s] from one of its ends on, where it stands."""
+    """Angle (n,) [rad] of the sine target of a largest rate [deg/s], starting at rest from one of its ends."""
     w = SINE_ACCELERATION / SINE_RATE
     return math.radians(rate) / w * (1.0 - np.cos(w * np.maximum(instants(SECONDS), 0.0)))
 
 
 def kept(loop, rate):
-    """Whether a loop still has the sine of this largest rate [deg/s] in its beam in the end."""
+    """Whether a Paper keeps the sine of this largest rate [deg/s] in its beam to the end."""
     target = from_rest(rate)
     return peak(settled(target - loop.run(target)[0])) < BEAMWIDTH
 
 
 def largest_kept(loop):
-    """The largest rate [deg/s] of the sine a loop keeps, by bisection."""
+    """The largest rate [deg/s] of the sine that a Paper keeps, by bisection."""
     low, high = 1.0, 400.0
     while high - low > 0.05:
         middle = 0.5 * (low + high)
@@ -313,7 +319,7 @@ def largest_kept(loop):
 
 
 def loss_rows():
-    """The largest rate of the sine a loop keeps, and how far off a linear receiver would have the beam then."""
+    """Rows of the largest rate of the sine that a loop keeps, and of the error with a linear receiver at that rate."""
     rows = []
     for form in ('type_1', 'type_2'):
         for kind in RECEIVERS:
@@ -330,14 +336,14 @@ PAPERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth', 'elevation')
           for key, value in (('form', 'type_1'), ('rate_compensation', 0.85))}
 
 GRAPH = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001}, 'graph/T=10ms/paper-delta': PAPERS}
-"""{case: parameters of the scenario phased_array_sway}: steered as it comes, every 1 ms, and the paper's loop."""
+"""{case: parameters of the scenario phased_array_sway}: its own, steered every 1 ms, and the paper's loop."""
 
 QUIET = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_noise': 0.0, 'ins.heading_noise': 0.0,
          'ins.rate_noise': 0.0}
 
 
 def graph_case(case, quiet=False):
-    """The Case of one of GRAPH, quiet: without noise in receiver and INS, but with the gains it has with them."""
+    """The Case of one of GRAPH; quiet: without noise in receiver and INS, but with the gains of the noisy case."""
     noisy = Case(case, 'phased_array_sway', GRAPH[case])
     if not quiet:
         return noisy
@@ -347,7 +353,7 @@ def graph_case(case, quiet=False):
 
 
 def graph_rows(progress):
-    """Cross-elevation and elevation together, at both ends of the intervals; the first 10 s are left to settle."""
+    """Rows of GRAPH: cross-elevation and elevation together, at both ends of the intervals, after 10 s of settling."""
     rows = []
     for i, case in enumerate(GRAPH):
         progress(0.75 + 0.25 * i / len(GRAPH), case)
@@ -362,18 +368,18 @@ def graph_rows(progress):
 
 
 def readings(loops, target, rate=None):
-    """{label: {S: (reading, true error (n,))}} of loops {label: Paper}."""
-    found = {}
+    """{label: {S: (error the receiver reads, true error), each (n,) [rad]}} of loops {label: Paper}."""
+    errors = {}
     for label, loop in loops.items():
-        found[label] = {}
+        errors[label] = {}
         for S in SMOOTHINGS:
-            beam, seen = dataclasses.replace(loop, smoothing=S).run(target, rate)
-            found[label][S] = seen, target - beam
-    return found
+            beam, read = dataclasses.replace(loop, smoothing=S).run(target, rate)
+            errors[label][S] = read, target - beam
+    return errors
 
 
 def drawings(done, limit, errors):
-    """{file name: function that draws it}."""
+    """{file name: function that draws it}; arguments as of `steps`, `limits` and `compared`."""
     def of(**fixed):
         return {loop: y for loop, y in done.items() if loop.slope == 1.0
                 and all(getattr(loop, field) == value for field, value in fixed.items())}
@@ -394,7 +400,7 @@ def drawings(done, limit, errors):
         'figure-5': draw(figures.steps, of(alpha=0.1, period=10), lambda loop: f'delay {loop.delay} ms',
                          'figure 5: delay, alpha 0.1, T = 10 ms', 2.0),
         'figure-6-left': draw(figures.lags, {**ramps[10], **ramps[5]}, 'figure 6, left: 30 deg/s', (0.0, 1.5)),
-        'figure-6-right': draw(figures.lags, {label: lag for found in rates for label, lag in found.items()},
+        'figure-6-right': draw(figures.lags, {label: lag for lags in rates for label, lag in lags.items()},
                                'figure 6, right: rates, T = 10 ms', (0.0, 1.5)),
         'figure-7': draw(figures.lags, readings({'sine': Paper(delay=DELAY)}, sine_target()),
                          'figure 7: sine of 30 deg/s and 10 deg/s2, delay 20 ms', (20.0, 58.0)),
@@ -406,21 +412,22 @@ def drawings(done, limit, errors):
 
 
 def run(progress) -> Result:
+    """Run all loops on all targets."""
     progress(0.0, 'steps')
     done = steps()
-    found = step_rows(done)
+    table = step_rows(done)
     progress(0.1, 'delays until the loop is unstable')
     limit = limits()
-    found += limit_rows(limit)
+    table += limit_rows(limit)
     progress(0.4, 'ramps, sine, sway')
-    found += moving_rows()
+    table += moving_rows()
     errors = compared(progress)
-    found += compared_rows(errors)
+    table += compared_rows(errors)
     progress(0.7, 'beams that lose the target')
-    found += loss_rows()
-    found += graph_rows(progress)
+    table += loss_rows()
+    table += graph_rows(progress)
     rows = [row(case, metric, value, unit, PAPER.get((case, metric)), TARGETS.get((case, metric)))
-            for case, metric, value, unit in found]
+            for case, metric, value, unit in table]
     shown = [r for r in rows if r['target'] is not None or r['case'].startswith(('graph/', 'loss/'))
              or (r['case'].startswith('best/') and r['metric'].startswith('ends_'))]
     return Result(rows, drawings(done, limit, errors), REMARKS, shown)

@@ -1,13 +1,13 @@
 """What an independent measurement of the rate does for the filter (paper 004): bandwidth and dynamic error.
 
 The 'current' statistical filter with constant sigma_a and noises settles to constant gains: X+ = A X + B (y, y'),
-read off the compiled filter itself, one unit state and one unit measurement at a time. A sine y = e^jwt, y' = jw y
-then gives
+identified on the compiled filter itself, one unit state and one unit measurement at a time. A sine y = e^jwt, y' = jw
+y then gives
 
     G(jw) = (1 - A e^-jwT)^-1 B (1, jw)',        angle: G_1,  rate: G_2 / jw,  dynamic error: |1 - G_1|.
 
-The rate has its bandwidth where |G_2 / jw| first falls below -3 dB; with enough weight on the measured rate the angle
-never does, the pair being a complementary filter.
+The bandwidth of the rate is where |G_2 / jw| first falls below -3 dB. With enough weight on the measured rate |G_1|
+never does: the two measurements make a complementary filter.
 """
 import dataclasses
 import math
@@ -60,7 +60,7 @@ SKIPPED = 5.0
 """Of the flyby, for the filter to settle [s]."""
 
 DIFFERENCED = {'differenced-1': 1, 'differenced-20': 20}
-"""Rates made of the same measured angles: over so many T."""
+"""Rates from differences of the measured angles, over this many T."""
 
 BATCH, SEED = 25, 1
 """Flybys of one piece of work, and of their noise."""
@@ -74,7 +74,7 @@ def filter_of(a_max, floor):
 
 @compiled
 def _settle(f, c, rate, R_rate, steps):
-    """Steps on a target at rest; rate: 0 measured, NaN none."""
+    """Run the filter for `steps` on a target at rest; rate: 0 where it is measured, else NaN."""
     axis_filter.start(f[0], c[0], 0.0, SIGMA * SIGMA, 1.0)
     for _ in range(steps):
         axis_filter.predict(f[0], c[0], T)
@@ -140,20 +140,22 @@ CASES = {name if sigma_a == MAIN else f'{name}/sigma_a-{sigma_a:g}': (sigma_a, r
 
 
 def differenced(y, steps):
-    """(rate (n,), its variance) of angles y (n,) less those `steps` before; NaN before there are such."""
+    """(rate (n,) [rad/s], its variance) from differences of angles y (n,) [rad] over `steps` T; NaN in the first
+    steps."""
     rate = np.full(len(y), math.nan)
     rate[steps:] = (y[steps:] - y[:-steps]) / (steps * T)
     return rate, 2.0 * (SIGMA / (steps * T)) ** 2
 
 
 def flyby():
-    """(t (n,), target (n, 3)) of PROFILE."""
+    """(times (n,) [s], angle, rate and acceleration (n, 3)) of PROFILE."""
     t = T * np.arange(round(profiles.DURATION / T))
     return t, np.column_stack(profiles.truth(PROFILE, t))
 
 
 def flown(name, run):
-    """(measured angle, measured rate (n,), ESTIMATE (n,)) of one flyby; name: of FLYBYS; run i has the noise of i."""
+    """(measured angle [rad], measured rate [rad/s], ESTIMATE), each (n,), of one flyby; name: of FLYBYS; the noise
+    depends on `run` alone."""
     t, target = flyby()
     normals = ensemble.drawn(SEED, run, 1, len(t))[:, 0]
     y = target[:, 0] + SIGMA * normals[0]
@@ -170,8 +172,8 @@ def flown(name, run):
 
 
 def batch(item):
-    """(angle error squared [rad2], rate error squared [rad2/s2]), means over time, summed over runs; item: (name,
-    first run, how many)."""
+    """(squared error of the angle [rad2], of the rate [rad2/s2]), means over time, summed over runs; item: (name,
+    first run, number of runs)."""
     name, first, count = item
     t, target = flyby()
     counts = t >= SKIPPED
@@ -186,36 +188,36 @@ FLYBYS = (*RATE_SIGMA, *DIFFERENCED)
 TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5', ('position-rate', 'dynamic_error_ratio'): '>= 9'}
 
 
-def rows(found, errors):
-    """The rows of {case: measures} and {name of FLYBYS: rms errors [rad, rad/s]}."""
-    result = []
-    for name, values in found.items():
-        result += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)
+def rows(measured, errors):
+    """The rows of measured {case: as of `measures`} and errors {name of FLYBYS: rms [rad, rad/s]}."""
+    table = []
+    for name, values in measured.items():
+        table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)
                    for metric, (value, unit) in values.items()]
         kind, _, sigma_a = name.partition('/')
         if kind != 'position':
-            without = found['position' + ('/' + sigma_a if sigma_a else '')]
+            without = measured['position' + ('/' + sigma_a if sigma_a else '')]
             for metric, over, under in (('rate_bandwidth', values, without), ('dynamic_error', without, values)):
                 full = next(key for key in values if key.startswith(metric))
                 ratio = over[full][0] / under[full][0]
-                result.append(row(name, f'{metric}_ratio', ratio, '', target=TARGETS.get((name, f'{metric}_ratio'))))
+                table.append(row(name, f'{metric}_ratio', ratio, '', target=TARGETS.get((name, f'{metric}_ratio'))))
     for name, (angle, rate) in errors.items():
-        result += [row(f'{PROFILE}/{name}', 'angle_rms_deg', math.degrees(angle), 'deg'),
-                   row(f'{PROFILE}/{name}', 'rate_rms_deg_s', math.degrees(rate), 'deg/s')]
-    return result
+        table += [row(f'{PROFILE}/{name}', 'angle_rms_deg', math.degrees(angle), 'deg'),
+                  row(f'{PROFILE}/{name}', 'rate_rms_deg_s', math.degrees(rate), 'deg/s')]
+    return table
 
 
-def remarks(found, errors):
-    """What the rows do not say by themselves."""
+def remarks(measured, errors):
+    """Sentences that the rows need; arguments as of `rows`."""
     one, twenty, without = (math.degrees(errors[name][0]) for name in (*DIFFERENCED, 'position'))
-    slowest = max(found, key=lambda name: found[name]['largest_eigenvalue'][0])
+    largest, slowest = max((measured[name]['largest_eigenvalue'][0], name) for name in measured)
     return [
         f'Paper 004 prints neither its noises nor its sigma_a: here {math.degrees(SIGMA):g} deg, sigma_a '
         f'{", ".join(f"{sigma_a:g}" for sigma_a in SIGMA_A)} deg/s2 and a rate to 0.1 and 0.02 deg/s; rows without '
         f'sigma_a in their name have {MAIN:g} deg/s2. It claims a wider band and a smaller dynamic error, without a '
         'number: true, and by how much depends on these.',
         'An angle_bandwidth_hz without a number: the angle never falls by 3 dB, a measured rate carries it beyond.',
-        f'Stable in every case: the largest eigenvalue is {found[slowest]["largest_eigenvalue"][0]:.4f} ({slowest}).',
+        f'Stable in every case: the largest eigenvalue is {largest:.4f} ({slowest}).',
         f'Only an independent rate helps. The rate of the same angles, differenced over {T:g} s, leaves the error on '
         f'{PROFILE} where it was ({one:.4f} deg, {without:.4f} without); over {DIFFERENCED["differenced-20"] * T:g} s '
         f'and believed to be white it harms ({twenty:.4f} deg): it is half that time late, and its errors are those '
@@ -232,7 +234,7 @@ def figures():
 
 
 def bode_figure():
-    """Responses of angle and rate with and without the rate, and the error they leave."""
+    """Responses of angle and rate with and without a measured rate, and their dynamic errors."""
     figure, axes = drawing.panels(2, 2, size=(7.4, 5.6), sharex=True)
     for name, colour in COLOURS.items():
         angle, rate = responses(*settled(MAIN, RATE_SIGMA[name]), BAND)
@@ -253,7 +255,7 @@ def bode_figure():
 
 
 def sigma_a_figure():
-    """What the rate adds to the band of the rate and takes from the dynamic error, over sigma_a."""
+    """Bandwidth of the rate and dynamic error of the angle over sigma_a, with and without a measured rate."""
     figure, axes = drawing.panels(1, 2, size=(7.4, 3.4), sharex=True)
     sigma_a = np.geomspace(SIGMA_A[0], SIGMA_A[-1], 13)
     for name, colour in COLOURS.items():
@@ -294,8 +296,9 @@ def flyby_figure():
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
+    """Identify the filters of CASES and run `runs` flybys; pool: monte_carlo.Pool, None for this process."""
     pieces = monte_carlo.batches(runs, BATCH)
     done = (pool or monte_carlo.Pool(1)).map(batch, [(name, *piece) for name in FLYBYS for piece in pieces], progress)
     errors = {name: np.sqrt(sum(next(done) for _ in pieces) / runs) for name in FLYBYS}
-    found = {name: measures(*case) for name, case in CASES.items()}
-    return Result(rows(found, errors), figures(), remarks(found, errors))
+    measured = {name: measures(*case) for name, case in CASES.items()}
+    return Result(rows(measured, errors), figures(), remarks(measured, errors))

@@ -1,6 +1,6 @@
 """Paper 000's step and sine (figures 5, 6), then a better controller on the same plant.
 
-Cases: paper-r1 and paper-r2, the two readings of the paper's sine, with gains found for each; best, the feed-forward
+Cases: paper-r1 and paper-r2, the two readings of the paper's sine, with gains for each; best, the feed-forward
 controller; best-inertia-plus and -minus, the same with 20 % more and less load; best-full-torque, without a reserve
 for such a load; adrc. Every case is `pedestal run servo_step|servo_sine --param ...` too (Case.command).
 """
@@ -26,7 +26,7 @@ FREQUENCIES = {'0p4hz': 0.8 * math.pi, '0p4rads': 0.4}
 READINGS = {'0p4hz': '0.4 Hz', '0p4rads': '0.4 rad/s'}
 
 PERIODS = 4
-"""Of each sine; the first is left to the start."""
+"""Of each sine; the first belongs to the transient."""
 
 GUST, GUST_START = 1000.0, 0.2
 """Step of wind torque on the azimuth [Nm], when [s]."""
@@ -48,7 +48,7 @@ DRIVE = {
 SHAPER = {
     'acu.azimuth.shaper.rate': 2.42, 'acu.azimuth.shaper.acceleration': 31.0, 'acu.azimuth.shaper.jerk': 8000.0,
     'acu.azimuth.shaper.h0': 0.006}
-"""A quarter of the torque is left for a load that is heavier than known."""
+"""A quarter of the torque is reserved for a load heavier than assumed."""
 
 BEST = {
     **DRIVE, **SHAPER, 'adu.azimuth.speed_loop.disturbance_observer': 400.0,
@@ -64,7 +64,7 @@ FULL_TORQUE = {**BEST, 'acu.azimuth.shaper.acceleration': 38.0, 'acu.azimuth.sha
 
 ADRC = {**DRIVE, **SHAPER, 'adu.azimuth.speed_loop.proportional': 6.0, 'adu.azimuth.speed_loop.integral': 200.0,
         'acu.azimuth.controller': 'adrc'}
-"""With its own observer in place of the drive's, and the speed loop it knows."""
+"""With its own observer in place of the drive's, and the speed loop it was designed for."""
 
 CASES = {
     'paper-r1': R1, 'paper-r2': R2, 'best': BEST,
@@ -90,21 +90,23 @@ UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}
 
 
 def step_case(name):
+    """The Case of the step of figure 5 with the parameters of CASES[name]."""
     return Case(name, 'servo_step', CASES[name])
 
 
 def sine_case(name, reading):
-    """PERIODS of one reading of the paper's sine."""
+    """The Case of PERIODS of one of READINGS of the paper's sine."""
     return cases.sine_case(Case(name, 'servo_sine', CASES[name]), FREQUENCIES[reading], PERIODS)
 
 
 def gust_case(name, **more):
-    """At rest in the wind, then a step of torque."""
+    """The Case of an axis at rest with a step of wind torque; more: further parameters."""
     return Case(name, 'servo_step', {**CASES[name], 'acu.azimuth.preset': 0.0, 'adu.wind.gust.kind': 'step',
                                      'adu.wind.gust.azimuth': GUST, 'adu.wind.gust.start': GUST_START, **more})
 
 
 def step_metrics(record):
+    """{metric: value} of a closed_loop.Run of a step."""
     t, y = record.t, record.truth['load_position'][:, 0]
     return {'step_overshoot_percent': metrics.overshoot_percent(y, STEP),
             'step_settling_2percent_s': metrics.settling_time(t, y, STEP, BAND),
@@ -112,11 +114,12 @@ def step_metrics(record):
 
 
 def sine_error(record, w):
-    """The reference as it is meant less the true load angle [rad]."""
+    """The sine of figure 6 at w [rad/s] less the true load angle (n,) [rad]."""
     return AMPLITUDE * np.sin(w * record.t) - record.truth['load_position'][:, 0]
 
 
 def sine_metrics(record, reading):
+    """{metric: value} of a closed_loop.Run of one of READINGS of the sine."""
     w = FREQUENCIES[reading]
     t, error, period = record.t, sine_error(record, w), 2.0 * math.pi / w
     steady = metrics.whole_periods(t, period, period)
@@ -128,6 +131,7 @@ def sine_metrics(record, reading):
 
 
 def gust_metrics(record):
+    """{metric: value} of a closed_loop.Run of a gust."""
     t, y = record.t, record.truth['load_position'][:, 0]
     return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START] - y[t < GUST_START][-1])}
 
@@ -138,11 +142,11 @@ RUNS = {
     'best-inertia-minus': ('step',), 'best-full-torque': ('step',),
     'adrc': ('step', '0p4rads', '0p4hz', 'gust'),
 }
-"""What is done with each case."""
+"""The runs of each case."""
 
 
 def records(cases, progress):
-    """{(case, run): record} of the cases named."""
+    """{(case, kind of run): closed_loop.Run} of the cases named."""
     wanted = [(name, kind) for name in cases for kind in RUNS[name]]
     done = {}
     for i, (name, kind) in enumerate(wanted):
@@ -157,7 +161,7 @@ METRICS = {'step': step_metrics, 'gust': gust_metrics,
 
 
 def rows(done):
-    """The rows of some records."""
+    """The rows of records as of `records`."""
     return [row(name, metric, value, UNITS[metric.rpartition('_')[2]], PAPER.get(metric.removeprefix(f'sine_{kind}_')),
                 TARGETS.get(name, {}).get(metric))
             for (name, kind), record in done.items() for metric, value in METRICS[kind](record).items()]
@@ -177,7 +181,7 @@ def bang_bang(step, adu):
 
 
 def remarks(done):
-    """What the rows do not say by themselves, with the limits of the plant."""
+    """Sentences that the rows need, with the limits of the plant."""
     slow = step_metrics(done['paper-r2', 'step'])['step_settling_2percent_s']
     adu = step_case('best').loaded().node_parameters('adu')
     whole, settled = bang_bang(STEP, adu)
@@ -264,7 +268,7 @@ def sine_figure(done):
 
 
 def gust_figure(done):
-    """How far a gust moves the load."""
+    """Deflection of the load by the gust."""
     figure, axes = drawing.panels(1, size=(7.4, 3.4))
     axes = axes[0, 0]
     for name in ('paper-r1', 'adrc', 'best'):
@@ -306,5 +310,6 @@ def inertia_figure(done):
 
 
 def run(progress) -> Result:
+    """Run all CASES."""
     done = records(CASES, progress)
     return Result(rows(done), figures(done), remarks(done))

@@ -1,8 +1,8 @@
 """Many runs at once: on the cores of this machine, or on the Dask cluster behind a scheduler.
 
-A study cuts its runs into batches whose size and seeds do not depend on who works, and adds their results in order: so
-the same numbers come out to the last bit whatever the pool. A batch reduces its runs (sums, not records) before it
-answers, so that memory stays bounded whatever --runs is.
+A study splits its runs into batches whose size and seeds do not depend on the workers, and adds their results in
+order, so that its numbers are equal to the last bit on any pool. A batch returns sums instead of records, so that
+memory stays bounded for any --runs.
 """
 import contextlib
 import logging
@@ -17,7 +17,7 @@ from joblib.externals import loky
 from pedestal_common.compiled import COLUMNS, digest
 
 TIMEOUT = 10.0
-"""How long a scheduler, or its first worker, is waited for [s]."""
+"""Longest time to wait for a scheduler, or for its first worker [s]."""
 
 
 def batches(runs, size):
@@ -42,7 +42,7 @@ class Pool:
         self._stack = contextlib.ExitStack()
 
     def __enter__(self):
-        # joblib complains of work that is wasted when a study is stopped, at any time after that
+        # joblib warns of wasted work when a study is stopped, at any time after that
         warnings.filterwarnings('ignore', '.*tasks (which were|have been)', UserWarning, r'joblib\.parallel')
         if self.scheduler is None:
             if self.workers > 1:
@@ -73,22 +73,22 @@ class Pool:
 
 @contextlib.contextmanager
 def _ctrl_c_held_back():
-    """Ctrl-C reaches every process of a terminal; those started now never hear it: this one does, and ends them.
+    """Keep Ctrl-C, which reaches every process of a terminal, from workers started now; this process ends them.
 
-    The trackers that go with the first worker let it through when they start, so they are started before. A thread of
-    numpy may hear it for this one, which must not be torn out of starting the workers: that is told afterwards.
+    The resource trackers that start with the first worker unblock the signal, so they are started before. Here it must
+    not interrupt the start of the workers either, but a thread of numpy may receive it: it is raised afterwards.
     """
     multiprocessing.resource_tracker.ensure_running()
     loky.backend.resource_tracker.ensure_running()
-    heard = []
-    handler = signal.signal(signal.SIGINT, lambda *_: heard.append(True))
+    received = []
+    handler = signal.signal(signal.SIGINT, lambda *_: received.append(True))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         signal.signal(signal.SIGINT, handler)
-    if heard:
+    if received:
         raise KeyboardInterrupt
 
 
@@ -110,11 +110,11 @@ def _client(address):
         raise RuntimeError(f'--scheduler {address}: nobody answers as a Dask scheduler: {error}') from None
     try:
         client.wait_for_workers(1, timeout=TIMEOUT)
-        others = [worker for worker, found in client.run(sources).items() if found != sources()]
+        others = [worker for worker, theirs in client.run(sources).items() if theirs != sources()]
         problem = others and f'other versions of the pedestal packages or of numba on {", ".join(others)}'
     except TimeoutError:
         problem = f'no worker came within {TIMEOUT:g} s'
-    except Exception as error:  # so Dask passes on what a worker could not import
+    except Exception as error:  # Dask raises here what a worker could not import
         problem = f'a worker cannot work: {error}'
     if problem:
         client.close()
@@ -123,5 +123,5 @@ def _client(address):
 
 
 def sources():
-    """Digest of what makes the numbers: the packages' sources and the version of numba."""
+    """Digest of all that determines the numbers: the packages' sources and the version of numba."""
     return digest(('pedestal_common', *COLUMNS, 'pedestal_bringup'))

@@ -1,15 +1,15 @@
-"""`pedestal tune`: the parameters of a filter, or the gains of the feed-forward, found for a recording or a scenario.
+"""`pedestal tune`: tunes the parameters of a filter, or the gains of the feed-forward, to a recording or a scenario.
 
-recording   the recorded inputs go through the ACU's step function, as `pedestal recompute` feeds it, with changed
-            parameters. Made large is the mean log-density of the innovations of the angle, log N(nu; 0, S), which
-            wants small innovations and an honest S alike. Beyond HUBER sigmas it falls linearly, so that an outlier
-            counts as one. Every other PIECE of time is kept apart, and tells what the result is worth.
-scenario    the compiled closed loop runs on stated seeds. Made small is the rms of the true pointing error of the axis
-            (cross-elevation, elevation) in settled autotrack; another seed tells what the result is worth.
+recording   the recorded inputs go through the ACU's step function, as in `pedestal recompute`, with changed
+            parameters. The criterion maximises the mean log-density of the innovations of the angle, log N(nu; 0, S),
+            which rewards small innovations and a correct S alike. Beyond HUBER sigmas it falls linearly, so that an
+            outlier counts as one. Every other PIECE of time is kept apart and validates the result.
+scenario    the compiled closed loop runs on stated seeds. The criterion minimises the rms of the true pointing error
+            of the axis (cross-elevation, elevation) in settled autotrack; another seed validates the result.
 feed-forward    the rate loop of the drive is identified (identification.py); k_v and k_a follow from it. The closed
-            loop tells what they do.
+            loop validates them.
 
-The search is that of studies/tuning.py. The result is a ROS 2 parameter file, for nodes and `pedestal run` alike.
+The search is that of tuning.py. The result is a ROS 2 parameter file, for nodes and `pedestal run` alike.
 """
 import dataclasses
 import math
@@ -34,23 +34,23 @@ from pedestal_common.steps import SECOND
 HUBER = 4.0
 """Standard deviations of an innovation beyond which it is an outlier."""
 CONVERGED, PIECE = 1.0, 0.5
-"""Recording: what the filter is given to converge after the first error [s]; the pieces it is cut into [s]."""
+"""Recording: time for the filter to converge after the first error [s]; length of the pieces it is split into [s]."""
 AXES = topics.AXES
 RUNS = 2
 """Seeds a scenario is tuned on."""
 ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
 UKF = ('cv_noise', 'ca_noise', 'dwell')
-"""What is searched of tracker.ukf; the rest matters only at the start."""
+"""Tuned parameters of tracker.ukf; the others matter only at the start."""
 
 
 class TuneError(ValueError):
-    """What was asked for cannot be tuned; one line."""
+    """A request that cannot be tuned; the message is one line."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """What parameters are worth for each axis (2,): the criterion, to be made small, on the part that is searched and
-    on the one kept apart; mean NIS of the latter; {metric: (value, unit)} that tell of the pointing."""
+    """How good parameters are on each axis (2,): the criterion, which is minimised, on the part that is searched and
+    on the one kept apart; mean NIS of the latter; pointing: {metric: (value, unit)}."""
     searched: np.ndarray
     kept: np.ndarray
     nis: np.ndarray
@@ -70,8 +70,10 @@ def _mean(values):
 
 
 class Recorded:
-    """A recording that any filter may be given. criterion: the negative mean log-density of the innovations. of_beams:
-    of several, where a node `acu` is none of the graph's (`beam_1/acu`) and pedestal alone knows that it means all."""
+    """A recording on which filters are tuned. criterion: the negative mean log-density of the innovations.
+
+    of_beams: whether it has several beams. Their nodes are `beam_1/acu`, ..., so that only pedestal resolves `acu`.
+    Raises TuneError where the receiver gave too few errors."""
 
     criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the pieces kept apart'
 
@@ -82,8 +84,8 @@ class Recorded:
         done = recompute.recompute(self.recording, 'acu', self.params)
         self.feed = done.feed
         self.requests = {step: [service for service, _ in made] for step, made in done.requests.items()}
-        came = self.feed.inputs[RANGE]['stamp'] != records.NEVER
-        self.ranged = np.isfinite(self.feed.inputs[RANGE]['range'][came]).any()
+        present = self.feed.inputs[RANGE]['stamp'] != records.NEVER
+        self.ranged = np.isfinite(self.feed.inputs[RANGE]['range'][present]).any()
         t = self.feed.stamps / SECOND
         compared = np.isfinite(self._innovations(done.steps)[0]).all(axis=1)
         if not compared.any():
@@ -105,26 +107,28 @@ class Recorded:
         return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
 
     def criterion(self, params):
+        """The criterion (2,) of AcuParameters on the pieces that are searched."""
         innovation, sigma, _ = self._innovations(self._run(params)[1])
         return _mean(-log_density(innovation, sigma)[self.parts[0]])
 
     def score(self, params) -> Score:
+        """The Score of AcuParameters."""
         unit, steps = self._run(params)
         innovation, sigma, nis = self._innovations(steps)
         density = log_density(innovation, sigma)
-        found = what_if.numbers(self.recording.bag, [recompute.outputs_of(unit, self.feed, steps)])
+        numbers = what_if.numbers(self.recording.bag, [recompute.outputs_of(unit, self.feed, steps)])
         return Score(_mean(-density[self.parts[0]]), _mean(-density[self.parts[1]]), _mean(nis[self.parts[1]]),
-                     {name: (found[name][0][0], found[name][1]) for name in ESTIMATE_ERRORS if name in found})
+                     {name: (numbers[name][0][0], numbers[name][1]) for name in ESTIMATE_ERRORS if name in numbers})
 
 
 class Simulated:
-    """A scenario whose closed loop any parameters may be given. criterion: rms pointing error in settled autotrack, or
-    in any mode but standby."""
+    """A scenario on whose closed loop parameters are tuned. criterion: rms pointing error [deg] in settled autotrack,
+    or in any mode but standby. Raises TuneError where it is never in such a mode."""
 
     criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the seed kept apart'
 
     def __init__(self, load, seed, runs, any_mode):
-        """load(seed) -> Scenario; seed None: as the scenario says."""
+        """load(seed) -> Scenario; seed None: the scenario's own."""
         chosen = load(seed)
         self.any_mode = any_mode
         self.of_beams = chosen.prefixes != ('',)
@@ -149,9 +153,11 @@ class Simulated:
         return tuple(map(np.concatenate, zip(*parts)))
 
     def criterion(self, params):
+        """The criterion (2,) [deg] of AcuParameters on the seeds that are searched."""
         return np.degrees(np.sqrt(_mean(self.runs(params, self.seeds)[1]['error']**2)))
 
     def score(self, params) -> Score:
+        """The Score of AcuParameters."""
         kept, truth = self.runs(params, self.kept_seeds)
         rms = np.degrees(np.sqrt(_mean(truth['error']**2)))
         difference = kept['acu/reference']['position'] - kept['joint_states']['position']
@@ -166,10 +172,11 @@ def _with_filter(params, axis, changed):
 
 
 def filters(source, kind, axes, progress):
-    """(AcuParameters with the tuned filter, {parameter: value} of it) of a Recorded or Simulated."""
+    """(AcuParameters with the tuned filter, {parameter: value} of it) for a Recorded or Simulated; raises
+    TuneError."""
     count = 0
 
-    def told(criterion, part):
+    def counted(criterion, part):
         nonlocal count
         count += 1
         progress((part + 1.0 - math.exp(-count / 40.0)) / len(axes), f'{axes[part]}: {count} tried')
@@ -178,7 +185,7 @@ def filters(source, kind, axes, progress):
     params = source.params
     for axis in axes:
         params = _with_filter(params, axis, dataclasses.replace(getattr(params, axis).filter, kind=kind))
-    found = {f'{axis}.filter.kind': kind for axis in axes}
+    settings = {f'{axis}.filter.kind': kind for axis in axes}
     if kind == 'imm_ukf':
         if not source.ranged:
             raise TuneError('--filter imm_ukf: needs a measured range (tracking_receiver.receiver.ranging.measured); '
@@ -188,47 +195,48 @@ def filters(source, kind, axes, progress):
         def with_ukf(ukf):
             return dataclasses.replace(params, tracker=dataclasses.replace(params.tracker, ukf=ukf))
 
-        best, _ = tuning.tuned(params.tracker.ukf, lambda ukf: told(source.criterion(with_ukf(ukf))[rows].sum(), 0),
+        best, _ = tuning.tuned(params.tracker.ukf, lambda ukf: counted(source.criterion(with_ukf(ukf))[rows].sum(), 0),
                                UKF)
         best = _rounded(best, UKF)
-        return with_ukf(best), {**found, **{f'tracker.ukf.{name}': getattr(best, name) for name in UKF}}
+        return with_ukf(best), {**settings, **{f'tracker.ukf.{name}': getattr(best, name) for name in UKF}}
     for part, axis in enumerate(axes):
         count, i = 0, AXES.index(axis)
 
         def cost(changed, axis=axis, i=i, part=part, params=params):
-            return told(source.criterion(_with_filter(params, axis, changed))[i], part)
+            return counted(source.criterion(_with_filter(params, axis, changed))[i], part)
 
         given = getattr(params, axis).filter
         best = _rounded(tuning.tuned(given, cost)[0], tuning.names(given))
         params = _with_filter(params, axis, best)
         values = parameters.as_dict(best)
         names = tuning.names(given) + (('imm.models',) if kind == 'imm' else ())
-        found.update({f'{axis}.filter.{name}': values[name] for name in names})
-    return params, found
+        settings.update({f'{axis}.filter.{name}': values[name] for name in names})
+    return params, settings
 
 
 def _rounded(params, names):
-    """The same with four digits."""
+    """The parameters with those of these names rounded to four digits."""
     values = parameters.as_dict(params)
     return parameters.build(type(params), {**values, **{name: float(f'{values[name]:.4g}') for name in names}})
 
 
 def feedforward(chosen, source, axes, progress):
-    """(AcuParameters with the identified gains, {parameter: value}) of a scenario's drive."""
+    """(AcuParameters with the identified gains of the feed-forward, {parameter: value} of them); chosen: Scenario."""
     progress(0.1, 'identifying the rate loop')
-    loops, params, found = identification.identify(chosen), source.params, {}
+    loops, params, settings = identification.identify(chosen), source.params, {}
     for axis in axes:
         old = getattr(params, axis)
         new = dataclasses.replace(old.feedforward, rate_feedforward=float(f'{loops[axis].k_v:.5g}'),
                                   acceleration_feedforward=float(f'{loops[axis].k_a:.3g}'))
         params = dataclasses.replace(params, **{axis: dataclasses.replace(old, feedforward=new)})
-        found |= {f'{axis}.feedforward.rate_feedforward': new.rate_feedforward,
+        settings |= {f'{axis}.feedforward.rate_feedforward': new.rate_feedforward,
                   f'{axis}.feedforward.acceleration_feedforward': new.acceleration_feedforward}
-    return params, found
+    return params, settings
 
 
 def main(options, command, progress):
-    """Do what the verb's options ask for; the lines to print. command: as it was given, for the file's head."""
+    """Tune as the verb's options say and write the parameter file: the lines to print. command: the whole command
+    line, for the head of the file. Raises TuneError."""
     is_bag = pathlib.Path(options.source).is_dir() or options.source.endswith('.mcap')
     axes = AXES if options.axis == 'both' else (options.axis,)
     what = options.filter or 'feedforward'
@@ -242,16 +250,16 @@ def main(options, command, progress):
             return scenario.load(options.source, options.param, seed, options.duration)
         source = Simulated(load, options.seed, options.runs or RUNS, options.feedforward)
     if options.feedforward:
-        params, found = feedforward(load(options.seed), source, axes, progress)
+        params, settings = feedforward(load(options.seed), source, axes, progress)
     else:
-        params, found = filters(source, options.filter, axes, progress)
+        params, settings = filters(source, options.filter, axes, progress)
     progress(0.98, 'judging')
     old, new = source.score(source.params), source.score(params)
-    lines = [*_table(source, old, new, axes), *_remarks(source, old, new, axes, found)]
+    lines = [*_table(source, old, new, axes), *_remarks(source, old, new, axes, settings)]
     made = [f'made by: {" ".join(command.split())}', f'git {configuration.git_revision() or "unknown"}', *lines]
     file.write_text(''.join(f'# {line}\n' for line in made) + yaml.safe_dump(
-        {'acu': {'ros__parameters': found}}, sort_keys=False))
-    values = [f'{name:48} {value}' for name, value in found.items()]
+        {'acu': {'ros__parameters': settings}}, sort_keys=False))
+    values = [f'{name:48} {value}' for name, value in settings.items()]
     hint = f'pedestal run ... --params-file {file}'
     if not source.of_beams:
         hint += f', or ros2 run acu_tracker acu_node --ros-args --params-file {file}'
@@ -259,7 +267,7 @@ def main(options, command, progress):
 
 
 def _check(options, is_bag, file):
-    """Refuse at once what does not fit together."""
+    """Raises TuneError for options that do not fit together, or a file that exists."""
     if bool(options.filter) == options.feedforward:
         raise TuneError('one of --filter KIND and --feedforward must be given')
     if options.filter and options.filter not in KINDS:
@@ -278,7 +286,7 @@ def _check(options, is_bag, file):
 
 
 def _table(source, old, new, axes):
-    """Lines: old against new."""
+    """Lines that compare the old Score with the new."""
     rows = []
     for i, axis in enumerate(AXES):
         if axis in axes:
@@ -290,19 +298,19 @@ def _table(source, old, new, axes):
     return lines + [f'{name:52} {_text(a):>11} {_text(b):>11} {unit}'.rstrip() for name, a, b, unit in rows]
 
 
-def _remarks(source, old, new, axes, found):
-    """Lines: what should make one doubt the result."""
-    said = []
+def _remarks(source, old, new, axes, settings):
+    """Lines: reasons to doubt the result."""
+    doubts = []
     for axis in axes:
         i = AXES.index(axis)
         if not new.kept[i] <= old.kept[i] + 1e-3 * abs(old.kept[i]):
-            said.append(f'{axis}: {source.kept} the new parameters are no better than the old')
+            doubts.append(f'{axis}: {source.kept} the new parameters are no better than the old')
     fields = dict(parameters.flatten(AcuParameters))
-    for name, value in found.items():
+    for name, value in settings.items():
         meta = fields[name].metadata
         if 'low' in meta and not 1.05 * meta['low'] < value < 0.95 * meta['high'] and value > 0.0:
-            said.append(f'{name} is at the end of its range: the best lies there or beyond')
-    return said
+            doubts.append(f'{name} is at the end of its range: the best lies there or beyond')
+    return doubts
 
 
 def _text(value):

@@ -1,10 +1,9 @@
-"""The one procedure by which the parameters of a filter are found.
+"""The one procedure that tunes the parameters of a filter.
 
-The criterion (a number to make small: the angle rms of a study, the negative log-likelihood of a bag's innovations)
-is taken as a function of the logarithms of the kind's own parameters. First on a grid over RANGES, for one or two of
-them; then, from the best point (from the given parameters where there are more than two), downhill by the simplex of
-Nelder and Mead until the parameters stay within 2 %. Judge the result on seeds, or a part of the recording, of its
-own.
+It minimises a criterion (the angle rms of a study, the negative log-likelihood of a bag's innovations) over the
+logarithms of the kind's own parameters: first on their grids, for one or two of them; then, from the best point
+(from the given parameters where there are more than two), by the simplex of Nelder and Mead until the parameters stay
+within 2 %. The result must be judged on other seeds, or on another part of the recording.
 """
 import itertools
 import math
@@ -13,19 +12,14 @@ import numpy as np
 from scipy.optimize import minimize
 
 from acu_tracker.estimation.kinds import named_models
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_common import parameters
-
-RANGES = {'alpha_beta.alpha': (0.003, 0.8, 8), 'alpha_beta_gamma.alpha': (0.003, 0.8, 8),
-          'cv.noise': (1e-6, 1.0, 7), 'ca.noise': (1e-6, 10.0, 8),
-          'singer.alpha': (0.03, 3.0, 3), 'singer.sigma': (1e-5, 1.0, 6),
-          'current_statistical.alpha': (0.03, 3.0, 3), 'current_statistical.a_max': (1e-4, 1.0, 5)}
-"""Lowest and highest value and number of points of the grid; the search that follows may leave it."""
 
 TOLERANCE = 0.02
 """Of the logarithms."""
 
 FAILED = 1e300
-"""Stands for the criterion where it does not work: finite, so that the simplex can tell its differences."""
+"""Value of a criterion that is not finite; finite itself, so that the simplex can take differences."""
 
 
 def names(params):
@@ -36,14 +30,15 @@ def names(params):
 
 
 def _of_kind(kind):
-    return tuple(name for name in RANGES if name.startswith(f'{kind}.'))
+    return tuple(name for name, field in parameters.flatten(FilterParameters)
+                 if name.startswith(f'{kind}.') and field.metadata.get('grid'))
 
 
 def tuned(params, criterion, searched=None):
-    """(parameters with the least criterion found, that criterion), from FilterParameters or UkfParameters.
+    """(parameters with the least criterion, that criterion), searched from FilterParameters or UkfParameters.
 
-    criterion: function of them, infinite or NaN where it does not work. searched: names, None: those of `names`.
-    Raises ValueError where it works nowhere.
+    criterion: function of them, infinite or NaN where it has no value. searched: names, None: those of `names`.
+    Raises ValueError where it has no value anywhere.
     """
     searched = names(params) if searched is None else tuple(searched)
     given = parameters.as_dict(params)
@@ -62,13 +57,13 @@ def tuned(params, criterion, searched=None):
         return value if math.isfinite(value) else FAILED
 
     start = [math.log(given[name]) for name in searched]
-    if len(searched) <= 2 and set(searched) <= set(RANGES):
-        grid = itertools.product(*(np.linspace(math.log(low), math.log(high), points)
-                                   for low, high, points in (RANGES[name] for name in searched)))
-        start = min([start, *grid], key=cost)
+    grids = [fields[name].metadata['grid'] for name in searched]
+    if len(grids) <= 2 and all(grids):
+        points = itertools.product(*(np.linspace(math.log(low), math.log(high), n) for low, high, n in grids))
+        start = min([start, *points], key=cost)
     corners = np.vstack((start, np.asarray(start) + 0.7 * np.eye(len(start))))
     options = {'initial_simplex': corners, 'xatol': TOLERANCE, 'fatol': math.inf, 'maxfev': 100 * len(start)}
-    found = minimize(cost, start, method='Nelder-Mead', bounds=bounds, options=options)
-    if found.fun >= FAILED:
+    optimum = minimize(cost, start, method='Nelder-Mead', bounds=bounds, options=options)
+    if optimum.fun >= FAILED:
         raise ValueError(f'no {", ".join(searched)} gives a finite criterion')
-    return at(found.x), float(found.fun)
+    return at(optimum.x), float(optimum.fun)

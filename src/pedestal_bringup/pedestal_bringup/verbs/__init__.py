@@ -1,1 +1,1 @@
-"""The verbs of `pedestal`, one a file: its arguments and its main."""
+"""The verbs of `pedestal`, one per file: its arguments and its main."""

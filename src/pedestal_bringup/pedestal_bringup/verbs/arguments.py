@@ -5,13 +5,13 @@ import pathlib
 def add_param(parser, example='acu.azimuth.feedforward.bandwidth=20'):
     """--param NODE.KEY=VALUE, any number of times."""
     parser.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                        help=f'change a parameter, as {example}; may be repeated')
+                        help=f'change a parameter, for example {example}; may be repeated')
 
 
 def add_beam(parser):
     """--beam NAME of a recording of several beams."""
-    parser.add_argument('--beam', default='', metavar='NAME', help='of a recording of several, as beam_2; default: '
-                        'the first')
+    parser.add_argument('--beam', default='', metavar='NAME', help='of a recording of several, for example beam_2; '
+                        'default: the first')
 
 
 def add_new_bag(parser):

@@ -4,6 +4,7 @@ import sys
 
 
 def add_arguments(parser):
+    """Bag, format, output folder, topics."""
     parser.add_argument('bag', type=pathlib.Path)
     parser.add_argument('--format', choices=('csv', 'parquet'), default='csv', help='default: csv')
     parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: export in the bag')
@@ -12,6 +13,7 @@ def add_arguments(parser):
 
 
 def main(options):
+    """Write the tables and print one line for each."""
     from pedestal_bringup.bags.export import export
     for file, rows, columns in export(options.bag, options.format, options.output, options.topics, options.overwrite):
         if file is None:

@@ -2,10 +2,12 @@
 
 
 def add_arguments(parser):
+    """The node."""
     parser.add_argument('node', help='acu, adu, beam_steering, tracking_receiver, ship_motion, ins, recorder ...')
 
 
 def main(options):
+    """Print one line for each parameter of the node."""
     from pedestal_bringup.run import scenario
     from pedestal_common import parameters
     parameters_type = scenario.parameters_of(options.node)

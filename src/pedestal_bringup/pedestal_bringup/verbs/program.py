@@ -1,13 +1,31 @@
 """send the program track of a scenario to a running ACU"""
+import datetime
+
 from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Scenario, duration, parameters."""
     parser.add_argument('scenario')
     parser.add_argument('--duration', type=float, metavar='S', help='of the run it is for')
+    parser.add_argument('--start', type=_utc, metavar='UTC', help='when its time is 0, as 2026-11-22T12:00:00 or now; '
+                        'default: when the graph began, which the ACU is asked for')
     arguments.add_param(parser)
 
 
+def _utc(text):
+    """ISO 8601 in UTC, or `now` -> ns."""
+    if text == 'now':
+        moment = datetime.datetime.now(datetime.timezone.utc)
+    else:
+        moment = datetime.datetime.fromisoformat(text.removesuffix('Z'))
+        if moment.tzinfo is None:
+            moment = moment.replace(tzinfo=datetime.timezone.utc)
+    return round(moment.timestamp() * 1e6) * 1000
+
+
 def main(options):
+    """Send the program track; exit code of graph.send_program."""
     from pedestal_bringup.run import graph, scenario
-    return graph.send_program(scenario.load(options.scenario, options.param, duration=options.duration))
+    chosen = scenario.load(options.scenario, options.param, duration=options.duration)
+    return graph.send_program(chosen, options.start)

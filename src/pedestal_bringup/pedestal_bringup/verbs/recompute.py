@@ -1,18 +1,17 @@
 """feed recorded inputs to a node again and compare its outputs
 
-Feeds the recorded inputs of a node to its step function and compares what it answers with what was recorded: count and
+Feeds the recorded inputs of a node to its step function and compares its outputs with the recorded ones: count and
 order of the messages first, then every field. Exit code 1 when something differs beyond its tolerance, or when the
 recording never exercised the node (never locked, never in autotrack, never moved).
 
 Exact for a lockstep recording: the same version on the same machine gives the same bits. In a realtime recording a
-step gets what had been sent when the next one began: that is what the node had, but for messages that were on their
-way to it just then. Services are not recorded: a change of acu/mode or adu/state that the node would not make by
-itself is asked for at that step, and counted. Nor are parameters that were changed while running. Diagnostics are not
-recomputed.
+step gets the messages sent before the next one began, which the node had too, except for those still on their way.
+Services are not recorded: a change of acu/mode or adu/state that the node would not make by itself is requested at
+that step, and counted. Parameters that were changed while running are not recorded. Diagnostics are not recomputed.
 
-With --param it does not fail but reports old against new. The recorded antenna does not move with the recomputed
-command: compared are the estimate against the recorded truth (error, noise, lag) and the noise of the command; what a
-parameter does to the pointing, a new run tells."""
+With --param it does not fail but compares old with new. The recorded antenna does not move with the recomputed
+command, so the comparison covers the estimate against the recorded truth (error, noise, lag) and the noise of the
+command; the effect of a parameter on the pointing needs a new run."""
 import pathlib
 
 from pedestal_bringup import console
@@ -20,6 +19,7 @@ from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Bag, beam, nodes, changed parameters, tolerances, output."""
     parser.add_argument('bag', type=pathlib.Path)
     arguments.add_beam(parser)
     parser.add_argument('--node', action='append', default=[], metavar='NODE',
@@ -35,7 +35,7 @@ def add_arguments(parser):
     parser.add_argument('--relative', type=float, metavar='X', help='and relative to the recorded value; default: '
                         '1e-9')
     parser.add_argument('--ignore', action='append', default=[], metavar='PATTERN',
-                        help="topics or topic.field not to compare, as 'acu/reference*'; may be repeated")
+                        help="topics or topic.field not to compare, for example 'acu/reference*'; may be repeated")
     parser.add_argument('--allow-idle', action='store_true', help='compare also where the node was never exercised')
     parser.add_argument('--live', action='store_true', help='feed the real node process, in lockstep over DDS')
     console.add_json(parser)
@@ -44,6 +44,7 @@ def add_arguments(parser):
 
 
 def main(options):
+    """Recompute and print the comparison; exit code 1 where it fails."""
     from pedestal_bringup.again import recompute_report
     lines, rows, well = recompute_report.main(options)
     print('\n'.join(lines))

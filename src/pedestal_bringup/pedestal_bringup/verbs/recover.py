@@ -3,11 +3,13 @@ import pathlib
 
 
 def add_arguments(parser):
+    """Bag and output folder."""
     parser.add_argument('bag', type=pathlib.Path)
     parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: beside it, BAG-recovered')
 
 
 def main(options):
+    """Recover the bag and print what was saved."""
     from pedestal_bringup.bags.recover import recover
     print('\n'.join(recover(options.bag, options.output).lines()))
     return 0

@@ -3,10 +3,11 @@ import pathlib
 
 
 def add_arguments(parser):
+    """Bag, which topics, pace, part of the recording."""
     parser.add_argument('bag', type=pathlib.Path)
     into = parser.add_mutually_exclusive_group()
     into.add_argument('--node', nargs='+', action='extend', default=[], metavar='NAME',
-                      help='what these nodes read, as acu; default: every topic')
+                      help='the topics these nodes read, for example acu; default: every topic')
     into.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='these topics')
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument('--rate', type=float, default=1.0, metavar='X', help='times real time; default: 1')
@@ -19,6 +20,7 @@ def add_arguments(parser):
 
 
 def main(options):
+    """Replay and print the outcome; raises KeyboardInterrupt where it was stopped."""
     from pedestal_bringup.again.replay import ReplayOptions, replay
     result = replay(options.bag, ReplayOptions(
         options.node, options.topics, None if options.lockstep else options.rate, options.start, options.duration,

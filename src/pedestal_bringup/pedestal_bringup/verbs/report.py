@@ -5,6 +5,7 @@ from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Bag, beam, output file, folder of the figures."""
     parser.add_argument('bag', type=pathlib.Path)
     parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
     arguments.add_beam(parser)
@@ -12,6 +13,7 @@ def add_arguments(parser):
 
 
 def main(options):
+    """Write the report and print its path."""
     from pedestal_bringup.report import page
     print(page.write(options.bag, options.output, options.png, options.beam))
     return 0

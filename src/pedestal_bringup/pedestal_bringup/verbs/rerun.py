@@ -6,11 +6,13 @@ from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Recording and bag of the new run."""
     parser.add_argument('recording', type=pathlib.Path)
     arguments.add_new_bag(parser)
 
 
 def main(options):
+    """Make the run and print the comparison; exit code 1 where a message differs."""
     from pedestal_bringup.again import rerun
     from pedestal_bringup.bags import bag
     from pedestal_bringup.run import graph
@@ -18,7 +20,8 @@ def main(options):
     chosen = rerun.configured(recording)
     path = arguments.new_bag(options.bag, chosen.name)
     with console.progress_of_run(chosen.header.duration) as progress:
-        graph.run(chosen, path, progress)
+        if graph.run(chosen, path, progress).stopped:
+            raise KeyboardInterrupt
     result = rerun.result(recording, bag.read(path))
     print('\n'.join(result.lines()))
     return 0 if result.equal else 1

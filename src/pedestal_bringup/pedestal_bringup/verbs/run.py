@@ -7,6 +7,7 @@ from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Scenario, pacing, duration, seed, bag, parameters."""
     parser.add_argument('scenario', help='name (see `pedestal scenarios`) or path of a .yaml')
     parser.add_argument('--pacing', choices=('lockstep', 'realtime'), help='default: what the scenario says')
     parser.add_argument('--duration', type=float, metavar='S', help="length of the run in the drive's time")
@@ -15,11 +16,12 @@ def add_arguments(parser):
     console.add_json(parser)
     arguments.add_param(parser)
     parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
-                        help='ROS 2 parameter file whose values replace those of the scenario, as `pedestal tune` '
-                        'writes')
+                        help='ROS 2 parameter file whose values replace those of the scenario, for example one of '
+                        '`pedestal tune`')
 
 
 def main(options):
+    """Run, record and print the results; raises RuntimeError where the recording is not complete."""
     from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read
     from pedestal_bringup.bags.verify import verify
@@ -29,22 +31,27 @@ def main(options):
     bag = arguments.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
     with console.progress_of_run(chosen.header.duration) as progress:
-        try:
-            outcome = graph.run(chosen, bag, progress)
-        except KeyboardInterrupt:
-            print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+        outcome = graph.run(chosen, bag, progress)
+    if outcome.stopped:
+        print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+        if not outcome.recorder.get('messages'):
             return console.EXIT_STOPPED
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     of_beams = [results.measured(results.of_bag(recording.view(beam))) for beam in beams]
-    whole = results.measured({'run': outcome})
-    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams, whole)
+    realtime = chosen.header.pacing == 'realtime'
+    whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
+    lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
+    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
+                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else '')})
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                       'mcap_sha256': outcome.recorder['sha256']})
+    if outcome.stopped:
+        return console.EXIT_STOPPED
     check = verify(bag)
-    if not check.complete:
+    if not check.finished:
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     return 0

@@ -8,17 +8,20 @@ from pedestal_bringup import console
 
 
 def add_arguments(parser):
+    """Name, output folder, runs and who works on them."""
     parser.add_argument('name', nargs='?', metavar='NAME', help='without one: list the studies')
     console.add_json(parser)
     parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
     parser.add_argument('--runs', type=int, metavar='N', help='of each case; default: what the study says')
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument('--workers', type=int, metavar='N', help='processes for the runs; default: one per core')
-    workers.add_argument('--scheduler', metavar='ADDRESS', help="Dask cluster for the runs, as tcp://host:8786; needs "
-                         "pip install 'pedestal_bringup[cluster]' here and the pedestal packages there")
+    workers.add_argument('--scheduler', metavar='ADDRESS', help="Dask cluster for the runs, for example "
+                         "tcp://host:8786; needs pip install 'pedestal_bringup[cluster]' here and the pedestal "
+                         "packages there")
 
 
 def main(options):
+    """Run the study, print its table and remarks, draw its figures; exit code 2 for an unknown name."""
     from pedestal_bringup import studies
     if options.name not in studies.NAMES:
         problem = f'unknown study {options.name!r}' if options.name else 'no study named'

@@ -6,6 +6,7 @@ from pedestal_bringup.verbs import arguments
 
 
 def add_arguments(parser):
+    """Recording or scenario, what to tune, on which axes and seeds."""
     parser.add_argument('source', metavar='BAG|SCENARIO', help='a recording: innovations; a scenario: pointing error')
     parser.add_argument('--filter', metavar='KIND', help='the kind of filter to tune')
     parser.add_argument('--feedforward', action='store_true', help="the gains that follow from the drive's rate loop")
@@ -18,6 +19,7 @@ def add_arguments(parser):
 
 
 def main(options):
+    """Tune, write the parameter file and print the comparison."""
     from pedestal_bringup.trials import tune
     with console.progress_of_share() as progress:
         lines = tune.main(options, options.command, progress)

@@ -1,13 +1,15 @@
-"""prove that a recording is complete; exit code 1 with the gaps if not"""
+"""prove that a recording is complete up to the planned end of its run; exit code 1 with the gaps if not"""
 import pathlib
 
 
 def add_arguments(parser):
+    """The bag."""
     parser.add_argument('bag', type=pathlib.Path)
 
 
 def main(options):
+    """Print the check; exit code 1 where the bag is not complete."""
     from pedestal_bringup.bags.verify import verify
     check = verify(options.bag)
     print('\n'.join(check.lines()))
-    return 0 if check.complete else 1
+    return 0 if check.finished else 1

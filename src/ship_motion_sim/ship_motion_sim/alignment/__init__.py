@@ -2,20 +2,20 @@
 
 classical           fourth-order gyrocompass: the azimuth loop is closed through the level error it makes
 adrc                paper 001, corrected: levelled by ADRC, azimuth from the least-squares slope of the level commands
-adrc_scheduled      the same observer with a bandwidth that falls as 6/t, azimuth from what it finds (z3)
-riccati_eso         the same observer with the gains of a Kalman filter
-oba                 optimisation-based: two bundles of vectors brought to cover each other, no loop at all
+adrc_scheduled      adrc's observer with a bandwidth that falls as 6/t, azimuth from its z3
+riccati_eso         adrc's observer with the gains of a Kalman filter
+oba                 optimisation-based: the rotation that maps one set of vectors onto another, no feedback loop
 
-Each is a file with one `step` and its STATE; extended_observer, levelling, slope and steady_state are what they share,
-conditions is what all are told, navigator runs the selected one. Sources: paper 001 (Zhou, Yang, Qin 2011) with the
+Each is a file with one `step` and its STATE; they share extended_observer, levelling, slope and steady_state, and
+get the same conditions; navigator runs the selected one. Sources: paper 001 (Zhou, Yang, Qin 2011) with the
 corrections of reference/nav.md section 1.1; Han 2009 (ADRC); Horn 1987 and Wu 2013 (optimisation-based alignment).
 
 Symbols
-    n, n'           ENU; what the computer takes for it, turned by a_z about up and by a_x, a_y (small) about level
+    n, n'           ENU; the computer's frame for it, rotated by a_z about up and by a_x, a_y (small) about level
     az              azimuth misalignment a_z: C_b^n = R_z(az) C_b^n'                [rad]
     w_c             commanded rate of n' against the earth, in n' (E, N, U)         [rad/s]
     w_N, g          north part of the earth's rate, gravity                         [rad/s, m/s2]
-    v_E, v_N        level velocity in n' less what an aid says it is: the error     [m/s]
+    v_E, v_N        level velocity in n' less that of an aid: the error            [m/s]
     x1, x2, x3      v, its rate, the rate of that without command; z1, z2, z3 as observed
                     north: x2 = g a_x, x3 = g (-sin az w_N - eps_E), b0 = g
                     east: x2 = -g a_y, x3 = -g ((1 - cos az) w_N - eps_N), b0 = -g

@@ -1,8 +1,8 @@
 """Paper 001, corrected: level by ADRC (TD, ESO, NLC), azimuth from the commands that keep it level.
 
-Once level, the commands only take back what the earth's rotation tilts, so (14), (15) at rest give (19):
+Once level, the commands only cancel the tilt by the earth's rotation, so (14), (15) at rest give (19):
 sin az = w_cE / w_N, cos az = 1 + w_cN / w_N. The commands are noisy; the least-squares slope of their integral since
-`start` takes the noise out (a plain mean never gets there: reference/nav.md section 1.3).
+`start` removes the noise (a plain mean does not: reference/nav.md section 1.3).
 """
 import math
 
@@ -32,7 +32,7 @@ STATE = np.dtype([
 
 
 def constants(k, p, h) -> np.ndarray:
-    """The record () of CONSTANTS of an AdrcParameters; k CONDITIONS."""
+    """The record () of CONSTANTS of AdrcParameters for steps of h [s]; k: CONDITIONS."""
     record = np.zeros((), CONSTANTS)
     record['w_o'], record['w_c'], record['start'] = p.observer, p.control, p.start
     g, r = float(k['gravity']), float(k['velocity_density']) / h
@@ -59,11 +59,11 @@ def constants(k, p, h) -> np.ndarray:
 
 @compiled
 def azimuth_sigma(c, k, window, surprise):
-    """1 sigma [rad] of the slope over a window [s].
+    """1 sigma [rad] of the azimuth from the slope over a window [s]; surprise as in extended_observer.
 
-    Random walk under the parabola's weights: 1.2 / window. The commands' own noise is the second derivative of the
-    velocity's integral, so only the ends of the window see it: 2 x 6^2 / window^4 of the velocity's variance, to which
-    all that surprises the observer (swell) is added.
+    The gyros' random walk has 1.2 / window under the parabola's weights. The commands' own noise is the second
+    derivative of the velocity's integral, so that only the ends of the window count: 2 x 6^2 / window^4 of the
+    velocity's variance. What the observer did not expect (swell) is added to that variance.
     """
     g, w_north = k.gravity, k.earth_rate[1]
     variance = c.velocity_variance + max(surprise - CALM, 0.0) * c.innovation_variance
@@ -73,8 +73,9 @@ def azimuth_sigma(c, k, window, surprise):
 
 @compiled
 def level_sigma(c, k, o, t):
-    """1 sigma [rad]: of the settled loop, wider where the sea surprises, or what is known to be left if that is more;
-    and what the observer, all poles at w_o, has not seen yet of the level at power-up."""
+    """1 sigma [rad] of level t [s] after power-up: that of the settled loop, widened where innovations are larger than
+    expected, or the observed tilt if that is more; and the initial tilt that the observer, all poles at w_o, has not
+    yet observed."""
     x = c.w_o * t
     unseen = extended_observer.LEVEL_SIGMA * (1.0 + x + 0.5 * x * x) * math.exp(-x)
     return math.hypot(max(math.sqrt(max(o.surprise, 1.0)) * c.level, extended_observer.tilt(o, k)), unseen)
@@ -82,7 +83,7 @@ def level_sigma(c, k, o, t):
 
 @compiled
 def step(s, c, k, v_east, v_north, h):
-    """One step; records STATE, CONSTANTS, CONDITIONS."""
+    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONSTANTS, CONDITIONS."""
     s.t += h
     o = s.observer
     for i in range(2):

@@ -25,7 +25,7 @@ def bandwidth(t):
 
 @compiled
 def step(s, k, v_east, v_north, h):
-    """One step; records STATE, CONDITIONS."""
+    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONDITIONS."""
     o, r = s.observer, k.velocity_density / h
     s.t += h
     w_o = bandwidth(s.t)

@@ -1,9 +1,9 @@
-"""The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity turns the azimuth back.
+"""The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity corrects the azimuth.
 
 v' = f - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N with K1 = K4 = 2 s0, k2 = 4 s0^2/g,
 K3 = 4 s0^4/g: all four poles at -s0 +- j s0 (reference/nav.md section 1.2). 180 deg of azimuth is an unstable
-equilibrium, left by what the first levelling kicks: the loop is closed from the start. Its velocities are those of a
-gyrocompass, integrals of what two accelerometers feel: that they turn with w_cU the axes they stand on do not know.
+equilibrium, which the transient of the first levelling leaves: the loop is closed from the start. Its velocities are
+those of a gyrocompass, the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
 """
 import math
 
@@ -24,20 +24,20 @@ CONSTANTS = np.dtype([
 
 STATE = np.dtype([
     ('t', 'f8'),                    # since the start [s]
-    ('turning', 'f8'),              # v_N / (s + K4) [m]
-    ('residual', 'f8'),             # azimuth that the loop still turns back, smoothed [rad]
-    ('taken', 'f8', (2,)),          # what this step takes off v_E, v_N [m/s]
+    ('lagged', 'f8'),               # v_N / (s + K4) [m]
+    ('residual', 'f8'),             # azimuth that the loop still corrects, smoothed [rad]
+    ('taken', 'f8', (2,)),          # subtracted from v_E, v_N in this step [m/s]
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
 
 
 def constants(k, s0, h) -> np.ndarray:
-    """The record () of CONSTANTS for the bandwidth s0 [rad/s]; k CONDITIONS."""
+    """The record () of CONSTANTS for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS."""
     record = np.zeros((), CONSTANTS)
     g, w_north = float(k['gravity']), float(k['earth_rate'][1])
     K1 = K4 = 2.0 * s0
     k2, K3 = 4.0 * s0**2 / g, 4.0 * s0**4 / g
-    # north channel: v, a_x, turning, az, residual under velocity noise per step and random walk of the gyros
+    # north channel: v, a_x, lagged, az, residual under velocity noise per step and random walk of the gyros
     rates = np.array([[-K1, g, 0.0, 0.0, 0.0], [-k2, 0.0, 0.0, -w_north, 0.0], [1.0, 0.0, -K4, 0.0, 0.0],
                       [0.0, 0.0, K3 / w_north, 0.0, 0.0], [0.0, 0.0, K3 / w_north, 0.0, -0.5 * s0]])
     noise = h * rates[:, 0]
@@ -53,21 +53,21 @@ def constants(k, s0, h) -> np.ndarray:
 
 @compiled
 def envelope(x):
-    """What is left of 1 after x = s0 t: the slower pair of its poles."""
+    """Decay from 1 after x = s0 t [-], by the slower pair of the loop's poles."""
     return (1.0 + x) * math.exp(-x)
 
 
 @compiled
 def step(s, c, k, v_east, v_north, h):
-    """One step; records STATE, CONSTANTS, CONDITIONS."""
+    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONSTANTS, CONDITIONS."""
     s.t += h
-    s.turning += h * (v_north - c.K4 * s.turning)
+    s.lagged += h * (v_north - c.K4 * s.lagged)
     # The damping, and what the strapdown has just made of w_c x v.
     s.taken[0] = h * (c.K1 * v_east + s.command[2] * v_north)
     s.taken[1] = h * (c.K1 * v_north - s.command[2] * v_east)
     s.command[0], s.command[1] = -c.k2 * v_north, c.k2 * v_east
-    s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.turning, -RATE_LIMIT), RATE_LIMIT)
-    # A steady az is turned back at az s0 / 2. At 180 deg it is not, which the envelope covers.
+    s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.lagged, -RATE_LIMIT), RATE_LIMIT)
+    # The loop corrects a steady az at az s0 / 2, except at 180 deg, which the envelope covers.
     s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
     left = SIGMA_UNKNOWN * envelope(c.s0 * s.t)
     moving = max(s.residual**2 - 9.0 * c.residual**2, 0.0)      # beyond three sigma of its noise

@@ -1,4 +1,4 @@
-"""What every alignment method is told of its place, its sensors and the sea."""
+"""The conditions every alignment method assumes: latitude, sensors and sea."""
 import math
 
 import numpy as np

@@ -28,40 +28,21 @@ def gains(w_o, h):
 
 @compiled
 def predicted(z1, z2, z3, push, h):
-    """(z1, z2, z3) h later; push = b0 u."""
+    """(z1, z2, z3) [m/s, m/s2, m/s3] h [s] later, push = b0 u [m/s3] in force."""
     rate = z3 + push
     return z1 + h * z2 + 0.5 * h * h * rate, z2 + h * rate, z3
 
 
 @compiled
-def covariance_predicted(p11, p12, p13, p22, p23, p33, q, h):
-    """The covariance h later, F p F^T + Q; q [(m/s2)2/s] is what the gyros' random walk does to x2."""
-    half = 0.5 * h * h
-    a11, a12, a13 = p11 + h * p12 + half * p13, p12 + h * p22 + half * p23, p13 + h * p23 + half * p33
-    a22, a23 = p22 + h * p23, p23 + h * p33
-    return a11 + h * a12 + half * a13, a12 + h * a13, a13, a22 + h * a23 + q * h, a23, p33
-
-
-@compiled
 def kalman_gains(p11, p12, p13, r):
-    """(l1, l2, l3) that make the covariance smallest."""
+    """(l1 [-], l2 [1/s], l3 [1/s2]) that make the covariance smallest, r [m2/s2] the variance of the measured v."""
     return p11 / (p11 + r), p12 / (p11 + r), p13 / (p11 + r)
 
 
 @compiled
-def covariance_corrected(p11, p12, p13, p22, p23, p33, l1, l2, l3, r):
-    """The covariance after a correction with any gains: (I - l H) p (I - l H)^T + l r l^T."""
-    s = p11 + r
-    return ((1.0 - l1)**2 * p11 + l1 * l1 * r,
-            (1.0 - l1) * (p12 - l2 * p11) + l1 * l2 * r,
-            (1.0 - l1) * (p13 - l3 * p11) + l1 * l3 * r,
-            p22 - 2.0 * l2 * p12 + l2 * l2 * s, p23 - l2 * p13 - l3 * p12 + l2 * l3 * s,
-            p33 - 2.0 * l3 * p13 + l3 * l3 * s)
-
-
-@compiled
 def surprised(surprise, e_east, e_north, s, h):
-    """The running mean of innovation^2 over its expected variance s: 1 where the disturbance is as expected."""
+    """The running mean, h [s] later, of innovation^2 [m2/s2] over its expected variance s: 1 where the disturbance is
+    as expected."""
     return surprise + h / SURPRISE_TIME * (0.5 * (e_east * e_east + e_north * e_north) / s - surprise)
 
 
@@ -71,7 +52,7 @@ VELOCITY_SIGMA, LEVEL_SIGMA, AZIMUTH_SIGMA = 0.1, math.radians(5.0), 2.0
 
 @compiled
 def start(o, k, level_sigma, azimuth_sigma):
-    """Nothing observed yet (record STATE; k CONDITIONS), 1 sigma [rad] of level and azimuth as given."""
+    """Reset the STATE o at power-up: nothing observed, 1 sigma [rad] of level and azimuth as given; k CONDITIONS."""
     for i in range(2):
         o.push[i] = 0.0
         for j in range(3):
@@ -86,22 +67,34 @@ def start(o, k, level_sigma, azimuth_sigma):
 
 @compiled
 def predict_covariance(o, k, h):
-    """Carry o.p over h."""
-    p = o.p
-    p[0], p[1], p[2], p[3], p[4], p[5] = covariance_predicted(p[0], p[1], p[2], p[3], p[4], p[5],
-                                                              (k.gravity * k.gyro_noise)**2, h)
+    """Carry the covariance o.p over h [s]: F p F^T + Q, where Q is what the gyros' random walk does to x2."""
+    p, q, half = o.p, (k.gravity * k.gyro_noise)**2, 0.5 * h * h
+    p11, p12, p13 = p[0], p[1], p[2]
+    p22, p23, p33 = p[3], p[4], p[5]
+    a11, a12, a13 = p11 + h * p12 + half * p13, p12 + h * p22 + half * p23, p13 + h * p23 + half * p33
+    a22, a23 = p22 + h * p23, p23 + h * p33
+    p[0], p[1], p[2] = a11 + h * a12 + half * a13, a12 + h * a13, a13
+    p[3], p[4] = a22 + h * a23 + q * h, a23
 
 
 @compiled
 def correct_covariance(o, l1, l2, l3, r):
-    """Put a correction with these gains into o.p."""
+    """Put a correction with any gains into the covariance o.p: (I - l H) p (I - l H)^T + l r l^T, r [m2/s2]."""
     p = o.p
-    p[0], p[1], p[2], p[3], p[4], p[5] = covariance_corrected(p[0], p[1], p[2], p[3], p[4], p[5], l1, l2, l3, r)
+    p11, p12, p13 = p[0], p[1], p[2]
+    p22, p23, p33 = p[3], p[4], p[5]
+    s = p11 + r
+    p[0] = (1.0 - l1)**2 * p11 + l1 * l1 * r
+    p[1] = (1.0 - l1) * (p12 - l2 * p11) + l1 * l2 * r
+    p[2] = (1.0 - l1) * (p13 - l3 * p11) + l1 * l3 * r
+    p[3] = p22 - 2.0 * l2 * p12 + l2 * l2 * s
+    p[4] = p23 - l2 * p13 - l3 * p12 + l2 * l3 * s
+    p[5] = p33 - 2.0 * l3 * p13 + l3 * l3 * s
 
 
 @compiled
 def predict(o, h):
-    """Carry z of both channels over h."""
+    """Carry z of both channels over h [s]."""
     for i in range(2):
         z = o.z[i]
         z[0], z[1], z[2] = predicted(z[0], z[1], z[2], o.push[i], h)
@@ -109,7 +102,8 @@ def predict(o, h):
 
 @compiled
 def correct(o, v_east, v_north, l1, l2, l3, s, h):
-    """Correct z of both channels with the measured velocities; s: expected variance of the innovations."""
+    """Correct z of both channels with the measured velocities [m/s]; s: expected variance of the innovations [m2/s2].
+    """
     e_east, e_north = v_east - o.z[0, 0], v_north - o.z[1, 0]
     o.surprise = surprised(o.surprise, e_east, e_north, s, h)
     for i in range(2):
@@ -121,19 +115,20 @@ def correct(o, v_east, v_north, l1, l2, l3, s, h):
 
 @compiled
 def azimuth(o, k):
-    """az [rad] of what the observer finds: z3 = g (-sin az w_N) north, -g (1 - cos az) w_N east."""
+    """Azimuth misalignment az [rad] from the observed z3: g (-sin az w_N) north, -g (1 - cos az) w_N east."""
     return math.atan2(-o.z[1, 2] / k.gravity, k.earth_rate[1] + o.z[0, 2] / k.gravity)
 
 
 @compiled
 def tilt(o, k):
-    """Level of n' [rad], rms of both axes, that is known to be wrong and that the commands have not taken away yet."""
+    """Observed tilt of n' [rad], rms of both axes, that the commands have not yet removed."""
     return math.hypot(o.z[0, 1], o.z[1, 1]) / (math.sqrt(2.0) * k.gravity)
 
 
 @compiled
 def sigmas(o, k):
-    """(azimuth, level) 1 sigma [rad]: covariance, wider where the sea surprises, and the sensors' biases."""
+    """(azimuth, level) 1 sigma [rad]: from the covariance, widened where innovations are larger than expected, and
+    from the biases of the sensors."""
     wider = max(o.surprise, 1.0)
     azimuth_variance = (wider * o.p[5] / k.gravity**2 + k.gyro_bias**2) / k.earth_rate[1]**2
     level_variance = (wider * o.p[3] + k.accelerometer_bias**2) / k.gravity**2

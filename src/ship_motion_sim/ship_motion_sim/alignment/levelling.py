@@ -13,13 +13,15 @@ RATE_LIMIT = 0.5        # of a command [rad/s]
 
 @compiled
 def differentiated(v1, v2, reference, h):
-    """(v1, v2) of the tracking differentiator one step on: r0 = 1/h^2, h0 = h, c0 = 1, so it is there in two steps."""
+    """(v1 [m/s], v2 [m/s2]) of the tracking differentiator one step of h [s] later; with r0 = 1/h^2, h0 = h, c0 = 1 it
+    reaches the reference in two steps."""
     return v1 + h * v2, v2 + h * fhan(v1 - reference, v2, 1.0 / (h * h), h)
 
 
 @compiled
 def command(z1, z2, z3, v1, v2, b0, w_c):
-    """u [rad/s] that brings z1, z2 to v1, v2 with bandwidth w_c and takes z3 away, as far as it may turn n'."""
+    """u [rad/s], within RATE_LIMIT, that brings z1, z2 to v1, v2 with bandwidth w_c [rad/s] and cancels z3; b0: what u
+    does to x2 [m/s2 per rad]."""
     u0 = fhan(z1 - v1, DAMPING * (z2 - v2), ACCELERATION, 1.0 / w_c)
     return min(max((u0 - z3) / b0, -RATE_LIMIT), RATE_LIMIT)
 
@@ -28,7 +30,7 @@ def command(z1, z2, z3, v1, v2, b0, w_c):
 def level(o, k, v1, v2, w_c, out):
     """Commands of both channels of an extended_observer.STATE o into out (3,) (w_cE, w_cN, w_cU); v1, v2 (2,).
 
-    The observer is told the command as it was limited.
+    The observer gets the command as it was limited.
     """
     g = k.gravity
     out[1] = command(o.z[0, 0], o.z[0, 1], o.z[0, 2], v1[0], v2[0], -g, w_c)

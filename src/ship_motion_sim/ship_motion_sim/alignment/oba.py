@@ -1,9 +1,10 @@
-"""Optimisation-based alignment: which rotation brings what was felt onto what gravity must have done? No loop.
+"""Optimisation-based alignment: the rotation that best maps measured specific force onto gravity's. No feedback loop.
 
 a = int C_b^b0 f dt (gyros only, b0 the deck at the start) is, but for the velocity, C_n0^b0 b with
 b = -int C_n^n0 g dt. The rotation b0 -> n0 that brings the vectors a onto b with least squares is the eigenvector of
-a 4 x 4 matrix (Horn 1987). The centroid of either bundle is taken off: that is the unknown velocity at the start
-(taken for zero, as is usual, the error is 15 times larger at 100 s), and what is left of swell averages out.
+a 4 x 4 matrix (Horn 1987). The centroids of the vectors a and of the vectors b are subtracted: that removes the
+unknown velocity at the start (where it is taken for zero, as is usual, the error is 15 times larger at 100 s), and the
+rest of the swell averages out.
 """
 import math
 
@@ -28,7 +29,7 @@ STATE = np.dtype([
 
 @compiled
 def gravity_integral(t, k):
-    """b [m/s] in n0 after t: the reaction to gravity, turned with the earth about w_ie / |w_ie|. Closed form."""
+    """b [m/s] in n0 after t [s]: the integral of the reaction to gravity, which turns with the earth. Closed form."""
     north, up = k.earth_rate[1], k.earth_rate[2]
     w = math.sqrt(north * north + up * up)
     n, u = north / w, up / w
@@ -37,43 +38,42 @@ def gravity_integral(t, k):
 
 
 @compiled
-def step(s, k, ax, ay, az, vx, vy, vz, h):
-    """One more pair; records STATE, CONDITIONS.
+def step(s, k, a, v, h):
+    """Take one more pair of vectors, h [s] after the last; records STATE, CONDITIONS.
 
-    (ax, ay, az): int C_b^b0 f dt less what a log says of the velocity there [m/s], whose Coriolis force is left out:
-    7 m/s tilt the level by 0.1 arcmin. (vx, vy, vz): the velocity in n that a GNSS says, 0 without one.
+    a: int C_b^b0 f dt in b0, less the velocity a log measures [m/s], three floats. The Coriolis force of that velocity
+    is left out: 7 m/s tilt the level by 0.1 arcmin. v: the velocity in n that a GNSS measures, zeros without one.
     """
     s.t += h
     o = s.observer
     l1, l2, l3, variance = riccati_eso.limit(o, k, h)
-    if vx == 0.0 and vy == 0.0:
-        # how far the sea is from what is expected; a GNSS takes it off b instead, and leaves nothing to judge by
+    if v[0] == 0.0 and v[1] == 0.0:
+        # The innovations show how the sea differs from the expected; with a GNSS b has the ship's motion already.
         extended_observer.predict(o, h)
-        extended_observer.correct(o, ax, ay, l1, l2, l3, variance, h)
+        extended_observer.correct(o, a[0], a[1], l1, l2, l3, variance, h)
     s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k)
     north, up = k.earth_rate[1], k.earth_rate[2]
-    cx, cy, cz = strapdown.cross(0.0, north, up, vx, vy, vz)
+    cx, cy, cz = strapdown.cross(0.0, north, up, v[0], v[1], v[2])
     s.coriolis[0] += h * cx
     s.coriolis[1] += h * cy
     s.coriolis[2] += h * cz
     bx, by, bz = gravity_integral(s.t, k)
-    # n turned back to n0: w_ie t is small
-    bx += vx + s.t * cx + s.coriolis[0]
-    by += vy + s.t * cy + s.coriolis[1]
-    bz += vz + s.t * cz + s.coriolis[2]
+    # From n back to n0: w_ie t is small.
+    bx += v[0] + s.t * cx + s.coriolis[0]
+    by += v[1] + s.t * cy + s.coriolis[1]
+    bz += v[2] + s.t * cz + s.coriolis[2]
     s.count += 1.0
     for i in range(3):
-        a = ax if i == 0 else ay if i == 1 else az
-        s.sum_a[i] += a
+        s.sum_a[i] += a[i]
         s.sum_b[i] += bx if i == 0 else by if i == 1 else bz
-        s.sum_ab[i, 0] += a * bx
-        s.sum_ab[i, 1] += a * by
-        s.sum_ab[i, 2] += a * bz
+        s.sum_ab[i, 0] += a[i] * bx
+        s.sum_ab[i, 1] += a[i] * by
+        s.sum_ab[i, 2] += a[i] * bz
 
 
 @compiled
 def jacobi(m, v):
-    """Bring a symmetric m (4, 4) to diagonal form; v (4, 4) gets its eigenvectors as columns."""
+    """Diagonalise a symmetric m (4, 4) in place by Jacobi rotations; v (4, 4) gets its eigenvectors as columns."""
     for i in range(4):
         for j in range(4):
             v[i, j] = 1.0 if i == j else 0.0
@@ -126,8 +126,8 @@ def solve(s):
 
 @compiled
 def attitude(s, k, qx, qy, qz, qw):
-    """Quaternion deck -> n now, of the deck -> b0 one that the gyros give (qx, qy, qz, qw)."""
+    """Quaternion (x, y, z, w) deck -> n now, from the deck -> b0 that the gyros give (qx, qy, qz, qw)."""
     bx, by, bz, bw = solve(s)
     qx, qy, qz, qw = strapdown.product(bx, by, bz, bw, qx, qy, qz, qw)
-    nx, ny, nz, nw = strapdown.turn(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
+    nx, ny, nz, nw = strapdown.from_rotvec(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
     return strapdown.product(nx, ny, nz, nw, qx, qy, qz, qw)

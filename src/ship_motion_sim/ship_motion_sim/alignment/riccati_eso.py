@@ -1,6 +1,6 @@
-"""The extended observer with Kalman gains: no better linear estimate of azimuth exists while the sea is as assumed.
+"""The extended observer with Kalman gains: the best linear estimate of azimuth while the sea is as assumed.
 
-Its covariance is the information limit: x3 out of velocities with white noise r per step, x2 walking with q.
+Its covariance is the information limit: x3 from velocities with white noise r per step, x2 a random walk of q.
 """
 import math
 
@@ -21,7 +21,8 @@ STATE = np.dtype([
 
 @compiled
 def limit(o, k, h):
-    """Carry the covariance of o over one step and its measurement; (l1, l2, l3, expected innovation variance)."""
+    """Carry the covariance of o over one step of h [s] and its measurement: (l1, l2, l3, expected variance of the
+    innovation [m2/s2])."""
     r = k.velocity_density / h
     extended_observer.predict_covariance(o, k, h)
     s = o.p[0] + r
@@ -32,8 +33,8 @@ def limit(o, k, h):
 
 @compiled
 def step(s, k, v_east, v_north, h, w_c):
-    """One step; records STATE, CONDITIONS. What control of bandwidth w_c [rad/s] does is known exactly: it does not
-    touch the estimate."""
+    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONDITIONS. The level control, of
+    bandwidth w_c [rad/s], is known exactly and does not affect the estimate."""
     o = s.observer
     for i in range(2):
         s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)

@@ -1,16 +1,17 @@
-"""The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop and the one that is better.
+"""The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and one on a target filter.
 
 Each is one compiled kernel of the laws the nodes run: the receiver's smoothing and pattern, the loop of the beam or a
-target filter, the electronic beam. Sample i of the grid is what the receiver measures over the millisecond that ends
-at its stamp i GRID, off the beam that stood in it; a target is given at the middles of these milliseconds. A command
-stamped i GRID is in force from the millisecond after i GRID + delay on.
+target filter, the electronic beam. Sample i of the grid is measured over the millisecond that ends at its stamp
+i GRID, against the beam in force in it; a target is given at the middles of these milliseconds. A command stamped
+i GRID is in force from the millisecond after i GRID + delay on.
 """
 import dataclasses
 import math
+from collections import namedtuple
 
 import numpy as np
 
-from acu_tracker.estimation import alpha_beta, axis_filter
+from acu_tracker.estimation import axis_filter, constant_gain
 from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import CaParameters, FilterParameters
 from acu_tracker.geometry import attitude as attitudes
@@ -33,11 +34,30 @@ FULL_SCALE, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
 
 SMOOTHERS = np.dtype([('error', smoothing.SMOOTHER)], align=True)
 
+Target = namedtuple('Target', 'angle attitude rate noise')
+"""Target and carrier on the grid, each (n,): true angle [rad]; the part of it that the carrier's attitude causes [rad]
+and its rate [rad/s], as measured for the loop; noise of the samples [rad]."""
+
+Beam = namedtuple('Beam', 'state constants inputs outputs')
+"""Records (1,) of an electronic beam without elevation."""
+
+Receiver = namedtuple('Receiver', 'slope beamwidth lost')
+"""slope: true over assumed [-]; beamwidth [rad], 0 for a linear receiver; lost: power over that on axis below which
+the signal is lost [-]."""
+
+PaperConstants = namedtuple('PaperConstants', 'form alpha period delta smoothing')
+"""The constants of a Paper: code of beam_loop.FORMS, gain [-], period in samples, share of the carrier's rate that is
+compensated [-], code of smoothing.SMOOTHINGS."""
+
+BetterConstants = namedtuple('BetterConstants', 'filter variance period hold delay tau')
+"""The constants of a Better: those (1,) of its filter, variance of a measurement [rad2], period and hold in samples,
+delay and low-pass of the acceleration [s]."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Paper:
-    """Paper 002's loop. period, delay in samples of the grid; slope: true over assumed; beamwidth [rad]: of a receiver
-    with a monopulse pattern, 0: linear for ever; lost: power over that on axis below which there is no error."""
+    """Paper 002's loop. period, delay: in samples of the grid; slope, beamwidth, lost: as in Receiver; delta: share of
+    the carrier's rate that is compensated."""
     alpha: float = 0.1
     period: int = 10
     delay: int = 0
@@ -49,25 +69,26 @@ class Paper:
     lost: float = 0.0
 
     def run(self, target, rate=None, noise=None):
-        """(beam (n,), error as the loop had it (n,)) [rad] of a target (n,) [rad] that the carrier's motion alone
-        moves at `rate` (n,) [rad/s]; noise (n,) [rad] of the samples."""
-        nothing = np.zeros(len(target))
-        beam, seen = np.zeros(len(target)), np.zeros(len(target))
-        _paper(beam_loop.FORMS.index(self.form), self.alpha, self.period, self.delta, self.slope, self.beamwidth,
-               self.lost, SMOOTHINGS[self.smoothing], np.asarray(target), nothing if rate is None else rate,
-               nothing if noise is None else noise, np.zeros(1, SMOOTHERS), *_beam(self.delay, self.period), beam,
-               seen)
-        return beam, seen
+        """(beam, smoothed error in the loop), each (n,) [rad], of a target (n,) [rad]; rate (n,) [rad/s]: of its
+        motion by the carrier; noise (n,) [rad] of the samples. None for zeros."""
+        zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
+        constants = PaperConstants(beam_loop.FORMS.index(self.form), self.alpha, self.period, self.delta,
+                                   SMOOTHINGS[self.smoothing])
+        _paper(constants, Receiver(self.slope, self.beamwidth, self.lost),
+               Target(np.asarray(target), zeros, zeros if rate is None else rate, zeros if noise is None else noise),
+               np.zeros(1, SMOOTHERS), _beam(self.delay, self.period), beam, errors)
+        return beam, errors
 
 
 @dataclasses.dataclass(frozen=True)
 class Better:
-    """Beam in force + error into a target filter; the beam is its prediction for the middle of its interval.
+    """A loop in which beam in force + error goes into a target filter; the command is the filter's prediction for the
+    middle of the interval in which it will be in force.
 
-    period: block of samples that is one measurement; hold: samples a command stands; delay: true, known: believed
-    (None: true), all in samples. jerk: noise of the constant-acceleration filter [rad/s3/sqrt(Hz)]; sigma: of one
-    sample [rad]. ins: the filter works in the earth frame; late: error of the INS's stamps in samples; tau: low-pass
-    of its acceleration [s], none: without the acceleration.
+    period: samples averaged to one measurement; hold: samples between two commands; delay: true delay, known: the
+    delay that the loop assumes (None: the true one), all in samples. jerk: noise of the constant-acceleration filter
+    [rad/s3/sqrt(Hz)]; sigma: of one sample [rad]. ins: the filter works in the earth frame; late: error of the INS's
+    stamps in samples; tau: low-pass of its acceleration [s], 0 without the acceleration.
     """
     jerk: float
     sigma: float
@@ -80,34 +101,35 @@ class Better:
     tau: float = 0.05
 
     def run(self, target, noise=None, attitude=None, rate=None):
-        """(beam, error as the filter had it (n,)) [rad] of a target (n,) [rad]; attitude, rate (n,) [rad, rad/s]: how
-        the carrier turns the target away from where the earth has it, as the INS knows it, on the same instants."""
+        """(beam, innovation of the filter), each (n,) [rad], of a target (n,) [rad]; noise (n,) [rad] of the samples;
+        attitude, rate (n,) [rad, rad/s]: rotation of the target by the carrier, as the INS measures it."""
         n = len(target)
-        nothing, beam, seen = np.zeros(n), np.zeros(n), np.zeros(n)
+        zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
         late = np.maximum(np.arange(n) - self.late, 0)
-        constants = axis_filter.constants(FilterParameters(kind='ca', ca=CaParameters(noise=self.jerk)))
-        _better(constants, self.sigma**2 / self.period, self.period, self.hold,
-                GRID * (self.delay if self.known is None else self.known), self.tau, np.asarray(target),
-                nothing if noise is None else noise, attitude[late] if self.ins else nothing,
-                rate[late] if self.ins else nothing, np.zeros(1, SMOOTHERS), np.zeros(1, axis_filter.FILTER),
-                *_beam(self.delay, self.hold), beam, seen)
-        return beam, seen
+        c = axis_filter.constants(FilterParameters(kind='ca', ca=CaParameters(noise=self.jerk)))
+        constants = BetterConstants(c, self.sigma**2 / self.period, self.period, self.hold,
+                                    GRID * (self.delay if self.known is None else self.known), self.tau)
+        _better(constants, Target(np.asarray(target), attitude[late] if self.ins else zeros,
+                                  rate[late] if self.ins else zeros, zeros if noise is None else noise),
+                np.zeros(1, SMOOTHERS), np.zeros(1, axis_filter.FILTER), _beam(self.delay, self.hold), beam, errors)
+        return beam, errors
 
 
 def _beam(delay, hold):
-    """State, constants, inputs, outputs of a beam that has no elevation."""
-    return (electronic_beam.initial_state(0.0, 0.0),
-            electronic_beam.constants(GRID, delay * GRID, 2 * hold * GRID), np.zeros(1, electronic_beam.INPUTS),
-            np.zeros(1, electronic_beam.OUTPUTS))
+    """A Beam at rest at 0; delay, hold: in samples of the grid."""
+    return Beam(electronic_beam.initial_state(0.0, 0.0),
+                electronic_beam.constants(GRID, delay * GRID, 2 * hold * GRID), np.zeros(1, electronic_beam.INPUTS),
+                np.zeros(1, electronic_beam.OUTPUTS))
 
 
 @compiled
-def received(off, slope, beamwidth, lost):
-    """What the receiver makes of a target `off` the beam [rad]: linear without a beamwidth, else as its pattern and
-    full scale have it; NaN where the signal is lost."""
+def received(offset, receiver):
+    """The error [rad] that a Receiver measures for an offset [rad] of the target from the beam: linear without a
+    beamwidth, else by its monopulse pattern within full scale; NaN where the signal is lost."""
+    slope, beamwidth, lost = receiver
     if beamwidth == 0.0:
-        return slope * off
-    S, D, _ = monopulse.channels(off / beamwidth, 0.0, slope * K_M, 1.0, 0.0)
+        return slope * offset
+    S, D, _ = monopulse.channels(offset / beamwidth, 0.0, slope * K_M, 1.0, 0.0)
     if S * S < lost:
         return math.nan
     return beamwidth * max(-FULL_SCALE, min(D / (K_M * S), FULL_SCALE))
@@ -115,65 +137,69 @@ def received(off, slope, beamwidth, lost):
 
 @compiled
 def command(u, stamp, due, beam):
-    """Put a command into the inputs of the electronic beam."""
+    """Put a command, beam [rad] at sample `stamp` of the grid, into the inputs u of the electronic beam; due: whether
+    it is a new one."""
     u.stamp_ns = u.command_stamp_ns = stamp * GRID_NS
     u.due = 1 if due else 0
     u.position[0] = beam
 
 
 @compiled
-def _paper(form, alpha, period, delta, slope, beamwidth, lost, kind, target, rate, noise, smoothers, state, constants,
-           inputs, outputs, beam, seen):
-    s, beta, T = smoothers[0].error, alpha_beta.benedict_bordner(alpha), period * GRID
+def _paper(constants, receiver, target, smoothers, plant, beam, errors):
+    """Paper 002's loop over a Target into beam and errors (n,) [rad]; plant: the Beam."""
+    form, alpha, period, delta, kind = constants
+    s, beta, T = smoothers[0].error, constant_gain.benedict_bordner(alpha), period * GRID
     R = v = error = 0.0
-    for i in range(len(target)):
-        beam[i] = outputs[0].position[0]
-        sample = received(target[i] - beam[i], slope, beamwidth, lost) + noise[i]
+    for i in range(len(target.angle)):
+        beam[i] = plant.outputs[0].position[0]
+        sample = received(target.angle[i] - beam[i], receiver) + target.noise[i]
         if not math.isnan(sample):
             smoothing.begin(s)
             smoothing.put(s, sample, 1.0 / LENGTH)
         if i % period == 0:
             error = math.nan if math.isnan(sample) else smoothing.smoothed(s, kind, 1, LENGTH)
-            R, v = beam_loop.step(form, R, v, error, alpha, beta, T, delta * rate[i])
-        seen[i] = error
-        command(inputs[0], i, i % period == 0, R)
-        electronic_beam.step(state[0], constants[0], inputs[0], outputs[0])
+            R, v = beam_loop.step(form, R, v, error, alpha, beta, T, delta * target.rate[i])
+        errors[i] = error
+        command(plant.inputs[0], i, i % period == 0, R)
+        electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
 
 
 @compiled
-def _better(constants_of_filter, variance, period, hold, delay, tau, target, noise, attitude, rate, smoothers, filters,
-            state, constants, inputs, outputs, beam, seen):
-    s, f, c = smoothers[0].error, filters[0], constants_of_filter[0]
+def _better(constants, target, smoothers, filters, plant, beam, errors):
+    """The loop on a target filter over a Target into beam and innovations `errors` (n,) [rad]; plant: the Beam."""
+    s, f, c = smoothers[0].error, filters[0], constants.filter[0]
+    period, hold, rate = constants.period, constants.hold, target.rate
     running, aimed, acceleration = False, 0.0, 0.0
-    for i in range(len(target)):
-        beam[i] = outputs[0].position[0]
+    for i in range(len(target.angle)):
+        beam[i] = plant.outputs[0].position[0]
         if i % period == 0:
             smoothing.begin(s)
-        # The carrier turns the target by the attitude: what is left is where the earth has it.
-        smoothing.put(s, beam[i] + (target[i] - beam[i] + noise[i]) - attitude[i], 0.0)
-        if i > 0 and tau > 0.0:
-            acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID, tau)
+        # Less the rotation by the carrier it is the angle in the earth frame.
+        smoothing.put(s, beam[i] + (target.angle[i] - beam[i] + target.noise[i]) - target.attitude[i], 0.0)
+        if i > 0 and constants.tau > 0.0:
+            acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID, constants.tau)
         if (i + 1) % period == 0:
             y = smoothing.smoothed(s, smoothing.NO_SMOOTHING, period, period)
             if running:
-                m = AxisMeasurement(y, variance, math.nan, 0.0)
+                m = AxisMeasurement(y, constants.variance, math.nan, 0.0)
                 axis_filter.predict(f, c, period * GRID)
-                seen[i] = axis_filter.innovation(f, m).nu
+                errors[i] = axis_filter.innovation(f, m).nu
                 axis_filter.correct(f, c, m)
             else:
-                axis_filter.start(f, c, y, variance, 1.0)
+                axis_filter.start(f, c, y, constants.variance, 1.0)
             running = True
             block = i
         if running and i % hold == 0:
-            ahead = delay + 0.5 * hold * GRID                  # from the stamp to the middle of the interval in force
-            earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + ahead).angle
-            aimed = earth + attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID + ahead)
-        command(inputs[0], i, running and i % hold == 0, aimed)
-        electronic_beam.step(state[0], constants[0], inputs[0], outputs[0])
+            # From the stamp to the middle of the interval in force.
+            lead = constants.delay + 0.5 * hold * GRID
+            earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + lead).angle
+            aimed = earth + target.attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID + lead)
+        command(plant.inputs[0], i, running and i % hold == 0, aimed)
+        electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
 
 
 def stable(loop, size=1e-9, seconds=20.0):
-    """Whether the paper's loop comes to rest after a step [rad]: its error keeps falling."""
+    """Whether the paper's loop (Paper) settles after a step of `size` [rad]: its error keeps falling."""
     n = round(seconds / GRID)
     error = np.abs(size - loop.run(np.full(n, size))[0])
     middle, last = error[n // 3:2 * n // 3].max(), error[2 * n // 3:].max()
@@ -181,7 +207,8 @@ def stable(loop, size=1e-9, seconds=20.0):
 
 
 def delay_limit(loop, highest=400):
-    """Largest delay in samples of the grid with which the paper's loop is stable, by bisection."""
+    """Largest delay, in samples of the grid up to `highest`, at which the paper's loop (Paper) is stable; by
+    bisection."""
     low, high = 0, highest
     while high - low > 1:
         middle = (low + high) // 2
@@ -195,11 +222,11 @@ def delay_limit(loop, highest=400):
 def spectral_radius(loop):
     """Largest modulus of the eigenvalues of the paper's linear loop over one period.
 
-    State: v T, the smoothing's output, the commands k, k - 1, ... : those that the samples of the next period (and of
-    the moving average before it) can meet. Sample j = 1 ... period after the update k meets the command
-    k + floor((j - 1 - delay) / period).
+    loop: Paper. State: v T, the smoothing's output, and the commands k, k - 1, ... that are in force in the samples of
+    the next period (and of the moving average before it). In sample j = 1 ... period after the update k the command
+    k + floor((j - 1 - delay) / period) is in force.
     """
-    M, beta, n = loop.period, alpha_beta.benedict_bordner(loop.alpha), LENGTH
+    M, beta, n = loop.period, constant_gain.benedict_bordner(loop.alpha), LENGTH
     first = {'S0': M, 'S1': 1, 'S2': M - n + 1}[loop.smoothing]
     ages = [-((j - 1 - loop.delay) // M) for j in range(first, M + 1)]
     V, E, C = 0, 1, 2

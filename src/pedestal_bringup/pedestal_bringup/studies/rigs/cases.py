@@ -23,17 +23,18 @@ class Case:
         return closed_loop.Loop(self.loaded()).run()
 
     def overrides(self):
+        """The parameters as texts node.key=value."""
         return [f'{key}={value}' for key, value in self.parameters.items()]
 
     def command(self):
-        """How to run the same through the nodes."""
+        """The command that runs this case through the nodes."""
         duration = [] if self.duration is None else ['--duration', f'{self.duration:g}']
         parameters = [part for override in self.overrides() for part in ('--param', override)]
         return shlex.join(['pedestal', 'run', self.scenario, *duration, *parameters])
 
 
 def sine_case(case, w, periods):
-    """A case of servo_sine with a sine of w [rad/s], for `periods` and a little more, so that the last is whole."""
+    """The Case with a sine of w [rad/s], for `periods` and up to 12 ms more, so that the last period is whole."""
     step = 0.002
     duration = math.ceil((2.0 * math.pi * periods / w + 0.01) / step) * step
     parameters = {**case.parameters, 'tracking_receiver.target.angle.frequency': w / (2.0 * math.pi)}

@@ -15,7 +15,7 @@ def panels(rows, columns=1, size=SIZE, **options):
 
 
 def draw_torques(axes, record):
-    """Torque of both azimuth motors over time."""
+    """Draw the torque [Nm] of both azimuth motors of a closed_loop.Run over time."""
     for i, (colour, style) in enumerate(((figures.MOTOR_1, '-'), (figures.MOTOR_2, '--'))):
         axes.plot(record.t, record['adu/motor_states']['effort'][:, i], style, color=colour, label=f'motor {i + 1}')
 

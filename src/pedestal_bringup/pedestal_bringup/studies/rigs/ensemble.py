@@ -1,10 +1,11 @@
 """A filter of acu_tracker over many noisy records of one motion, reduced to the moments of its errors.
 
-Noise of a run depends on a seed and the number of the run alone, so that every filter, profile and noise sees the same
-draws and it does not matter how runs are cut into batches.
+The noise of a run depends on a seed and the number of the run alone, so that every filter, profile and noise gets the
+same draws, however the runs are cut into batches.
 """
 import dataclasses
 import math
+from collections import namedtuple
 
 import numpy as np
 from scipy.signal import lfilter
@@ -24,13 +25,21 @@ INITIAL_RATE = TrackerParameters().initial_rate
 MOMENTS = np.dtype([('runs', 'f8'), ('angle', 'f8'), ('angle2', 'f8'), ('rate', 'f8'), ('rate2', 'f8'),
                     ('acceleration', 'f8'), ('acceleration2', 'f8'), ('raw2', 'f8'), ('variance', 'f8'),
                     ('rate_variance', 'f8'), ('nis', 'f8'), ('mu', 'f8', (axis_filter.BANK,))])
-"""Sums over runs at one time: errors of angle, rate, acceleration and of the raw angle, their squares, the variances
-the filter believes, normalised innovations squared, mode probabilities."""
+"""Sums over runs at one time: errors of angle, rate, acceleration and of the raw angle, their squares, the filter's
+own variances, normalised innovations squared, mode probabilities."""
+
+Series = namedtuple('Series', 't y R y_rate R_rate')
+"""What a filter measures of one axis: times (n,) [s], angles (runs, n) [rad], their variance (n,), rates (runs, n)
+[rad/s], their variance (n,)."""
+
+RangedSeries = namedtuple('RangedSeries', 'azimuth elevation R ranges R_range')
+"""What the Cartesian filter measures: angles (runs, n) [rad] of variance R, ranges (runs, n) [m] of variance
+R_range."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """Of the measured angle: rms sigma [rad]; bandwidth None: white, or that of a first-order lag [Hz].
+    """Noise of the measured angle: rms sigma [rad]; bandwidth of a first-order lag [Hz], None for white noise.
 
     rate_sigma: of an independent, white rate measurement [rad/s], None without one.
     """
@@ -53,7 +62,8 @@ def coloured(white, bandwidth):
 
 
 def records(truth, noise, seed, first, count):
-    """Measured angles and rates, each (count, n), of a truth (angle, rate, acceleration); no sensor: rates NaN."""
+    """Measured angles [rad] and rates [rad/s], each (count, n), of a truth (angle, rate, acceleration), each (n,); the
+    rates are NaN without a sensor."""
     angle, rate, _ = truth
     nu, nu_rate = drawn(seed, first, count, len(angle))
     if noise.bandwidth is not None:
@@ -63,31 +73,32 @@ def records(truth, noise, seed, first, count):
 
 
 def moments(params, t, truth, noise, measured):
-    """MOMENTS (n,) of a filter (FilterParameters) over measured records as of `records`.
+    """MOMENTS (n,) of a filter (FilterParameters) at times t (n,) [s], over measured records as of `records`.
 
-    The filter is told sigma and rate_sigma, and takes both for white.
+    The filter knows sigma and rate_sigma, and assumes white noise.
     """
     y, y_rate = measured
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=noise.rate_sigma is not None))
-    R = np.full(len(t), noise.sigma**2)
-    R_rate = np.full(len(t), (noise.rate_sigma or 0.0) ** 2)
+    series = Series(t, y, np.full(len(t), noise.sigma**2), y_rate, np.full(len(t), (noise.rate_sigma or 0.0) ** 2))
     sums = np.zeros(len(t), MOMENTS)
-    _add_runs(c, t, *truth, y, R, y_rate, R_rate, INITIAL_RATE, np.zeros(len(t), axis_filter.ESTIMATE), sums)
+    _add_runs(c, AxisMotion(*truth), series, INITIAL_RATE, np.zeros(len(t), axis_filter.ESTIMATE), sums)
     return sums
 
 
 @compiled
-def _add_runs(c, t, angle, rate, acceleration, y, R, y_rate, R_rate, initial_rate, out, sums):
-    for run in range(len(y)):
-        axis_filter.estimates(c, t, y[run], R, y_rate[run], R_rate, initial_rate, out)
-        for k in range(len(t)):
-            _add(sums[k], out[k], angle[k], rate[k], acceleration[k], y[run, k])
+def _add_runs(c, truth, m, initial_rate, out, sums):
+    """Add the errors of a filter over a Series m to MOMENTS (n,); truth: AxisMotion of arrays (n,)."""
+    for run in range(len(m.y)):
+        axis_filter.estimates(c, m.t, m.y[run], m.R, m.y_rate[run], m.R_rate, initial_rate, out)
+        for k in range(len(m.t)):
+            _add(sums[k], out[k], truth, k, m.y[run, k])
 
 
 @compiled
-def _add(s, o, angle, rate, acceleration, y):
-    """Add to MOMENTS an ESTIMATE of what is angle, rate and acceleration, after the measured angle y."""
-    d1, d2, d3, raw = o.angle - angle, o.rate - rate, o.acceleration - acceleration, y - angle
+def _add(s, o, truth, k, y):
+    """Add the errors of an ESTIMATE at step k to one of MOMENTS; y: the measured angle [rad]."""
+    angle = truth.angle[k]
+    d1, d2, d3, raw = o.angle - angle, o.rate - truth.rate[k], o.acceleration - truth.acceleration[k], y - angle
     s.runs += 1.0
     s.angle += d1
     s.angle2 += d1 * d1
@@ -103,31 +114,34 @@ def _add(s, o, angle, rate, acceleration, y):
         s.mu[j] += o.mu[j]
 
 
-def unscented_moments(params, t, truth, distance, noise, range_sigma, seed, first, count):
-    """MOMENTS (n,) of the azimuth of the IMM of unscented filters (params: UkfParameters).
+def unscented_moments(params, truth, distance, noise, range_sigma, runs):
+    """MOMENTS (n,) of the azimuth of the IMM of unscented filters (params: UkfParameters); runs: (seed, first, count).
 
-    The target is at elevation 0, `distance` (n,) [m] away, measured with range_sigma [m], white; both angles as
-    `noise` says, the azimuth with the same draws as in `records`.
+    The target is at elevation 0 and at `distance` (n,) [m], measured with white noise of range_sigma [m]; both angles
+    have the Noise `noise`, the azimuth with the draws of `records`.
     """
-    nu, _, nu_elevation, nu_range = drawn(seed, first, count, len(t), 4)
+    seed, first, count = runs
+    nu, _, nu_elevation, nu_range = drawn(seed, first, count, len(distance), 4)
     if noise.bandwidth is not None:
         nu, nu_elevation = coloured(nu, noise.bandwidth), coloured(nu_elevation, noise.bandwidth)
-    sums = np.zeros(len(t), MOMENTS)
-    _add_unscented_runs(unscented.constants(params), PERIOD, *truth, truth[0] + noise.sigma * nu,
-                        noise.sigma * nu_elevation, noise.sigma**2, distance + range_sigma * nu_range, range_sigma**2,
-                        INITIAL_RATE**2, sums)
+    sums = np.zeros(len(distance), MOMENTS)
+    measured = RangedSeries(truth[0] + noise.sigma * nu, noise.sigma * nu_elevation, noise.sigma**2,
+                            distance + range_sigma * nu_range, range_sigma**2)
+    _add_unscented_runs(unscented.constants(params), PERIOD, AxisMotion(*truth), measured, INITIAL_RATE**2, sums)
     return sums
 
 
 @compiled
-def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, ranges, R_range, rate_variance, sums):
+def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
+    """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (n,); truth: AxisMotion of arrays (n,)."""
+    R, R_range = measured.R, measured.R_range
     out = np.zeros(1, axis_filter.ESTIMATE)
     o = out[0]
-    for run in range(len(azimuth)):
+    for run in range(len(measured.azimuth)):
         state = np.zeros(1, unscented.STATE)
         s = state[0]
-        for k in range(len(angle)):
-            A, E, r = azimuth[run, k], elevation[run, k], ranges[run, k]
+        for k in range(len(truth.angle)):
+            A, E, r = measured.azimuth[run, k], measured.elevation[run, k], measured.ranges[run, k]
             o.nis = math.nan
             if k == 0:
                 known = AxisVariances(R, 0.0, rate_variance)
@@ -144,19 +158,19 @@ def _add_unscented_runs(c, T, angle, rate, acceleration, azimuth, elevation, R, 
             axes, _ = unscented.variances(s)
             o.variance, o.covariance, o.rate_variance = axes[0]
             unscented.probabilities(s, o.mu)
-            _add(sums[k], o, angle[k], rate[k], acceleration[k], A)
+            _add(sums[k], o, truth, k, A)
 
 
 def added(sums, more):
-    """MOMENTS, element by element."""
+    """Sum of two arrays (n,) of MOMENTS, element by element."""
     return (sums.view('f8') + more.view('f8')).view(MOMENTS)
 
 
 def total(sums):
-    """MOMENTS (1,) of all times (n,) together."""
+    """Sum (1,) of MOMENTS (n,) over all times."""
     return sums.view('f8').reshape(len(sums), -1).sum(axis=0).view(MOMENTS)
 
 
 def rms(sums, name):
-    """Root of the mean of a squared error ('angle', 'rate', 'acceleration', 'raw') of MOMENTS."""
+    """Rms error [rad, rad/s, rad/s2] of MOMENTS (n,), name: 'angle', 'rate', 'acceleration' or 'raw'; (n,)."""
     return np.sqrt(sums[f'{name}2'] / sums['runs'])

@@ -1,8 +1,8 @@
-"""The loop of paper 003: a rate loop that is fed a measured miss, and the rate and acceleration of a filter.
+"""The loop of paper 003: a rate loop whose command is a measured miss with rate and acceleration fed forward.
 
-The target moves to and fro and turns round in a half cosine. Every T the tracker says how far the antenna missed it d
-ago, with noise. What the antenna's encoder said then plus the miss is the line of sight, y; a filter of
-`acu_tracker.estimation.axis_filter` makes rate v and acceleration a of it, and the rate loop is told
+The target moves to and fro; in a reversal its rate is half a cosine. Every T the tracker measures the miss of the
+antenna, d ago, with noise. The encoder angle of that instant plus the miss is the line of sight, y; a filter of
+`acu_tracker.estimation.axis_filter` estimates its rate v and acceleration a, and the command of the rate loop is
 
     u = K_p miss(t - d) + k_v v + k_a a,        W(s) = w^2 / (s^2 + 2 zeta w s + w^2),
 
@@ -25,7 +25,7 @@ from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 
 DELAY = 4
-"""Age of a miss when it comes, in T."""
+"""Age of a miss when it arrives, in T."""
 
 SIGMA = math.radians(0.02)
 """Of a miss [rad]."""
@@ -40,7 +40,7 @@ REVERSALS = {'azimuth': 1.0, 'elevation': 1.6}
 """Duration of a reversal [s]: 11 and 6.9 deg/s2 at its peak. The paper does not print it."""
 
 PERIODS = 2
-"""Of the motion that count, after half of one to settle."""
+"""Periods of the motion that count, after half of one to settle."""
 
 CALM = 2.0
 """After a reversal the rate is called uniform from then on [s]."""
@@ -70,7 +70,7 @@ STEP = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('mu', 
 
 @compiled
 def _follow(target, known, f, c, lead, M, normals, out):
-    """Runs of the loop: target (n, 3), normals (runs, n) into out (runs, n).
+    """Run the loop: target (n, 3), normals (runs, n) into STEP records out (runs, n); M as of `rate_loop_step`.
 
     known (n, 2): rate and acceleration to feed forward; (0, 2): those of the filter f, c, `lead` [s] after its miss.
     """
@@ -118,17 +118,18 @@ def filter_of(kind, **groups):
 
 
 def cv(q):
-    """Constant rate; q [deg/s2/sqrt(Hz)]."""
+    """The Source of a constant-rate filter; q [deg/s2/sqrt(Hz)]."""
     return Source(filter_of('cv', cv={'noise': math.radians(q)}))
 
 
 def ca(q):
-    """Constant acceleration; q [deg/s3/sqrt(Hz)]."""
+    """The Source of a constant-acceleration filter; q [deg/s3/sqrt(Hz)]."""
     return Source(filter_of('ca', ca={'noise': math.radians(q)}))
 
 
 def imm(q_ca, predicted):
-    """A quiet cv, a ca of q_ca [deg/s3/sqrt(Hz)], a lively current_statistical; each holds for 5 s."""
+    """The Source of an IMM: cv of low noise, ca of q_ca [deg/s3/sqrt(Hz)], current_statistical of high acceleration;
+    dwell 5 s."""
     default = FilterParameters().imm
     bank = {
         'models': 'cv ca current_statistical', 'dwell': 5.0,
@@ -179,9 +180,9 @@ def batch(item):
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
-    """What came of the runs of a Source on an axis: over them at each step (n,) the mean miss, its rms [rad], the rms
-    error of the rate [rad/s]; the mean of the largest misses [rad]."""
+class MissStatistics:
+    """Statistics of the runs of a Source on an axis: over the runs at each step (n,) the mean miss and its rms [rad]
+    and the rms error of the rate [rad/s]; the mean of the largest misses [rad]."""
     axis: str
     miss_mean: np.ndarray
     miss_rms: np.ndarray
@@ -195,19 +196,19 @@ class Outcome:
         squares = np.square(self.miss_rms[counts])
         second = round(1.0 / T)
         windows = np.convolve(squares, np.full(second, 1.0 / second), 'valid')
-        turning = np.convolve(np.abs(target[:, 1]) < 0.999 * RATE, np.ones(round(CALM / T)))[:len(t)] > 0.5
+        reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * RATE, np.ones(round(CALM / T)))[:len(t)] > 0.5
         return {'miss_rms_deg': (math.degrees(math.sqrt(squares.mean())), 'deg'),
                 'miss_worst_second_deg': (math.degrees(math.sqrt(windows.max())), 'deg'),
                 'miss_peak_deg': (math.degrees(self.peak), 'deg'),
-                'rate_noise_deg_s': (math.degrees(metrics.rms(self.rate_rms[counts & ~turning])), 'deg/s')}
+                'rate_noise_deg_s': (math.degrees(metrics.rms(self.rate_rms[counts & ~reversing])), 'deg/s')}
 
 
-def outcomes(cases, count, pool, progress=lambda share, text: None):
-    """{name: Outcome} of `count` runs of each of cases {name: (axis, source)}."""
+def statistics(cases, count, pool, progress=lambda share, text: None):
+    """{name: MissStatistics} of `count` runs of each of cases {name: (axis, Source)}; pool: monte_carlo.Pool."""
     pieces = monte_carlo.batches(count, BATCH)
     items = [(axis, source, *piece) for axis, source in cases.values() for piece in pieces]
     done = pool.map(batch, items, progress)
-    found = {}
+    result = {}
     for name, (axis, _) in cases.items():
         sums, peaks = 0.0, 0.0
         for _ in pieces:
@@ -215,6 +216,6 @@ def outcomes(cases, count, pool, progress=lambda share, text: None):
             sums += more.view('f8')
             peaks += peak
         mean = (sums / count).view(SUMS)
-        found[name] = Outcome(axis, mean['miss'], np.sqrt(mean['miss_squared']),
-                              np.sqrt(mean['rate_error_squared']), peaks / count)
-    return found
+        result[name] = MissStatistics(axis, mean['miss'], np.sqrt(mean['miss_squared']),
+                                      np.sqrt(mean['rate_error_squared']), peaks / count)
+    return result

@@ -1,6 +1,6 @@
 """Metrics of steps and sines. Angles [rad], times [s], arrays (n,) on one even grid of time.
 
-Not by libraries, which give other numbers: control.step_info takes a settling time from the grid instead of between its
+Not by libraries, which give other numbers: control.step_info takes a settling time from the grid, not between its
 points; scipy.optimize.curve_fit gives amplitude and period of a sine that differ by 7e-13 from those of the published
 rows.
 """
@@ -10,30 +10,30 @@ import numpy as np
 
 
 def overshoot_percent(y, size):
-    """How far a step response from 0 goes past its size [%]."""
+    """Overshoot [%] of a step response y (n,) from 0 to size."""
     return 100.0 * max(float(np.max(y / size)) - 1.0, 0.0)
 
 
 def settling_time(t, y, size, band=0.02):
     """Time after which y stays within +-band * size of size; NaN if it never does. Linear between samples."""
-    off = np.abs(y / size - 1.0) - band
-    outside = np.flatnonzero(off > 0.0)
+    excess = np.abs(y / size - 1.0) - band
+    outside = np.flatnonzero(excess > 0.0)
     if outside.size == 0:
         return float(t[0])
     last = outside[-1]
     if last == len(t) - 1:
         return math.nan
-    return float(t[last] + (t[last + 1] - t[last]) * off[last] / (off[last] - off[last + 1]))
+    return float(t[last] + (t[last + 1] - t[last]) * excess[last] / (excess[last] - excess[last + 1]))
 
 
 def crossings(y, size, band=0.005):
-    """How often y crosses its final value, moves within +-band * size of it not counted."""
+    """How often y crosses its final value `size`; motion within +-band * size of it does not count."""
     side = np.sign(y - size)[np.abs(y - size) > band * abs(size)]
     return int(np.sum(side[1:] != side[:-1]))
 
 
 def whole_periods(t, period, skip):
-    """The whole periods of a record from `skip` [s] after its start on, as a mask."""
+    """Mask (n,) of the whole periods of a record from `skip` [s] after its start on; raises ValueError for none."""
     t = t - t[0]
     whole = math.floor((t[-1] - skip) / period + 1e-6)
     if whole < 1:
@@ -65,15 +65,17 @@ def amplitude_and_period(t, y, period):
 
 
 def residual(t, y, period):
-    """What the fundamental leaves of y: y - offset - a sin - b cos."""
+    """y without offset and fundamental: y - offset - a sin - b cos, (n,)."""
     w = 2.0 * math.pi / period
     offset, a, b = harmonic_fit(t, y, w)
     return y - offset - a * np.sin(w * t) - b * np.cos(w * t)
 
 
 def rms(y):
+    """Root mean square of y (any shape), a float in its unit."""
     return float(np.sqrt(np.mean(np.square(y))))
 
 
 def peak(y):
+    """Largest absolute value of y (any shape), a float in its unit."""
     return float(np.max(np.abs(y)))

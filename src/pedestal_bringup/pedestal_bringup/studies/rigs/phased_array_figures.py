@@ -1,4 +1,4 @@
-"""Figures of the study phased-array: what paper 002 drew, with S0, S1 and S2 side by side, and the better loop."""
+"""Figures of the study phased-array: those of paper 002 with S0, S1 and S2 side by side, and of the better loop."""
 import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
@@ -58,18 +58,18 @@ def stability(limits):
     figure, axes = drawing.panels(1, 3, size=(9.6, 3.6))
     for panel, T in zip(axes[0], (10, 5)):
         for S, colour in zip(SMOOTHED, COLOURS):
-            found = {loop.alpha: both for loop, both in limits.items() if loop.smoothing == S and loop.period == T
+            by_alpha = {loop.alpha: both for loop, both in limits.items() if loop.smoothing == S and loop.period == T
                      and loop.slope == 1.0 and loop.form == 'type_1'}
-            panel.plot(list(found), [bisected for bisected, _ in found.values()], color=colour, label=S)
-            panel.plot(list(found), [exact for _, exact in found.values()], 'o', color=colour, markersize=4)
+            panel.plot(list(by_alpha), [bisected for bisected, _ in by_alpha.values()], color=colour, label=S)
+            panel.plot(list(by_alpha), [exact for _, exact in by_alpha.values()], 'o', color=colour, markersize=4)
         panel.set_title(f'T = {T} ms')
         panel.set_xlabel('alpha')
         panel.set_ylim(0.0, 220.0)
-    found = {loop.slope: both for loop, both in limits.items() if loop.alpha == 0.1 and loop.smoothing == 'S1'
+    by_slope = {loop.slope: both for loop, both in limits.items() if loop.alpha == 0.1 and loop.smoothing == 'S1'
              and loop.period == 10 and loop.form == 'type_1'}
-    order = sorted(found)
-    axes[0, 2].plot(order, [found[slope][0] for slope in order], color=TRUTH)
-    axes[0, 2].plot(order, [found[slope][1] for slope in order], 'o', color=TRUTH, markersize=4)
+    order = sorted(by_slope)
+    axes[0, 2].plot(order, [by_slope[slope][0] for slope in order], color=TRUTH)
+    axes[0, 2].plot(order, [by_slope[slope][1] for slope in order], 'o', color=TRUTH, markersize=4)
     axes[0, 2].set_title('alpha 0.1, T = 10 ms, S1')
     axes[0, 2].set_xlabel('true slope over assumed')
     axes[0, 2].set_ylim(0.0, 220.0)

@@ -31,31 +31,33 @@ STROKE, RATE, REVERSAL = math.radians(20.0), math.radians(3.5), 1.0
 
 
 def truth(name, t):
-    """(angle, rate, acceleration) of a profile at t (n,) [s]; KeyError for an unknown name."""
+    """(angle, rate, acceleration), each (n,), of a profile at t (n,) [s]; KeyError for an unknown name."""
     if name in NEAREST:
         return flyby(t - 0.5 * DURATION, SPEED / NEAREST[name])
     return {'s-turn-500m': s_turn, 's-20deg': lambda t: s_motion(t, STROKE, RATE, REVERSAL)}[name](t)
 
 
 def distance(name, t):
-    """Of a flyby from the antenna [m]."""
+    """Distance [m] of a flyby from the antenna at t (n,) [s]; KeyError for another profile."""
     return np.hypot(NEAREST[name], SPEED * (t - 0.5 * DURATION))
 
 
 def flyby(t, w):
-    """A straight line passed at speed over distance w [rad/s], nearest at t = 0."""
+    """(angle, rate, acceleration) (n,) of a straight line, nearest at t = 0; w: speed over smallest distance
+    [rad/s]."""
     u = w * t
     return np.arctan(u), w / (1.0 + u * u), -2.0 * u * w * w / (1.0 + u * u) ** 2
 
 
 def s_turn(t):
-    """Straight on, a turn to one side, twice as long to the other, back, and straight on, along the old line."""
-    found, before = [0.0, 0.0, 0.0], 0.0
+    """(angle, rate, acceleration) (n,) of an S-turn at t (n,) [s]: a turn to one side, one twice as long to the other
+    side, and a third back to the old course; straight before and after."""
+    motion, before = [0.0, 0.0, 0.0], 0.0
     for at, side in TURNS.items():
         jump = (side - before) * TURN_ACCELERATION / TURN_DISTANCE
-        found = [x + jump * more for x, more in zip(found, _step(t - at, ROLL_TIME))]
+        motion = [x + jump * more for x, more in zip(motion, _step(t - at, ROLL_TIME))]
         before = side
-    return tuple(found)
+    return tuple(motion)
 
 
 def _step(t, width):
@@ -67,10 +69,11 @@ def _step(t, width):
 
 
 def s_motion(t, stroke, rate, reversal):
-    """To and fro over `stroke` [rad] from end to end at +-rate [rad/s], each reversal [s] half a cosine in rate.
+    """(angle, rate, acceleration) (n,) of a motion to and fro over `stroke` [rad] at +-rate [rad/s]; each reversal [s]
+    is half a cosine in rate.
 
-    In the middle, forward, at t = 0; the largest acceleration is pi rate / reversal. ValueError where the reversals
-    alone are longer than the stroke.
+    At t = 0 it is in the middle and moves forward; the largest acceleration is pi rate / reversal. Raises ValueError
+    where the reversals alone are longer than the stroke.
     """
     uniform = stroke / rate - 2.0 * reversal / math.pi
     if uniform < 0.0:

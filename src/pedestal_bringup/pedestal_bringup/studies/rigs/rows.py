@@ -1,11 +1,11 @@
-"""What a study comes to: rows, and the targets they meet or miss."""
+"""The result of a study: rows, and the targets they meet or miss."""
 import dataclasses
 import math
 
 
 @dataclasses.dataclass
 class Result:
-    """What a study found: rows as of `row`, figures {name: function that draws a Figure}, remarks in sentences.
+    """The result of a study: rows as of `row`, figures {name: function that draws a Figure}, remarks in sentences.
 
     shown: the rows that are printed, where they are too many for a terminal; None: all.
     """
@@ -22,7 +22,7 @@ def row(case, metric, value, unit, paper=None, target=None):
 
 
 def meets(value, target):
-    """Whether a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'; no value meets none."""
+    """Whether a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'; None meets no target."""
     if value is None:
         return False
     first, word, last = ('', *target.split()) if len(target.split()) == 2 else target.split()

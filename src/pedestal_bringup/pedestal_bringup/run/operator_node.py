@@ -1,0 +1,98 @@
+"""The operator inside `pedestal run` and `pedestal program`: sends the program tracks, hears who lives."""
+import time
+
+from rcl_interfaces.srv import GetParameters
+
+from pedestal_bringup.run.processes import RunError
+from pedestal_common import messages, nodes, parameters
+from pedestal_common.shell import Shell
+
+DISCOVERY_TIME = 0.5
+"""Seconds a run looks for another graph on its domain before it starts its own."""
+
+ANSWER_TIME = 2.0
+"""Seconds a node has to answer a parameter service before it counts as stuck."""
+
+
+class Operator(Shell):
+    """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of the others:
+    hears(node, monotonic time [s]) is called for each."""
+
+    def __init__(self, beams=0):
+        super().__init__('operator', parameters.Parameters)
+        self.links = nodes.links(beams)
+        self.time = 0.0
+        self.heard = {}
+        self.hears = self.heard.__setitem__
+        self._writers = {}
+        self.message_reader('diagnostics', self._take)
+
+    def send(self, tracks):
+        """The program tracks {topic: message}, latched."""
+        self._open(tracks)
+        for topic, message in tracks.items():
+            self._writers[topic](messages.serialize(message))
+
+    def send_to(self, names, tracks):
+        """The same once all of the nodes that read them are there, or a short run may end before its recorder has
+        them; whether they are sent."""
+        self._open(tracks)
+        if any(self._missing(publisher, nodes.readers(link, names))
+               for link, publisher in self.publishers_by_link.items()):
+            return False
+        self.send(tracks)
+        return True
+
+    def _open(self, names):
+        for name in names:
+            if name not in self._writers:
+                self._writers[name] = self.writer(name)
+
+    def refuse_company(self):
+        """Raise RunError when the nodes of another graph are on this domain: they would hear this one."""
+        deadline = time.monotonic() + DISCOVERY_TIME
+        while time.monotonic() < deadline:
+            names = self.get_node_names()
+            if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.module):
+                raise another_graph(self.context.get_domain_id())
+            time.sleep(0.02)
+
+    def _take(self, array):
+        self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
+        for status in array.status:
+            self.hears(status.name, time.monotonic())
+
+    def silent(self, limit):
+        """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""
+        last = min(self.heard, key=self.heard.get, default=None)
+        return last if last is not None and time.monotonic() - self.heard[last] > limit else None
+
+    def stuck(self, names, executor):
+        """Those of the nodes whose process does not even answer a parameter service."""
+        answers = self._ask(names, GetParameters.Request(), executor)
+        return [node for node in names if node not in answers]
+
+    def graph_start(self, node, executor):
+        """graph.start [ns UTC] of a running node. Raises RunError where it does not answer."""
+        answers = self._ask([node], GetParameters.Request(names=['graph.start']), executor)
+        if node not in answers or not answers[node].values:
+            raise RunError(f'{node} does not say when its graph began: is it running on ROS_DOMAIN_ID '
+                           f'{self.context.get_domain_id()}?')
+        return answers[node].values[0].integer_value
+
+    def _ask(self, names, request, executor):
+        """{node: its answer to a request for parameters} of those that answer in time."""
+        clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in names}
+        asked = {}
+        deadline = time.monotonic() + ANSWER_TIME
+        while time.monotonic() < deadline and not (len(asked) == len(clients) and all(
+                answer.done() for answer in asked.values())):
+            for node, client in clients.items():
+                if node not in asked and client.service_is_ready():
+                    asked[node] = client.call_async(request)
+            executor.spin_once(timeout_sec=0.02)
+        return {node: answer.result() for node, answer in asked.items() if answer.done()}
+
+
+def another_graph(domain_id):
+    return RunError(f'another graph runs on ROS_DOMAIN_ID {domain_id}; set a free one')

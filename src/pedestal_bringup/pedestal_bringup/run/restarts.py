@@ -1,0 +1,65 @@
+"""When a node that died is started again, and when it has died too often. No processes here, and no clock."""
+import collections
+
+
+class Restarts:
+    """Times are those of one steady clock [s].
+
+    attempts: how often a node may be started again within `within` [s]; 0: never. delay: from death to start [s].
+    """
+
+    def __init__(self, attempts, within, delay):
+        self.attempts, self.within, self.delay = attempts, within, delay
+        self.count = 0
+        self._deaths = collections.defaultdict(collections.deque)
+        self._due = {}
+
+    def died(self, node, now):
+        """A node has died; which start within the window is its next, 0 where it has died too often."""
+        deaths = self._deaths[node]
+        while deaths and deaths[0] <= now - self.within:
+            deaths.popleft()
+        if len(deaths) >= self.attempts:
+            return 0
+        deaths.append(now)
+        self._due[node] = now + self.delay
+        self.count += 1
+        return len(deaths)
+
+    def due(self, now):
+        """The nodes to be started now, each of them told once."""
+        ready = [node for node, time in self._due.items() if time <= now]
+        for node in ready:
+            del self._due[node]
+        return ready
+
+
+class Silence:
+    """Which nodes have said nothing for how long, on the same clock.
+
+    Nobody is silent while the listener itself was held up: what it did not hear in a gap longer than `gap` [s] between
+    two looks does not count.
+    """
+
+    def __init__(self, gap=1.0):
+        self._gap = gap
+        self._heard = {}
+        self._looked = None
+
+    def heard(self, node, now):
+        self._heard[node] = now
+
+    def forget(self, node):
+        """A node has died: it is silent again only after it has been heard again."""
+        self._heard.pop(node, None)
+
+    def longer_than(self, limit, now):
+        """The nodes that were heard once and then not for longer than limit [s]."""
+        return [node for node, time in self._heard.items() if now - time > limit]
+
+    def look(self, now):
+        """To be called at every look around, before `longer_than`."""
+        if self._looked is not None and now - self._looked > self._gap:
+            lost = now - self._looked
+            self._heard = {node: time + lost for node, time in self._heard.items()}
+        self._looked = now

@@ -1,0 +1,63 @@
+"""Which node is started again and when, and who counts as silent: decisions without processes and without a clock."""
+from pedestal_bringup.run.restarts import Restarts, Silence
+
+
+def test_a_node_starts_again_after_the_delay_and_once():
+    restarts = Restarts(5, 60.0, 0.5)
+    assert restarts.died('acu', 10.0) == 1
+    assert restarts.due(10.4) == []
+    assert restarts.due(10.5) == ['acu']
+    assert restarts.due(11.0) == []
+    assert restarts.count == 1
+
+
+def test_too_many_deaths_within_the_window_are_given_up():
+    restarts = Restarts(3, 60.0, 0.5)
+    assert [restarts.died('acu', now) for now in (0.0, 1.0, 2.0, 59.9)] == [1, 2, 3, 0]
+    assert restarts.count == 3
+
+
+def test_a_death_is_forgotten_after_the_window():
+    restarts = Restarts(2, 60.0, 0.5)
+    assert [restarts.died('acu', now) for now in (0.0, 30.0, 60.0, 61.0, 90.0)] == [1, 2, 2, 0, 2]
+
+
+def test_nodes_are_counted_each_for_itself():
+    restarts = Restarts(1, 60.0, 0.5)
+    assert [restarts.died(node, 0.0) for node in ('acu', 'adu', 'acu')] == [1, 1, 0]
+    assert sorted(restarts.due(1.0)) == ['acu', 'adu']
+
+
+def test_no_attempts_means_never():
+    assert Restarts(0, 60.0, 0.5).died('acu', 0.0) == 0
+
+
+def test_a_node_is_silent_once_it_was_heard():
+    silence = Silence()
+    silence.look(0.0)
+    assert silence.longer_than(5.0, 100.0) == []
+    silence.heard('acu', 100.0)
+    assert silence.longer_than(5.0, 105.0) == []
+    assert silence.longer_than(5.0, 105.1) == ['acu']
+    silence.heard('acu', 106.0)
+    assert silence.longer_than(5.0, 107.0) == []
+
+
+def test_a_node_that_died_is_not_silent():
+    silence = Silence()
+    silence.heard('acu', 0.0)
+    silence.forget('acu')
+    assert silence.longer_than(5.0, 10.0) == []
+
+
+def test_nobody_is_silent_because_the_listener_slept():
+    silence = Silence(gap=1.0)
+    silence.look(0.0)
+    silence.heard('acu', 0.0)
+    silence.look(0.5)
+    silence.look(40.5)
+    assert silence.longer_than(5.0, 40.5) == []
+    for now in (41.0, 42.0, 43.0, 44.0, 45.0):
+        silence.look(now)
+    assert silence.longer_than(5.0, 45.0) == []
+    assert silence.longer_than(5.0, 45.1) == ['acu']

@@ -1,0 +1,44 @@
+"""Files that others wrote, opened so that nothing in their name or their length hangs or fills the process."""
+import errno
+import hashlib
+import os
+import stat
+
+SPARSE = 16_000_000, 100
+"""A file longer than this [bytes], of which the disk holds less than one part in so many, is one large hole."""
+
+
+def open_regular(path, largest=None):
+    """A regular file as an open binary stream: no device, no pipe, no directory, at most `largest` bytes where given.
+
+    Raises OSError, whose strerror says what is wrong.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    try:
+        info = os.fstat(descriptor)
+        if not stat.S_ISREG(info.st_mode):
+            raise OSError(errno.EINVAL, 'not a regular file', str(path))
+        if largest is not None and info.st_size > largest:
+            raise OSError(errno.EFBIG, f'{info.st_size} bytes, must be at most {largest}', str(path))
+        if info.st_size > SPARSE[0] and info.st_blocks * 512 * SPARSE[1] < info.st_size:
+            raise OSError(errno.EINVAL, f'{info.st_size} bytes long, of which the disk holds {info.st_blocks * 512}',
+                          str(path))
+        return os.fdopen(descriptor, 'rb')
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def read_text(path, largest):
+    """The text of a regular UTF-8 file of at most `largest` bytes. Raises OSError, UnicodeDecodeError."""
+    with open_regular(path, largest) as stream:
+        return stream.read(largest + 1).decode()
+
+
+def sha256(path) -> str:
+    """The SHA-256 of a file, read piece by piece. Raises OSError."""
+    digest = hashlib.sha256()
+    with open(path, 'rb') as stream:
+        while piece := stream.read(1 << 20):
+            digest.update(piece)
+    return digest.hexdigest()

@@ -1,0 +1,85 @@
+"""`pedestal run` in realtime: who dies is started again, the run ends in order, and nobody is left behind."""
+import re
+import signal
+import subprocess
+import time
+
+import pytest
+
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.run import reaper
+
+NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
+
+
+def wait_until(condition, seconds):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, f'not within {seconds:g} s'
+        time.sleep(0.05)
+
+
+@pytest.fixture(scope='module')
+def begun(start_run):
+    """begun(prefix of its command) -> a realtime Run that records."""
+    def begin(prefix=()):
+        run = start_run('leo_pass', '--pacing', 'realtime', prefix=prefix)
+        wait_until(lambda: run.bag.exists() and run.recorded(1), 180.0)
+        return run
+    return begin
+
+
+def test_a_run_that_is_told_to_end_does_so_in_order_with_a_result(begun):
+    """Also one that a script runs in the background, where a shell has SIGINT ignored."""
+    run = begun(('sh', '-c', 'trap "" INT; exec "$@"', 'sh'))
+    wait_until(run.recorded, 60.0)
+    run.process.send_signal(signal.SIGTERM)
+    result = run.finish()
+    assert result.returncode == 130
+    assert result.stderr == f'pedestal: stopped; what was recorded is in {run.bag}\n'
+    assert 'restarts' in result.stdout
+    assert run.pids() == {}
+    assert bags.load(run.bag).damage == ''
+
+
+def test_nobody_outlives_a_killed_run(begun):
+    """Not even a node that is stopped and so does not hear that it shall end."""
+    run = begun()
+    assert set(run.pids()) == set(NODES)
+    run.signal('acu', signal.SIGSTOP)
+    run.process.kill()
+    wait_until(lambda: run.pids() == {}, reaper.PATIENCE + 10.0)
+    assert bags.load(run.bag).damage == ''
+
+
+def test_a_node_that_always_dies_is_given_up(start_run):
+    """Where the bag shall be is a file: the recorder ends at once, however often it is started."""
+    run = start_run('leo_pass', '--pacing', 'realtime', '--param', 'scenario.restart.attempts=2', '--param',
+                    'scenario.restart.delay=0.1')
+    wait_until(lambda: run.log.exists(), 60.0)
+    run.bag.touch()
+    result = run.finish()
+    assert result.returncode == 1
+    said = result.stderr.splitlines()
+    assert [line for line in said if 'starting it again' in line] == said[:2]
+    assert re.match(r'pedestal: recorder ended with exit code 1 \(recorder.* error: .*/bag.*\): starting it again, 1 '
+                    'of 2 within 60 s', said[0])
+    assert said[2].startswith('pedestal: error: recorder ended with exit code 1, after 2 starts within 60 s; its last '
+                              'log lines')
+    assert run.pids() == {}
+
+
+FULL = """mount -t tmpfs -o size=4m tmpfs "$0" || exit
+(until [ -s "$0/bag/bag_0.mcap" ]; do sleep 0.1; done; cat /dev/zero > "$0/filler") 2> /dev/null &
+exec "$@"
+"""
+"""A disk of its own for a run, which is full to the last byte as soon as something is recorded."""
+
+
+def test_the_cause_of_an_end_is_kept_on_a_full_disk(start_run, tmp_path):
+    alone = ('unshare', '--mount', 'sh', '-c', FULL, tmp_path)
+    if subprocess.run([*alone[:4], 'mount -t tmpfs tmpfs "$0"', tmp_path], capture_output=True).returncode != 0:
+        pytest.skip('this machine mounts nothing')
+    result = start_run('leo_pass', bag=tmp_path / 'bag', prefix=alone).finish()
+    assert result.returncode == 1
+    assert re.search(r'^  \| recorder: error: .*bag_0.mcap: No space left on device$', result.stderr, re.MULTILINE)
