@@ -93,8 +93,8 @@ class Field:
 
     def fresh(self, name):
         """Wait for messages of a topic that were stamped after now."""
-        now = time.time_ns()
-        self.until(lambda: messages.nanoseconds(self.heard[name][-1].header.stamp) > now)
+        now, heard = time.time_ns(), self.heard[name]
+        self.until(lambda: heard and messages.nanoseconds(heard[-1].header.stamp) > now)
 
     def status(self, node, text):
         """Wait for a diagnostic of a node that comes from now on and holds the text."""
