@@ -79,11 +79,11 @@ class Watcher:
         return self.mode == 'autotrack' and all(time > since for time in self.heard.values()) and all(
             now - self.heard[node] < FRESH for node in ANSWERS)
 
-    def recovery(self, since, node=''):
+    def recovery(self, since, node='', goes_on=lambda: True):
         """{'own': time until the node spoke again, 'graph': time until all was well} after a kill [s]; None after
-        PATIENCE."""
+        PATIENCE, or when it does not go on."""
         own = begun = None
-        while time.monotonic() - since < PATIENCE:
+        while time.monotonic() - since < PATIENCE and goes_on():
             self.spin()
             if own is None and (not node or self.heard[node] > since + LAST_WORDS):
                 own = time.monotonic() - since
@@ -158,7 +158,7 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
         if watcher.recovery(since) is None and watcher.recovery(since + PATIENCE) is None:
             process.terminate()
             raise RuntimeError(f'the graph did not begin: {log}: {ended(process, counts)}')
-        last = time.monotonic() + duration - 30.0
+        last = time.monotonic() + duration - 40.0
         while order and time.monotonic() < last and process.poll() is None:
             watcher.spin(chance.uniform(0.0, 2.0))
             node = order.pop()
@@ -170,8 +170,10 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
             since = time.monotonic()
             os.kill(running[node], signal.SIGKILL)
             counts['kills'] += 1
-            recovery = watcher.recovery(since, node)
-            if recovery is None:
+            recovery = watcher.recovery(since, node, lambda process=process: process.poll() is None)
+            if recovery is None and process.poll() is not None:
+                counts['run over meanwhile'] += 1
+            elif recovery is None:
                 counts['unrecovered'] += 1
                 print(f'not recovered: {node}, mode {watcher.mode}, heard '
                       f'{ {name: round(time.monotonic() - at, 2) for name, at in watcher.heard.items()} }; {log}',
