@@ -180,6 +180,8 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
                       flush=True)
             else:
                 outages[node].append(recovery)
+                print(f'{node}: it speaks again after {recovery["own"]:.2f} s, all is well after '
+                      f'{recovery["graph"]:.2f} s', flush=True)
         if not order and process.poll() is None:
             process.send_signal(signal.SIGINT)
         said = ended(process, counts)

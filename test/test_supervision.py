@@ -1,14 +1,19 @@
 """`pedestal run` in realtime: who dies is started again, the run ends in order, and nobody is left behind."""
+import importlib.util
+import pathlib
 import re
 import signal
 import subprocess
 import time
 
-import kills
 import pytest
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import reaper
+
+_spec = importlib.util.spec_from_file_location('kills', pathlib.Path(__file__).with_name('kills.py'))
+kills = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(kills)
 
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 
