@@ -1,7 +1,7 @@
 """Damaged and hostile files to every verb that reads files: python test/hostile_files.py FOLDER [COUNT] [SEED].
 
-Each file goes to each of its verbs in a child of its own, which may take TIME seconds and, with what the parent had
-imported and compiled, MEMORY bytes. A verb must do its work, or refuse the file by one line on stderr. What did
+Each file goes to each of its verbs in a child of its own, which may take TIME seconds of a core and, with what the
+parent had imported, MEMORY bytes. A verb must do its work, or refuse the file by one line on stderr. What did
 neither is listed; the exit code is 1 when anything is. Every second file is crafted, one of CRAFTED; the others are
 sound ones with random damage.
 """
@@ -26,7 +26,9 @@ from mcap.writer import Writer as McapWriter
 from pedestal_bringup import cli
 from pedestal_bringup.run import scenario
 
-TIME = 60.0
+TIME, WAITING = 60, 600.0
+"""Seconds of a core, and of the clock beside a busy machine, after which a verb hangs."""
+
 MEMORY = 500_000_000
 ADDRESSES = 4_000_000_000
 """Addresses that a child may take beyond those of its parent, so that a claim of terabytes fails at once."""
@@ -364,6 +366,7 @@ def child(verb, arguments, errors):
         with open('/proc/self/statm') as stream:
             addresses = int(stream.read().split()[0]) * resource.getpagesize() + ADDRESSES
         resource.setrlimit(resource.RLIMIT_AS, (addresses, addresses))
+        resource.setrlimit(resource.RLIMIT_CPU, (TIME, TIME))
         with open(os.devnull) as nothing, open(errors, 'w') as stream, open(os.devnull, 'w') as sink:
             for source, target in ((nothing, 0), (sink, 1), (stream, 2)):
                 os.dup2(source.fileno(), target)
@@ -380,7 +383,7 @@ def child(verb, arguments, errors):
 
 
 def outcome(verb, arguments, errors):
-    """(what went wrong or '', seconds, bytes) of a verb in a child."""
+    """(what went wrong or '', seconds of a core, bytes) of a verb in a child."""
     begun = time.monotonic()
     number = os.fork()
     if not number:
@@ -391,17 +394,17 @@ def outcome(verb, arguments, errors):
         done, status, usage = os.wait4(number, os.WNOHANG)
         if done:
             break
-        if time.monotonic() - begun > TIME:
+        if time.monotonic() - begun > WAITING:
             hung = True
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(number, signal.SIGKILL)
         time.sleep(0.002)
-    seconds, memory = time.monotonic() - begun, usage.ru_maxrss * 1024
+    seconds, memory = usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024
     said = pathlib.Path(errors).read_text(errors='replace')
     lines = [line for line in said.splitlines() if not line.startswith('pedestal: left out: ')]
     wrong = ''
     if hung:
-        wrong = f'hangs after {TIME:g} s'
+        wrong = f'hangs, {seconds:.1f} s of a core in {WAITING:g} s'
     elif 'Traceback' in said or os.WIFSIGNALED(status) or os.WEXITSTATUS(status) not in (0, 1):
         wrong = f'ends with {status}: {lines[-1] if lines else ""}'
     elif verb != 'run' and len(lines) > 1:
@@ -437,23 +440,22 @@ def _do_all(output):
 def attack(folder, names, seed=1, verbs=None):
     """Make the files (of CRAFTED by their names, None: a damaged one) and give each to its verbs, or those named.
 
-    [(file, verb, what went wrong or '', seconds, bytes)].
+    Iterator of (file, verb, what went wrong or '', seconds of a core, bytes).
     """
     folder = pathlib.Path(folder)
     folder.mkdir(exist_ok=True)
-    files, rows = Files(folder, random.Random(seed)), []
+    files = Files(folder, random.Random(seed))
     for number, name in enumerate(names):
         name, path = crafted(files, name) if name else damaged(files)
         for verb, arguments in commands(path, folder / 'out').items():
             if verbs is None or verb in verbs:
                 (folder / 'out').mkdir(exist_ok=True)
-                rows.append((f'{number:03} {name}', verb, *outcome(verb, arguments, folder / 'errors')))
+                yield f'{number:03} {name}', verb, *outcome(verb, arguments, folder / 'errors')
                 shutil.rmtree(folder / 'out')
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:
             path.unlink()
-    return rows
 
 
 def main(folder, count=300, seed=1):
@@ -464,17 +466,17 @@ def main(folder, count=300, seed=1):
     rng, names = random.Random(seed), list(CRAFTED)
     rng.shuffle(names)
     chosen = [names[k // 2 % len(names)] if k % 2 == 0 else None for k in range(count)]
-    rows = attack(folder / 'files', chosen, seed)
     by_verb = collections.defaultdict(list)
-    for file, verb, wrong, seconds, memory in rows:
+    for file, verb, wrong, seconds, memory in attack(folder / 'files', chosen, seed):
         by_verb[verb].append((wrong, seconds, memory))
         if wrong:
-            print(f'{file}: {verb} {wrong}')
-    print(f'{count} files, {len(rows)} calls\n{"verb":26} {"calls":>6} {"wrong":>6} {"longest s":>10} {"most MB":>8}')
+            print(f'{file}: {verb} {wrong}', flush=True)
+    print(f'{count} files, {sum(map(len, by_verb.values()))} calls')
+    print(f'{"verb":26} {"calls":>6} {"wrong":>6} {"most s":>10} {"most MB":>8}')
     for verb, of_verb in by_verb.items():
         wrongs, times, sizes = zip(*of_verb)
         print(f'{verb:26} {len(of_verb):6} {sum(map(bool, wrongs)):6} {max(times):10.1f} {max(sizes) / 1e6:8.0f}')
-    return int(any(wrong for _, _, wrong, _, _ in rows))
+    return int(any(wrong for of_verb in by_verb.values() for wrong, _, _ in of_verb))
 
 
 if __name__ == '__main__':

@@ -1,8 +1,8 @@
 """YAML as parameter files use it: sections, lists, numbers, true, false and texts, each what it looks like.
 
 YAML 1.1 takes 1:30 for 90, 010 for 8, 1_0 for 10, 2024-01-01 for a date and `on` for true; here they are texts, so
-that a parameter which is a number refuses them. A section says a key once. Aliases, with which a few lines stand for
-billions of values, and tags are refused, as ROS 2 does.
+that a parameter which is a number refuses them. A section says a key once. Tags are refused, and aliases with which a
+few lines stand for billions of values.
 """
 import re
 
@@ -13,8 +13,8 @@ from pedestal_common import files
 LARGEST = 2_000_000
 """Bytes of a file; every parameter of an array of 16 beams is a tenth of it."""
 
-DEPTH = 20
-"""Sections in sections."""
+DEPTH, VALUES = 20, 200_000
+"""Sections in sections, and values with those that aliases stand for, at the most."""
 
 _TAG = 'tag:yaml.org,2002:'
 _PLAIN = ('null', 'bool', 'int', 'float', 'str', 'seq', 'map')
@@ -57,15 +57,29 @@ for _name, _pattern, _first in (
 
 def parse(text):
     """The values of a YAML text. Raises yaml.YAMLError."""
-    depth = 0
-    for event in yaml.parse(text, Loader=_Base):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEPTH:
-            raise yaml.composer.ComposerError(None, None, f'more than {DEPTH} sections in sections', event.start_mark)
-        if isinstance(event, yaml.AliasEvent) or getattr(event, 'tag', None):
-            what = f'tag {event.tag}' if hasattr(event, 'tag') else f'alias *{event.anchor}: must be written out'
-            raise yaml.composer.ComposerError(None, None, what, event.start_mark)
+    _check(yaml.parse(text, Loader=_Base))
     return yaml.load(text, Loader=_Loader)
+
+
+def _check(events):
+    """Raise yaml.YAMLError where a text is too deep, says a tag or stands for too many values."""
+    count, begun, sizes = 0, [], {}
+    for event in events:
+        if getattr(event, 'tag', None):
+            raise yaml.composer.ComposerError(None, None, f'tag {event.tag}', event.start_mark)
+        if isinstance(event, yaml.AliasEvent):
+            count += sizes.get(event.anchor, VALUES)  # of nothing, or of what it stands in
+        elif isinstance(event, yaml.CollectionStartEvent):
+            begun.append((event.anchor, count))
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = begun.pop()
+            sizes[anchor] = count - before
+        elif isinstance(event, yaml.ScalarEvent):
+            sizes[event.anchor] = 1
+        count += 1
+        if len(begun) > DEPTH or count > VALUES:
+            most = f'{DEPTH} sections in sections' if len(begun) > DEPTH else f'{VALUES} values'
+            raise yaml.composer.ComposerError(None, None, f'more than {most}', event.start_mark)
 
 
 def read(path):
@@ -79,4 +93,5 @@ def problem(error) -> str:
         return error.strerror or str(error)
     if isinstance(error, UnicodeDecodeError):
         return f'no valid UTF-8 text at byte {error.start}'
-    return f'no valid YAML: {" ".join(str(error).split())}'
+    where = str(error).replace('in "<unicode string>", ', 'at ')
+    return f'no valid YAML: {" ".join(where.split())}'

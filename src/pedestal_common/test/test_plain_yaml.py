@@ -22,7 +22,8 @@ def test_keys_are_texts():
 
 
 @pytest.mark.parametrize('text, problem', [
-    ('a: &x 1\nb: *x', r'alias \*x: must be written out'), ('a: !!int 5', 'tag tag:yaml.org,2002:int'),
+    ('a: &x [*x]', 'more than 200000 values'), ('a: *x', 'more than 200000 values'),
+    ('a: !!int 5', 'tag tag:yaml.org,2002:int'),
     ('a: 1\na: 2', "'a' is said twice"), ('? [1]\n: 2', 'a key must be a text'),
     ('[' * 100_000, 'sections in sections'), ('- ' * 100_000, 'sections in sections'),
     ('a: ' + '9' * 20, 'more than 64 bits'), ('a: ' + '9' * 5000, 'more than 64 bits'),
@@ -34,10 +35,19 @@ def test_what_hides_or_grows_is_refused(text, problem):
     assert '\n' not in plain_yaml.problem(error.value)
 
 
+def test_a_few_lines_do_not_stand_for_billions_of_values():
+    lines = ['a: &a [x, x, x, x, x, x, x, x, x, x]']
+    lines += [f'{name}: &{name} [{", ".join([f"*{other}"] * 10)}]' for other, name in zip('abcdefgh', 'bcdefghi')]
+    assert plain_yaml.parse('\n'.join(lines[:4]))['d'][9][9][9][9] == 'x'
+    with pytest.raises(yaml.YAMLError, match='more than 200000 values'):
+        plain_yaml.parse('\n'.join(lines))
+
+
 def test_what_is_dumped_comes_back():
     values = {'text': '1:30', 'other': '010', 'date': '2024-01-01', 'flag': True, 'number': 1e-5, 'large': 2**63 - 1,
               'empty': '', 'none': None, 'list': [1.0, 'on'], 'on': 'null', 'float': '1e5', 'nan': '.nan'}
     assert plain_yaml.parse(yaml.safe_dump(values)) == values
+    assert plain_yaml.parse(yaml.safe_dump([values, values])) == [values, values]
 
 
 @pytest.mark.parametrize('make, problem', [

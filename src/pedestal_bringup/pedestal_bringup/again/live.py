@@ -15,7 +15,8 @@ from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import Trigger
 
 from pedestal_bringup.again import difference, recompute
-from pedestal_bringup.run.graph import Operator, RunError, command_line, sole_run
+from pedestal_bringup.run.graph import Operator, sole_run
+from pedestal_bringup.run.processes import RunError, command_line
 from pedestal_common import middleware, nodes, parameters, records
 from pedestal_common.steps import SECOND
 

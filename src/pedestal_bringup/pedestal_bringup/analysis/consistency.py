@@ -88,8 +88,9 @@ def read(bag, run):
     _rates(relative, velocity, attitude, ship_velocity, true_rate)
     error = (estimate[:, :2] - run.target_earth + math.pi) % (2.0 * math.pi) - math.pi
     rate_error = estimate[:, 2:] - true_rate
-    a, b, correlation = error / numbers['sigma'], rate_error / numbers['rate_sigma'], numbers['correlation']
-    nees = (a * a - 2.0 * correlation * a * b + b * b) / (1.0 - correlation * correlation)
+    with np.errstate(all='ignore'):  # a filter that states nothing it could be held to has no NEES
+        a, b, correlation = error / numbers['sigma'], rate_error / numbers['rate_sigma'], numbers['correlation']
+        nees = (a * a - 2.0 * correlation * a * b + b * b) / (1.0 - correlation * correlation)
     return Consistency(t, **numbers, probability=probability, error=error, rate_error=rate_error, nees=nees,
                        tracking=run.tracking)
 

@@ -35,7 +35,7 @@ class Report:
     """What verify found. topics: [TopicCheck]; problems: of the whole bag, texts; steps: how many the run has; period
     [s], NaN when there are fewer than two; made: how the bag was made, a line; end, planned_end: time [ns] of the last
     step, and of the one the run was to go on to, None when the bag does not say; lost: steps that the drive made
-    without the command for them, as its last diagnostics say, None without one."""
+    without the command for them, and all it made, as its last diagnostics say; None where they do not."""
     path: str
     topics: list
     problems: list
@@ -44,7 +44,7 @@ class Report:
     made: str
     end: int
     planned_end: int | None
-    lost: int | None
+    lost: tuple | None
 
     @property
     def complete(self):
@@ -70,7 +70,7 @@ class Report:
     @property
     def lost_steps(self):
         """The steps that the drive lost, as text; '' where none is known of."""
-        return f'{self.lost} of {self.steps}' if self.lost else ''
+        return '{} of {}'.format(*self.lost) if self.lost and self.lost[0] else ''
 
     def lines(self):
         """The report as text: a row per topic, the gaps under it, the verdict last."""
@@ -130,13 +130,16 @@ def verify(path) -> Report:
     counts = {check.name: check.count for check in checks}
     if bag.statistics is not None and bag.statistics != counts:
         problems.append(f'the summary counts {_differences(bag.statistics, counts)}')
+    problems += _away([rows[name] for name in of_steps], bag.start, grid)
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
-    lost = bag.last_values(nodes.DRIVE).get('lost_steps', '')
+    drive = bag.last_values(nodes.DRIVE)
+    lost = tuple(int(number) for number in (drive.get('lost_steps', ''), drive.get('step', ''))
+                 if number.isdecimal() and len(number) < 20)
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(path), checks, bag.breaks + problems, grid.steps, grid.period / 1e9 if grid.period else np.nan,
                   configuration.line(bag), grid.last, planned,
-                  int(lost) if lost.isdecimal() and len(lost) < 20 else None)
+                  lost if len(lost) == 2 else None)
 
 
 def _problems(bag, rows, name, stamp, grid):
@@ -145,7 +148,7 @@ def _problems(bag, rows, name, stamp, grid):
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Steps that nobody made, and what strangers said, are no fault of the recording.
-        return ([] if stamp.size else ['no message']) + _sequences(rows)
+        return ([] if stamp.size else ['no message']) + _numbering(rows)
     problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
@@ -157,13 +160,9 @@ def _problems(bag, rows, name, stamp, grid):
         problems += _seconds(bag, name, stamp, grid)
     if topic and bag.topics[name] != topic.type:
         problems.append(f'of type {bag.topics[name]}, where the graph has {topic.type}')
-    return problems + (_sequences(rows) if ours else [])
-
-
-def _sequences(rows):
-    """What is wrong with the numbers of a topic's messages, which begin anew in each file."""
-    files = rows.channel >> 16
-    return [problem for file in np.unique(files) for problem in _sequence(rows.sequence[files == file])]
+    if ours:
+        problems += _numbering(rows)
+    return problems
 
 
 def _differences(claimed, counts):
@@ -249,6 +248,25 @@ def _seconds(bag, name, stamp, grid):
         if at.size > count:
             problems.append(f'{at.size - count} too many of {node}')
     return problems
+
+
+def _away(of_steps, start, grid):
+    """Where no step was recorded between two files: the recorder of the first was killed, and another one started.
+
+    of_steps: rows of the index of each topic of the steps.
+    """
+    none = np.zeros(0, np.int64)
+    number = np.concatenate([none, *(row.channel >> 16 for row in of_steps)])
+    stamp = np.concatenate([none, *(row.stamp - start for row in of_steps)])
+    spans = [(int(stamp[number == file].min()), int(stamp[number == file].max())) for file in np.unique(number)]
+    return [f'nothing recorded from {before / 1e9:.6f} to {after / 1e9:.6f} s, between two files'
+            for (_, before), (after, _) in zip(spans, spans[1:]) if after - before > max(grid.period, 1)]
+
+
+def _numbering(rows):
+    """What is wrong with the sequence numbers of a topic; in each file they begin with 1."""
+    file = rows.channel >> 16
+    return [problem for number in np.unique(file) for problem in _sequence(rows.sequence[file == number])]
 
 
 def _sequence(sequence):

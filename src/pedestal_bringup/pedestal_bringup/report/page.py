@@ -128,14 +128,15 @@ def _loop(bag, check):
     """Rows on the control loop: its rate in the drive's time, in realtime also in wall time, and what was lost."""
     rows = []
     joints = run_data.table(bag, 'joint_states')
-    if joints is not None and joints['t'].size > 1:
+    if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
         t = joints['t']
         rows.append(["loop rate achieved (drive's time)", _number((t.size - 1) / (t[-1] - t[0]), 'Hz')])
         if bag.metadata.get('pacing') == 'realtime':
             wall = bag.rows('joint_states').publish
             jitter = (np.diff(wall) - check.period * 1e9) / 1e6
             late = np.percentile(np.abs(jitter), 99.0)
-            rows += [['loop rate achieved (wall time)', _number((t.size - 1) / (wall[-1] - wall[0]) * 1e9, 'Hz')],
+            rate = (t.size - 1) / max(wall[-1] - wall[0], 1) * 1e9
+            rows += [['loop rate achieved (wall time)', _number(rate, 'Hz')],
                      ['jitter of the step, wall time',
                       f'{tracking.rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
                       f'largest {np.abs(jitter).max():.3g} ms']]

@@ -1,0 +1,42 @@
+"""A short form of hostile_files.py: what is most likely to fill the memory, to hang or to end in a traceback."""
+import importlib.util
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+_spec = importlib.util.spec_from_file_location('hostile_files', pathlib.Path(__file__).with_name('hostile_files.py'))
+hostile_files = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(hostile_files)
+
+VERBS = ('verify', 'recover', 'export', 'rerun', 'run', 'run --params-file')
+"""Those that need nothing compiled."""
+
+SHORT = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import hostile_files
+chosen = hostile_files.CRAFTED if sys.argv[3] == 'crafted' else [None] * 24
+names = [name for name in chosen if not name or not name.startswith('track')]
+for file, verb, wrong, _, _ in hostile_files.attack(sys.argv[2], names[::4], verbs=sys.argv[4:]):
+    print(f'{file}: {verb} {wrong or "well"}')
+"""
+
+
+@pytest.mark.parametrize('what', ['crafted', 'damaged'])
+def test_a_verb_does_its_work_or_refuses_the_file_by_one_line(tmp_path, what):
+    command = [sys.executable, '-c', SHORT, pathlib.Path(__file__).parent, tmp_path / 'files', what, *VERBS]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, '')
+    lines = done.stdout.splitlines()
+    assert len(lines) >= 6 and [line for line in lines if not line.endswith(' well')] == []
+
+
+def test_tracks_are_refused_before_a_node_starts(tmp_path, capsys, one_line):
+    files = hostile_files.Files(tmp_path, None)
+    for name in ('device', 'pipe', 'hole', 'open quote', '320 digits', 'too long', 'zero bytes'):
+        path = hostile_files.TRACKS[f'track: {name}'](files)
+        [arguments] = hostile_files.commands(path, tmp_path).values()
+        assert hostile_files.cli.main(['run', *arguments]) == 1
+        assert str(path) in one_line(capsys.readouterr().err)
