@@ -43,12 +43,11 @@ PATIENCE = 60.0
 class Watcher:
     """Hears a graph: when each node spoke last and what mode the ACU is in. Times are those of time.monotonic."""
 
-    def __init__(self):
+    def __init__(self, node, executor):
+        """node: of rclpy, in the executor."""
         self.heard = dict.fromkeys(NODES, -1e9)
         self.mode = ''
-        self._node = rclpy.create_node('watcher')
-        self._executor = middleware.make_executor()
-        self._executor.add_node(self._node)
+        self._node, self._executor = node, executor
         for node, topic in ANSWERS.items():
             self._listen(topic, lambda _, node=node: self.heard.__setitem__(node, time.monotonic()))
         self._listen('acu/mode', self._on_mode)
@@ -80,11 +79,11 @@ class Watcher:
         return self.mode == 'autotrack' and all(time > since for time in self.heard.values()) and all(
             now - self.heard[node] < FRESH for node in ANSWERS)
 
-    def recovery(self, since, node=''):
+    def recovery(self, since, node='', goes_on=lambda: True):
         """{'own': time until the node spoke again, 'graph': time until all was well} after a kill [s]; None after
-        PATIENCE."""
+        PATIENCE, or when it does not go on."""
         own = begun = None
-        while time.monotonic() - since < PATIENCE:
+        while time.monotonic() - since < PATIENCE and goes_on():
             self.spin()
             if own is None and (not node or self.heard[node] > since + LAST_WORDS):
                 own = time.monotonic() - since
@@ -100,10 +99,6 @@ class Watcher:
         """What a killed node said is no news."""
         if node == 'acu':
             self.mode = ''
-
-    def close(self):
-        self._executor.shutdown()
-        self._node.destroy_node()
 
 
 def children(pid):
@@ -151,16 +146,19 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
     """Kill after kill in runs of `duration` [s]; (counts, {node: [recovery]})."""
     chance, counts, outages = random.Random(seed), collections.Counter(), collections.defaultdict(list)
     middleware.initialise([])
-    watcher = Watcher()
+    executor = middleware.make_executor()
+    executor.add_node(observer := rclpy.create_node('watcher'))
+    watcher = Watcher(observer, executor)
     order = [node for _ in range(kills) for node in chance.sample(victims, len(victims))][:kills]
     while order:
         process, bag, log = started(folder, 'realtime', '--duration', str(duration), '--param',
-                                    'scenario.restart.attempts=1000000')
+                                    'scenario.restart.within=1')
         counts['runs'] += 1
         since = time.monotonic()
         if watcher.recovery(since) is None and watcher.recovery(since + PATIENCE) is None:
-            raise RuntimeError(f'the graph did not begin: {log}')
-        last = time.monotonic() + duration - 30.0
+            process.terminate()
+            raise RuntimeError(f'the graph did not begin: {log}: {ended(process, counts)}')
+        last = time.monotonic() + duration - 40.0
         while order and time.monotonic() < last and process.poll() is None:
             watcher.spin(chance.uniform(0.0, 2.0))
             node = order.pop()
@@ -172,14 +170,18 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
             since = time.monotonic()
             os.kill(running[node], signal.SIGKILL)
             counts['kills'] += 1
-            recovery = watcher.recovery(since, node)
-            if recovery is None:
+            recovery = watcher.recovery(since, node, lambda process=process: process.poll() is None)
+            if recovery is None and process.poll() is not None:
+                counts['run over meanwhile'] += 1
+            elif recovery is None:
                 counts['unrecovered'] += 1
                 print(f'not recovered: {node}, mode {watcher.mode}, heard '
                       f'{ {name: round(time.monotonic() - at, 2) for name, at in watcher.heard.items()} }; {log}',
                       flush=True)
             else:
                 outages[node].append(recovery)
+                print(f'{node}: it speaks again after {recovery["own"]:.2f} s, all is well after '
+                      f'{recovery["graph"]:.2f} s', flush=True)
         if not order and process.poll() is None:
             process.send_signal(signal.SIGINT)
         said = ended(process, counts)
@@ -188,7 +190,7 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
             print(f'{log}: exit code {process.returncode}: {said}', flush=True)
         counts['orphans'] += len(orphans(log))
         print(dict(counts), flush=True)
-    watcher.close()
+    observer.destroy_node()
     rclpy.try_shutdown()
     return counts, outages
 
@@ -202,7 +204,8 @@ def lockstep(kills, seed, folder, victims=NODES):
         begun = time.monotonic()
         while node not in children(process.pid):
             if process.poll() is not None or time.monotonic() - begun > PATIENCE:
-                raise RuntimeError(f'the graph did not begin: {log}')
+                process.terminate()
+                raise RuntimeError(f'the graph did not begin: {log}: {ended(process, counts)}')
             time.sleep(0.01)
         time.sleep(chance.uniform(0.0, 8.0))
         victim = children(process.pid).get(node)

@@ -1,5 +1,6 @@
 """A realtime graph as on a permanent station: nodes are killed, frozen and started again, strangers write what they
 should not, clocks are UTC. Each test is a defect that was once measured."""
+import contextlib
 import importlib.util
 import json
 import pathlib
@@ -47,12 +48,24 @@ class Field:
         self.station = station.Station(folder, domain_id, changes=(*CHANGES, f'adu.state_file={self.state_file}',
                                                                    *changes))
         self.operator = connect(domain_id, 'operator')
+        self.heard = self.operator.heard
+
+    def begin(self):
         self.station.start(*station.NODES)
         for name in ('joint_states', 'adu/state', 'acu/mode', 'acu/rate_command', 'diagnostics',
                      'tracking_receiver/angle_error'):
-            self.operator.read(name)
-        self.heard = self.operator.heard
+            self._hear(name)
         self.until(lambda: self.heard['joint_states'] and self.heard['acu/rate_command'], 300.0)
+
+    def _hear(self, name):
+        """Hear a topic, whatever strangers say on it."""
+        topic, heard = topics.BY_NAME[name], self.heard.setdefault(name, [])
+
+        def take(data):
+            with contextlib.suppress(ValueError):
+                heard.append(messages.deserialize(data, topic.type))
+        self.operator.node.create_subscription(middleware.message_class(topic.type), name, take,
+                                               middleware.qos(topic.rate, 'recorded'), raw=True)
 
     def until(self, condition, limit=SOON):
         return self.operator.until(condition, limit, self.told)
@@ -80,8 +93,8 @@ class Field:
 
     def fresh(self, name):
         """Wait for messages of a topic that were stamped after now."""
-        now = time.time_ns()
-        self.until(lambda: messages.nanoseconds(self.heard[name][-1].header.stamp) > now)
+        now, heard = time.time_ns(), self.heard[name]
+        self.until(lambda: heard and messages.nanoseconds(heard[-1].header.stamp) > now)
 
     def status(self, node, text):
         """Wait for a diagnostic of a node that comes from now on and holds the text."""
@@ -96,21 +109,22 @@ class Field:
 @pytest.fixture(scope='module')
 def standing(tmp_path_factory, reserve_domain, connect):
     """A station in standby."""
-    field = Field(tmp_path_factory.mktemp('standing'), reserve_domain(), connect, 'acu.initial_mode=standby')
-    yield field
-    field.close()
+    with contextlib.closing(Field(tmp_path_factory.mktemp('standing'), reserve_domain(), connect,
+                                  'acu.initial_mode=standby')) as field:
+        field.begin()
+        yield field
 
 
 @pytest.fixture(scope='module')
 def moving(tmp_path_factory, reserve_domain, connect):
     """A station that follows a program, swinging to and fro, and then its receiver."""
-    field = Field(tmp_path_factory.mktemp('moving'), reserve_domain(), connect)
-    tracks = program_messages(field.station.scenario)
-    field.operator.write('acu/program_track')
-    field.operator.publish('acu/program_track', tracks['acu/program_track'])
-    field.until(lambda: field.mode == 'autotrack')
-    yield field
-    field.close()
+    with contextlib.closing(Field(tmp_path_factory.mktemp('moving'), reserve_domain(), connect)) as field:
+        field.begin()
+        tracks = program_messages(field.station.scenario)
+        field.operator.write('acu/program_track')
+        field.operator.publish('acu/program_track', tracks['acu/program_track'])
+        field.until(lambda: field.mode == 'autotrack')
+        yield field
 
 
 def stranger_writes(field, connect, name, stamp, seconds=1.0, **numbers):
@@ -169,7 +183,7 @@ def test_malformed_messages_end_nobody_and_move_nothing(standing, connect, name)
         stranger.close()
     assert not ended, standing.told()
     assert moved < malformed.MOVED
-    for topic in ('joint_states', 'acu/rate_command', 'tracking_receiver/angle_error'):
+    for topic in {'joint_states', 'acu/rate_command', 'tracking_receiver/angle_error'} - {name}:
         standing.fresh(topic)
 
 

@@ -1,4 +1,6 @@
 """`pedestal run` in realtime: who dies is started again, the run ends in order, and nobody is left behind."""
+import importlib.util
+import pathlib
 import re
 import signal
 import subprocess
@@ -8,6 +10,10 @@ import pytest
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import reaper
+
+_spec = importlib.util.spec_from_file_location('kills', pathlib.Path(__file__).with_name('kills.py'))
+kills = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(kills)
 
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 
@@ -40,6 +46,27 @@ def test_a_run_that_is_told_to_end_does_so_in_order_with_a_result(begun):
     assert 'restarts' in result.stdout
     assert run.pids() == {}
     assert bags.load(run.bag).damage == ''
+
+
+def test_who_dies_is_started_again_until_all_is_as_before(begun, connect):
+    """Each node in its turn, the drive too: the target is tracked again, and recorded in a new file."""
+    run = begun()
+    client = connect(run.domain_id)
+    watcher = kills.Watcher(client.node, client.executor)
+    assert watcher.recovery(time.monotonic())
+    for node in NODES:
+        watcher.forget(node)
+        since = time.monotonic()
+        run.signal(node, signal.SIGKILL)
+        assert watcher.recovery(since, node), (node, watcher.mode, watcher.heard)
+    run.process.send_signal(signal.SIGINT)
+    result = run.finish()
+    assert result.returncode == 130
+    said = [line for line in result.stderr.splitlines() if 'starting it again' in line]
+    assert said == [f'pedestal: {node} died by signal SIGKILL: starting it again, 1 of 5 within 60 s'
+                    for node in NODES]
+    assert re.search(r'restarts +│ +4 ', result.stdout)
+    assert sorted(path.name for path in run.bag.glob('*.mcap')) == ['bag_0.mcap', 'bag_1.mcap']
 
 
 def test_nobody_outlives_a_killed_run(begun):

@@ -193,7 +193,10 @@ class Acu(Unit):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
         values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead'])]
         if state['unasked']['moves']:
-            return Diagnosis(ERROR, 'the antenna moves unasked: acu/reset_faults once it is known why', values)
+            found = ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded' for axis, (
+                rate, low, high) in zip(topics.AXES, state['unasked']['found']))
+            return Diagnosis(ERROR, f'the antenna moves unasked: {found}; acu/reset_faults once it is known why',
+                             values)
         if invalid == ['error_gated']:
             return Diagnosis(WARN, 'an error of the receiver was too far off to be believed', values)
         if invalid:

@@ -2,13 +2,17 @@
 from pedestal_bringup.run.restarts import Restarts, Silence
 
 
-def test_a_node_starts_again_after_the_delay_and_once():
+def test_a_node_starts_again_at_once_and_then_later_and_later():
     restarts = Restarts(5, 60.0, 0.5)
-    assert restarts.died('acu', 10.0) == 1
-    assert restarts.due(10.4) == []
-    assert restarts.due(10.5) == ['acu']
-    assert restarts.due(11.0) == []
-    assert restarts.count == 1
+    for number, delay in enumerate((0.0, 0.5, 1.0), 1):
+        died = 10.0 * number
+        assert restarts.died('acu', died) == number
+        assert restarts.due(died + delay - 0.01) == []
+        assert restarts.due(died + delay) == ['acu']
+        assert restarts.due(died + 9.0) == []
+    assert restarts.count == 3
+    restarts.died('acu', 200.0)
+    assert restarts.due(200.0) == ['acu']
 
 
 def test_too_many_deaths_within_the_window_are_given_up():

@@ -1,8 +1,9 @@
 """Which messages of a topic a node of a realtime graph takes: of the writer in charge, sound and newer than the last.
 
 The first writer is in charge. Another one is dropped and named, whatever it says. A writer that begins anew is taken
-up once the one in charge was silent for SILENCE; it had been another one if the two had spoken at the same time. Where
-nobody can say which is which, nothing is taken: what the topic commands comes to a stop. No ROS and no clock here.
+up once the one in charge was silent for SILENCE. One that spoke together with it is another one, taken up only when
+it has been alone for ABANDONED and the graph shows nobody who should not write. Where nobody can say which is which,
+nothing is taken: what the topic commands comes to a stop. No ROS and no clock here.
 """
 import collections
 
@@ -11,8 +12,12 @@ from pedestal_common.streams import Streams
 SILENCE = 200_000_000
 """Time [ns] after which the writer in charge is taken for gone, and after which stamps that went back are believed."""
 
+ABANDONED, ABANDONED_UNSEEN = 1_000_000_000, 5_000_000_000
+"""Time [ns] of silence of the writer in charge after which another one that spoke while it did is taken, if it is the
+only one that speaks: where the graph shows no stranger, and where it does not tell."""
+
 LOOK = 50_000_000
-"""Time [ns] between two looks at who else may write the topic, while somebody wants to be in charge."""
+"""Time [ns] between two looks at who else may write the topic, for each writer that wants to be in charge."""
 
 UNDECODABLE, STALE, FUTURE, ANOTHER_WRITER, UNCLEAR_WRITER = (
     'undecodable', 'stale', 'future', 'another writer', 'writers not told apart')
@@ -27,9 +32,9 @@ class Intake:
 
     decode(data) -> (stamp [ns], or None of a topic without stamps, message); raises ValueError for what is none.
     future: how far a stamp may be ahead of this node's UTC [ns].
-    strangers() -> how many writers the graph shows that should not write this topic; asked when somebody wants to be
-    in charge: as many must be known by what they wrote, or the candidate may be one of them. None: the topic is
-    everybody's, who is not told apart.
+    strangers() -> how many writers the graph shows that should not write this topic, None where it does not tell;
+    asked when somebody wants to be in charge: as many must be known by what they wrote, or the candidate may be one of
+    them. None in its place: the topic is everybody's, who is not told apart.
 
     dropped: {reason: count}; reason: of the last message that was dropped, detail: in numbers; dropped_at: when [ns];
     anew: whether the message just taken does not continue the one taken before it.
@@ -46,7 +51,6 @@ class Intake:
         self.offset = None
         self._stamp = None
         self._back_since = self._back = None
-        self._looked = None
 
     def take(self, data, number, source, now, utc):
         """What decode made of a message, None where it is dropped. number: its sequence number; source: when its
@@ -89,16 +93,20 @@ class Intake:
     def _may_take_over(self, stream, now):
         """Whether a writer that is not in charge is from now on."""
         charge = self.in_charge
-        if charge is not None and (stream.known or stream.mixed or now - charge.heard < SILENCE):
+        silent = SILENCE if charge is None else now - charge.heard
+        if silent < (ABANDONED if stream.known else SILENCE) or stream.mixed:
             return False
-        if self._looked is not None and now - self._looked < LOOK:
+        if stream.looked is not None and now - stream.looked < LOOK:
             return False
-        known = [other for other in self.writers.streams if other.known and now - other.heard < SILENCE]
-        if self._strangers() > len(known):
-            self._looked = now
-            return False
-        self._looked = None
-        return True
+        stream.looked = now
+        strangers = self._strangers()
+        speaking = [other for other in self.writers.streams if other is not stream and now - other.heard < SILENCE]
+        if stream.known:
+            free = not strangers and not speaking and silent >= (ABANDONED_UNSEEN if strangers is None else ABANDONED)
+        else:
+            free = not strangers or strangers <= sum(other.known for other in speaking)
+        stream.known = stream.known and not free
+        return free
 
     def _in_order(self, stamp, now, utc):
         """Whether a stamp is later than the last one and not ahead of the time. One that goes back is believed once

@@ -47,10 +47,14 @@ class Listener:
         if not self._expected:
             return []
         return [name for name in self._node.writers_of(self._ros_name)
-                if name not in self.link.writers and name != nodes.STAND_IN and UNKNOWN not in name]
+                if name not in self.link.writers and name != nodes.STAND_IN]
 
     def _count(self):
-        return len(self.strangers())
+        """As Intake wants it. Who is not discovered yet may be a stranger; but a text is said once only, when its
+        writer often is not."""
+        if not self._expected:
+            return None
+        return len([name for name in self.strangers() if self.link.rate != 'change' or UNKNOWN not in name])
 
     def finding(self, now):
         """(level, text) of what was dropped lately; None where nothing was."""

@@ -16,8 +16,15 @@ comes late counts 1: writers are held up easily."""
 MARGIN = 1.0
 """By how much a stream must be the better one to be believed."""
 
+NEAR = 20
+"""Two streams that both speak and whose numbers are this close are not told apart."""
+
+FASTER = 0.85
+"""Of two streams that were close the faster one is ahead, if its interval is below this part of the other's."""
+
 RESOLVED = 200_000_000
-"""Two streams that nobody can tell apart are one when for so long [ns] every number was above the one before."""
+"""A stream speaks while it was heard within this time [ns]. Two that are close have turned out to be one when for so
+long every number was above the one before."""
 
 FORGOTTEN = 30_000_000_000
 """A stream that was silent for so long [ns] is no longer known."""
@@ -25,12 +32,15 @@ FORGOTTEN = 30_000_000_000
 
 class Stream:
     """The messages of one writer. last: number of the last one; source: when it was sent, heard: when it came [ns];
-    interval: mean time between two [ns]; lost: numbers left out."""
-    __slots__ = ('heard', 'interval', 'known', 'last', 'lost', 'mixed', 'source')
+    interval: mean time between two [ns]; lost: numbers left out.
+
+    An Intake notes on it: known, whether it spoke together with the writer in charge; mixed, whether it may be that
+    writer; looked, when it was last asked who else may write [ns]."""
+    __slots__ = ('heard', 'interval', 'known', 'last', 'looked', 'lost', 'mixed', 'source')
 
     def __init__(self, number, source, now):
         self.last, self.source, self.heard = number, source, now
-        self.interval = None
+        self.interval = self.looked = None
         self.lost = 0
         self.known = self.mixed = False
 
@@ -62,42 +72,68 @@ class Streams:
     def __init__(self):
         self.streams = []
         self.lost = 0
-        self._rising = None    # (since [ns], last number) of messages that may be of several streams
+        self._close = ()        # two streams that are not told apart
+        self._high = None       # (number, when it was sent) of the message furthest ahead of theirs
+        self._rising = None     # (since [ns], last number) of messages that were each above the one before
 
     def of(self, number, source, now):
         """The Stream of a message, a new one where it continues none; None where it may be of several. number: its
         sequence number; source: when it was sent, now: when it came [ns]."""
-        fitting = [stream for stream in self.streams if stream.fits(number, source)]
+        if self._close and abs(number - self._high[0]) <= 4 * NEAR:
+            return self._told_apart(number, source, now)
+        fitting = [stream for stream in self.streams if stream not in self._close and stream.fits(number, source)]
         if not fitting:
-            return self._begun(number, source, now)
-        if len(fitting) > 1:
-            costs = sorted(stream.cost(number, source) for stream in fitting)
-            if costs[1] - costs[0] >= MARGIN:
-                fitting.sort(key=lambda stream: stream.cost(number, source))
-            elif not self._one(number, now):
+            found = self._begun(number, source, now)
+        else:
+            fitting.sort(key=lambda stream: stream.cost(number, source))
+            if len(fitting) > 1 and fitting[1].cost(number, source) - fitting[0].cost(number, source) < MARGIN:
                 return None
-            else:
-                self.streams = [stream for stream in self.streams if stream not in fitting[1:]]
-        self._rising = None
-        self.lost += fitting[0].follow(number, source, now)
-        return fitting[0]
+            found = fitting[0]
+            self.lost += found.follow(number, source, now)
+        if len(self.streams) > 1 and not self._close:
+            self._compare(found, now)
+        return found
 
     def several(self, now):
         """Whether more than one of the streams speaks at the time now [ns]."""
         return sum(now - stream.heard < RESOLVED for stream in self.streams) > 1
 
-    def _one(self, number, now):
-        """Whether the streams that messages may be of have turned out to be one."""
-        since, last = self._rising or (now, number)
-        self._rising = (since if number > last else now), number
-        return now - self._rising[0] >= RESOLVED
-
     def _begun(self, number, source, now):
-        """A new stream. One that has the very number of another cannot be told from it while both speak."""
-        stream = Stream(number, source, now)
         self.streams = [other for other in self.streams if now - other.heard < FORGOTTEN]
+        self.streams.append(Stream(number, source, now))
+        return self.streams[-1]
+
+    def _compare(self, found, now):
+        """Note that the stream of the message just heard has come close to another one."""
         for other in self.streams:
-            if other.last == number:
-                stream.mixed = other.mixed = True
-        self.streams.append(stream)
+            if other is not found and now - other.heard < RESOLVED and abs(other.last - found.last) <= NEAR:
+                ahead = max(found, other, key=lambda stream: stream.last)
+                self._close, self._high, self._rising = (other, found), (ahead.last, ahead.source), (now, found.last)
+                return
+
+    def _told_apart(self, number, source, now):
+        """The Stream of a message of the two that are close, once they have parted: the faster one is ahead."""
+        for stream in self._close:
+            stream.heard = now
+        since, last = self._rising
+        self._rising = (since if number > last else now), number
+        high, sent = self._high
+        if number > high:
+            self._high = number, source
+        if now - self._rising[0] >= RESOLVED:
+            return self._one(number, source, now)
+        if number >= high - NEAR:
+            return None
+        fast, slow = sorted(self._close, key=lambda stream: stream.interval or INTERVAL)
+        fast.mixed = slow.mixed = (fast.interval or INTERVAL) > FASTER * (slow.interval or INTERVAL)
+        fast.last, fast.source, slow.last, slow.source = high, sent, number, source
+        self._close = ()
+        return None if slow.mixed else slow
+
+    def _one(self, number, source, now):
+        """Only one of the two goes on, nobody knows which: as a stream of its own, that was known beside them."""
+        self.streams = [stream for stream in self.streams if stream not in self._close]
+        self._close = ()
+        stream = self._begun(number, source, now)
+        stream.known = True
         return stream

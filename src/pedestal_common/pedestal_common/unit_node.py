@@ -86,7 +86,7 @@ class UnitNode(shell.Shell):
         self.refused = ''
         self._waiting_for_once, self._held = set(), None
         self._alarming = False
-        self._clients = {} if self.graph.lockstep else {
+        self._callees = {} if self.graph.lockstep else {
             name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
         self._called = set()
         for port in self.ports:
@@ -191,10 +191,10 @@ class UnitNode(shell.Shell):
             self.alarm()
         self._alarming = alarming
         self._answered = time.monotonic_ns()
-        if self._clients:
+        if self._callees:
             calls = {name for port in self.ports for name in port.unit.calls}
             for name in calls - self._called:
-                self._clients[name].call_async(Trigger.Request())
+                self._callees[name].call_async(Trigger.Request())
             self._called = calls
 
     def _watch_trigger(self):

@@ -1,22 +1,23 @@
 """Whether the antenna moves as it was told: its rates against the envelope of the commands of late.
 
-    h_k = max(u_k, h_k-1 + a (u_k - h_k-1)),    l_k = min(u_k, l_k-1 + a (u_k - l_k-1)),    a = dt / tau
+    h_k = max(u_k, h_k-1 + a (u_k - h_k-1)),    l_k = min(u_k, l_k-1 + a (u_k - l_k-1))
 
-An axis may lag behind its commands and overshoot them, so that any rate between 0 and the envelope is expected, and a
-part of the envelope's width beyond it.
+with a = dt / tau once the time is over for which a command may stay in force, else 0. An axis may lag behind its
+commands and overshoot them, so that any rate between 0 and the envelope is expected, and part of its width beyond it.
 """
 import numpy as np
 
 from pedestal_common.compiled import compiled
 
 ENVELOPE = np.dtype([('high', 'f8', (2,)), ('low', 'f8', (2,)),      # h, l of azimuth and elevation [rad/s]
-                     ('since', 'f8'), ('beyond', 'f8'), ('moves', 'i8')], align=True)
+                     ('high_at', 'f8', (2,)), ('low_at', 'f8', (2,)),    # when they were commanded last [s]
+                     ('since', 'f8'), ('beyond', 'f8'), ('moves', 'i8'), ('found', 'f8', (2, 3))], align=True)
 """since: stamp from which the axes are watched; beyond: stamp since which a rate is beyond the envelope [s]; moves: 1
-since it was for TIME, until it is told to forget."""
+since it was for TIME, until it is told to forget; found: rate of each axis then, and the range it should have been in.
+"""
 
 TAU = 0.05
-"""Time in which the envelope shrinks [s]: three times the settling of a speed loop; longer where commands are delayed.
-"""
+"""Time in which the envelope shrinks [s]: three times the settling of a speed loop."""
 
 OVERSHOOT = 0.25
 """Part of the envelope's width by which a rate may be beyond it."""
@@ -43,7 +44,10 @@ def watch(s, t, velocity, threshold):
     beyond = False
     for i in range(2):
         allowed = threshold + OVERSHOOT * (s.high[i] - s.low[i])
-        beyond |= velocity[i] > max(s.high[i], 0.0) + allowed or velocity[i] < min(s.low[i], 0.0) - allowed
+        low, high = min(s.low[i], 0.0) - allowed, max(s.high[i], 0.0) + allowed
+        beyond |= velocity[i] > high or velocity[i] < low
+        if s.moves == 0:
+            s.found[i, 0], s.found[i, 1], s.found[i, 2] = velocity[i], low, high
     if not beyond or t - s.since < SETTLING:
         s.beyond = t
     elif t - s.beyond >= TIME:
@@ -52,8 +56,15 @@ def watch(s, t, velocity, threshold):
 
 
 @compiled
-def command(s, i, rate, dt, delay):
-    """Take the command [rad/s] of axis i in a step dt [s] after the one before; delay [s]: until it is in force."""
-    a = min(dt / (TAU + 4.0 * delay), 1.0)
-    s.high[i] = max(rate, s.high[i] + a * (rate - s.high[i]))
-    s.low[i] = min(rate, s.low[i] + a * (rate - s.low[i]))
+def command(s, i, rate, t, dt, hold):
+    """Take the command [rad/s] of axis i at t [s], a step dt [s] after the one before; hold [s]: how long a command
+    may stay in force."""
+    a = min(dt / TAU, 1.0)
+    if rate >= s.high[i]:
+        s.high[i], s.high_at[i] = rate, t
+    elif t - s.high_at[i] > hold:
+        s.high[i] = max(rate, s.high[i] + a * (rate - s.high[i]))
+    if rate <= s.low[i]:
+        s.low[i], s.low_at[i] = rate, t
+    elif t - s.low_at[i] > hold:
+        s.low[i] = min(rate, s.low[i] + a * (rate - s.low[i]))

@@ -5,7 +5,8 @@ import collections
 class Restarts:
     """Times are those of one steady clock [s].
 
-    attempts: how often a node may be started again within `within` [s]; 0: never. delay: from death to start [s].
+    attempts: how often a node may be started again within `within` [s]; 0: never. The first start comes at once, and
+    each further one of that time `delay` [s] later after the death than the one before.
     """
 
     def __init__(self, attempts, within, delay):
@@ -21,8 +22,8 @@ class Restarts:
             deaths.popleft()
         if len(deaths) >= self.attempts:
             return 0
+        self._due[node] = now + self.delay * len(deaths)
         deaths.append(now)
-        self._due[node] = now + self.delay
         self.count += 1
         return len(deaths)
 

@@ -34,7 +34,8 @@ class RestartParameters(parameters.Parameters):
     attempts: int = parameters.parameter(5, 0, 1_000_000, '', 'a node is started again at most so often within '
                                          '`within`; 0: never')
     within: float = parameters.parameter(60.0, 1.0, 86400.0, 's', 'the time in which its deaths are counted')
-    delay: float = parameters.parameter(0.5, 0.0, 60.0, 's', 'from the death of a node to its next start')
+    delay: float = parameters.parameter(0.5, 0.0, 60.0, 's', 'a node that dies is started again at once, and each '
+                                        'further time in `within` so much later after its death')
     silence: float = parameters.parameter(30.0, 0.0, 3600.0, 's', 'a node that publishes no diagnostics for so long '
                                           'is killed and started again; 0: never')
 
