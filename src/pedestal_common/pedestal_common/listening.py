@@ -64,7 +64,7 @@ class Listener:
         reason, count = taker.reason, taker.dropped[taker.reason]
         if reason not in intake.ALARMING:
             return WARN, f'{self.link.name}: {count} dropped: {reason}: {taker.detail}'
-        who = ', '.join(self.strangers()) or ', '.join(self._node.writers_of(self._ros_name))
+        who = ', '.join(self.strangers() if self._expected else self._node.writers_of(self._ros_name)) or 'it has gone'
         return ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
 
     def values(self):

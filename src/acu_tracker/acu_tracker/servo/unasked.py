@@ -16,8 +16,8 @@ ENVELOPE = np.dtype([('high', 'f8', (2,)), ('low', 'f8', (2,)),      # h, l of a
 since it was for TIME, until it is told to forget; found: rate of each axis then, and the range it should have been in.
 """
 
-TAU = 0.05
-"""Time in which the envelope shrinks [s]: three times the settling of a speed loop."""
+TAU = 0.2
+"""Time in which the envelope shrinks [s]: slower than a drive that gets no command ramps down."""
 
 OVERSHOOT = 0.25
 """Part of the envelope's width by which a rate may be beyond it."""
