@@ -85,6 +85,7 @@ class UnitNode(shell.Shell):
         self.steps = None
         self.refused = ''
         self._waiting_for_once, self._held = set(), None
+        self._settled, self._settling = not self.graph.lockstep, None
         self._alarming = False
         self._callees = {} if self.graph.lockstep else {
             name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
@@ -122,10 +123,20 @@ class UnitNode(shell.Shell):
                 self.refused = f'{name} refused: {error}'
                 self.get_logger().warning(self.refused)
             self._waiting_for_once.discard(name)
-            if self._held is not None and not self._waiting_for_once:
-                step, self._held = self._held, None
-                self.answer(*step)
+            self._release()
         return take
+
+    def _settle(self):
+        """What had arrived when the executor began has been taken."""
+        self._settling.cancel()
+        self._settled = True
+        self._release()
+
+    def _release(self):
+        """Answer the first step once nothing keeps it any more."""
+        if self._held is not None and self._settled and not self._waiting_for_once:
+            step, self._held = self._held, None
+            self.answer(*step)
 
     @property
     def awaits(self):
@@ -166,12 +177,15 @@ class UnitNode(shell.Shell):
         return take
 
     def _answer(self, stamp, trigger, values):
-        """A step is complete; in lockstep the first one waits for what comes once."""
+        """A step is complete. In lockstep the first one waits for what comes once, and for the texts that arrived
+        before the executor began: it takes what it finds then in any order."""
         values[self.steps.trigger] = trigger
-        if self._waiting_for_once:
-            self._held = stamp, values
-        else:
+        if self._settled and not self._waiting_for_once:
             self.answer(stamp, values)
+            return
+        self._held = stamp, values
+        if self._settling is None:
+            self._settling = self.every(0.001, self._settle)
 
     def answer(self, stamp, values):
         """Answer the step of a stamp [ns]. values: {topic: (stamp, numbers) or None}."""
