@@ -21,9 +21,10 @@ ANSWERS = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode')
 INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'ins/state', 'tracking_receiver/angle_error',
           'acu/program_track')
 STEPS = 401
-ENOUGH = {'lockstep': (STEPS,), 'realtime': (STEPS - 1, STEPS)}
+ENOUGH = {'--lockstep': range(STEPS, STEPS + 1), '--rate 1': range(STEPS - 1, STEPS + 1),
+          '--rate 20': range(STEPS // 10, STEPS + 1)}
 """Steps that are answered: in realtime the last one may wait for the message of the INS that was still on its way when
-the recording ended."""
+the recording ended, and a node takes the newest messages only, so that at 4000 steps a second it leaves some out."""
 
 
 @pytest.fixture(scope='module')
@@ -80,7 +81,7 @@ def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, 
     assert (done.returncode, done.stderr) == (0, '')
     assert sent(done.stdout) == {name: len(data(run.bag, name)) for name in INPUTS}
     [answered] = re.findall(f'^acu answered (\\d+) of {STEPS} steps$', done.stdout, re.MULTILINE)
-    assert int(answered) in ENOUGH[pacing]
+    assert int(answered) in ENOUGH[' '.join(pace)]
     end(acu), end(recorder)
     answers = {name: (data(run.bag, name), data(tmp_path / 'again', name)) for name in ANSWERS}
     assert len(answers['acu/mode'][0]) >= 2 and 'autotrack' in str(answers['acu/mode'][0][-1])

@@ -204,7 +204,7 @@ def test_broken_track_files(tmp_path):
 
     assert 'track_file.path is empty' in message('')
     assert 'No such file' in message(tmp_path / 'none.csv')
-    assert 'Is a directory' in message(tmp_path)
+    assert 'not a regular file' in message(tmp_path)
     assert "column 'altitude_m' is missing" in message(
         write_track(tmp_path / 'a.csv', ['1,2,3'], 'time_s,latitude_deg,longitude_deg'))
     (tmp_path / 'empty.csv').write_text('')

@@ -282,7 +282,7 @@ def _earlier_files(directory, metadata):
     """The files of a bag that is to be gone on with: the one of a realtime run, with this metadata, that has not come
     to its end; [] where there is none. Raises BagError for any other bag, and while its recorder still writes it."""
     path = pathlib.Path(directory)
-    if metadata.get('pacing') != 'realtime' or not path.is_dir():
+    if metadata.get('pacing') != 'realtime' or not any(path.glob('*.mcap')):
         return []
     files = locate(path)
     if not files[-1].stat().st_size:  # its recorder died before the first byte
