@@ -19,6 +19,9 @@ MARGIN = 1.0
 NEAR = 20
 """Two streams that both speak and whose numbers are this close are not told apart."""
 
+PARTED = 40
+"""Until their numbers are this far apart: more than NEAR, or two that come close would part at once as they came."""
+
 FASTER = 0.85
 """Of two streams that were close the faster one is ahead, if its interval is below this part of the other's."""
 
@@ -79,7 +82,7 @@ class Streams:
     def of(self, number, source, now):
         """The Stream of a message, a new one where it continues none; None where it may be of several. number: its
         sequence number; source: when it was sent, now: when it came [ns]."""
-        if self._close and abs(number - self._high[0]) <= 4 * NEAR:
+        if self._close and abs(number - self._high[0]) <= 2 * PARTED:
             return self._told_apart(number, source, now)
         fitting = [stream for stream in self.streams if stream not in self._close and stream.fits(number, source)]
         if not fitting:
@@ -122,7 +125,7 @@ class Streams:
             self._high = number, source
         if now - self._rising[0] >= RESOLVED:
             return self._one(number, source, now)
-        if number >= high - NEAR:
+        if number >= high - PARTED:
             return None
         fast, slow = sorted(self._close, key=lambda stream: stream.interval or INTERVAL)
         fast.mixed = slow.mixed = (fast.interval or INTERVAL) > FASTER * (slow.interval or INTERVAL)

@@ -81,8 +81,19 @@ def test_a_stranger_that_overtakes_is_never_taken(period, jitter, begin):
     stranger = Writer('stranger', begin=begin, period=period, jitter=jitter, seed=2)
     taker, taken, anew = run(Writer('acu', jitter=jitter), stranger)
     assert not taken['stranger'] and not anew
-    assert len(taken['acu']) > 1880
+    assert len(taken['acu']) > 1870
     assert taken['acu'][-1] > 9.9 * S
+
+
+@pytest.mark.parametrize('period', [T // 3, T // 2, 2 * T // 3, 4 * T // 5])
+@pytest.mark.parametrize('seed', range(6))
+def test_a_stranger_that_falls_back_while_it_comes_close_is_never_taken(period, seed):
+    """It sends in bursts and pauses: its numbers come near and part again before they go through."""
+    stranger = Writer('stranger', begin=S, period=period)
+    rng = np.random.default_rng(seed)
+    stranger.times = S + np.cumsum(rng.exponential(period, len(stranger.times))).astype(int)
+    _, taken, anew = run(Writer('acu', jitter=MS), stranger)
+    assert not taken['stranger'] and not anew
 
 
 @pytest.mark.parametrize('pause', [250 * MS, 3 * S])
