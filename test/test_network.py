@@ -125,7 +125,7 @@ def cut(hosts, tmp_path_factory, reserve_domain):
     [s of the run])."""
     folder, domain = tmp_path_factory.mktemp('hosts'), {'ROS_DOMAIN_ID': str(reserve_domain())}
     chosen = scenario.load('leo_pass', pacing='realtime', overrides=[
-        f'adu.command_timeout={TIMEOUT}', f'adu.azimuth.limits.deceleration={DECELERATION}',
+        'acu.resume_time=15', f'adu.command_timeout={TIMEOUT}', f'adu.azimuth.limits.deceleration={DECELERATION}',
         f'adu.elevation.limits.deceleration={DECELERATION}'])
     supervisor.prepare(chosen)
     start, bag, file = graph.begins(chosen), folder / 'bag', folder / 'parameters.yaml'

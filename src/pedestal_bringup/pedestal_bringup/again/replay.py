@@ -66,13 +66,16 @@ class ReplayResult:
 
 @contextlib.contextmanager
 def _stop_by_signal():
-    """stopped() -> whether SIGINT has come: rclpy must not be left in the middle of a call."""
+    """stopped() -> whether a signal to end has come: rclpy must not be left in the middle of a call."""
     signals = []
-    before = signal.signal(signal.SIGINT, lambda *_: signals.append(True))
+    before = {number: signal.signal(number, lambda *_: signals.append(True))
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+              if signal.getsignal(number) is not signal.SIG_IGN}
     try:
         yield lambda: bool(signals)
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def replay(path, options, ready=lambda: None) -> ReplayResult:
