@@ -24,9 +24,9 @@ START = 180.0
 @pytest.fixture(scope='session')
 def reserve_domain():
     """reserve() -> a ROS_DOMAIN_ID that no other test session of this machine holds. Those of Linux whose ports lie
-    outside of the ephemeral ones are 1 to 101 and 215 to 232; when all are taken, the one that this session was given
+    outside of the ephemeral ones are 1 to 101 and 215 to 229; when all are taken, the one that this session was given
     first is given again: Fast DDS remembers a killed process for 20 s."""
-    usable = [*range(1, 102), *range(215, 233)]
+    usable = [*range(1, 102), *range(215, 230)]
     candidates = iter(random.sample(usable, len(usable)))
     reservations = []
     given = collections.deque()

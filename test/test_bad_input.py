@@ -151,7 +151,7 @@ def graphs(start_run):
              'resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, 2_500_000)); os.execv(sys.argv[1], sys.argv[1:])')
     first = start_run('leo_pass', '--pacing', 'realtime', '--duration', '12')
     full = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '30', prefix=limit)
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 180.0
     while not first.recorded(10):
         assert time.monotonic() < deadline
         time.sleep(0.05)
