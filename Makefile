@@ -12,7 +12,7 @@ ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
 PIP := -m pip --disable-pip-version-check install --quiet --use-pep517 --constraint constraints.txt
 DEMO := bags/runs/demo
 # Graphs in realtime that are killed, frozen and cut: not beside other tests.
-REALTIME := test/test_field.py test/test_network.py test/test_supervision.py
+REALTIME := test/test_field.py test/test_network.py test/test_realtime.py test/test_supervision.py
 
 install: .venv/installed
 
