@@ -23,6 +23,8 @@ class AduNode(Timekeeper):
         left = resting.read(self.parameters.state_file) if self.parameters.state_file else None
         if left is not None:
             unit.resume(left)
+            self.get_logger().info(f'goes on at azimuth {left.azimuth:.6f}, elevation {left.elevation:.6f} rad, where '
+                                   f'{self.parameters.state_file} left it')
 
     def begin(self):
         super().begin()

@@ -9,6 +9,9 @@ INTERVAL = 5_000_000
 SLACK = 4
 """Numbers by which a stream may be ahead of twice its pace: a writer that catches up, of which some were left out."""
 
+PAUSE = 4.0
+"""Time between two messages, in intervals of their stream, that is believed of its pace."""
+
 EARLY, LOST = 3.0, 1.0
 """What speaks against a stream, in messages of it: each by which this one comes early, each left out. One by which it
 comes late counts 1: writers are held up easily."""
@@ -62,7 +65,8 @@ class Stream:
         """The message is of this stream; how many were left out before it."""
         gap, elapsed = number - self.last, source - self.source
         if elapsed > 0:
-            pace = elapsed / gap
+            # A silence, as of a cut cable, says little about the pace: it is taken for PAUSE intervals at the most.
+            pace = min(elapsed / gap, RESOLVED if self.interval is None else PAUSE * self.interval)
             self.interval = pace if self.interval is None else self.interval + 0.05 * (pace - self.interval)
         self.last, self.source, self.heard = number, source, now
         self.lost += gap - 1

@@ -148,6 +148,17 @@ def test_a_cut_cable_is_no_other_writer():
     assert taker.writers.lost == 2000
 
 
+@pytest.mark.parametrize('pause', [S, 10 * S, 600 * S])
+@pytest.mark.parametrize('lost', [1, 10, 19])
+def test_a_silent_writer_may_lose_some_when_it_speaks_again(pause, lost):
+    """The cable was cut, and the first messages went while the hosts still looked for each other."""
+    taker = Intake(decode, FUTURE)
+    for k in [*range(400), 401, *range(402 + lost, 800)]:
+        now = k * T + (pause if k > 400 else 0)
+        assert taker.take(UTC + now, k + 1, UTC + now, now, UTC + now) is not None and not taker.anew
+    assert taker.writers.lost == lost + 1
+
+
 def test_a_frozen_reader_takes_up_where_the_writer_is():
     """It finds what its queue kept, all at one time."""
     taker = Intake(decode, FUTURE)
