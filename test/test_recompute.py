@@ -191,7 +191,7 @@ def test_a_missing_input_is_named(runs, rewrite, pedestal):
         return rows
     code, said, _ = pedestal(rewrite(runs['leo'].bag, change), '--node', 'acu')
     assert code == 1
-    assert 'NOT recomputed to the end: inputs: joint_states stamped 2.505000 s came before step 2.500000 s' in said
+    assert f'NOT recomputed to the end: inputs: {ERROR} is stamped 2.505000 s where 2.500000 s is due' in said
     assert '501 not recomputed, the first at 2.500000 s' in said
 
 

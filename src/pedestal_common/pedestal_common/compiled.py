@@ -55,13 +55,24 @@ def _cache_folder(package) -> str | None:
     return str(folder) if os.access(folder, os.W_OK) else None
 
 
+def _done(unit_type):
+    """The file that says that the laws of a unit are in the cache; None where there is no cache."""
+    folder = _cache_folder(unit_type.__module__.partition('.')[0])
+    return pathlib.Path(folder, f'{unit_type.__name__}.done') if folder else None
+
+
+def is_compiled(unit_type) -> bool:
+    """Whether the laws of a unit are in the cache."""
+    done = _done(unit_type)
+    return done is not None and done.exists()
+
+
 @contextlib.contextmanager
 def compiled_once(unit):
     """Around the first call of the laws of a unit: of the processes that start with a cold cache one compiles them,
     the others wait for it and find them there. Four beams start as fast as one."""
-    folder = _cache_folder(type(unit).__module__.partition('.')[0])
-    done = folder and pathlib.Path(folder, f'{type(unit).__name__}.done')
-    if not folder or done.exists():
+    done = _done(type(unit))
+    if done is None or done.exists():
         yield
         return
     with done.with_suffix('.lock').open('w') as lock:

@@ -20,8 +20,9 @@ class Steps:
     """Brings a node's inputs together: the trigger stamped t_k and, of each follower, the message due at t_k.
 
     followers: {topic: latency in ns}; due is the newest trigger stamp <= t_k - latency (none at the start).
-    Lockstep waits for exactly that message. Realtime answers t_k at the latest when the trigger of the next
-    step arrives, with whatever newest message is there and None for a follower that sent nothing new; prompt: at once.
+    Lockstep waits for exactly that message; triggers that come meanwhile wait their turn, for who makes them may be
+    ahead by as much as others look back. Realtime answers t_k at the latest when the trigger of the next step arrives,
+    with whatever newest message is there and None for a follower that sent nothing new; prompt: at once.
     `answer(stamp_ns, trigger_message, {topic: message or None})` is called once per step, in order.
     """
 
@@ -34,6 +35,7 @@ class Steps:
         self._arrived = {topic: collections.deque() for topic in followers}
         self._last = dict.fromkeys((trigger, *followers))
         self._pending = None
+        self._ahead = collections.deque()
         self._period = None
         self.refused = 0
         self.refusal = ''
@@ -51,21 +53,25 @@ class Steps:
                     raise GraphError(f'{topic} stamp jumped from {last / SECOND:.6f} to {stamp / SECOND:.6f} s; '
                                      f'the period is {self._period / SECOND:.6f} s')
                 self._period = stamp - last
-            if self._pending is not None:
-                if self._lockstep:
-                    raise GraphError(f'{topic} stamped {stamp / SECOND:.6f} s came before step '
-                                     f'{self._pending[0] / SECOND:.6f} s was answered')
+            self._ahead.append((stamp, message))
+            if self._pending is not None and not self._lockstep:
                 self._close()
-            self._pending = (stamp, message)
-            for name, awaited in self._awaited.items():
-                awaited.append(stamp)
-                self._due[name] = None
-                while awaited and awaited[0] <= stamp - self._latency[name]:
-                    self._due[name] = awaited.popleft()
         else:
             self._arrived[topic].append((stamp, message))
-        if self._pending is not None and (self._prompt or all(map(self._ready, self._due))):
+        while self._pending or self._ahead:
+            if self._pending is None:
+                self._begin(*self._ahead.popleft())
+            if not (self._prompt or all(map(self._ready, self._due))):
+                break
             self._close()
+
+    def _begin(self, stamp, message):
+        self._pending = (stamp, message)
+        for name, awaited in self._awaited.items():
+            awaited.append(stamp)
+            self._due[name] = None
+            while awaited and awaited[0] <= stamp - self._latency[name]:
+                self._due[name] = awaited.popleft()
 
     def begin_anew(self, topic):
         """Realtime: the next message of this topic does not continue those before; of the trigger, no message does."""

@@ -3,6 +3,7 @@
 One class runs every unit. A node of its own kind adds what is no law: the drive owns the time
 (adu_drive.timekeeper_node), the ship speaks NMEA.
 """
+import collections
 import time
 
 import numpy as np
@@ -84,7 +85,7 @@ class UnitNode(shell.Shell):
         self.unit = self.ports[0].unit
         self.steps = None
         self.refused = ''
-        self._waiting_for_once, self._held = set(), None
+        self._waiting_for_once, self._held = set(), collections.deque()
         self._settled, self._settling = not self.graph.lockstep, None
         self._alarming = False
         self._callees = {} if self.graph.lockstep else {
@@ -133,10 +134,9 @@ class UnitNode(shell.Shell):
         self._release()
 
     def _release(self):
-        """Answer the first step once nothing keeps it any more."""
-        if self._held is not None and self._settled and not self._waiting_for_once:
-            step, self._held = self._held, None
-            self.answer(*step)
+        """Answer the first steps once nothing keeps them any more."""
+        while self._held and self._settled and not self._waiting_for_once:
+            self.answer(*self._held.popleft())
 
     @property
     def awaits(self):
@@ -183,7 +183,7 @@ class UnitNode(shell.Shell):
         if self._settled and not self._waiting_for_once:
             self.answer(stamp, values)
             return
-        self._held = stamp, values
+        self._held.append((stamp, values))
         if self._settling is None:
             self._settling = self.every(0.001, self._settle)
 

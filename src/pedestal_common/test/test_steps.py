@@ -23,6 +23,22 @@ def test_lockstep_answers_once_when_all_have_come(order):
         assert answers[-1] == (5 * k, f'trigger{k}', {'a': f'a{k}', 'b': f'b{k}'})
 
 
+def test_triggers_that_are_ahead_wait_their_turn():
+    """The drive may be ahead of a receiver by what the control unit looks back, and topics overtake each other."""
+    steps, answers = collect({'a': 0, 'b': 5 * MS})
+    for k in range(3):
+        steps.take('trigger', 5 * k * MS, k)
+    assert not answers and steps.pending_stamp == 0
+    for k in range(2):
+        steps.take('b', 5 * k * MS, f'b{k}')
+    for k in range(3):
+        steps.take('a', 5 * k * MS, f'a{k}')
+        assert len(answers) == k + 1
+    assert [inputs for _, _, inputs in answers] == [{'a': 'a0', 'b': None}, {'a': 'a1', 'b': 'b0'},
+                                                    {'a': 'a2', 'b': 'b1'}]
+    assert steps.pending_stamp is None
+
+
 def test_latency_makes_the_older_message_due():
     steps, answers = collect({'a': 12 * MS})
     for k in range(6):

@@ -150,8 +150,7 @@ def feed(recording, unit) -> Feed:
         take = matched.take
         for source, row, stamp, at in zip(*(values[order].tolist() for values in (sources, rows, stamps, arrival))):
             take(names[source], stamp, row)
-            if len(steps) > len(taken):
-                taken.append(at)
+            taken += [at] * (len(steps) - len(taken))
     except GraphError as error:
         problem = f'inputs: {error}'
     stamps = np.array([stamp for stamp, _, _ in steps], np.int64)

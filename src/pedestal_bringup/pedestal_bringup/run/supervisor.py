@@ -10,6 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from pedestal_bringup.run.processes import RunError, how
 from pedestal_bringup.run.restarts import Restarts, Silence
 from pedestal_common import nodes
+from pedestal_common.compiled import is_compiled
 from pedestal_common.steps import SECOND
 
 LAST_START = 0.5
@@ -23,8 +24,10 @@ CALL = 5.0
 
 
 def prepare(scenario):
-    """Compile the laws of every node, each in a process of its own, so that the nodes start warm. Raises RunError."""
-    units = {nodes.plain(node): node for node in scenario.nodes if scenario.row(node).unit}
+    """Compile the laws that are not yet, of each node in a process of its own, so that the nodes start warm. Raises
+    RunError."""
+    units = {nodes.plain(node): node for node in scenario.nodes
+             if scenario.row(node).unit and not is_compiled(scenario.row(node).unit_type())}
     processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.run.prepare', node, scenario.name],
                                         stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                         start_new_session=True) for node in units.values()}
