@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from acu_tracker import modes
+from acu_tracker import modes, resumption, signals
 from acu_tracker.estimation import measurement, target, target_filter, tracker
-from acu_tracker.estimation.motion_models import MODELS
 from acu_tracker.geometry import attitude, azimuth_wrap, deck_reference, encoders
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.motion import AxisMotion, Motion
@@ -22,53 +21,12 @@ from pedestal_common import blockage, line_of_sight
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import record, record_type
 
-INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
-                  'step_gap')
-"""Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
-(_STAMP, _ENCODER, _ERROR, _ERROR_STAMP, _ERROR_GATED, _ATTITUDE, _PROGRAM, _PRESET,
- _STEP_GAP) = (1 << i for i in range(len(INVALID_INPUTS)))
-
 ON_TARGET = 0.5
 """Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""
 
-DRIVE_RESTART = 0.3
-"""Silence [s] in which a drive may have been started again: a mode that it then ends for a while is resumed."""
-
-INPUTS = np.dtype([
-    ('stamp', 'f8'),                                                            # t_k [s]
-    ('position', 'f8', (2,)), ('velocity', 'f8', (2,)), ('encoder_valid', 'i8'),  # deck azimuth, elevation
-    ('error_stamp', 'f8'), ('error_valid', 'i8'),                               # 0: none came, or unlocked
-    ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
-    ('error_rate', 'f8', (2,)), ('error_rate_sigma', 'f8'),                     # of that error [rad/s]; NaN: none
-    ('range', 'f8'), ('range_variance', 'f8'),                                  # to that target [m], [m2]; NaN: none
-    ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
-    ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
-    ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
-    ('aligning', 'i8'),                                                         # 1: the INS is still aligning
-    ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
-    ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
-], align=True)
-
-OUTPUTS = np.dtype([
-    ('mode', 'i8'), ('reason', 'i8'),                                            # codes of MODES and REASONS
-    ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
-    ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
-    ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
-                                                                                # of a beam at t_m: the command
-    ('covariance', 'f8', (2, 3)),                                              # p11, p12, p22 at t_k
-    ('probability', 'f8', (2, len(MODELS))),                                   # of MODELS
-    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
-    ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
-    ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
-    ('rates_gated', 'i8'), ('ranges_gated', 'i8'),
-    ('coasting', 'i8'), ('locked', 'i8'), ('blocked', 'i8'), ('invalid_input', 'i8'),
-    ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
-], align=True)
-
 STATE = np.dtype([
     ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'),
-    ('kept', 'i8'), ('kept_until', 'f8'),          # mode before a silence, stamp until which it is resumed [s]
-    ('unasked', unasked.ENVELOPE),
+    ('resumption', resumption.RESUMPTION), ('unasked', unasked.ENVELOPE),
     ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('aligning', 'i8'),
     ('target', target.TARGET), ('error', 'f8', (2,)),                           # of this step, azimuth, elevation
     ('preset', 'f8', (2,)),
@@ -108,7 +66,7 @@ def constants(params) -> np.ndarray:
 def initial_state(params) -> np.ndarray:
     """State (1,) before the first step of AcuParameters: standby, the initial mode pending."""
     s = np.zeros(1, STATE)
-    s['stamp'] = s['outage'] = s['kept_until'] = -math.inf
+    s['stamp'] = s['outage'] = s['resumption']['until'] = -math.inf
     s['pending'] = modes.MODES.index(params.initial_mode)
     s['unasked']['since'] = -math.inf
     s['preset'] = params.azimuth.preset, params.elevation.preset
@@ -119,14 +77,14 @@ def initial_state(params) -> np.ndarray:
 
 @compiled
 def _take_encoders(s, u):
-    """Take the encoders of this step; _ENCODER where they are not valid, else 0."""
-    return 0 if u.encoder_valid and encoders.take(s.encoders, u.stamp, u.position, u.velocity) else _ENCODER
+    """Take the encoders of this step; signals.ENCODER where they are not valid, else 0."""
+    return 0 if u.encoder_valid and encoders.take(s.encoders, u.stamp, u.position, u.velocity) else signals.ENCODER
 
 
 @compiled
 def _take_attitude(s, c, u):
-    """Take the attitude of this step, also into the mean of the look-ahead; _ATTITUDE where it is not valid, else
-    0."""
+    """Take the attitude of this step, also into the mean of the look-ahead; signals.ATTITUDE where it is not valid,
+    else 0."""
     s.aligning = u.aligning
     if u.stabilised != s.attitude.stabilised:
         s.attitude.stabilised, s.target.tracker.running = u.stabilised, 0
@@ -134,7 +92,7 @@ def _take_attitude(s, c, u):
     if not u.stabilised:
         return 0
     if not u.attitude_valid:
-        return _ATTITUDE
+        return signals.ATTITUDE
     outcome = attitude.take(s.attitude, c.p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate)
     if outcome == attitude.NEW:
         deck = s.lookahead.deck
@@ -143,7 +101,7 @@ def _take_attitude(s, c, u):
             levelled_deck.restart(deck)
         h = s.attitude.history
         levelled_deck.take(deck, u.attitude_stamp, h.sample[h.newest], c.p.keyhole.mean_time)
-    return _ATTITUDE if outcome == attitude.INVALID else 0
+    return signals.ATTITUDE if outcome == attitude.INVALID else 0
 
 
 @compiled
@@ -159,12 +117,12 @@ def _take_error(s, c, u, o):
     if not u.error_valid:
         return 0
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
-        return _ERROR
+        return signals.ERROR
     if s.pointing_offset > ON_TARGET * receiver.beamwidth:
         return 0
     known, at = encoders.at(s.encoders, u.error_stamp - receiver.beam_age)
     if not known:
-        return _ERROR_STAMP
+        return signals.ERROR_STAMP
     measured = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
     s.error[0], s.error[1] = measured[0] - at.A, measured[1] - at.E
     restart_gap = math.inf if _outage_permitted(s, c) else c.p.tracker.restart_gap
@@ -174,19 +132,19 @@ def _take_error(s, c, u, o):
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
         o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(one.S)
     if outcome == target.NO_ATTITUDE:
-        return _ATTITUDE
+        return signals.ATTITUDE
     if outcome == target.STALE:
-        return _ERROR_STAMP
-    return _ERROR_GATED if outcome == target.GATED else 0
+        return signals.ERROR_STAMP
+    return signals.ERROR_GATED if outcome == target.GATED else 0
 
 
 @compiled
 def _take_preset(s, u):
-    """Take a new preset; _PRESET where it is not finite, else 0."""
+    """Take a new preset; signals.PRESET where it is not finite, else 0."""
     if not u.preset_valid:
         return 0
     if not math.isfinite(u.preset[0] + u.preset[1]):
-        return _PRESET
+        return signals.PRESET
     s.preset[0], s.preset[1] = u.preset[0], u.preset[1]
     return 0
 
@@ -218,8 +176,8 @@ def _outside(c, A, E):
 
 @compiled
 def _program_obstacle(s, c, program, t_m):
-    """(NONE or why the program cannot be followed, by its times or its place at t_m [s]; _PROGRAM if it is bad, else
-    0).
+    """(NONE or why the program cannot be followed, by its times or its place at t_m [s]; signals.PROGRAM if it is bad,
+    else 0).
     """
     obstacle = program_track.status(program, s.stamp)
     if obstacle != modes.NONE:
@@ -228,7 +186,7 @@ def _program_obstacle(s, c, program, t_m):
     motion = target.on_deck(s.target, c.p, s.attitude, t_m, source)
     A, E, limits = motion.azimuth.angle, motion.elevation.angle, c.axis[0].p.limits
     if not math.isfinite(A + E):
-        return modes.NO_PROGRAM, _PROGRAM
+        return modes.NO_PROGRAM, signals.PROGRAM
     return _outside(c, azimuth_wrap.nearest(A, s.azimuth, limits.low, limits.high, Travel(0.0, 0.0)), E), 0
 
 
@@ -276,21 +234,10 @@ def _change_mode(s, c, o, drive_ready, program, request):
 def _bridge_silence(s, c, stamp):
     """After a silence the axes stand. The mode goes on, from where they are, if it was short enough."""
     if s.mode != modes.STANDBY:
-        until = s.stamp + c.p.resume_time
-        if stamp > until:
-            s.mode, s.reason = modes.STANDBY, modes.SILENCE
-        elif stamp - s.stamp > DRIVE_RESTART:
-            s.kept, s.kept_until = s.mode, until
+        s.mode = resumption.mode_after(s.resumption, s.mode, s.stamp, stamp, c.p.resume_time)
+        if s.mode == modes.STANDBY:
+            s.reason = modes.SILENCE
     unasked.restart(s.unasked, stamp)
-
-
-@compiled
-def _resume(s, o):
-    """A drive that was started again is not ready at first: the mode of before is pending, as the initial one was."""
-    if s.stamp > s.kept_until:
-        s.kept_until, s.pending = -math.inf, modes.NO_REQUEST
-    elif s.mode == modes.STANDBY and s.reason == modes.DRIVE_NOT_READY:
-        s.pending = modes.PROGRAM if s.kept == modes.AUTOTRACK and not o.locked else s.kept
 
 
 @compiled
@@ -448,24 +395,6 @@ def _look_ahead(s, c, program):
 
 
 @compiled
-def clear(o):
-    """Reset the outputs at the start of a step."""
-    o.coasting, o.blocked, o.invalid_input = 0, 0, 0
-    o.torque[:] = 0.0
-    o.innovation[:] = math.nan
-    o.rate_innovation[:] = math.nan
-    o.innovation_sigma[:] = math.nan
-    o.nis[:] = math.nan
-    o.estimate[:] = math.nan
-    o.covariance[:] = math.nan
-    o.probability[:] = math.nan
-    o.reference[:] = 0.0
-    o.angle_limited[:] = 0
-    o.rate_limited[:] = 0
-    o.acceleration_limited[:] = 0
-
-
-@compiled
 def step(s, c, u, o, program):
     """Run one drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and a ProgramTrack.
 
@@ -473,14 +402,14 @@ def step(s, c, u, o, program):
     """
     dt = u.stamp - s.stamp
     if not (dt > 0.0 and math.isfinite(u.stamp)):
-        o.invalid_input = _STAMP
+        o.invalid_input = signals.STAMP
         o.reason = modes.BAD_STAMP
         return
-    clear(o)
+    signals.clear(o)
     jumped = dt > c.p.step_gap
     flags = 0
     if jumped and math.isfinite(s.stamp):
-        flags = _STEP_GAP
+        flags = signals.STEP_GAP
         _bridge_silence(s, c, u.stamp)
     now = Instants(u.stamp, u.stamp + c.lead, c.p.period if jumped else dt)
     s.stamp = u.stamp
@@ -493,11 +422,12 @@ def step(s, c, u, o, program):
     unasked.watch(s.unasked, s.stamp, u.velocity, c.p.unasked_rate)
     rested = s.mode == modes.STANDBY
     _, program_flags = _change_mode(s, c, o, u.drive_ready, program, s.pending if rested else modes.NO_REQUEST)
-    if math.isfinite(s.kept_until):
-        _resume(s, o)
+    if resumption.waits(s.resumption):
+        ended = s.mode == modes.STANDBY and s.reason == modes.DRIVE_NOT_READY
+        s.pending = resumption.pending(s.resumption, s.stamp, ended, o.locked, s.pending)
     if (rested or jumped) and encoders.taken(s.encoders, s.stamp):
         for i in range(2):
-            if flags & _STEP_GAP:
+            if flags & signals.STEP_GAP:
                 s.axis[i].command = u.velocity[i]
             position_loop.initialise(s.axis[i], c.axis[i].p, s.stamp, u.position[i], u.velocity[i])
         s.azimuth = u.position[0]

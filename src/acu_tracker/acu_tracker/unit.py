@@ -4,7 +4,7 @@ import typing
 
 import numpy as np
 
-from acu_tracker import announcement, control_unit, modes
+from acu_tracker import announcement, control_unit, modes, signals
 from acu_tracker.program import program_track
 from pedestal_common import messages, nodes, topics
 from pedestal_common.compiled import compiled
@@ -26,8 +26,8 @@ ALIGNING = topics.BY_NAME[INS].texts.index('aligning')
 
 
 RECORD = np.dtype([('state', control_unit.STATE), ('constants', control_unit.CONSTANTS),
-                   ('inputs', control_unit.INPUTS), ('outputs', control_unit.OUTPUTS), ('invalid', 'i8')], align=True)
-"""invalid: the bits of control_unit.INVALID_INPUTS that were set since the last diagnosis."""
+                   ('inputs', signals.INPUTS), ('outputs', signals.OUTPUTS), ('invalid', 'i8')], align=True)
+"""invalid: the bits of signals.INVALID_INPUTS that were set since the last diagnosis."""
 
 
 class Memory(typing.NamedTuple):
@@ -120,7 +120,7 @@ class Acu(Unit):
                                     constants=control_unit.constants(parameters)), program_track.NO_TRACK)
         self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE in self.reads, 1
         self.parts['outputs']['mode'] = modes.STANDBY
-        control_unit.clear(self.parts['outputs'])
+        signals.clear(self.parts['outputs'])
         self.drive_state = 'unknown'
 
     def latency(self, topic):
@@ -178,7 +178,7 @@ class Acu(Unit):
         """ERROR for invalid inputs since the last diagnosis, WARN for gated errors, overtravel or coasting."""
         state, outputs = self.parts['state'], self.parts['outputs']
         mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
-        invalid = [name for i, name in enumerate(control_unit.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
+        invalid = [name for i, name in enumerate(signals.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
         self.parts['invalid'] = 0
         values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
                   ('coasting', str(int(outputs['coasting']))),
@@ -193,9 +193,9 @@ class Acu(Unit):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
         values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead'])]
         if state['unasked']['moves']:
-            found = ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded' for axis, (
-                rate, low, high) in zip(topics.AXES, state['unasked']['found']))
-            return Diagnosis(ERROR, f'the antenna moves unasked: {found}; acu/reset_faults once it is known why',
+            rates = ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded' for axis, (
+                rate, low, high) in zip(topics.AXES, state['unasked']['measured']))
+            return Diagnosis(ERROR, f'the antenna moves unasked: {rates}; acu/reset_faults once it is known why',
                              values)
         if invalid == ['error_gated']:
             return Diagnosis(WARN, 'an error of the receiver was too far off to be believed', values)

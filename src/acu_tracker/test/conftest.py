@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker import control_unit
-from acu_tracker.control_unit import INVALID_INPUTS
+from acu_tracker import control_unit, signals
 from acu_tracker.modes import MODES, REASONS
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
+from acu_tracker.signals import INVALID_INPUTS
 from pedestal_common import line_of_sight
 from pedestal_common.parameters import as_dict, build
 
@@ -47,7 +47,7 @@ class Rig:
         self.params, self.target, self.attitude = params, target, attitude or self.level
         self.delay, self.latency = delay, error_latency
         self.constants, self.state = control_unit.constants(params), control_unit.initial_state(params)
-        self.inputs, self.outputs = np.zeros(1, control_unit.INPUTS), np.zeros(1, control_unit.OUTPUTS)
+        self.inputs, self.outputs = np.zeros(1, signals.INPUTS), np.zeros(1, signals.OUTPUTS)
         self.track = NO_TRACK
         self.angle, self.velocity = np.array(at, float), np.zeros(2)
         self.commands, self.passed, self.k = [(0.0, 0.0)] * (round(delay / self.T) + 1), [], 0

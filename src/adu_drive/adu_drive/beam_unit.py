@@ -48,13 +48,13 @@ def decode(u, m, command):
 
 
 @compiled
-def encode(y, m, stamp, said):
+def encode(y, m, stamp, outputs):
     """Outputs of the beam -> records of its messages; a beam has no rate and no torque."""
-    joints = said[JOINTS]
-    joints.stamp = said[CLOCK].stamp = stamp
+    joints = outputs[JOINTS]
+    joints.stamp = outputs[CLOCK].stamp = stamp
     for i in range(2):
         joints.position[i] = y.position[i]
-    said[STATE] = condition(m)
+    outputs[STATE] = condition(m)
 
 
 @compiled

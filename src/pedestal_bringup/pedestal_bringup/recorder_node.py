@@ -13,11 +13,12 @@ from pedestal_bringup.bags.bag import BagError
 from pedestal_bringup.bags.step_order import OrderError, StepOrder
 from pedestal_bringup.bags.writer import Writer
 from pedestal_bringup.run.recorder_params import RecorderParameters
-from pedestal_common import files, listening, messages, middleware, nodes, parameters, shell, topics
+from pedestal_common import files, messages, middleware, nodes, parameters, shell, topics
 from pedestal_common.cdr import STAMPED
-from pedestal_common.intake import Intake
+from pedestal_common.realtime import listening
+from pedestal_common.realtime.intake import Intake
+from pedestal_common.realtime.streams import Streams
 from pedestal_common.steps import SECOND, GraphError
-from pedestal_common.streams import Streams
 from pedestal_common.unit import ERROR, OK, WARN, Diagnosis
 
 QUIET = 0.5

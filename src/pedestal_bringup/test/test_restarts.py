@@ -40,16 +40,16 @@ def test_a_node_is_silent_once_it_was_heard():
     silence = Silence()
     silence.look(0.0)
     assert silence.longer_than(5.0, 100.0) == []
-    silence.heard('acu', 100.0)
+    silence.note('acu', 100.0)
     assert silence.longer_than(5.0, 105.0) == []
     assert silence.longer_than(5.0, 105.1) == ['acu']
-    silence.heard('acu', 106.0)
+    silence.note('acu', 106.0)
     assert silence.longer_than(5.0, 107.0) == []
 
 
 def test_a_node_that_died_is_not_silent():
     silence = Silence()
-    silence.heard('acu', 0.0)
+    silence.note('acu', 0.0)
     silence.forget('acu')
     assert silence.longer_than(5.0, 10.0) == []
 
@@ -57,7 +57,7 @@ def test_a_node_that_died_is_not_silent():
 def test_nobody_is_silent_because_the_listener_slept():
     silence = Silence(gap=1.0)
     silence.look(0.0)
-    silence.heard('acu', 0.0)
+    silence.note('acu', 0.0)
     silence.look(0.5)
     silence.look(40.5)
     assert silence.longer_than(5.0, 40.5) == []

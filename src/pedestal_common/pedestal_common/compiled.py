@@ -30,13 +30,13 @@ if not _ROOT.is_absolute():
 
 def digest(packages) -> str:
     """Of the sources of packages and the version of the compiler."""
-    found = hashlib.sha256(numba.__version__.encode())
+    sha = hashlib.sha256(numba.__version__.encode())
     for package in packages:
         spec = importlib.util.find_spec(package) if package != '__main__' else None
         if spec is not None and spec.origin is not None:
             for path in sorted(pathlib.Path(spec.origin).parent.rglob('*.py')):
-                found.update(path.read_bytes())
-    return found.hexdigest()[:16]
+                sha.update(path.read_bytes())
+    return sha.hexdigest()[:16]
 
 
 @functools.cache

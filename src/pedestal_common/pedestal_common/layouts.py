@@ -102,9 +102,9 @@ def column(type_name, path, texts):
     """The name of the column of a number at a path in a message of any type, None for one that is left out: header and
     covariances. texts: {path: text} of the message."""
     for field in LAYOUTS.get(type_name, ()):
-        found = re.fullmatch(field.path, path)
-        if found:
-            part = found[1]
+        match = re.fullmatch(field.path, path)
+        if match:
+            part = match[1]
             if field.components is None:
                 part = texts.get(f'{_JOINTS[type_name]}[{part}]', part)
             return field.column.format('xyz'[int(part) // 4] if field.name == 'orientation_variance' else part)

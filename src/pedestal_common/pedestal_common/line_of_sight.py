@@ -79,9 +79,16 @@ def offsets(azimuth, elevation, x, y, z):
 
 
 @compiled
-def offset_rates(azimuth, elevation, azimuth_rate, elevation_rate, x, y, z, dx, dy, dz):
-    """The time derivative of `offsets`, (d dX/dt, d dE/dt), of a direction that moves by (dx, dy, dz) per second, in
-    the frame the beam's angles and their rates [rad/s] are given in."""
+def offset_rates(beam, beam_rate, r, v):
+    """The time derivative of `offsets`, (d dX/dt, d dE/dt) [rad/s].
+
+    beam: (azimuth, elevation) [rad], beam_rate: theirs [rad/s]; r: vector of the direction, of any length, in the
+    frame of these angles, v: its time derivative.
+    """
+    azimuth, elevation = beam
+    azimuth_rate, elevation_rate = beam_rate
+    x, y, z = r
+    dx, dy, dz = v
     sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
     b, c, e = ce * ca * x - ce * sa * y + se * z, -sa * x - ca * y, -se * ca * x + se * sa * y + ce * z
     # The beam's axes turn: azimuth about the deck's vertical (along ce, up -se), elevation about cross-elevation.
@@ -91,9 +98,9 @@ def offset_rates(azimuth, elevation, azimuth_rate, elevation_rate, x, y, z, dx, 
     across = math.hypot(c, e)
     if across == 0.0:
         return dc / b, de / b
-    off = math.atan2(across, b)
+    theta = math.atan2(across, b)
     across_rate = (c * dc + e * de) / across
-    scale = off / across
+    scale = theta / across
     rise = ((b * across_rate - across * db) / (b * b + across * across) - scale * across_rate) / across
     return scale * dc + rise * c, scale * de + rise * e
 
@@ -101,9 +108,9 @@ def offset_rates(azimuth, elevation, azimuth_rate, elevation_rate, x, y, z, dx, 
 @compiled
 def displaced(azimuth, elevation, cross_elevation, elevation_error):
     """Azimuth and elevation of the direction that `offsets` saw: its inverse, the azimuth within pi of the beam's."""
-    off = math.hypot(cross_elevation, elevation_error)
-    sinc = math.sin(off) / off if off > 0.0 else 1.0
-    b, c, e = math.cos(off), sinc * cross_elevation, sinc * elevation_error
+    theta = math.hypot(cross_elevation, elevation_error)
+    sinc = math.sin(theta) / theta if theta > 0.0 else 1.0
+    b, c, e = math.cos(theta), sinc * cross_elevation, sinc * elevation_error
     se, ce = math.sin(elevation), math.cos(elevation)
     along, up = ce * b - se * e, se * b + ce * e
     return azimuth + math.atan2(c, along), math.atan2(up, math.hypot(along, c))
@@ -114,14 +121,14 @@ def displaced_motion(azimuth, elevation, azimuth_rate, elevation_rate, cross_ele
                      cross_elevation_rate, elevation_error_rate):
     """Unit vector of the direction that `offsets` and `offset_rates` saw, and its time derivative [1/s]: six floats
     (FLU, or north-west-up for earth angles)."""
-    off2 = cross_elevation * cross_elevation + elevation_error * elevation_error
-    off = math.sqrt(off2)
-    cos_off = math.cos(off)
-    sinc = math.sin(off) / off if off > 0.0 else 1.0
-    # d sinc / d(off) / off; where it would lose digits, the first two terms of its series.
-    bend = (cos_off - sinc) / off2 if off2 > 1e-4 else -1.0 / 3.0 + off2 / 30.0
+    theta2 = cross_elevation * cross_elevation + elevation_error * elevation_error
+    theta = math.sqrt(theta2)
+    cos_theta = math.cos(theta)
+    sinc = math.sin(theta) / theta if theta > 0.0 else 1.0
+    # d sinc / d theta / theta; where it would lose digits, the first two terms of its series.
+    bend = (cos_theta - sinc) / theta2 if theta2 > 1e-4 else -1.0 / 3.0 + theta2 / 30.0
     along = cross_elevation * cross_elevation_rate + elevation_error * elevation_error_rate
-    b, c, e = cos_off, sinc * cross_elevation, sinc * elevation_error
+    b, c, e = cos_theta, sinc * cross_elevation, sinc * elevation_error
     db = -sinc * along
     dc = sinc * cross_elevation_rate + bend * along * cross_elevation
     de = sinc * elevation_error_rate + bend * along * elevation_error

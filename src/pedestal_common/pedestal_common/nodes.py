@@ -137,8 +137,8 @@ def of_executable(module) -> Node:
 
 def beam_of(name):
     """'beam_2' of a node or topic 'beam_2/...'; '' of one without a beam."""
-    found = re.match(r'beam_[1-9]\d*(?=/)', name)
-    return found[0] if found else ''
+    match = re.match(r'beam_[1-9]\d*(?=/)', name)
+    return match[0] if match else ''
 
 
 def plain(name):
@@ -171,7 +171,7 @@ def links(beams=0) -> dict:
     """{name: Link} of a graph, in the order of TOPICS; beams 0: its drive has motors, else it is an electronic array
     of so many beams."""
     rows = [row(node.name, beams > 0) for node in NODES]
-    found = {}
+    links = {}
     for topic in TOPICS:
         writers = [node.name for node in rows if topic.name in node.writes
                    or (topic.name == 'diagnostics' and node.unit)]
@@ -181,8 +181,8 @@ def links(beams=0) -> dict:
         for prefix in prefixes(beams) if topic.name in OF_BEAM else ('',):
             of_this = [tuple(name for name in members(names, beams)
                              if not prefix or beam_of(name) in ('', prefix[:-1])) for names in (writers, readers)]
-            found[prefix + topic.name] = Link(prefix + topic.name, topic.type, topic.rate, topic.flag, *of_this)
-    return found
+            links[prefix + topic.name] = Link(prefix + topic.name, topic.type, topic.rate, topic.flag, *of_this)
+    return links
 
 
 def recorded(names, flags=(), beams=0) -> list:
@@ -204,9 +204,9 @@ def reads(node, names, flags=()) -> tuple:
     """
     plain_names = {plain(name) for name in names}
 
-    def heard(topic):
+    def is_read(topic):
         writers = [other for other in NODES if topic in other.writes]
         absent = all(other.optional and other.name not in plain_names for other in writers)
         flag = BY_NAME[topic].flag
         return topic == node.reads[0] or not absent and (not flag or flag in flags)
-    return tuple(topic for topic in node.reads if heard(topic))
+    return tuple(topic for topic in node.reads if is_read(topic))

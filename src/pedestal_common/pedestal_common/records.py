@@ -66,7 +66,7 @@ def code_of(topic, text) -> int:
 class _Shape:
     """Where the columns of a topic lie in messages alike in everything but their numbers, from one of them.
 
-    found: [(column, start, dtype)]; reader: the Struct that reads these numbers at once.
+    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once.
     """
 
     def __init__(self, topic, data):
@@ -75,11 +75,11 @@ class _Shape:
         index = {column.name: i for i, column in enumerate(layouts.columns(topic))}
         self.size = places.stop
         self.guard = [(start, stop, bytes(data[start:stop])) for start, stop in _joined(places.fixed)]
-        self.found = [(index[name], start, dtype) for path, start, dtype in places.numbers
+        self.fields = [(index[name], start, dtype) for path, start, dtype in places.numbers
                       if (name := layouts.column(type_name, path, places.texts)) in index]
-        self.in_order = [column for column, _, _ in self.found] == list(range(len(index)))
+        self.in_order = [column for column, _, _ in self.fields] == list(range(len(index)))
         form, at = places.order, 0
-        for _, start, dtype in self.found:
+        for _, start, dtype in self.fields:
             form += f'{start - at}x{_FORMATS[dtype[1:]]}'
             at = start + int(dtype[2:])
         self.reader = struct.Struct(form)
@@ -101,10 +101,10 @@ def _joined(fixed):
     return joined
 
 
-def _runs(found):
+def _runs(fields):
     """[(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], neighbours written at once."""
     runs = []
-    for column, start, dtype in found:
+    for column, start, dtype in fields:
         dtype = np.dtype(dtype)
         if runs:
             first, kind, count, begin = runs[-1]
@@ -135,7 +135,7 @@ class Decoder:
         values = self._shape.reader.unpack_from(data)
         if not self._shape.in_order:
             given, values = values, [np.nan] * self._columns
-            for (column, _, _), value in zip(self._shape.found, given):
+            for (column, _, _), value in zip(self._shape.fields, given):
                 values[column] = value
         return seconds * 1_000_000_000 + nanoseconds, values
 
@@ -160,7 +160,7 @@ class Encoder:
         shape = _Shape(topic, data)
         self._buffer = bytearray(data)
         self._views = [(columns, np.frombuffer(self._buffer, dtype, count, start))
-                       for columns, dtype, count, start in _runs(shape.found)]
+                       for columns, dtype, count, start in _runs(shape.fields)]
         if record is not None:
             self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 

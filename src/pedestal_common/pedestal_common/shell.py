@@ -21,10 +21,11 @@ from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 
-from pedestal_common import messages, middleware, nodes, parameters, utc
+from pedestal_common import messages, middleware, nodes, parameters
 from pedestal_common.compiled import compiled_once
-from pedestal_common.listening import Listener
 from pedestal_common.nodes import MAX_BEAMS
+from pedestal_common.realtime import utc
+from pedestal_common.realtime.listening import Listener
 from pedestal_common.steps import SECOND, GraphError
 from pedestal_common.unit import OK, WARN, Diagnosis
 
@@ -164,7 +165,7 @@ class Shell(Node):
         self._utc = utc.Utc(*readings())
         self._epoch = 0 if self.graph.lockstep else self.graph.start or None
         self._listeners = []
-        self._told = None
+        self._diagnosed = None
         self._away = 0
         self._steps_told = 0, None
 
@@ -289,19 +290,19 @@ class Shell(Node):
         self._diagnose = diagnose
         self._publish_diagnosis = self.writer('diagnostics')
         if not self.graph.lockstep:
-            self._told = time.monotonic_ns()
+            self._diagnosed = time.monotonic_ns()
             self.every(DIAGNOSTICS, self._publish_diagnostics)
 
     def alarm(self):
         """Realtime: something has become worse, which its diagnostics tell before their second."""
-        if self._publish_diagnosis and not self.graph.lockstep and time.monotonic_ns() - self._told > ALARM_PAUSE:
+        if self._publish_diagnosis and not self.graph.lockstep and time.monotonic_ns() - self._diagnosed > ALARM_PAUSE:
             self._publish_diagnostics()
 
     def _publish_diagnostics(self):
         diagnosis, stamp = self._diagnose(), self._stamp
         if not self.graph.lockstep:
             now, stamp = self.clock()
-            self._away, self._told = now - self._told, now
+            self._away, self._diagnosed = now - self._diagnosed, now
             diagnosis = self._with_findings(Diagnosis(*diagnosis), now)
         level, message, values = diagnosis
         array = messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(

@@ -257,8 +257,8 @@ class UnitNode(shell.Shell):
             since = (time.monotonic_ns() - self._answered) * 1e-9
             text = (f'no {self.steps.trigger} so far' if self._answered == self._begun else
                     f'no {self.steps.trigger} for {since:.1f} s')
-            told = f'{text}; {diagnosis.message}' if diagnosis.level == ERROR else text
-            return diagnosis._replace(level=ERROR, message=told)
+            text = f'{text}; {diagnosis.message}' if diagnosis.level == ERROR else text
+            return diagnosis._replace(level=ERROR, message=text)
         refusal = self.refused or (self.steps.refusal if self.steps else '')
         if refusal and diagnosis.level < ERROR:
             return diagnosis._replace(level=WARN, message=refusal)

@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
-from pedestal_common import intake
-from pedestal_common.intake import Intake
+from pedestal_common.realtime import intake
+from pedestal_common.realtime.intake import Intake
 
 MS, S = 1_000_000, 1_000_000_000
 T = 5 * MS

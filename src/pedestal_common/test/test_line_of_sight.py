@@ -95,7 +95,7 @@ def target_at(t):
 def test_offset_rates_against_the_difference_of_offsets(t):
     h = 1e-5
     before, after = (np.array(los.offsets(*beam_at(t + d)[0], *target_at(t + d)[0])) for d in (-h, h))
-    rates = los.offset_rates(*beam_at(t)[0], *beam_at(t)[1], *target_at(t)[0], *target_at(t)[1])
+    rates = los.offset_rates(*beam_at(t), *map(tuple, target_at(t)))
     assert rates == pytest.approx((after - before) / (2.0 * h), abs=1e-9)
 
 
@@ -105,4 +105,4 @@ def test_displaced_motion_inverts_offset_rates(offset):
     seen = los.displaced_motion(azimuth, elevation, *rates, *offset, 0.02, -0.03)
     assert seen[:3] == pytest.approx(los.direction(*los.displaced(azimuth, elevation, *offset)), abs=1e-15)
     assert np.dot(seen[:3], seen[3:]) == pytest.approx(0.0, abs=1e-15)
-    assert los.offset_rates(azimuth, elevation, *rates, *seen) == pytest.approx((0.02, -0.03), abs=1e-12)
+    assert los.offset_rates((azimuth, elevation), rates, seen[:3], seen[3:]) == pytest.approx((0.02, -0.03), abs=1e-12)

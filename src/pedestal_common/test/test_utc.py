@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from pedestal_common import utc
+from pedestal_common.realtime import utc
 
 MS, S = 1_000_000, 1_000_000_000
 BEGIN = 1_790_000_000 * S

@@ -11,9 +11,9 @@ def error_rate(i, position, velocity, target):
     target is at r = M' (p - position), and r' = M' v - velocity - w x r.
     """
     (e, n, u), (v_e, v_n, v_u) = target.position, target.velocity
-    x, y, z = to_deck(i.mat_ed, e - position[0], n - position[1], u - position[2])
+    x, y, z = r = to_deck(i.mat_ed, e - position[0], n - position[1], u - position[2])
     vx, vy, vz = to_deck(i.mat_ed, v_e, v_n, v_u)
     wx, wy, wz = i.twist_angular[0], i.twist_angular[1], i.twist_angular[2]
-    return offset_rates(i.azimuth, i.elevation, i.azimuth_rate, i.elevation_rate, x, y, z,
-                        vx - velocity[0] - (wy * z - wz * y), vy - velocity[1] - (wz * x - wx * z),
-                        vz - velocity[2] - (wx * y - wy * x))
+    v = (vx - velocity[0] - (wy * z - wz * y), vy - velocity[1] - (wz * x - wx * z),
+         vz - velocity[2] - (wx * y - wy * x))
+    return offset_rates((i.azimuth, i.elevation), (i.azimuth_rate, i.elevation_rate), r, v)

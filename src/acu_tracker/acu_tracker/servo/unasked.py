@@ -11,9 +11,9 @@ from pedestal_common.compiled import compiled
 
 ENVELOPE = np.dtype([('high', 'f8', (2,)), ('low', 'f8', (2,)),      # h, l of azimuth and elevation [rad/s]
                      ('high_at', 'f8', (2,)), ('low_at', 'f8', (2,)),    # when they were commanded last [s]
-                     ('since', 'f8'), ('beyond', 'f8'), ('moves', 'i8'), ('found', 'f8', (2, 3))], align=True)
+                     ('since', 'f8'), ('beyond', 'f8'), ('moves', 'i8'), ('measured', 'f8', (2, 3))], align=True)
 """since: stamp from which the axes are watched; beyond: stamp since which a rate is beyond the envelope [s]; moves: 1
-since it was for TIME, until it is told to forget; found: rate of each axis then, and the range it should have been in.
+since it was for TIME, until it is reset; measured: rate of each axis then, and the range it should have been in.
 """
 
 TAU = 0.2
@@ -47,7 +47,7 @@ def watch(s, t, velocity, threshold):
         low, high = min(s.low[i], 0.0) - allowed, max(s.high[i], 0.0) + allowed
         beyond |= velocity[i] > high or velocity[i] < low
         if s.moves == 0:
-            s.found[i, 0], s.found[i, 1], s.found[i, 2] = velocity[i], low, high
+            s.measured[i, 0], s.measured[i, 1], s.measured[i, 2] = velocity[i], low, high
     if not beyond or t - s.since < SETTLING:
         s.beyond = t
     elif t - s.beyond >= TIME:

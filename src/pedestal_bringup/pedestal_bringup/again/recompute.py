@@ -194,8 +194,8 @@ def _gathered(recording, unit, trigger, steps):
 
 def state_of(unit) -> str:
     """The text topic that tells the state of a unit which can be asked for one; '' where it cannot."""
-    told = [name for name in unit.NODE.writes if records.is_text(name) and name not in unit.MOMENTARY]
-    return told[0] if unit.REQUESTS else ''
+    states = [name for name in unit.NODE.writes if records.is_text(name) and name not in unit.MOMENTARY]
+    return states[0] if unit.REQUESTS else ''
 
 
 def compute(recording, unit, fed, states=None, requests=None):
@@ -345,27 +345,27 @@ def file_parameters(path, beam=''):
         chosen = scenario.load(str(path))
         return {node: chosen.given(beam + node if nodes.row(node).of_beam else node) for node in chosen.values
                 if not nodes.beam_of(node)}
-    found = {}
+    sections = {}
     for name, body in tree.items():
         node = name.removeprefix(beam)
         if node in UNITS:
             if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
                 raise RecomputeError(f'--params-file {path}: section {node} must hold ros__parameters')
-            found[node] = scenario.dotted(body['ros__parameters'])
-    return found
+            sections[node] = scenario.dotted(body['ros__parameters'])
+    return sections
 
 
 def overrides(texts, names):
     """{node: {key: value}} of texts [node.]key=value; the node may be left out where there is only one."""
-    found = {}
+    parameters = {}
     for text in texts:
         if text.partition('=')[0].partition('.')[0] not in scenario.RUN and len(names) == 1:
             text = f'{names[0]}.{text}'
         node, key, value = scenario.parse_override(text)
         if node not in names:
             raise RecomputeError(f'--param {text}: {node} is not recomputed; that is {", ".join(names)}')
-        found.setdefault(node, {})[key] = value
-    return found
+        parameters.setdefault(node, {})[key] = value
+    return parameters
 
 
 def parameters_of(recording, node, file_values=None, changes=()):

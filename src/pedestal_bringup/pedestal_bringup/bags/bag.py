@@ -78,15 +78,15 @@ def locate(path) -> list:
     try:
         if not path.is_dir():
             return [path]
-        found = list(path.glob('*.mcap')) or list(path.glob('*.db3'))
+        files = list(path.glob('*.mcap')) or list(path.glob('*.db3'))
     except OSError as error:
         raise BagError(f'{path}: {mcap_file.reason(error)}') from None
-    if len(found) == 1:
-        return found
-    numbered = {file: _NUMBERED.fullmatch(file.name) for file in found}
-    if not found or not all(numbered.values()) or len({match[1] for match in numbered.values()}) > 1:
-        raise BagError(f'{path}: {len(found)} .mcap files in it where one belongs, or NAME_0.mcap, NAME_1.mcap ...')
-    return sorted(found, key=lambda file: int(numbered[file][2]))
+    if len(files) == 1:
+        return files
+    numbered = {file: _NUMBERED.fullmatch(file.name) for file in files}
+    if not files or not all(numbered.values()) or len({match[1] for match in numbered.values()}) > 1:
+        raise BagError(f'{path}: {len(files)} .mcap files in it where one belongs, or NAME_0.mcap, NAME_1.mcap ...')
+    return sorted(files, key=lambda file: int(numbered[file][2]))
 
 
 def start(metadata_records) -> int:
@@ -96,11 +96,11 @@ def start(metadata_records) -> int:
 
 def planned_end(metadata_records):
     """When a run was to end, a stamp [ns], by the metadata records of its bag; None where they do not say."""
-    told = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
-    if told is None:  # made before bags said so
+    planned = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
+    if planned is None:  # recordings made before that was noted
         with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError, yaml.YAMLError):
-            told = round(plain_yaml.parse(metadata_records['parameters']['recorder'])['duration'] * 1e9) or None
-    return None if told is None else start(metadata_records) + told
+            planned = round(plain_yaml.parse(metadata_records['parameters']['recorder'])['duration'] * 1e9) or None
+    return None if planned is None else start(metadata_records) + planned
 
 
 def _nanoseconds(text):
@@ -249,10 +249,10 @@ class Bag:
     def beams(self):
         """Beams of the array that was recorded; 0: a drive with motors."""
         several = sum(1 for name in self.topics if nodes.plain(name) == 'joint_states' != name)
-        told = self.metadata.get('beams', '0')
-        if not (told.isdecimal() and max(several, int(told[:9])) <= nodes.MAX_BEAMS):
-            raise BagError(f'{self.file}: beams = {told}: must be 0 to {nodes.MAX_BEAMS}')
-        return several or int(told)
+        beams = self.metadata.get('beams', '0')
+        if not (beams.isdecimal() and max(several, int(beams[:9])) <= nodes.MAX_BEAMS):
+            raise BagError(f'{self.file}: beams = {beams}: must be 0 to {nodes.MAX_BEAMS}')
+        return several or int(beams)
 
     @property
     def start(self):

@@ -291,8 +291,8 @@ def _earlier_files(directory, metadata):
             path.rmdir()
             return []
     McapFile(files[-1])
-    told = _Content(files[0]).metadata.get('pedestal', {})
-    if any(told.get(key) != str(metadata[key]) for key in RUN if key in metadata):
+    earlier = _Content(files[0]).metadata.get('pedestal', {})
+    if any(earlier.get(key) != str(metadata[key]) for key in RUN if key in metadata):
         raise BagError(f'{directory} exists already, of another run; a recording is never overwritten')
     try:
         information = plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information']

@@ -16,14 +16,14 @@ ANSWER_TIME = 2.0
 
 class Operator(Shell):
     """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of the others:
-    hears(node, monotonic time [s]) is called for each."""
+    on_diagnostics(node, monotonic time [s]) is called for each."""
 
     def __init__(self, beams=0):
         super().__init__('operator', parameters.Parameters)
         self.links = nodes.links(beams)
         self.time = 0.0
-        self.heard = {}
-        self.hears = self.heard.__setitem__
+        self.latest = {}
+        self.on_diagnostics = self.latest.__setitem__
         self._writers = {}
         self.message_reader('diagnostics', self._take)
 
@@ -60,12 +60,12 @@ class Operator(Shell):
     def _take(self, array):
         self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
         for status in array.status:
-            self.hears(status.name, time.monotonic())
+            self.on_diagnostics(status.name, time.monotonic())
 
     def silent(self, limit):
         """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""
-        last = min(self.heard, key=self.heard.get, default=None)
-        return last if last is not None and time.monotonic() - self.heard[last] > limit else None
+        last = min(self.latest, key=self.latest.get, default=None)
+        return last if last is not None and time.monotonic() - self.latest[last] > limit else None
 
     def stuck(self, names, executor):
         """Those of the nodes whose process does not even answer a parameter service."""

@@ -171,16 +171,16 @@ class Graph:
         """{node: exit code} of the processes that have ended."""
         return {node: process.returncode for node, process in self.processes.items() if process.poll() is not None}
 
-    def told(self, node, reason):
-        """What happened to a node, with the last lines of its log."""
+    def obituary(self, node, reason):
+        """A text that says what became of a node, with the last lines of its log."""
         log = '\n'.join(f'  | {line}' for line in self.last_lines(node)) or '  | (it logged nothing)'
         return f'{node} {reason}; its last log lines ({self._log_of(node)}):\n{log}'
 
     def cause(self, node, code):
         """Why a node that ended by itself with this exit code did, as it said, in brackets; '' of one that was
         killed."""
-        said = self.last_lines(node)
-        return f' ({said[-1]})' if said and code > 0 else ''
+        lines = self.last_lines(node)
+        return f' ({lines[-1]})' if lines and code > 0 else ''
 
 
 def how(code):

@@ -44,23 +44,23 @@ class Silence:
 
     def __init__(self, gap=1.0):
         self._gap = gap
-        self._heard = {}
+        self._latest = {}
         self._looked = None
 
-    def heard(self, node, now):
-        self._heard[node] = now
+    def note(self, node, now):
+        self._latest[node] = now
 
     def forget(self, node):
         """A node has died: it is silent again only after it has been heard again."""
-        self._heard.pop(node, None)
+        self._latest.pop(node, None)
 
     def longer_than(self, limit, now):
         """The nodes that were heard once and then not for longer than limit [s]."""
-        return [node for node, time in self._heard.items() if now - time > limit]
+        return [node for node, time in self._latest.items() if now - time > limit]
 
     def look(self, now):
         """To be called at every look around, before `longer_than`."""
         if self._looked is not None and now - self._looked > self._gap:
             lost = now - self._looked
-            self._heard = {node: time + lost for node, time in self._heard.items()}
+            self._latest = {node: time + lost for node, time in self._latest.items()}
         self._looked = now

@@ -72,7 +72,7 @@ OF_BEAMS = tuple(node.name for node in nodes.NODES if node.of_beam)
 """Those that each beam of several has of its own."""
 
 
-TOLD = (
+SHARED = (
     ('adu', 'period', 'acu', 'tracker.receiver.integration'),
     ('adu', 'transport_delay', 'acu', 'command_delay'),
     ('tracking_receiver', 'receiver.latency', 'acu', 'receiver_latency'),
@@ -149,12 +149,12 @@ def _folder():
 
 def available():
     """{name: title} of the scenarios that come with the product."""
-    found = {}
+    titles = {}
     for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
         if entry.name.endswith('.yaml'):
             sections = plain_yaml.parse(entry.read_text())
-            found[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
-    return found
+            titles[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
+    return titles
 
 
 def _text(name_or_path):
@@ -295,41 +295,41 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
 
 
 def _spread(name, sections, header, seed):
-    """What several nodes must agree on, said once: length and period of the run, seeds, ship, latencies, beam.
+    """Give every node what several must agree on: length and period of the run, seeds, ship, latencies, beam.
 
-    Raises ScenarioError where a node was told something else.
+    Raises ScenarioError where the section of a node has another value.
     """
-    def tell(node, key, value):
+    def share(node, key, value):
         sections[node].setdefault(key, value)
         for section in [section for section in sections if nodes.plain(section) == node]:
-            told = sections[section].get(key, value)
-            if told != value:
-                raise ScenarioError(f'scenario {name}, {section}: {key} = {told}: must be {value}, as is said '
+            own = sections[section].get(key, value)
+            if own != value:
+                raise ScenarioError(f'scenario {name}, {section}: {key} = {own}: must be {value}, as it is '
                                     'elsewhere; leave it out here')
 
     for node in ('adu', 'recorder', 'tracking_receiver'):
-        tell(node, 'duration', header.duration)
-    tell('recorder', 'scenario', name)
-    tell('recorder', 'seed', header.seed)
+        share(node, 'duration', header.duration)
+    share('recorder', 'scenario', name)
+    share('recorder', 'seed', header.seed)
     for node, key in (('ship_motion', 'ship.seed'), ('ship_motion', 'imu.seed'), ('ins', 'seed'),
                       ('tracking_receiver', 'seed')):
         if seed is not None or key not in sections[node]:
             sections[node][key] = header.seed
     for key, value in sections['ship_motion'].items():
         if key.startswith('ship.'):
-            tell('ins', key, value)
+            share('ins', key, value)
     for node in ('acu', 'tracking_receiver'):
-        tell(node, 'period', sections['adu'].get(
+        share(node, 'period', sections['adu'].get(
             'period', parameters.defaults(nodes.row(nodes.DRIVE, header.beam).parameters_type())['period']))
-    for key, told in MEASURED:
+    for key, flag in MEASURED:
         measured = sections['tracking_receiver'].get(key, False)
         for node in ('acu', 'recorder'):
-            if measured or any(told in values for section, values in sections.items()
+            if measured or any(flag in values for section, values in sections.items()
                                if nodes.plain(section) == node):
-                tell(node, told, measured)
-    for owner, key, node, told in TOLD:
+                share(node, flag, measured)
+    for owner, key, node, known_as in SHARED:
         if key in sections[owner]:
-            sections[node].setdefault(told, sections[owner][key])
+            sections[node].setdefault(known_as, sections[owner][key])
     if header.beam:
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
         for prefix in nodes.prefixes(header.graph_beams):
@@ -348,10 +348,10 @@ def _spread_to_beam(name, node, sections, header, seed):
     if node == own_receiver and (seed is not None or 'seed' not in values):
         spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
         values['seed'] = int(spread.generate_state(1)[0] >> 1)
-    for owner, key, other, told in TOLD:
+    for owner, key, other, known_as in SHARED:
         own = sections.get(f'{beam}/{owner}', {})
         if nodes.plain(node) == other and key in own:
-            values.setdefault(told, own[key])
+            values.setdefault(known_as, own[key])
     for key, _ in MEASURED:
         if key in sections[own_receiver]:
             raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: is the same for every beam; say it in '

@@ -38,9 +38,9 @@ def prepare(scenario):
         for node, process in processes.items():
             complaint = process.stderr.read()
             if process.wait() != 0:
-                said = complaint.strip().splitlines()
+                lines = complaint.strip().splitlines()
                 raise RunError(f'the laws of {node} do not compile: it {how(process.returncode)}'
-                               + (f'; {said[-1]}' if said else ''))
+                               + (f'; {lines[-1]}' if lines else ''))
     finally:
         for process in processes.values():
             process.kill()
@@ -60,7 +60,7 @@ class Supervisor:
         self._silence = Silence()
         self._called = set()
         self._dead = set()
-        operator.hears = self._hear
+        operator.on_diagnostics = self._note
 
     def watch(self, tracks, progress):
         """Until the end of the run in UTC, which no restart prolongs. progress(time of the run [s]).
@@ -91,7 +91,7 @@ class Supervisor:
         for node in self._silence.longer_than(min(CALL, self._limits.silence or CALL), now):
             if node not in self._called:
                 self._called.add(node)
-                tell(f'{node} is silent')
+                report(f'{node} is silent')
         if self._limits.silence:
             for node in self._silence.longer_than(self._limits.silence, now):
                 self._graph.kill(node)
@@ -111,19 +111,19 @@ class Supervisor:
         self._silence.forget(node)
         number = self.restarts.died(node, now)
         if not number:
-            raise RunError(self._graph.told(node, f'{reason}, after {limits.attempts} starts within '
+            raise RunError(self._graph.obituary(node, f'{reason}, after {limits.attempts} starts within '
                                             f'{limits.within:g} s'))
-        tell(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
+        report(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
              f'within {limits.within:g} s')
 
-    def _hear(self, node, now):
-        self._silence.heard(node, now)
+    def _note(self, node, now):
+        self._silence.note(node, now)
         if node in self._called:
             self._called.discard(node)
-            tell(f'{node} is heard again')
+            report(f'{node} is heard again')
 
 
-def tell(line):
+def report(line):
     """A line for people; a terminal that is gone does not end the run."""
     with contextlib.suppress(OSError):
         print(f'pedestal: {line}', file=sys.stderr, flush=True)

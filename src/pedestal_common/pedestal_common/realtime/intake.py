@@ -7,7 +7,7 @@ nothing is taken: what the topic commands comes to a stop. No ROS and no clock h
 """
 import collections
 
-from pedestal_common.streams import Streams
+from pedestal_common.realtime.streams import Streams
 
 SILENCE = 200_000_000
 """Time [ns] after which the writer in charge is taken for gone, and after which stamps that went back are believed."""
@@ -75,10 +75,10 @@ class Intake:
         elif stream is charge:
             others = [other for other in self.writers.streams if other is not charge]
             for other in others:
-                other.known = other.known or now - other.heard < SILENCE
+                other.known = other.known or now - other.arrival < SILENCE
             if not stream.mixed:
                 return True
-            stream.mixed = any(other.mixed and now - other.heard < SILENCE for other in others)
+            stream.mixed = any(other.mixed and now - other.arrival < SILENCE for other in others)
             if not stream.mixed:
                 return True
             self._drop(UNCLEAR_WRITER, '', now)
@@ -93,14 +93,14 @@ class Intake:
     def _may_take_over(self, stream, now):
         """Whether a writer that is not in charge is from now on."""
         charge = self.in_charge
-        silent = SILENCE if charge is None else now - charge.heard
+        silent = SILENCE if charge is None else now - charge.arrival
         if silent < (ABANDONED if stream.known else SILENCE) or stream.mixed:
             return False
         if stream.looked is not None and now - stream.looked < LOOK:
             return False
         stream.looked = now
         strangers = self._strangers()
-        speaking = [other for other in self.writers.streams if other is not stream and now - other.heard < SILENCE]
+        speaking = [other for other in self.writers.streams if other is not stream and now - other.arrival < SILENCE]
         if stream.known:
             free = not strangers and not speaking and silent >= (ABANDONED_UNSEEN if strangers is None else ABANDONED)
         else:

@@ -1,7 +1,8 @@
 """How a node of a realtime graph hears its topics: what it takes of them, and what it says of the rest."""
 import inspect
 
-from pedestal_common import intake, nodes
+from pedestal_common import nodes
+from pedestal_common.realtime import intake
 from pedestal_common.unit import ERROR, WARN
 
 FRESH = 2_000_000_000

@@ -37,15 +37,15 @@ FORGOTTEN = 30_000_000_000
 
 
 class Stream:
-    """The messages of one writer. last: number of the last one; source: when it was sent, heard: when it came [ns];
+    """The messages of one writer. last: number of the last one; source: when it was sent, arrival: when it came [ns];
     interval: mean time between two [ns]; lost: numbers left out.
 
     An Intake notes on it: known, whether it spoke together with the writer in charge; mixed, whether it may be that
     writer; looked, when it was last asked who else may write [ns]."""
-    __slots__ = ('heard', 'interval', 'known', 'last', 'looked', 'lost', 'mixed', 'source')
+    __slots__ = ('arrival', 'interval', 'known', 'last', 'looked', 'lost', 'mixed', 'source')
 
     def __init__(self, number, source, now):
-        self.last, self.source, self.heard = number, source, now
+        self.last, self.source, self.arrival = number, source, now
         self.interval = self.looked = None
         self.lost = 0
         self.known = self.mixed = False
@@ -68,7 +68,7 @@ class Stream:
             # A silence, as of a cut cable, says little about the pace: it is taken for PAUSE intervals at the most.
             pace = min(elapsed / gap, RESOLVED if self.interval is None else PAUSE * self.interval)
             self.interval = pace if self.interval is None else self.interval + 0.05 * (pace - self.interval)
-        self.last, self.source, self.heard = number, source, now
+        self.last, self.source, self.arrival = number, source, now
         self.lost += gap - 1
         return gap - 1
 
@@ -90,38 +90,39 @@ class Streams:
             return self._told_apart(number, source, now)
         fitting = [stream for stream in self.streams if stream not in self._close and stream.fits(number, source)]
         if not fitting:
-            found = self._begun(number, source, now)
+            stream = self._begun(number, source, now)
         else:
             fitting.sort(key=lambda stream: stream.cost(number, source))
             if len(fitting) > 1 and fitting[1].cost(number, source) - fitting[0].cost(number, source) < MARGIN:
                 return None
-            found = fitting[0]
-            self.lost += found.follow(number, source, now)
+            stream = fitting[0]
+            self.lost += stream.follow(number, source, now)
         if len(self.streams) > 1 and not self._close:
-            self._compare(found, now)
-        return found
+            self._compare(stream, now)
+        return stream
 
     def several(self, now):
         """Whether more than one of the streams speaks at the time now [ns]."""
-        return sum(now - stream.heard < RESOLVED for stream in self.streams) > 1
+        return sum(now - stream.arrival < RESOLVED for stream in self.streams) > 1
 
     def _begun(self, number, source, now):
-        self.streams = [other for other in self.streams if now - other.heard < FORGOTTEN]
+        self.streams = [other for other in self.streams if now - other.arrival < FORGOTTEN]
         self.streams.append(Stream(number, source, now))
         return self.streams[-1]
 
-    def _compare(self, found, now):
+    def _compare(self, stream, now):
         """Note that the stream of the message just heard has come close to another one."""
         for other in self.streams:
-            if other is not found and now - other.heard < RESOLVED and abs(other.last - found.last) <= NEAR:
-                ahead = max(found, other, key=lambda stream: stream.last)
-                self._close, self._high, self._rising = (other, found), (ahead.last, ahead.source), (now, found.last)
+            if other is not stream and now - other.arrival < RESOLVED and abs(other.last - stream.last) <= NEAR:
+                leading = max(stream, other, key=lambda stream: stream.last)
+                self._close, self._high = (other, stream), (leading.last, leading.source)
+                self._rising = now, stream.last
                 return
 
     def _told_apart(self, number, source, now):
         """The Stream of a message of the two that are close, once they have parted: the faster one is ahead."""
         for stream in self._close:
-            stream.heard = now
+            stream.arrival = now
         since, last = self._rising
         self._rising = (since if number > last else now), number
         high, sent = self._high

@@ -1,0 +1,62 @@
+"""What the control unit takes and answers in one step."""
+import math
+
+import numpy as np
+
+from acu_tracker.estimation.motion_models import MODELS
+from pedestal_common.compiled import compiled
+
+INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
+                  'step_gap')
+"""Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
+(STAMP, ENCODER, ERROR, ERROR_STAMP, ERROR_GATED, ATTITUDE, PROGRAM, PRESET,
+ STEP_GAP) = (1 << i for i in range(len(INVALID_INPUTS)))
+
+INPUTS = np.dtype([
+    ('stamp', 'f8'),                                                            # t_k [s]
+    ('position', 'f8', (2,)), ('velocity', 'f8', (2,)), ('encoder_valid', 'i8'),  # deck azimuth, elevation
+    ('error_stamp', 'f8'), ('error_valid', 'i8'),                               # 0: none came, or unlocked
+    ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
+    ('error_rate', 'f8', (2,)), ('error_rate_sigma', 'f8'),                     # of that error [rad/s]; NaN: none
+    ('range', 'f8'), ('range_variance', 'f8'),                                  # to that target [m], [m2]; NaN: none
+    ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
+    ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
+    ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
+    ('aligning', 'i8'),                                                         # 1: the INS is still aligning
+    ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
+    ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
+], align=True)
+
+OUTPUTS = np.dtype([
+    ('mode', 'i8'), ('reason', 'i8'),                                            # codes of MODES and REASONS
+    ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
+    ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
+    ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
+                                                                                # of a beam at t_m: the command
+    ('covariance', 'f8', (2, 3)),                                              # p11, p12, p22 at t_k
+    ('probability', 'f8', (2, len(MODELS))),                                   # of MODELS
+    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
+    ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
+    ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
+    ('rates_gated', 'i8'), ('ranges_gated', 'i8'),
+    ('coasting', 'i8'), ('locked', 'i8'), ('blocked', 'i8'), ('invalid_input', 'i8'),
+    ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
+], align=True)
+
+
+@compiled
+def clear(o):
+    """Reset the outputs at the start of a step."""
+    o.coasting, o.blocked, o.invalid_input = 0, 0, 0
+    o.torque[:] = 0.0
+    o.innovation[:] = math.nan
+    o.rate_innovation[:] = math.nan
+    o.innovation_sigma[:] = math.nan
+    o.nis[:] = math.nan
+    o.estimate[:] = math.nan
+    o.covariance[:] = math.nan
+    o.probability[:] = math.nan
+    o.reference[:] = 0.0
+    o.angle_limited[:] = 0
+    o.rate_limited[:] = 0
+    o.acceleration_limited[:] = 0
