@@ -246,6 +246,16 @@ def test_a_bag_with_inputs_only_gets_its_outputs(inputs_only, runs, pedestal, tm
     assert pedestal(output, '--node', 'acu', *EXACT)[0] == 0
 
 
+def test_a_changed_parameter_on_a_ship_and_rows_alone_on_the_standard_output(run_process):
+    ship = pathlib.Path(__file__).parents[1] / 'bags' / 'reference' / 'ship_pass'
+    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recompute', ship, '--param',
+                        'acu.azimuth.filter.current_statistical.a_max=0.4', '--json', '-'], 120.0)
+    assert done.returncode == 0, done.stderr
+    metrics = {row['metric'] for row in json.loads(done.stdout)['rows']}
+    assert any('pointing' in metric or 'estimate' in metric for metric in metrics), metrics
+    assert 'acu: ' in done.stderr and 'Traceback' not in done.stderr
+
+
 def test_a_bag_with_inputs_only_and_a_changed_parameter(inputs_only, pedestal):
     code, said, _ = pedestal(inputs_only, '--node', 'acu', '--param', 'azimuth.filter.current_statistical.alpha=2')
     assert code == 0

@@ -4,12 +4,13 @@ A verb is a module of the room `verbs`: its help is the module's docstring, `add
 and `main(options)` does the work and returns the exit code.
 """
 import argparse
+import contextlib
 import importlib
 import shlex
 import signal
 import sys
 
-from pedestal_bringup.console import EXIT_STOPPED
+from pedestal_bringup.console import EXIT_STOPPED, STDOUT
 from pedestal_common.parameters import ParameterError
 
 VERBS = ('run', 'scenarios', 'parameters', 'program', 'verify', 'recover', 'rerun', 'report', 'study', 'export',
@@ -24,8 +25,10 @@ def main(args=None) -> int:
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
+    alone = getattr(options, 'json', None) == STDOUT
     try:
-        return options.main(options)
+        with contextlib.redirect_stdout(sys.stderr) if alone else contextlib.nullcontext():
+            return options.main(options)
     except (ParameterError, ValueError, RuntimeError, OSError) as error:
         print(f'pedestal: error: {error}', file=sys.stderr)
         return 1

@@ -8,6 +8,9 @@ import sys
 EXIT_STOPPED = 130
 EXIT_WRONG_COMMAND = 2
 
+STDOUT = pathlib.Path('/dev/stdout')
+"""What --json - stands for."""
+
 TABLE_WIDTH = 120
 """Columns that a table of results may take on any terminal, so that a row stays one line."""
 
@@ -46,7 +49,8 @@ def progress_of_share():
 
 def add_json(parser):
     """The option --json FILE of a verb that measures."""
-    parser.add_argument('--json', type=pathlib.Path, metavar='FILE', help='write the result rows')
+    parser.add_argument('--json', type=lambda text: STDOUT if text == '-' else pathlib.Path(text), metavar='FILE',
+                        help='write the result rows; -: to the standard output, and all else to the standard error')
 
 
 def check_json(path):

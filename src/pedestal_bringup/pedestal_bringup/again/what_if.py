@@ -23,10 +23,11 @@ NOTE = ('the recorded antenna does not move with the recomputed command: compare
 
 
 class Overlay:
-    """A recording whose outputs of one node are replaced: topics, beams and table(topic) as of a bag.Bag."""
+    """A recording whose outputs of one node are replaced: what analysis/ reads of a bag.Bag."""
 
     def __init__(self, bag, outputs):
         self.path, self.beams, self.metadata = bag.path, bag.beams, bag.metadata
+        self.configuration = bag.configuration
         self._bag, self._outputs = bag, outputs
         self.topics = {**bag.topics, **dict.fromkeys(outputs, '')}
 

@@ -1,5 +1,6 @@
 """measure the compiled closed loop against the papers: rows and figures"""
 import contextlib
+import difflib
 import inspect
 import pathlib
 import sys
@@ -21,13 +22,18 @@ def add_arguments(parser):
 
 
 def main(options):
-    """Run the study, print its table and remarks, draw its figures; exit code 2 for an unknown name."""
+    """Run the study, print its table and remarks, draw its figures; without a name list them; exit code 2 for an
+    unknown one."""
     from pedestal_bringup import studies
-    if options.name not in studies.NAMES:
-        problem = f'unknown study {options.name!r}' if options.name else 'no study named'
-        print(f'pedestal: error: {problem}, there are', file=sys.stderr)
+    if not options.name:
         for name, line in studies.descriptions().items():
-            print(f'  {name:10} {line}', file=sys.stderr)
+            print(f'{name:16} {line}')
+        return 0
+    if options.name not in studies.NAMES:
+        near = difflib.get_close_matches(options.name, studies.NAMES, 1)
+        print(f'pedestal: error: unknown study {options.name!r}; '
+              + (f'did you mean {near[0]!r}? ' if near else '') + f'there are {", ".join(studies.NAMES)}',
+              file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
     from pedestal_bringup.studies.rigs import drawing, rows
     output = options.output or pathlib.Path('studies', options.name)
