@@ -3,13 +3,19 @@ import contextlib
 import json
 import math
 import pathlib
+import shutil
 import sys
+import textwrap
 
 EXIT_STOPPED = 130
 EXIT_WRONG_COMMAND = 2
 
 STDOUT = pathlib.Path('/dev/stdout')
 """What --json - stands for."""
+
+WIDEST_NAME, WIDEST, SENTENCE = 44, 24, 40
+"""Columns that the name of a list and its other cells have to themselves, a longer one moves what follows; and the
+least that a sentence beside them has, which stands below them otherwise."""
 
 TABLE_WIDTH = 120
 """Columns that a table of results may take on any terminal, so that a row stays one line."""
@@ -63,6 +69,27 @@ def write_json(path, content):
     """Write content as JSON to the path of --json; nothing where that is None."""
     if path:
         path.write_text(json.dumps(content, indent=1) + '\n')
+
+
+def show_list(rows):
+    """Print rows of texts in columns; on a terminal the last is wrapped to its width, in a pipe a row is a line."""
+    rows = list(rows)
+    widths = [min(max(len(row[i]) for row in rows), WIDEST if i else WIDEST_NAME) for i in range(len(rows[0]) - 1)]
+    indent = sum(widths) + 2 * len(widths)
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
+    if width < indent + SENTENCE:
+        # Too narrow for a column of sentences: they go below.
+        indent = 4
+    for *cells, sentence in rows:
+        head = '  '.join(f'{cell:{width}}' for cell, width in zip(cells, widths))
+        if not width:
+            print(f'{head}  {sentence}')
+        elif indent == 4:
+            print(head.rstrip(), *textwrap.wrap(sentence, width, initial_indent=' ' * 4, subsequent_indent=' ' * 4),
+                  sep='\n')
+        else:
+            first, *more = textwrap.wrap(sentence, width - indent) or ['']
+            print(f'{head:{indent - 2}}  {first}', *(' ' * indent + line for line in more), sep='\n')
 
 
 def show_results(title, columns, results, whole):

@@ -139,7 +139,9 @@ def send_program(scenario, start=None) -> int:
         executor.add_node(operator)
         tracks = program_messages(scenario)
         if start is None:
-            start = operator.graph_start(nodes.members(('acu',), scenario.header.graph_beams)[0], executor)
+            acu = nodes.members(('acu',), scenario.header.graph_beams)[0]
+            print(f'asks {acu} on ROS_DOMAIN_ID {operator.context.get_domain_id()} when its time began', flush=True)
+            start = operator.graph_start(acu, executor)
         for track in tracks.values():
             messages.put_stamp(track.header.stamp, start)
         operator.send(tracks)

@@ -1,4 +1,5 @@
 """list the parameters of a node: default, range, unit, meaning"""
+from pedestal_bringup import console
 
 
 def add_arguments(parser):
@@ -7,15 +8,19 @@ def add_arguments(parser):
 
 
 def main(options):
-    """Print one line for each parameter of the node."""
+    """Print a row for each parameter of the node, and for those of the graph that every node has."""
     from pedestal_bringup.run import scenario
-    from pedestal_common import parameters
-    parameters_type = scenario.parameters_of(options.node)
-    values = parameters.defaults(parameters_type)
-    for name, field in parameters.flatten(parameters_type):
-        meta = field.metadata
-        allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ' | '.join(meta.get('options', ()))
-        unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
-        value = f'{values[name]:g}' if isinstance(values[name], float) else str(values[name])
-        print(f'{name:42} {value:>14}  {allowed:24} {meta["doc"]}{unit}')
+    from pedestal_common import parameters, shell
+    rows = []
+    for prefix, parameters_type in (('', scenario.parameters_of(options.node)), ('graph.', shell.GraphParameters)):
+        values = parameters.defaults(parameters_type)
+        rows += [(prefix + name, *_columns(field.metadata, values[name]))
+                 for name, field in parameters.flatten(parameters_type)]
+    console.show_list(rows)
     return 0
+
+
+def _columns(meta, value):
+    allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ' | '.join(meta.get('options', ()))
+    unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
+    return f'{value:g}' if isinstance(value, float) else str(value), allowed, f'{meta["doc"]}{unit}'

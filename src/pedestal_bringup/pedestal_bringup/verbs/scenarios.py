@@ -1,4 +1,5 @@
 """list the scenarios"""
+from pedestal_bringup import console
 
 
 def add_arguments(parser):
@@ -8,6 +9,5 @@ def add_arguments(parser):
 def main(_options):
     """Print name and title of every scenario."""
     from pedestal_bringup.run import scenario
-    for name, title in scenario.available().items():
-        print(f'{name:14} {title}')
+    console.show_list(scenario.available().items())
     return 0

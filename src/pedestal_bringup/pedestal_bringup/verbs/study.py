@@ -26,8 +26,7 @@ def main(options):
     unknown one."""
     from pedestal_bringup import studies
     if not options.name:
-        for name, line in studies.descriptions().items():
-            print(f'{name:16} {line}')
+        console.show_list(studies.descriptions().items())
         return 0
     if options.name not in studies.NAMES:
         near = difflib.get_close_matches(options.name, studies.NAMES, 1)

@@ -1,0 +1,28 @@
+"""Lists on terminals of all widths, and in a pipe."""
+import os
+import sys
+
+import pytest
+
+from pedestal_bringup import console
+
+ROWS = [('leo', '1', 'a satellite pass around its culmination, ashore, as seen by somebody who stands there'),
+        ('a.long.name.of.a.parameter', '', 'short'), ('empty', 'x' * 60, '')]
+
+
+@pytest.mark.parametrize('columns', [40, 80, 200])
+def test_a_list_stays_within_the_terminal(capsys, monkeypatch, columns):
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
+    monkeypatch.setattr(console.shutil, 'get_terminal_size', lambda: os.terminal_size((columns, 24)))
+    console.show_list(ROWS[:2])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= columns
+    words = ' '.join(lines).split()
+    assert words == ' '.join(cell for row in ROWS[:2] for cell in row).split()
+
+
+def test_in_a_pipe_a_row_is_a_line(capsys):
+    console.show_list(ROWS)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 3 and lines[0].endswith(ROWS[0][-1])
+    assert [line.index(row[1] or row[2]) for line, row in zip(lines, ROWS)][0] == len(ROWS[1][0]) + 2
