@@ -10,7 +10,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
 from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
 
-COMMAND, JOINTS, CLOCK, STATE = 'acu/reference', 'joint_states', 'clock', 'adu/state'
+COMMAND, JOINTS, TRUTH = 'acu/reference', 'joint_states', 'adu/truth'
+CLOCK, STATE = 'clock', 'adu/state'
 
 ENABLED, DISABLED, EMERGENCY_STOP = range(3)
 CONDITIONS = ('enabled', 'disabled', 'emergency stop')
@@ -49,11 +50,12 @@ def decode(u, m, command):
 
 @compiled
 def encode(y, m, stamp, said):
-    """Outputs of the beam -> records of its messages; a beam has no rate and no torque."""
-    joints = said[JOINTS]
-    joints.stamp = said[CLOCK].stamp = stamp
+    """Outputs of the beam -> records of its messages. A beam has no rate and no torque, and it points where it says.
+    """
+    joints, truth = said[JOINTS], said[TRUTH]
+    joints.stamp = truth.stamp = said[CLOCK].stamp = stamp
     for i in range(2):
-        joints.position[i] = y.position[i]
+        joints.position[i] = truth.position[i] = y.position[i]
     said[STATE] = condition(m)
 
 
