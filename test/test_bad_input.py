@@ -193,9 +193,9 @@ def joints(stamp_ms, position=(0.1, 0.5)):
 
 STAMPS = {
     'acu back': ('acu', 'joint_states', [5, 0], 'joint_states stamp went back from 0.005000 to 0.000000 s'),
-    'receiver back': ('tracking_receiver', 'joint_states', [10, 5], 'joint_states stamp went back from 0.010000 to '),
-    'receiver jump': ('tracking_receiver', 'joint_states', [0, 5, 25],
-                      'joint_states stamp jumped from 0.005000 to 0.025000 s; the period is 0.005000 s'),
+    'receiver back': ('tracking_receiver', 'adu/truth', [10, 5], 'adu/truth stamp went back from 0.010000 to '),
+    'receiver jump': ('tracking_receiver', 'adu/truth', [0, 5, 25],
+                      'adu/truth stamp jumped from 0.005000 to 0.025000 s; the period is 0.005000 s'),
     'drive': ('adu', 'acu/rate_command', [10], 'acu/rate_command is stamped 0.010000 s where 0.000000 s is due'),
 }
 
@@ -209,7 +209,7 @@ def misled(start_node, connect):
     for case, (_, topic, stamps, _) in STAMPS.items():
         client = connect(started[case].domain_id, 'acu')
         client.write(topic)
-        if topic != 'joint_states':
+        if topic == 'acu/rate_command':
             client.read('joint_states')
             client.read('adu/state')
             client.until(lambda client=client: client.heard['joint_states'])
@@ -229,13 +229,13 @@ def test_lockstep_ends_on_a_wrong_stamp(misled, case, one_line):
 def test_receiver_names_bad_input_in_realtime(start_node, connect):
     node = start_node('tracking_receiver')
     client = connect(node.domain_id)
-    client.write('joint_states')
+    client.write('adu/truth')
     client.read('tracking_receiver/angle_error')
     client.read('diagnostics')
     errors = client.heard['tracking_receiver/angle_error']
 
     def seen(stamp, position):
-        client.publish('joint_states', joints(stamp, position))
+        client.publish('adu/truth', joints(stamp, position))
         client.until(lambda: errors and messages.nanoseconds(errors[-1].header.stamp) == stamp * 1_000_000)
         return errors[-1].vector
 
@@ -243,9 +243,9 @@ def test_receiver_names_bad_input_in_realtime(start_node, connect):
     for stamp, bad in ((10, math.nan), (15, math.inf)):
         assert math.isnan(seen(stamp, (bad, 0.5)).x)
     seen(20, (0.1, 0.5))
-    client.until(lambda: any('joint states not valid' in text for text in client.said(0)))
-    client.publish('joint_states', joints(1))
-    client.diagnosed('joint_states: 1 dropped: stale: 0.019 s older than the last')
+    client.until(lambda: any('direction of the beam not valid' in text for text in client.said(0)))
+    client.publish('adu/truth', joints(1))
+    client.diagnosed('adu/truth: 1 dropped: stale: 0.019 s older than the last')
     node.process.send_signal(signal.SIGINT)
     result = node.finish(15.0)
     assert (result.returncode, result.stderr) == (0, '')

@@ -165,7 +165,7 @@ def test_a_second_writer_of_the_command_moves_nothing_and_is_named(standing, con
     assert standing.state == 'enabled'
 
 
-@pytest.mark.parametrize('name, reader', [('joint_states', 'acu'), ('joint_states', 'tracking_receiver'),
+@pytest.mark.parametrize('name, reader', [('joint_states', 'acu'), ('adu/truth', 'tracking_receiver'),
                                           ('tracking_receiver/angle_error', 'acu')])
 def test_a_stamp_of_the_future_makes_nobody_deaf(standing, connect, name, reader):
     stranger_writes(standing, connect, name, lambda: time.time_ns() + 3600 * SECOND, 0.3)

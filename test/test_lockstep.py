@@ -108,7 +108,7 @@ ANNOUNCED = {'acu/keyhole', 'acu/blockage', 'ins/state'}
 """Topics of words that neither run gives a reason to say."""
 
 
-@pytest.mark.parametrize('name, topics', [('first', 15), ('ship', 19)])
+@pytest.mark.parametrize('name, topics', [('first', 16), ('ship', 20)])
 def test_recording_is_complete(runs, name, topics, run_process):
     done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'verify', runs[name].bag], 60.0)
     assert done.returncode == 0, done.stdout

@@ -12,6 +12,7 @@ from pedestal_bringup import cli
 from pedestal_bringup.again import difference, recompute, recompute_report
 from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.bags.writer import Writer as BagWriter
 from pedestal_common import messages, topics
 from pedestal_common import nodes as graph
@@ -223,6 +224,24 @@ def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     (before, after), unit = numbers['estimate_lag_s']
     assert unit == 's'
     assert after - before == pytest.approx(0.02, abs=1e-3)
+
+
+def test_a_recording_from_before_the_truth_is_read_by_its_encoders(runs, rewrite, pedestal):
+    """Every verb that reads the truth of the dish takes joint_states for it and says so. The receiver then errs by the
+    counts of the encoders."""
+    path = rewrite(runs['leo'].bag, lambda rows: [row for row in rows if row[0] != 'adu/truth'])
+    assert verify(path).finished
+    old, whole = (results.measured(results.of_tracking(tracking.read(bags.read(bag)))) for bag in (
+        path, runs['leo'].bag))
+    assert not any(name.startswith('encoder_') for name in old)
+    for name in ('pointing_rms_deg', 'pointing_max_deg', 'cross_elevation_rms_deg', 'elevation_max_deg'):
+        assert old[name] == whole[f'encoder_{name}'] != whole[name]
+    code, said, _ = pedestal(path, '--node', 'tracking_receiver', '--absolute', '5e-3', '--relative', '0')
+    assert code == 0 and 'no adu/truth in it: joint_states stands for it' in said
+    assert said.splitlines()[-1] == 'tracking_receiver: equal within tolerance'
+    assert pedestal(path, '--node', 'acu', *EXACT)[0] == pedestal(path, '--node', 'adu', *EXACT)[0] == 0
+    _, said, _ = pedestal(path, '--param', 'acu.azimuth.filter.current_statistical.a_max=0.4')
+    assert f'note: {tracking.BY_ENCODERS}' in said.splitlines()
 
 
 @pytest.fixture

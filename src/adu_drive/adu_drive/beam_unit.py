@@ -10,7 +10,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
 from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
 
-COMMAND, JOINTS, CLOCK, STATE = 'acu/reference', 'joint_states', 'clock', 'adu/state'
+COMMAND, JOINTS, TRUTH = 'acu/reference', 'joint_states', 'adu/truth'
+CLOCK, STATE = 'clock', 'adu/state'
 
 ENABLED, DISABLED, EMERGENCY_STOP = range(3)
 CONDITIONS = ('enabled', 'disabled', 'emergency stop')
@@ -49,11 +50,12 @@ def decode(u, m, command):
 
 @compiled
 def encode(y, m, stamp, outputs):
-    """Outputs of the beam -> records of its messages; a beam has no rate and no torque."""
-    joints = outputs[JOINTS]
-    joints.stamp = outputs[CLOCK].stamp = stamp
+    """Outputs of the beam -> records of its messages. A beam has no rate and no torque, and it points where it says.
+    """
+    joints, truth = outputs[JOINTS], outputs[TRUTH]
+    joints.stamp = truth.stamp = outputs[CLOCK].stamp = stamp
     for i in range(2):
-        joints.position[i] = y.position[i]
+        joints.position[i] = truth.position[i] = y.position[i]
     outputs[STATE] = condition(m)
 
 

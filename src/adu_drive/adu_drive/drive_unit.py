@@ -50,8 +50,9 @@ end_stop          1 when the end of travel cut the rate command within the perio
 stopping          1 when not enabled within the period: ramped to standstill, then held there
 faults            latched fault word, see faults.FAULTS
 thermal_load      of motor 1 and 2; 1 after rated torque for ever
-load_position, load_velocity, true_torque       the truth, for tests and studies; never published: where the beam
-                  points (the dish, where the structure is flexible), and K_t i_q of motor 1 and 2
+load_position, load_velocity                    the truth: where the beam points (the dish, where the structure is
+                  flexible) [rad] and how fast it turns [rad/s]; no controller knows it
+true_torque       K_t i_q of motor 1 and 2, for tests; never published
 
 invalid_command   1 when an input of this call was not finite (or beyond LARGEST): the command counts as enable 0,
                   a disturbance as 0

@@ -12,7 +12,7 @@ from pedestal_common.records import NEVER
 from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
 
 CLOCK, COMMAND, SHIP, JOINTS, MOTORS = 'clock', 'acu/rate_command', 'ship/truth', 'joint_states', 'adu/motor_states'
-STATE = 'adu/state'
+TRUTH, STATE = 'adu/truth', 'adu/state'
 
 INVALID = ('', COMMAND, SHIP)
 """Topics that can hold what the drive does not believe."""
@@ -69,11 +69,12 @@ def note_invalid(u, m):
 @compiled
 def encode(y, stamp, outputs):
     """Outputs of the drive -> records of its messages."""
-    joints, motors = outputs[JOINTS], outputs[MOTORS]
-    joints.stamp = motors.stamp = outputs[CLOCK].stamp = stamp
+    joints, truth, motors = outputs[JOINTS], outputs[TRUTH], outputs[MOTORS]
+    joints.stamp = truth.stamp = motors.stamp = outputs[CLOCK].stamp = stamp
     for i in range(2):
         axis = y.azimuth if i == 0 else y.elevation
         joints.position[i], joints.velocity[i], joints.effort[i] = axis.position, axis.velocity, axis.torque
+        truth.position[i], truth.velocity[i] = axis.load_position, axis.load_velocity
         for j in range(2):
             motors.position[2 * i + j] = axis.motor_position[j]
             motors.velocity[2 * i + j] = axis.motor_velocity[j]

@@ -17,7 +17,10 @@ from pedestal_common import messages, topics
 T = 5_000_000
 STEPS = 1000
 NOISE = math.radians(0.03)
-ASHORE = ('clock', 'joint_states', 'adu/motor_states', 'tracking_receiver/angle_error', 'target/truth',
+TWIST = 0.001
+"""Of the dish off the azimuth encoder [rad]."""
+
+ASHORE = ('clock', 'joint_states', 'adu/truth', 'adu/motor_states', 'tracking_receiver/angle_error', 'target/truth',
           'acu/estimate', 'acu/filter', 'acu/mode', 'diagnostics')
 
 
@@ -29,8 +32,9 @@ def stamped(message, k):
 def step(k, rng, locked=True, effort=True):
     """{topic: message} of step k: a target that crosses south of the zenith through azimuth 180 deg."""
     azimuth, elevation = math.pi + 0.1 * (k - STEPS / 2) * T * 1e-9, 0.8
-    joints = messages.template('joint_states')
-    joints.position[:] = azimuth - 0.0002 * math.sin(0.05 * k), elevation - 0.0001
+    truth, joints = messages.template('adu/truth'), messages.template('joint_states')
+    truth.position[:] = azimuth - 0.0002 * math.sin(0.05 * k), elevation - 0.0001
+    joints.position[:] = truth.position[0] - TWIST, truth.position[1]
     joints.effort[:] = 100.0, 50.0
     if not effort:
         joints.effort = np.zeros(0)
@@ -51,8 +55,8 @@ def step(k, rng, locked=True, effort=True):
     told = messages.template('acu/filter')
     told.position[:] = [value for nu in noise for value in (
         nu, math.nan, (nu / NOISE)**2, 0.1 * NOISE, 0.02 * NOISE, 0.0, NOISE, 0.3, 0.3, math.nan, 0.4)]
-    made = {'joint_states': joints, 'acu/filter': told, 'adu/motor_states': motors, 'target/truth': target,
-            'tracking_receiver/angle_error': error, 'acu/estimate': estimate}
+    made = {'joint_states': joints, 'adu/truth': truth, 'acu/filter': told, 'adu/motor_states': motors,
+            'target/truth': target, 'tracking_receiver/angle_error': error, 'acu/estimate': estimate}
     return {name: stamped(message, k) for name, message in made.items()}
 
 
@@ -179,6 +183,11 @@ def test_numbers_are_those_of_the_summary(page, whole):
     assert noise == pytest.approx(0.03, rel=0.1)
     assert read('pointing error, rms') == near(*rms)
     assert read('pointing error, largest') == near('cross_elevation_max_deg', 'elevation_max_deg', 'pointing_max_deg')
+    assert read('the same by the encoders, rms') == near(*(f'encoder_{key}' for key in rms))
+    assert read('the same by the encoders, largest')[1:2] == near('encoder_elevation_max_deg')
+    assert values['encoder_cross_elevation_rms_deg'] == pytest.approx(
+        math.degrees(math.hypot(TWIST, 0.0002 / math.sqrt(2.0)) * math.cos(0.8)), rel=0.05)
+    assert 'by the encoders:' not in page[0].text
     assert read("rms / receiver's single-sample noise") == near(*rms, scale=noise)
     assert read('noise reduction by the filter') == near(
         'noise_reduction_cross_elevation', 'noise_reduction_elevation', 'noise_reduction')
@@ -234,6 +243,14 @@ def test_missing_topics(tmp_path, names, drawn, said):
     assert page.drawn == drawn
     assert said in page.text
     assert sorted(path.stem for path in tmp_path.glob('*.png')) == sorted(drawn)
+
+
+def test_a_recording_from_before_the_truth_says_that_its_errors_are_those_of_the_encoders(page, tmp_path):
+    old = page_of(make_bag(tmp_path / 'old', [name for name in ASHORE if name != 'adu/truth']))
+    assert f'Pointing errors by the encoders: {tracking.BY_ENCODERS}.' in old.text
+    assert 'the same by the encoders, rms' not in old.rows
+    for name in ('rms', 'largest'):
+        assert old.rows[f'pointing error, {name}'] == page[0].rows[f'the same by the encoders, {name}']
 
 
 def test_never_locked(tmp_path):

@@ -24,7 +24,7 @@ def test_the_parts_of_a_recording_decide_its_rows():
     ashore, ship = (results.measured(results.of_bag(bag.read(REFERENCES / name)))
                     for name in ('leo_pass', 'ship_pass'))
     kinds = {name: results.BY_NAME[name].part for name in ship}
-    assert set(kinds.values()) == {'motors', 'tracking', 'filter', 'attitude'}    # too short for an isolation
+    assert set(kinds.values()) == {'motors', 'encoders', 'tracking', 'filter', 'attitude'}    # no isolation: too short
     assert list(ashore) == [name for name in ship if kinds[name] != 'attitude']
     rows = results.rows('leo_pass', {**ashore, 'loss_s': (math.nan, 's')})
     assert [(row['metric'], row['unit'], row['target']) for row in rows] == [

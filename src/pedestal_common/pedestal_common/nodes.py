@@ -81,7 +81,7 @@ NODES = (
          stands_for='INS', optional=True),
     Node('tracking_receiver', 'tracking_receiver_sim.tracking_receiver_node',
          'tracking_receiver_sim.params:TrackingReceiverNodeParameters', 'tracking_receiver_sim.unit:TrackingReceiver',
-         reads=('joint_states', 'ship/truth'),
+         reads=('adu/truth', 'ship/truth'),
          writes=('tracking_receiver/angle_error', 'tracking_receiver/angle_rate', 'tracking_receiver/range',
                  'target/truth'),
          answer='target/truth',
@@ -95,7 +95,7 @@ NODES = (
          doc='antenna control unit: filter, modes, position loop', stands_for='the product itself', of_beam=True),
     Node(DRIVE, 'adu_drive.adu_node', 'adu_drive.params:AduNodeParameters', 'adu_drive.unit:Adu',
          reads=('clock', 'acu/rate_command', 'ship/truth'),
-         writes=('joint_states', 'clock', 'adu/motor_states', 'adu/state'),
+         writes=('joint_states', 'adu/truth', 'clock', 'adu/motor_states', 'adu/state'),
          answer='joint_states',
          doc='antenna drive unit: two axes, two motors each, and the plant; owns the time',
          stands_for='servo drive and pedestal'),
@@ -109,7 +109,7 @@ NODES = (
 
 ARRAY = Node(DRIVE, 'adu_drive.beam_steering_node', 'adu_drive.params:BeamParameters', 'adu_drive.beam_unit:Beam',
              reads=('clock', 'acu/reference'),
-             writes=('joint_states', 'clock', 'adu/state'),
+             writes=('joint_states', 'adu/truth', 'clock', 'adu/state'),
              answer='joint_states',
              doc='electronically steered array in the place of the drive (`beam: true`): no motors',
              stands_for='beam steering computer and array')
@@ -118,7 +118,7 @@ ARRAY = Node(DRIVE, 'adu_drive.beam_steering_node', 'adu_drive.params:BeamParame
 NAMES = tuple(node.name for node in NODES)
 UNITS = (*(node for node in NODES if node.unit), ARRAY)
 
-OF_BEAM = frozenset(('joint_states', 'acu/program_track',
+OF_BEAM = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
                      *(topic for node in NODES if node.of_beam for topic in node.writes)))
 """Topics that each beam of several has of its own: what its nodes write, and what shared nodes write for each."""
 

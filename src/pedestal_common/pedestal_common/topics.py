@@ -75,6 +75,9 @@ TOPICS = (
     Topic('clock', 'rosgraph_msgs/msg/Clock', 'step', "the drive's time t_k"),
     Topic('joint_states', 'sensor_msgs/msg/JointState', 'step',
           '`azimuth`, `elevation`: encoder angle [rad], rate [rad/s], torque on the load [Nm]', frame='base_link'),
+    Topic('adu/truth', 'sensor_msgs/msg/JointState', 'step',
+          '`azimuth`, `elevation`: true deck angle [rad] and rate [rad/s] of the dish, or of the beam of an array: '
+          'what simulated equipment reads, and the ACU never', frame='base_link'),
     Topic('adu/motor_states', 'sensor_msgs/msg/JointState', 'step',
           '`azimuth_motor_1` ... `elevation_motor_2`: shaft angle [rad], rate [rad/s], torque [Nm]', names=MOTORS,
           frame='base_link'),

@@ -30,7 +30,8 @@ def test_what_a_row_names_exists(node):
 def test_a_graph_with_a_drive_holds_every_topic():
     graph = nodes.links()
     assert list(graph) == list(topics.BY_NAME)
-    assert graph['joint_states'].readers == ('tracking_receiver', 'acu') and graph['clock'].readers == ('ship_motion',)
+    assert graph['joint_states'].readers == ('acu',) and graph['clock'].readers == ('ship_motion',)
+    assert graph['adu/truth'].readers == ('tracking_receiver',)
     assert graph['diagnostics'].writers == ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu')
     assert nodes.members(nodes.NAMES, 0) == nodes.members(nodes.NAMES, 1) == nodes.NAMES
 
@@ -48,8 +49,9 @@ def test_several_beams_share_what_belongs_to_the_ship_and_the_clock():
     own = [name for name in nodes.links(1) if name not in SHARED]
     assert [name for name in graph if name.startswith('beam_2/')] == [f'beam_2/{name}' for name in own]
     assert graph['beam_3/acu/reference'].writers == ('beam_3/acu',)
-    assert graph['beam_3/joint_states'] == nodes.links()['joint_states']._replace(
-        name='beam_3/joint_states', readers=('beam_3/tracking_receiver', 'beam_3/acu'))
+    for name, reader in (('joint_states', 'acu'), ('adu/truth', 'tracking_receiver')):
+        assert graph[f'beam_3/{name}'] == nodes.links()[name]._replace(
+            name=f'beam_3/{name}', readers=(f'beam_3/{reader}',))
     assert graph['ship/imu/data'].readers == ('beam_1/acu', 'beam_2/acu', 'beam_3/acu')
 
 

@@ -348,7 +348,7 @@ def test_bad_inputs_unlock_and_leave_no_trace(field, value):
     good = bench.inputs.copy()
     bench.inputs[field] = value
     out = bench.run(3)
-    assert np.all(out['status'] == receiver.NO_JOINTS) and np.all(out['locked'] == 0)
+    assert np.all(out['status'] == receiver.NO_BEAM) and np.all(out['locked'] == 0)
     assert np.all(np.isnan(out['cross_elevation'])) and np.all(np.isnan(out['true_elevation']))
     assert np.all(out['due'] == 1) and np.all(np.isfinite(out['cn0_dbhz']))
     assert np.all(out['target_valid'] == 1)

@@ -26,9 +26,9 @@ from tracking_receiver_sim.monopulse import channels, detect, thermal_noise
 from tracking_receiver_sim.params import BEAMS, HELD
 from tracking_receiver_sim.smoothing import SMOOTHINGS
 
-STATUSES = ('locked', 'no lock', 'target below the horizon', 'target outside its track', 'joint states not valid',
-            'stamp not after the one before', 'target hidden by the superstructure')
-LOCKED, NO_LOCK, BELOW_HORIZON, NO_TARGET, NO_JOINTS, STAMP_ORDER, HIDDEN = range(7)
+STATUSES = ('locked', 'no lock', 'target below the horizon', 'target outside its track',
+            'direction of the beam not valid', 'stamp not after the one before', 'target hidden by the superstructure')
+LOCKED, NO_LOCK, BELOW_HORIZON, NO_TARGET, NO_BEAM, STAMP_ORDER, HIDDEN = range(7)
 
 NORMALS_PER_SAMPLE = 6
 """Real and imaginary noise of the sum and of the two difference channels."""
@@ -73,7 +73,7 @@ powers: carrier power in one sample over noise power in one sample; range_varian
 INPUTS = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
                    ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3), ('azimuth_rate', 'f8'), ('elevation_rate', 'f8'),
                    ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
-"""Step's stamp [ns]; joint states there and fresh (0 or 1); beam on the deck [rad]; true attitude deck -> earth;
+"""Step's stamp [ns]; beam there and fresh (0 or 1); its true angles on the deck [rad]; true attitude deck -> earth;
 ENU position of base_link against the station [m]; rates of the beam on the deck [rad/s]; velocity of base_link [m/s]
 and rate of the deck [rad/s], FLU."""
 
@@ -159,9 +159,9 @@ def age(params, period):
 
 
 def beam_age(params, period):
-    """How long before the stamp of an error [s] the joint states were stamped, in the mean, that its beam had.
+    """How long before the stamp of an error [s] the beam was stamped, in the mean, that it was measured off.
 
-    A beam that is held through a step has the joint states of the step's end. params: TrackingReceiverParameters;
+    A beam that is held through a step is told at the step's end. params: TrackingReceiverParameters;
     period: drive step [s]."""
     receiver = params.receiver
     if BEAMS.index(receiver.beam) != HELD:
@@ -175,7 +175,7 @@ def _hertz(cn0_dbhz):
 
 @compiled
 def inputs_known(i):
-    """Whether joint states, attitude and position are there and finite."""
+    """Whether beam, attitude and position are there and finite."""
     total = i.azimuth + i.elevation
     for row in range(3):
         total += i.position[row] + i.mat_ed[row, 0] + i.mat_ed[row, 1] + i.mat_ed[row, 2]
@@ -346,7 +346,7 @@ def step(s, c, i, o, breaks, coefficients, normals):
                     LOCKED if s.locked != 0 else NO_LOCK)
     else:
         s.error_known, s.locked, s.timer_ns = 0, 0, 0
-        o.status = NO_JOINTS
+        o.status = NO_BEAM
     if s.locked == 0:
         error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
     cn0_dbhz = 10.0 * math.log10(max(s.level_power - 1.0, POWER_FLOOR) / c.tau)

@@ -1,4 +1,4 @@
-"""ROS node of the tracking receiver: answers every joint state with the receiver's channels."""
+"""ROS node of the tracking receiver: answers every direction of the beam with the receiver's channels."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

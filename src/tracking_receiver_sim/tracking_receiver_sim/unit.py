@@ -1,4 +1,5 @@
-"""The unit of the tracking receiver: joint states and the ship's truth in, the receiver's channels out."""
+"""The unit of the tracking receiver: the true direction of the beam and the ship's truth in, the receiver's channels
+out."""
 import math
 import typing
 
@@ -10,10 +11,10 @@ from pedestal_common.records import NEVER
 from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
 from tracking_receiver_sim import receiver, target
 
-JOINTS, SHIP, ERRORS, TARGET = 'joint_states', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
+BEAM, SHIP, ERRORS, TARGET = 'adu/truth', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 
-FAULTS = (receiver.NO_TARGET, receiver.NO_JOINTS, receiver.STAMP_ORDER)
+FAULTS = (receiver.NO_TARGET, receiver.NO_BEAM, receiver.STAMP_ORDER)
 """Statuses that are kept for the next diagnosis."""
 
 
@@ -31,11 +32,11 @@ class Memory(typing.NamedTuple):
 
 
 @compiled
-def decode(u, stamp, joints, ship):
+def decode(u, stamp, beam, ship):
     """Records of the messages of a step -> inputs of the receiver; the last ship/truth stands until the next."""
     u.stamp_ns = stamp
-    u.azimuth, u.elevation = joints.position[0], joints.position[1]
-    u.azimuth_rate, u.elevation_rate = joints.velocity[0], joints.velocity[1]
+    u.azimuth, u.elevation = beam.position[0], beam.position[1]
+    u.azimuth_rate, u.elevation_rate = beam.velocity[0], beam.velocity[1]
     u.valid = 1
     if ship.stamp != NEVER:
         q = ship.orientation
@@ -65,7 +66,7 @@ def encode(o, c, stamp, outputs):
 def law(memory, stamp, inputs, outputs):
     """Step k."""
     m = memory.record[0]
-    decode(m.inputs, stamp, inputs[JOINTS], inputs[SHIP])
+    decode(m.inputs, stamp, inputs[BEAM], inputs[SHIP])
     receiver.step(m.state, m.constants, m.inputs, m.outputs, memory.breaks, memory.coefficients,
                   memory.normals[m.row])
     m.row += 1

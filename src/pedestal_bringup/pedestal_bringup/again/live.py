@@ -118,7 +118,7 @@ def _run(recording, done, params, folder):
     values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(names),
               'graph.beams': recording.bag.beams}
     file.write_text(yaml.safe_dump({done.node: {'ros__parameters': values}}))
-    inputs = [name for name in done.unit.reads if recording.has(name) and name not in done.unit.NODE.writes]
+    inputs = [name for name in done.unit.reads if recording.feeds(name) and name not in done.unit.NODE.writes]
     feeder = Feeder(done.node, inputs, done.outputs)
     with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:
         feeder.refuse_company()

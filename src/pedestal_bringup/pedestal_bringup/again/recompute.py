@@ -24,6 +24,9 @@ from pedestal_common import messages, nodes, parameters, plain_yaml, records, to
 from pedestal_common.steps import SECOND, GraphError, Steps
 from pedestal_common.unit import announced
 
+STANDS_FOR = {'adu/truth': 'joint_states'}
+"""{topic: topic that stands for it in an old recording}: receivers once looked where the encoders said."""
+
 AFTER_ALL = 2**63 - 1
 """Stamp of the step of a message after which its writer answered none."""
 
@@ -57,9 +60,17 @@ class Recording:
     def has(self, topic):
         return topic in self.bag.topics and len(self.rows(topic)) > 0
 
+    def source(self, topic):
+        """The recorded topic whose messages a node gets that reads a topic: itself, or what STANDS_FOR it."""
+        return topic if topic in self.bag.topics else STANDS_FOR.get(topic, topic)
+
+    def feeds(self, topic):
+        """Whether there are messages for a node that reads a topic."""
+        return self.has(self.source(topic))
+
     def rows(self, topic):
         if topic not in self._rows:
-            self._rows[topic] = self.bag.rows(topic)
+            self._rows[topic] = self.bag.rows(self.source(topic))
         return self._rows[topic]
 
     def arrival(self, topic):
@@ -71,10 +82,10 @@ class Recording:
     def data(self, topic):
         """The CDR bytes of its messages."""
         if topic not in self._data:
-            wanted = topics.BY_NAME[topic].type
-            if self.bag.topics[topic] != wanted:
-                raise RecomputeError(f'{self.bag.path}: {topic} is {self.bag.topics[topic]}; must be {wanted}')
-            self._data[topic] = [data for _, _, _, data in self.bag.raw(topic)]
+            wanted, source = topics.BY_NAME[topic].type, self.source(topic)
+            if self.bag.topics[source] != wanted:
+                raise RecomputeError(f'{self.bag.path}: {source} is {self.bag.topics[source]}; must be {wanted}')
+            self._data[topic] = [data for _, _, _, data in self.bag.raw(source)]
         return self._data[topic]
 
     def output(self, topic) -> difference.Output:
@@ -133,7 +144,7 @@ def feed(recording, unit) -> Feed:
     latencies = unit.latencies
     names = [trigger, *latencies]
     for name in names:
-        if not recording.has(name):
+        if not recording.feeds(name):
             raise RecomputeError(f'{recording.bag.path}: no {name} in it, which the node hears')
     stamps = [recording.output(name).stamps for name in names]
     sources = np.concatenate([np.full(len(part), number) for number, part in enumerate(stamps)])
@@ -321,7 +332,7 @@ def chosen(recording, names, file_values):
 
     def able(name):
         row = row_of(recording, name)
-        begun = recording.has(row.reads[0]) or row.reads[0] in row.writes and recording.has(row.writes[0])
+        begun = recording.feeds(row.reads[0]) or row.reads[0] in row.writes and recording.has(row.writes[0])
         return begun and name in (known or ('acu',)) and (name == 'acu' or any(map(recording.has, row.writes)))
     selected = [name for name in UNITS if (name in names if names else able(name))]
     if not selected:

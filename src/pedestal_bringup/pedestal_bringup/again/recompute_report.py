@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from pedestal_bringup.again import difference, recompute, what_if
+from pedestal_bringup.analysis import tracking
 from pedestal_bringup.analysis.results import row
 from pedestal_bringup.bags.writer import Writer
 from pedestal_common import messages, records, topics
@@ -66,7 +67,8 @@ def _node_report(recording, node, given, changes, options):
         report.lines.insert(0, f'compared is what the process of {node} published, fed in lockstep')
     else:
         report = _against_recorded(recording, done.outputs, done, tolerance)
-    report.lines[:0] = [_title(recording, done, options.params_file), *_input_problems(done), *_requests(done)]
+    report.lines[:0] = [_title(recording, done, options.params_file), *_stand_ins(recording, done),
+                         *_input_problems(done), *_requests(done)]
     idle = '' if options.allow_idle else recompute.idle(recording, done)
     if idle:
         report.lines.append(f'{node}: NOT exercised: {idle} (--allow-idle lets it pass)')
@@ -85,6 +87,12 @@ def _title(recording, done, params_file):
     else:
         origin = 'DEFAULT parameters, for the recording does not say how it was made (--params-file)'
     return f'{recording.bag.path}: {recording.bag.beam}{done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
+
+
+def _stand_ins(recording, done):
+    """Lines on the inputs that were not recorded, and what stands for them."""
+    return [f'no {topic} in it: {source} stands for it' for topic in done.feed.rows
+            if (source := recording.source(topic)) != topic]
 
 
 def _input_problems(done):
@@ -138,9 +146,15 @@ def _new_numbers(recording, outputs, done):
     rows = [row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
     if done.node == 'acu' and len(done.feed.stamps):
         numbers = what_if.numbers(recording.bag, [done.outputs])
+        lines += _by_encoders(recording)
         lines += [f'{name:42} {_text(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
         rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
     return NodeReport(lines, rows, outputs, done.unit.messages, not done.feed.problem)
+
+
+def _by_encoders(recording):
+    """A line on errors that are not those of the dish, in a list; none where its true direction was recorded."""
+    return [] if recording.has('adu/truth') or recording.bag.beams else [f'note: {tracking.BY_ENCODERS}']
 
 
 def _text(value):
@@ -155,7 +169,8 @@ def _old_against_new(recording, old, new, tolerance, changes):
     lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
     rows = []
     if new.node == 'acu' and len(new.feed.stamps):
-        lines += [f'note: {what_if.NOTE}', f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']
+        lines += [f'note: {what_if.NOTE}', *_by_encoders(recording),
+                  f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']
         for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
             ratio = f'{b / a:9.4g}' if a and math.isfinite(b / a) else f'{"":9}'
             lines.append(f'{name:42} {_text(a):>12} {_text(b):>12} {ratio} {unit}'.rstrip())

@@ -2,6 +2,7 @@
 
 A result is measured on a part of what is known of a run; without that part it has no row:
 motors      tracking.Tracking of a drive with motors    tracking    tracking.Tracking of any drive
+encoders    the same where the true direction of its dish is known too
 filter      consistency.Consistency                     isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
 run         graph.Outcome                               supervised  graph.Outcome in realtime
@@ -38,7 +39,8 @@ RESULTS = (
     Result('elevation_following_max_deg', 'deg', 'motors', lambda run: largest(run.following[:, 1]),
            'Largest of reference less encoder in elevation, over every step outside standby.'),
     Result('pointing_rms_deg', 'deg', 'tracking', lambda run: run.pointing(rms),
-           'Rms of the true pointing error, both axes together, in settled autotrack.'),
+           'Rms of the true pointing error, the target off where the dish points, both axes together, in settled '
+           'autotrack.'),
     Result('pointing_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest),
            'Largest true pointing error of either axis in settled autotrack.'),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(rms, 0),
@@ -49,6 +51,18 @@ RESULTS = (
            'Largest true pointing error in cross-elevation.'),
     Result('elevation_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest, 1),
            'Largest true pointing error in elevation.'),
+    Result('encoder_pointing_rms_deg', 'deg', 'encoders', lambda run: rms(run.by_encoders),
+           'Rms of the pointing error that the encoders show, both axes together.'),
+    Result('encoder_pointing_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders),
+           'Largest pointing error that the encoders show on either axis.'),
+    Result('encoder_cross_elevation_rms_deg', 'deg', 'encoders', lambda run: rms(run.by_encoders[:, 0]),
+           'Rms of the pointing error that the encoders show in cross-elevation.'),
+    Result('encoder_elevation_rms_deg', 'deg', 'encoders', lambda run: rms(run.by_encoders[:, 1]),
+           'Rms of the pointing error that the encoders show in elevation.'),
+    Result('encoder_cross_elevation_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders[:, 0]),
+           'Largest pointing error that the encoders show in cross-elevation.'),
+    Result('encoder_elevation_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders[:, 1]),
+           'Largest pointing error that the encoders show in elevation.'),
     Result('single_sample_noise_deg', 'deg', 'tracking', lambda run: rms(run.noise),
            "Rms of the receiver's error less the true one.", "receiver's single-sample noise"),
     Result('pointing_to_noise', '', 'tracking', lambda run: run.pointing(rms) / rms(run.noise),
@@ -118,7 +132,7 @@ BY_NAME = {result.name: result for result in RESULTS}
 
 def of_tracking(run):
     """The parts {part: record} that a tracking.Tracking is."""
-    return {'motors': None if run.electronic else run, 'tracking': run}
+    return {'motors': None if run.electronic else run, 'encoders': run if run.has_encoders else None, 'tracking': run}
 
 
 def of_bag(bag):

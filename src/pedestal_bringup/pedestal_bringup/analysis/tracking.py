@@ -1,4 +1,4 @@
-"""A recorded run on the drive's steps: beam, estimate and the receiver's errors against the recorded truth."""
+"""A recorded run on the drive's steps: beam, encoders, estimate and receiver against the recorded truth."""
 import contextlib
 import dataclasses
 import functools
@@ -12,21 +12,34 @@ from pedestal_common.compiled import compiled
 SETTLING = 2.0
 """Seconds after the first hand-over to autotrack that are left out of every statistic."""
 DEGREES = math.degrees(1.0)
+BY_ENCODERS = ('there is no adu/truth in it, so the beam is taken to be where joint_states say: what moves the dish '
+               'off its encoders does not show')
+"""What is said of the numbers of a recording from before the drive told where its dish truly points."""
 
 
 @compiled
-def _pointing(beam, relative, attitude, known_attitude, estimate, error, filtered, beam_earth):
-    """Fill, per row: the pointing error and the filtered error (cross-elevation, elevation), the beam's earth angles.
+def _true_error(direction, relative, attitude, error):
+    """Fill the error (n, 2) (cross-elevation, elevation) [rad] of deck angles (n, 2) against the target.
 
-    relative (n, 3): ENU [m] from the antenna to the target; attitude is the true one, known_attitude the INS's, in
-    whose earth angles the estimate is given.
+    relative (n, 3): ENU [m] from the antenna to the target; attitude (n, 4): the true one.
+    """
+    mat_ed = np.empty((3, 3))
+    for k in range(len(direction)):
+        line_of_sight.rotation(attitude[k, 0], attitude[k, 1], attitude[k, 2], attitude[k, 3], mat_ed)
+        x, y, z = line_of_sight.to_deck(mat_ed, relative[k, 0], relative[k, 1], relative[k, 2])
+        error[k, 0], error[k, 1] = line_of_sight.offsets(direction[k, 0], direction[k, 1], x, y, z)
+
+
+@compiled
+def _seen(beam, attitude, known_attitude, estimate, filtered, beam_earth):
+    """Fill, per row: the filtered error (cross-elevation, elevation) seen from the beam, the beam's earth angles.
+
+    attitude is the true one, known_attitude the INS's, in whose earth angles the estimate is given.
     """
     mat_ed, known = np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(beam)):
         azimuth, elevation = beam[k, 0], beam[k, 1]
         line_of_sight.rotation(attitude[k, 0], attitude[k, 1], attitude[k, 2], attitude[k, 3], mat_ed)
-        x, y, z = line_of_sight.to_deck(mat_ed, relative[k, 0], relative[k, 1], relative[k, 2])
-        error[k, 0], error[k, 1] = line_of_sight.offsets(azimuth, elevation, x, y, z)
         x, y, z = line_of_sight.direction(azimuth, elevation)
         east, north, height = line_of_sight.to_earth(mat_ed, x, y, z)
         beam_earth[k, 0], beam_earth[k, 1] = line_of_sight.earth_angles(east, north, height)
@@ -59,11 +72,13 @@ class Tracking:
     cross-elevation) and elevation.
 
     t (n,) s; azimuth, elevation (n,): encoders; reference (n, 2): deck angles that the ACU follows, NaN in standby and
-    of an electronic beam, which obeys them later; cross_elevation, elevation_error (n,): true error at the stamps;
-    measured (n, 2): errors of the receiver; cn0 (n,) dB-Hz; filtered (n, 2): the estimate seen from the beam;
-    beam_earth, target_earth (n, 2): earth angles; range (n,) m; mode (n,): text; tracking (n,) bool: in autotrack and
-    settled, the evaluated part; since (n,) bool: that or later; beamwidth, NaN when the bag does not say; begun
-    (n, 2): true error of an electronic beam at the beginning of the interval that ends at the stamp, else NaN.
+    of an electronic beam, which obeys them later; cross_elevation, elevation_error (n,): true error at the stamps, the
+    target off where the dish points; encoder_error (n, 2): the target off where the encoders say, NaN of an electronic
+    beam and where the bag does not tell the two apart; measured (n, 2): errors of the receiver; cn0 (n,) dB-Hz;
+    filtered (n, 2): the estimate seen from the beam; beam_earth, target_earth (n, 2): earth angles; range (n,) m; mode
+    (n,): text; tracking (n,) bool: in autotrack and settled, the evaluated part; since (n,) bool: that or later;
+    beamwidth, NaN when the bag does not say; begun (n, 2): true error of an electronic beam at the beginning of the
+    interval that ends at the stamp, else NaN.
     """
     t: np.ndarray
     azimuth: np.ndarray
@@ -71,6 +86,7 @@ class Tracking:
     reference: np.ndarray
     cross_elevation: np.ndarray
     elevation_error: np.ndarray
+    encoder_error: np.ndarray
     measured: np.ndarray
     cn0: np.ndarray
     filtered: np.ndarray
@@ -102,6 +118,16 @@ class Tracking:
     def true(self):
         """True error (k, 2) [rad] over the evaluated part."""
         return np.column_stack((self.cross_elevation, self.elevation_error))[self.tracking]
+
+    @property
+    def has_encoders(self):
+        """Whether what the encoders say is known beside where the beam points."""
+        return np.isfinite(self.encoder_error).any()
+
+    @functools.cached_property
+    def by_encoders(self):
+        """Error by the encoders (k, 2) [deg] over the evaluated part."""
+        return self.encoder_error[self.tracking] * DEGREES
 
     @functools.cached_property
     def noise(self):
@@ -177,7 +203,8 @@ def read(bag) -> Tracking:
     joints = bag.table('joint_states')
     t = joints['t']
     at_steps = functools.partial(on_grid, bag, t)
-    beam = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
+    encoders = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
+    beam = at_steps('adu/truth', ('azimuth.position', 'elevation.position')) if 'adu/truth' in bag.topics else encoders
     target = at_steps('target/truth', ('position.x', 'position.y', 'position.z'))
     quaternion = ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w')
     if 'ship/truth' in bag.topics:
@@ -189,9 +216,12 @@ def read(bag) -> Tracking:
         attitude = known_attitude = np.tile(line_of_sight.ASHORE, (t.size, 1))
     measured = at_steps('tracking_receiver/angle_error', ('x', 'y', 'z'))
     estimate = at_steps('acu/estimate', ('azimuth.position', 'elevation.position'))
-    error, filtered, beam_earth = np.empty((3, t.size, 2))
+    error, encoder_error, filtered, beam_earth = np.full((4, t.size, 2), np.nan)
     relative = target - ship
-    _pointing(beam, relative, attitude, known_attitude, estimate, error, filtered, beam_earth)
+    _true_error(beam, relative, attitude, error)
+    if beam is not encoders and not bag.beams:
+        _true_error(encoders, relative, attitude, encoder_error)
+    _seen(beam, attitude, known_attitude, estimate, filtered, beam_earth)
     target_earth = np.column_stack((np.arctan2(relative[:, 0], relative[:, 1]),
                                     np.arctan2(relative[:, 2], np.hypot(relative[:, 0], relative[:, 1]))))
     mode = modes(bag, t)
@@ -199,7 +229,7 @@ def read(bag) -> Tracking:
     start = t[automatic][0] + SETTLING if automatic.any() else math.inf
     reference = at_steps('acu/reference', ('azimuth.position', 'elevation.position'))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
-    return Tracking(t, beam[:, 0], beam[:, 1], reference, error[:, 0], error[:, 1], measured[:, :2], measured[:, 2],
+    return Tracking(t, *encoders.T, reference, *error.T, encoder_error, measured[:, :2], measured[:, 2],
                     filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
                     automatic & (t >= start), t >= start, beamwidth(bag),
                     began(beam, error) if bag.beams else np.full_like(error, np.nan))

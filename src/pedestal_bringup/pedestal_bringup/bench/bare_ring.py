@@ -12,7 +12,7 @@ from rclpy.node import Node
 from pedestal_common import layouts, middleware, nodes, shell, topics
 
 ROLES = ('tracking_receiver', 'acu', 'adu', 'recorder')
-TRIGGERS = {'tracking_receiver': 'joint_states', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
+TRIGGERS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
 WARM_UP = 300
 """Laps before the clock starts."""
 

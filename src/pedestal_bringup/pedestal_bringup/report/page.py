@@ -101,7 +101,9 @@ def _pointing(bag, data, values):
     rms = ('cross_elevation_rms_deg', 'elevation_rms_deg', 'pointing_rms_deg')
     largest = ('cross_elevation_max_deg', 'elevation_max_deg', 'pointing_max_deg')
     joints = run_data.table(bag, 'joint_states')
-    return [row('pointing error, rms', *rms), row('pointing error, largest', *largest),
+    by_encoders = [row(f'the same by the encoders, {name}', *(f'encoder_{key}' for key in keys))
+                   for name, keys in (('rms', rms), ('largest', largest))] if data.run.has_encoders else []
+    return [row('pointing error, rms', *rms), row('pointing error, largest', *largest), *by_encoders,
             row("rms / receiver's single-sample noise", *rms, scale=noise, unit=''),
             row("largest / receiver's single-sample noise", *largest, scale=noise, unit=''),
             row('noise reduction by the filter', 'noise_reduction_cross_elevation', 'noise_reduction_elevation',
@@ -157,6 +159,8 @@ def _results(bag, data, check):
             parts.append(_rows(['', 'azimuth', 'elevation', ''], _torques(data), 'n'))
     else:
         known = results.of_tracking(data.run)
+        if 'adu/truth' not in bag.topics and not bag.beams:
+            parts.append(f'<p class="bad">Pointing errors by the encoders: {html.escape(tracking.BY_ENCODERS)}.</p>')
         if not data.run.tracking.any():
             parts.append('<p class="bad">The run was never in autotrack for longer than the settling time, so nothing '
                          'was evaluated.</p>')

@@ -346,8 +346,8 @@ FIGURES = (
     Spec('pointing', 'Pointing error against truth', 'True angle from the beam axis to the target on both axes, and '
          'its size over the whole run; background and dotted lines show the mode of the ACU.', ('truth',), pointing),
     Spec('error', 'Error before and after the filter (figure 7 of the paper)', 'The error the receiver put out (grey) '
-         'jumps from sample to sample; the filtered line of sight less the encoder (blue) is what the position loop '
-         'gets instead, on a ship shifted by the attitude error of its INS.',
+         'jumps from sample to sample; the filtered line of sight seen from the beam (blue) is what the position '
+         "loop gets instead, but for the error of the encoders, and on a ship that of its INS's attitude.",
          ('truth', 'lock'), error),
     Spec('error_zoom', 'Error, zoomed (figure 8 of the paper)', f'The middle {ZOOM:g} s of the evaluated part: the '
          'position loop holds the filtered error (blue) near zero; the true one (orange) is what the filter leaves of '

@@ -24,9 +24,8 @@ COMMAND, REFERENCE = 'acu/rate_command', 'acu/reference'
 STEP = records.of(*(topic.name for topic in topics.TOPICS if topic.rate in ('step', 'change')))
 """One step: every topic but the program track and the diagnostics."""
 
-TRUTH = np.dtype([('load_position', 'f8', 2), ('bias', 'f8', 2), ('error', 'f8', 2)])
-"""What no topic tells of t_k: true angles of the load [rad], bias torques [Nm], the true error of the beam
-(cross-elevation, elevation) [rad]."""
+TRUTH = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
+"""What no topic tells of t_k: bias torques [Nm], the true error of the beam (cross-elevation, elevation) [rad]."""
 
 _LAWS = {memory: law for node in nodes.UNITS for memory, (law, _) in node.unit_type().LAWS.items()}
 
@@ -44,22 +43,18 @@ def _step(memory, stamp, inputs, outputs):
     return lambda memory, stamp, inputs, outputs: law(memory, stamp, inputs, outputs)
 
 
-def true_load(drive, truth):
-    """Fill load_position and bias of a TRUTH from the memory of the drive. Compiled code calls it."""
+def true_bias(drive, truth):
+    """Fill bias of a TRUTH from the memory of the drive; a beam has none. Compiled code calls it."""
     raise NotImplementedError
 
 
-@overload(true_load)
-def _true_load(drive, truth):
+@overload(true_bias)
+def _true_bias(drive, truth):
     def of_axes(drive, truth):
         y = drive.record[0].outputs
-        truth.load_position[0], truth.load_position[1] = y.azimuth.load_position, y.elevation.load_position
         truth.bias[0], truth.bias[1] = y.azimuth.bias, y.elevation.bias
 
-    def of_beam(drive, truth):
-        position = drive.record[0].outputs.position
-        truth.load_position[0], truth.load_position[1] = position[0], position[1]
-    return {drive_unit.Memory: of_axes, beam_unit.Memory: of_beam}[drive.instance_class]
+    return {drive_unit.Memory: of_axes, beam_unit.Memory: lambda drive, truth: None}[drive.instance_class]
 
 
 @compiled
@@ -77,7 +72,7 @@ def loop(units, first, period_ns, before, injected, steps, truth):
         step(ins, stamp, steps[k], steps[k])
         step(receiver, stamp, steps[k], steps[k])
         step(acu, stamp, steps[k], steps[k])
-        true_load(drive, truth[k])
+        true_bias(drive, truth[k])
         true = receiver.record[0].outputs
         truth[k].error[0], truth[k].error[1] = true.true_cross_elevation, true.true_elevation
         before[0] = steps[k]

@@ -81,13 +81,13 @@ def structure_case(name):
 def standstill(record):
     """(times [s], load angle [rad]) from SETTLED on."""
     late = record.t >= SETTLED
-    return record.t[late], record.truth['load_position'][late, 0]
+    return record.t[late], record['adu/truth']['position'][late, 0]
 
 
 def steady_residual(record, amplitude, w):
     """(times [s], error without its fundamental w [rad/s], (n,) [rad]) over the whole periods after the first."""
     t, period = record.t, 2.0 * math.pi / w
-    error = amplitude * np.sin(w * t) - record.truth['load_position'][:, 0]
+    error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
     steady = metrics.whole_periods(t, period, period)
     return t[steady], metrics.residual(t[steady], error[steady], period)
 
@@ -121,7 +121,7 @@ def measured(kind, name, record):
         left = steady_residual(record, servo.AMPLITUDE, servo.FREQUENCIES['0p4hz'])[1]
         return {'sine_residual_rad': (metrics.peak(left), 'rad')}
     if kind == 'step':
-        overshoot = metrics.overshoot_percent(record.truth['load_position'][:, 0], servo.STEP)
+        overshoot = metrics.overshoot_percent(record['adu/truth']['position'][:, 0], servo.STEP)
         return {'step_overshoot_percent': (overshoot, '%')}
     moving = record.t < MOVED
     return {'fight_torque_rms_nm': (metrics.rms(fight(record)[~moving]), 'Nm'),

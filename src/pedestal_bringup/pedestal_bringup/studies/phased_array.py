@@ -359,7 +359,7 @@ def graph_rows(progress):
         progress(0.75 + 0.25 * i / len(GRAPH), case)
         noisy, quiet = graph_case(case).run(), graph_case(case, quiet=True).run()
         kept = quiet.t >= 10.0
-        ends = quiet.truth['error'], began(quiet['joint_states']['position'], quiet.truth['error'])
+        ends = quiet.truth['error'], began(quiet['adu/truth']['position'], quiet.truth['error'])
         worst = max(peak(np.hypot(*error[kept].T)) for error in ends)
         jitter = rms(noisy.truth['error'][kept, 1] - quiet.truth['error'][kept, 1])
         rows += [(case, 'max_error_deg', math.degrees(worst), 'deg'), (case, 'isolation_db', isolation(worst), 'dB'),

@@ -107,7 +107,7 @@ def gust_case(name, **more):
 
 def step_metrics(record):
     """{metric: value} of a closed_loop.Run of a step."""
-    t, y = record.t, record.truth['load_position'][:, 0]
+    t, y = record.t, record['adu/truth']['position'][:, 0]
     return {'step_overshoot_percent': metrics.overshoot_percent(y, STEP),
             'step_settling_2percent_s': metrics.settling_time(t, y, STEP, BAND),
             'step_crossings': metrics.crossings(y, STEP)}
@@ -115,7 +115,7 @@ def step_metrics(record):
 
 def sine_error(record, w):
     """The sine of figure 6 at w [rad/s] less the true load angle (n,) [rad]."""
-    return AMPLITUDE * np.sin(w * record.t) - record.truth['load_position'][:, 0]
+    return AMPLITUDE * np.sin(w * record.t) - record['adu/truth']['position'][:, 0]
 
 
 def sine_metrics(record, reading):
@@ -123,7 +123,7 @@ def sine_metrics(record, reading):
     w = FREQUENCIES[reading]
     t, error, period = record.t, sine_error(record, w), 2.0 * math.pi / w
     steady = metrics.whole_periods(t, period, period)
-    amplitude, fitted = metrics.amplitude_and_period(t[steady], record.truth['load_position'][steady, 0], period)
+    amplitude, fitted = metrics.amplitude_and_period(t[steady], record['adu/truth']['position'][steady, 0], period)
     return {f'sine_{reading}_max_error_rad': metrics.peak(error[steady]),
             f'sine_{reading}_rms_error_rad': metrics.rms(error[steady]),
             f'sine_{reading}_amplitude_rad': amplitude, f'sine_{reading}_period_s': fitted,
@@ -132,7 +132,7 @@ def sine_metrics(record, reading):
 
 def gust_metrics(record):
     """{metric: value} of a closed_loop.Run of a gust."""
-    t, y = record.t, record.truth['load_position'][:, 0]
+    t, y = record.t, record['adu/truth']['position'][:, 0]
     return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START] - y[t < GUST_START][-1])}
 
 
@@ -224,7 +224,7 @@ def step_figure(done):
     for name, below in zip(names, axes[1:, 0]):
         record = done[name, 'step']
         t = record.t
-        top.plot(t, record.truth['load_position'][:, 0], color=COLOURS[name], linewidth=1.4, label=name)
+        top.plot(t, record['adu/truth']['position'][:, 0], color=COLOURS[name], linewidth=1.4, label=name)
         drawing.draw_torques(below, record)
         below.set_title(f'{name}: torque of the motors')
         below.set_ylabel('torque [Nm]')
@@ -246,7 +246,7 @@ def sine_figure(done):
     t = record.t / period
     axes[0, 0].plot(t, AMPLITUDE * np.sin(FREQUENCIES['0p4hz'] * record.t), color=INK, linestyle='--',
                     label='reference')
-    axes[0, 0].plot(t, record.truth['load_position'][:, 0], color=COLOURS['paper-r1'], linewidth=1.4,
+    axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=COLOURS['paper-r1'], linewidth=1.4,
                     label='paper-r1, 0.4 Hz')
     axes[0, 0].set_title('sine of 0.87 rad (figure 6 of the paper)')
     axes[0, 0].set_ylabel('azimuth [rad]')
@@ -273,7 +273,7 @@ def gust_figure(done):
     axes = axes[0, 0]
     for name in ('paper-r1', 'adrc', 'best'):
         record = done[name, 'gust']
-        y = record.truth['load_position'][:, 0]
+        y = record['adu/truth']['position'][:, 0]
         axes.plot(record.t, 1e6 * (y - y[record.t < GUST_START][-1]), color=COLOURS[name], linewidth=1.3,
                   label=name)
     stiffness = 2.0 * step_case('best').loaded().node_parameters('adu').azimuth.gear_train.stiffness
@@ -293,7 +293,8 @@ def inertia_figure(done):
     for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as known'),
                         ('best-inertia-plus', 'load 20 % heavier')):
         record = done[name, 'step']
-        axes[0, 0].plot(record.t, 1e3 * (record.truth['load_position'][:, 0] - STEP), color=COLOURS[name], label=label)
+        axes[0, 0].plot(record.t, 1e3 * (record['adu/truth']['position'][:, 0] - STEP), color=COLOURS[name],
+                        label=label)
         torque = record['adu/motor_states']['effort'][:, :2].mean(axis=1)
         axes[1, 0].plot(record.t, torque, color=COLOURS[name], label=label)
     for side in (-BAND, BAND):
