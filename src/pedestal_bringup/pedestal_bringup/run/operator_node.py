@@ -15,12 +15,14 @@ ANSWER_TIME = 2.0
 
 
 class Operator(Shell):
-    """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of the others:
-    hears(node, monotonic time [s]) is called for each."""
+    """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of its nodes:
+    hears(node, monotonic time [s]) is called for each. names: those nodes; what others say on the topic is not theirs.
+    """
 
-    def __init__(self, beams=0):
+    def __init__(self, beams=0, names=()):
         super().__init__('operator', parameters.Parameters)
         self.links = nodes.links(beams)
+        self._names = frozenset(names)
         self.time = 0.0
         self.heard = {}
         self.hears = self.heard.__setitem__
@@ -58,9 +60,10 @@ class Operator(Shell):
             time.sleep(0.02)
 
     def _take(self, array):
-        self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
         for status in array.status:
-            self.hears(status.name, time.monotonic())
+            if status.name in self._names:
+                self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
+                self.hears(status.name, time.monotonic())
 
     def silent(self, limit):
         """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""
