@@ -183,7 +183,7 @@ def realtime(kills, seed, folder, victims=NODES, duration=120.0):
                 print(f'{node}: it speaks again after {recovery["own"]:.2f} s, all is well after '
                       f'{recovery["graph"]:.2f} s', flush=True)
         if not order and process.poll() is None:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGTERM)    # a script in the background has SIGINT ignored
         said = ended(process, counts)
         if process.returncode not in (0, 130):
             counts['runs that failed'] += 1

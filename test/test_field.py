@@ -177,8 +177,8 @@ def test_a_stamp_of_the_future_makes_nobody_deaf(standing, connect, name, reader
 def test_malformed_messages_end_nobody_and_move_nothing(standing, connect, name):
     stranger = malformed.Stranger(standing.station.domain_id)
     try:
-        stranger.until(lambda: stranger.angles, SOON)
-        ended, moved = malformed.attack(standing.station, stranger, name, 60)
+        stranger.until(lambda: stranger.steps, SOON)
+        _, ended, moved = malformed.attack(standing.station, stranger, name, 60)
     finally:
         stranger.close()
     assert not ended, standing.told()

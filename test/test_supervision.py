@@ -10,6 +10,7 @@ import pytest
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import reaper
+from pedestal_common import messages
 
 _spec = importlib.util.spec_from_file_location('kills', pathlib.Path(__file__).with_name('kills.py'))
 kills = importlib.util.module_from_spec(_spec)
@@ -46,6 +47,21 @@ def test_a_run_that_is_told_to_end_does_so_in_order_with_a_result(begun):
     assert 'restarts' in result.stdout
     assert run.pids() == {}
     assert bags.load(run.bag).damage == ''
+
+
+def test_the_diagnostics_of_others_are_not_the_business_of_a_run(start_run, connect):
+    """Not even that they cease, for which a node of its own is killed."""
+    run = start_run('leo_pass', '--pacing', 'realtime', '--param', 'scenario.restart.silence=3')
+    wait_until(lambda: run.bag.exists() and run.recorded(1), 180.0)
+    client = connect(run.domain_id, 'gps')
+    client.write('diagnostics')
+    said = messages.DiagnosticStatus(level=0, name='gps', message='', hardware_id='', values=[])
+    client.publish('diagnostics', messages.DiagnosticArray(header=messages.header(''), status=[said]))
+    time.sleep(5.0)
+    assert run.process.poll() is None
+    run.process.send_signal(signal.SIGTERM)
+    result = run.finish()
+    assert result.returncode == 130 and 'gps' not in result.stderr
 
 
 def test_who_dies_is_started_again_until_all_is_as_before(begun, connect):

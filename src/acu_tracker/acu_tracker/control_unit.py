@@ -443,7 +443,7 @@ def step(s, c, u, o, program):
         o.coasting = s.mode == modes.AUTOTRACK and _coasting(s, c)
 
     for i in range(2):
-        unasked.command(s.unasked, i, o.rate[i], s.stamp, now.dt, c.p.step_gap + c.p.command_delay)
+        unasked.command(s.unasked, i, o.rate[i], s.stamp, min(now.dt, c.p.period), c.p.step_gap + c.p.command_delay)
     t = s.target.tracker
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.gated, o.rates_gated, o.ranges_gated = t.gated, t.rates_gated, t.ranges_gated

@@ -114,6 +114,20 @@ def test_motion_against_the_commands_ends_the_mode(Rig):
     assert rig.mode == 'standby'
 
 
+@pytest.mark.parametrize('slows_down', [True, False])
+def test_axes_of_a_drive_that_is_held_up_are_given_their_time(Rig, slows_down):
+    """Its stamps are 9 periods apart, but the axes slow down by what 20 rad/s2 are in the one that it made."""
+    rig = far_away(Rig, 'preset')
+    rates = rig.velocity.copy()
+    rig.ask(0)
+    for _ in range(100):
+        rig.k += 8
+        if slows_down:
+            rates -= np.clip(rates, -20.0 * rig.T, 20.0 * rig.T)
+        rig.step(velocity=rates)
+    assert rig.state['unasked']['moves'][0] != slows_down
+
+
 def test_slow_drift_and_what_stands_is_no_alarm(Rig):
     rig = Rig()
     for rates in ((0.03, -0.03), (0.0, 0.0)):

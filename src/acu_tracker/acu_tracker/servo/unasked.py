@@ -57,8 +57,9 @@ def watch(s, t, velocity, threshold):
 
 @compiled
 def command(s, i, rate, t, dt, hold):
-    """Take the command [rad/s] of axis i at t [s], a step dt [s] after the one before; hold [s]: how long a command
-    may stay in force."""
+    """Take the command [rad/s] of axis i at t [s]. dt [s]: how long the drive had for the one before, a period at the
+    most, for one that was held up does not make the steps that it missed. hold [s]: how long a command may stay in
+    force."""
     a = min(dt / TAU, 1.0)
     if rate >= s.high[i]:
         s.high[i], s.high_at[i] = rate, t

@@ -87,7 +87,7 @@ def run(scenario, bag, progress):
     graph = Graph(scenario, bag)
     middleware.initialise([])
     try:
-        operator = Operator(scenario.header.graph_beams)
+        operator = Operator(scenario.header.graph_beams, scenario.nodes)
         try:
             with sole_run(operator.context.get_domain_id()):
                 operator.refuse_company()

@@ -15,12 +15,15 @@ ANSWER_TIME = 2.0
 
 
 class Operator(Shell):
-    """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of the others:
-    on_diagnostics(node, monotonic time [s]) is called for each."""
+    """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of its nodes:
+    on_diagnostics(node, monotonic time [s]) is called for each. names: of these nodes; what others publish there does
+    not count.
+    """
 
-    def __init__(self, beams=0):
+    def __init__(self, beams=0, names=()):
         super().__init__('operator', parameters.Parameters)
         self.links = nodes.links(beams)
+        self._names = frozenset(names)
         self.time = 0.0
         self.latest = {}
         self.on_diagnostics = self.latest.__setitem__
@@ -58,9 +61,10 @@ class Operator(Shell):
             time.sleep(0.02)
 
     def _take(self, array):
-        self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
         for status in array.status:
-            self.on_diagnostics(status.name, time.monotonic())
+            if status.name in self._names:
+                self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
+                self.on_diagnostics(status.name, time.monotonic())
 
     def silent(self, limit):
         """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""

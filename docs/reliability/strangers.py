@@ -1,0 +1,112 @@
+"""Strangers beside a station ashore: one that stops reading, a slow one, two that flood: steps that the drive loses.
+
+    python docs/reliability/strangers.py [SECONDS]
+
+Each case lasts SECONDS (default 60). Drive, control unit, receiver and recorder run in standby; prints a row per case
+from the diagnostics of the drive. A step is missed when the drive does not make it, lost when it is missed or when the
+command for it has not come.
+"""
+import multiprocessing
+import os
+import signal
+import sys
+import tempfile
+import time
+
+import rclpy
+from messages import Stranger
+from station import Station
+
+from pedestal_common import messages, middleware, topics
+
+COUNTERS = 'step', 'lost_steps', 'missed_steps', 'late_ticks'
+
+
+def node_of(domain_id):
+    """A node of rclpy in a process of its own."""
+    middleware.set_defaults()
+    rclpy.init(args=[], domain_id=domain_id)
+    return rclpy.create_node('stranger')
+
+
+def read(domain_id, pause):
+    """Read joint_states as `ros2 topic echo` does, reliably, and sleep for `pause` [s] at each message."""
+    node = node_of(domain_id)
+    kind = middleware.message_class(topics.BY_NAME['joint_states'].type)
+    node.create_subscription(kind, 'joint_states', lambda _: time.sleep(pause), 10)
+    rclpy.spin(node)
+
+
+def write(domain_id, name, rate, count):
+    """Publish JointStates, `rate` of them a second, on a topic; count (multiprocessing.Value): how many so far."""
+    node = node_of(domain_id)
+    row = topics.BY_NAME['acu/rate_command']
+    publisher = node.create_publisher(middleware.message_class(row.type), name, middleware.qos('step', 'written'))
+    message = messages.template(row.name)
+    message.velocity[:] = 0.5
+    begun = time.monotonic()
+    while True:
+        messages.put_stamp(message.header.stamp, time.time_ns())
+        publisher.publish(messages.serialize(message))
+        count.value += 1
+        time.sleep(max(begun + count.value / rate - time.monotonic(), 0.0))
+
+
+def counters(watcher):
+    """{name: number} of COUNTERS as the drive tells them next."""
+    watcher.said.pop('adu', None)
+    watcher.until(lambda: 'adu' in watcher.said)
+    return {value.key: int(value.value) for value in watcher.said['adu'].values if value.key in COUNTERS}
+
+
+def measured(watcher, case, seconds, stranger=None, stop=False, count=None):
+    """Print what the counters of the drive have become after `seconds` beside a stranger, a process. stop: it is
+    stopped once it has read for 2 s."""
+    if stranger:
+        stranger.start()
+        watcher.spin(4.0)
+    if stop:
+        os.kill(stranger.pid, signal.SIGSTOP)
+    sent, begun = count.value if count else 0, time.monotonic()
+    before = counters(watcher)
+    watcher.moved()
+    watcher.spin(seconds)
+    after, moved = counters(watcher), watcher.moved()
+    rate = f'{(count.value - sent) / (time.monotonic() - begun):.0f}' if count else ''
+    said = watcher.said['adu'].message
+    if stranger:
+        stranger.kill()
+        stranger.join()
+        watcher.spin(2.0)
+    print(f'{case:48} {rate:>6} ' + ' '.join(f'{after[name] - before[name]:12}' for name in COUNTERS)
+          + f' {moved:10.1e}  {said[:60]}', flush=True)
+
+
+def main(seconds=60.0):
+    process, number = multiprocessing.get_context('spawn').Process, multiprocessing.get_context('spawn').Value
+    with tempfile.TemporaryDirectory() as folder:
+        domain_id = int(os.environ.get('ROS_DOMAIN_ID', '77'))
+        station = Station(folder, domain_id, changes=('acu.initial_mode=standby', 'scenario.duration=36000'))
+        watcher = Stranger(domain_id)
+        try:
+            station.start(*station.nodes, 'recorder')
+            watcher.until(lambda: watcher.steps > 100 and {*station.nodes, 'recorder'} <= set(watcher.said))
+            watcher.spin(5.0)
+            print(f'{"case":48} {"Hz":>6} ' + ' '.join(f'{name:>12}' for name in COUNTERS) + f' {"moved rad":>10}')
+            measured(watcher, 'nobody', seconds)
+            measured(watcher, 'a reader of joint_states that is stopped', seconds,
+                     process(target=read, args=(domain_id, 0.0)), stop=True)
+            measured(watcher, 'a reader of joint_states that sleeps 50 ms', seconds,
+                     process(target=read, args=(domain_id, 0.05)))
+            for name in ('stranger', 'acu/rate_command'):
+                count = number('q', 0)
+                measured(watcher, f'a writer of {name} at 5 kHz', seconds,
+                         process(target=write, args=(domain_id, name, 5000.0, count)), count=count)
+        finally:
+            watcher.close()
+            station.close()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(*map(float, sys.argv[1:])))
