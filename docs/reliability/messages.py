@@ -184,7 +184,7 @@ class Stranger:
         self.furthest.clear()
         return furthest
 
-    def send(self, name, count, make, pause=0.0005):
+    def send(self, name, count, make):
         """Publish make() count times; how many of them left: Fast DDS sends none that is longer than its type."""
         topic = topics.BY_NAME[nodes.plain(name)]
         publisher = self.node.create_publisher(middleware.message_class(topic.type), name,
@@ -192,11 +192,12 @@ class Stranger:
         self.sending = name
         self.until(publisher.get_subscription_count)
         sent = 0
-        for _ in range(count):
+        for number in range(count):
             with contextlib.suppress(rclpy_implementation.RCLError):
                 publisher.publish(make())
                 sent += 1
-            self.executor.spin_once(timeout_sec=pause)
+            if number % 10 == 0:
+                self.executor.spin_once(timeout_sec=0.001)
         self.spin(0.5)
         self.node.destroy_publisher(publisher)
         self.spin(0.3)
