@@ -226,6 +226,7 @@ def lockstep(kills, seed, folder, victims=NODES):
             with contextlib.suppress(bags.BagError):
                 bags.load(bag)
                 counts['bags that can be read'] += 1
+        print(f'{node}: {dict(counts)}', flush=True)
     return counts, {}
 
 

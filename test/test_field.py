@@ -187,6 +187,28 @@ def test_malformed_messages_end_nobody_and_move_nothing(standing, connect, name)
         standing.fresh(topic)
 
 
+def test_what_a_stranger_says_of_the_drive_stops_nothing(moving, connect):
+    """Not in its first milliseconds either, when the graph does not show yet whose words these are. Once it has gone
+    the drive is heard again."""
+    moving.until(lambda: moving.mode in ('program', 'autotrack') and moving.state == 'enabled')
+    modes = len(moving.heard['acu/mode'])
+    for _ in range(3):
+        stranger = malformed.Stranger(moving.station.domain_id)
+        try:
+            stranger.send('adu/state', 20, lambda: messages.serialize(messages.String(data='disabled')))
+        finally:
+            stranger.close()
+    moving.wait(0.5)
+    assert 'standby' not in [mode.data for mode in moving.heard['acu/mode'][modes:]]
+    assert moving.mode in ('program', 'autotrack')
+    assert moving.operator.trigger('adu/disable')[0]
+    moving.until(lambda: moving.mode == 'standby')
+    assert moving.operator.trigger('adu/enable')[0]
+    moving.until(lambda: moving.state == 'enabled')
+    for mode in ('program', 'autotrack'):
+        moving.until(lambda mode=mode: moving.operator.trigger(f'acu/{mode}')[0])
+
+
 def test_a_drive_that_is_killed_goes_on_where_it_was(moving):
     """On the same grid of time, at the same angle, on its brakes at first; the mode is resumed."""
     moving.wait(1.5)

@@ -11,6 +11,7 @@ import argparse
 import contextlib
 import dataclasses
 import functools
+import math
 import os
 import random
 import sys
@@ -24,7 +25,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from station import NODES, Station, reads
 
 from pedestal_bringup.run import scenario
-from pedestal_common import messages, middleware, nodes, topics
+from pedestal_common import listening, messages, middleware, nodes, topics
 
 NUMBERS = (float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 0.0, -0.0, 0.5, -2.0, 1e6)
 STAMPS = (0, 1, -1, 2**31 - 1, -2**31, 1_000_000_000)
@@ -136,7 +137,7 @@ class Stranger:
         self.executor.add_node(self.node)
         self.first, self.furthest, self.said = {}, {}, {}
         self.steps = 0
-        self.sending = None
+        self.sent_until = {}
         for name in JOINTS:
             self._read(name, functools.partial(self._joints, name))
         self._read('diagnostics', self._diagnostics)
@@ -144,17 +145,16 @@ class Stranger:
     def _read(self, name, take):
         topic = topics.BY_NAME[nodes.plain(name)]
 
-        def callback(data):
-            try:
-                take(messages.deserialize(data, topic.type))
-            except ValueError:
-                pass    # our own
-        self.node.create_subscription(middleware.message_class(topic.type), name, callback,
+        def callback(data, info):
+            if info['source_timestamp'] > self.sent_until.get(name, 0):     # else it may be our own
+                with contextlib.suppress(ValueError):
+                    take(messages.deserialize(data, topic.type))
+        self.node.create_subscription(middleware.message_class(topic.type), name, listening.pair(callback),
                                       middleware.qos(topic.rate, 'recorded'), raw=True)
 
     def _joints(self, name, message):
         angles = np.asarray(message.position)
-        if message.header.frame_id == 'base_link' and angles.shape == (2,) and name != self.sending:
+        if angles.shape == (2,):
             moved = float(np.abs(angles - self.first.setdefault(name, angles)).max())
             self.furthest[name] = max(moved, self.furthest.get(name, 0.0))
             self.steps += 1
@@ -184,23 +184,24 @@ class Stranger:
         self.furthest.clear()
         return furthest
 
-    def send(self, name, count, make, pause=0.0005):
+    def send(self, name, count, make):
         """Publish make() count times; how many of them left: Fast DDS sends none that is longer than its type."""
         topic = topics.BY_NAME[nodes.plain(name)]
         publisher = self.node.create_publisher(middleware.message_class(topic.type), name,
                                                middleware.qos(topic.rate, 'written'))
-        self.sending = name
+        self.sent_until[name] = math.inf
         self.until(publisher.get_subscription_count)
         sent = 0
-        for _ in range(count):
+        for number in range(count):
             with contextlib.suppress(rclpy_implementation.RCLError):
                 publisher.publish(make())
                 sent += 1
-            self.executor.spin_once(timeout_sec=pause)
+            if number % 10 == 0:
+                self.executor.spin_once(timeout_sec=0.001)
         self.spin(0.5)
         self.node.destroy_publisher(publisher)
+        self.sent_until[name] = time.time_ns()
         self.spin(0.3)
-        self.sending = None
         return sent
 
     def close(self):
@@ -247,8 +248,9 @@ def attacked(kind, count):
                 for node in ended:
                     print(station.log(node)[-1000:])
                 station.start(*ended)
+            stranger.spin(5.0)
             stranger.said.clear()
-            stranger.spin(3.0)
+            stranger.until(lambda: {*station.nodes, 'recorder'} <= set(stranger.said))
             for node, status in sorted(stranger.said.items()):
                 if node in station.processes:
                     print(node, status.level, status.message[:300])

@@ -4,10 +4,12 @@
 
 Each case lasts SECONDS (default 60). Drive, control unit, receiver and recorder run in standby; prints a row per case
 from the diagnostics of the drive. A step is missed when the drive does not make it, lost when it is missed or when the
-command for it has not come.
+command for it has not come. ms is what a step costs the drive of a core, which says on a busy machine, too, whether a
+stranger burdens it.
 """
 import multiprocessing
 import os
+import pathlib
 import signal
 import sys
 import tempfile
@@ -59,19 +61,25 @@ def counters(watcher):
     return {value.key: int(value.value) for value in watcher.said['adu'].values if value.key in COUNTERS}
 
 
-def measured(watcher, case, seconds, stranger=None, stop=False, count=None):
-    """Print what the counters of the drive have become after `seconds` beside a stranger, a process. stop: it is
-    stopped once it has read for 2 s."""
+def core_time(pid):
+    """Time [s] that a process has had of a core."""
+    ticks = pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[11:13]
+    return sum(map(int, ticks)) / os.sysconf('SC_CLK_TCK')
+
+
+def measured(watcher, drive, case, seconds, stranger=None, stop=False, count=None):
+    """Print what the counters of the drive, a process, have become after `seconds` beside a stranger, another one.
+    stop: it is stopped once it has read for some seconds."""
     if stranger:
         stranger.start()
         watcher.spin(4.0)
     if stop:
         os.kill(stranger.pid, signal.SIGSTOP)
     sent, begun = count.value if count else 0, time.monotonic()
-    before = counters(watcher)
+    before, used = counters(watcher), core_time(drive.pid)
     watcher.moved()
     watcher.spin(seconds)
-    after, moved = counters(watcher), watcher.moved()
+    after, moved, used = counters(watcher), watcher.moved(), core_time(drive.pid) - used
     rate = f'{(count.value - sent) / (time.monotonic() - begun):.0f}' if count else ''
     said = watcher.said['adu'].message
     if stranger:
@@ -79,7 +87,7 @@ def measured(watcher, case, seconds, stranger=None, stop=False, count=None):
         stranger.join()
         watcher.spin(2.0)
     print(f'{case:48} {rate:>6} ' + ' '.join(f'{after[name] - before[name]:12}' for name in COUNTERS)
-          + f' {moved:10.1e}  {said[:60]}', flush=True)
+          + f' {1e3 * used / (after["step"] - before["step"]):6.2f} {moved:10.1e}  {said[:60]}', flush=True)
 
 
 def main(seconds=60.0):
@@ -92,15 +100,17 @@ def main(seconds=60.0):
             station.start(*station.nodes, 'recorder')
             watcher.until(lambda: watcher.steps > 100 and {*station.nodes, 'recorder'} <= set(watcher.said))
             watcher.spin(5.0)
-            print(f'{"case":48} {"Hz":>6} ' + ' '.join(f'{name:>12}' for name in COUNTERS) + f' {"moved rad":>10}')
-            measured(watcher, 'nobody', seconds)
-            measured(watcher, 'a reader of joint_states that is stopped', seconds,
+            print(f'{"case":48} {"Hz":>6} ' + ' '.join(f'{name:>12}' for name in COUNTERS)
+                  + f' {"ms":>6} {"moved rad":>10}')
+            drive = station.processes['adu']
+            measured(watcher, drive, 'nobody', seconds)
+            measured(watcher, drive, 'a reader of joint_states that is stopped', seconds,
                      process(target=read, args=(domain_id, 0.0)), stop=True)
-            measured(watcher, 'a reader of joint_states that sleeps 50 ms', seconds,
+            measured(watcher, drive, 'a reader of joint_states that sleeps 50 ms', seconds,
                      process(target=read, args=(domain_id, 0.05)))
             for name in ('stranger', 'acu/rate_command'):
                 count = number('q', 0)
-                measured(watcher, f'a writer of {name} at 5 kHz', seconds,
+                measured(watcher, drive, f'a writer of {name} at 5 kHz', seconds,
                          process(target=write, args=(domain_id, name, 5000.0, count)), count=count)
         finally:
             watcher.close()

@@ -247,17 +247,16 @@ class Shell(Node):
         None, message) can read; it raises ValueError for others. In lockstep these end the node. In realtime they are
         dropped, as is all that an Intake does not take; anew: it does not continue the one before."""
         link, ros_name = self._link(name)
-        role = 'lockstep'
+
+        def subscribe(callback, role):
+            return self.create_subscription(middleware.message_class(link.type), ros_name, self._guarded(callback),
+                                            middleware.qos(link.rate, role), raw=True)
         if self.graph.lockstep:
-            def callback(data):
-                take(decode(data)[1], False)
+            subscribe(lambda data: take(decode(data)[1], False), 'lockstep')
         else:
-            role = 'read'
             listener = Listener(self, link, ros_name, decode, take)
             self._listeners.append(listener)
-            callback = listener.callback
-        self.create_subscription(middleware.message_class(link.type), ros_name, self._guarded(callback),
-                                 middleware.qos(link.rate, role), raw=True)
+            listener.open(lambda: subscribe(listener.callback, 'read'))
 
     def writers_of(self, ros_name):
         """Names of the nodes that write a topic now."""

@@ -208,3 +208,17 @@ def test_what_is_no_message_is_dropped_and_counted():
 def test_losses_of_two_writers_are_those_of_each():
     taker, _, _ = run(Writer('acu'), Writer('stranger', begin=S, period=3 * MS, number=5000))
     assert taker.writers.lost == 0
+
+
+def test_beside_a_stranger_nothing_is_taken_of_a_topic_without_a_pace():
+    """Its number fits the right writer as well, whose next text could have come at any time."""
+    strangers = 0
+    taker = Intake(lambda text: (None, text), FUTURE, lambda: strangers, paced=False)
+
+    def take(text, number, time):
+        return taker.take(text, number, UTC + time, time, UTC + time)
+    assert take('enabled', 1, 0) == 'enabled'
+    strangers = 1
+    assert take('disabled', 2, 60 * S) is None and taker.reason == intake.ANOTHER_WRITER
+    strangers = 0
+    assert take('stopping', 2, 70 * S) == 'stopping'

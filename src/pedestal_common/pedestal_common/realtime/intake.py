@@ -35,13 +35,15 @@ class Intake:
     strangers() -> how many writers the graph shows that should not write this topic, None where it does not tell;
     asked when somebody wants to be in charge: as many must be known by what they wrote, or the candidate may be one of
     them. None in its place: the topic is everybody's, who is not told apart.
+    paced: whether its messages come at a pace, which tells writers apart. Where they do not, nothing is taken while
+    the graph shows a stranger: what was said before it came still holds.
 
     dropped: {reason: count}; reason: of the last message that was dropped, detail: in numbers; dropped_at: when [ns];
     anew: whether the message just taken does not continue the one taken before it.
     """
 
-    def __init__(self, decode, future, strangers=lambda: 0):
-        self._decode, self._future, self._strangers = decode, future, strangers
+    def __init__(self, decode, future, strangers=lambda: 0, paced=True):
+        self._decode, self._future, self._strangers, self._paced = decode, future, strangers, paced
         self.writers = Streams()
         self.in_charge = None
         self.dropped = collections.Counter()
@@ -56,7 +58,10 @@ class Intake:
         """What decode made of a message, None where it is dropped. number: its sequence number; source: when its
         writer sent it [ns UTC]; now, utc: this moment [ns], steady and UTC."""
         self.anew = False
-        if self._strangers and not self._of_charge(self.writers.of(number, source, now), now):
+        if not self._paced:
+            if self._strangers():
+                return self._drop(ANOTHER_WRITER, '', now)
+        elif self._strangers and not self._of_charge(self.writers.of(number, source, now), now):
             return None
         try:
             stamp, message = self._decode(data)

@@ -1,4 +1,5 @@
 """How a node of a realtime graph hears its topics: what it takes of them, and what it says of the rest."""
+import collections
 import inspect
 
 from pedestal_common import nodes
@@ -10,6 +11,16 @@ FRESH = 2_000_000_000
 
 UNKNOWN = '_NODE_NAME_UNKNOWN_'
 """What rmw calls a node that is not discovered yet."""
+
+DISCOVERY = 10_000_000_000
+"""Time [ns] for which a text waits until the graph names every writer of its topic: it is said once only, often before
+its writer is discovered."""
+
+LOOK = 0.02
+"""Time [s] between two looks at who writes a text."""
+
+HELD = 1000
+"""Texts that wait at the most."""
 
 
 def pair(function):
@@ -31,8 +42,36 @@ class Listener:
         self.link, self._node, self._ros_name, self._take = link, node, ros_name, take
         everybodys = len(link.writers) > 1 or link.rate == 'once'
         self._expected = any(writer in node.graph.members for writer in link.writers)
-        self.intake = intake.Intake(decode, round(node.graph.future * 1e9), None if everybodys else self._count)
-        self.callback = pair(self._hear)
+        text = link.rate == 'change' and self._expected
+        self.intake = intake.Intake(decode, round(node.graph.future * 1e9), None if everybodys else self._count,
+                                    paced=not text)
+        self._held, self._missed = collections.deque(maxlen=HELD), 0
+        self.callback = pair(self._hold if text else self._hear)
+        if text:
+            node.every(LOOK, self._look)
+
+    def open(self, subscribe):
+        """Begin to hear. subscribe() makes a subscription with `callback`."""
+        self._subscribe = subscribe
+        self._subscription = subscribe()
+
+    def _hold(self, data, info):
+        self._held.append((self._node.clock()[0], data, info))
+        self._look()
+
+    def _look(self):
+        """Hear the texts that wait, once every writer has a name. What was said beside a stranger is not taken; once
+        it has gone a subscription anew brings the last text again."""
+        while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > DISCOVERY):
+            self._hear(*self._held.popleft()[1:])
+        missed = self.intake.dropped[intake.ANOTHER_WRITER]
+        if missed > self._missed and not self.strangers():
+            self._missed = missed
+            self._node.destroy_subscription(self._subscription)
+            self._subscription = self._subscribe()
+
+    def _undiscovered(self):
+        return any(UNKNOWN in name for name in self._node.writers_of(self._ros_name))
 
     def _hear(self, data, info):
         taker = self.intake
@@ -51,11 +90,8 @@ class Listener:
                 if name not in self.link.writers and name != nodes.STAND_IN]
 
     def _count(self):
-        """As Intake wants it. Who is not discovered yet may be a stranger; but a text is said once only, when its
-        writer often is not."""
-        if not self._expected:
-            return None
-        return len([name for name in self.strangers() if self.link.rate != 'change' or UNKNOWN not in name])
+        """As Intake wants it. Who is not discovered yet may be a stranger."""
+        return len(self.strangers()) if self._expected else None
 
     def finding(self, now):
         """(level, text) of what was dropped lately; None where nothing was."""
