@@ -304,7 +304,7 @@ def _spread(name, sections, header, seed):
         for section in [section for section in sections if nodes.plain(section) == node]:
             own = sections[section].get(key, value)
             if own != value:
-                raise ScenarioError(f'scenario {name}, {section}: {key} = {own}: must be {value}, as it is '
+                raise ScenarioError(f'scenario {name}, {section}: {key} = {own}: must be {value}, as is said '
                                     'elsewhere; leave it out here')
 
     for node in ('adu', 'recorder', 'tracking_receiver'):

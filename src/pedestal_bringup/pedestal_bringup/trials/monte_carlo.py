@@ -9,6 +9,7 @@ import logging
 import multiprocessing.resource_tracker
 import re
 import signal
+import threading
 import warnings
 
 import joblib
@@ -46,6 +47,7 @@ class Pool:
         warnings.filterwarnings('ignore', '.*tasks (which were|have been)', UserWarning, r'joblib\.parallel')
         if self.scheduler is None:
             if self.workers > 1:
+                self._stack.enter_context(_manager_in_silence())
                 self._stack.callback(_end_local)
         else:
             client = self._stack.enter_context(_client(self.scheduler))
@@ -90,6 +92,18 @@ def _ctrl_c_held_back():
         signal.signal(signal.SIGINT, handler)
     if received:
         raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def _manager_in_silence():
+    """The thread of loky that hands out the work may still do so while its workers are ended, and print a KeyError."""
+    before = threading.excepthook
+    threading.excepthook = lambda failure: (
+        None if failure.thread and failure.thread.name == 'ExecutorManagerThread' else before(failure))
+    try:
+        yield
+    finally:
+        threading.excepthook = before
 
 
 def _end_local():
