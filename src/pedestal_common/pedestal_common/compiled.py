@@ -18,6 +18,7 @@ import tempfile
 import time
 
 import numba
+from numba.core.caching import FunctionCache
 from numba.misc.appdirs import user_cache_dir
 
 COLUMNS = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
@@ -55,39 +56,63 @@ def _cache_folder(package) -> str | None:
     return str(folder) if os.access(folder, os.W_OK) else None
 
 
-def _done(unit_type):
-    """The file that says that the laws of a unit are in the cache; None where there is no cache."""
-    folder = _cache_folder(unit_type.__module__.partition('.')[0])
-    return pathlib.Path(folder, f'{unit_type.__name__}.done') if folder else None
+def _done(unit):
+    """The file that says that the laws of a unit, which its memory tells apart, are in the cache; None where there is
+    no cache."""
+    memory_type = type(unit.memory)
+    folder = _cache_folder(memory_type.__module__.partition('.')[0])
+    return pathlib.Path(folder, f'{memory_type.__module__}.{memory_type.__name__}.done') if folder else None
 
 
-def is_compiled(unit_type) -> bool:
+def is_compiled(unit) -> bool:
     """Whether the laws of a unit are in the cache."""
-    done = _done(unit_type)
+    done = _done(unit)
     return done is not None and done.exists()
+
+
+@contextlib.contextmanager
+def _alone(path):
+    """Hold the lock of a file, which other processes wait for."""
+    with path.open('w') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 @contextlib.contextmanager
 def compiled_once(unit):
     """Around the first call of the laws of a unit: of the processes that start with a cold cache one compiles them,
     the others wait for it and find them there. Four beams start as fast as one."""
-    done = _done(type(unit))
+    done = _done(unit)
     if done is None or done.exists():
         yield
         return
-    with done.with_suffix('.lock').open('w') as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with _alone(done.with_suffix('.lock')):
         yield
         done.touch()
+
+
+class _SharedCache(FunctionCache):
+    """Of two processes that save a law for two signatures at once one may lose its entry, or find the other's code
+    under it: numba reads the index, chooses a name, writes the index and then the code. Here one waits."""
+
+    def __init__(self, law, folder):
+        super().__init__(law)
+        self._lock = pathlib.Path(folder, 'index.lock')
+
+    def _save_overload(self, signature, data):
+        with _alone(self._lock):
+            super()._save_overload(signature, data)
 
 
 def compiled(law):
     """Decorator of a law. Division by zero gives inf or NaN as in numpy, never an exception. Nobody calls a law from
     C: without the wrappers for it a tenth of the time to compile is saved."""
     folder = _cache_folder(law.__module__.partition('.')[0])
+    dispatcher = numba.njit(error_model='numpy', no_cfunc_wrapper=True)(law)
     if folder is not None:
         numba.config.CACHE_DIR = folder
-    return numba.njit(cache=folder is not None, error_model='numpy', no_cfunc_wrapper=True)(law)
+        dispatcher._cache = _SharedCache(law, folder)
+    return dispatcher
 
 
 @compiled

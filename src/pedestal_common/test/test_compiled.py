@@ -6,32 +6,50 @@ import sys
 import pytest
 
 LAW = """
+import sys
+import time
+import typing
+
+import numpy
+from numba.core.caching import IndexDataCacheFile
+
 from pedestal_common.compiled import compiled, compiled_once
 
 @compiled
 def law(x):
     return x.sum() + x.mean()
 
+class Memory(typing.NamedTuple):
+    pass
+
 class Unit:
+    memory = Memory()
+
     def prepare(self):
-        import numpy
         law(numpy.ones(3))
 
 if __name__ == '__main__':
     from one_law import law as module
     unit = module.Unit()
-    with compiled_once(unit):
-        unit.prepare()
+    if len(sys.argv) > 1:
+        read = IndexDataCacheFile._load_index
+        IndexDataCacheFile._load_index = lambda index: (read(index), time.sleep(1.0))[0]
+        module.law(numpy.ones(3, sys.argv[1]))
+    else:
+        with compiled_once(unit):
+            unit.prepare()
     print(sum(module.law.stats.cache_misses.values()))
 """
 
+TYPES = ('f8', 'f4', 'i8')
 
-def compilations(folder, cache, count):
-    """How often each of `count` processes that start together compiled the law."""
+
+def compilations(folder, cache, arguments):
+    """How often each of the processes with these arguments, which start together, compiled the law."""
     environment = {**os.environ, 'XDG_CACHE_HOME': str(cache),
                    'PYTHONPATH': os.pathsep.join([str(folder), *filter(None, sys.path)])}
-    processes = [subprocess.Popen([sys.executable, '-m', 'one_law.law'], env=environment, stdout=subprocess.PIPE,
-                                  text=True) for _ in range(count)]
+    processes = [subprocess.Popen([sys.executable, '-m', 'one_law.law', *argument], env=environment,
+                                  stdout=subprocess.PIPE, text=True) for argument in arguments]
     return [int(process.communicate(timeout=120.0)[0]) for process in processes]
 
 
@@ -45,10 +63,17 @@ def folder(tmp_path):
 
 
 def test_one_of_many_compiles(folder):
-    assert sorted(compilations(folder, folder / 'cache', 4)) == [0, 0, 0, 1]
-    assert compilations(folder, folder / 'cache', 1) == [0]
+    assert sorted(compilations(folder, folder / 'cache', [()] * 4)) == [0, 0, 0, 1]
+    assert compilations(folder, folder / 'cache', [()]) == [0]
+
+
+def test_laws_saved_at_once_are_all_kept(folder):
+    """Of one law for several signatures, whose index is one file."""
+    types = [(name,) for name in TYPES]
+    assert compilations(folder, folder / 'cache', types) == [1] * len(types)
+    assert compilations(folder, folder / 'cache', types) == [0] * len(types)
 
 
 def test_without_a_cache_everyone_compiles(folder):
     (folder / 'cache').touch()
-    assert compilations(folder, folder / 'cache', 2) == [1, 1]
+    assert compilations(folder, folder / 'cache', [()] * 2) == [1, 1]

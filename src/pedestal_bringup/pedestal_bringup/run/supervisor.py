@@ -27,7 +27,7 @@ def prepare(scenario):
     """Compile the laws that are not yet, of each node in a process of its own, so that the nodes start warm. Raises
     RunError."""
     units = {nodes.plain(node): node for node in scenario.nodes
-             if scenario.row(node).unit and not is_compiled(scenario.row(node).unit_type())}
+             if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
     processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.run.prepare', node, scenario.name],
                                         stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                         start_new_session=True) for node in units.values()}
@@ -112,9 +112,9 @@ class Supervisor:
         number = self.restarts.died(node, now)
         if not number:
             raise RunError(self._graph.obituary(node, f'{reason}, after {limits.attempts} starts within '
-                                            f'{limits.within:g} s'))
+                                                f'{limits.within:g} s'))
         report(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
-             f'within {limits.within:g} s')
+               f'within {limits.within:g} s')
 
     def _note(self, node, now):
         self._silence.note(node, now)
