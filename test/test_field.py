@@ -217,12 +217,15 @@ def test_a_drive_that_is_killed_goes_on_where_it_was(moving):
     assert moving.operator.trigger('acu/stow') == (
         False, f'refused: no joint_states, the drive is silent; mode is {moving.mode}')
     moving.wait(0.1)
-    left = json.loads(moving.state_file.read_text())
+    left, count = json.loads(moving.state_file.read_text()), len(moving.heard['joint_states'])
+    moving.station.signal('acu', signal.SIGSTOP)    # who hears the drive late hears it still standing
     moving.station.start('adu')
     moving.fresh('joint_states')
-    assert (messages.nanoseconds(moving.joints.header.stamp) - moving.station.start_time) % PERIOD == 0
-    assert (f"goes on at azimuth {left['azimuth']:.6f}, elevation {left['elevation']:.6f} rad, where "
-            f'{moving.state_file} left it') in moving.station.log('adu')
+    moving.station.signal('acu', signal.SIGCONT)
+    first = moving.heard['joint_states'][count]
+    assert (messages.nanoseconds(first.header.stamp) - moving.station.start_time) % PERIOD == 0
+    np.testing.assert_allclose(first.position, (left['azimuth'], left['elevation']), atol=1e-5)
+    np.testing.assert_allclose(first.velocity, 0.0, atol=1e-4)
     moving.until(lambda: moving.state == 'enabled')
     moving.fresh('acu/rate_command')
 

@@ -76,19 +76,16 @@ def show_list(rows):
     rows = list(rows)
     widths = [min(max(len(row[i]) for row in rows), WIDEST if i else WIDEST_NAME) for i in range(len(rows[0]) - 1)]
     indent = sum(widths) + 2 * len(widths)
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
-    if width < indent + SENTENCE:
-        # Too narrow for a column of sentences: they go below.
-        indent = 4
+    terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for *cells, sentence in rows:
         head = '  '.join(f'{cell:{width}}' for cell, width in zip(cells, widths))
-        if not width:
+        if terminal is None:
             print(f'{head}  {sentence}')
-        elif indent == 4:
-            print(head.rstrip(), *textwrap.wrap(sentence, width, initial_indent=' ' * 4, subsequent_indent=' ' * 4),
-                  sep='\n')
+        elif terminal < indent + SENTENCE:
+            # Too narrow for a column of sentences: they go below.
+            print(head.rstrip(), textwrap.indent(textwrap.fill(sentence, terminal - 4), ' ' * 4), sep='\n')
         else:
-            first, *more = textwrap.wrap(sentence, width - indent) or ['']
+            first, *more = textwrap.wrap(sentence, terminal - indent) or ['']
             print(f'{head:{indent - 2}}  {first}', *(' ' * indent + line for line in more), sep='\n')
 
 

@@ -230,4 +230,4 @@ def test_a_bag_that_is_being_written(verb, tmp_path, capsys):
 def test_an_unknown_topic_names_the_nearest(verb, recording, capsys):
     assert cli.main([verb, str(recording), '--topics', 'joint_states', 'acu/rate_comand']) == 1
     error = capsys.readouterr().err
-    assert 'no topic acu/rate_comand in it; did you mean acu/rate_command?' in error and error.count('\n') == 1
+    assert "no topic acu/rate_comand in it; did you mean 'acu/rate_command'?" in error and error.count('\n') == 1

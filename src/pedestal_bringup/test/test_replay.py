@@ -107,7 +107,7 @@ REFUSED = {
     'start': (['--start', '-1'], '--start -1 s: must be 0 or more'),
     'duration': (['--duration', '0'], '--duration 0: must be above 0'),
     'deadline': (['--deadline', '-2'], '--deadline -2: must be above 0'),
-    'node': (['--node', 'acuu'], '--node acuu is no node; did you mean acu? there are ship_motion, ins,'),
+    'node': (['--node', 'acuu'], "--node acuu is no node; did you mean 'acu'? there are ship_motion, ins,"),
     'lockstep with nobody': (['--lockstep'], '--lockstep: say with --node who answers the steps; there are'),
     'lockstep with the INS': (['--lockstep', '--node', 'ins'], '--lockstep: ins answers no step at its stamp'),
     'paused for ever': (['--paused'], '--paused: standard input is no terminal'),

@@ -3,6 +3,7 @@
 The ROS side (declare, refuse, read) is in shell.py; this file knows no ROS.
 """
 import dataclasses
+import difflib
 import math
 import typing
 
@@ -103,6 +104,12 @@ def as_dict(instance, prefix=''):
     return values
 
 
+def did_you_mean(name, known):
+    """' did you mean ...?' with the known name most like one that is not known; '' where none is."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f' did you mean {near[0]!r}?' if near else ''
+
+
 def build(cls, values, prefix=''):
     """An instance from {dotted name: value}, every name beginning with `prefix`; names left out keep their default.
 
@@ -111,9 +118,8 @@ def build(cls, values, prefix=''):
     known = [name for name, _ in flatten(cls, prefix)]
     for name in values:
         if name not in known:
-            import difflib
-            near = difflib.get_close_matches(name, known, n=1)
-            raise ParameterError(f'unknown parameter {name!r}' + (f'; did you mean {near[0]!r}?' if near else ''))
+            hint = did_you_mean(name, known)
+            raise ParameterError(f'unknown parameter {name!r}' + (f';{hint}' if hint else ''))
     return _replace(cls(), values, prefix)
 
 

@@ -4,13 +4,13 @@ The order is that of the stamps (`header.stamp`; the log time of a type that has
 go first and have arrived everywhere before anything follows, for so do nodes send them (Shell.announce); then comes
 the order of the table of topics, topics that are not in it last; then the order of the file.
 """
-import difflib
 import itertools
 
 import numpy as np
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_common import nodes, topics
+from pedestal_common.parameters import did_you_mean
 
 SECOND = 1_000_000_000
 
@@ -43,9 +43,7 @@ def select(bag, of, names):
     chosen, graph, known = [], bag.graph, nodes.members(nodes.NAMES, bag.beams)
     for node in of:
         if node not in known:
-            near = difflib.get_close_matches(node, known, n=1)
-            hint = f'did you mean {near[0]}? ' if near else ''
-            raise bags.BagError(f'--node {node} is no node; {hint}there are {", ".join(known)}')
+            raise bags.BagError(f'--node {node} is no node;{did_you_mean(node, known)} there are {", ".join(known)}')
         of_node = [name for name in bag.topics
                    if reads(graph, node, name) and not any(writes(graph, other, name) for other in of)]
         if not of_node:

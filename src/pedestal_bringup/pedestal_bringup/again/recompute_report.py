@@ -154,7 +154,7 @@ def _new_numbers(recording, outputs, done):
 
 def _by_encoders(recording):
     """A line on errors that are not those of the dish, in a list; none where its true direction was recorded."""
-    return [] if recording.has('adu/truth') or recording.bag.beams else [f'note: {tracking.BY_ENCODERS}']
+    return [f'note: {tracking.BY_ENCODERS}'] if tracking.by_encoders(recording.bag) else []
 
 
 def _text(value):

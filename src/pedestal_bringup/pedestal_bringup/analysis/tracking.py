@@ -194,6 +194,12 @@ def _lever_arm(bag, attitude):
     return enu
 
 
+def by_encoders(bag):
+    """Whether the beam of a bag is taken to be where its encoders say (BY_ENCODERS); an array's steering is the
+    truth."""
+    return not bag.beams and 'adu/truth' not in bag.topics
+
+
 def read(bag) -> Tracking:
     """The Tracking of a bag (bag.Bag). Raises ValueError when it has no joint_states or target/truth."""
     missing = [name for name in ('joint_states', 'target/truth') if name not in bag.topics]

@@ -1,7 +1,6 @@
 """Reads a bag: a rosbag2 directory with its MCAP files, or one file. No ROS here."""
 import contextlib
 import copy
-import difflib
 import functools
 import pathlib
 import re
@@ -14,6 +13,7 @@ from pedestal_bringup.bags import columns, mcap_file
 from pedestal_bringup.bags.mcap_file import MESSAGE, BagError, McapFile
 from pedestal_common import messages, nodes, plain_yaml
 from pedestal_common.cdr import STAMPED
+from pedestal_common.parameters import did_you_mean
 
 CACHE = 64_000_000
 """Bytes of unpacked chunks that are kept."""
@@ -52,9 +52,8 @@ def chosen_topics(bag, names):
     chosen = list(dict.fromkeys(name.lstrip('/') for name in names))
     for name in chosen:
         if name not in bag.topics:
-            near = difflib.get_close_matches(name, bag.topics, n=1)
-            hint = f'did you mean {near[0]}? ' if near else ''
-            raise BagError(f'{bag.path}: no topic {name} in it; {hint}there are {", ".join(bag.topics)}')
+            raise BagError(f'{bag.path}: no topic {name} in it;{did_you_mean(name, bag.topics)} '
+                           f'there are {", ".join(bag.topics)}')
     return chosen
 
 

@@ -159,7 +159,7 @@ def _results(bag, data, check):
             parts.append(_rows(['', 'azimuth', 'elevation', ''], _torques(data), 'n'))
     else:
         known = results.of_tracking(data.run)
-        if 'adu/truth' not in bag.topics and not bag.beams:
+        if tracking.by_encoders(bag):
             parts.append(f'<p class="bad">Pointing errors by the encoders: {html.escape(tracking.BY_ENCODERS)}.</p>')
         if not data.run.tracking.any():
             parts.append('<p class="bad">The run was never in autotrack for longer than the settling time, so nothing '

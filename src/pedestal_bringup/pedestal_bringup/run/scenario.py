@@ -6,7 +6,6 @@ several beams: its nodes are `/beam_1/acu` and so on, which the section `acu` do
 """
 import contextlib
 import dataclasses
-import difflib
 import importlib.resources
 import json
 import pathlib
@@ -167,10 +166,8 @@ def _text(name_or_path):
     entry = _folder() / f'{name_or_path}.yaml'
     if not entry.is_file():
         names = list(available())
-        near = difflib.get_close_matches(name_or_path, names, n=1)
-        hint = f'did you mean {near[0]!r}? ' if near else ''
-        raise ScenarioError(f'unknown scenario {name_or_path!r}; {hint}there are {", ".join(names)} '
-                            '(or give a path that ends in .yaml)')
+        raise ScenarioError(f'unknown scenario {name_or_path!r};{parameters.did_you_mean(name_or_path, names)} there '
+                            f'are {", ".join(names)} (or give a path that ends in .yaml)')
     return name_or_path, entry.read_text()
 
 

@@ -1,11 +1,11 @@
 """measure the compiled closed loop against the papers: rows and figures"""
 import contextlib
-import difflib
 import inspect
 import pathlib
 import sys
 
 from pedestal_bringup import console
+from pedestal_common.parameters import did_you_mean
 
 
 def add_arguments(parser):
@@ -29,10 +29,8 @@ def main(options):
         console.show_list(studies.descriptions().items())
         return 0
     if options.name not in studies.NAMES:
-        near = difflib.get_close_matches(options.name, studies.NAMES, 1)
-        print(f'pedestal: error: unknown study {options.name!r}; '
-              + (f'did you mean {near[0]!r}? ' if near else '') + f'there are {", ".join(studies.NAMES)}',
-              file=sys.stderr)
+        print(f'pedestal: error: unknown study {options.name!r};{did_you_mean(options.name, studies.NAMES)} '
+              f'there are {", ".join(studies.NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
     from pedestal_bringup.studies.rigs import drawing, rows
     output = options.output or pathlib.Path('studies', options.name)
