@@ -4,7 +4,8 @@ Strict IEEE arithmetic (no fastmath): a law gives the same bits wherever it is i
 node and a recomputed bag agree exactly, and NaN keeps its meaning on the topics.
 
 Numba's cache does not see that a callee in another file changed (numba documentation, "Notes on
-Caching"), so the cache lives in a folder named after all sources of the product.
+Caching"), so the cache lives in a folder named after all sources of the product. It holds what any checkout of
+them compiled.
 """
 import contextlib
 import fcntl
@@ -18,7 +19,7 @@ import tempfile
 import time
 
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.misc.appdirs import user_cache_dir
 
 COLUMNS = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
@@ -91,27 +92,39 @@ def compiled_once(unit):
         done.touch()
 
 
-class _SharedCache(FunctionCache):
+class _Place(UserProvidedCacheLocator):
+    """The folder of a law is named after its module, not after the path of its file: a checkout finds what another of
+    the same sources has compiled."""
+
+    def __init__(self, law, file):
+        super().__init__(law, file)
+        self._cache_path = os.path.join(_cache_folder(law.__module__.partition('.')[0]), law.__module__)
+
+    @classmethod
+    def from_function(cls, law, file):
+        return cls(law, file)
+
+
+class _Contents(CompileResultCacheImpl):
+    _locator_classes = (_Place,)
+
+
+class _Cache(FunctionCache):
     """Of two processes that save a law for two signatures at once one may lose its entry, or find the other's code
     under it: numba reads the index, chooses a name, writes the index and then the code. Here one waits."""
-
-    def __init__(self, law, folder):
-        super().__init__(law)
-        self._lock = pathlib.Path(folder, 'index.lock')
+    _impl_class = _Contents
 
     def _save_overload(self, signature, data):
-        with _alone(self._lock):
+        with _alone(pathlib.Path(self.cache_path).with_name('index.lock')):
             super()._save_overload(signature, data)
 
 
 def compiled(law):
     """Decorator of a law. Division by zero gives inf or NaN as in numpy, never an exception. Nobody calls a law from
     C: without the wrappers for it a tenth of the time to compile is saved."""
-    folder = _cache_folder(law.__module__.partition('.')[0])
     dispatcher = numba.njit(error_model='numpy', no_cfunc_wrapper=True)(law)
-    if folder is not None:
-        numba.config.CACHE_DIR = folder
-        dispatcher._cache = _SharedCache(law, folder)
+    if _cache_folder(law.__module__.partition('.')[0]) is not None:
+        dispatcher._cache = _Cache(law)
     return dispatcher
 
 

@@ -1,5 +1,6 @@
 """The cache of compiled laws, shared by processes that start together."""
 import os
+import shutil
 import subprocess
 import sys
 
@@ -65,6 +66,16 @@ def folder(tmp_path):
 def test_one_of_many_compiles(folder):
     assert sorted(compilations(folder, folder / 'cache', [()] * 4)) == [0, 0, 0, 1]
     assert compilations(folder, folder / 'cache', [()]) == [0]
+
+
+def test_a_checkout_finds_what_another_of_the_same_sources_compiled(folder):
+    """And not what was compiled of others."""
+    law = folder / 'one_law' / 'law.py'
+    assert compilations(folder, folder / 'cache', [()]) == [1]
+    shutil.copytree(folder / 'one_law', folder / 'elsewhere' / 'one_law')
+    assert compilations(folder / 'elsewhere', folder / 'cache', [()]) == [0]
+    law.write_text(law.read_text() + '# changed')
+    assert compilations(folder, folder / 'cache', [()]) == [1]
 
 
 def test_laws_saved_at_once_are_all_kept(folder):
