@@ -26,7 +26,7 @@ demo: install
 test: install
 	.venv/bin/ruff check .
 	.venv/bin/python -m pytest --numprocesses 3 --dist loadfile $(addprefix --ignore=,$(REALTIME))
-	.venv/bin/python -m pytest $(REALTIME)
+	.venv/bin/python -m pytest --numprocesses 2 --dist loadfile $(REALTIME)
 
 update-references: install
 	.venv/bin/python bags/reference/update.py

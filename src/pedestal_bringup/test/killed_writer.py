@@ -1,4 +1,5 @@
-"""Writers that die: `python killed_writer.py FOLDER SEED` writes bags in children and kills each at a random place.
+"""Writers that die: `python killed_writer.py FOLDER SEED COUNT` writes bags in children and kills each at a random
+place.
 
 Bag N is FOLDER/N; line N of the output says how many rows were written and how many of them before the last flush.
 Every fifth writer meets a disk that is full at a random size instead.
@@ -24,7 +25,6 @@ _spec = importlib.util.spec_from_file_location('bag_test_messages', pathlib.Path
 _bag_test = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(_bag_test)
 
-BAGS = 50
 STEPS = 400
 ROWS = 40_000
 
@@ -66,10 +66,10 @@ def write(directory, made, counters):
         writer.close()
 
 
-def main(folder, seed):
+def main(folder, seed, count):
     rng = random.Random(seed)
     made = list(itertools.islice(rows(), ROWS))
-    for number in range(BAGS):
+    for number in range(count):
         last, wait, size = rng.randrange(ROWS - 5_000), rng.uniform(0.0, 0.01), rng.randrange(20_000, 2_000_000)
         counters = np.frombuffer(mmap.mmap(-1, 16), np.int64)
         child = os.fork()
@@ -90,4 +90,4 @@ def main(folder, seed):
 
 
 if __name__ == '__main__':
-    main(sys.argv[1], int(sys.argv[2]))
+    main(sys.argv[1], *map(int, sys.argv[2:]))
