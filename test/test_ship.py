@@ -16,7 +16,7 @@ from pedestal_bringup.again import difference, recompute
 from pedestal_bringup.analysis import isolation, known_attitude, results, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import messages
+from pedestal_common import layouts, messages
 from ship_motion_sim import motion
 from tracking_receiver_sim import target
 
@@ -60,6 +60,17 @@ def ashore():
     ('ship_pass', (), 1.3), ('ship_pass', ('ins.latency=0.02',), 1.5), ('ship_pass_ss6', (), 1.5)])
 def test_a_ship_points_nearly_as_well_as_the_shore(ashore, name, overrides, times):
     assert pointing(name, *overrides) <= times * ashore
+
+
+@pytest.mark.parametrize('cn0_dbhz', [40, 60, 80, 110])
+@pytest.mark.parametrize('name', ['ship_pass', 'ship_pass_ss6'])
+def test_a_signal_of_any_strength_is_tracked_by_a_filter_that_knows_its_errors(name, cn0_dbhz):
+    """Where the receiver's noise has gone the attitude's is left. A filter that knew nothing of it refused every error
+    from 80 dB-Hz on."""
+    _, run, on = track(name, f'tracking_receiver.receiver.cn0_dbhz={cn0_dbhz}', 'scenario.duration=30')
+    assert on.mean() > 0.85
+    nis = np.nanmean(layouts.of_filter(run.steps, 'nis')[on], axis=0)
+    assert (nis > 0.8).all() and (nis < 1.2).all()
 
 
 @pytest.mark.parametrize('name', ['ship_pass', 'ship_pass_ss6'])

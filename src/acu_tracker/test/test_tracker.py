@@ -2,12 +2,24 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from acu_tracker.estimation import target_filter, tracker
 from acu_tracker.estimation.kinds import KINDS
-from acu_tracker.estimation.measurement import AxisMeasurement, Measurement, error_variance, nis
-from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters, TrackerParameters
+from acu_tracker.estimation.measurement import (
+    AxisMeasurement,
+    Measurement,
+    attitude_variances,
+    error_variance,
+    nis,
+)
+from acu_tracker.estimation.params import (
+    AttitudeModelParameters,
+    FilterParameters,
+    ReceiverModelParameters,
+    TrackerParameters,
+)
 from pedestal_common.parameters import build, record
 
 DEG = math.pi / 180
@@ -225,3 +237,15 @@ def test_receiver_law():
     assert error_variance(0.3 * DEG, 0.4 * DEG, 40.0, receiver) == pytest.approx(1.64 * R)
     receiver['sigma_floor'] = 1e-3
     assert error_variance(0.0, 0.0, 300.0, receiver) == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize('elevation', [0.1, 0.7, 1.3])
+def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation):
+    """Oracle: scipy turns the direction by 20,000 small rotations about deck axes and the vertical."""
+    attitude = record(AttitudeModelParameters(tilt_noise=2e-4, heading_noise=5e-4))[0]
+    generator = np.random.default_rng(1)
+    tilt, heading = 2e-4 * generator.standard_normal((2, 20_000)), 5e-4 * generator.standard_normal(20_000)
+    east, north, up = Rotation.from_rotvec(np.column_stack((*tilt, heading))).apply(
+        [0.0, math.cos(elevation), math.sin(elevation)]).T
+    measured = (math.cos(elevation) * np.arctan2(east, north)).var(), np.arcsin(up).var()
+    assert attitude_variances(elevation, attitude) == pytest.approx(measured, rel=0.03)

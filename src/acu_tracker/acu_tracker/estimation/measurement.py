@@ -40,6 +40,18 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
 
 
 @compiled
+def attitude_variances(elevation, attitude):
+    """Variances [rad2] (cross-elevation, elevation) of a direction at an elevation [rad] from the noise of the
+    attitude it was measured with: tilted by it across the line of sight, and turned about the vertical.
+
+    attitude: record of AttitudeModelParameters.
+    """
+    s, c = math.sin(elevation), math.cos(elevation)
+    tilt, heading = attitude.tilt_noise * attitude.tilt_noise, attitude.heading_noise * attitude.heading_noise
+    return s * s * tilt + c * c * heading, tilt
+
+
+@compiled
 def with_azimuth_near(m, near):
     """The Measurement, its azimuth on the wrap that is nearest to `near` [rad]."""
     a = m.axis[0]

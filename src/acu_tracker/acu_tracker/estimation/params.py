@@ -112,6 +112,15 @@ class ReceiverModelParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class AttitudeModelParameters(Parameters):
+    """The control unit's model of the INS, on a ship: the part of its error that changes from sample to sample. What
+    changes slowly cancels, because the target is measured and pointed at with the same attitude."""
+
+    tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')
+    heading_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of heading, per sample')
+
+
+@dataclasses.dataclass(frozen=True)
 class TrackerParameters(Parameters):
     """The target filter, its gates and the conditions of a lock."""
 
@@ -126,6 +135,7 @@ class TrackerParameters(Parameters):
     coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack is left')
     handover: bool = flag(True, 'program hands over to autotrack by itself once locked')
     receiver: ReceiverModelParameters = group(ReceiverModelParameters)
+    attitude: AttitudeModelParameters = group(AttitudeModelParameters)
     ukf: UkfParameters = group(UkfParameters)
 
     def check(self):

@@ -15,6 +15,7 @@ from acu_tracker.estimation.measurement import (
     AxisVariances,
     Estimate,
     Measurement,
+    attitude_variances,
     error_variance,
 )
 from acu_tracker.geometry import attitude, deck_reference, estimate_frame, lever_arm
@@ -88,11 +89,14 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
         azimuth_rate, elevation_rate = _measured_rates(g, deck, u, at)
-    R = error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e)
+    R_cross = R_elevation = error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e)
+    if deck.stabilised:
+        cross, along = attitude_variances(elevation, p.tracker.attitude)
+        R_cross, R_elevation = R_cross + cross, R_elevation + along
     R_rate = u.error_rate_sigma * u.error_rate_sigma
     cos_el = max(math.cos(elevation), 0.01)
-    axis = (AxisMeasurement(azimuth, R / (cos_el * cos_el), azimuth_rate, R_rate / (cos_el * cos_el)),
-            AxisMeasurement(elevation, R, elevation_rate, R_rate))
+    axis = (AxisMeasurement(azimuth, R_cross / (cos_el * cos_el), azimuth_rate, R_rate / (cos_el * cos_el)),
+            AxisMeasurement(elevation, R_elevation, elevation_rate, R_rate))
     outcome, innovation = tracker.observe(g.tracker, p.tracker, c, Measurement(t, axis, u.range, u.range_variance),
                                           restart_gap)
     if outcome != STALE:

@@ -79,6 +79,8 @@ SHARED = (
     ('tracking_receiver', 'antenna.slope', 'acu', 'tracker.receiver.slope'),
     ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
     ('ins', 'latency', 'acu', 'attitude_latency'),
+    ('ins', 'tilt_noise', 'acu', 'tracker.attitude.tilt_noise'),
+    ('ins', 'heading_noise', 'acu', 'tracker.attitude.heading_noise'),
     ('ship_motion', 'imu.output', 'ins', 'imu_output'),
     *(('tracking_receiver', f'lever_arm.{axis}', 'acu', f'lever_arm.{axis}') for axis in 'xyz'),
     ('tracking_receiver', 'blockage', 'acu', 'blockage'),
