@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from acu_tracker import modes, resumption, signals
-from acu_tracker.estimation import measurement, target, target_filter, tracker
+from acu_tracker.estimation import divergence, measurement, target, target_filter, tracker
 from acu_tracker.geometry import attitude, azimuth_wrap, deck_reference, encoders
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.motion import AxisMotion, Motion
@@ -29,6 +29,7 @@ STATE = np.dtype([
     ('resumption', resumption.RESUMPTION), ('unasked', unasked.ENVELOPE),
     ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('aligning', 'i8'),
     ('target', target.TARGET), ('error', 'f8', (2,)),                           # of this step, azimuth, elevation
+    ('divergence', divergence.DIVERGENCE),
     ('preset', 'f8', (2,)),
     ('azimuth', 'f8'), ('target_angles', 'f8', (2,)),  # raw azimuth of the last reference; deck angles of its target
     ('pointing_offset', 'f8'),                                  # intended angle between beam and target [rad]
@@ -57,7 +58,8 @@ def constants(params) -> np.ndarray:
     c, axes = np.zeros(1, CONSTANTS), (params.azimuth, params.elevation)
     c['p'] = record(params, SharedParameters)
     c['lead'] = params.command_delay + 0.5 * params.period
-    c['axis'] = np.concatenate([axis_constants(axis, params.period) for axis in axes])
+    c['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period)
+                                for axis in axes])
     c['tracker'] = tracker.constants(params.tracker, [axis.filter for axis in axes])
     c['lookahead'] = planner.constants(params)
     return c
@@ -127,6 +129,7 @@ def _take_error(s, c, u, o):
     s.error[0], s.error[1] = measured[0] - at.A, measured[1] - at.E
     restart_gap = math.inf if _outage_permitted(s, c) else c.p.tracker.restart_gap
     outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, measured, restart_gap)
+    divergence.take(s.divergence, innovation)
     for i in range(2):
         one = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
@@ -199,15 +202,21 @@ def _situation(s, c, drive_ready, program, t_m, request):
         unstable = (modes.INS_ALIGNING if s.aligning and s.attitude.history.count > 0 else
                     modes.NONE if attitude.at(s.attitude, c.p, t_m) else modes.ATTITUDE_INVALID)
     since = _since_accepted(s, c)
-    lost = not s.target.tracker.running or (since > c.p.tracker.coast_time and not _outage_permitted(s, c))
-    wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and lost)
+    silent = not _outage_permitted(s, c)
+    lost = not s.target.tracker.running or (since > c.p.tracker.coast_time and silent)
+    ends = modes.SIGNAL_LOST if lost else modes.NONE
+    unfit = modes.NONE if tracker.locked(s.target.tracker, c.p.tracker, since) else modes.NOT_LOCKED
+    if s.mode == modes.AUTOTRACK:
+        divergence.watch(s.divergence, _coasting(s, c) and silent)
+    if s.divergence.diverged:
+        unfit = ends = modes.DIVERGED
+    wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and ends != modes.NONE)
     unable, flags = modes.NONE, 0
     if wanted and unstable == modes.NONE:
         unable, flags = _program_obstacle(s, c, program, t_m)
-    locked = tracker.locked(s.target.tracker, c.p.tracker, since)
     return modes.situation(
         encoders.taken(s.encoders, s.stamp), drive_ready, unstable, _outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
-        _outside(c, s.preset[0], s.preset[1]), unable, locked, lost), flags
+        _outside(c, s.preset[0], s.preset[1]), unable, unfit, ends), flags
 
 
 @compiled
@@ -227,6 +236,7 @@ def _change_mode(s, c, o, drive_ready, program, request):
         s.target.tracker.running = 0
     if mode != s.mode:
         s.mode, s.entered = mode, 1
+        divergence.restart(s.divergence)
     return result, flags
 
 

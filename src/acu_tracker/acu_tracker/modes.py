@@ -30,7 +30,7 @@ TABLE = (
          follows=True, handover='autotrack'),
     Mode('autotrack', 'the filtered target, through short losses the prediction of the filter',
          'receiver locked, filter converged',
-         'after `coast_time` without an error to `program`, or to `standby` without a program',
+         'after `coast_time` without an error, or diverged, to `program`, or to `standby` without a program',
          follows=True, fallback='program'))
 """Another mode is a row here, its entries in `situation`, and what it asks of the axes in control_unit."""
 
@@ -44,10 +44,10 @@ _HANDOVER = tuple(MODES.index(row.handover) if row.handover else NEVER for row i
 REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'attitude invalid', 'no program track',
            'before program track', 'after program track', 'receiver not locked', 'outside limits', 'unknown mode',
            'stamp does not advance', 'drive not ready', 'INS aligning', 'blocked', 'keyhole', 'silence',
-           'moves unasked')
+           'moves unasked', 'diverged')
 (NONE, REQUESTED, LOCKED, SIGNAL_LOST, ENCODER_INVALID, ATTITUDE_INVALID, NO_PROGRAM, BEFORE_PROGRAM,
  AFTER_PROGRAM, NOT_LOCKED, OUTSIDE_LIMITS, UNKNOWN_MODE, BAD_STAMP, DRIVE_NOT_READY, INS_ALIGNING,
- BLOCKED, KEYHOLE, SILENCE, MOVES_UNASKED) = range(len(REASONS))
+ BLOCKED, KEYHOLE, SILENCE, MOVES_UNASKED, DIVERGED) = range(len(REASONS))
 
 NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 
@@ -61,17 +61,16 @@ or the reason that it ends."""
 
 
 @compiled
-def situation(encoder_valid, drive_ready, attitude, stow, preset, program, locked, lost):
+def situation(encoder_valid, drive_ready, attitude, stow, preset, program, autotrack, lost):
     """The Situation of these conditions.
 
-    attitude, stow, preset, program: NONE or the reason against each; locked: enough errors were accepted and the
-    filter has converged; lost: no measurement for longer than permitted. A program that leads outside the limits
-    cannot be entered, but is not ended by that.
+    attitude, stow, preset, program, autotrack: NONE or the reason against each; lost: NONE or the reason that
+    autotrack ends. A program that leads outside the limits cannot be entered, but is not ended by that.
     """
     ends = program if program != OUTSIDE_LIMITS else NONE
     return Situation(encoder_valid, drive_ready, attitude,
-                     (NONE, stow, preset, program, NONE if locked else NOT_LOCKED),
-                     (NONE, NONE, NONE, ends, SIGNAL_LOST if lost else NONE))
+                     (NONE, stow, preset, program, autotrack),
+                     (NONE, NONE, NONE, ends, lost))
 
 
 Decision = namedtuple('Decision', 'mode reason result')

@@ -4,7 +4,7 @@ import typing
 
 import numpy as np
 
-from acu_tracker import announcement, control_unit, modes, signals
+from acu_tracker import announcement, control_unit, faults, modes, signals
 from acu_tracker.program import program_track
 from pedestal_common import messages, nodes, topics
 from pedestal_common.compiled import compiled
@@ -160,7 +160,7 @@ class Acu(Unit):
         mode = name.removeprefix('acu/')
         m, outputs = self.parts, self.parts['outputs']
         if mode == 'reset_faults':
-            m['state']['unasked']['moves'] = 0
+            m['state']['unasked']['moves'] = m['state']['divergence']['diverged'] = 0
             return Reply(True, 'cleared')
         if self.silent and mode != 'standby':
             return Reply(False, f'refused: no {JOINTS}, the drive is silent; mode is {modes.MODES[outputs["mode"]]}')
@@ -180,8 +180,8 @@ class Acu(Unit):
         mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
         invalid = [name for i, name in enumerate(signals.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
         self.parts['invalid'] = 0
-        values = [('mode', mode), ('reason', reason), ('locked', str(int(outputs['locked']))),
-                  ('coasting', str(int(outputs['coasting']))),
+        values = [('mode', mode), ('reason', reason), ('faults', ', '.join(self.faults)),
+                  ('locked', str(int(outputs['locked']))), ('coasting', str(int(outputs['coasting']))),
                   ('drive', 'silent' if self.silent else self.drive_state),
                   ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
                   ('rates gated', str(int(outputs['rates_gated']))),
@@ -192,11 +192,14 @@ class Acu(Unit):
         for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
         values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead'])]
-        if state['unasked']['moves']:
+        if faults.MOVES_UNASKED in self.faults:
             rates = ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded' for axis, (
                 rate, low, high) in zip(topics.AXES, state['unasked']['measured']))
             return Diagnosis(ERROR, f'the antenna moves unasked: {rates}; acu/reset_faults once it is known why',
                              values)
+        if faults.DIVERGED in self.faults:
+            return Diagnosis(ERROR, "autotrack diverged: the receiver's errors led away from the target; "
+                             'acu/reset_faults once their slope, phase and sign are right', values)
         if invalid == ['error_gated']:
             return Diagnosis(WARN, 'an error of the receiver was too far off to be believed', values)
         if invalid:
@@ -211,9 +214,17 @@ class Acu(Unit):
         return self.CALLS if self.parts['state']['unasked']['moves'] else ()
 
     @property
+    def faults(self):
+        """Names of the faults that wait for acu/reset_faults."""
+        state = self.parts['state']
+        latched = state['unasked']['moves'], state['divergence']['diverged']
+        return tuple(fault.name for fault, on in zip(faults.FAULTS, latched) if on)
+
+    @property
     def alarm(self):
-        outputs = self.parts['outputs']
-        return bool(self.parts['state']['unasked']['moves']) or outputs['reason'] == modes.SILENCE
+        state = self.parts['state']
+        return bool(state['unasked']['moves'] or state['divergence']['diverged']
+                    or self.parts['outputs']['reason'] == modes.SILENCE)
 
     @staticmethod
     def idle(numbers):

@@ -30,7 +30,8 @@ from acu_tracker.modes import (
 def next_mode(mode, request=NO_REQUEST, encoder_ok=True, drive_ready=True, attitude=NONE, program=NONE, stow=NONE,
               preset=NONE, locked=True, lost=False, handover=False):
     """Of a situation in which all is well but for what is named."""
-    now = modes.situation(encoder_ok, drive_ready, attitude, stow, preset, program, locked, lost)
+    now = modes.situation(encoder_ok, drive_ready, attitude, stow, preset, program, NONE if locked else NOT_LOCKED,
+                          SIGNAL_LOST if lost else NONE)
     return modes.next_mode(mode, request, now, handover)
 
 

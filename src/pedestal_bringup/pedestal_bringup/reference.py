@@ -6,6 +6,7 @@ import pathlib
 import re
 import sys
 
+from acu_tracker import faults as acu_faults
 from acu_tracker import modes
 from acu_tracker.estimation.kinds import KINDS
 from adu_drive import faults
@@ -81,6 +82,12 @@ def fault_table():
                    for fault in faults.FAULTS])
 
 
+def acu_fault_table():
+    """The faults of the control unit."""
+    return _table(('fault', 'from', 'what it does'),
+                  [(f'`{fault.name}`', fault.doc, fault.effect) for fault in acu_faults.FAULTS])
+
+
 def study_table():
     """The studies."""
     return _table(('study', 'what it measures'),
@@ -110,7 +117,8 @@ def result_table(table=results.RESULTS):
 
 TABLES = {'nodes': node_table, 'studies': study_table, 'topics': topic_table, 'services': service_table,
           'modes': mode_table,
-          'filter kinds': filter_table, 'drive faults': fault_table, 'results': result_table,
+          'filter kinds': filter_table, 'drive faults': fault_table,
+          'control unit faults': acu_fault_table, 'results': result_table,
           'recomputed results': lambda: result_table(what_if.NUMBERS),
           'first parameters': parameter_table}
 

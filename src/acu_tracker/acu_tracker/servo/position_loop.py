@@ -5,6 +5,7 @@ feed the one of t_m forward.
 `beam` steers an electronic beam, which has no dynamics: the command is the raw target at t_m or, in autotrack of the
 forms type_1 and type_2, the beam of paper 002's loop on the receiver's error.
 """
+import dataclasses
 from collections import namedtuple
 
 import numpy as np
@@ -39,6 +40,20 @@ fixed target; closed: whether a beam closes its own loop on both."""
 Command = namedtuple('Command', 'rate torque reference angle_limited rate_limited acceleration_limited')
 """rate [rad/s] and load torque [Nm]; reference: the AxisMotion that is compared with the encoder at t_k, of a beam
 the command; angle_limited, rate_limited, acceleration_limited: what was limited."""
+
+
+LARGEST_PHASE = 0.5
+"""Largest bandwidth times delay of the command [rad]: what it takes of the phase margin of a loop."""
+
+
+def slowed(params, delay):
+    """AxisParameters whose loops a delay of the command [s] leaves stable, none faster than LARGEST_PHASE / delay."""
+    if delay == 0.0:
+        return params
+    loops = {name: getattr(params, name) for name in ('pid', 'feedforward', 'adrc')}
+    return dataclasses.replace(params, **{
+        name: dataclasses.replace(loop, bandwidth=min(loop.bandwidth, LARGEST_PHASE / delay))
+        for name, loop in loops.items()})
 
 
 @compiled

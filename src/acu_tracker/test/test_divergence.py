@@ -1,0 +1,52 @@
+"""The mean of the innovations against scipy's filter of the same series."""
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from acu_tracker.estimation import divergence
+from acu_tracker.estimation.measurement import NO_INNOVATION, AxisInnovation, Innovation
+
+
+def innovation(chi_square):
+    axis = AxisInnovation(math.sqrt(chi_square), 1.0, chi_square, math.nan, math.nan)
+    return Innovation((axis, axis), math.nan, math.nan)
+
+
+@pytest.fixture
+def state():
+    record = np.zeros(1, divergence.DIVERGENCE)[0]
+    divergence.restart(record)
+    return record
+
+
+def test_mean(state):
+    x = np.random.default_rng(1).chisquare(2, 500) * np.linspace(0.5, 4.0, 500)
+    a = 1.0 / divergence.ERRORS
+    expected, _ = lfilter([a], [1.0, a - 1.0], np.minimum(x, divergence.LARGEST), zi=[1.0 - a])
+    for value, mean in zip(x, expected):
+        divergence.take(state, innovation(value))
+        divergence.take(state, NO_INNOVATION)
+        assert state['m'] == pytest.approx(mean, rel=1e-12)
+
+
+def test_a_burst_of_interference_is_not_held_against_the_filter(state):
+    for _ in range(20):
+        divergence.take(state, innovation(1e6))
+    divergence.watch(state, False)
+    assert not state['diverged']
+
+
+@pytest.mark.parametrize('without_signal, errors', [(False, 43), (True, 10)])
+def test_it_stays_until_it_is_reset(state, without_signal, errors):
+    """m = 1 + 11.5 (1 - 0.99^n) passes 5 with the 43rd error that counts 12.5, and 2 with the 10th."""
+    for _ in range(errors):
+        divergence.watch(state, without_signal)
+        assert not state['diverged']
+        divergence.take(state, innovation(100.0))
+    divergence.watch(state, without_signal)
+    assert state['diverged']
+    divergence.restart(state)
+    divergence.watch(state, without_signal)
+    assert state['diverged'] and state['m'] == 1.0

@@ -1,0 +1,67 @@
+"""What leads the antenna away from its target: errors of the wrong sign, gusts, delays. Closed loops of scenarios."""
+import numpy as np
+import pytest
+
+from acu_tracker import modes
+from pedestal_bringup.run import closed_loop, scenario
+from pedestal_common.unit import ERROR
+
+SECONDS = 8.0
+
+
+def run(*overrides, name='leo_pass', seed=1):
+    return closed_loop.Loop(scenario.load(name, overrides, seed=seed, duration=SECONDS)).run()
+
+
+def off(run):
+    """Angle between beam and target [deg]."""
+    return np.degrees(np.hypot(*run.truth['error'].T))
+
+
+@pytest.mark.parametrize('name, wrong', [
+    ('leo_pass', 'slope_factor=3'), ('leo_pass', 'slope_factor=4'), ('uav_flyby', 'slope_factor=3'),
+    ('leo_pass', 'cross_coupling=1.21'), ('leo_pass', 'cross_coupling=2'), ('leo_pass', 'cross_coupling=3.14'),
+    ('ship_pass', 'cross_coupling=-1.21')])
+def test_errors_that_lead_away_are_recognised_and_left(name, wrong):
+    """The beam is a degree wide. Autotrack ends at once, the program goes on, and nothing enters autotrack again until
+    somebody resets the fault."""
+    done = run(f'tracking_receiver.antenna.{wrong}', name=name)
+    mode, t = done['acu/mode'], done.t
+    automatic = np.flatnonzero(mode == modes.AUTOTRACK)
+    assert automatic.size and t[automatic[-1]] - t[automatic[0]] < 1.0
+    assert off(done)[automatic].max() < 7.0
+    assert (mode[automatic[-1] + 1:] == modes.PROGRAM).all() and off(done)[-1] < 0.25
+    acu = done.units['acu']
+    diagnosis = acu.diagnose()
+    assert diagnosis.level == ERROR and diagnosis.message.startswith('autotrack diverged') and acu.alarm
+    assert dict(diagnosis.values)['faults'] == 'diverged'
+    assert acu.request('acu/autotrack') == (False, 'refused: diverged; mode is program')
+    acu.request('acu/reset_faults')
+    assert acu.faults == () and acu.request('acu/autotrack').granted
+
+
+@pytest.mark.parametrize('wrong', ['slope_factor=2', 'cross_coupling=0.7', 'slope_factor=0.5', 'phase_error=0.8'])
+def test_errors_that_are_merely_wrong_are_tracked(wrong):
+    done = run(f'tracking_receiver.antenna.{wrong}')
+    assert done['acu/mode'][-1] == modes.AUTOTRACK and off(done)[-200:].max() < 0.2
+
+
+@pytest.mark.parametrize('name', ['leo_pass', 'uav_flyby', 'ship_pass_ss6'])
+def test_a_filter_that_knows_its_errors_never_counts_as_diverged(name):
+    for seed in range(1, 6):
+        done = run(name=name, seed=seed)
+        assert done['acu/mode'][-1] == modes.AUTOTRACK
+        assert done.units['acu'].parts['state']['divergence']['m'] < 1.5
+
+
+def test_a_gust_of_4000_nm_on_both_axes_is_no_end_of_autotrack():
+    done = run('adu.wind.gust.kind=step', 'adu.wind.gust.azimuth=4000', 'adu.wind.gust.elevation=4000',
+               'adu.wind.gust.start=4')
+    assert off(done)[round(4.0 / 0.005):].max() > 0.05
+    assert done['acu/mode'][-1] == modes.AUTOTRACK and off(done)[-200:].max() < 0.02
+
+
+@pytest.mark.parametrize('delay', [0.07, 0.1])
+def test_the_loop_is_slowed_with_a_command_that_comes_late(delay):
+    done = run(f'adu.transport_delay={delay}')
+    assert done['acu/mode'][-1] == modes.AUTOTRACK and off(done)[-200:].max() < 0.05
