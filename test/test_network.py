@@ -125,7 +125,7 @@ def cut(hosts, tmp_path_factory, reserve_domain):
                            overrides=['acu.resume_time=15', f'adu.command_timeout={TIMEOUT}'])
     supervisor.prepare(chosen)
     start, bag, file = graph.begins(chosen), folder / 'bag', folder / 'parameters.yaml'
-    file.write_text(graph.parameter_file(chosen, bag, start))
+    file.write_text(graph.parameters_of_all(chosen, bag, start))
     (folder / 'bag.log').mkdir()
     started = [hosts.start('far' if node == 'acu' else 'near',
                            processes.command_line(node, chosen.row(node).module, file), folder / f'{node}.log',

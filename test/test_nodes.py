@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from pedestal_bringup.run import parameter_file
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder')
 
@@ -22,7 +24,9 @@ def scenario_file():
 def ended(start_node, connect, scenario_file):
     """{(node, signal): result} of nodes that loaded a scenario file as it is, each told to stop once it was there."""
     def end(number):
-        started = {node: start_node(node, '--params-file', scenario_file) for node in NODES}
+        # The recorder, which a scenario says nothing of, would complain of its file.
+        started = {node: start_node(node, *(() if node == 'recorder' else ('--params-file', scenario_file)))
+                   for node in NODES}
         for node, alone in started.items():
             client = connect(alone.domain_id)
             client.until(lambda client=client, node=node: node in client.node.get_node_names())
@@ -112,6 +116,21 @@ def refused(start_node, tmp_path_factory):
     started = {case: start_node(node, *arguments) for case, (node, arguments, _) in REFUSED.items()}
     started['file'] = start_node('recorder', '--params-file', file)
     return {case: node.finish() for case, node in started.items()}
+
+
+def test_a_parameter_file_holds_in_any_namespace(start_node, connect, tmp_path, one_line):
+    """With sections as the product writes them; a node that finds nothing for itself says so and goes on."""
+    files = {name: tmp_path / f'{name}.yaml' for name in ('everywhere', 'nowhere')}
+    files['everywhere'].write_text(parameter_file.text({'ins': {'methd': 'oba'}}))
+    files['nowhere'].write_text('ins:\n  ros__parameters:\n    methd: oba\n')
+    started = {name: start_node('ins', '-r', '__ns:=/ship', '--params-file', file) for name, file in files.items()}
+    refused = started['everywhere'].finish()
+    assert refused.returncode == 1 and "unknown parameter 'methd'; did you mean 'method'?" in one_line(refused.stderr)
+    client = connect(started['nowhere'].domain_id)
+    client.until(lambda: ('ins', '/ship') in client.node.get_node_names_and_namespaces())
+    started['nowhere'].process.send_signal(signal.SIGINT)
+    ended = started['nowhere'].finish()
+    assert ended.returncode == 0 and 'no parameter of /ship/ins is in the parameter file' in one_line(ended.stderr)
 
 
 @pytest.mark.parametrize('case', [*REFUSED, 'file'])

@@ -46,8 +46,8 @@ def told(output, metric):
 def written(file):
     """{parameter: value} of the ACU."""
     tree = yaml.safe_load(file.read_text())
-    assert list(tree) == ['acu']
-    return tree['acu']['ros__parameters']
+    assert list(tree) == ['/**/acu']
+    return tree['/**/acu']['ros__parameters']
 
 
 @pytest.fixture

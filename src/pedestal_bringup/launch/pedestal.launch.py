@@ -19,7 +19,7 @@ def start(context):
     chosen = scenario.load(given['scenario'], pacing=given['pacing'] or None,
                            duration=float(given['duration']) if given['duration'] else None)
     file = pathlib.Path(tempfile.mkdtemp(prefix='pedestal-')) / 'parameters.yaml'
-    file.write_text(graph.parameter_file(chosen, given['bag'] or graph.free_bag(chosen.name),
+    file.write_text(graph.parameters_of_all(chosen, given['bag'] or graph.free_bag(chosen.name),
                                          graph.begins(chosen)))
     actions = []
     for name in chosen.nodes:

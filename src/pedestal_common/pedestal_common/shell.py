@@ -185,6 +185,9 @@ class Shell(Node):
         self.parameters = parameters.build(self._parameters_type, {**own, **dict.fromkeys(unknown)})
         self.graph = parameters.build(GraphParameters, graph, 'graph.')
         self.parameters.check_graph(self.graph.beams)
+        if '--params-file' in sys.argv and not self._parameter_overrides:
+            self.get_logger().warning(f'no parameter of {self.get_fully_qualified_name()} is in the parameter file: a '
+                                      'section /**/NODE is for a node in any namespace, NODE for one in none')
         if live:
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)

@@ -9,12 +9,12 @@ import time
 
 import numpy as np
 import rclpy
-import yaml
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import Trigger
 
 from pedestal_bringup.again import difference, recompute
+from pedestal_bringup.run import parameter_file
 from pedestal_bringup.run.graph import Operator, sole_run
 from pedestal_bringup.run.processes import RunError, command_line
 from pedestal_common import middleware, nodes, parameters, records
@@ -117,7 +117,7 @@ def _run(recording, done, params, folder):
     names = _graph(recording, done.unit)
     values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(names),
               'graph.beams': recording.bag.beams}
-    file.write_text(yaml.safe_dump({done.node: {'ros__parameters': values}}))
+    file.write_text(parameter_file.text({done.node: values}))
     inputs = [name for name in done.unit.reads if recording.feeds(name) and name not in done.unit.NODE.writes]
     feeder = Feeder(done.node, inputs, done.outputs)
     with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:

@@ -15,12 +15,11 @@ import dataclasses
 import time
 
 import numpy as np
-import yaml
 
 from pedestal_bringup.again import difference
 from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import scenario
-from pedestal_common import messages, nodes, parameters, plain_yaml, records, topics
+from pedestal_bringup.run import parameter_file, scenario
+from pedestal_common import messages, nodes, parameters, records, topics
 from pedestal_common.steps import SECOND, GraphError, Steps
 from pedestal_common.unit import announced
 
@@ -344,26 +343,14 @@ def chosen(recording, names, file_values):
 def file_parameters(path, beam=''):
     """{node: {dotted name: value}} of a ROS 2 parameter file or a scenario, of several beams those of one ('beam_2/').
 
-    Raises ScenarioError.
+    Raises ScenarioError or ParameterFileError.
     """
-    try:
-        tree = plain_yaml.read(path)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise RecomputeError(f'--params-file {path}: {plain_yaml.problem(error)}') from None
-    if not isinstance(tree, dict):
-        raise RecomputeError(f'--params-file {path}: must hold a section for a node')
-    if 'scenario' in tree and 'recorder' not in tree:
+    sections = parameter_file.read(path)
+    if 'scenario' in sections and 'recorder' not in sections:
         chosen = scenario.load(str(path))
         return {node: chosen.given(beam + node if nodes.row(node).of_beam else node) for node in chosen.values
                 if not nodes.beam_of(node)}
-    sections = {}
-    for name, body in tree.items():
-        node = name.removeprefix(beam)
-        if node in UNITS:
-            if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
-                raise RecomputeError(f'--params-file {path}: section {node} must hold ros__parameters')
-            sections[node] = scenario.dotted(body['ros__parameters'])
-    return sections
+    return {node: values for name, values in sections.items() if (node := name.removeprefix(beam)) in UNITS}
 
 
 def overrides(texts, names):

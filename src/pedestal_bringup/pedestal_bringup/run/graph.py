@@ -9,11 +9,10 @@ import socket
 import time
 
 import rclpy
-import yaml
 from rclpy.executors import SingleThreadedExecutor
 
 from pedestal_bringup.bags import configuration
-from pedestal_bringup.run import lockstep, supervisor
+from pedestal_bringup.run import lockstep, parameter_file, supervisor
 from pedestal_bringup.run.operator_node import Operator, another_graph
 from pedestal_bringup.run.processes import Graph, log_folder
 from pedestal_bringup.run.program import program_messages
@@ -50,7 +49,7 @@ def begins(scenario):
     return time.time_ns() + round(START_TIME * SECOND) if scenario.header.pacing == 'realtime' else 0
 
 
-def parameter_file(scenario, bag, start):
+def parameters_of_all(scenario, bag, start):
     """The scenario as a ROS 2 parameter file, every node told of the graph it is in. start: graph.start [ns UTC]."""
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
@@ -59,7 +58,7 @@ def parameter_file(scenario, bag, start):
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
     if start and not scenario.header.beam:
         sections[nodes.DRIVE].setdefault('state_file', str(log_folder(bag) / f'{nodes.DRIVE}.state'))
-    return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()})
+    return parameter_file.text(sections)
 
 
 @contextlib.contextmanager
@@ -99,7 +98,7 @@ def run(scenario, bag, progress):
 
 
 def _in_lockstep(graph, operator, tracks, progress):
-    graph.write(parameter_file(graph.scenario, graph.bag, 0))
+    graph.write(parameters_of_all(graph.scenario, graph.bag, 0))
     with graph:
         try:
             lockstep.watch(graph, operator, tracks, progress)
@@ -112,7 +111,7 @@ def _in_lockstep(graph, operator, tracks, progress):
 def _in_realtime(graph, operator, tracks, progress):
     supervisor.prepare(graph.scenario)
     start = begins(graph.scenario)
-    graph.write(parameter_file(graph.scenario, graph.bag, start))
+    graph.write(parameters_of_all(graph.scenario, graph.bag, start))
     for track in tracks.values():
         messages.put_stamp(track.header.stamp, start)
     with graph:

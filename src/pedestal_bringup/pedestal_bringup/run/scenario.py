@@ -1,8 +1,8 @@
 """Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
 
-`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged, but for an array of
-several beams: its nodes are `/beam_1/acu` and so on, which the section `acu` does not match. They take the file that
-`pedestal run` leaves beside the bag, parameters.yaml.
+`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged, in any namespace
+where its sections are called /**/NODE, but without what several nodes must agree on (_spread). That is in the file
+that `pedestal run` leaves beside the bag, parameters.yaml.
 """
 import contextlib
 import dataclasses
@@ -13,6 +13,7 @@ import pathlib
 import numpy as np
 import yaml
 
+from pedestal_bringup.run import parameter_file
 from pedestal_common import files, nodes, parameters, plain_yaml, topics
 from tracking_receiver_sim import receiver
 
@@ -173,16 +174,6 @@ def _text(name_or_path):
     return name_or_path, entry.read_text()
 
 
-def dotted(tree, prefix=''):
-    flat = {}
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            flat.update(dotted(value, f'{prefix}{key}.'))
-        else:
-            flat[f'{prefix}{key}'] = value
-    return flat
-
-
 def _whole(sections, node):
     """The values of a node, what holds for every beam first."""
     return {**sections.get(nodes.plain(node), {}), **sections.get(node, {})}
@@ -197,17 +188,17 @@ def _sections(name, content):
         tree = plain_yaml.parse(content)
     except yaml.YAMLError as error:
         raise ScenarioError(f'scenario {name}: {plain_yaml.problem(error)}') from None
-    if not isinstance(tree, dict) or 'scenario' not in tree:
+    if not isinstance(tree, dict) or 'scenario' not in map(parameter_file.node_of, tree):
         raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
     sections = {}
-    for section, body in tree.items():
+    for section, body in ((parameter_file.node_of(section), body) for section, body in tree.items()):
         if section != 'scenario' and not _is_node(section):
             raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(RUN)}')
         whole = isinstance(body, dict) and list(body) == ['ros__parameters']
         values = body['ros__parameters'] or {} if whole else None
         if not isinstance(values, dict):
             raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
-        sections[section] = dotted(values)
+        sections[section] = parameter_file.dotted(values)
     return sections
 
 
@@ -236,19 +227,8 @@ def parse_override(text):
 
 def file_overrides(path):
     """Texts 'node.key=value' of a ROS 2 parameter file."""
-    try:
-        tree = plain_yaml.read(path)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ScenarioError(f'--params-file {path}: {plain_yaml.problem(error)}') from None
-    if not isinstance(tree, dict) or not tree:
-        raise ScenarioError(f'--params-file {path}: must hold a section for a node')
-    texts = []
-    for node, body in tree.items():
-        if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
-            raise ScenarioError(f'--params-file {path}: section {node} must hold ros__parameters')
-        texts += [f'{node}.{key}={json.dumps(value, ensure_ascii=False)}'
-                  for key, value in dotted(body['ros__parameters']).items()]
-    return texts
+    return [f'{node}.{key}={json.dumps(value, ensure_ascii=False)}'
+            for node, values in parameter_file.read(path).items() for key, value in values.items()]
 
 
 def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):

@@ -16,7 +16,6 @@ import math
 import pathlib
 
 import numpy as np
-import yaml
 
 from acu_tracker.estimation.kinds import KINDS
 from acu_tracker.modes import AUTOTRACK, STANDBY
@@ -26,7 +25,7 @@ from pedestal_bringup.again import recompute, what_if
 from pedestal_bringup.analysis import identification
 from pedestal_bringup.analysis.tracking import SETTLING
 from pedestal_bringup.bags import configuration
-from pedestal_bringup.run import closed_loop, scenario
+from pedestal_bringup.run import closed_loop, parameter_file, scenario
 from pedestal_bringup.trials import tuning
 from pedestal_common import layouts, parameters, records, topics
 from pedestal_common.steps import SECOND
@@ -257,8 +256,7 @@ def main(options, command, progress):
     old, new = source.score(source.params), source.score(params)
     lines = [*_table(source, old, new, axes), *_remarks(source, old, new, axes, settings)]
     made = [f'made by: {" ".join(command.split())}', f'git {configuration.git_revision() or "unknown"}', *lines]
-    file.write_text(''.join(f'# {line}\n' for line in made) + yaml.safe_dump(
-        {'acu': {'ros__parameters': settings}}, sort_keys=False))
+    file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text({'acu': settings}))
     values = [f'{name:48} {value}' for name, value in settings.items()]
     hint = f'pedestal run ... --params-file {file}'
     if not source.of_beams:
