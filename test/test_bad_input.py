@@ -105,6 +105,15 @@ def test_track_file_that_is_not_there(capsys, one_line, tmp_path):
     assert 'path' in refused(capsys, one_line, 'run', 'track_file', '--bag', tmp_path / 'bag2')
 
 
+def test_recorded_ship_is_read_before_the_run(capsys, one_line, tmp_path):
+    (tmp_path / 'ship.csv').write_text('time,roll\n0,1\n')
+    changes = ('motion=recorded', 'heading_deg=0', 'sea_state=0', 'speed=0', f'recorded.path={tmp_path}/ship.csv')
+    line = refused(capsys, one_line, 'run', 'ship_pass', '--bag', tmp_path / 'bag',
+                   *(part for change in changes for part in ('--param', f'ship_motion.ship.{change}')))
+    assert f"{tmp_path}/ship.csv: line 1: column 'time_s' is missing" in line
+    assert not (tmp_path / 'bag.log').exists()
+
+
 def test_tle_with_a_bad_checksum(capsys, one_line, tmp_path):
     line_1 = '1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9992'
     line = refused(capsys, one_line, 'run', 'leo_pass', '--bag', tmp_path / 'bag', '--param',

@@ -18,6 +18,7 @@ from pedestal_bringup.run.processes import Graph, log_folder
 from pedestal_bringup.run.program import program_messages
 from pedestal_common import messages, middleware, nodes
 from pedestal_common.steps import SECOND
+from ship_motion_sim import motion
 
 START_TIME = 5.0
 """Seconds from the start of the nodes of a realtime run to the beginning of its time: a warm start takes two of them.
@@ -82,7 +83,10 @@ def run(scenario, bag, progress):
     then stays readable.
     """
     realtime = scenario.header.pacing == 'realtime'
+    # The files of the target and of the ship are read before anything is started.
     tracks = program_messages(scenario)
+    if 'ship_motion' in scenario.nodes:
+        motion.constants(scenario.node_parameters('ship_motion').ship)
     graph = Graph(scenario, bag)
     middleware.initialise([])
     try:
