@@ -1,5 +1,6 @@
 """Lists on terminals of all widths, and in a pipe."""
 import os
+import subprocess
 import sys
 
 import pytest
@@ -26,3 +27,12 @@ def test_in_a_pipe_a_row_is_a_line(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 3 and lines[0].endswith(ROWS[0][-1])
     assert [line.index(row[1] or row[2]) for line, row in zip(lines, ROWS)][0] == len(ROWS[1][0]) + 2
+
+
+@pytest.mark.parametrize('command', [['scenarios'], ['study'], ['parameters', 'scenario'], ['parameters', 'recorder']])
+def test_a_verb_that_computes_nothing_imports_no_compiler(command):
+    """Nor ROS: each takes longer than the verb itself."""
+    code = ('import sys; from pedestal_bringup import cli; assert cli.main(sys.argv[1:]) == 0; '
+            'sys.stderr.write(", ".join({"numba", "rclpy", "scipy"} & set(sys.modules)))')
+    done = subprocess.run([sys.executable, '-c', code, *command], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, '')

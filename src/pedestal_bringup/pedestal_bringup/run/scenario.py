@@ -15,7 +15,6 @@ import yaml
 
 from pedestal_bringup.run import parameter_file
 from pedestal_common import files, nodes, parameters, plain_yaml, topics
-from tracking_receiver_sim import receiver
 
 
 @dataclasses.dataclass(frozen=True)
@@ -310,6 +309,8 @@ def _spread(name, sections, header, seed):
         if key in sections[owner]:
             sections[node].setdefault(known_as, sections[owner][key])
     if header.beam:
+        # Only here, because its laws take half a second to import.
+        from tracking_receiver_sim import receiver
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
         for prefix in nodes.prefixes(header.graph_beams):
             tracking = _checked(name, f'{prefix}tracking_receiver', nodes.row('tracking_receiver').parameters_type(),

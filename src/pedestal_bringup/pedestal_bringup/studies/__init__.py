@@ -6,7 +6,9 @@ and is `run(progress, runs=RUNS, pool=None)`: pool is a monte_carlo.Pool; withou
 process. `rigs` holds what several studies use. A case that is a scenario with parameters can be run through the nodes
 as well: `pedestal run SCENARIO --param ...`.
 """
+import ast
 import importlib
+import pathlib
 import pkgutil
 
 NAMES = tuple(module.name.replace('_', '-') for module in pkgutil.iter_modules(__path__) if not module.ispkg)
@@ -18,5 +20,6 @@ def study(name):
 
 
 def descriptions():
-    """{name of a study: one line}."""
-    return {name: study(name).__doc__.partition('\n')[0] for name in NAMES}
+    """{name of a study: one line}, read from the files: to import them all takes two seconds."""
+    files = {name: pathlib.Path(__file__).with_name(f'{name.replace("-", "_")}.py') for name in NAMES}
+    return {name: ast.get_docstring(ast.parse(file.read_text())).partition('\n')[0] for name, file in files.items()}

@@ -10,9 +10,10 @@ def add_arguments(parser):
 def main(options):
     """Print a row for each parameter of the node, and for those of the graph that every node has."""
     from pedestal_bringup.run import scenario
-    from pedestal_common import parameters, shell
+    from pedestal_common import parameters
+    from pedestal_common.graph_parameters import GraphParameters
     rows = []
-    for prefix, parameters_type in (('', scenario.parameters_of(options.node)), ('graph.', shell.GraphParameters)):
+    for prefix, parameters_type in (('', scenario.parameters_of(options.node)), ('graph.', GraphParameters)):
         values = parameters.defaults(parameters_type)
         rows += [(prefix + name, *_columns(field.metadata, values[name]))
                  for name, field in parameters.flatten(parameters_type)]

@@ -1,0 +1,42 @@
+"""What every node is told about its graph (ROS parameters `graph.*`). No ROS here."""
+import dataclasses
+
+from pedestal_common import nodes, parameters
+from pedestal_common.nodes import MAX_BEAMS
+from pedestal_common.steps import SECOND
+
+
+@dataclasses.dataclass(frozen=True)
+class GraphParameters(parameters.Parameters):
+    """What every node is told about the run (ROS parameters `graph.*`)."""
+    pacing: str = parameters.choice('realtime', ('lockstep', 'realtime'), 'who waits for whom')
+    nodes: str = parameters.text('', 'names of the nodes of this run, comma separated; each waits for its readers '
+                                 'among them')
+    beams: int = parameters.parameter(0, 0, MAX_BEAMS, '', 'beams of an electronic array, each of several in '
+                                      'its namespace beam_i; 0: a drive with motors')
+    deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
+    start: int = parameters.parameter(0, 0, 2**31 * SECOND, 'ns', 'realtime: UTC at which the time of the scenario is '
+                                      '0; 0: the day begins')
+    future: float = parameters.parameter(0.05, 1e-3, 10.0, 's', 'realtime: a stamp further ahead of the time of this '
+                                         'node is refused')
+    silence: float = parameters.parameter(0.2, 0.02, 60.0, 's', 'realtime: a node without its first input for this '
+                                          'long says so')
+
+    def check(self):
+        for name in self._names:
+            if name not in nodes.NAMES:
+                raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}' is none of "
+                                                f'{", ".join(nodes.NAMES)}')
+
+    @property
+    def members(self):
+        """`nodes` as a tuple, with the nodes of every beam."""
+        return nodes.members(self._names, self.beams)
+
+    @property
+    def _names(self):
+        return tuple(name for name in self.nodes.replace(' ', '').split(',') if name)
+
+    @property
+    def lockstep(self):
+        return self.pacing == 'lockstep'
