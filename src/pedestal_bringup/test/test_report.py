@@ -197,7 +197,8 @@ def test_numbers_are_those_of_the_summary(page, whole):
     assert read("loop rate achieved (drive's time)") == pytest.approx([200.0])
     assert read('torque of motor 1, rms of the run') == [15.0, 13.0]
     assert read('load torque, rms of the run') == [100.0, 50.0]
-    assert rows['lost steps'] == ['0'] and rows['steps'] == [str(STEPS)]
+    assert rows['lost steps, made by the drive without the command for them'] == ['0']
+    assert rows['steps missing in the recording'] == ['0'] and rows['steps'] == [str(STEPS)]
     assert rows['recording'][0].startswith('complete')
 
 
@@ -277,7 +278,7 @@ def test_drive_that_gives_no_torque(tmp_path):
 
 def test_lost_steps_are_shown(tmp_path):
     page = page_of(make_bag(tmp_path / 'holes', steps=300, skip=(100, 101, 102)))
-    assert page.rows['lost steps'] == ['3']
+    assert page.rows['steps missing in the recording'] == ['3']
     assert 'gaps' in page.ids
     assert 'joint_states: missing 3 steps from 0.500000 to 0.510000 s' in page.text
 

@@ -142,10 +142,12 @@ def _loop(bag, check):
                      ['jitter of the step, wall time',
                       f'{tracking.rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
                       f'largest {np.abs(jitter).max():.3g} ms']]
-    lost = max([check.steps - topic.count for topic in check.topics
-                if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],
-               default=0)
-    return [*rows, ['steps', f'{check.steps}'], ['lost steps', check.lost_steps or f'{max(lost, 0)}'],
+    missing = max([check.steps - topic.count for topic in check.topics
+                   if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],
+                  default=0)
+    return [*rows, ['steps', f'{check.steps}'],
+            ['lost steps, made by the drive without the command for them', check.lost_steps or '0'],
+            ['steps missing in the recording', f'{max(missing, 0)}'],
             ['recording', 'complete, every step once and in order' if check.complete else
              'NOT complete, see below']]
 
