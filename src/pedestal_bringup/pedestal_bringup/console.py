@@ -9,6 +9,7 @@ import textwrap
 
 EXIT_STOPPED = 130
 EXIT_WRONG_COMMAND = 2
+EXIT_DISTURBED = 3
 
 STDOUT = pathlib.Path('/dev/stdout')
 """What --json - stands for."""

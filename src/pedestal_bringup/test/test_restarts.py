@@ -1,5 +1,5 @@
 """Which node is started again and when, and who counts as silent: decisions without processes and without a clock."""
-from pedestal_bringup.run.restarts import Restarts, Silence
+from pedestal_bringup.run.restarts import Losses, Restarts, Silence
 
 
 def test_a_node_starts_again_at_once_and_then_later_and_later():
@@ -65,3 +65,27 @@ def test_nobody_is_silent_because_the_listener_slept():
         silence.look(now)
     assert silence.longer_than(5.0, 45.0) == []
     assert silence.longer_than(5.0, 45.1) == ['acu']
+
+
+def test_steps_lost_for_a_death_do_not_count():
+    losses = Losses()
+    for number, now in ((0, 1.0), (4, 2.0), (4, 3.0)):
+        losses.note(number, now)
+    assert losses.count == 4
+    losses.died(3.5)
+    losses.note(300, 4.5)
+    losses.note(420, 8.4)
+    assert losses.count == 4
+    losses.note(421, 9.4)
+    assert losses.count == 5
+
+
+def test_a_drive_that_is_started_anew_counts_from_0():
+    losses = Losses()
+    losses.note(50, 1.0)
+    losses.died(2.0)
+    losses.note(7, 4.0)
+    losses.note(9, 8.0)
+    assert losses.count == 52
+    losses.note(3, 20.0)
+    assert losses.count == 55

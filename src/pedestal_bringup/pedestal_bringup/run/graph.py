@@ -28,10 +28,11 @@ Who comes later has lost steps, no more."""
 @dataclasses.dataclass
 class Outcome:
     """What a run says of itself: the last JSON line of the drive and of the recorder, {} of one that left none; how
-    often a node was started again; whether the user stopped it."""
+    often a node was started again; the steps that the drive lost beside; whether the user stopped it."""
     drive: dict
     recorder: dict
     restarts: int = 0
+    losses: int = 0
     stopped: bool = False
 
 
@@ -127,7 +128,8 @@ def _in_realtime(graph, operator, tracks, progress):
             stopped = True
         graph.stop()
         recorder = graph.result('recorder') if stopped else graph.outcome('recorder')
-        return Outcome(graph.result(nodes.DRIVE), recorder, supervised.restarts.count, stopped)
+        return Outcome(graph.result(nodes.DRIVE), recorder, supervised.restarts.count, supervised.losses.count,
+                       stopped)
 
 
 def send_program(scenario, start=None) -> int:

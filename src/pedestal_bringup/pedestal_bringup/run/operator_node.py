@@ -16,8 +16,8 @@ ANSWER_TIME = 2.0
 
 class Operator(Shell):
     """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of its nodes:
-    on_diagnostics(node, monotonic time [s]) is called for each. names: of these nodes; what others publish there does
-    not count.
+    on_diagnostics(status, monotonic time [s]) is called for each DiagnosticStatus. names: of these nodes; what others
+    publish there does not count.
     """
 
     def __init__(self, beams=0, names=()):
@@ -26,7 +26,7 @@ class Operator(Shell):
         self._names = frozenset(names)
         self.time = 0.0
         self.latest = {}
-        self.on_diagnostics = self.latest.__setitem__
+        self.on_diagnostics = lambda status, now: None
         self._writers = {}
         self.message_reader('diagnostics', self._take)
 
@@ -64,7 +64,8 @@ class Operator(Shell):
         for status in array.status:
             if status.name in self._names:
                 self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
-                self.on_diagnostics(status.name, time.monotonic())
+                self.latest[status.name] = time.monotonic()
+                self.on_diagnostics(status, self.latest[status.name])
 
     def silent(self, limit):
         """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""

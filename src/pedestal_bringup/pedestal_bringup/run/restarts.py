@@ -1,5 +1,6 @@
 """When a node that died is started again, and when it has died too often. No processes here, and no clock."""
 import collections
+import math
 
 
 class Restarts:
@@ -33,6 +34,26 @@ class Restarts:
         for node in ready:
             del self._due[node]
         return ready
+
+
+class Losses:
+    """Steps that the drive lost outside the RECOVERY after a death, from the number it tells, on the same clock."""
+    RECOVERY = 5.0
+    """Time after a death in which steps are lost because of it [s]: all is well within 2.3 (docs/reliability.md)."""
+
+    def __init__(self):
+        self.count = 0
+        self._last, self._until = 0, -math.inf
+
+    def died(self, now):
+        """Some node has died."""
+        self._until = now + self.RECOVERY
+
+    def note(self, number, now):
+        """The drive says how many it has lost so far; one that was started anew begins at 0."""
+        if now > self._until:
+            self.count += number - (self._last if number >= self._last else 0)
+        self._last = number
 
 
 class Silence:

@@ -8,7 +8,7 @@ import time
 from rclpy.executors import SingleThreadedExecutor
 
 from pedestal_bringup.run.processes import RunError, how
-from pedestal_bringup.run.restarts import Restarts, Silence
+from pedestal_bringup.run.restarts import Losses, Restarts, Silence
 from pedestal_common import nodes
 from pedestal_common.compiled import is_compiled
 from pedestal_common.steps import SECOND
@@ -57,7 +57,7 @@ class Supervisor:
         self._start, self._end = start, start + round(header.duration * SECOND)
         self._limits = header.restart
         self.restarts = Restarts(self._limits.attempts, self._limits.within, self._limits.delay)
-        self._silence = Silence()
+        self._silence, self.losses = Silence(), Losses()
         self._called = set()
         self._dead = set()
         operator.on_diagnostics = self._note
@@ -109,6 +109,7 @@ class Supervisor:
         self._dead.add(node)
         self._called.discard(node)
         self._silence.forget(node)
+        self.losses.died(now)
         number = self.restarts.died(node, now)
         if not number:
             raise RunError(self._graph.obituary(node, f'{reason}, after {limits.attempts} starts within '
@@ -116,8 +117,13 @@ class Supervisor:
         report(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
                f'within {limits.within:g} s')
 
-    def _note(self, node, now):
+    def _note(self, status, now):
+        node = status.name
         self._silence.note(node, now)
+        if node == nodes.DRIVE:
+            for value in status.values:
+                if value.key == 'lost_steps' and value.value.isdecimal():
+                    self.losses.note(int(value.value), now)
         if node in self._called:
             self._called.discard(node)
             report(f'{node} is heard again')

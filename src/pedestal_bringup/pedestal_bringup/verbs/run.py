@@ -1,4 +1,7 @@
-"""run a scenario as separate nodes and record it"""
+"""run a scenario as separate nodes and record it
+
+Exit code 0; 1 where it cannot run, or the recording is not complete; 3 where a realtime run ended before its planned
+end, or its drive lost more than 1 % of its steps outside announced restarts; 130 where it was stopped."""
 import pathlib
 import sys
 
@@ -20,12 +23,17 @@ def add_arguments(parser):
                         '`pedestal tune`')
 
 
+LARGEST_LOSS = 0.01
+"""Share of its steps that a drive in realtime may lose, beside those of an announced restart."""
+
+
 def main(options):
-    """Run, record and print the results; raises RuntimeError where the recording is not complete."""
+    """Run, record and print the results; the exit code. Raises RuntimeError where the recording is not complete."""
     from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read
     from pedestal_bringup.bags.verify import verify
     from pedestal_bringup.run import graph, scenario
+    from pedestal_common import nodes
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
     chosen = scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
     bag = arguments.new_bag(options.bag, chosen.name)
@@ -52,9 +60,16 @@ def main(options):
     if outcome.stopped:
         return console.EXIT_STOPPED
     check = verify(bag)
-    if check.aborted or not (check.complete or outcome.restarts):
+    if not realtime and check.aborted or not (check.complete or outcome.restarts):
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     if not check.complete:
         print('pedestal: the recording has gaps, a node was started again:\n' + '\n'.join(check.problems),
               file=sys.stderr)
-    return 0
+    planned = chosen.header.duration / chosen.node_parameters(nodes.DRIVE).period
+    disturbed = [check.ending] if check.aborted else []
+    if outcome.losses > LARGEST_LOSS * planned:
+        disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than {LARGEST_LOSS:.0%}, '
+                         'outside announced restarts')
+    for reason in disturbed:
+        print(f'pedestal: {reason}', file=sys.stderr)
+    return console.EXIT_DISTURBED if disturbed else 0
