@@ -215,7 +215,7 @@ def test_what_is_open_follows_from_the_file(tmp_path):
     path.write_text('time_s,latitude_deg,longitude_deg,altitude_m\n' + '\n'.join(rows))
     target = TargetParameters(kind='track_file', track_file=TrackFileParameters(path=str(path), start=9.5))
     found = place.left_open(target, set())
-    assert tuple(found) == place.OPEN and found['duration'] == 109.5
+    assert tuple(found) == place.OPEN and found['duration'] == 109.4
     station = StationParameters(*(found[name] for name in place.STATION))
     assert station == place.beside(logs.read(target.track_file), target.track_file)
     there = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height).itrs_xyz.m

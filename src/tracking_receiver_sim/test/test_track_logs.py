@@ -221,6 +221,12 @@ def test_too_many_rows(tmp_path, monkeypatch):
         assert 'must be at most 5 rows' in refused(tmp_path, log()), name
 
 
+def test_too_many_aircraft(tmp_path, monkeypatch):
+    monkeypatch.setattr(fixes, 'MOST_AIRCRAFT', 3)
+    message = refused(tmp_path, traffic(tuple(f'{k:06x},' for k in range(50))), aircraft='000001')
+    assert 'must be at most 3 aircraft' in message
+
+
 def test_a_text_as_long_as_the_file_is_cut(tmp_path):
     got = read(tmp_path, gpx((f'{"n" * 3_000_000}',)))
     assert len(got.time) == N and len(got.said) < 200

@@ -18,6 +18,9 @@ BEGINNING = 4096
 LISTED = 12
 """Aircraft that are named where a file holds several."""
 
+MOST_AIRCRAFT = 10_000
+"""Of a file."""
+
 LEAST = 4
 """Fixes of a track."""
 
@@ -58,6 +61,8 @@ def read(track) -> Fixes:
     for line, who, *fix in _reader(track.path)(track.path, log):
         if len(numbers) >= 6 * csv_table.MOST_ROWS:
             raise csv_table.too_long(track.path, line)
+        if len(names) > MOST_AIRCRAFT:
+            raise csv_table.TableError(f'{track.path}: line {line}: must be at most {MOST_AIRCRAFT} aircraft')
         number, known_as = names.setdefault(who[:1], (len(names), set()))
         known_as.update(who)
         numbers.extend((line, number, *fix))
@@ -98,7 +103,7 @@ def _chosen(track, names):
 
 
 def _label(known_as):
-    return ' '.join(sorted(name[:40] for name in known_as if name))
+    return ' '.join(sorted(name[:40] for name in known_as if name)[:LISTED])
 
 
 def _passed_over(log):

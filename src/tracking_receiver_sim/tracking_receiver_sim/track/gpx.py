@@ -9,8 +9,8 @@ from xml.parsers import expat
 from pedestal_common import csv_table, files
 from tracking_receiver_sim.track import instant
 
-PIECE = 1 << 16
-"""Bytes that are parsed at once."""
+PIECE = 1 << 20
+"""Bytes that are parsed at once; expat reads a token that is not complete again with each piece."""
 
 DEEPEST, LONGEST = 100, 200
 """Elements within each other, and characters of a text that is read; a longer one is cut."""

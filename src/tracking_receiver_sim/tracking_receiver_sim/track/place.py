@@ -66,7 +66,8 @@ def left_open(target, said):
     """{name of OPEN: value} that follow from the file of a TargetParameters; said: the names that are given, of which
     only those of the station matter here. Raises csv_table.TableError.
 
-    The C/N0 holds at the greatest range, so that it is nowhere less; the run ends with the flight.
+    The C/N0 holds at the greatest range, so that it is nowhere less; the run ends at the last tenth of a second before
+    the last fix.
     """
     fixes = logs.read(target.track_file)
     found = beside(fixes, target.track_file)
@@ -74,4 +75,4 @@ def left_open(target, said):
                                                      if name not in said})
     laid = flight.lay_out(fixes, target.track_file, station)
     return dict(zip(OPEN, (*dataclasses.astuple(station), max(10.0, 10.0 * math.ceil(0.1 * laid.greatest_range)),
-                           min(LONGEST, math.floor(1e3 * laid.breaks[-1]) / 1e3))))
+                           min(LONGEST, (math.ceil(10.0 * laid.breaks[-1]) - 1) / 10.0))))
