@@ -22,7 +22,7 @@ from tracking_receiver_sim import geodesy
 from tracking_receiver_sim.track import fixes as logs
 from tracking_receiver_sim.track import instant
 
-SAMPLES = 8
+SAMPLES = 4
 """Of a piece of the spline, for peak speed and range."""
 
 STEPS = (('100 ft', 30.48), ('25 ft', 7.62))
