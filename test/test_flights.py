@@ -50,7 +50,7 @@ def test_the_flight_is_in_the_diagnostics_of_the_receiver(adsb):
     unit = scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH]).unit('tracking_receiver')
     values = dict(unit.diagnose().values)
     assert values['stamp_0_utc'] == '2018-07-23T10:00:00.000Z'
-    assert (values['track_log'], values['track_path']) == unit.target.summary
+    assert (values['track_log'], values['track_flight']) == unit.target.summary
 
 
 def test_what_is_raw_and_impossible_is_refused(adsb):

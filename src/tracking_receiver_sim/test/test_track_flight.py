@@ -170,7 +170,8 @@ def test_quantisation_is_stated():
     coarse = circle()
     coarse.altitude[:] = np.round(7.62 * (80 + np.arange(120) // 3), 1)
     laid = flight.lay_out(coarse, track(max_acceleration=100.0), STATION)
-    assert 'times in whole seconds (up to 2' in laid.summary[0] and 'altitudes in steps of 25 ft' in laid.summary[0]
+    assert 'times in whole seconds (half of one is up to 2' in laid.summary[0]
+    assert 'altitudes in steps of 25 ft' in laid.summary[0]
     fine = flight.lay_out(noisy(sigma=0.0), track(), STATION).summary[0]
     assert 'whole seconds' not in fine and 'steps' not in fine
 

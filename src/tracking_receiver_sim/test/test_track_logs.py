@@ -209,10 +209,30 @@ BOMB = ('<?xml version="1.0"?>\n<!DOCTYPE gpx [<!ENTITY a "aaaaaaaaaa">' + ''.jo
     (nmea([gga(k, time='100001' if k == 2 else None) for k in range(N)]), '4: time = 2018-07-23T10:00:01.000Z: 0 s'),
     (nmea([gga(k, quality='0') for k in range(N)]), '0 rows, must be at least 4, passed over 8 x GGA without a fix'),
     ('$' + 'x' * 5000, 'line 1: longer than 1024 characters'),
+    (gpx().replace('UTF-8', 'UTF-9').replace('Rega', '\udce4').encode(errors='surrogateescape'), 'line 4: not well'),
     (b'$\xff\xfe', '0 rows'), (b'<gpx>\xff', 'line 1: not well-formed XML'),
     (gpx().encode('utf-16'), 'not a CSV text file')])
 def test_bad_logs(tmp_path, content, message):
     assert message in refused(tmp_path, content)
+
+
+@pytest.mark.parametrize('name', LOGS)
+def test_a_damaged_log_is_read_or_refused_by_one_line(tmp_path, name):
+    """Some bytes of a sound log become others; beside TableError nothing may be raised."""
+    random, content = np.random.default_rng(1), LOGS[name]().encode()
+    odd = np.frombuffer(b'0123456789.,-+eEnaif<>"\'&;:TZ*$\n\x00\xff NSEW/', np.uint8)
+    outcomes = set()
+    for _ in range(200):
+        damaged = np.frombuffer(content, np.uint8).copy()
+        count = random.integers(1, 6)
+        damaged[random.integers(0, len(damaged), count)] = random.choice(odd, count)
+        try:
+            read(tmp_path, damaged.tobytes())
+            outcomes.add('read')
+        except csv_table.TableError as error:
+            assert str(error).startswith(f'{tmp_path}/flight.log: ') and '\n' not in str(error)
+            outcomes.add('refused')
+    assert outcomes == {'read', 'refused'}
 
 
 def test_too_many_rows(tmp_path, monkeypatch):

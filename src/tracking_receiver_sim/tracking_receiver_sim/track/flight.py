@@ -113,7 +113,7 @@ def _quantisation(fixes, speed):
     whole = bool((fixes.time == np.round(fixes.time)).all())
     steps = next((name for name, step in STEPS if len(np.unique(fixes.altitude)) >= 3 and
                   np.abs(fixes.altitude - step * np.round(fixes.altitude / step)).max() < WITHIN), None)
-    return ((f', times in whole seconds (up to {0.5 * speed:.2g} m along the track)' if whole else '')
+    return ((f', times in whole seconds (half of one is up to {0.5 * speed:.2g} m)' if whole else '')
             + (f', altitudes in steps of {steps}' if steps else ''))
 
 

@@ -46,7 +46,7 @@ class _Points:
         self.path, self.log = path, log
         self.path_of_elements, self.texts, self.fixes = [], {}, []
         self.tracks, self.track, self.with_ele = 0, '', False
-        self.parser = expat.ParserCreate()
+        self.parser = expat.ParserCreate('UTF-8')  # whatever the file calls its encoding
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self.doctype
         self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end

@@ -24,7 +24,7 @@ BELOW = 0.1
 """Of the least range."""
 LOWEST, HIGHEST = -500.0, 3000.0
 """Of the station [m]."""
-LONGEST = 86400.0
+SHORTEST, LONGEST = 0.1, 86400.0
 """Run [s]."""
 
 STATION = {f'target.station.{field.name}': field.name for field in dataclasses.fields(StationParameters)}
@@ -74,5 +74,6 @@ def left_open(target, said):
     station = dataclasses.replace(target.station, **{field: getattr(found, field) for name, field in STATION.items()
                                                      if name not in said})
     laid = flight.lay_out(fixes, target.track_file, station)
-    return dict(zip(OPEN, (*dataclasses.astuple(station), max(10.0, 10.0 * math.ceil(0.1 * laid.greatest_range)),
-                           min(LONGEST, (math.ceil(10.0 * laid.breaks[-1]) - 1) / 10.0))))
+    reference_range = max(10.0, 10.0 * math.ceil(0.1 * laid.greatest_range))
+    duration = max(SHORTEST, min(LONGEST, (math.ceil(10.0 * laid.breaks[-1]) - 1) / 10.0))
+    return dict(zip(OPEN, (*dataclasses.astuple(station), reference_range, duration)))
