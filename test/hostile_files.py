@@ -36,6 +36,7 @@ ADDRESSES = 4_000_000_000
 REFERENCE = pathlib.Path(__file__).parent.parent / 'bags' / 'reference' / 'leo_pass'
 TRACK = 'time_s,latitude_deg,longitude_deg,altitude_m\n' + ''.join(
     f'{t},{47.4 + 1e-3 * t:.6f},8.52,1500\n' for t in range(20))
+ADSB = 'time,icao24,lat,lon,geoaltitude\n'
 MAGIC = b'\x89MCAP0\r\n'
 STAMP = struct.Struct('<iI')
 
@@ -314,6 +315,20 @@ TRACKS = {
             'longitude', 'long'), 'column twice': TRACK.replace('altitude_m', 'time_s'), 'latin': b'\xe9\xff' * 100,
         'UTF-16': TRACK.encode('utf-16'), 'no line break': 'x' * 3_000_000, 'too long': b'1' * 70_000_000,
         'rows of commas': TRACK + ',' * 100_000 + '\n', 'sqlite': b'SQLite format 3\0' + bytes(1000)}.items()},
+    **{f'track: {name}': lambda files, content=content: files.new('.csv', content()) for name, content in {
+        'million aircraft': lambda: ADSB + ''.join(f'1532340000,{k:06x},47,8,1500\n' for k in range(1_000_000)),
+        'impossible': lambda: ADSB + ''.join(f'{1532340000 + k},4b1812,{47 + k % 2},8,1500\n' for k in range(100)),
+        'GPX of entities': lambda: '<?xml version="1.0"?><!DOCTYPE gpx [<!ENTITY a0 "aaaaaaaaaa">' + ''.join(
+            f'<!ENTITY a{k + 1} "{f"&a{k};" * 10}">' for k in range(12)) + ']><gpx><name>&a12;</name></gpx>',
+        'GPX with a file in it': lambda: '<!DOCTYPE gpx [<!ENTITY a SYSTEM "file:///etc/passwd">]><gpx>&a;</gpx>',
+        'GPX of elements': lambda: '<gpx>' + '<trk>' * 10_000_000,
+        'GPX of one text': lambda: '<gpx><trk><name>' + 'a' * 60_000_000,
+        'GPX of one attribute': lambda: '<gpx><trk a="' + 'a' * 60_000_000,
+        'GPX of no points': lambda: '<gpx>' + '<trk></trk>' * 5_000_000 + '</gpx>',
+        'GPX cut off': lambda: '<gpx><trk><trkseg><trkpt lat="47"', 'NMEA of one line': lambda: '$' * 60_000_000,
+        'NMEA of commas': lambda: '$GPGGA,' + ',' * 900 + '\n', 'NMEA of empty lines': lambda: '$\n' * 30_000_000,
+        'NMEA of GGA': lambda: '$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\n' * 900_000,
+        }.items()},
 }
 CRAFTED = {**BAGS, **YAML, **TRACKS}
 

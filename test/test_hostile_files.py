@@ -35,7 +35,9 @@ def test_a_verb_does_its_work_or_refuses_the_file_by_one_line(tmp_path, what):
 
 def test_tracks_are_refused_before_a_node_starts(tmp_path, capsys, one_line):
     files = hostile_files.Files(tmp_path, None)
-    for name in ('device', 'pipe', 'hole', 'open quote', '320 digits', 'too long', 'zero bytes'):
+    for name in ('device', 'pipe', 'hole', 'open quote', '320 digits', 'too long', 'zero bytes', 'impossible',
+                 'GPX of entities', 'GPX with a file in it', 'GPX of elements', 'GPX cut off', 'NMEA of one line',
+                 'NMEA of commas'):
         path = hostile_files.TRACKS[f'track: {name}'](files)
         [arguments] = hostile_files.commands(path, tmp_path).values()
         assert hostile_files.cli.main(['run', *arguments]) == 1

@@ -1,7 +1,8 @@
 """Targets and the monopulse receiver that tracks them.
 
-receiver.py composes the column and owns `step`; below it target.py (where the target is), smoothing.py and
-monopulse.py (the voltages of the channels for an error); params.py holds every number.
+receiver.py composes the column and owns `step`; below it target.py (where the target is) on geodesy.py and the
+room track (recorded flights), smoothing.py and monopulse.py (the voltages of the channels for an error); params.py
+holds every number.
 
 Frames: the station's ENU frame for targets (axes fixed to the earth at the station), deck FLU and the
 beam's offsets as in pedestal_common. Time of a target runs from the start of the run (stamp 0).

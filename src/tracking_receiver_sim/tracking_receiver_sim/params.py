@@ -44,10 +44,17 @@ class LeoPassParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class TrackFileParameters(Parameters):
-    """A recorded track: CSV with columns time_s, latitude_deg, longitude_deg, altitude_m (WGS84)."""
-    path: str = text('', 'CSV file')
-    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first row')
-    max_gap: float = parameter(10.0, 0.01, 600.0, 's', 'largest time between two rows')
+    """A recorded flight: CSV, ADS-B (CSV of traffic or OpenSky), GPX or NMEA, see docs/tracks.md."""
+    path: str = text('', 'file: CSV, ADS-B as CSV, GPX, NMEA')
+    aircraft: str = text('', 'which one, where the file holds several: icao24, callsign, or name of a GPX track')
+    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first fix')
+    max_gap: float = parameter(10.0, 0.01, 600.0, 's', 'largest time between two fixes')
+    max_speed: float = parameter(400.0, 1.0, 12e3, 'm/s', 'a track that is faster is refused')
+    max_acceleration: float = parameter(50.0, 0.1, 1000.0, 'm/s2', 'a track that needs more is refused')
+    smooth: bool = flag(False, 'Rauch-Tung-Striebel smoother of a constant-velocity model on each axis')
+    sigma_horizontal: float = parameter(10.0, 1e-3, 1e4, 'm', 'smooth: 1-sigma of a fix east and north')
+    sigma_vertical: float = parameter(3.0, 1e-3, 1e4, 'm', 'smooth: 1-sigma of a fix up; 25 ft steps alone: 2.2')
+    acceleration_noise: float = parameter(1.0, 1e-3, 1e3, 'm/s2/sqrt(Hz)', 'smooth: white acceleration of the target')
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,9 +9,10 @@ leo_pass: SGP4 position and velocity at every KNOT_SPACING, joined by cubic Herm
 0.3 mdeg with UT1 = UTC, which is taken here; the true UT1 - UTC (up to 0.9 s of earth rotation) moves an ISS
 pass by up to 0.04 deg (7 mdeg on the default pass). SGP4's own error is kilometres within days.
 
-track_file: a cubic spline through the fixes. Measured on a real 1 Hz helicopter flight it predicts left-out
-fixes as well as PCHIP or Akima pieces (9 m, the jitter of the fixes), with half their peak acceleration; in
-a 3 m/s^2 turn its velocity is right to 1e-4 m/s where PCHIP, flattening every extremum, is 1.3 m/s off.
+track_file: a cubic spline through the fixes of a log, or smoothed: the room `track`. Measured on a real 1 Hz
+helicopter flight it predicts left-out fixes as well as PCHIP or Akima pieces (9 m, the jitter of the fixes), with
+half their peak acceleration; in a 3 m/s^2 turn its velocity is right to 1e-4 m/s where PCHIP, flattening every
+extremum, is 1.3 m/s off.
 """
 import datetime
 import math
@@ -19,21 +20,20 @@ import typing
 from collections import namedtuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import minimize_scalar
 from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
 from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
-from pedestal_common import csv_table
 from pedestal_common.compiled import compiled
 from pedestal_common.interval import interval
 from pedestal_common.line_of_sight import earth_angles, earth_direction
 from pedestal_common.parameters import record, record_type
+from tracking_receiver_sim.geodesy import station_frame
 from tracking_receiver_sim.params import KINDS, RAMP, SINE, STEP, AngleParameters
+from tracking_receiver_sim.track import flight as recorded
 
-EARTH_RADIUS, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
-"""WGS84 [m], [-]."""
 EARTH_RATE = 7.29211514670698e-5
 """Of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
 KNOT_SPACING = 1.0
@@ -44,9 +44,6 @@ MARGIN = 5.0
 """Time before and after the run [s] that every kind but a track_file covers, for a program track."""
 TLE_AGE = 30.0
 """Largest time between TLE epoch and start_time [days]: beyond it SGP4 is useless."""
-COLUMNS = {'time_s': (-1e12, 1e12), 'latitude_deg': (-90.0, 90.0), 'longitude_deg': (-180.0, 360.0),
-           'altitude_m': (-1000.0, 1e8)}
-"""Of a track file, with the range of each."""
 TLE_NUMBERS = (
     {'epoch year': (18, 20), 'epoch day': (20, 32)},
     {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
@@ -67,12 +64,14 @@ class Target(typing.NamedTuple):
     """A target built for one run.
 
     constants: (1,) TARGET record; breaks: (n + 1,) times [s]; coefficients: (4, n, 3), highest power first,
-    of (t - breaks[i]), ENU [m]; start_time: UTC of stamp 0 in ISO 8601, empty where the target has no date.
+    of (t - breaks[i]), ENU [m]; start_time: UTC of stamp 0 in ISO 8601, empty where the target has no date; summary:
+    lines on what a recorded flight is and asks of the antenna, none of any other target.
     """
     constants: np.ndarray
     breaks: np.ndarray
     coefficients: np.ndarray
     start_time: str = ''
+    summary: tuple = ()
 
 
 @compiled
@@ -146,14 +145,14 @@ def look_angles(built, times):
 def build(params, duration) -> Target:
     """A Target from TargetParameters for a run of `duration` [s] from stamp 0; raises TargetError."""
     builder = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}.get(params.kind, _angles)
-    breaks, coefficients, start_time = builder(params, duration)
+    breaks, coefficients, *said = builder(params, duration)
     constants = np.zeros(1, TARGET)
     constants['kind'], constants['angle'] = KINDS.index(params.kind), record(params.angle)
-    return Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), start_time)
+    return Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *said)
 
 
 def _angles(params, duration):
-    return np.array([-MARGIN, duration + MARGIN]), np.zeros((4, 1, 3)), ''
+    return np.array([-MARGIN, duration + MARGIN]), np.zeros((4, 1, 3))
 
 
 def _flyby(params, duration):
@@ -164,24 +163,7 @@ def _flyby(params, duration):
     coefficients = np.zeros((4, 1, 3))
     coefficients[2, 0] = velocity
     coefficients[3, 0] = closest - velocity * (MARGIN + flyby.closest_time)
-    return np.array([-MARGIN, duration + MARGIN]), coefficients, ''
-
-
-def geocentric(latitude, longitude, height):
-    """Earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or numbers."""
-    e2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
-    N = EARTH_RADIUS / np.sqrt(1.0 - e2 * np.sin(latitude)**2)
-    return np.stack([(N + height) * np.cos(latitude) * np.cos(longitude),
-                     (N + height) * np.cos(latitude) * np.sin(longitude),
-                     (N * (1.0 - e2) + height) * np.sin(latitude)], axis=-1)
-
-
-def _station(station):
-    """Earth-fixed position (3,) [m] and rotation (3, 3) earth-fixed -> ENU of a station."""
-    latitude, longitude = math.radians(station.latitude_deg), math.radians(station.longitude_deg)
-    sp, cp, sl, cl = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
-    to_enu = np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
-    return geocentric(latitude, longitude, station.height), to_enu
+    return np.array([-MARGIN, duration + MARGIN]), coefficients
 
 
 # leo_pass
@@ -223,7 +205,7 @@ def _satellite_enu(satrec, station, julian, fraction, times):
     to_fixed[:, 0, 0], to_fixed[:, 0, 1], to_fixed[:, 1, 0], to_fixed[:, 1, 1], to_fixed[:, 2, 2] = c, s, -s, c, 1.0
     r = np.einsum('nij,nj->ni', to_fixed, 1e3 * position)
     v = np.einsum('nij,nj->ni', to_fixed, 1e3 * velocity) - np.cross([0.0, 0.0, EARTH_RATE], r)
-    origin, to_enu = _station(station)
+    origin, to_enu = station_frame(station)
     return (r - origin) @ to_enu.T, v @ to_enu.T
 
 
@@ -310,15 +292,5 @@ def _leo_pass(params, duration):
 # track_file
 
 def _track_file(params, duration):
-    track = params.track_file
-    if not track.path:
-        raise TargetError('track_file.path is empty: must name a CSV file')
-    time, latitude, longitude, altitude = csv_table.read(track.path, COLUMNS, 4, track.max_gap, 'max_gap').T
-    time = time - time[0] - track.start
-    if time[-1] <= 0.0:
-        raise TargetError(f'{track.path}: start = {track.start:g} s: must be before the end of the track at '
-                          f'{time[-1] + track.start:g} s')
-    origin, to_enu = _station(params.station)
-    enu = (geocentric(np.radians(latitude), np.radians(longitude), altitude) - origin) @ to_enu.T
-    spline = CubicSpline(time, enu)
-    return spline.x, spline.c, ''
+    laid = recorded.read(params)
+    return laid.breaks, laid.coefficients, laid.start_time, laid.summary

@@ -113,6 +113,7 @@ class TrackingReceiver(Unit):
                   ('target', p.target.kind), ('angle_noise_deg', f'{math.degrees(sigma):.4g}')]
         if self.target.start_time:
             values.append(('stamp_0_utc', self.target.start_time))
+        values += zip(('track_log', 'track_flight'), self.target.summary)
         if fault in FAULTS:
             return Diagnosis(ERROR, receiver.STATUSES[fault], values)
         return Diagnosis(OK if status == receiver.LOCKED else WARN, receiver.STATUSES[status], values)

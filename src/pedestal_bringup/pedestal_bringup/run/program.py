@@ -21,6 +21,13 @@ def program_table(scenario, prefix=''):
     return times, np.column_stack((np.unwrap(azimuth) + program.azimuth_offset, elevation + program.elevation_offset))
 
 
+def flights(scenario):
+    """Lines on the recorded flights that are the targets of a scenario's beams, each once; [] where there is none."""
+    built = (target.build(scenario.node_parameters(prefix + 'tracking_receiver').target, scenario.header.duration)
+             for prefix in scenario.prefixes)
+    return list(dict.fromkeys(line for made in built for line in made.summary))
+
+
 def program_messages(scenario):
     """{topic: JointTrajectory} of a scenario's program track for every beam; {} where it has none."""
     if scenario.header.program.source == 'none':

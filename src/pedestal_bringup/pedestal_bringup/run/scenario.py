@@ -249,6 +249,7 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     for key, value in (('seed', seed), ('duration', duration), ('pacing', pacing)):
         if value is not None:
             header_values[key] = value
+    _follow_flight(name, sections.get('tracking_receiver', {}), header_values)
     header = _checked(name, 'scenario', ScenarioParameters, header_values)
     of_beams = [name for name in nodes.members(OF_BEAMS, header.graph_beams) if nodes.beam_of(name)]
     for node in sections:
@@ -270,6 +271,20 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
         typed = parameters.as_dict(checked)
         sections[node] = {key: typed[key] for key in values}
     return Scenario(name, header, sections)
+
+
+def _follow_flight(name, receiver_values, header_values):
+    """Station, reference range and duration follow from the file of a recorded flight where the scenario leaves them
+    open. Raises ScenarioError, TableError."""
+    target = _checked(name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
+                      receiver_values).target
+    if target.kind != 'track_file' or not target.track_file.path:
+        return
+    from tracking_receiver_sim.track import place  # with scipy, which only a flight needs
+    said = {*receiver_values, *({'duration'} & set(header_values))}
+    if not said.issuperset(place.OPEN):
+        for key, value in place.left_open(target, said).items():
+            (header_values if key == 'duration' else receiver_values).setdefault(key, value)
 
 
 def _spread(name, sections, header, seed):

@@ -32,12 +32,14 @@ def main(options):
     from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read
     from pedestal_bringup.bags.verify import verify
-    from pedestal_bringup.run import graph, scenario
+    from pedestal_bringup.run import graph, program, scenario
     from pedestal_common import nodes
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
     chosen = scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
     bag = arguments.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
+    for line in program.flights(chosen):
+        print(line)
     with console.progress_of_run(chosen.header.duration) as progress:
         outcome = graph.run(chosen, bag, progress)
     if outcome.stopped:

@@ -1,0 +1,35 @@
+"""WGS84: earth-fixed positions and the east-north-up frame of a station."""
+import math
+
+import numpy as np
+
+EARTH_RADIUS, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
+"""WGS84 [m], [-]."""
+
+
+def geocentric(latitude, longitude, height):
+    """Earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or numbers."""
+    e2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
+    N = EARTH_RADIUS / np.sqrt(1.0 - e2 * np.sin(latitude)**2)
+    return np.stack([(N + height) * np.cos(latitude) * np.cos(longitude),
+                     (N + height) * np.cos(latitude) * np.sin(longitude),
+                     (N * (1.0 - e2) + height) * np.sin(latitude)], axis=-1)
+
+
+def station_frame(station):
+    """Earth-fixed position (3,) [m] and rotation (3, 3) earth-fixed -> ENU of a StationParameters."""
+    latitude, longitude = math.radians(station.latitude_deg), math.radians(station.longitude_deg)
+    sp, cp, sl, cl = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
+    to_enu = np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
+    return geocentric(latitude, longitude, station.height), to_enu
+
+
+def destination(latitude_deg, longitude_deg, bearing, distance):
+    """(latitude, longitude) [deg] of the place at a distance [m] along the great circle that leaves with a bearing
+    [rad, clockwise from north], on a sphere: the distance is right to 0.6 %."""
+    phi, delta = math.radians(latitude_deg), distance / EARTH_RADIUS
+    sin_there = math.sin(phi) * math.cos(delta) + math.cos(phi) * math.sin(delta) * math.cos(bearing)
+    east = math.atan2(math.sin(bearing) * math.sin(delta) * math.cos(phi),
+                      math.cos(delta) - math.sin(phi) * sin_there)
+    longitude = longitude_deg + math.degrees(east)
+    return math.degrees(math.asin(max(-1.0, min(1.0, sin_there)))), (longitude + 180.0) % 360.0 - 180.0

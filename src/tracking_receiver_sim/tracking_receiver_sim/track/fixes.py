@@ -1,0 +1,120 @@
+"""The fixes of a log: read as they come, of one aircraft, in order of time.
+
+What a file is, its content says: it begins with < as GPX, with $ or ! as NMEA, and is CSV otherwise.
+"""
+import array
+import collections
+import pathlib
+import typing
+
+import numpy as np
+
+from pedestal_common import csv_table, files
+from tracking_receiver_sim.track import gpx, instant, nmea, tables
+
+BEGINNING = 4096
+"""Bytes that say what a file is."""
+
+LISTED = 12
+"""Aircraft that are named where a file holds several."""
+
+MOST_AIRCRAFT = 10_000
+"""Of a file."""
+
+LEAST = 4
+"""Fixes of a track."""
+
+
+class Log:
+    """What its reader says of a file.
+
+    form: its name; time_name: of the time in it; dated: the time is UTC since 1970 once `offset` [s] is added;
+    remarks: sentences about the numbers; passed_over: {what: how many}.
+    """
+
+    def __init__(self):
+        self.form, self.time_name, self.dated, self.offset = '', '', False, 0.0
+        self.remarks, self.passed_over = [], collections.Counter()
+
+
+class Fixes(typing.NamedTuple):
+    """The fixes of one aircraft, n of them.
+
+    line: (n,) in the file; time: (n,) [s], growing, UTC since 1970 where `dated`; latitude, longitude: (n,) WGS84
+    [deg]; altitude: (n,) above the ellipsoid [m]; said: what the file is and what was passed over.
+    """
+    path: str
+    line: np.ndarray
+    time: np.ndarray
+    latitude: np.ndarray
+    longitude: np.ndarray
+    altitude: np.ndarray
+    dated: bool
+    said: str
+
+
+def read(track) -> Fixes:
+    """The fixes of the file of a TrackFileParameters. Raises csv_table.TableError."""
+    if not track.path:
+        raise csv_table.TableError('track_file.path is empty: must name a file: CSV, ADS-B, GPX or NMEA')
+    log, numbers, names = Log(), array.array('d'), {}
+    for line, who, *fix in _reader(track.path)(track.path, log):
+        if len(numbers) >= 6 * csv_table.MOST_ROWS:
+            raise csv_table.too_long(track.path, line)
+        if len(names) > MOST_AIRCRAFT:
+            raise csv_table.TableError(f'{track.path}: line {line}: must be at most {MOST_AIRCRAFT} aircraft')
+        number, known_as = names.setdefault(who[:1], (len(names), set()))
+        known_as.update(who)
+        numbers.extend((line, number, *fix))
+    rows = np.array(numbers).reshape(-1, 6)
+    aircraft, number = _chosen(track, names)
+    line, _, time, latitude, longitude, altitude = rows[rows[:, 1] == number].T
+    if len(line) < LEAST:
+        raise csv_table.TableError(f'{track.path}: {len(line)} rows, must be at least {LEAST}{_passed_over(log)}')
+    fixes = Fixes(track.path, line.astype(int), time + log.offset, latitude, longitude, altitude, log.dated,
+                  f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
+                  + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
+    _check_order(fixes, track, log)
+    return fixes
+
+
+def _reader(path):
+    try:
+        with files.open_regular(path, csv_table.LARGEST) as stream:
+            beginning = stream.read(BEGINNING).removeprefix(b'\xef\xbb\xbf').lstrip()[:1]
+    except OSError as error:
+        raise csv_table.TableError(f'{path}: {error.strerror}') from None
+    return {b'<': gpx.rows, b'$': nmea.rows, b'!': nmea.rows}.get(beginning, tables.rows)
+
+
+def _chosen(track, names):
+    """(' of' its names, its number) of the aircraft that is asked for or alone; names: {identity: (number, names)}."""
+    asked = track.aircraft.strip().lower()
+    found = [row for row in names.values() if not asked or asked in {name.lower() for name in row[1]}]
+    if len(found) == 1:
+        label = _label(found[0][1])
+        return f' of {label}' if label else '', found[0][0]
+    if not names:
+        return '', 0
+    labels = [_label(known_as) or 'one without a name' for _, known_as in names.values()]
+    more = f' and {len(labels) - LISTED} more' if len(labels) > LISTED else ''
+    raise csv_table.TableError(f'{track.path}: aircraft = {track.aircraft!r:.60}: must name one of the {len(labels)} '
+                               f'in the file: {", ".join(labels[:LISTED])}{more}')
+
+
+def _label(known_as):
+    return ' '.join(sorted(name[:40] for name in known_as if name)[:LISTED])
+
+
+def _passed_over(log):
+    return ''.join(f', passed over {count} x {what}' for what, count in sorted(log.passed_over.items()))
+
+
+def _check_order(fixes, track, log):
+    step = np.diff(fixes.time)
+    wrong = ~((step > 0.0) & (step <= track.max_gap))
+    if wrong.any():
+        i = int(np.argmax(wrong)) + 1
+        value = instant.iso(fixes.time[i]) if fixes.dated else f'{fixes.time[i]:.10g}'
+        raise csv_table.bad_step(fixes.path, fixes.line[i], f'{log.time_name} = {value}', step[i - 1], 's',
+                                 track.max_gap, 'max_gap')

@@ -1,0 +1,127 @@
+"""A flight as a cubic spline in the station's ENU frame, from fixes that are held, coarse and noisy.
+
+Held positions: an ADS-B log repeats latitude and longitude until the next message comes. Such a repetition is no
+measurement and is dropped. Where they stay for max_gap or longer, or throughout the file, the target stands.
+
+Smoothing: per axis the fixes are position + white noise of sigma, and the acceleration is white of the density q^2
+(constant velocity, CV). The Rauch-Tung-Striebel smoother of this model, started with no knowledge, is at the fixes and
+between them the natural cubic spline f that minimises
+
+    sum (x_k - f(t_k))^2 + lambda integral f''^2 dt,   lambda = sigma^2 / q^2
+
+(Wahba, J. R. Stat. Soc. B 40 (1978) 364-372; Kohn and Ansley, SIAM J. Sci. Stat. Comput. 8 (1987) 33-48), which scipy
+solves in a time proportional to the fixes. Without smoothing the spline runs through every fix.
+"""
+import typing
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
+
+from pedestal_common import csv_table
+from tracking_receiver_sim import geodesy
+from tracking_receiver_sim.track import fixes as logs
+from tracking_receiver_sim.track import instant
+
+SAMPLES = 4
+"""Of a piece of the spline, for peak speed and range."""
+
+STEPS = (('100 ft', 30.48), ('25 ft', 7.62))
+"""Steps [m] in which altitudes are broadcast."""
+WITHIN = 0.06
+"""A multiple of a step is met within this [m]: logs are rounded to 0.1 m."""
+
+
+class Flight(typing.NamedTuple):
+    """A flight as the target takes it. breaks: (m + 1,) [s] from stamp 0; coefficients: (4, m, 3) as in target.Target;
+    start_time: UTC of stamp 0 in ISO 8601, empty without a date; summary: two lines for people, of the log and of the
+    path; speed: the peak [m/s]; greatest_range: from the station [m]."""
+    breaks: np.ndarray
+    coefficients: np.ndarray
+    start_time: str
+    summary: tuple
+    speed: float
+    greatest_range: float
+
+
+def lay_out(fixes, track, station) -> Flight:
+    """The Flight of Fixes, of a TrackFileParameters and a StationParameters; raises csv_table.TableError."""
+    kept, dropped = without_held(fixes, track.max_gap)
+    origin, to_enu = geodesy.station_frame(station)
+    earth_fixed = geodesy.geocentric(np.radians(kept.latitude), np.radians(kept.longitude), kept.altitude)
+    enu = (earth_fixed - origin) @ to_enu.T
+    time = kept.time - fixes.time[0] - track.start
+    if time[-1] <= 0.0:
+        raise csv_table.TableError(f'{fixes.path}: start = {track.start:g} s: must be before the end of the track at '
+                                   f'{time[-1] + track.start:g} s')
+    spline = smoothed(time, enu, track) if track.smooth else CubicSpline(time, enu)
+    speed, acceleration = _check_limits(kept, spline, track)
+    distance = np.linalg.norm(spline(_samples(spline.x)), axis=1)
+    log = (f'{fixes.said}: {len(kept.line)} of {len(fixes.line)} fixes, {dropped} held positions dropped'
+           f'{_quantisation(fixes, speed)}{_residual(spline(time) - enu) if track.smooth else ""}')
+    path = (f'{time[-1]:.10g} s, at most {speed:.4g} m/s and {acceleration:.3g} m/s2, {distance.min() / 1e3:.4g} to '
+            f'{distance.max() / 1e3:.4g} km from the station at latitude {station.latitude_deg:.5f}, longitude '
+            f'{station.longitude_deg:.5f} deg, height {station.height:.1f} m')
+    start_time = instant.iso(fixes.time[0] + track.start) if fixes.dated else ''
+    return Flight(spline.x, spline.c, start_time, (log, path), float(speed), float(distance.max()))
+
+
+def without_held(fixes, max_gap):
+    """(Fixes without held positions, how many were dropped)."""
+    moved = np.append(True, (np.diff(fixes.latitude) != 0.0) | (np.diff(fixes.longitude) != 0.0))
+    first = np.flatnonzero(moved)
+    last = np.append(first[1:], len(moved)) - 1
+    stands = fixes.time[last] - fixes.time[first] >= max_gap
+    keep = moved | np.repeat(stands, last - first + 1) | (len(first) == 1)
+    return fixes._replace(**{name: getattr(fixes, name)[keep]
+                             for name in ('line', 'time', 'latitude', 'longitude', 'altitude')}), int((~keep).sum())
+
+
+def smoothed(time, enu, track):
+    """The smoothing spline of positions enu (n, 3) [m] at times (n,) [s]; a PPoly."""
+    if len(time) < 5:
+        raise csv_table.TableError(f'{track.path}: {len(time)} fixes, must be at least 5 to be smoothed')
+    sigmas = track.sigma_horizontal, track.sigma_horizontal, track.sigma_vertical
+    axes = [PPoly.from_spline(make_smoothing_spline(time, x, lam=(sigma / track.acceleration_noise)**2))
+            for x, sigma in zip(enu.T, sigmas)]
+    pieces = slice(3, -3)  # those before the first and past the last fix have no length
+    return PPoly(np.stack([axis.c[:, pieces] for axis in axes], axis=-1), axes[0].x[pieces])
+
+
+def _samples(breaks):
+    return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(SAMPLES) / SAMPLES).ravel(), breaks[-1])
+
+
+def _check_limits(fixes, spline, track):
+    """(peak speed [m/s], peak acceleration [m/s2]) of a spline; raises TableError with the line of the fix nearest to
+    the peak where it is above the limit. The acceleration is linear between the breaks: its peak is at one of them."""
+    times = _samples(spline.x)
+    peaks = []
+    for name, limit, unit, at, order in (('acceleration', track.max_acceleration, 'm/s2', spline.x, 2),
+                                         ('speed', track.max_speed, 'm/s', times, 1)):
+        size = np.linalg.norm(spline(at, order), axis=1)
+        worst = int(np.argmax(size))
+        if not size[worst] <= limit:
+            line = fixes.line[np.argmin(np.abs(spline.x - at[worst]))]
+            remedy = 'after smoothing' if track.smooth else 'or smoothed by smooth = true'
+            raise csv_table.TableError(f'{fixes.path}: line {line}: {name} = {size[worst]:.4g} {unit} at this fix: '
+                                       f'must be at most max_{name} = {limit:g} {unit} {remedy}')
+        peaks.append(size[worst])
+    return peaks[1], peaks[0]
+
+
+def _quantisation(fixes, speed):
+    whole = bool((fixes.time == np.round(fixes.time)).all())
+    steps = next((name for name, step in STEPS if len(np.unique(fixes.altitude)) >= 3 and
+                  np.abs(fixes.altitude - step * np.round(fixes.altitude / step)).max() < WITHIN), None)
+    return ((f', times in whole seconds (half of one is up to {0.5 * speed:.2g} m)' if whole else '')
+            + (f', altitudes in steps of {steps}' if steps else ''))
+
+
+def _residual(apart):
+    size = np.linalg.norm(apart, axis=1)
+    return f', smoothed: off the fixes by {np.sqrt(np.mean(size**2)):.3g} m rms, {size.max():.3g} m at most'
+
+
+def read(target) -> Flight:
+    """The Flight of a TargetParameters; raises csv_table.TableError."""
+    return lay_out(logs.read(target.track_file), target.track_file, target.station)

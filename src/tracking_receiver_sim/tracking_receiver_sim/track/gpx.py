@@ -1,0 +1,101 @@
+"""Tracks as GPX: every trkpt with a time and an ele, read from the stream by expat.
+
+expat says the line of a point, keeps nothing of what it has read, and ends at a document type declaration, so that no
+entity is ever expanded and no file fetched. ele is above mean sea level; the height above the ellipsoid is
+ele + geoidheight where the point says so, otherwise ele is taken for it, and that is said.
+"""
+from xml.parsers import expat
+
+from pedestal_common import csv_table, files
+from tracking_receiver_sim.track import instant
+
+PIECE = 1 << 20
+"""Bytes that are parsed at once; expat reads a token that is not complete again with each piece."""
+
+DEEPEST, LONGEST = 100, 200
+"""Elements within each other, and characters of a text that is read; a longer one is cut."""
+
+TEXTS = ('ele', 'time', 'geoidheight', 'name')
+"""Elements whose text is read."""
+
+
+def rows(path, log):
+    """Fixes (line, (name of the track,), UTC [s], latitude, longitude [deg], altitude [m]) of a GPX file; log: the
+    fixes.Log in which it is noted what the file is. Raises TableError."""
+    log.form, log.time_name, log.dated = 'GPX', 'time', True
+    points = _Points(path, log)
+    try:
+        with files.open_regular(path, csv_table.LARGEST) as stream:
+            while piece := stream.read(PIECE):
+                points.parser.Parse(piece)
+                yield from points.taken()
+            points.parser.Parse(b'', True)
+    except OSError as error:
+        raise csv_table.TableError(f'{path}: {error.strerror}') from None
+    except expat.ExpatError as error:
+        raise csv_table.TableError(f'{path}: line {error.lineno}: not well-formed XML: '
+                                   f'{expat.ErrorString(error.code)}') from None
+    if points.with_ele:
+        log.remarks.append('ele taken as height above the ellipsoid')
+
+
+class _Points:
+    """What expat calls. It holds the texts of the point that is open, and the fixes until they are taken."""
+
+    def __init__(self, path, log):
+        self.path, self.log = path, log
+        self.path_of_elements, self.texts, self.fixes = [], {}, []
+        self.tracks, self.track, self.with_ele = 0, '', False
+        self.parser = expat.ParserCreate('UTF-8')  # whatever the file calls its encoding
+        self.parser.buffer_text = True
+        self.parser.StartDoctypeDeclHandler = self.doctype
+        self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
+        self.parser.CharacterDataHandler = self.text
+
+    def taken(self):
+        """The fixes since the last call."""
+        fixes, self.fixes = self.fixes, []
+        return fixes
+
+    def doctype(self, *_):
+        raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: a document type declaration: '
+                                   'GPX has none')
+
+    def start(self, name, attributes):
+        name = name.rpartition(':')[2]
+        self.path_of_elements.append(name)
+        if len(self.path_of_elements) > DEEPEST:
+            raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: must be at most {DEEPEST} '
+                                       'elements within each other')
+        if len(self.path_of_elements) == 1 and name != 'gpx':
+            raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: element {name!r:.60}: '
+                                       'must be gpx')
+        if name == 'trk':
+            self.tracks += 1
+            self.track = f'track {self.tracks}'
+        elif name == 'trkpt':
+            self.texts, self.line, self.place = {}, self.parser.CurrentLineNumber, attributes
+
+    def text(self, text):
+        *_, parent, name = ('', '', *self.path_of_elements)
+        if name in TEXTS and parent == ('trk' if name == 'name' else 'trkpt'):
+            self.texts[name] = (self.texts.get(name, '') + text[:LONGEST])[:LONGEST]
+
+    def end(self, name):
+        name = self.path_of_elements.pop()
+        if name == 'name' and self.path_of_elements[-1:] == ['trk']:
+            self.track = self.texts.pop('name', '').strip() or self.track
+        elif name == 'trkpt':
+            self.point()
+
+    def point(self):
+        path, line, texts = self.path, self.line, self.texts
+        if 'time' not in texts or 'ele' not in texts:
+            self.log.passed_over['point without time or ele'] += 1
+            return
+        ele = csv_table.number(path, line, 'ele', texts['ele'], -1000.0, 1e8)
+        geoid = csv_table.number(path, line, 'geoidheight', texts.get('geoidheight', '0'), -150.0, 150.0)
+        self.with_ele = self.with_ele or 'geoidheight' not in texts
+        self.fixes.append((line, (self.track,), instant.seconds(path, line, 'time', texts['time']),
+                           csv_table.number(path, line, 'lat', self.place.get('lat'), -90.0, 90.0),
+                           csv_table.number(path, line, 'lon', self.place.get('lon'), -180.0, 360.0), ele + geoid))

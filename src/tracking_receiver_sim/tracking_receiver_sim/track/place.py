@@ -1,0 +1,79 @@
+"""What a scenario leaves open about a recorded flight: where the station stands, at which range its C/N0 holds, how
+long the run is.
+
+The station stands beside the fix in the middle of the flight (by time), to the right of the line from the first fix
+to the last, just so far that no fix comes nearer over ground than the least range. That is the range at which the
+peak speed turns the azimuth by AZIMUTH_RATE, and at least LEAST_RANGE. No terrain is known: the station is lower than
+the lowest fix by BELOW of the least range, so that a level flight is above its horizon, and not above HIGHEST.
+"""
+import dataclasses
+import math
+
+import numpy as np
+
+from tracking_receiver_sim import geodesy
+from tracking_receiver_sim.params import StationParameters
+from tracking_receiver_sim.track import fixes as logs
+from tracking_receiver_sim.track import flight
+
+AZIMUTH_RATE = 0.05
+"""[rad/s], at most."""
+LEAST_RANGE = 100.0
+"""[m], over ground."""
+BELOW = 0.1
+"""Of the least range."""
+LOWEST, HIGHEST = -500.0, 3000.0
+"""Of the station [m]."""
+SHORTEST, LONGEST = 0.1, 86400.0
+"""Run [s]."""
+
+STATION = {f'target.station.{field.name}': field.name for field in dataclasses.fields(StationParameters)}
+OPEN = (*STATION, 'receiver.reference_range', 'duration')
+"""What a scenario may leave open: parameters of the receiver, and the duration of the run."""
+
+
+def beside(fixes, track) -> StationParameters:
+    """A station for Fixes; raises csv_table.TableError."""
+    middle = int(np.argmin(np.abs(fixes.time - 0.5 * (fixes.time[0] + fixes.time[-1]))))
+    below = StationParameters(latitude_deg=float(fixes.latitude[middle]),
+                              longitude_deg=float(fixes.longitude[middle]))
+    laid = flight.lay_out(fixes, track, below)
+    ground = laid.coefficients[3, :, :2]
+    clearance = max(LEAST_RANGE, laid.speed / AZIMUTH_RATE)
+    along = ground[-1] - ground[0]
+    bearing = math.atan2(along[0], along[1]) + 0.5 * math.pi
+    right = np.array([math.sin(bearing), math.cos(bearing)])
+    distance = _clear_of(ground @ np.array([right[1], -right[0]]), ground @ right, clearance)
+    latitude, longitude = geodesy.destination(below.latitude_deg, below.longitude_deg, bearing, distance)
+    height = float(np.clip(fixes.altitude.min() - BELOW * clearance, LOWEST, HIGHEST))
+    return StationParameters(latitude_deg=round(latitude, 5), longitude_deg=round(longitude, 5),
+                             height=round(height, 1))
+
+
+def _clear_of(along, across, clearance):
+    """The least s >= 0 whose place (0, s) is no nearer than the clearance to any of the points (along, across)."""
+    near = np.abs(along) < clearance
+    half = np.sqrt(clearance**2 - along[near]**2)
+    s = 0.0
+    for low, high in sorted(zip(across[near] - half, across[near] + half)):
+        if low > s:
+            break
+        s = max(s, high)
+    return float(s)
+
+
+def left_open(target, said):
+    """{name of OPEN: value} that follow from the file of a TargetParameters; said: the names that are given, of which
+    only those of the station matter here. Raises csv_table.TableError.
+
+    The C/N0 holds at the greatest range, so that it is nowhere less; the run ends at the last tenth of a second before
+    the last fix.
+    """
+    fixes = logs.read(target.track_file)
+    found = beside(fixes, target.track_file)
+    station = dataclasses.replace(target.station, **{field: getattr(found, field) for name, field in STATION.items()
+                                                     if name not in said})
+    laid = flight.lay_out(fixes, target.track_file, station)
+    reference_range = max(10.0, 10.0 * math.ceil(0.1 * laid.greatest_range))
+    duration = max(SHORTEST, min(LONGEST, (math.ceil(10.0 * laid.breaks[-1]) - 1) / 10.0))
+    return dict(zip(OPEN, (*dataclasses.astuple(station), reference_range, duration)))

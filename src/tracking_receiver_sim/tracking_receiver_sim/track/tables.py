@@ -1,0 +1,67 @@
+"""Flights as CSV. The name of its column of time says what a file holds: a row of FORMS.
+
+    our own                     time_s, latitude_deg, longitude_deg, altitude_m: every cell is a number
+    traffic (ADS-B)             timestamp, latitude, longitude, geoaltitude or altitude: in feet
+    OpenSky state vectors       time, lat, lon, geoaltitude or baroaltitude: in metres
+
+The geometric altitude of ADS-B is above the ellipsoid; where a file has only the barometric one, that is taken for it
+and said. ADS-B logs have rows without a position: these are passed over and counted.
+"""
+import typing
+
+from pedestal_common import csv_table
+from tracking_receiver_sim.track import instant
+
+FOOT = 0.3048
+"""[m]"""
+
+FEET, METRES = (-3000.0, 500_000.0), (-1000.0, 150_000.0)
+"""Altitudes of ADS-B."""
+
+EMPTY = ('', 'nan', 'none', 'null')
+"""What a log writes where it knows nothing."""
+
+
+class Form(typing.NamedTuple):
+    """Names of the columns; altitudes: the best first, and the unit of both [m]; adsb: cells may be empty, the time is
+    UTC and aircraft have an icao24 or a callsign."""
+    name: str
+    time: str
+    latitude: str
+    longitude: str
+    altitudes: tuple
+    unit: float
+    limits: tuple
+    adsb: bool
+
+
+FORMS = (Form('CSV', 'time_s', 'latitude_deg', 'longitude_deg', ('altitude_m',), 1.0, (-1000.0, 1e8), False),
+         Form('ADS-B', 'timestamp', 'latitude', 'longitude', ('geoaltitude', 'altitude'), FOOT, FEET, True),
+         Form('ADS-B', 'time', 'lat', 'lon', ('geoaltitude', 'baroaltitude'), 1.0, METRES, True))
+
+
+def rows(path, log):
+    """Fixes (line, (icao24, callsign), time [s], latitude, longitude [deg], altitude [m]) of a CSV file; log: the
+    fixes.Log in which it is noted what the file is. Raises TableError."""
+    with csv_table.opened(path) as reader:
+        header = reader.fieldnames or ()
+        form = next((form for form in FORMS if form.time in header), FORMS[0])
+        altitude = next((name for name in form.altitudes if name in header), form.altitudes[0])
+        names = form.time, form.latitude, form.longitude, altitude
+        csv_table.require(path, reader, names)
+        identities = [name for name in ('icao24', 'callsign') if name in header] if form.adsb else []
+        log.form, log.time_name, log.dated = form.name, form.time, form.adsb
+        if form.adsb and altitude != form.altitudes[0]:
+            log.remarks.append('barometric altitude taken as height above the ellipsoid')
+        for row in reader:
+            line = reader.line_num
+            said = {name: (row[name] or '').strip() for name in (*names, *identities)} if form.adsb else row
+            if form.adsb and any(said[name].lower() in EMPTY for name in (*names, *identities[:1])):
+                log.passed_over['row without time, position or aircraft'] += 1
+                continue
+            time = (instant.seconds(path, line, form.time, said[form.time]) if form.adsb else
+                    csv_table.number(path, line, form.time, said[form.time], -1e12, 1e12))
+            yield (line, tuple(said[name] for name in identities), time,
+                   csv_table.number(path, line, form.latitude, said[form.latitude], -90.0, 90.0),
+                   csv_table.number(path, line, form.longitude, said[form.longitude], -180.0, 360.0),
+                   form.unit * csv_table.number(path, line, altitude, said[altitude], *form.limits))
