@@ -86,7 +86,7 @@ def driven(item):
     """(times [s], true error of the axis [rad]), each (n,), from DRIVE_START on, of an item (name of DRIVE_CASES,
     seed); errors NaN if autotrack was left."""
     name, seed = item
-    record = dataclasses.replace(DRIVE_CASES[name], seed=seed).run()
+    record = DRIVE_CASES[name].with_seed(seed).run()
     record = record.where(record.t >= DRIVE_START)
     error = record.truth['error'][:, list(REVERSALS).index(name.partition('/')[0])]
     return record.t, error if np.all(record['acu/mode'] == AUTOTRACK) else np.full_like(error, math.nan)

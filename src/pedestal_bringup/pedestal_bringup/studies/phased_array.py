@@ -382,7 +382,7 @@ GRAPH_SETTLED = 10.0
 def graph_error(case, quiet=False, seed=None):
     """True error (n, 2) [rad] of one of GRAPH once settled, at the ends of the intervals; arguments as of
     `graph_case`."""
-    run = dataclasses.replace(graph_case(case, quiet), seed=seed).run()
+    run = graph_case(case, quiet).with_seed(seed).run()
     return run.truth['error'][run.t >= GRAPH_SETTLED]
 
 

@@ -207,9 +207,9 @@ def remarks(done):
         "One controller cannot do both of the paper's figures if its sine is 0.4 rad/s: an error of 0.04 rad is that "
         f'of a gain of {AMPLITUDE * 0.4 / 0.04:.2g} 1/s (paper-r2), whose step takes '
         f'{slow:.3f} s, not 0.2 s. If it is 0.4 Hz, paper-all does all that is printed, the peak of the sine to '
-        '0.12 % too; paper-r1, the gains of servo_step and servo_sine, is off by more there.',
-        'peak_error_percent is the shortfall of the amplitude (0.869 of 0.87 rad), max_error_percent the largest error '
-        "of the steady sine over the amplitude. The paper's mean square error of 2.81 % is read as 0.0281 rad rms.",
+        '0.12 % too; paper-r1, the gains of servo_step and servo_sine, misses that.',
+        'peak_error_percent is the shortfall of the amplitude (0.869 of 0.87 rad), max_error_percent the largest '
+        'error of the steady sine over the amplitude. The mean square error of 2.81 % is read as 0.0281 rad rms.',
         f'The 0.4 Hz sine starts from rest with {AMPLITUDE * FREQUENCIES["0p4hz"]:.2f} rad/s: the error of its start '
         'is v2/(2 a), set by the torque, and no controller removes it.',
         f'Limit of the step: torque. Full torque forwards and back takes {whole:.3f} s, {settled:.3f} s to the 2 % '

@@ -16,6 +16,10 @@ class Case:
     duration: float | None = None
     seed: int | None = None
 
+    def with_seed(self, seed):
+        """This Case with another seed."""
+        return dataclasses.replace(self, seed=seed)
+
     def loaded(self):
         """The scenario.Scenario of this case."""
         return scenario.load(self.scenario, self.overrides(), duration=self.duration, seed=self.seed)
