@@ -1,9 +1,10 @@
 """Alignment of the INS: paper 001's figures 3 and 4 for five methods, over many seeds, beside the information limit.
 
-Paper 001's IMU and sway (section 5), misaligned by 3, 3 and 180 deg; a white velocity of 0.05 m/s per axis, one value
-per 0.02 s, which the paper does not state (results scale with it). Cases: method; limit, what the gyros and that
-velocity allow: covariance of riccati_eso and the gyros' bias over w_N; method/swell, 0.5 m/s at 0.1 Hz on every axis
-beside; method/quadrant-N, any heading of the ship and error of azimuth in quadrant N, biases drawn at random.
+Paper 001's IMU, sway and white velocity of 0.05 m/s per axis (section 5 and table 1), misaligned by 3, 3 and 180 deg.
+The velocity has one value per 0.02 s, which the paper does not state (results scale with it). Cases: method; limit,
+what the gyros and that velocity allow: covariance of riccati_eso and the gyros' bias over w_N; method/swell, 0.5 m/s
+at 0.1 Hz on every axis beside; method/quadrant-N, any heading of the ship and error of azimuth in quadrant N, biases
+drawn at random.
 """
 import dataclasses
 import functools

@@ -109,9 +109,9 @@ PAPER = {'azimuth/kalman-cv': 0.17, 'azimuth/imm': 0.035, 'elevation/kalman-cv':
 MAIN = {f'{axis}/{name}' for axis in REVERSALS for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state')}
 """The cases that get all rows."""
 
-RATIOS = {'azimuth/imm': ('>= 4', 0.17 / 0.035), 'azimuth/imm-predicted': ('>= 6', None),
-          'elevation/imm': ('>= 3', 0.1 / 0.03), 'elevation/imm-predicted': ('>= 5', None)}
-"""Target and paper of how often the miss of kalman-cv is that of a case."""
+RATIOS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('>= 6', None),
+          'elevation/imm': ('>= 3', 3.0), 'elevation/imm-predicted': ('>= 5', None)}
+"""Target and paper of how often the miss of kalman-cv is that of a case; of the azimuth the paper prints 4 to 5."""
 
 
 def conventional(misses, axis):

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from pedestal_bringup.analysis import results
-from pedestal_bringup.report.figures import FILTERED
+from pedestal_bringup.analysis import results, tracking
+from pedestal_bringup.report.figures import FILTERED, INK, RAW
 from pedestal_bringup.studies.rigs import drawing
 from pedestal_bringup.studies.rigs.cases import Case
 from pedestal_bringup.studies.rigs.rows import Result, row
@@ -130,9 +130,34 @@ def run(progress, runs=RUNS, pool=None) -> Result:
     for (name, *_), of_batch in zip(items, (pool or monte_carlo.Pool(1)).map(batch, items, progress)):
         values.setdefault(name, []).append(of_batch)
     values = {name: np.concatenate(parts) for name, parts in values.items()}
-    return Result(rows(values), {'pointing': lambda: pointing_figure(values)},
+    return Result(rows(values), {'pointing': lambda: pointing_figure(values), 'uav-flyby': flyby_figure},
                   [f'Seeds {SEED} to {SEED + runs - 1}. ship_pass-late: {CASES["ship_pass-late"].command()}',
                    f'uav_flyby-60m: {CASES["uav_flyby-60m"].command()}'])
+
+
+def flyby_figure():
+    """Paper 000's figures 7 to 11 on uav_flyby: error and angle before and after the filter, and the azimuth flown."""
+    figure, axes = drawing.panels(3, size=(7.4, 7.2))
+    case = CASES['uav_flyby'].with_seed(SEED)
+    flown = tracking.read(Recorded(case.loaded(), case.run()))
+    middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
+    true = np.column_stack((flown.cross_elevation, flown.elevation_error))
+    for panel, errors, title in ((axes[0, 0], (flown.measured[:, 0], flown.filtered[:, 0], true[:, 0]),
+                                  'error in cross-elevation (figures 7, 8)'),
+                                 (axes[1, 0], tuple(angles[:, 1] - true[:, 1] + flown.target_earth[:, 1] for angles in
+                                                    (flown.measured, flown.filtered, true)),
+                                  'elevation of the target (figures 9, 10)')):
+        for values, colour, label in zip(errors, (RAW, FILTERED, INK), ('receiver', 'filtered', 'truth')):
+            panel.plot(flown.t[middle], np.degrees(values[middle]), color=colour, label=label,
+                       linewidth=0.6 if label == 'receiver' else 1.2)
+        panel.set_title(title)
+        panel.set_ylabel('[deg]')
+    axes[2, 0].plot(flown.t, np.degrees(flown.azimuth), color=FILTERED)
+    axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
+    axes[2, 0].set_ylabel('[deg]')
+    axes[2, 0].set_xlabel('time [s]')
+    axes[0, 0].legend(ncols=3)
+    return figure
 
 
 def pointing_figure(values):
