@@ -18,6 +18,7 @@ from pedestal_bringup.studies import (
     pareto,
     phased_array,
     rate_measurement,
+    telemetry_flight,
 )
 from pedestal_bringup.studies.rigs.feedforward_loop import REVERSALS
 from pedestal_bringup.studies.rigs.profiles import PROFILES
@@ -171,6 +172,15 @@ def feedforward_numbers(rows):
     return ('case', 'miss rms deg', 'rate noise deg/s', 'x less than a conventional filter of equal rate noise'), lines
 
 
+def matrix_table(rows):
+    """The matrices of paper 004's proof of stability, in seconds, with rank and condition."""
+    lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
+              *(_number(rows['telemetry-flight', name, metric]['value'])
+                for metric in ('rank', 'condition', 'condition_in_seconds')))
+             for name, (matrix, _) in telemetry_flight.matrices().items()]
+    return ('matrix', 'its lines, in seconds', 'rank', 'condition, time in T', 'in seconds'), lines
+
+
 def pareto_numbers(rows):
     """What is left of the miss by any tuning of a filter, and at the rate noise of the IMM."""
     lines = [(name, *(_spread(rows['pareto', name, metric]) for metric in (
@@ -220,7 +230,7 @@ TABLES = {'results over seeds': seen_table,
           **{f'claims of paper {paper}': claim_table(paper) for paper in claims.PAPERS},
           'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
           'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
-          'array loops': array_numbers}
+          'array loops': array_numbers, 'matrices': matrix_table}
 """{name: rows -> (head, lines)}."""
 
 STUDIES = tuple(dict.fromkeys((*(claim.study for of in claims.PAPERS.values() for claim in of if claim.study),

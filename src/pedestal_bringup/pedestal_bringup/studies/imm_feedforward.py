@@ -122,7 +122,7 @@ def conventional(misses, axis):
 
 def at_rate_noise(misses, axis, rate_noise):
     """Miss (runs,) [deg] of a conventional filter tuned to a rate noise (runs,) [deg/s] in each run, between those of
-    CV (log-log)."""
+    CV (log-log), and that of the quietest where even that is louder, which misses by less than it should."""
     noises, curve = np.log(conventional(misses, axis))
     return np.exp([np.interp(*run) for run in zip(np.log(rate_noise), noises.T, curve.T)])
 
