@@ -1,7 +1,8 @@
 # make demo    set up, run the main scenario as separate nodes, record it, check the recording, write the report
 # make test    set up, lint, run every test
 # make update-references  record bags/reference anew and print the difference that is accepted with it
-# make docs    write the tables of README.md and docs/ anew from the tables of the code
+# make docs    write the tables of README.md and docs/ anew from the tables of the code and from docs/rows.json
+# make numbers run the studies and write docs/rows.json anew (some minutes), then make docs
 # make bench   set up, measure the graph, the core and bags
 # make colcon  build src/ as a ROS 2 workspace and start a node from it
 # make clean   remove everything made here
@@ -32,6 +33,10 @@ update-references: install
 	.venv/bin/python bags/reference/update.py
 
 docs: install
+	.venv/bin/python -m pedestal_bringup.reference
+
+numbers: install
+	.venv/bin/python -m pedestal_bringup.published
 	.venv/bin/python -m pedestal_bringup.reference
 
 bench: install
@@ -75,4 +80,4 @@ APT := apt-get -qq -o APT::Sandbox::User=root
 	    rm -r usr python3-pip-whl_*.deb ); fi || \
 	    { rm -rf $*; echo 'This Python cannot make an environment with pip: sudo apt-get install python3-venv'; exit 1; }
 
-.PHONY: install demo test update-references docs bench colcon clean
+.PHONY: install demo test update-references docs numbers bench colcon clean

@@ -18,7 +18,7 @@ WIDEST_NAME, WIDEST, SENTENCE = 44, 24, 40
 """Columns that the name of a list and its other cells have to themselves, a longer one moves what follows; and the
 least that a sentence beside them has, which stands below them otherwise."""
 
-TABLE_WIDTH = 120
+TABLE_WIDTH = 150
 """Columns that a table of results may take on any terminal, so that a row stays one line."""
 
 
@@ -123,9 +123,10 @@ def show_study(title, rows, missed):
 
     table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     for name, justify in (('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'),
-                          ('target', 'left'), ('unit', 'left'), ('', 'left')):
+                          ('95 % interval', 'right'), ('target', 'left'), ('unit', 'left'), ('', 'left')):
         table.add_column(name, justify=justify, no_wrap=True)
     for row in rows:
-        table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), row['target'] or '',
-                      row['unit'], 'MISSED' if missed(row) else '')
+        interval = f'{number(row["ci_low"])} to {number(row["ci_high"])}' if 'runs' in row else ''
+        table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), interval,
+                      row['target'] or '', row['unit'], 'MISSED' if missed(row) else '')
     Console(width=max(Console().width, TABLE_WIDTH)).print(table)

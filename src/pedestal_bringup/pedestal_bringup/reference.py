@@ -1,4 +1,4 @@
-"""The tables of README.md and docs/, written from the tables of the code: `make docs`.
+"""The tables of README.md and docs/, written from the tables of the code and from docs/rows.json: `make docs`.
 
 A table stands between <!-- table NAME --> and <!-- end --> in a file; a test holds the files against it.
 """
@@ -10,13 +10,13 @@ from acu_tracker import faults as acu_faults
 from acu_tracker import modes
 from acu_tracker.estimation.kinds import KINDS
 from adu_drive import faults
-from pedestal_bringup import studies
+from pedestal_bringup import published, studies
 from pedestal_bringup.again import what_if
 from pedestal_bringup.analysis import results
 from pedestal_bringup.run import scenario
 from pedestal_common import nodes, parameters, topics
 
-FILES = ('README.md', 'docs/graph.md')
+FILES = ('README.md', 'docs/graph.md', 'docs/papers.md')
 FIRST = (
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
     'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
@@ -123,19 +123,22 @@ TABLES = {'nodes': node_table, 'studies': study_table, 'topics': topic_table, 's
           'first parameters': parameter_table}
 
 
-def written(text):
-    """A file's text with its tables written again. Raises KeyError for an unknown table."""
+def written(text, rows):
+    """A file's text with its tables written again; rows: published.Rows. Raises KeyError for an unknown table."""
     def table(match):
-        return '\n'.join((f'<!-- table {match[1]} -->', *TABLES[match[1]](), '<!-- end -->'))
+        name = match[1]
+        lines = _table(*published.TABLES[name](rows)) if name in published.TABLES else TABLES[name]()
+        return '\n'.join((f'<!-- table {name} -->', *lines, '<!-- end -->'))
     return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)
 
 
 def main(root='.') -> int:
     """Write the tables of every file under a checkout."""
+    rows = published.read(root)
     for name in FILES:
         file = pathlib.Path(root, name)
         old = file.read_text()
-        new = written(old)
+        new = written(old, rows)
         if new != old:
             file.write_text(new)
             print(f'{name}: tables written')

@@ -112,7 +112,8 @@ def test_moments_are_those_of_the_estimates():
     truth = np.sin(t), np.cos(t), -np.sin(t)
     noise, params = Noise(0.01, None, 0.02), FilterParameters(kind='imm')
     measured = ensemble.records(truth, noise, 3, 0, 4)
-    sums = ensemble.moments(params, t, truth, noise, measured)
+    of_runs = ensemble.moments(params, t, truth, noise, measured)
+    sums = ensemble.over_runs(of_runs)
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=True))
     out = np.zeros((4, 300), axis_filter.ESTIMATE)
     for i in range(4):
@@ -121,7 +122,9 @@ def test_moments_are_those_of_the_estimates():
     assert np.allclose(ensemble.rms(sums, 'rate'), np.sqrt(np.mean((out['rate'] - truth[1])**2, axis=0)), rtol=1e-12)
     assert np.allclose(sums['mu'][:, 0], out['mu'][:, :, 0].sum(axis=0), rtol=1e-12)
     assert np.allclose(sums['nis'][1:], out['nis'][:, 1:].sum(axis=0), rtol=1e-12)
-    assert ensemble.total(sums)['runs'] == 1200.0
+    assert np.allclose(ensemble.rms(ensemble.over_time(of_runs), 'angle'),
+                       np.sqrt(np.mean((out['angle'] - truth[0])**2, axis=1)), rtol=1e-12)
+    assert ensemble.over_time(of_runs)['runs'].tolist() == [300.0] * 4
 
 
 @pytest.mark.parametrize('kind, least', [('cv', {'cv.noise': 3.7e-3}), ('alpha_beta', {'alpha_beta.alpha': 0.21}),

@@ -16,7 +16,7 @@ from tracking_receiver_sim import monopulse
 
 @pytest.fixture(scope='module', name='result')
 def study():
-    return phased_array.run(lambda *_: None)
+    return phased_array.run(lambda *_: None, runs=8)
 
 
 @pytest.fixture(scope='module', name='values')

@@ -1,11 +1,13 @@
 """Alignment of the INS: paper 001's figures 3 and 4 for five methods, over many seeds, beside the information limit.
 
-Paper 001's IMU and sway (section 5), misaligned by 3, 3 and 180 deg; a white velocity of 0.05 m/s per axis, one value
-per 0.02 s, which the paper does not state (results scale with it). Cases: method; limit, what the gyros and that
-velocity allow: covariance of riccati_eso and the gyros' bias over w_N; method/swell, 0.5 m/s at 0.1 Hz on every axis
-beside; method/quadrant-N, any heading of the ship and error of azimuth in quadrant N, biases drawn at random.
+Paper 001's IMU, sway and white velocity of 0.05 m/s per axis (section 5 and table 1), misaligned by 3, 3 and 180 deg.
+The velocity has one value per 0.02 s, which the paper does not state (results scale with it). Cases: method; limit,
+what the gyros and that velocity allow: covariance of riccati_eso and the gyros' bias over w_N; method/swell, 0.5 m/s
+at 0.1 Hz on every axis beside; method/quadrant-N, any heading of the ship and error of azimuth in quadrant N, biases
+drawn at random.
 """
 import dataclasses
+import functools
 import math
 import time
 import typing
@@ -15,7 +17,7 @@ import numpy as np
 
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies.rigs import drawing
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result, pseudo_values, row
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import to_deck
@@ -86,25 +88,64 @@ Increments = namedtuple('Increments', 'angle force attitude')
 
 class Sums(typing.NamedTuple):
     """Sums over runs: squared errors (n, 3) about east, north, up [rad2]; squared ratio of the error in azimuth to its
-    1 sigma (n,); wall time [s]. first: errors (n, 3) [rad] of the first run, None where it is not among them."""
+    1 sigma (n,); wall time [s]; steps; runs. first: errors (n, 3) [rad] of the first run, None where it is not among
+    them."""
     squares: np.ndarray = 0.0
     ratios: np.ndarray = 0.0
     first: np.ndarray | None = None
     wall_time: float = 0.0
+    steps: float = 0.0
+    runs: int = 0
 
     def plus(self, more):
         """These sums and more Sums."""
         return Sums(self.squares + more.squares, self.ratios + more.ratios,
-                    more.first if self.first is None else self.first, self.wall_time + more.wall_time)
+                    more.first if self.first is None else self.first, self.wall_time + more.wall_time,
+                    self.steps + more.steps, self.runs + more.runs)
 
 
-class Accuracy(typing.NamedTuple):
-    """Accuracy of a method over all runs: rms of the errors (n, 3) [arcmin]; rms ratio of the error in azimuth to its
-    1 sigma (n,); errors of the first run (n, 3) [rad], None in a batch without it; wall time of a step [us]."""
-    rms: np.ndarray
-    ratio: np.ndarray
-    first: np.ndarray | None
-    step_us: float
+PARTS = 20
+"""Parts of the runs from which the intervals of what is measured over all of them follow."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Accuracy:
+    """Accuracy of a method over parts of its runs, a list of Sums."""
+    parts: list
+
+    @functools.cached_property
+    def whole(self):
+        """The Sums of all runs."""
+        return functools.reduce(Sums.plus, self.parts)
+
+    @property
+    def rms(self):
+        """Rms of the errors over the runs (n, 3) [arcmin]."""
+        return np.sqrt(self.whole.squares / self.whole.runs) / ARCMIN
+
+    @property
+    def azimuth(self):
+        """Rms of the error in azimuth over the runs (n,) [arcmin]."""
+        return self.rms[:, 2]
+
+    @property
+    def level(self):
+        """Rms of the level errors over the runs and the time from SHORT on [arcmin]."""
+        return math.sqrt(np.mean(self.rms[round(SHORT / EVERY):, :2]**2))
+
+    @property
+    def ratio(self):
+        """Rms over the runs of the error in azimuth over its 1 sigma (n,)."""
+        return np.sqrt(self.whole.ratios / self.whole.runs)
+
+    @property
+    def step_us(self):
+        """Wall time of a step [us]."""
+        return 1e6 * self.whole.wall_time / self.whole.steps
+
+    def over_parts(self, statistic):
+        """rows.pseudo_values of statistic(Accuracy)."""
+        return pseudo_values(self.parts, lambda parts: statistic(Accuracy(parts)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -232,7 +273,8 @@ def aligned(batch):
             wall_time = time.perf_counter() - begun
             e = errors(estimates['quaternion'], attitude[every - 1::every])
             sums[case] = sums.get(case, Sums()).plus(Sums(
-                e * e, (e[:, 2] / estimates['azimuth_sigma'])**2, e if batch.first + i == 0 else None, wall_time))
+                e * e, (e[:, 2] / estimates['azimuth_sigma'])**2, e if batch.first + i == 0 else None, wall_time,
+                batch.duration / STEP, 1))
     return sums
 
 
@@ -270,44 +312,41 @@ TARGETS = {
 PAPER = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
 
 
-def case_row(case, metric, value, unit):
-    """The rows.row of a case and metric, with the paper's number and our target."""
-    return row(case, metric, value, unit, PAPER.get((case, metric)), TARGETS.get((case, metric)))
+MEASURES = {
+    '': {'time_to_12arcmin_rms_s': ('s', lambda a: settling_time(a.azimuth)),
+         **{f'azimuth_rms_arcmin_{t}s': ('arcmin', lambda a, t=t: at(a.azimuth, t)) for t in TIMES},
+         'level_rms_arcmin': ('arcmin', lambda a: a.level),
+         'azimuth_error_over_sigma_300s': ('-', lambda a: at(a.ratio, 300))},
+    'swell': {f'azimuth_rms_arcmin_{SWELL_TIME}s': ('arcmin', lambda a: at(a.azimuth, SWELL_TIME)),
+              f'azimuth_error_over_sigma_{SWELL_TIME}s': ('-', lambda a: at(a.ratio, SWELL_TIME))},
+    'quadrant': {'azimuth_rms_arcmin_300s': ('arcmin', lambda a: at(a.azimuth, 300))}}
+"""{kind of runs: {metric: (unit, its value of an Accuracy)}}."""
 
 
 def rows(accuracy, bound):
     """The rows of accuracy {kind: {case: Accuracy}}; bound: as of `limit`."""
     table = []
-    curves = {case: (a.rms[:, 2], math.sqrt(np.mean(a.rms[round(SHORT / EVERY):, :2]**2)))
-              for case, a in accuracy[''].items()}
-    curves['limit'] = bound[0] / ARCMIN, math.sqrt(np.mean((bound[1][round(SHORT / EVERY):] / ARCMIN)**2))
-    for case, (azimuth, level) in curves.items():
-        table.append(case_row(case, 'time_to_12arcmin_rms_s', settling_time(azimuth), 's'))
-        table += [case_row(case, f'azimuth_rms_arcmin_{t}s', at(azimuth, t), 'arcmin') for t in TIMES]
-        table.append(case_row(case, 'level_rms_arcmin', level, 'arcmin'))
-    for case, a in accuracy[''].items():
-        table.append(case_row(case, 'azimuth_error_over_sigma_300s', at(a.ratio, 300), '-'))
-        table.append(case_row(case, 'step_us', a.step_us, 'us'))
     for kind, cases in accuracy.items():
-        if kind == 'swell':
-            table += [case_row(f'{case}/{kind}', f'azimuth_rms_arcmin_{SWELL_TIME}s', at(a.rms[:, 2], SWELL_TIME),
-                               'arcmin') for case, a in cases.items()]
-            table += [case_row(f'{case}/{kind}', f'azimuth_error_over_sigma_{SWELL_TIME}s', at(a.ratio, SWELL_TIME),
-            '-')
-                      for case, a in cases.items()]
-        elif kind:
-            table += [case_row(f'{case}/{kind}', 'azimuth_rms_arcmin_300s', at(a.rms[:, 2], 300), 'arcmin')
-                      for case, a in cases.items()]
-    return table
+        for method, a in cases.items():
+            case = f'{method}/{kind}'.rstrip('/')
+            table += [row(case, metric, a.over_parts(value), unit, PAPER.get((case, metric)),
+                          TARGETS.get((case, metric)), a.whole.runs)
+                      for metric, (unit, value) in MEASURES[kind.partition('-')[0]].items()]
+    azimuth, level = (sigma / ARCMIN for sigma in bound)
+    table += [row('limit', 'time_to_12arcmin_rms_s', settling_time(azimuth), 's'),
+              *(row('limit', f'azimuth_rms_arcmin_{t}s', at(azimuth, t), 'arcmin') for t in TIMES),
+              row('limit', 'level_rms_arcmin', math.sqrt(np.mean(level[round(SHORT / EVERY):]**2)), 'arcmin')]
+    return table + [row(case, 'step_us', a.step_us, 'us') for case, a in accuracy[''].items()]
 
 
 def remarks(runs):
     """Sentences that the rows need, after this number of runs."""
     return [
-        f'{runs} runs: an rms is known to {100.0 / math.sqrt(2.0 * runs):.0f} %, the last crossing of 12 arcmin to '
-        'tens of seconds where the rms flattens out just below. What kicks the classical loop off 180 deg turns it by '
-        'more than a turn, so its time hangs on details: bandwidths of 0.024 to 0.028 rad/s give 414 to 494 s in no '
-        'order, the other signs of the tilts at the start 425 to 542 s.',
+        f'{runs} runs; every number is one of all of them, such as an rms, its interval by the jackknife over {PARTS} '
+        'parts of them. The last crossing of 12 arcmin is known to tens of seconds only where the rms flattens out '
+        'just below. What kicks the classical loop off 180 deg turns it by more than a turn, so its time hangs on '
+        'details: bandwidths of 0.024 to 0.028 rad/s give 414 to 494 s in no order, the other signs of the tilts at '
+        'the start 425 to 542 s.',
         'level_rms_arcmin is over 300 to 600 s; step_us is one step of 0.02 s with its two of the strapdown.']
 
 
@@ -317,17 +356,14 @@ def run(progress, runs=RUNS, pool=None) -> Result:
     quarter = -(-runs // 4)
     kinds = {'': runs, 'swell': runs, **{f'quadrant-{n}': quarter for n in range(1, 5)}}
     batches = [Batch(kind, *part) for kind, count in kinds.items() for part in monte_carlo.batches(count, BATCH)]
-    totals = {kind: dict.fromkeys(CASES, Sums()) for kind in kinds}
+    parts = {(kind, case): [Sums()] * min(PARTS, -(-count // BATCH))
+             for kind, count in kinds.items() for case in CASES}
     for batch, sums in zip(batches, pool.map(aligned, batches, progress)):
-        total = totals[batch.kind]
         for case, more in sums.items():
-            total[case] = total[case].plus(more)
-    accuracy = {}
-    for kind, cases in totals.items():
-        count, steps = kinds[kind], Batch(kind, 0, 1).duration / STEP
-        accuracy[kind] = {case: Accuracy(np.sqrt(sums.squares / count) / ARCMIN, np.sqrt(sums.ratios / count),
-                                         sums.first, 1e6 * sums.wall_time / count / steps)
-                          for case, sums in cases.items()}
+            of_case = parts[batch.kind, case]
+            i = batch.first // BATCH % len(of_case)
+            of_case[i] = of_case[i].plus(more)
+    accuracy = {kind: {case: Accuracy(parts[kind, case]) for case in CASES} for kind in kinds}
     bound = limit()
     return Result(rows(accuracy, bound), figures(accuracy, bound), remarks(runs))
 
@@ -343,8 +379,8 @@ def azimuth_figure(accuracy, bound):
     figure, axes = drawing.panels(3, size=(7.4, 9.0))
     t = EVERY * np.arange(1, len(bound[0]) + 1)
     for case, a in accuracy.items():
-        axes[0, 0].plot(t, np.degrees(a.first[:, 2]), color=COLOURS[case], label=case)
-        axes[1, 0].plot(t, a.first[:, 2] / ARCMIN, color=COLOURS[case])
+        axes[0, 0].plot(t, np.degrees(a.whole.first[:, 2]), color=COLOURS[case], label=case)
+        axes[1, 0].plot(t, a.whole.first[:, 2] / ARCMIN, color=COLOURS[case])
         axes[2, 0].plot(t, a.rms[:, 2], color=COLOURS[case], label=case)
     axes[0, 0].set_title('azimuth error of one run (figure 3 of the paper)')
     axes[0, 0].set_ylabel('[deg]')
@@ -373,7 +409,7 @@ def level_figure(accuracy, bound):
     figure, axes = drawing.panels(2, size=(7.4, 6.4))
     t = EVERY * np.arange(1, len(bound[1]) + 1)
     for case, a in accuracy.items():
-        axes[0, 0].plot(t, a.first[:, 0] / ARCMIN, color=COLOURS[case], linewidth=0.8, label=case)
+        axes[0, 0].plot(t, a.whole.first[:, 0] / ARCMIN, color=COLOURS[case], linewidth=0.8, label=case)
         axes[1, 0].plot(t, np.sqrt(np.mean(a.rms[:, :2]**2, axis=1)), color=COLOURS[case], label=case)
     axes[0, 0].set_title('level error about east of one run (figure 4 of the paper)')
     axes[0, 0].set_xlim(100.0, DURATION)

@@ -2,8 +2,8 @@
 
 Cases <profile>/<filter>/<noise>, measurements at 100 Hz. Every filter but imm is tuned for each profile and noise by
 the procedure of `tuning` for the least angle rms over TUNING_RUNS records of other seeds; imm has one fixed tuning,
-its default parameters. `-rate-X`: with an independent rate measurement of X deg/s rms. Moments are over all runs,
-after SETTLED.
+its default parameters. `-rate-X`: with an independent rate measurement of X deg/s rms. Every run has its own rms and
+means, after SETTLED.
 """
 import math
 
@@ -59,10 +59,6 @@ TARGETS = {
     ('s-turn-500m', 'imm', 'angle_rms_deg'): '<= 0.0078', ('s-20deg', 'imm', 'angle_rms_deg'): '<= 0.0097'}
 """Of the noise white-0.03."""
 
-PAPER = {('flyby-500m', 'current_statistical', 'reduction'): 7.0,
-         ('flyby-60m', 'current_statistical', 'reduction'): 3.0}
-"""Paper 000, figures 7 to 10."""
-
 CONSISTENT = (0.8, 1.25)
 """Range of mean NIS per degree of freedom, and of rms error over the filter's own sigma, of a consistent filter."""
 
@@ -78,7 +74,7 @@ def times():
 
 
 def measured(params, profile, noise, rate_sigma, seed, first, count):
-    """MOMENTS over time (n,) of one filter (FilterParameters), runs first ... first + count - 1."""
+    """MOMENTS (count, n) of one filter (FilterParameters), runs first ... first + count - 1."""
     t = times()
     noise = Noise(noise.sigma, noise.bandwidth, rate_sigma)
     truth = profiles.truth(profile, t)
@@ -86,8 +82,8 @@ def measured(params, profile, noise, rate_sigma, seed, first, count):
 
 
 def settled(sums):
-    """Total of MOMENTS over time once the filter has settled."""
-    return ensemble.total(sums[round(SETTLED / ensemble.PERIOD):])
+    """Sum (runs,) of MOMENTS (runs, n) over the time once the filter has settled."""
+    return ensemble.over_time(sums[:, round(SETTLED / ensemble.PERIOD):])
 
 
 def tune(item):
@@ -99,7 +95,8 @@ def tune(item):
     records = ensemble.records(truth, noise_known, TUNING_SEED, 0, TUNING_RUNS)
 
     def angle_rms(params):
-        return ensemble.rms(settled(ensemble.moments(params, t, truth, noise_known, records)), 'angle').item()
+        sums = settled(ensemble.moments(params, t, truth, noise_known, records))
+        return math.sqrt(sums['angle2'].sum() / sums['runs'].sum())
 
     return tuning.tuned(FILTERS[name], angle_rms)[0]
 
@@ -109,17 +106,18 @@ THINNED = 10
 
 
 def batch(item):
-    """{filter: (total, MOMENTS over thinned time)} of an item (profile, noise, {filter: parameters}, first, count)."""
+    """{filter: (MOMENTS (count,) of every run, MOMENTS over the runs at thinned times)} of an item (profile, noise,
+    {filter: parameters}, first, count)."""
     profile, noise, filters, first, count = item
     sums_of = {}
     for name, params in filters.items():
         sums = measured(params, profile, NOISES[noise], RATES.get(name), SEED, first, count)
-        sums_of[name] = settled(sums), sums[::THINNED].copy()
+        sums_of[name] = settled(sums), ensemble.over_runs(sums[:, ::THINNED])
     if profile == RANGED[0]:
         t = times()
         sums = ensemble.unscented_moments(UkfParameters(), profiles.truth(profile, t), profiles.distance(profile, t),
                                           NOISES[noise], RANGED[1], (SEED, first, count))
-        sums_of['imm_ukf'] = settled(sums), sums[::THINNED].copy()
+        sums_of['imm_ukf'] = settled(sums), ensemble.over_runs(sums[:, ::THINNED])
     return sums_of
 
 
@@ -133,33 +131,35 @@ def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE
             tune, wanted, lambda share, text: progress(0.5 * share, f'tuning, {text}'))):
         tuned[profile, noise][name] = params
     items = [(*key, tuned[key], first, count) for key in tuned for first, count in monte_carlo.batches(runs, BATCH)]
-    totals, over_time = {}, {}
+    of_runs, over_time = {}, {}
     for (profile, noise, *_), sums_of in zip(items, pool.map(
             batch, items, lambda share, text: progress(0.5 + 0.5 * share, f'{runs} runs of each case, {text}'))):
         for name, (sums, thinned) in sums_of.items():
             case = profile, name, noise
-            totals[case] = ensemble.added(totals[case], sums) if case in totals else sums
+            of_runs.setdefault(case, []).append(sums)
             over_time[case] = ensemble.added(over_time[case], thinned) if case in over_time else thinned
-    values = {case: metrics(sums) for case, sums in totals.items()}
-    return Result(rows(values), figures(values, over_time), remarks(values, tuned, runs), shown=shown(rows(values)))
+    values = {case: metrics(np.concatenate(sums)) for case, sums in of_runs.items()}
+    means = {case: {metric: float(value.mean()) for metric, (value, _) in measured.items()}
+             for case, measured in values.items()}
+    table = rows(values)
+    return Result(table, figures(means, over_time), remarks(means, tuned, runs), shown=shown(table))
 
 
 def metrics(sums):
-    """{metric: (value, unit)} of MOMENTS (1,); a consistent filter has a nis_mean of its freedom and both _over_sigma
-    1."""
-    angle, rate, raw = (ensemble.rms(sums, name).item() for name in ('angle', 'rate', 'raw'))
-    runs = sums['runs'].item()
-    return {'angle_rms_deg': (math.degrees(angle), 'deg'), 'rate_rms_deg_s': (math.degrees(rate), 'deg/s'),
-            'reduction': (raw / angle, ''), 'nis_mean': (sums['nis'].item() / runs, ''),
-            'angle_over_sigma': (angle / math.sqrt(sums['variance'].item() / runs), ''),
-            'rate_over_sigma': (rate / math.sqrt(sums['rate_variance'].item() / runs), '')}
+    """{metric: (values (runs,), unit)} of MOMENTS (runs,); a consistent filter has a nis_mean of its freedom and both
+    _over_sigma 1."""
+    angle, rate, raw = (ensemble.rms(sums, name) for name in ('angle', 'rate', 'raw'))
+    n = sums['runs']
+    return {'angle_rms_deg': (np.degrees(angle), 'deg'), 'rate_rms_deg_s': (np.degrees(rate), 'deg/s'),
+            'reduction': (raw / angle, ''), 'nis_mean': (sums['nis'] / n, ''),
+            'angle_over_sigma': (angle / np.sqrt(sums['variance'] / n), ''),
+            'rate_over_sigma': (rate / np.sqrt(sums['rate_variance'] / n), '')}
 
 
 def rows(values):
     """A row for every metric of every case (profile, filter, noise)."""
     return [row('/'.join(case), metric, value, unit,
-                PAPER.get((*case[:2], metric)) if case[2] == SHOWN else None,
-                TARGETS.get((*case[:2], metric)) if case[2] == SHOWN else None)
+                target=TARGETS.get((*case[:2], metric)) if case[2] == SHOWN else None)
             for case, measured in values.items() for metric, (value, unit) in measured.items()]
 
 
@@ -171,13 +171,12 @@ def shown(table):
 def _cell(measured):
     if measured is None:
         return 34 * ' '
-    value = {metric: value for metric, (value, _) in measured.items()}
-    return (f'{value["angle_rms_deg"]:.4f} ({value["reduction"]:.1f})  {value["rate_rms_deg_s"]:.4f}  '
-            f'{value["angle_over_sigma"]:.2f} {value["rate_over_sigma"]:.2f}').ljust(34)
+    return (f'{measured["angle_rms_deg"]:.4f} ({measured["reduction"]:.1f})  {measured["rate_rms_deg_s"]:.4f}  '
+            f'{measured["angle_over_sigma"]:.2f} {measured["rate_over_sigma"]:.2f}').ljust(34)
 
 
 def remarks(values, tuned, runs):
-    """Sentences that the rows need, with a table of the profiles."""
+    """Sentences that the rows need, with a table of the profiles; values {case: {metric: mean over the runs}}."""
     lines = [f'{runs} runs of each case. Angle rms [deg] (reduction), rate rms [deg/s], error over own sigma of angle '
              f'and rate, noise {SHOWN} deg; every case is in the rows of --json.']
     on = [profile for profile, noise in tuned if noise == SHOWN]
@@ -188,8 +187,8 @@ def remarks(values, tuned, runs):
     for colour in ('white', 'coloured'):
         inconsistent = {}
         for (_, name, noise), measured in values.items():
-            measures = {'NIS': measured['nis_mean'][0] / freedom(name), 'angle': measured['angle_over_sigma'][0],
-                        'rate': measured['rate_over_sigma'][0]}
+            measures = {'NIS': measured['nis_mean'] / freedom(name), 'angle': measured['angle_over_sigma'],
+                        'rate': measured['rate_over_sigma']}
             if noise.startswith(colour):
                 for what, value in measures.items():
                     if not CONSISTENT[0] <= value <= CONSISTENT[1]:
@@ -200,8 +199,8 @@ def remarks(values, tuned, runs):
         if listed:
             lines += [f'Not honest under {colour} noise, NIS per degree of freedom or error over own sigma outside '
                       f'{CONSISTENT[0]:g} to {CONSISTENT[1]:g} in some case:', *listed]
-    pairs = [(values[profile, name, noise]['reduction'][0],
-              values[profile, name, noise.replace('white', 'coloured')]['reduction'][0])
+    pairs = [(values[profile, name, noise]['reduction'],
+              values[profile, name, noise.replace('white', 'coloured')]['reduction'])
              for profile, name, noise in values if noise == SHOWN
              and (profile, name, noise.replace('white', 'coloured')) in values and name == 'current_statistical']
     if pairs:
@@ -212,7 +211,7 @@ def remarks(values, tuned, runs):
 
 
 def figures(values, over_time):
-    """{name: function that draws it} of the cases with the noise SHOWN."""
+    """{name: function that draws it} of the cases with the noise SHOWN; values as of `remarks`."""
     on = list(dict.fromkeys(profile for profile, _, noise in values if noise == SHOWN))
     if not on:
         return {}
@@ -274,14 +273,14 @@ def _colour(name):
 
 def rms_figure(values, on):
     """Angle rms of every filter; the number on a bar is the reduction."""
-    return bars(values, on, lambda name, at: at['angle_rms_deg'][0], 'angle rms [deg]', _colour,
-                lambda name, at: f'{at["reduction"][0]:.1f}')[0]
+    return bars(values, on, lambda name, at: at['angle_rms_deg'], 'angle rms [deg]', _colour,
+                lambda name, at: f'{at["reduction"]:.1f}')[0]
 
 
 def nis_figure(values, on):
     """Mean NIS per degree of freedom of every filter; 1 for a consistent one."""
     def nis(name, at):
-        return at['nis_mean'][0] / freedom(name)
+        return at['nis_mean'] / freedom(name)
 
     figure, panels = bars(values, on, nis, 'NIS per degree of freedom', _colour,
                           lambda name, at: f'{nis(name, at):.2f}')
@@ -313,7 +312,7 @@ def noise_figure(values, on):
     for panel, profile in zip(axes[0], on):
         for noise, colour, marker in zip(NOISES, (RAW, RAW, FILTERED, FILTERED), 'o^o^'):
             there = [name for name in SHOWN_FILTERS if (profile, name, noise) in values]
-            panel.plot([values[profile, name, noise]['reduction'][0] for name in there], there, marker,
+            panel.plot([values[profile, name, noise]['reduction'] for name in there], there, marker,
                            color=colour, ms=4.0, linestyle='', label=f'{noise} deg',
                            fillstyle='full' if marker == 'o' else 'none')
         panel.axvline(1.0, color=INK, linewidth=0.8)

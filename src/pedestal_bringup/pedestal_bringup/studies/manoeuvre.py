@@ -1,7 +1,7 @@
 """Manoeuvre: rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
 
 A target moves to and fro through 20 deg at 3.5 deg/s with reversals of half a cosine that last 4, 2, 1, 0.5 and
-0.35 s, one after the other; it is measured at 100 Hz with 0.02 deg. Cases reversal-<s>/<filter>: rms over all runs
+0.35 s, one after the other; it is measured at 100 Hz with 0.02 deg. Cases reversal-<s>/<filter>: rms of a run
 inside the reversal. cv and ca are conventional filters, imm-a and imm-b those of the study imm-feedforward.
 """
 import math
@@ -53,31 +53,34 @@ def motion():
 
 
 def batch(item):
-    """MOMENTS (n,) of an item (filter, first run, number of runs)."""
+    """(MOMENTS (n,) over the runs, rms (count, len(REVERSALS), 2) of rate [deg/s] and acceleration [deg/s2] of every
+    run inside the reversals) of an item (filter, first run, number of runs)."""
     name, first, count = item
-    t, truth, _ = motion()
-    return ensemble.moments(FILTERS[name], t, truth, NOISE, ensemble.records(truth, NOISE, SEED, first, count))
+    t, truth, reversals = motion()
+    sums = ensemble.moments(FILTERS[name], t, truth, NOISE, ensemble.records(truth, NOISE, SEED, first, count))
+    inside = [ensemble.over_time(sums[:, mask]) for mask in reversals.values()]
+    rms = np.degrees([[ensemble.rms(of, what) for what in ('rate', 'acceleration')] for of in inside])
+    return ensemble.over_runs(sums), rms.transpose(2, 0, 1)
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
     """Filter `runs` noisy records with each of FILTERS; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH)]
-    sums_of = {}
-    for (name, *_), sums in zip(items, pool.map(batch, items, progress)):
+    sums_of, errors = {}, {}
+    for (name, *_), (sums, rms) in zip(items, pool.map(batch, items, progress)):
         sums_of[name] = ensemble.added(sums_of[name], sums) if name in sums_of else sums
-    values = measured(sums_of)
+        errors.setdefault(name, []).append(rms)
+    values = measured({name: np.concatenate(rms) for name, rms in errors.items()})
     figures = {'figure-3': lambda: rate_figure(sums_of), 'figure-4': lambda: acceleration_figure(sums_of),
                'sharpness': lambda: sharpness_figure(values)}
     return Result(rows(values), figures, remarks(values))
 
 
-def measured(sums_of):
-    """{(reversal, filter): (rms of rate [deg/s], rms of acceleration [deg/s2])} inside the reversals."""
-    _, _, reversals = motion()
-    return {(reversal, name): tuple(math.degrees(ensemble.rms(ensemble.total(sums[inside]), what).item())
-                                    for what in ('rate', 'acceleration'))
-            for reversal, inside in reversals.items() for name, sums in sums_of.items()}
+def measured(errors):
+    """{(reversal, filter): rms (2, runs) of rate [deg/s] and acceleration [deg/s2]}; errors {filter: (runs,
+    len(REVERSALS), 2)}."""
+    return {(reversal, name): rms[:, i].T for i, reversal in enumerate(REVERSALS) for name, rms in errors.items()}
 
 
 def rows(values):
@@ -102,7 +105,7 @@ def peak_acceleration(reversal):
 def remarks(values):
     """Sentences that the rows need; values as of `measured`."""
     worse = [f'{peak_acceleration(reversal):.1f}' for reversal in REVERSALS
-             if values[reversal, 'imm-a'][1] > values[reversal, 'cv'][1]]
+             if values[reversal, 'imm-a'][1].mean() > values[reversal, 'cv'][1].mean()]
     lines = ['_ratio_of_cv: how many times the error of cv is that of the filter. cv has no acceleration: its error '
              'is the acceleration itself.']
     if worse:
@@ -149,7 +152,7 @@ def sharpness_figure(values):
     x = [peak_acceleration(reversal) for reversal in REVERSALS]
     for i, (panel, label) in enumerate(zip(axes[0], ('rate rms [deg/s]', 'acceleration rms [deg/s2]'))):
         for name, colour in COLOURS.items():
-            y = [values[reversal, name][i] for reversal in REVERSALS]
+            y = [values[reversal, name][i].mean() for reversal in REVERSALS]
             panel.loglog(x, y, 'o-', ms=3.5, color=colour, label=name)
         panel.set_ylabel(label)
         panel.set_xlabel('peak acceleration of the reversal [deg/s2]')

@@ -57,13 +57,13 @@ def run(progress, runs=RUNS, pool=None) -> Result:
     """Run every tuning `runs` times; pool: monte_carlo.Pool, None for this process."""
     misses = feedforward_loop.statistics(cases(), runs, pool or monte_carlo.Pool(1), progress)
     points = {case: measured(misses[case]) for case in misses}
-    return Result(rows(points), {'miss': lambda: miss_figure(points)}, remarks(points))
+    mean = {case: tuple(values.mean(axis=1)) for case, values in points.items()}
+    return Result(rows(points), {'miss': lambda: miss_figure(mean)}, remarks(mean))
 
 
 def measured(statistics):
-    """(noise of a uniform rate [deg/s], miss rms [deg]) of a MissStatistics."""
-    values = statistics.measures()
-    return values['rate_noise_deg_s'][0], values['miss_rms_deg'][0]
+    """(noise of a uniform rate [deg/s], miss rms [deg]) of every run of a MissStatistics, an array (2, runs)."""
+    return np.array([statistics.of(metric) for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 
 def curve(points, name):
@@ -92,26 +92,31 @@ def noise_at(front, miss):
 
 
 def rows(points):
-    """The rows of points {(filter, value): (rate noise [deg/s], miss [deg])}."""
+    """The rows of points {(filter, value): (rate noise [deg/s], miss [deg]) of every run, an array (2, runs)}.
+
+    The curves are read run by run, as all filters have the same noise in a run; a number that is not on the curve of
+    every run has no row.
+    """
     noise, miss = points['reference', 0.0]
     table = [row('imm-predicted', 'miss_rms_deg', miss, 'deg'),
              row('imm-predicted', 'rate_noise_deg_s', noise, 'deg/s')]
     for name in TUNINGS:
-        front = frontier(points, name)
-        table += [row(name, 'least_miss_deg', front[1, -1], 'deg'),
-                  row(name, 'rate_noise_at_least_miss_deg_s', front[0, -1], 'deg/s')]
-        if front[0, 0] <= noise:
-            equal = miss_at(front, noise)
+        fronts = [frontier({case: values[:, i] for case, values in points.items()}, name) for i in range(len(miss))]
+        table += [row(name, 'least_miss_deg', np.array([front[1, -1] for front in fronts]), 'deg'),
+                  row(name, 'rate_noise_at_least_miss_deg_s', np.array([front[0, -1] for front in fronts]), 'deg/s')]
+        if all(front[0, 0] <= own for front, own in zip(fronts, noise)):
+            equal = np.array([miss_at(*run) for run in zip(fronts, noise)])
             table += [row(name, 'miss_at_equal_rate_noise_deg', equal, 'deg'),
                       row(name, 'miss_ratio_at_equal_rate_noise', equal / miss, '', None,
                           TARGET if name == 'cv' else None)]
-        if front[1, -1] <= miss:
-            table.append(row(name, 'rate_noise_at_equal_miss_deg_s', noise_at(front, miss), 'deg/s'))
+        if all(front[1, -1] <= own for front, own in zip(fronts, miss)):
+            table.append(row(name, 'rate_noise_at_equal_miss_deg_s',
+                             np.array([noise_at(*run) for run in zip(fronts, miss)]), 'deg/s'))
     return table
 
 
 def remarks(points):
-    """Sentences that the rows need; points as of `rows`."""
+    """Sentences that the rows need; points {(filter, value): (rate noise [deg/s], miss [deg])}: means of the runs."""
     tuned = '; '.join(f'{name}: {what} {values[0]:g} to {values[-1]:g}'
                       for name, (what, values, _) in TUNINGS.items())
     noise, miss = points['reference', 0.0]
@@ -128,7 +133,7 @@ def remarks(points):
 
 
 def miss_figure(points):
-    """Miss against rate noise, a curve for every filter."""
+    """Miss against rate noise, a curve for every filter; points as of `remarks`."""
     figure, axes = drawing.panels(1, size=(7.4, 4.8))
     panel = axes[0, 0]
     for name, colour in COLOURS.items():

@@ -25,8 +25,12 @@ from pedestal_bringup.studies.rigs.angle_loop import (
 from pedestal_bringup.studies.rigs.cases import Case
 from pedestal_bringup.studies.rigs.metrics import overshoot_percent, peak, rms
 from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.trials import monte_carlo
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
+
+RUNS, SEED = 40, 1
+"""Runs of each case with noise; seed of the first."""
 
 STEP = math.radians(1.0)
 ALPHAS, PERIODS, DELAYS, SLOPES = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80), (0.5, 0.7, 1.0, 1.5, 2.0)
@@ -236,9 +240,9 @@ def moving_rows():
     return rows
 
 
-def noises():
-    """Noise of the receiver [rad], of the INS's attitude [rad] and rate [rad/s], each (n,), of one seed."""
-    rng = np.random.default_rng(1)
+def noises(run):
+    """Noise of the receiver [rad], of the INS's attitude [rad] and rate [rad/s], each (n,), of one run."""
+    rng = np.random.default_rng(SEED + run)
     return [sigma * rng.standard_normal(round(SECONDS / GRID)) for sigma in (NOISE, INS_ANGLE, INS_RATE)]
 
 
@@ -254,32 +258,51 @@ def at_ends(error, target):
     return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))
 
 
-def compared(progress):
-    """{case: (true error without noise, jitter), each (n,) [rad]} of all loops on all targets."""
-    noise, ins_angle, ins_rate = noises()
+COMPARED = (*(f'{loop}/{target}' for loop in LOOPS for target in ('ramp', 'sine', 'sway')), *INS_LOOPS)
+"""The cases of LOOPS on all targets and INS_LOOPS."""
+
+
+def beam(case, run=None):
+    """Beam (n,) [rad] of one of COMPARED; run: which noise, None for none."""
     sway, rate = sway_target()
-    targets, done = compared_targets(), {}
-    for i, (loop_name, loop) in enumerate(LOOPS.items()):
-        progress(0.5 + 0.2 * i / len(LOOPS), f'loop {loop_name}')
-        for target_name, target in targets.items():
-            more = {'rate': rate} if isinstance(loop, Paper) and target_name == 'sway' else {}
-            clean, noisy = loop.run(target, **more)[0], loop.run(target, noise=noise, **more)[0]
-            done[f'{loop_name}/{target_name}'] = target - clean, noisy - clean
-    for case, loop in INS_LOOPS.items():
-        clean = loop.run(sway, attitude=sway, rate=rate)[0]
-        noisy = loop.run(sway, noise, sway + ins_angle, rate + ins_rate)[0]
-        done[case] = sway - clean, noisy - clean
-    return done
+    noise, ins_angle, ins_rate = 3 * (np.zeros(len(sway)),) if run is None else noises(run)
+    if case in INS_LOOPS:
+        return INS_LOOPS[case].run(sway, noise, sway + ins_angle, rate + ins_rate)[0]
+    name, of = case.split('/')
+    loop = LOOPS[name]
+    more = {'rate': rate} if isinstance(loop, Paper) and of == 'sway' else {}
+    return loop.run(compared_targets()[of], noise=noise, **more)[0]
 
 
-def compared_rows(done):
-    """Rows (case, metric, value, unit) of `compared`."""
+def jitter(item):
+    """Rms [deg] that noise moves the beam by in every run of an item (one of COMPARED or GRAPH, how many runs)."""
+    case, runs = item
+    if case in GRAPH:
+        quiet = graph_error(case, quiet=True)
+        return [math.degrees(rms((graph_error(case, seed=SEED + i) - quiet)[:, 1])) for i in range(runs)]
+    clean = beam(case)
+    return [math.degrees(rms(settled(beam(case, i) - clean))) for i in range(runs)]
+
+
+def compared():
+    """{case: true error without noise (n,) [rad]} of COMPARED."""
+    targets = compared_targets()
+    return {case: targets[target_of(case)] - beam(case) for case in COMPARED}
+
+
+def target_of(case):
+    """The name of the target of one of COMPARED."""
+    return case.split('/')[1].removesuffix('-ins')
+
+
+def compared_rows(done, jitters):
+    """Rows (case, metric, value, unit) of `compared`; jitters {case: rms of every run [deg]}."""
     rows, targets = [], compared_targets()
-    for case, (error, jitter) in done.items():
-        worst, at_the_ends = peak(settled(error)), at_ends(error, targets[case.split('/')[1].removesuffix('-ins')])
+    for case, error in done.items():
+        worst, at_the_ends = peak(settled(error)), at_ends(error, targets[target_of(case)])
         rows += [(case, 'max_error_deg', math.degrees(worst), 'deg'),
                  (case, 'ends_max_error_deg', math.degrees(at_the_ends), 'deg'),
-                 (case, 'jitter_rms_deg', math.degrees(rms(settled(jitter))), 'deg')]
+                 (case, 'jitter_rms_deg', jitters[case], 'deg')]
         if '/sway' in case:
             rows += [(case, 'isolation_db', isolation(worst), 'dB'),
                      (case, 'ends_isolation_db', isolation(at_the_ends), 'dB')]
@@ -352,18 +375,28 @@ def graph_case(case, quiet=False):
     return dataclasses.replace(noisy, parameters={**GRAPH[case], **QUIET, 'acu.tracker.receiver.sigma_floor': sigma})
 
 
-def graph_rows(progress):
-    """Rows of GRAPH: cross-elevation and elevation together, at both ends of the intervals, after 10 s of settling."""
+GRAPH_SETTLED = 10.0
+"""The time from which the runs of GRAPH are evaluated [s]."""
+
+
+def graph_error(case, quiet=False, seed=None):
+    """True error (n, 2) [rad] of one of GRAPH once settled, at the ends of the intervals; arguments as of
+    `graph_case`."""
+    run = graph_case(case, quiet).with_seed(seed).run()
+    return run.truth['error'][run.t >= GRAPH_SETTLED]
+
+
+def graph_rows(jitters):
+    """Rows of GRAPH: cross-elevation and elevation together, at both ends of the intervals; jitters {case: rms of
+    every run [deg]}, in elevation."""
     rows = []
-    for i, case in enumerate(GRAPH):
-        progress(0.75 + 0.25 * i / len(GRAPH), case)
-        noisy, quiet = graph_case(case).run(), graph_case(case, quiet=True).run()
-        kept = quiet.t >= 10.0
+    for case in GRAPH:
+        quiet = graph_case(case, quiet=True).run()
+        kept = quiet.t >= GRAPH_SETTLED
         ends = quiet.truth['error'], began(quiet['adu/truth']['position'], quiet.truth['error'])
         worst = max(peak(np.hypot(*error[kept].T)) for error in ends)
-        jitter = rms(noisy.truth['error'][kept, 1] - quiet.truth['error'][kept, 1])
         rows += [(case, 'max_error_deg', math.degrees(worst), 'deg'), (case, 'isolation_db', isolation(worst), 'dB'),
-                 (case, 'jitter_rms_deg', math.degrees(jitter), 'deg')]
+                 (case, 'jitter_rms_deg', jitters[case], 'deg')]
     return rows
 
 
@@ -411,8 +444,8 @@ def drawings(done, limit, errors):
         'loss': draw(figures.loss, lost, (0.0, 20.0))}
 
 
-def run(progress) -> Result:
-    """Run all loops on all targets."""
+def run(progress, runs=RUNS, pool=None) -> Result:
+    """Run all loops on all targets, those with noise `runs` times; pool: monte_carlo.Pool, None for this process."""
     progress(0.0, 'steps')
     done = steps()
     table = step_rows(done)
@@ -421,11 +454,13 @@ def run(progress) -> Result:
     table += limit_rows(limit)
     progress(0.4, 'ramps, sine, sway')
     table += moving_rows()
-    errors = compared(progress)
-    table += compared_rows(errors)
-    progress(0.7, 'beams that lose the target')
+    errors, cases = compared(), (*COMPARED, *GRAPH)
+    jitters = dict(zip(cases, (pool or monte_carlo.Pool(1)).map(
+        jitter, [(case, runs) for case in cases], lambda share, text: progress(0.5 + 0.4 * share, f'noise, {text}'))))
+    table += compared_rows(errors, jitters)
+    progress(0.9, 'beams that lose the target')
     table += loss_rows()
-    table += graph_rows(progress)
+    table += graph_rows(jitters)
     rows = [row(case, metric, value, unit, PAPER.get((case, metric)), TARGETS.get((case, metric)))
             for case, metric, value, unit in table]
     shown = [r for r in rows if r['target'] is not None or r['case'].startswith(('graph/', 'loss/'))

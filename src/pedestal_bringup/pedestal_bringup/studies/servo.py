@@ -1,8 +1,9 @@
 """Paper 000's step and sine (figures 5, 6), then a better controller on the same plant.
 
-Cases: paper-r1 and paper-r2, the two readings of the paper's sine, with gains for each; best, the feed-forward
-controller; best-inertia-plus and -minus, the same with 20 % more and less load; best-full-torque, without a reserve
-for such a load; adrc. Every case is `pedestal run servo_step|servo_sine --param ...` too (Case.command).
+Cases: paper-r1 and paper-r2, the two readings of the paper's sine, with gains for each; paper-all, one controller for
+every number that is printed with figures 5 and 6, the sine read as 0.4 Hz; best, the feed-forward controller;
+best-inertia-plus and -minus, the same with 20 % more and less load; best-full-torque, without a reserve for such a
+load; adrc. Every case is `pedestal run servo_step|servo_sine --param ...` too (Case.command).
 """
 import functools
 import math
@@ -39,6 +40,12 @@ R1 = {}
 
 R2 = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}
 
+ALL = {'acu.azimuth.pid.bandwidth': 54.0, 'acu.azimuth.pid.derivative': 0.45,
+       'adu.azimuth.speed_loop.proportional': 1.5, 'adu.azimuth.speed_loop.integral': 7.0}
+"""Found by a search, as the paper prints no gain. A position loop K e + D e' before a rate loop of type 1 falls short
+of the amplitude by (1 + 2 D) (w / K)^2 / 2, 0.2 % with R1; a slow rate loop, tau = J / K_p, gives tau w^2 / K of
+that back."""
+
 DRIVE = {
     'adu.azimuth.speed_loop.proportional': 8.0, 'adu.azimuth.speed_loop.integral': 50.0,
     'adu.azimuth.bias.schedule': 'hold_fade', 'adu.azimuth.bias.torque': 12.0, 'adu.azimuth.bias.hold': 14.0,
@@ -67,17 +74,20 @@ ADRC = {**DRIVE, **SHAPER, 'adu.azimuth.speed_loop.proportional': 6.0, 'adu.azim
 """With its own observer in place of the drive's, and the speed loop it was designed for."""
 
 CASES = {
-    'paper-r1': R1, 'paper-r2': R2, 'best': BEST,
+    'paper-r1': R1, 'paper-r2': R2, 'paper-all': ALL, 'best': BEST,
     'best-inertia-plus': {**BEST, 'adu.azimuth.load.inertia': 252.0},
     'best-inertia-minus': {**BEST, 'adu.azimuth.load.inertia': 168.0},
     'best-full-torque': FULL_TORQUE, 'adrc': ADRC}
 
 TARGETS = {
-    'paper-r1': {'step_overshoot_percent': '12 +- 1.5', 'step_settling_2percent_s': '0.20 +- 0.03',
-                 'step_crossings': '1 +- 0', 'sine_0p4hz_max_error_rad': '0.0397 +- 0.002',
-                 'sine_0p4hz_rms_error_rad': '0.0281 +- 0.001', 'sine_0p4hz_amplitude_rad': '0.868 to 0.8695'},
+    **{name: {'step_overshoot_percent': '12 +- 1.5', 'step_settling_2percent_s': '0.20 +- 0.03',
+              'step_crossings': '1 +- 0', 'sine_0p4hz_max_error_rad': '0.0397 +- 0.002',
+              'sine_0p4hz_rms_error_rad': '0.0281 +- 0.001', 'sine_0p4hz_amplitude_rad': '0.868 to 0.8695',
+              'sine_0p4hz_peak_error_percent': '< 0.12', 'sine_0p4hz_max_error_percent': '< 4.6'}
+       for name in ('paper-r1', 'paper-all')},
     'paper-r2': {'sine_0p4rads_max_error_rad': '0.0397 +- 0.002', 'sine_0p4rads_rms_error_rad': '0.0281 +- 0.001',
-                 'sine_0p4rads_amplitude_rad': '0.868 to 0.8695'},
+                 'sine_0p4rads_amplitude_rad': '0.868 to 0.8695', 'sine_0p4rads_peak_error_percent': '< 0.12',
+                 'sine_0p4rads_max_error_percent': '< 4.6'},
     'best': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15',
              'sine_0p4rads_max_error_rad': '<= 5e-5', 'sine_0p4rads_start_error_rad': '<= 4e-3',
              'sine_0p4hz_max_error_rad': '<= 3e-4', 'gust_1000nm_peak_rad': '<= 3.4e-4'},
@@ -85,7 +95,7 @@ TARGETS = {
     'best-inertia-minus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
 }
 PAPER = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2, 'max_error_rad': 0.04,
-         'rms_error_rad': 0.0281, 'amplitude_rad': 0.869}
+         'rms_error_rad': 0.0281, 'amplitude_rad': 0.869, 'peak_error_percent': 0.12, 'max_error_percent': 4.6}
 UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}
 
 
@@ -124,7 +134,10 @@ def sine_metrics(record, reading):
     t, error, period = record.t, sine_error(record, w), 2.0 * math.pi / w
     steady = metrics.whole_periods(t, period, period)
     amplitude, fitted = metrics.amplitude_and_period(t[steady], record['adu/truth']['position'][steady, 0], period)
-    return {f'sine_{reading}_max_error_rad': metrics.peak(error[steady]),
+    largest = metrics.peak(error[steady])
+    return {f'sine_{reading}_max_error_rad': largest,
+            f'sine_{reading}_max_error_percent': 100.0 * largest / AMPLITUDE,
+            f'sine_{reading}_peak_error_percent': 100.0 * abs(1.0 - amplitude / AMPLITUDE),
             f'sine_{reading}_rms_error_rad': metrics.rms(error[steady]),
             f'sine_{reading}_amplitude_rad': amplitude, f'sine_{reading}_period_s': fitted,
             f'sine_{reading}_start_error_rad': metrics.peak(error[t < period])}
@@ -138,6 +151,7 @@ def gust_metrics(record):
 
 RUNS = {
     'paper-r1': ('step', '0p4hz', '0p4rads', 'gust'), 'paper-r2': ('step', '0p4rads'),
+    'paper-all': ('step', '0p4hz'),
     'best': ('step', '0p4rads', '0p4hz', 'gust'), 'best-inertia-plus': ('step',),
     'best-inertia-minus': ('step',), 'best-full-torque': ('step',),
     'adrc': ('step', '0p4rads', '0p4hz', 'gust'),
@@ -192,7 +206,10 @@ def remarks(done):
     return [
         "One controller cannot do both of the paper's figures if its sine is 0.4 rad/s: an error of 0.04 rad is that "
         f'of a gain of {AMPLITUDE * 0.4 / 0.04:.2g} 1/s (paper-r2), whose step takes '
-        f'{slow:.3f} s, not 0.2 s. If it is 0.4 Hz, paper-r1 does both.',
+        f'{slow:.3f} s, not 0.2 s. If it is 0.4 Hz, paper-all does all that is printed, the peak of the sine to '
+        '0.12 % too; paper-r1, the gains of servo_step and servo_sine, misses that.',
+        'peak_error_percent is the shortfall of the amplitude (0.869 of 0.87 rad), max_error_percent the largest '
+        'error of the steady sine over the amplitude. The mean square error of 2.81 % is read as 0.0281 rad rms.',
         f'The 0.4 Hz sine starts from rest with {AMPLITUDE * FREQUENCIES["0p4hz"]:.2f} rad/s: the error of its start '
         'is v2/(2 a), set by the torque, and no controller removes it.',
         f'Limit of the step: torque. Full torque forwards and back takes {whole:.3f} s, {settled:.3f} s to the 2 % '

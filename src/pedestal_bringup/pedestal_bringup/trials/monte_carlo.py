@@ -1,8 +1,8 @@
 """Many runs at once: on the cores of this machine, or on the Dask cluster behind a scheduler.
 
 A study splits its runs into batches whose size and seeds do not depend on the workers, and adds their results in
-order, so that its numbers are equal to the last bit on any pool. A batch returns sums instead of records, so that
-memory stays bounded for any --runs.
+order, so that its numbers are equal to the last bit on any pool. A batch returns sums and a few numbers of every run
+instead of records, so that memory suffices for many --runs.
 """
 import contextlib
 import logging

@@ -8,15 +8,21 @@ from pedestal_bringup.run import closed_loop, scenario
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A scenario with some parameters changed: parameters is {'node.key': value}, duration [s] None for its own."""
+    """A scenario with some parameters changed: parameters is {'node.key': value}, duration [s] and seed None for its
+    own."""
     name: str
     scenario: str
     parameters: dict = dataclasses.field(default_factory=dict)
     duration: float | None = None
+    seed: int | None = None
+
+    def with_seed(self, seed):
+        """This Case with another seed."""
+        return dataclasses.replace(self, seed=seed)
 
     def loaded(self):
         """The scenario.Scenario of this case."""
-        return scenario.load(self.scenario, self.overrides(), duration=self.duration)
+        return scenario.load(self.scenario, self.overrides(), duration=self.duration, seed=self.seed)
 
     def run(self):
         """The closed loop of this case, a closed_loop.Run."""
@@ -30,7 +36,8 @@ class Case:
         """The command that runs this case through the nodes."""
         duration = [] if self.duration is None else ['--duration', f'{self.duration:g}']
         parameters = [part for override in self.overrides() for part in ('--param', override)]
-        return shlex.join(['pedestal', 'run', self.scenario, *duration, *parameters])
+        seed = [] if self.seed is None else ['--seed', str(self.seed)]
+        return shlex.join(['pedestal', 'run', self.scenario, *duration, *seed, *parameters])
 
 
 def sine_case(case, w, periods):

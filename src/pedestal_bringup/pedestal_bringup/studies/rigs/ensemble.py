@@ -73,25 +73,25 @@ def records(truth, noise, seed, first, count):
 
 
 def moments(params, t, truth, noise, measured):
-    """MOMENTS (n,) of a filter (FilterParameters) at times t (n,) [s], over measured records as of `records`.
+    """MOMENTS (runs, n) of a filter (FilterParameters) at times t (n,) [s], of measured records as of `records`.
 
     The filter knows sigma and rate_sigma, and assumes white noise.
     """
     y, y_rate = measured
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=noise.rate_sigma is not None))
     series = Series(t, y, np.full(len(t), noise.sigma**2), y_rate, np.full(len(t), (noise.rate_sigma or 0.0) ** 2))
-    sums = np.zeros(len(t), MOMENTS)
+    sums = np.zeros(y.shape, MOMENTS)
     _add_runs(c, AxisMotion(*truth), series, INITIAL_RATE, np.zeros(len(t), axis_filter.ESTIMATE), sums)
     return sums
 
 
 @compiled
 def _add_runs(c, truth, m, initial_rate, out, sums):
-    """Add the errors of a filter over a Series m to MOMENTS (n,); truth: AxisMotion of arrays (n,)."""
+    """Add the errors of a filter over a Series m to MOMENTS (runs, n); truth: AxisMotion of arrays (n,)."""
     for run in range(len(m.y)):
         axis_filter.estimates(c, m.t, m.y[run], m.R, m.y_rate[run], m.R_rate, initial_rate, out)
         for k in range(len(m.t)):
-            _add(sums[k], out[k], truth, k, m.y[run, k])
+            _add(sums[run, k], out[k], truth, k, m.y[run, k])
 
 
 @compiled
@@ -115,7 +115,8 @@ def _add(s, o, truth, k, y):
 
 
 def unscented_moments(params, truth, distance, noise, range_sigma, runs):
-    """MOMENTS (n,) of the azimuth of the IMM of unscented filters (params: UkfParameters); runs: (seed, first, count).
+    """MOMENTS (runs, n) of the azimuth of the IMM of unscented filters (params: UkfParameters); runs: (seed, first,
+    count).
 
     The target is at elevation 0 and at `distance` (n,) [m], measured with white noise of range_sigma [m]; both angles
     have the Noise `noise`, the azimuth with the draws of `records`.
@@ -124,7 +125,7 @@ def unscented_moments(params, truth, distance, noise, range_sigma, runs):
     nu, _, nu_elevation, nu_range = drawn(seed, first, count, len(distance), 4)
     if noise.bandwidth is not None:
         nu, nu_elevation = coloured(nu, noise.bandwidth), coloured(nu_elevation, noise.bandwidth)
-    sums = np.zeros(len(distance), MOMENTS)
+    sums = np.zeros((count, len(distance)), MOMENTS)
     measured = RangedSeries(truth[0] + noise.sigma * nu, noise.sigma * nu_elevation, noise.sigma**2,
                             distance + range_sigma * nu_range, range_sigma**2)
     _add_unscented_runs(unscented.constants(params), PERIOD, AxisMotion(*truth), measured, INITIAL_RATE**2, sums)
@@ -133,7 +134,8 @@ def unscented_moments(params, truth, distance, noise, range_sigma, runs):
 
 @compiled
 def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
-    """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (n,); truth: AxisMotion of arrays (n,)."""
+    """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (runs, n); truth: AxisMotion of arrays
+    (n,)."""
     R, R_range = measured.R, measured.R_range
     out = np.zeros(1, axis_filter.ESTIMATE)
     o = out[0]
@@ -158,7 +160,7 @@ def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
             axes, _ = unscented.variances(s)
             o.variance, o.covariance, o.rate_variance = axes[0]
             unscented.probabilities(s, o.mu)
-            _add(sums[k], o, truth, k, A)
+            _add(sums[run, k], o, truth, k, A)
 
 
 def added(sums, more):
@@ -166,9 +168,19 @@ def added(sums, more):
     return (sums.view('f8') + more.view('f8')).view(MOMENTS)
 
 
-def total(sums):
-    """Sum (1,) of MOMENTS (n,) over all times."""
-    return sums.view('f8').reshape(len(sums), -1).sum(axis=0).view(MOMENTS)
+def over_runs(sums):
+    """Sum (n,) of MOMENTS (runs, n) over the runs."""
+    return _summed(sums, 0)
+
+
+def over_time(sums):
+    """Sum (runs,) of MOMENTS (runs, n) over the times: the moments of every run."""
+    return _summed(sums, 1)
+
+
+def _summed(sums, axis):
+    numbers = np.ascontiguousarray(sums).view('f8').reshape(*sums.shape, -1)
+    return numbers.sum(axis=axis).view(MOMENTS)[:, 0]
 
 
 def rms(sums, name):

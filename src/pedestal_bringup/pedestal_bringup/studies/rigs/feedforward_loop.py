@@ -163,44 +163,45 @@ def steps_of(axis, source, first, count):
     return out
 
 
-SUMS = np.dtype([('miss', 'f8'), ('miss_squared', 'f8'), ('rate_error_squared', 'f8')])
-"""Over runs, at one step [rad, rad2, rad2/s2]."""
+METRICS = {'miss_rms_deg': 'deg', 'miss_worst_second_deg': 'deg', 'miss_peak_deg': 'deg', 'rate_noise_deg_s': 'deg/s'}
+"""{metric: unit} of a run: the miss over all, in its worst second, its largest; noise of a uniform rate."""
+
+
+def measures(axis, steps):
+    """METRICS of every run, an array (runs, 4), of STEP records (runs, n) on an axis."""
+    t, target, period = motion(axis)
+    counts = t >= 0.5 * period
+    second = round(1.0 / T)
+    reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * RATE, np.ones(round(CALM / T)))[:len(t)] > 0.5
+    miss, noise = steps['miss'][:, counts], (steps['rate'] - target[:, 1])[:, counts & ~reversing]
+    values = [(metrics.rms(one), math.sqrt(np.convolve(one * one, np.full(second, 1.0 / second), 'valid').max()),
+               metrics.peak(one), metrics.rms(other)) for one, other in zip(miss, noise)]
+    return np.degrees(values)
 
 
 def batch(item):
-    """(SUMS (n,), sum of the largest misses of each run [rad]) of an item (axis, source, first run, how many)."""
+    """(sum over the runs of the miss (n,) [rad], METRICS of every run (count, 4)) of an item (axis, source, first run,
+    how many)."""
     axis, source, first, count = item
     steps = steps_of(axis, source, first, count)
-    t, target, period = motion(axis)
-    sums = np.zeros(len(t), SUMS)
-    sums['miss'] = steps['miss'].sum(axis=0)
-    sums['miss_squared'] = np.square(steps['miss']).sum(axis=0)
-    sums['rate_error_squared'] = np.square(steps['rate'] - target[:, 1]).sum(axis=0)
-    return sums, float(np.abs(steps['miss'][:, t >= 0.5 * period]).max(axis=1).sum())
+    return steps['miss'].sum(axis=0), measures(axis, steps)
 
 
 @dataclasses.dataclass(frozen=True)
 class MissStatistics:
-    """Statistics of the runs of a Source on an axis: over the runs at each step (n,) the mean miss and its rms [rad]
-    and the rms error of the rate [rad/s]; the mean of the largest misses [rad]."""
+    """Statistics of the runs of a Source on an axis: miss_mean (n,) [rad], at each step the mean over the runs; values
+    (runs, 4), METRICS of every run."""
     axis: str
     miss_mean: np.ndarray
-    miss_rms: np.ndarray
-    rate_rms: np.ndarray
-    peak: float
+    values: np.ndarray
 
-    def measures(self):
-        """{metric: (value, unit)}: miss over all, in the worst second, its peak; noise of a uniform rate."""
-        t, target, period = motion(self.axis)
-        counts = t >= 0.5 * period
-        squares = np.square(self.miss_rms[counts])
-        second = round(1.0 / T)
-        windows = np.convolve(squares, np.full(second, 1.0 / second), 'valid')
-        reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * RATE, np.ones(round(CALM / T)))[:len(t)] > 0.5
-        return {'miss_rms_deg': (math.degrees(math.sqrt(squares.mean())), 'deg'),
-                'miss_worst_second_deg': (math.degrees(math.sqrt(windows.max())), 'deg'),
-                'miss_peak_deg': (math.degrees(self.peak), 'deg'),
-                'rate_noise_deg_s': (math.degrees(metrics.rms(self.rate_rms[counts & ~reversing])), 'deg/s')}
+    def of(self, metric):
+        """The values (runs,) of one of METRICS."""
+        return self.values[:, list(METRICS).index(metric)]
+
+    def mean(self, metric):
+        """The mean over the runs of one of METRICS."""
+        return float(self.of(metric).mean())
 
 
 def statistics(cases, count, pool, progress=lambda share, text: None):
@@ -210,12 +211,10 @@ def statistics(cases, count, pool, progress=lambda share, text: None):
     done = pool.map(batch, items, progress)
     result = {}
     for name, (axis, _) in cases.items():
-        sums, peaks = 0.0, 0.0
+        miss, values = 0.0, []
         for _ in pieces:
-            more, peak = next(done)
-            sums += more.view('f8')
-            peaks += peak
-        mean = (sums / count).view(SUMS)
-        result[name] = MissStatistics(axis, mean['miss'], np.sqrt(mean['miss_squared']),
-                                      np.sqrt(mean['rate_error_squared']), peaks / count)
+            more, of_runs = next(done)
+            miss += more
+            values.append(of_runs)
+        result[name] = MissStatistics(axis, miss / count, np.concatenate(values))
     return result

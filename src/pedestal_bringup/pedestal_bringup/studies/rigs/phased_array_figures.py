@@ -80,7 +80,7 @@ def stability(limits):
 
 
 def better(errors, seconds):
-    """True errors {case: (without noise, jitter (n,)) [rad]} of the paper's loop and of better ones."""
+    """True errors {case: (n,) [rad]} without noise of the paper's loop and of better ones."""
     figure, axes = drawing.panels(3, size=(7.4, 7.6), sharex=True)
     lines = {'paper': RAW, 'paper-delta': INK, 'type-2': MOTOR_2, 'tracked-10ms': MOTOR_1, 'best': FILTERED}
     first = slice(*(round(t / GRID) for t in seconds))
@@ -89,12 +89,12 @@ def better(errors, seconds):
                                     ('30 deg/s', 'sine of 30 deg/s and 10 deg/s2', 'sway of 10 deg in 8 s')):
         for loop, colour in lines.items():
             if target == 'sway' or loop != 'paper-delta':
-                panel.semilogy(t, envelope(np.degrees(np.abs(errors[f'{loop}/{target}'][0][first]))), color=colour,
+                panel.semilogy(t, envelope(np.degrees(np.abs(errors[f'{loop}/{target}'][first]))), color=colour,
                                linewidth=1.1, label=loop)
         panel.set_title(title, fontsize=10)
         panel.set_ylabel('off by up to [deg]')
         panel.set_ylim(1e-5, 1.0)
-    axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][0][first]))), color=TRUTH, linewidth=1.1,
+    axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][first]))), color=TRUTH, linewidth=1.1,
                         label='best with INS, 5 ms late')
     figure.legend(*axes[2, 0].get_legend_handles_labels(), loc='outside lower center', ncols=3)
     axes[2, 0].set_xlabel('time [s]')
