@@ -12,7 +12,7 @@ class Fault(typing.NamedTuple):
 FAULTS = (
     Fault('moves unasked', 'a rate beyond the envelope of the commands of late by more than `unasked_rate` for 14 ms, '
           'in standby too', 'standby and `adu/emergency_stop`'),
-    Fault('diverged', 'in autotrack, innovations squared over their variance: 5 in the mean of 100 errors, or 2 when '
+    Fault('diverged', 'in autotrack, innovations squared over their variance: 7 in the mean of 100 errors, or 2 when '
           'the signal goes', '`program`, or `standby` without a program; autotrack is refused'),
 )
 MOVES_UNASKED, DIVERGED = (fault.name for fault in FAULTS)

@@ -19,8 +19,8 @@ ERRORS = 100
 LARGEST = 12.5
 """More does not count of one error, half the default gate: an interference of some errors is none of the filter."""
 
-LIMIT = 5.0
-"""Largest m. Axes turned by 46 deg, with which a satellite is still tracked to a fifth of the beam, reach 4.9."""
+LIMIT = 7.0
+"""Largest m. A filter that knows no acceleration, on a target that reverses, reaches 6.1 and still has it in the beam."""
 
 LIMIT_WITHOUT_SIGNAL = 2.0
 """Largest m with which the filter may coast."""
