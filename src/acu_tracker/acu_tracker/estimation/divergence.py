@@ -20,7 +20,7 @@ LARGEST = 12.5
 """More does not count of one error, half the default gate: an interference of some errors is none of the filter."""
 
 LIMIT = 7.0
-"""Largest m. A filter that knows no acceleration, on a target that reverses, reaches 6.1 and still has it in the beam."""
+"""Largest m. A filter that knows no acceleration, on a target that reverses, reaches 6.1 and keeps it in the beam."""
 
 LIMIT_WITHOUT_SIGNAL = 2.0
 """Largest m with which the filter may coast."""
