@@ -1,10 +1,19 @@
-"""`pedestal bench bag`, with a shorter recording than the user's."""
+"""`pedestal bench`: bags with a shorter recording than the user's, the floor of the graph with fewer laps."""
 import json
 import sys
 
 SHORT = ('import json; from pedestal_bringup.bench import recording; '
          'recording.BAG_SECONDS = 2.0; recording.DISK_BYTES = 10_000_000; '
          'rows = recording.run(); print(json.dumps(rows))')
+
+RING = ('from pedestal_bringup.bench import lockstep; '
+        'lockstep.RING_STEPS = 200; print(lockstep.bare_lap())')
+
+
+def test_the_bare_ring_closes(run_process, reserve_domain):
+    done = run_process([sys.executable, '-c', RING], 60.0, ROS_DOMAIN_ID=str(reserve_domain()))
+    assert (done.returncode, done.stderr) == (0, '')
+    assert float(done.stdout) > 0.0
 
 
 def test_rows_of_bags(run_process, reserve_domain):

@@ -34,6 +34,7 @@ def _filled(topic):
 
 class Ring(Node):
     """A node of the ring: it passes on what comes on its trigger and drops everything else."""
+    awaits = 'its trigger'
 
     def __init__(self, role, steps):
         super().__init__(role)
