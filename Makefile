@@ -2,20 +2,24 @@
 # make test    set up, lint, run every test
 # make update-references  record bags/reference anew and print the difference that is accepted with it
 # make docs    write the tables of README.md and docs/ anew from the tables of the code and from docs/rows.json
+# make book    the documentation as a book in build/book/site, to be read without a network; a broken link fails
 # make numbers run the studies and write docs/rows.json anew (some minutes), then make docs
 # make bench   set up, measure the graph, the core and bags
 # make colcon  build src/ as a ROS 2 workspace and start a node from it
 # make clean   remove everything made here
 
 PYTHON ?= python3
-PACKAGES := pedestal_common ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_bringup
+PACKAGES := pedestal_common ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_operator \
+	pedestal_bringup pedestal
 ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
 PIP := -m pip --disable-pip-version-check install --quiet --use-pep517 --constraint constraints.txt
 DEMO := bags/runs/demo
 # Graphs in realtime that are killed, frozen and cut: not beside other tests.
-REALTIME := test/test_field.py test/test_network.py test/test_realtime.py test/test_supervision.py
+REALTIME := test/test_field.py test/test_live.py test/test_network.py test/test_operating.py test/test_page.py \
+	test/test_realtime.py test/test_rotctld.py test/test_supervision.py
 
 install: .venv/installed
+	@.venv/bin/python -m pedestal_bringup.run.prepare
 
 demo: install
 	rm -rf $(DEMO) $(DEMO).log
@@ -35,6 +39,14 @@ update-references: install
 docs: install
 	.venv/bin/python -m pedestal_bringup.reference
 
+# What is made of the code is written beside a copy of docs/; no page may fetch anything from elsewhere.
+book: install .venv-docs/installed
+	.venv/bin/python -m pedestal_bringup.book build/book/pages
+	NO_MKDOCS_2_WARNING=1 .venv-docs/bin/mkdocs build --strict
+	! grep --recursive --include='*.html' --extended-regexp --files-with-matches \
+	    '<(script|img|iframe|link)[^>]*(src|href)="?(https?:)?//' build/book/site
+	@echo 'Book: $(CURDIR)/build/book/site/index.html'
+
 numbers: install
 	.venv/bin/python -m pedestal_bringup.published
 	.venv/bin/python -m pedestal_bringup.reference
@@ -51,7 +63,7 @@ colcon: .venv-colcon/installed
 	. build/colcon/install/local_setup.sh && .venv-colcon/bin/python -m pytest test/test_colcon.py
 
 clean:
-	rm -rf .venv .venv-colcon build install log .pytest_cache .ruff_cache bags/runs src/*/build src/*/*.egg-info
+	rm -rf .venv .venv-colcon .venv-docs build install log .pytest_cache .ruff_cache bags/runs src/*/build src/*/*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv/bin/pip
@@ -61,7 +73,12 @@ clean:
 
 .venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip
 	@echo 'Installing into .venv-colcon ...'
-	.venv-colcon/bin/python $(PIP) $(ROS) colcon-common-extensions colcon-ros numpy numba rosbags
+	.venv-colcon/bin/python $(PIP) $(ROS) colcon-common-extensions colcon-ros numpy numba rosbags sgp4
+	@touch $@
+
+.venv-docs/installed: Makefile constraints.txt | .venv-docs/bin/pip
+	@echo 'Installing into .venv-docs ...'
+	.venv-docs/bin/python $(PIP) mkdocs-material
 	@touch $@
 
 # Debian and Ubuntu keep ensurepip in a package of its own, python3-venv. Where that is missing, pip comes from
@@ -80,4 +97,4 @@ APT := apt-get -qq -o APT::Sandbox::User=root
 	    rm -r usr python3-pip-whl_*.deb ); fi || \
 	    { rm -rf $*; echo 'This Python cannot make an environment with pip: sudo apt-get install python3-venv'; exit 1; }
 
-.PHONY: install demo test update-references docs numbers bench colcon clean
+.PHONY: install demo test update-references docs book numbers bench colcon clean

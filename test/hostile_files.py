@@ -36,6 +36,12 @@ ADDRESSES = 4_000_000_000
 REFERENCE = pathlib.Path(__file__).parent.parent / 'bags' / 'reference' / 'leo_pass'
 TRACK = 'time_s,latitude_deg,longitude_deg,altitude_m\n' + ''.join(
     f'{t},{47.4 + 1e-3 * t:.6f},8.52,1500\n' for t in range(20))
+OEM_HEAD = 'CCSDS_OEM_VERS = 2.0\n'
+OEM_META = ('OBJECT_NAME = ISS\nOBJECT_ID = 1998-067A\nCENTER_NAME = EARTH\nREF_FRAME = ITRF\nTIME_SYSTEM = UTC\n'
+            'INTERPOLATION = HERMITE\nINTERPOLATION_DEGREE = 7\n')
+OEM = OEM_HEAD + 'META_START\n' + OEM_META + 'META_STOP\n' + ''.join(
+    f'2026-11-22T00:{k:02}:00 6800 {7 * k} 0 0 7 0\n' for k in range(20))
+STK = 'stk.v.11.0\nBEGIN Ephemeris\nScenarioEpoch 1 Jan 2026 00:00:00.0\nEphemerisTimePosVel\n'
 ADSB = 'time,icao24,lat,lon,geoaltitude\n'
 MAGIC = b'\x89MCAP0\r\n'
 STAMP = struct.Struct('<iI')
@@ -330,7 +336,52 @@ TRACKS = {
         'NMEA of GGA': lambda: '$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\n' * 900_000,
         }.items()},
 }
-CRAFTED = {**BAGS, **YAML, **TRACKS}
+PREDICTED = {
+    'OEM head only': lambda: OEM.partition('META_STOP')[0], 'OEM of keywords': lambda: OEM.replace(
+        'META_STOP', 'X = 1\n' * 900_000 + 'META_STOP'), 'OEM of segments': lambda: OEM_HEAD + (
+        'META_START\n' + OEM_META + 'META_STOP\n') * 100_000, 'OEM of objects': lambda: OEM_HEAD + ''.join(
+        f'META_START\n{OEM_META.replace("ISS", str(k))}META_STOP\n' for k in range(100_000)),
+    'OEM in one line': lambda: OEM.replace('META_STOP\n', 'META_STOP\n' + '1 ' * 30_000_000),
+    'OEM of nan': lambda: OEM.replace(' 6800 ', ' nan '), 'OEM of one time': lambda: OEM.replace('T00:1', 'T00:0'),
+    'OEM of the year 0': lambda: OEM.replace('2026', '0000'),
+    'OEM of 320 digits': lambda: OEM.replace('6800', '9' * 320),
+    'OEM, degree 99': lambda: OEM.replace('DEGREE = 7', 'DEGREE = 99'),
+    'OEM, degree of 900 digits': lambda: OEM.replace('DEGREE = 7', 'DEGREE = ' + '9' * 900),
+    'OEM of the moon': lambda: OEM.replace('EARTH', 'MOON'), 'OEM and zeros': lambda: OEM + '\0' * 1_000_000,
+    'OEM of many states': lambda: OEM_HEAD + 'META_START\n' + OEM_META + 'META_STOP\n' + ''.join(
+        f'2026-{1 + k // 86400:03}T{k // 3600 % 24:02}:{k // 60 % 60:02}:{k % 60:02} 6800 0 0 0 7 0\n'
+        for k in range(200_000)),
+    'STK head only': lambda: 'stk.v.11.0\nBEGIN Ephemeris\n', 'STK of blocks': lambda: 'stk.v.11.0\n' + (
+        'BEGIN X\n' * 900_000), 'STK of segments': lambda: STK + '0 6800000 0 0 0 7000 0\n' * 300_000,
+    'STK of an epoch of digits': lambda: STK.replace('2026', '9' * 900),
+    'program of one day': lambda: '2461000.5 10 20\n' * 900_000, 'program of 900 digits': lambda: (
+        f'2461000.{"5" * 900} 10 20\n' * 9), 'program of words': lambda: '2461000.5 10 20\nx\n',
+    'directions of commas': lambda: 'utc,az,el\n' + ',' * 1_000_000, 'directions of nan': lambda: (
+        'utc,az,el\n' + ''.join(f'{k},nan,{k}\n' for k in range(9))), 'directions of 320 digits': lambda: (
+        'utc,az,el\n' + f'{"9" * 320},1,1\n' * 9), 'directions far apart': lambda: 'utc,az,el\n' + ''.join(
+        f'{k},{150 * k % 360},1\n' for k in range(99))}
+TRACKS.update({f'track: {name}': lambda files, content=content: files.new('.csv', content())
+               for name, content in PREDICTED.items()})
+
+ELEMENTS = {
+    **{f'elements: {name}': lambda files, make=make: special(files, '.tle', make) for name, make in SPECIAL.items()},
+    **{f'elements: {name}': lambda files, content=content: files.new('.tle', content()) for name, content in {
+        'empty': lambda: '', 'line of 60 MB': lambda: '1' * 60_000_000, 'too long': lambda: b'1' * 70_000_000,
+        'lines without a satellite': lambda: '1 x\n' * 900_000, 'million pairs': lambda: '1 x\n2 x\n' * 450_000,
+        'zeros': lambda: bytes(1_000_000), 'UTF-16': lambda: '1 2'.encode('utf-16'), 'latin': lambda: b'\xe9\xff' * 99,
+        'JSON in depth': lambda: '[' * 10_000_000, 'JSON of objects in depth': lambda: '{"a":' * 1_000_000,
+        'JSON of empty objects': lambda: '[' + '{},' * 3_000_000 + '{}]', 'JSON of lists': lambda: '[[1],' * 1000,
+        'JSON of a long number': lambda: '[{"MEAN_MOTION": ' + '9' * 1_000_000 + '}]', 'JSON cut': lambda: '[{"a": "',
+        'JSON of commas': lambda: '[' + ',' * 60_000_000, 'JSON of values': lambda: '{"EPOCH": {"a": [1, {}]}}',
+        'XML of elements': lambda: '<omm>' + '<a>' * 10_000_000, 'XML of one text': lambda: (
+            '<omm><segment><EPOCH>' + 'a' * 60_000_000), 'XML of entities': lambda: (
+            '<!DOCTYPE x [<!ENTITY a "b">]><x>&a;'),
+        'XML of empty segments': lambda: '<omm>' + '<segment></segment>' * 1_000_000 + '</omm>',
+        'KVN of heads': lambda: 'CCSDS_OMM_VERS = 2.0\n' * 900_000, 'KVN of nothing': lambda: 'CCSDS_OMM_VERS\n',
+        'CSV of empty rows': lambda: 'EPOCH,NORAD_CAT_ID\n' + ',\n' * 3_000_000, 'CSV of a long field': lambda: (
+            'EPOCH,NORAD_CAT_ID\n' + '9' * 500_000 + ',1\n')}.items()},
+}
+CRAFTED = {**BAGS, **YAML, **TRACKS, **ELEMENTS}
 
 
 def crafted(files, name):
@@ -367,8 +418,11 @@ def commands(path, output):
         return {name: ['leo_pass' if 'ship' in name else 'track_file', '--duration', '0.2', '--param', f'{key}={path}',
                        '--bag', f'{output}/bag', *more] for name, key, more in (
             ('run, target', 'tracking_receiver.target.track_file.path', ()),)}
+    if path.endswith('.tle'):
+        return {'run, TLE': ['leo_pass', '--tle', path, '--satellite', 'ISS', '--bag', taken]}
     return {'verify': [path], 'recover': [path, '--output', f'{output}/recovered'],
             'report': [path, '--output', f'{output}/report.html'], 'export': [path, '--output', f'{output}/tables'],
+            'export, TDM': [path, '--format', 'tdm', '--output', f'{output}/pass.tdm'],
             'recompute': [path, '--output', f'{output}/again'], 'rerun': [path, '--bag', taken],
             'replay': [path, '--deadline', '0.3', '--duration', '0.1'],
             'tune': [path, '--filter', 'cv', '--axis', 'azimuth', '--output', f'{output}/tuned.yaml']}
@@ -447,7 +501,7 @@ def _do_all(output):
     for verb, arguments in commands(REFERENCE, output).items():
         if verb not in ('replay', 'rerun', 'tune'):
             with open(os.devnull, 'w') as sink, contextlib.redirect_stdout(sink):
-                cli.main([verb, *arguments])
+                cli.main([verb.split(',')[0], *arguments])
     for name in ('pedestal_bringup.again.replay', 'pedestal_bringup.trials.tune', 'pedestal_bringup.run.graph'):
         importlib.import_module(name)
 

@@ -39,6 +39,13 @@ COMMAND_LINES = {
     'mapping for a text': (['leo_pass', '--param', 'recorder.scenario={a: 1}'], ['scenario = ']),
     'duration': (['leo_pass', '--duration', 'nan'], ['duration = nan s: must be 0.1 to 86400']),
     'seed': (['leo_pass', '--seed', '-1'], ['seed = -1']),
+    'no TLE': (['leo_pass', '--tle', '/nowhere/iss.tle'], ['TLE file /nowhere/iss.tle: No such file']),
+    'old TLE': (['leo_pass', '--pass', 'next'], ['--pass next: the TLE of satellite 25544 is of 2019-12-09']),
+    'no such pass': (['leo_pass', '--pass', '99'], ['--pass 99: there are 26 passes above 10 deg']),
+    'station': (['leo_pass', '--station', '47.4,8.5'], ["--station '47.4,8.5': must be LATITUDE,LONGITUDE,HEIGHT"]),
+    'latitude': (['leo_pass', '--station', '95,8.5,0'], ['target.station.latitude_deg = 95 deg: must be -90 to 90']),
+    'pass of a UAV': (['uav_flyby', '--pass', '1'], ['the target of uav_flyby is a flyby, which is no satellite']),
+    'pass of an array': (['phased_array_four', '--pass', '1'], ['phased_array_four has 4 beams']),
     'no file': (['/nowhere/run.yaml'], ['/nowhere/run.yaml: No such file']),
 }
 

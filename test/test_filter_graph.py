@@ -18,7 +18,7 @@ from pedestal_common import layouts, topics
 SECONDS = 5.0
 PARAMS = ['acu.tracker.lock_count=20', 'tracking_receiver.receiver.rate.measured=true',
           'tracking_receiver.receiver.ranging.measured=true', 'tracking_receiver.receiver.latency=0.01',
-          'acu.azimuth.filter.rate_measurement=true', 'acu.azimuth.filter.kind=imm',
+          'acu.azimuth.filter.rate_measurement=true',
           'acu.elevation.filter.kind=imm_ukf']
 
 
@@ -40,7 +40,8 @@ def runs(start_run, connect):
     measured = start_run('ship_pass', '--pacing', 'lockstep', '--duration', f'{SECONDS:g}', *params)
     result = measured.finish(180.0)  # the first run compiles the laws
     assert result.returncode == 0, result.stderr
-    changed = start_run('uav_flyby', '--pacing', 'lockstep', '--duration', '15', '--param', PARAMS[0])
+    kinds = [word for axis in topics.AXES for word in ('--param', f'acu.{axis}.filter.kind=current_statistical')]
+    changed = start_run('uav_flyby', '--pacing', 'lockstep', '--duration', '15', '--param', PARAMS[0], *kinds)
     assert switched(changed, connect) == [True, True]
     result = changed.finish()
     assert result.returncode == 0, result.stderr
@@ -93,7 +94,8 @@ def test_what_the_filter_tells(told):
     probability = found.probability[on]
     assert np.nansum(probability, axis=2) == pytest.approx(1.0)
     assert [[name for name, there in zip(topics.MOTION_MODELS, np.isfinite(probability[:, i]).all(axis=0)) if there]
-            for i in range(2)] == [['cv', 'ca', 'current_statistical'], ['cv', 'ca']]
+            for i in range(2)] == [
+                ['cv', 'ca', 'singer', 'current_statistical'], ['cv', 'ca']]
     assert np.all(np.abs(found.correlation[on]) <= 1.0) and np.all(found.sigma[on] > 0.0)
     header = list(export.table(bag, 'acu/filter'))
     assert 'azimuth_rate_sigma.position [rad/s]' in header and 'elevation_nis.position' in header

@@ -7,7 +7,7 @@ import pytest
 
 from acu_tracker import modes
 from pedestal_bringup.run import closed_loop, program, scenario
-from tracking_receiver_sim.track import place
+from tracking_receiver_sim.track import files
 
 PATH = 'tracking_receiver.target.track_file.path'
 SMOOTH = 'tracking_receiver.target.track_file.smooth=true'
@@ -39,11 +39,11 @@ def test_two_options_are_enough(adsb):
 
 
 def test_the_flight_is_told_where_the_run_begins(adsb):
-    log, path = program.flights(scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH]))
+    log, path = program.announced(scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH]))
     assert log.startswith('flight.csv: ADS-B of 4b1812 RGA3: 57 of 60 fixes, 3 held positions dropped, times in whole')
     assert 'altitudes in steps of 100 ft, smoothed: off the fixes by ' in log
     assert path.startswith('59 s, at most 3') and ' km from the station at latitude 47.' in path
-    assert program.flights(scenario.load('uav_flyby')) == []
+    assert program.announced(scenario.load('uav_flyby')) == []
 
 
 def test_the_flight_is_in_the_diagnostics_of_the_receiver(adsb):
@@ -69,7 +69,7 @@ def test_what_the_scenario_says_stands(adsb):
 
 def test_a_scenario_says_all_that_followed_from_its_file(adsb):
     chosen = scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH])
-    assert {*place.OPEN} - {'duration'} <= {*chosen.given('tracking_receiver')}
+    assert {*files.OPEN} - {'duration'} <= {*chosen.given('tracking_receiver')}
     text = chosen.as_yaml()
     content = adsb.read_text()
     adsb.write_text('moved away')
@@ -77,3 +77,37 @@ def test_a_scenario_says_all_that_followed_from_its_file(adsb):
         assert scenario.parse('track_file', text) == chosen
     finally:
         adsb.write_text(content)
+
+
+@pytest.fixture(scope='module')
+def oem(tmp_path_factory):
+    """Eight minutes of a satellite in an earth-fixed frame that climbs over the station: a circle, states of 30 s."""
+    lines = ['CCSDS_OEM_VERS = 2.0', 'META_START', 'OBJECT_NAME = SAT', 'OBJECT_ID = 2026-001A', 'CENTER_NAME = EARTH',
+             'REF_FRAME = ITRF', 'TIME_SYSTEM = UTC', 'META_STOP']
+    w = 1.1e-3
+    for k in range(17):
+        phase = w * (30.0 * k - 240.0)
+        across = np.array([math.cos(0.85), 0.1, math.sin(0.85)]) / math.sqrt(1.01)
+        r = 6900.0 * (math.cos(phase) * across + math.sin(phase) * np.array([0.0, 1.0, 0.0]))
+        v = 6900.0 * w * (-math.sin(phase) * across + math.cos(phase) * np.array([0.0, 1.0, 0.0]))
+        lines.append(f'2026-11-22T05:{k // 2:02}:{30 * (k % 2):02} ' + ' '.join(f'{x:.6f}' for x in (*r, *v)))
+    path = tmp_path_factory.mktemp('orbits') / 'pass.oem'
+    path.write_text('\n'.join(lines) + '\n')
+    return path
+
+
+def test_an_orbit_from_a_file_is_tracked(oem):
+    """By the same option as a flight, from where the file begins; the program track has the UTC of the file."""
+    begin = 'tracking_receiver.target.track_file.start=200'
+    chosen = scenario.load('track_file', [f'{PATH}={oem}', begin], duration=20.0)
+    run = closed_loop.Loop(chosen).run()
+    assert run['acu/mode'][-1] == modes.AUTOTRACK
+    error = run.truth['error'][run.t > 10.0]
+    half_beam = 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
+    assert np.isfinite(error).all() and np.abs(error).max() < 0.5 * half_beam
+    log, path = program.announced(chosen)
+    assert log == 'pass.oem: CCSDS OEM of SAT (2026-001A): 17 states in ITRF, HERMITE of degree 7'
+    assert path.startswith('20 s from 2026-11-22T05:03:20.000Z, highest ')
+    assert program.begins(chosen) == 1_795_323_800 * 10**9
+    with pytest.raises(ValueError, match='--start file: the target of uav_flyby has no date'):
+        program.begins(scenario.load('uav_flyby'))

@@ -18,7 +18,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import hostile_files
 chosen = hostile_files.CRAFTED if sys.argv[3] == 'crafted' else [None] * 24
-names = [name for name in chosen if not name or not name.startswith('track')]
+names = [name for name in chosen if not name or not name.startswith(('track', 'elements'))]
 for file, verb, wrong, _, _ in hostile_files.attack(sys.argv[2], names[::4], verbs=sys.argv[4:]):
     print(f'{file}: {verb} {wrong or "well"}')
 """
@@ -35,10 +35,14 @@ def test_a_verb_does_its_work_or_refuses_the_file_by_one_line(tmp_path, what):
 
 def test_tracks_are_refused_before_a_node_starts(tmp_path, capsys, one_line):
     files = hostile_files.Files(tmp_path, None)
-    for name in ('device', 'pipe', 'hole', 'open quote', '320 digits', 'too long', 'zero bytes', 'impossible',
-                 'GPX of entities', 'GPX with a file in it', 'GPX of elements', 'GPX cut off', 'NMEA of one line',
-                 'NMEA of commas'):
-        path = hostile_files.TRACKS[f'track: {name}'](files)
+    tracks = ('device', 'pipe', 'hole', 'open quote', '320 digits', 'too long', 'zero bytes', 'impossible',
+              'GPX of entities', 'GPX with a file in it', 'GPX of elements', 'GPX cut off', 'NMEA of one line',
+              'NMEA of commas', 'OEM of segments', 'OEM in one line', 'OEM of nan', 'OEM and zeros', 'STK of segments',
+              'program of one day', 'directions of commas')
+    elements = ('device', 'hole', 'line of 60 MB', 'JSON in depth', 'JSON of objects in depth', 'XML of elements',
+                'XML of entities', 'CSV of a long field', 'zeros')
+    for name in (*(f'track: {name}' for name in tracks), *(f'elements: {name}' for name in elements)):
+        path = hostile_files.CRAFTED[name](files)
         [arguments] = hostile_files.commands(path, tmp_path).values()
         assert hostile_files.cli.main(['run', *arguments]) == 1
         assert str(path) in one_line(capsys.readouterr().err)

@@ -1,4 +1,4 @@
-"""The six packages as pip installs them, and the rules of who may import whom."""
+"""The packages as pip installs them, and the rules of who may import whom."""
 import ast
 import pathlib
 import shutil
@@ -18,8 +18,14 @@ EXECUTABLES = {
     'acu_tracker': {'acu_node': 'acu_tracker.acu_node:main'},
     'adu_drive': {'adu_node': 'adu_drive.adu_node:main',
                   'beam_steering_node': 'adu_drive.beam_steering_node:main'},
+    'pedestal_operator': {'easycomm_node': 'pedestal_operator.easycomm_node:main',
+                          'operator_page': 'pedestal_operator.page_node:main',
+                          'frames_node': 'pedestal_operator.frames_node:main',
+                          'live_node': 'pedestal_operator.live_node:main',
+                          'rotctld_node': 'pedestal_operator.rotctld_node:main'},
     'pedestal_bringup': {'recorder_node': 'pedestal_bringup.recorder_node:main',
                          'pedestal': 'pedestal_bringup.cli:main'},
+    'pedestal': {},
 }
 PACKAGES = tuple(EXECUTABLES)
 COLUMNS = PACKAGES[1:5]
@@ -41,7 +47,7 @@ def imported(path):
 
 @pytest.fixture(scope='module')
 def installed(tmp_path_factory):
-    """A folder with the six packages as `pip install` (not editable) lays them out.
+    """A folder with the packages as `pip install` (not editable) lays them out.
 
     Built from copies, because setuptools leaves build/ in the sources it builds; needs no network.
     """

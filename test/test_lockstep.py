@@ -14,7 +14,7 @@ from rosbags.highlevel import AnyReader
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import parameters
+from pedestal_common import nodes, parameters
 
 PARAM = 'acu.tracker.lock_count=20'
 LENGTH = {'leo_pass': 4.0, 'ship_pass': 3.0}
@@ -104,11 +104,12 @@ def test_a_run_that_tracks_has_all_numbers(runs):
     assert [row['metric'] for row in rows if row['value'] is None] == []
 
 
-ANNOUNCED = {'acu/keyhole', 'acu/blockage', 'ins/state'}
-"""Topics of words that neither run gives a reason to say."""
+ANNOUNCED = {'acu/keyhole', 'acu/blockage', 'ins/state', *(
+    name for node in nodes.NODES for name in (node.obeys, node.replies))}
+"""Topics of words that neither run gives a reason to say, and nobody asks for anything."""
 
 
-@pytest.mark.parametrize('name, topics', [('first', 16), ('ship', 20)])
+@pytest.mark.parametrize('name, topics', [('first', 20), ('ship', 26)])
 def test_recording_is_complete(runs, name, topics, run_process):
     done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'verify', runs[name].bag], 60.0)
     assert done.returncode == 0, done.stdout

@@ -9,8 +9,9 @@ from pedestal_bringup.run import closed_loop, scenario
 DURATION = 6.0
 
 
-OF_THEIR_WHOLE_LENGTH = ('ship_overhead', 'ship_align_and_track')
-"""Runs of seconds say nothing about these; test_ship makes them."""
+OF_THEIR_WHOLE_LENGTH = ('ship_overhead', 'ship_align_and_track', 'late_tle', 'sidelobe', 'steptrack_geo',
+                         'leo_station_7m')
+"""Runs of seconds say nothing about these; test_ship, test_acquisition and test_data_sheet make them."""
 
 TRACKED = [name for name in scenario.available()
            if not name.startswith('servo_') and name not in OF_THEIR_WHOLE_LENGTH]

@@ -1,6 +1,7 @@
 """The ACU's modes by service, and what it says to bad input: one node alone under a client that plays the rest."""
 import math
 import signal
+import time
 
 import numpy as np
 import pytest
@@ -8,14 +9,15 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
 from pedestal_bringup.run.program import program_message
-from pedestal_common import messages
+from pedestal_common import messages, middleware
 
 PERIOD = 5_000_000
 JOINTS, ERROR = 'joint_states', 'tracking_receiver/angle_error'
 
 
 class Plant:
-    """Encoders at rest and a receiver that sees the target in the beam; each step waits for the ACU's command."""
+    """Encoders at rest whose last bit flickers, or they would be frozen, and a receiver that sees the target in the
+    beam; each step waits for the ACU's command."""
 
     def __init__(self, client):
         self.client = client
@@ -24,14 +26,15 @@ class Plant:
         for name in ('acu/rate_command', 'acu/mode', 'diagnostics'):
             client.read(name)
 
-    def step(self, count=1, position=(0.1, 0.5), error=(0.0, 0.0, 60.0), jump=0):
+    def step(self, count=1, position=(0.1, 0.5), error=(0.0, 0.0, 60.0), jump=0, velocity=(0.0, 0.0)):
         """Publish count steps, each after the answer to the one before: of a backlog a node takes the newest."""
         self.stamp += jump
         for _ in range(count):
             self.stamp += PERIOD
             joints = messages.template('joint_states')
             messages.put_stamp(joints.header.stamp, self.stamp)
-            joints.position[:] = position
+            joints.position[:] = position[0], position[1] + 1e-6 * (self.stamp // PERIOD % 2)
+            joints.velocity[:] = velocity
             self.client.publish(JOINTS, joints)
             measured = messages.Vector3Stamped(header=messages.header('beam'), vector=messages.vector3(*error))
             messages.put_stamp(measured.header.stamp, self.stamp)
@@ -138,6 +141,20 @@ def test_one_row_is_a_preset(plant):
     assert plant.client.trigger('acu/preset') == (False, 'refused: outside limits; mode is standby')
 
 
+def test_a_writer_that_does_not_latch_is_heard(plant):
+    """As `ros2 topic pub` writes; what was there before is outside the limits."""
+    client, kind = plant.client, middleware.message_class('trajectory_msgs/msg/JointTrajectory')
+    writer = client.node.create_publisher(kind, 'acu/program_track', 10)
+    client.until(writer.get_subscription_count)
+    time.sleep(0.3)  # the reader's side of the discovery
+    writer.publish(messages.serialize(plant.program([(0.0, 0.3, 0.7)])))
+    client.until(lambda: plant.step() or client.trigger('acu/preset')[0])
+    plant.step(3)
+    assert (client.heard['acu/rate_command'][-1].velocity > 0.0).all(), 'it moves from (0.1, 0.5) to (0.3, 0.7)'
+    assert client.trigger('acu/standby')[0]
+    client.node.destroy_publisher(writer)
+
+
 @pytest.mark.parametrize('bad', [
     {'encoder': {'position': (math.nan, 0.5)}, 'error': {'error': (0.0, math.nan, 60.0)}},
     {'encoder': {'position': (0.1, math.inf)}, 'error': {'error': (math.inf, 0.0, 60.0)}},
@@ -183,7 +200,7 @@ def test_controllers_while_it_tracks(plant):
     def track(steps):
         nonlocal azimuth
         for _ in range(steps):
-            plant.step(position=(azimuth, 0.5), error=(math.nan, math.nan, 10.0))
+            plant.step(position=(azimuth, 0.5), error=(math.nan, math.nan, 10.0), velocity=(sum(rates[-1:]), 0.0))
             rates.append(plant.client.heard['acu/rate_command'][-1].velocity[0])
             azimuth += PERIOD * 1e-9 * rates[-1]
 
@@ -213,7 +230,7 @@ def test_filters_while_it_tracks(plant):
         nonlocal azimuth
         for _ in range(steps):
             error = (0.3 + 0.02 * (plant.stamp * 1e-9 - first) - azimuth) * math.cos(0.5)
-            plant.step(position=(azimuth, 0.5), error=(error, 0.0, 60.0))
+            plant.step(position=(azimuth, 0.5), error=(error, 0.0, 60.0), velocity=(sum(rates[-1:]), 0.0))
             rates.append(plant.client.heard['acu/rate_command'][-1].velocity[0])
             azimuth += PERIOD * 1e-9 * rates[-1]
 
@@ -246,7 +263,7 @@ def test_a_drive_that_does_not_follow(plant):
     plant.enters('stow')
     plant.client.publish('adu/state', messages.String(data='fault: azimuth overspeed'))
     plant.client.until(lambda: plant.step() or plant.mode == 'standby')
-    assert (plant.client.heard['acu/rate_command'][-1].velocity == 0.0).all()
+    assert plant.client.heard['acu/rate_command'][-1].velocity == pytest.approx(0.0, abs=1e-9)
     plant.client.publish('adu/state', messages.String(data='enabled'))
     plant.client.until(lambda: plant.step() or plant.client.trigger('acu/stow')[0])
     assert plant.client.trigger('acu/standby')[0]
@@ -254,12 +271,15 @@ def test_a_drive_that_does_not_follow(plant):
 
 def test_parameters_while_it_runs(plant):
     def moved_by():
-        """The rate commanded soon after preset is asked for, 0.5 rad away in azimuth."""
+        """The rate commanded soon after preset is asked for, 0.4 rad away in azimuth, of an antenna that obeys."""
         plant.client.publish('acu/program_track', plant.program([(0.0, 0.6, 0.5)]))
         plant.step()
         assert plant.client.trigger('acu/preset')[0]
-        plant.step(20)
-        rate = plant.client.heard['acu/rate_command'][-1].velocity[0]
+        azimuth, rate = 0.1, 0.0
+        for _ in range(20):
+            plant.step(position=(azimuth, 0.5), velocity=(rate, 0.0))
+            rate = plant.client.heard['acu/rate_command'][-1].velocity[0]
+            azimuth += PERIOD * 1e-9 * rate
         assert plant.client.trigger('acu/standby')[0]
         plant.step(20)
         return rate

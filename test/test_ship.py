@@ -66,9 +66,10 @@ def test_a_ship_points_nearly_as_well_as_the_shore(ashore, name, overrides, time
 @pytest.mark.parametrize('name', ['ship_pass', 'ship_pass_ss6'])
 def test_a_signal_of_any_strength_is_tracked_by_a_filter_that_knows_its_errors(name, cn0_dbhz):
     """Where the receiver's noise has gone the attitude's is left. A filter that knew nothing of it refused every error
-    from 80 dB-Hz on."""
+    from 80 dB-Hz on. There autotrack begins after 3 s, because a filter that started while the dish still slewed is
+    begun anew only after a second."""
     _, run, on = track(name, f'tracking_receiver.receiver.cn0_dbhz={cn0_dbhz}', 'scenario.duration=30')
-    assert on.mean() > 0.85
+    assert on.mean() > 0.82
     nis = np.nanmean(layouts.of_filter(run.steps, 'nis')[on], axis=0)
     assert (nis > 0.8).all() and (nis < 1.2).all()
 
@@ -81,8 +82,11 @@ def test_the_ship_is_isolated_by_60_db(name):
 
 
 def test_without_noise_the_isolation_is_far_above_60_db():
-    """A receiver and an INS without noise; the filter is told of 5e-4 rad, or it would follow every quirk."""
+    """A receiver and an INS without noise; a filter made for a satellite is told of 5e-4 rad, or it would follow every
+    quirk."""
     found = isolated('ship_pass', 'tracking_receiver.receiver.cn0_dbhz=120', 'acu.tracker.receiver.sigma_floor=5e-4',
+                     *(f'acu.{axis}.filter.{key}' for axis in ('azimuth', 'elevation')
+                       for key in ('kind=current_statistical', 'current_statistical.a_max=0.002')),
                      *(f'ins.{name}=0' for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
                                                     'heading_wander')))
     assert found.isolation > 80.0

@@ -101,7 +101,7 @@ def test_an_outlier_counts_little():
 def test_scenario_and_the_file_in_a_run(pedestal, folder, one_line):
     """Tuned on one seed; `pedestal run --params-file` gets the values."""
     file = folder / 'scenario.yaml'
-    wrong = 'acu.azimuth.filter.current_statistical.a_max=0.5'
+    wrong = 'acu.azimuth.filter.kind=current_statistical'
     code, output, errors = pedestal('tune', 'uav_flyby', '--filter', 'alpha_beta', '--axis', 'azimuth', '--runs', '1',
                                     '--seed', '4', '--duration', '6', '--param', wrong, '--output', file)
     assert (code, errors) == (0, '')

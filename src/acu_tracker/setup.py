@@ -11,7 +11,7 @@ setup(
         ('share/' + package_name, ['package.xml']),
     ],
     install_requires=['numpy', 'numba'],
-    extras_require={'test': ['pytest', 'scipy', 'filterpy']},
+    extras_require={'test': ['pytest', 'scipy', 'filterpy', 'hypothesis', 'skyfield']},
     python_requires='>=3.10',
     zip_safe=False,
     maintainer='pedestal maintainers',

@@ -11,7 +11,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
     ],
-    install_requires=['numpy', 'numba', 'rosbags'],
+    install_requires=['numpy', 'numba', 'rosbags', 'sgp4'],
     extras_require={'test': ['pytest', 'scipy']},
     python_requires='>=3.10',
     zip_safe=False,

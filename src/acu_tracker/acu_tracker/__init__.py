@@ -4,7 +4,8 @@
     encoders, attitude, error in    -> measured angles of the target (`geometry`)
     -> `estimation`: the target filter, its prediction to the instant of the command
     -> `modes`: which target the axes follow; `program`: the time-tagged one; `lookahead`: slews through the keyhole
-    -> reference on the deck (`geometry`) -> `servo`: rate and torque of each axis, or the angles of a beam.
+    -> reference on the deck (`geometry`) -> `servo`: rate and torque of each axis, or the angles of a beam
+    -> `alarms`: what is wrong, by what all of this shows.
 The symbols are in the docstring of each room; everywhere:
     A, E            azimuth (clockwise), elevation; dA, ddA ... their time derivatives  [rad, rad/s, rad/s2]
     t_k             stamp of the drive step                                             [s]

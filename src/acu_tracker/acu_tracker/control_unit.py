@@ -6,16 +6,18 @@ import math
 
 import numpy as np
 
-from acu_tracker import modes, resumption, signals
-from acu_tracker.estimation import divergence, measurement, target, target_filter, tracker
+from acu_tracker import by_level, direction, manual, modes, reach, resumption, signals, stow, supervision
+from acu_tracker.alarms import conditions
+from acu_tracker.estimation import divergence, measurement, repetition, target, target_filter, tracker
 from acu_tracker.geometry import attitude, azimuth_wrap, deck_reference, encoders
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from acu_tracker.geometry.vector import vector
 from acu_tracker.lookahead import levelled_deck, planner
 from acu_tracker.params import AxisParameters, SharedParameters
-from acu_tracker.program import bridge, program_track
-from acu_tracker.servo import notch, position_loop, unasked
+from acu_tracker.program import bridge, program_track, tables
+from acu_tracker.search import acquisition, coast
+from acu_tracker.servo import ends, floor, frozen, notch, position_loop, reference, unasked
 from acu_tracker.servo.position_loop import Feedback, Instants
 from pedestal_common import blockage, line_of_sight
 from pedestal_common.compiled import compiled
@@ -26,30 +28,36 @@ ON_TARGET = 0.5
 
 STATE = np.dtype([
     ('stamp', 'f8'), ('mode', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('entered', 'i8'),
-    ('resumption', resumption.RESUMPTION), ('unasked', unasked.ENVELOPE),
+    ('resumption', resumption.RESUMPTION), ('unasked', unasked.ENVELOPE), ('frozen', frozen.FROZEN),
     ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('aligning', 'i8'),
     ('target', target.TARGET), ('error', 'f8', (2,)),                           # of this step, azimuth, elevation
-    ('divergence', divergence.DIVERGENCE),
-    ('preset', 'f8', (2,)),
+    ('repetition', repetition.REPETITION), ('divergence', divergence.DIVERGENCE),
+    ('preset', direction.DIRECTION), ('slave', direction.DIRECTION), ('manual', manual.MANUAL), ('fallback', 'i8'),
+    ('table', 'i8'), ('stow', stow.STOW),                       # mode whose table was followed last
     ('azimuth', 'f8'), ('target_angles', 'f8', (2,)),  # raw azimuth of the last reference; deck angles of its target
     ('pointing_offset', 'f8'),                                  # intended angle between beam and target [rad]
     ('overtravel', 'i8'),                                       # 1: no azimuth wrap held the whole program
     ('outage', 'f8'), ('blocked', 'i8'),                        # stamp at which an outage had a reason last [s]
     ('bridge', bridge.BRIDGE),                                  # program where the target was last tracked
-    ('lookahead', planner.PLANNER), ('axis', position_loop.AXIS, (2,)),
+    ('acquisition', acquisition.ACQUISITION),
+    ('lookahead', planner.PLANNER), ('axis', position_loop.AXIS, (2,)), ('supervision', conditions.SUPERVISION),
 ], align=True)
 
-AXIS_CONSTANTS = np.dtype([('p', record_type(AxisParameters)), ('notch', 'f8', (5,))], align=True)
+AXIS_CONSTANTS = np.dtype([('p', record_type(AxisParameters)), ('notch', 'f8', (5,)), ('reaction', 'f8'),
+                           ('braking', 'f8')], align=True)
 CONSTANTS = np.dtype([('p', record_type(SharedParameters)), ('axis', AXIS_CONSTANTS, (2,)), ('lead', 'f8'),
-                      ('tracker', tracker.CONSTANTS), ('lookahead', planner.CONSTANTS)], align=True)
-"""p: the parameters; notch: coefficients; lead: t_m - t_k [s]."""
+                      ('tracker', tracker.CONSTANTS), ('lookahead', planner.CONSTANTS), ('floor', floor.FLOOR)],
+                     align=True)
+"""p: the parameters; notch: coefficients; reaction, braking: time [s] given in
+front of a limit, deceleration there [rad/s2]; lead: t_m - t_k [s]."""
 
 
-def axis_constants(params, period) -> np.ndarray:
-    """Constants (1,) of AxisParameters, for steps of period [s]."""
+def axis_constants(params, period, reaction) -> np.ndarray:
+    """Constants (1,) of AxisParameters, for steps of period [s]; reaction [s]: see position_loop.follow."""
     c, n = np.zeros(1, AXIS_CONSTANTS), params.notch
     c['p'] = record(params, AxisParameters)
     c['notch'] = notch.coefficients(n.frequency, n.width, n.depth, period)
+    c['reaction'], c['braking'] = reaction, params.limits.deceleration
     return c
 
 
@@ -58,8 +66,9 @@ def constants(params) -> np.ndarray:
     c, axes = np.zeros(1, CONSTANTS), (params.azimuth, params.elevation)
     c['p'] = record(params, SharedParameters)
     c['lead'] = params.command_delay + 0.5 * params.period
-    c['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period)
-                                for axis in axes])
+    c['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period,
+                                               params.reaction) for axis in axes])
+    c['floor'] = floor.table(params.floor)
     c['tracker'] = tracker.constants(params.tracker, [axis.filter for axis in axes])
     c['lookahead'] = planner.constants(params)
     return c
@@ -71,9 +80,14 @@ def initial_state(params) -> np.ndarray:
     s['stamp'] = s['outage'] = s['resumption']['until'] = -math.inf
     s['pending'] = modes.MODES.index(params.initial_mode)
     s['unasked']['since'] = -math.inf
-    s['preset'] = params.azimuth.preset, params.elevation.preset
+    s['preset']['angle'] = params.azimuth.preset, params.elevation.preset
+    s['fallback'], s['table'] = modes.FALLBACKS[params.fallback], modes.PROGRAM
+    stow.initialise(s['stow'])
+    s['manual']['until'] = s['slave']['stamp'] = s['preset']['stamp'] = -math.inf
     target.initialise(s['target'])
+    acquisition.initialise(s['acquisition'])
     planner.initialise(s['lookahead'])
+    conditions.initialise(s['supervision'])
     return s
 
 
@@ -95,7 +109,7 @@ def _take_attitude(s, c, u):
         return 0
     if not u.attitude_valid:
         return signals.ATTITUDE
-    outcome = attitude.take(s.attitude, c.p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate)
+    outcome = attitude.take(s.attitude, c.p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate, u.aligning)
     if outcome == attitude.NEW:
         deck = s.lookahead.deck
         if s.aligning:
@@ -107,7 +121,7 @@ def _take_attitude(s, c, u):
 
 
 @compiled
-def _take_error(s, c, u, o):
+def _take_error(s, c, u, o, program):
     """Filter y = encoder at the instant of the error, displaced by the error; a flag where it is not accepted, else 0.
 
     The error is a mean of samples that were taken while a beam jumped from step to step, so that target and beam each
@@ -125,11 +139,15 @@ def _take_error(s, c, u, o):
     known, at = encoders.at(s.encoders, u.error_stamp - receiver.beam_age)
     if not known:
         return signals.ERROR_STAMP
+    if repetition.take(s.repetition, u, at):
+        return 0
     measured = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
     s.error[0], s.error[1] = measured[0] - at.A, measured[1] - at.E
+    by_level.check_slope(s, c, program, at, u.error_stamp - receiver.age, (u.cross_elevation, u.elevation))
     restart_gap = math.inf if _outage_permitted(s, c) else c.p.tracker.restart_gap
     outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, measured, restart_gap)
-    divergence.take(s.divergence, innovation)
+    if outcome != target.NOISY and supervision.obeys(s):
+        divergence.take(s.divergence, innovation)
     for i in range(2):
         one = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
@@ -138,6 +156,8 @@ def _take_error(s, c, u, o):
         return signals.ATTITUDE
     if outcome == target.STALE:
         return signals.ERROR_STAMP
+    if outcome == target.NOISY:
+        return signals.ERROR_NOISY
     return signals.ERROR_GATED if outcome == target.GATED else 0
 
 
@@ -148,7 +168,7 @@ def _take_preset(s, u):
         return 0
     if not math.isfinite(u.preset[0] + u.preset[1]):
         return signals.PRESET
-    s.preset[0], s.preset[1] = u.preset[0], u.preset[1]
+    s.preset.angle[0], s.preset.angle[1], s.preset.moves = u.preset[0], u.preset[1], 0.0
     return 0
 
 
@@ -171,31 +191,9 @@ def _outage_permitted(s, c):
 
 
 @compiled
-def _outside(c, A, E):
-    """OUTSIDE_LIMITS if deck angles [rad] cannot be pointed at, else NONE; NaN is outside."""
-    a, e = c.axis[0].p.limits, c.axis[1].p.limits
-    return modes.NONE if a.low <= A <= a.high and e.low <= E <= e.high else modes.OUTSIDE_LIMITS
-
-
-@compiled
-def _program_obstacle(s, c, program, t_m):
-    """(NONE or why the program cannot be followed, by its times or its place at t_m [s]; signals.PROGRAM if it is bad,
-    else 0).
-    """
-    obstacle = program_track.status(program, s.stamp)
-    if obstacle != modes.NONE:
-        return obstacle, 0
-    source = target.Source(0, program_track.motion_at(program, t_m))
-    motion = target.on_deck(s.target, c.p, s.attitude, t_m, source)
-    A, E, limits = motion.azimuth.angle, motion.elevation.angle, c.axis[0].p.limits
-    if not math.isfinite(A + E):
-        return modes.NO_PROGRAM, signals.PROGRAM
-    return _outside(c, azimuth_wrap.nearest(A, s.azimuth, limits.low, limits.high, Travel(0.0, 0.0)), E), 0
-
-
-@compiled
-def _situation(s, c, drive_ready, program, t_m, request):
-    """(modes.Situation at s.stamp, flags of the program); the program is evaluated only where it matters."""
+def _situation(s, c, u, of_all, request, fallback):
+    """(modes.Situation at s.stamp, flags of the tables); a table is evaluated only where it matters."""
+    t_m = s.stamp + c.lead
     unstable = modes.NONE
     if s.attitude.stabilised:
         # Before the first attitude the state of the INS may not have arrived yet.
@@ -203,36 +201,59 @@ def _situation(s, c, drive_ready, program, t_m, request):
                     modes.NONE if attitude.at(s.attitude, c.p, t_m) else modes.ATTITUDE_INVALID)
     since = _since_accepted(s, c)
     silent = not _outage_permitted(s, c)
-    lost = not s.target.tracker.running or (since > c.p.tracker.coast_time and silent)
-    ends = modes.SIGNAL_LOST if lost else modes.NONE
+    spread = by_level.sigma(s, c) if s.target.tracker.running and silent and _coasting(s, c) else 0.0
+    lost = not s.target.tracker.running or (
+        silent and coast.over(since, c.p.tracker.coast_time, spread, c.p.tracker.receiver.beamwidth))
+    ends = modes.SIGNAL_LOST if lost else modes.SIDE_LOBE if by_level.in_side_lobe(s, c) else modes.NONE
     unfit = modes.NONE if tracker.locked(s.target.tracker, c.p.tracker, since) else modes.NOT_LOCKED
-    if s.mode == modes.AUTOTRACK:
+    if s.mode == modes.AUTOTRACK and supervision.obeys(s):
         divergence.watch(s.divergence, _coasting(s, c) and silent)
     if s.divergence.diverged:
         unfit = ends = modes.DIVERGED
-    wanted = request == modes.PROGRAM or s.mode == modes.PROGRAM or (s.mode == modes.AUTOTRACK and ends != modes.NONE)
-    unable, flags = modes.NONE, 0
-    if wanted and unstable == modes.NONE:
-        unable, flags = _program_obstacle(s, c, program, t_m)
-    return modes.situation(
-        encoders.taken(s.encoders, s.stamp), drive_ready, unstable, _outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
-        _outside(c, s.preset[0], s.preset[1]), unable, unfit, ends), flags
+    pins = stow.obstacle(s.stow, c.p.stow_pins, u.pins)
+    falls_back = s.mode == modes.SEARCH or (s.mode == modes.AUTOTRACK and ends != modes.NONE)
+    program, flags = modes.NONE, 0
+    tle = sun = modes.NONE
+    if unstable == modes.NONE:
+        if reach.matters(s, modes.PROGRAM, request, fallback, falls_back):
+            program, flags = reach.table(s, c, u, modes.PROGRAM, of_all)
+        if reach.matters(s, modes.TLE, request, fallback, falls_back):
+            tle, flag = reach.table(s, c, u, modes.TLE, of_all)
+            flags |= flag
+        if reach.matters(s, modes.SUN, request, fallback, falls_back):
+            sun, flag = reach.table(s, c, u, modes.SUN, of_all)
+            flags |= flag
+    unchecked = modes.DIVERGED if s.divergence.diverged else modes.NONE
+    stowed = reach.outside(c, c.axis[0].p.stow, c.axis[1].p.stow)
+    preset = reach.outside(c, s.preset.angle[0], s.preset.angle[1])
+    unled = modes.NONE if direction.there(s.slave, s.stamp) else modes.NO_DIRECTION
+    obstacle = (modes.NONE, modes.NONE, stowed, modes.PINS_OUT, preset, modes.NONE, unled, program, tle, sun, unfit,
+                unchecked, unchecked, modes.NONE)
+    obeyed = u.drive_ready != 0 and supervision.distrust(s) == modes.DRIVE_NOT_READY
+    drive = encoders.taken(s.encoders, s.stamp), obeyed
+    return modes.situation(drive, unstable, pins, s.table, obstacle, (ends, by_level.end(s, c))), flags
 
 
 @compiled
-def _change_mode(s, c, o, drive_ready, program, request):
-    """Run the mode machine at s.stamp with a `request` or NO_REQUEST: (result, flags of the program)."""
-    obeyed = drive_ready != 0 and s.unasked.moves == 0
-    now, flags = _situation(s, c, obeyed, program, s.stamp + c.lead, request)
+def _change_mode(s, c, u, o, of_all, request):
+    """Run the mode machine at s.stamp with a `request` or NO_REQUEST: (result, flags of the tables)."""
+    # There is no coasting on a filter that has begun anew.
+    fallback = s.fallback if s.fallback != modes.AUTOTRACK or s.target.tracker.running else modes.PROGRAM
+    now, flags = _situation(s, c, u, of_all, request, fallback)
     o.locked = now.obstacle[modes.AUTOTRACK] == modes.NONE
-    mode, reason, result = modes.next_mode(s.mode, request, now, c.p.tracker.handover)
+    handover = by_level.found(s, c) if modes.BY_LEVEL[s.mode] else c.p.tracker.handover != 0
+    mode, reason, result = modes.next_mode(s.mode, request, now, handover, fallback)
     if result == modes.ACCEPTED:
         s.pending = modes.NO_REQUEST
-        if mode == modes.PROGRAM:
+        if modes.BY_TABLE[mode]:
             s.target.tracker.accepted_in_a_row = 0
+    if modes.BY_TABLE[mode] and mode != s.table:
+        s.table, s.bridge.valid = mode, 0
     if reason != modes.NONE:
-        s.reason = modes.MOVES_UNASKED if reason == modes.DRIVE_NOT_READY and s.unasked.moves else reason
-    if s.mode == modes.AUTOTRACK and now.end[modes.AUTOTRACK] != modes.NONE:
+        s.reason = supervision.distrust(s) if reason == modes.DRIVE_NOT_READY else reason
+    if mode != s.mode and modes.BY_LEVEL[mode]:
+        by_level.begin(s, c, tables.of_mode(of_all, s.table), mode, s.mode == modes.AUTOTRACK and not _coasting(s, c))
+    if s.mode == modes.AUTOTRACK and now.end[modes.AUTOTRACK] != modes.NONE and mode != modes.AUTOTRACK:
         s.target.tracker.running = 0
     if mode != s.mode:
         s.mode, s.entered = mode, 1
@@ -248,24 +269,29 @@ def _bridge_silence(s, c, stamp):
         if s.mode == modes.STANDBY:
             s.reason = modes.SILENCE
     unasked.restart(s.unasked, stamp)
+    frozen.restart(s.frozen, stamp)
 
 
 @compiled
-def request(s, c, u, o, program, mode):
+def request(s, c, u, o, of_all, mode):
     """Request a mode (its code) between two steps; True when granted. Sets outputs.mode and outputs.reason.
 
     The decision uses the inputs of the last step; it takes effect on the command of the next. Arguments as of `step`.
     """
-    result, _ = _change_mode(s, c, o, u.drive_ready, program, mode)
+    result, _ = _change_mode(s, c, u, o, of_all, mode)
     o.mode, o.reason = s.mode, s.reason
     return result == modes.ACCEPTED
 
 
 @compiled
 def _source(s, c, program, t):
-    """The target.Source of program or autotrack at t [s]; the program bridges an outage that has a reason."""
-    if s.mode == modes.PROGRAM:
+    """The target.Source of the mode at t [s]; the program bridges an outage that has a reason."""
+    if s.mode == modes.SLAVE:
+        return target.Source(0, direction.motion_at(s.slave, t))
+    if modes.BY_TABLE[s.mode]:
         return target.Source(0, program_track.motion_at(program, t))
+    if modes.BY_LEVEL[s.mode]:
+        return by_level.source(s, c, program, t)
     if (s.bridge.valid and _coasting(s, c) and _outage_permitted(s, c)
             and program_track.status(program, t) == modes.NONE):
         return target.Source(0, bridge.motion_at(s.bridge, program, t))
@@ -273,19 +299,16 @@ def _source(s, c, program, t):
 
 
 @compiled
-def _pointed(s, A, E):
-    """Motion of axes that are to stand at deck angles [rad]."""
-    s.azimuth = s.axis[0].reference.angle
-    return Motion(AxisMotion(A, 0.0, 0.0), AxisMotion(E, 0.0, 0.0))
-
-
-@compiled
 def _reference(s, c, program, t):
     """Reference Motion on the deck at t [s] of the mode: its target, on the azimuth wrap that fits, or a slew."""
+    if not modes.FOLLOWS[s.mode]:
+        s.azimuth = s.axis[0].reference.angle
     if s.mode == modes.STOW:
-        return _pointed(s, c.axis[0].p.stow, c.axis[1].p.stow)
+        return Motion(AxisMotion(c.axis[0].p.stow, 0.0, 0.0), AxisMotion(c.axis[1].p.stow, 0.0, 0.0))
     if s.mode == modes.PRESET:
-        return _pointed(s, s.preset[0], s.preset[1])
+        return direction.motion_at(s.preset, t)
+    if s.mode == modes.STOP or s.mode == modes.RATE:
+        return Motion(manual.motion(s.manual, 0, t - s.stamp), manual.motion(s.manual, 1, t - s.stamp))
     source = _source(s, c, program, t)
     motion = target.on_deck(s.target, c.p, s.attitude, t, source)
     s.target_angles[0], s.target_angles[1] = motion.azimuth.angle, motion.elevation.angle
@@ -304,7 +327,7 @@ def _reference(s, c, program, t):
 def _wrapped(s, c, program, t, azimuth):
     """AxisMotion of the azimuth at t [s] on the wrap that fits; when a program begins, on one that holds all of it."""
     limits, travel = c.axis[0].p.limits, Travel(0.0, 0.0)
-    begins = s.entered and s.mode == modes.PROGRAM
+    begins = s.entered and modes.BY_TABLE[s.mode]
     if begins:
         travel = program_track.azimuth_travel(program, t)
     s.azimuth = azimuth_wrap.nearest(azimuth.angle, s.azimuth, limits.low, limits.high, travel)
@@ -337,9 +360,9 @@ def _deck_rates(s, c):
 @compiled
 def _follow(s, c, u, o, motion, now):
     """Run the position loops of both axes towards a Motion."""
-    V, closed = _deck_rates(s, c), s.mode == modes.AUTOTRACK
+    V, closed, now_ends = _deck_rates(s, c), s.mode == modes.AUTOTRACK, floor.ends(c, u, motion.azimuth.angle)
     for i in range(2):
-        feedback = Feedback(u.position[i], u.velocity[i], s.error[i], V[i], closed)
+        feedback = Feedback(u.position[i], u.velocity[i], s.error[i], V[i], closed, now_ends[i])
         _write(o, i, position_loop.follow(s.axis[i], c.axis[i], motion[i], feedback, now))
 
 
@@ -368,6 +391,14 @@ def _watch_outage(s, c, program):
 
 
 @compiled
+def _stow(s, c, u):
+    """Ask for the stow pins, and say when they are in."""
+    stow.step(s.stow, c, u, s.mode)
+    if s.mode == modes.STOW and s.reason == modes.REQUESTED and u.pins == stow.BOTH_IN:
+        s.reason = modes.PINS_IN
+
+
+@compiled
 def _read_estimate(s, c, o):
     """Put the estimate of the target at s.stamp, in earth angles of the antenna, into the outputs."""
     estimate = target.read(s.target, c.p, c.tracker, s.attitude, s.stamp)
@@ -381,7 +412,7 @@ def _read_estimate(s, c, o):
 def _look_ahead(s, c, program):
     """Plan ahead once in planner.INTERVAL: keyholes and hidden sectors on the path of the target."""
     h = s.lookahead
-    if not modes.FOLLOWS[s.mode]:
+    if not modes.FOLLOWS[s.mode] or s.mode == modes.SLAVE:
         planner.forget(h)
         s.overtravel, s.pointing_offset = 0, 0.0
         return
@@ -391,12 +422,13 @@ def _look_ahead(s, c, program):
         s.bridge.valid, s.entered = 0, 1
     if not planner.due(h, s.stamp):
         return
-    if s.mode == modes.PROGRAM:
+    if modes.BY_TABLE[s.mode]:
         s.bridge.valid = 0
         planner.look_along_program(h, c.lookahead, s.stamp, s.azimuth, program, s.bridge)
         return
-    sight = target.earth_outlook(s.target, c.tracker, s.stamp)
-    if not _coasting(s, c):
+    sight = (by_level.sight(s, program, s.stamp) if modes.BY_LEVEL[s.mode]
+             else target.earth_outlook(s.target, c.tracker, s.stamp))
+    if s.mode == modes.AUTOTRACK and not _coasting(s, c):
         bridge.begin(s.bridge, program, s.stamp, sight.u)
     if s.bridge.valid and program_track.status(program, s.stamp) == modes.NONE:
         planner.look_along_program(h, c.lookahead, s.stamp, s.azimuth, program, s.bridge)
@@ -405,8 +437,25 @@ def _look_ahead(s, c, program):
 
 
 @compiled
-def step(s, c, u, o, program):
-    """Run one drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and a ProgramTrack.
+def _start_from_actual(s, c, u, begins, gap):
+    """Targets := actual, of both axes where they begin anew; of one that does not obey in every step until it does, or
+    it would wind up behind its commands and make good for them at once when it hears them again."""
+    if begins:
+        s.azimuth = u.position[0]
+    for i in range(2):
+        rate = u.velocity[i]
+        immobile = not begins and s.supervision.axis[i].immobile != 0
+        if immobile:
+            rate = position_loop.realised(s.axis[i].command, rate)
+        if gap or immobile:
+            s.axis[i].command = rate
+        if begins or immobile:
+            position_loop.initialise(s.axis[i], c.axis[i].p, s.stamp, u.position[i], rate)
+
+
+@compiled
+def step(s, c, u, o, of_all):
+    """Run one drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and the Tables `of_all`.
 
     A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
     """
@@ -423,26 +472,37 @@ def step(s, c, u, o, program):
         _bridge_silence(s, c, u.stamp)
     now = Instants(u.stamp, u.stamp + c.lead, c.p.period if jumped else dt)
     s.stamp = u.stamp
+    program = tables.of_mode(of_all, s.table)
 
     tracker.transfer(s.target.tracker, c.p.tracker, c.tracker)
-    flags |= _take_encoders(s, u) | _take_attitude(s, c, u) | _take_error(s, c, u, o) | _take_preset(s, u)
+    flags |= _take_encoders(s, u) | _take_attitude(s, c, u) | _take_error(s, c, u, o, program) | _take_preset(s, u)
 
     if not u.drive_ready or not math.isfinite(s.unasked.since):
         unasked.restart(s.unasked, s.stamp)
     unasked.watch(s.unasked, s.stamp, u.velocity, c.p.unasked_rate)
-    rested = s.mode == modes.STANDBY
-    _, program_flags = _change_mode(s, c, o, u.drive_ready, program, s.pending if rested else modes.NO_REQUEST)
+    if c.axis[0].p.controller != position_loop.BEAM:
+        frozen.watch(s.frozen, u, c.p.step_gap + c.p.command_delay)
+    by_level.advance(s, c, u, program)
+    rested = stow.rests(s.stow, c.p.stow_pins, u.pins, s.mode)
+    _, program_flags = _change_mode(s, c, u, o, of_all, s.pending if s.mode == modes.STANDBY else modes.NO_REQUEST)
+    program = tables.of_mode(of_all, s.table)
+    if c.p.stow_pins:
+        _stow(s, c, u)
     if resumption.waits(s.resumption):
         ended = s.mode == modes.STANDBY and s.reason == modes.DRIVE_NOT_READY
         s.pending = resumption.pending(s.resumption, s.stamp, ended, o.locked, s.pending)
-    if (rested or jumped) and encoders.taken(s.encoders, s.stamp):
-        for i in range(2):
-            if flags & signals.STEP_GAP:
-                s.axis[i].command = u.velocity[i]
-            position_loop.initialise(s.axis[i], c.axis[i].p, s.stamp, u.position[i], u.velocity[i])
-        s.azimuth = u.position[0]
+    if encoders.taken(s.encoders, s.stamp):
+        _start_from_actual(s, c, u, rested or jumped, flags & signals.STEP_GAP)
 
-    if s.mode == modes.STANDBY:
+    travel = floor.by_hand(c, u, s.manual.angle[0])
+    for i in range(2):
+        if s.entered or rested or jumped:
+            manual.begin(s.manual, i, reference.now(s.axis[i].reference))
+        if s.mode == modes.STOP or s.mode == modes.RATE:
+            heard = s.mode == modes.RATE and s.stamp <= s.manual.until
+            manual.step(s.manual, i, c.axis[i].p.shaper, travel[i], heard, now.dt)
+
+    if stow.rests(s.stow, c.p.stow_pins, u.pins, s.mode):
         for i in range(2):
             _write(o, i, position_loop.stop(s.axis[i], c.axis[i].p, now.dt))
     else:
@@ -451,12 +511,17 @@ def step(s, c, u, o, program):
         _watch_outage(s, c, program)
         o.blocked = s.blocked
         o.coasting = s.mode == modes.AUTOTRACK and _coasting(s, c)
+    of_axes = floor.ends(c, u, u.position[0])
 
     for i in range(2):
         unasked.command(s.unasked, i, o.rate[i], s.stamp, min(now.dt, c.p.period), c.p.step_gap + c.p.command_delay)
+        frozen.command(s.frozen, i, o.rate[i], c.p.period)
+        o.time_to_limit[i] = ends.time_to(u.position[i], u.velocity[i], of_axes[i])
     t = s.target.tracker
     o.mode, o.reason, o.invalid_input = s.mode, s.reason, flags | program_flags
     o.gated, o.rates_gated, o.ranges_gated = t.gated, t.rates_gated, t.ranges_gated
     if t.running:
         _read_estimate(s, c, o)
     _look_ahead(s, c, program)
+    o.pins, o.pins_wrong = s.stow.asked, stow.wrong(s.stow, c, u) if c.p.stow_pins else 0
+    supervision.step(s, c, u, o, dt, s.reason == modes.SIGNAL_LOST or (o.coasting and not _outage_permitted(s, c)))

@@ -9,68 +9,120 @@ class Mode(typing.NamedTuple):
     """A row of TABLE.
 
     doc: what the axes do; entry: when it can be entered; exit: when it ends by itself. follows: it follows a target
-    through the sky, for which the deck's attitude must be known; fallback: the mode it falls back on when its target
-    ends; handover: the mode it hands over to by itself, once that can be entered. Both are names, '' for none.
+    through the sky, for which the deck's attitude must be known; by_level: it goes by the level of the signal about
+    the expected place of the target; fallback: the mode it falls back on when its target ends, of `program` the mode
+    whose table was followed last; handover: the mode it hands over to by itself, once that can be entered. Both are
+    names, '' for none. table: it follows a table of directions; pinned: the stow pins may be in.
     """
     name: str
     doc: str
     entry: str
     exit: str = ''
     follows: bool = False
+    by_level: bool = False
     fallback: str = ''
     handover: str = ''
+    table: bool = False
+    pinned: bool = False
 
 
 TABLE = (
     Mode('standby', 'rate command 0', 'always; after a fault'),
-    Mode('stow', 'the stow angles', 'encoders valid, angles inside the limits'),
+    Mode('stop', 'the axes stand where they come to rest', 'encoders valid'),
+    Mode('stow', 'the stow angles; with `stow_pins` the pins go in once the axes stand there',
+         'encoders valid, angles inside the limits', pinned=True),
+    Mode('unstow', 'rate command 0; the stow pins go out', 'encoders valid, a stow pin is not out',
+         'to `standby` when both are out', pinned=True),
     Mode('preset', 'the preset angles', 'encoders valid, angles inside the limits'),
+    Mode('rate', 'the rates of the last ask `rate`, for 0.5 s; nobody asks again: the axes stand', 'encoders valid'),
+    Mode('slave', 'the direction of the last ask `slave`, in earth angles, moved on by its rates',
+         'a direction was given and holds, 1 s by default', 'to `stop` when it holds no longer',
+         follows=True, fallback='stop'),
     Mode('program', 'the time-tagged table', 'the table is there, valid now and inside the limits',
-         'to `autotrack` after `lock_count` accepted errors; to `standby` past its end',
-         follows=True, handover='autotrack'),
+         'to `autotrack` after `lock_count` accepted errors; to `standby` past its end, or where rows are missing',
+         follows=True, handover='autotrack', table=True),
+    Mode('tle', 'a satellite by its elements', 'there are elements, not older than `prediction.oldest`; the satellite '
+         'is above the horizon and inside the limits',
+         'to `autotrack` after `lock_count` accepted errors; to `standby` when it has set',
+         follows=True, handover='autotrack', table=True),
+    Mode('sun', 'the sun, to calibrate the pointing', 'the sun is above the horizon and inside the limits',
+         'to `standby` when it has set', follows=True, table=True),
     Mode('autotrack', 'the filtered target, through short losses the prediction of the filter',
          'receiver locked, filter converged',
-         'after `coast_time` without an error, or diverged, to `program`, or to `standby` without a program',
-         follows=True, fallback='program'))
+         'after `coast_time` without an error, or once the estimate is uncertain by half a beamwidth, to the fallback '
+         'chosen beforehand, diverged to the table, in a side lobe to `acquire`; to `standby` where that cannot be '
+         'entered',
+         follows=True, fallback='program'),
+    Mode('search', 'a pattern about the expected place of the target: the last place, a small area, the full one',
+         'not after `diverged`', 'to `acquire` where the level has passed a peak; after `search.rounds` to the table, '
+         'or to `standby` without one', follows=True, by_level=True, fallback='program', handover='acquire'),
+    Mode('acquire', 'the place of the highest level, a look around it for a main lobe, a small circle to check the '
+         'slopes of the errors', 'not after `diverged`',
+         'to `autotrack` once the slopes are right and the receiver is locked; to `search` without a signal there; '
+         'diverged, to `standby`, where a slope is wrong',
+         follows=True, by_level=True, fallback='search', handover='autotrack'),
+    Mode('steptrack', 'the highest level, found by steps to either side', 'always', 'to `search` without a signal',
+         follows=True, by_level=True, fallback='search'))
 """Another mode is a row here, its entries in `situation`, and what it asks of the axes in control_unit."""
 
 MODES = tuple(row.name for row in TABLE)
-STANDBY, STOW, PRESET, PROGRAM, AUTOTRACK = range(len(MODES))
+(STANDBY, STOP, STOW, UNSTOW, PRESET, RATE, SLAVE, PROGRAM, TLE, SUN, AUTOTRACK, SEARCH, ACQUIRE,
+ STEPTRACK) = range(len(MODES))
 FOLLOWS = tuple(row.follows for row in TABLE)
+BY_LEVEL = tuple(row.by_level for row in TABLE)
+BY_TABLE = tuple(row.table for row in TABLE)
+_PINNED = tuple(row.pinned for row in TABLE)
 NEVER = -1
 _FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else STANDBY for row in TABLE)
+
+FALLBACKS = {'coast': AUTOTRACK, 'memory': STOP, 'program': PROGRAM, 'tle': TLE, 'search': SEARCH, 'preset': PRESET,
+             'standby': STANDBY}
+"""{what can be chosen for the loss of the track: the mode it is}; coast is to stay in autotrack on the filter alone,
+memory to stand where the target was seen last, program to go back to the table that was followed last."""
+
+FALLBACK_OF = {mode: name for name, mode in FALLBACKS.items()}
+
 _HANDOVER = tuple(MODES.index(row.handover) if row.handover else NEVER for row in TABLE)
 
 REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'attitude invalid', 'no program track',
            'before program track', 'after program track', 'receiver not locked', 'outside limits', 'unknown mode',
            'stamp does not advance', 'drive not ready', 'INS aligning', 'blocked', 'keyhole', 'silence',
-           'moves unasked', 'diverged')
+           'moves unasked', 'diverged', 'no direction', 'found', 'not found', 'wrong slope', 'side lobe',
+           'stow pins not out', 'stow pin failed', 'stow pins in', 'stow pins out', 'no elements',
+           'elements too old', 'below the horizon', 'gap in the program track', 'UTC unknown', 'drive frozen')
 (NONE, REQUESTED, LOCKED, SIGNAL_LOST, ENCODER_INVALID, ATTITUDE_INVALID, NO_PROGRAM, BEFORE_PROGRAM,
  AFTER_PROGRAM, NOT_LOCKED, OUTSIDE_LIMITS, UNKNOWN_MODE, BAD_STAMP, DRIVE_NOT_READY, INS_ALIGNING,
- BLOCKED, KEYHOLE, SILENCE, MOVES_UNASKED, DIVERGED) = range(len(REASONS))
+ BLOCKED, KEYHOLE, SILENCE, MOVES_UNASKED, DIVERGED, NO_DIRECTION, FOUND, NOT_FOUND, WRONG_SLOPE,
+ SIDE_LOBE, PINNED, PIN_FAILED, PINS_IN, PINS_OUT, NO_ELEMENTS, TOO_OLD, BELOW_HORIZON,
+ PROGRAM_GAP, NO_UTC, DRIVE_FROZEN) = range(len(REASONS))
 
 NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 
 
-Situation = namedtuple('Situation', 'encoder_valid drive_ready attitude obstacle end')
+Situation = namedtuple('Situation', 'encoder_valid drive_ready attitude pins table obstacle end')
 """The conditions of a change of mode.
 
 drive_ready: the drive follows commands; a mode that runs ends with it, and none begins without it. attitude: NONE
-or why it is not known; obstacle: for each mode NONE or the reason that it cannot be entered; end: for each mode NONE
-or the reason that it ends."""
+or why it is not known; pins: NONE or why the stow pins forbid the axes to move; table: the mode whose table was
+followed last; obstacle: for each mode NONE or the reason that it cannot be entered; end: for each mode NONE or the
+reason that it ends."""
 
 
 @compiled
-def situation(encoder_valid, drive_ready, attitude, stow, preset, program, autotrack, lost):
-    """The Situation of these conditions.
+def _end_of_table(obstacle):
+    """A table that leads outside the limits cannot be entered, but is not ended by that."""
+    return obstacle if obstacle != OUTSIDE_LIMITS else NONE
 
-    attitude, stow, preset, program, autotrack: NONE or the reason against each; lost: NONE or the reason that
-    autotrack ends. A program that leads outside the limits cannot be entered, but is not ended by that.
-    """
-    ends = program if program != OUTSIDE_LIMITS else NONE
-    return Situation(encoder_valid, drive_ready, attitude,
-                     (NONE, stow, preset, program, autotrack),
-                     (NONE, NONE, NONE, ends, lost))
+
+@compiled
+def situation(drive, attitude, pins, table, obstacle, ends):
+    """The Situation of these conditions. drive: (encoder_valid, drive_ready); obstacle: for each mode NONE or the
+    reason against it; ends: (lost, level), NONE or the reason that autotrack and a mode that goes by the level end."""
+    lost, level = ends
+    unstowed = PINS_OUT if pins == NONE else NONE
+    return Situation(drive[0], drive[1], attitude, pins, table, obstacle, (
+        NONE, NONE, NONE, unstowed, NONE, NONE, obstacle[SLAVE], _end_of_table(obstacle[PROGRAM]),
+        _end_of_table(obstacle[TLE]), _end_of_table(obstacle[SUN]), lost, level, level, level))
 
 
 Decision = namedtuple('Decision', 'mode reason result')
@@ -86,6 +138,8 @@ def obstacle(request, now):
         return UNKNOWN_MODE
     if not now.encoder_valid:
         return ENCODER_INVALID
+    if now.pins != NONE:
+        return NONE if _PINNED[request] and now.pins == PINNED else now.pins
     if not now.drive_ready:
         return DRIVE_NOT_READY
     if FOLLOWS[request] and now.attitude != NONE:
@@ -94,9 +148,9 @@ def obstacle(request, now):
 
 
 @compiled
-def next_mode(mode, request, now, handover):
+def next_mode(mode, request, now, handover, chosen):
     """The Decision of one step in a Situation; request: a mode or NO_REQUEST; handover: whether a mode may hand over
-    by itself."""
+    by itself; chosen: the mode for the loss of the track, AUTOTRACK: none."""
     why, result = NONE, NO_REQUEST
     if request != NO_REQUEST:
         why = obstacle(request, now)
@@ -107,13 +161,22 @@ def next_mode(mode, request, now, handover):
         return Decision(mode, why, result)
     if not now.encoder_valid:
         return Decision(STANDBY, ENCODER_INVALID, result)
-    if not now.drive_ready:
+    if now.pins != NONE:
+        stays = _PINNED[mode] and now.pins == PINNED
+        return Decision(mode, why, result) if stays else Decision(STANDBY, now.pins, result)
+    if not now.drive_ready and mode != UNSTOW:
         return Decision(STANDBY, DRIVE_NOT_READY, result)
     if FOLLOWS[mode] and now.attitude != NONE:
         return Decision(STANDBY, now.attitude, result)
     if handover and _HANDOVER[mode] != NEVER and now.obstacle[_HANDOVER[mode]] == NONE:
-        return Decision(_HANDOVER[mode], LOCKED, result)
+        return Decision(_HANDOVER[mode], LOCKED if _HANDOVER[mode] == AUTOTRACK else FOUND, result)
     if now.end[mode] != NONE:
-        fallback = _FALLBACK[mode]
+        fallback = ACQUIRE if now.end[mode] == SIDE_LOBE else _FALLBACK[mode]
+        if mode == AUTOTRACK and now.end[mode] == SIGNAL_LOST:
+            if chosen == AUTOTRACK:
+                return Decision(mode, now.end[mode], result)
+            fallback = chosen
+        if fallback == PROGRAM:
+            fallback = now.table
         return Decision(fallback if now.obstacle[fallback] == NONE else STANDBY, now.end[mode], result)
     return Decision(mode, why, result)

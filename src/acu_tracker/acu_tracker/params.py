@@ -5,7 +5,10 @@ import math
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
 from acu_tracker.history import LENGTH
 from acu_tracker.lookahead.params import KeyholeParameters
-from acu_tracker.modes import MODES
+from acu_tracker.modes import FALLBACKS, MODES
+from acu_tracker.prediction import PredictionParameters
+from acu_tracker.search.params import AcquisitionParameters, SearchParameters, StepTrackParameters
+from acu_tracker.servo import ends, floor
 from acu_tracker.servo.params import (
     AdrcParameters,
     BeamParameters,
@@ -16,8 +19,10 @@ from acu_tracker.servo.params import (
     ShaperParameters,
 )
 from acu_tracker.servo.position_loop import CONTROLLERS
+from acu_tracker.verbs import POINTS_DOC, VERBS, points
 from pedestal_common.blockage import DOC as SECTORS_DOC
 from pedestal_common.blockage import sectors
+from pedestal_common.commands import SCHEDULE_DOC, schedule
 from pedestal_common.lever_arm import LeverArm
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
@@ -78,12 +83,25 @@ class SharedParameters(Parameters):
     receiver_rate: bool = flag(False, 'the receiver measures the rate of its errors: tracking_receiver/angle_rate')
     receiver_range: bool = flag(False, 'the receiver measures the range: tracking_receiver/range')
     initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
+    stow_pins: bool = flag(False, 'the drive has stow pins: adu/stow_pins')
+    stow_window: float = parameter(1.75e-3, 1e-5, 0.1, 'rad', 'largest distance of an axis from its stow angle at '
+                                   'which the pins are asked to go in')
+    stow_timeout: float = parameter(20.0, 0.1, 3600.0, 's', 'time within which the pins must be where they were '
+                                    'asked to be')
+    prediction: PredictionParameters = group(PredictionParameters)
+    fallback: str = choice('program', FALLBACKS, 'what follows the loss of the track, until another one is chosen')
+    points: str = text('', POINTS_DOC)
+    commands: str = text('', SCHEDULE_DOC)
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
     attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')
     lever_arm: LeverArm = group(LeverArm)
     blockage: str = text('', SECTORS_DOC)
+    floor: str = text('', floor.DOC)
     keyhole: KeyholeParameters = group(KeyholeParameters)
     tracker: TrackerParameters = group(TrackerParameters)
+    acquisition: AcquisitionParameters = group(AcquisitionParameters)
+    search: SearchParameters = group(SearchParameters)
+    steptrack: StepTrackParameters = group(StepTrackParameters)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +111,7 @@ class AcuParameters(SharedParameters):
     azimuth: AxisParameters = group(AxisParameters)
     elevation: ElevationParameters = group(ElevationParameters)
 
-    def check_graph(self, beams):
+    def check_graph(self, beams, lockstep):
         """Raise ParameterError unless both controllers are `beam` where the drive is an array (beams > 0), else
         neither."""
         array = beams > 0
@@ -103,13 +121,42 @@ class AcuParameters(SharedParameters):
                 raise ParameterError(f"{axis}.controller = '{controller}': must "
                                      + ('be beam: the drive is an array' if array else
                                         f'be one of {", ".join(CONTROLLERS[:-1])}: the drive has motors'))
+        if array and self.stow_pins:
+            raise ParameterError('stow_pins = true: must be false: the drive is an array')
+
+    @property
+    def reaction(self):
+        """Time [s] that an axis is given to react in front of a limit: e tau, tau the delay of its command, a period
+        until it is measured and one until it is in force. A delayed axis x' = -f(x(t - tau)) with f <= x / (e tau)
+        does not overshoot."""
+        return math.e * (self.command_delay + 2.0 * self.period)
+
+    def _check_travel(self):
+        """Raise ParameterError where an axis cannot brake from its full rate inside its travel, or stow or preset is
+        below the floor."""
+        for name in ('azimuth', 'elevation'):
+            axis = getattr(self, name)
+            a = axis.limits.deceleration
+            d = ends.braking_distance.py_func(axis.shaper.rate, a, self.reaction)
+            if 2.0 * d > axis.limits.high - axis.limits.low:
+                raise ParameterError(f'{name}.limits.braking = {a:g} rad/s2: from shaper.rate = '
+                                     f'{axis.shaper.rate:g} rad/s the axis stops in {d:g} rad; must be at most half '
+                                     f'its travel, {0.5 * (axis.limits.high - axis.limits.low):g} rad')
+        for name in ('stow', 'preset'):
+            A, E = getattr(self.azimuth, name), getattr(self.elevation, name)
+            lowest = floor.at(self.floor, A)
+            if lowest > E:
+                raise ParameterError(f'elevation.{name} = {E:g} rad: is below the floor, {lowest:g} rad at '
+                                     f'azimuth.{name} = {A:g} rad')
 
     def check(self):
         """Raise ParameterError for a delay longer than the histories, a notch beyond half the step rate, an attitude
         that times out before it is used, or a step_gap that every step would exceed."""
         sectors(self.blockage)
+        schedule('commands', self.commands, VERBS)
+        points(self.points)
         kept = ['receiver_latency', 'attitude_latency']
-        if {self.azimuth.controller, self.elevation.controller} != {'beam'}:  # which keeps no reference until then
+        if {self.azimuth.controller, self.elevation.controller} != {'beam'}:  # which keeps no reference so long
             kept.append('command_delay')
         for name in kept:
             if getattr(self, name) > (LENGTH - 4) * self.period:
@@ -131,3 +178,4 @@ class AcuParameters(SharedParameters):
         if self.step_gap < 1.5 * self.period:
             raise ParameterError(f'step_gap = {self.step_gap:g} s: must be at least 1.5 periods, '
                                  f'{1.5 * self.period:g} s')
+        self._check_travel()

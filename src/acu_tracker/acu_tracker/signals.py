@@ -4,18 +4,26 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.motion_models import MODELS
+from pedestal_common import topics
 from pedestal_common.compiled import compiled
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
-                  'step_gap')
+                  'step_gap', 'error_noisy')
 """Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
 (STAMP, ENCODER, ERROR, ERROR_STAMP, ERROR_GATED, ATTITUDE, PROGRAM, PRESET,
- STEP_GAP) = (1 << i for i in range(len(INVALID_INPUTS)))
+ STEP_GAP, ERROR_NOISY) = (1 << i for i in range(len(INVALID_INPUTS)))
+
+DRIVE_STATES = topics.BY_NAME['adu/state'].texts
+READY = len(topics.ENABLED) - 1
+EMERGENCY_STOP, DRIVE_FAULT = DRIVE_STATES.index('emergency stop'), len(DRIVE_STATES)
+"""Codes of adu/state: up to READY the drive follows commands, from DRIVE_FAULT on it tells a fault. A drive that has
+sent none, topics.SILENT, counts as ready."""
 
 INPUTS = np.dtype([
     ('stamp', 'f8'),                                                            # t_k [s]
     ('position', 'f8', (2,)), ('velocity', 'f8', (2,)), ('encoder_valid', 'i8'),  # deck azimuth, elevation
-    ('error_stamp', 'f8'), ('error_valid', 'i8'),                               # 0: none came, or unlocked
+    ('torque', 'f8', (2,)),                                                     # of the motors on the load [Nm]
+    ('error_came', 'i8'), ('error_stamp', 'f8'), ('error_valid', 'i8'),          # valid 0: none came, or unlocked
     ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
     ('error_rate', 'f8', (2,)), ('error_rate_sigma', 'f8'),                     # of that error [rad/s]; NaN: none
     ('range', 'f8'), ('range_variance', 'f8'),                                  # to that target [m], [m2]; NaN: none
@@ -23,7 +31,11 @@ INPUTS = np.dtype([
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
     ('aligning', 'i8'),                                                         # 1: the INS is still aligning
-    ('drive_ready', 'i8'),                                                      # 1: the drive follows the commands
+    ('drive_ready', 'i8'), ('drive', 'i8'),             # 1: the drive follows the commands; code of DRIVE_STATES
+    ('pins', 'i8'),                                                             # code of adu/stow_pins
+    ('unpredicted', 'i8', (2,)),                         # of the modes tle, sun: NONE or why there is no table
+    ('gap', 'i8'), ('turnaround', 'i8'),                # 1: rows of the program are missing here; the last segment
+                                                        # was refused because it asked for too fast a turnaround
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
 ], align=True)
 
@@ -40,6 +52,9 @@ OUTPUTS = np.dtype([
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
     ('rates_gated', 'i8'), ('ranges_gated', 'i8'),
     ('coasting', 'i8'), ('locked', 'i8'), ('blocked', 'i8'), ('invalid_input', 'i8'),
+    ('time_to_limit', 'f8', (2,)),                                              # at the present rates [s]; inf: never
+    ('alarms', 'i8'),                                                           # changes of the list of alarms so far
+    ('pins', 'i8'), ('pins_wrong', 'i8'),               # code of acu/stow_pins; bits of the axes whose pin failed
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)
 

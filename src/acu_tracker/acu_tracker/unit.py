@@ -4,25 +4,31 @@ import typing
 
 import numpy as np
 
-from acu_tracker import announcement, control_unit, faults, modes, signals
-from acu_tracker.program import program_track
+from acu_tracker import announcement, control_unit, manual, modes, signals, supervision
+from acu_tracker.alarms import annunciator, machine, report, table
+from acu_tracker.authority import Authority
+from acu_tracker.prediction import Predictor
+from acu_tracker.program import segments, tables
+from acu_tracker.verbs import ALARM_VERBS, VERBS, points
 from pedestal_common import messages, nodes, topics
+from pedestal_common.commands import Reply, schedule
 from pedestal_common.compiled import compiled
+from pedestal_common.parameters import did_you_mean
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
+from pedestal_common.unit import ERROR, NEVER_DUE, OK, WARN, Diagnosis, Unit, joined
 
 JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 COMMAND, ESTIMATE, REFERENCE, FILTER = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/filter'
-MODE, KEYHOLE, BLOCKAGE = 'acu/mode', 'acu/keyhole', 'acu/blockage'
+MODE, KEYHOLE, BLOCKAGE, ALARMS = 'acu/mode', 'acu/keyhole', 'acu/blockage', 'acu/alarms'
 PROGRAM, DRIVE, INS = 'acu/program_track', 'adu/state', 'ins/state'
+PINS_ASKED, PINS = 'acu/stow_pins', 'adu/stow_pins'
 
 FILTER_SIZE, MODELS = len(topics.FILTER), len(topics.MOTION_MODELS)
 """Numbers of an axis on acu/filter; the last of them are the probabilities of the motion models."""
 
-READY = topics.BY_NAME[DRIVE].texts.index('enabled')
 ALIGNING = topics.BY_NAME[INS].texts.index('aligning')
-"""Codes of these states; a drive or an INS that has not sent one, topics.SILENT, counts as ready or aligned."""
+"""Code of this state; an INS that has not sent one, topics.SILENT, counts as aligned."""
 
 
 RECORD = np.dtype([('state', control_unit.STATE), ('constants', control_unit.CONSTANTS),
@@ -30,10 +36,15 @@ RECORD = np.dtype([('state', control_unit.STATE), ('constants', control_unit.CON
 """invalid: the bits of signals.INVALID_INPUTS that were set since the last diagnosis."""
 
 
+DRIVE_SILENT, DRIVE_FAULT = table.INDEX['drive silent'], table.INDEX['drive fault']
+MOTORS_LOST = tuple(table.INDEX[f'{axis} motor lost'] for axis in topics.AXES)
+"""Alarms of which adu/state, or its silence, tells more."""
+
+
 class Memory(typing.NamedTuple):
     """All the control unit works on."""
     record: np.ndarray
-    program: program_track.ProgramTrack
+    tables: tables.Tables
 
 
 @compiled
@@ -44,9 +55,9 @@ def decode(u, stamp, inputs):
     rate, distance = inputs[RATE], inputs[RANGE]
     u.stamp = stamp * 1e-9
     for i in range(2):
-        u.position[i], u.velocity[i] = joints.position[i], joints.velocity[i]
+        u.position[i], u.velocity[i], u.torque[i] = joints.position[i], joints.velocity[i], joints.effort[i]
     u.encoder_valid = 1
-    u.error_valid = 0
+    u.error_came, u.error_valid = error.stamp != NEVER, 0
     if error.stamp != NEVER:
         x, y, cn0_dbhz = error.vector[0], error.vector[1], error.vector[2]
         u.error_valid = 1 if x == x else 0
@@ -64,7 +75,8 @@ def decode(u, stamp, inputs):
             u.quaternion[i] = attitude.orientation[i]
         for i in range(3):
             u.deck_rate[i] = attitude.angular_velocity[i]
-    u.drive_ready, u.aligning = inputs[DRIVE] <= READY, inputs[INS] == ALIGNING
+    u.drive, u.aligning = inputs[DRIVE], inputs[INS] == ALIGNING
+    u.drive_ready, u.pins = u.drive <= signals.READY, inputs[PINS]
 
 
 @compiled
@@ -86,6 +98,7 @@ def encode(o, lookahead, stamp, outputs):
         for model in range(MODELS):
             numbers[FILTER_SIZE - MODELS + model] = o.probability[i, model]
     outputs[MODE], outputs[KEYHOLE], outputs[BLOCKAGE] = o.mode, lookahead.forecasts - 1, lookahead.blockages - 1
+    outputs[ALARMS], outputs[PINS_ASKED] = o.alarms, o.pins
 
 
 @compiled
@@ -93,7 +106,7 @@ def law(memory, stamp, inputs, outputs):
     """Step k."""
     m = memory.record[0]
     decode(m.inputs, stamp, inputs)
-    control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.program)
+    control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.tables)
     m.inputs.preset_valid = 0
     m.invalid |= m.outputs.invalid_input
     encode(m.outputs, m.state.lookahead, stamp, outputs)
@@ -110,18 +123,50 @@ class Acu(Unit):
     """The control unit of an AcuParameters, on a ship where its graph has ship/imu/data."""
     NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
     LIVE = ('tracker', 'azimuth', 'elevation')
-    REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/reset_faults')
+    REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/acknowledge', 'acu/reset_faults')
+    VERBS = VERBS
     CALLS = ('adu/emergency_stop',)
-    MOMENTARY = (KEYHOLE, BLOCKAGE)
+    MOMENTARY = (KEYHOLE, BLOCKAGE, ALARMS)
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         self.memory = Memory(joined(RECORD, state=control_unit.initial_state(parameters),
-                                    constants=control_unit.constants(parameters)), program_track.NO_TRACK)
+                                    constants=control_unit.constants(parameters)), tables.NO_TABLES)
         self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE in self.reads, 1
-        self.parts['outputs']['mode'] = modes.STANDBY
+        self.parts['outputs']['mode'], self.parts['outputs']['pins'] = modes.STANDBY, topics.SILENT
         signals.clear(self.parts['outputs'])
         self.drive_state = 'unknown'
+        self.authority = Authority()
+        self.segments = segments.Segments([(axis.limits.rate, axis.limits.acceleration) for axis in (
+            parameters.azimuth, parameters.elevation)])
+        self.predictor, self.predicted = Predictor(parameters.prediction), {}
+        self.offset, self._laid = (0.0, 0.0, 0.0), (NEVER_DUE, NEVER)
+        self.reasons = {}
+        self._silent = False
+
+    @property
+    def silent(self):
+        """Whether the drive stays away, which raises its alarm: no step comes in which that could be seen."""
+        return self._silent
+
+    @silent.setter
+    def silent(self, silent):
+        self._silent = silent
+        if silent:
+            stamp = self.parts['state']['stamp']
+            annunciator.know(self.alarms, DRIVE_SILENT, True, stamp if math.isfinite(stamp) else 0.0)
+            self.outputs[ALARMS] = self.alarms['revision']
+
+    def prepare(self):
+        """Compile what the commands of the alarms call as well."""
+        super().prepare()
+        before = self.memory.record.copy()
+        for ask in (self.reset, self.acknowledge, lambda: self.shelve(table.NAMES[0], 1.0, 'none'),
+                    lambda: self.unshelve(table.NAMES[0]), lambda: self.encode(ALARMS, 0)):
+            ask()
+        annunciator.know(self.alarms, DRIVE_SILENT, True, 0.0)
+        self.memory.record[...] = before
+        self.reasons.clear()
 
     def latency(self, topic):
         """Age [s] of a topic's stamp at a step: attitude_latency or receiver_latency."""
@@ -131,6 +176,7 @@ class Acu(Unit):
         """Take other values of LIVE parameters into the constants; the state stays."""
         super().configure(parameters)
         self.memory.record['constants'] = control_unit.constants(parameters)
+        self._laid = NEVER_DUE, NEVER
 
     def decode(self, topic, message):
         """A program track: two or more points in earth angles; or a preset: one point in deck angles. Raises
@@ -140,7 +186,59 @@ class Acu(Unit):
             self.parts['inputs']['preset'], self.parts['inputs']['preset_valid'] = angles[0], 1
         else:
             start = messages.nanoseconds(message.header.stamp) * 1e-9
-            self.memory = self.memory._replace(program=program_track.checked(times + start, angles))
+            self._append(times + start, angles)
+
+    def _append(self, times, angles):
+        """Append a segment to the program track. Raises ValueError."""
+        state, inputs = self.parts['state'], self.parts['inputs']
+        followed = state['mode'] == modes.PROGRAM
+        try:
+            self.segments.append(times, angles, float(state['stamp']) - self.offset[0], followed)
+        except segments.TurnaroundError:
+            inputs['turnaround'] = 1
+            raise
+        inputs['turnaround'] = 0
+        self.lay_tables()
+
+    @property
+    def next_due(self):
+        return min(super().next_due, self._laid[1])
+
+    def obey_due(self, stamp):
+        """Obey what is due before the step of a stamp [ns], on the tables for it."""
+        if self.epoch != self.predictor.epoch:
+            self._predict_by(Predictor(self.predictor.parameters, self.epoch))
+        since, until = self._laid
+        if not since <= stamp < until:
+            self.lay_tables(stamp)
+        super().obey_due(stamp)
+
+    @property
+    def _now(self):
+        """The stamp [ns] of the last step, 0 before the first."""
+        stamp = float(self.parts['state']['stamp'])
+        return round(stamp * 1e9) if math.isfinite(stamp) else 0
+
+    def _predict_by(self, predictor):
+        """Predict by another Predictor."""
+        self.predictor, self.predicted, self._laid = predictor, {}, (NEVER_DUE, NEVER)
+
+    def lay_tables(self, stamp=None):
+        """Bring the tables of the law to a stamp [ns], or now: the piece of the program that is due, what is
+        predicted, all of them shifted by the offset."""
+        stamp = self._now if stamp is None else int(stamp)
+        inputs, t = self.parts['inputs'], stamp * 1e-9
+        for mode, predict in ((modes.TLE, self.predictor.satellite), (modes.SUN, self.predictor.sun)):
+            known = self.predicted.get(mode)
+            if known is None or not known.since <= t < known.until:
+                known = self.predicted[mode] = predict(t)
+            inputs['unpredicted'][mode - modes.TLE] = known.reason
+        piece, inputs['gap'], ends = self.segments.at(t - self.offset[0])
+        until = min(ends + self.offset[0], *(known.until for known in self.predicted.values()))
+        self._laid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE
+        self.memory = self.memory._replace(tables=tables.Tables(*(
+            tables.shifted(track, self.offset) for track in (piece, *(known.track for known in (
+                self.predicted[modes.TLE], self.predicted[modes.SUN]))))))
 
     def take_text(self, topic, text):
         """Take a text topic; the drive's state is kept for the diagnosis."""
@@ -149,26 +247,129 @@ class Acu(Unit):
             self.drive_state = text
 
     def encode(self, topic, code):
-        """The text of a code on acu/mode, acu/keyhole or acu/blockage."""
+        """The text of a code on a text topic; the message on acu/alarms."""
         lookahead = self.parts['state']['lookahead']
         if topic == KEYHOLE:
             return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
-        return announcement.hidden(lookahead) if topic == BLOCKAGE else modes.MODES[code]
+        if topic == ALARMS:
+            tripped = dict.fromkeys((DRIVE_FAULT, *MOTORS_LOST), self.drive_state)
+            return report.message(self.alarms, tripped, self.reasons)
+        if topic == BLOCKAGE:
+            return announcement.hidden(lookahead)
+        return modes.MODES[code] if topic == MODE else super().encode(topic, code)
+
+    def schedule(self):
+        return schedule('commands', self.parameters.commands, VERBS)
+
+    def obey(self, command, arguments):
+        """The Reply to one of VERBS; a refusal names the reason and changes nothing."""
+        verb, state = command.verb, self.parts['state']
+        if verb in ALARM_VERBS:
+            return getattr(self, verb)(*arguments.values())
+        if verb == 'take':
+            return self.authority.take(command.who, arguments['role'])
+        if verb == 'release':
+            return self.authority.release()
+        if verb == 'fallback':
+            state['fallback'] = modes.FALLBACKS[arguments['mode']]
+            return Reply(True, f'fallback is {arguments["mode"]}')
+        if verb == 'offset':
+            self.offset = (arguments['time'], *(arguments[axis] for axis in topics.AXES))
+            self.lay_tables()
+            return Reply(True, 'program track shifted by {:g} s, {:g} and {:g} rad'.format(*self.offset))
+        if verb == 'elements':
+            self._take_elements(*arguments.values())
+            return Reply(True, f'elements of satellite {self.predictor.number}')
+        before, predictor = {name: state[name].copy() for name in ('preset', 'manual', 'slave')}, self.predictor
+        self._take_arguments(verb, arguments)
+        reply = self.request(f'acu/{verb}')
+        if not reply.granted:
+            for name, value in before.items():
+                state[name] = value
+            if self.predictor is not predictor:
+                self._predict_by(predictor)
+                self.lay_tables()
+        return reply
+
+    def _take_elements(self, line_1, line_2):
+        """Predict by other elements, in whose lines _ stands for a blank. Raises ValueError."""
+        self._predict_by(self.predictor.by(line_1.replace('_', ' '), line_2.replace('_', ' ')))
+        self.lay_tables()
+
+    def _take_arguments(self, mode, arguments):
+        """What a mode is asked for with. Raises ValueError."""
+        state = self.parts['state']
+        if mode == 'preset':
+            angles = [arguments[axis] for axis in topics.AXES]
+            if arguments['point']:
+                named = points(self.parameters.points)
+                if arguments['point'] not in named:
+                    raise ValueError(f'point = {arguments["point"]}: must be one of {", ".join(named) or "none"}')
+                angles = named[arguments['point']]
+            preset = state['preset']
+            preset['angle'] = np.where(np.isfinite(angles), angles, preset['angle'])
+            preset['stamp'], preset['moves'], preset['rate'] = state['stamp'], arguments['moves'], _rates(arguments)
+        elif mode == 'rate':
+            state['manual']['asked'] = [arguments[axis] for axis in topics.AXES]
+            state['manual']['until'] = state['stamp'] + manual.DEAD_MAN
+        elif mode == 'tle' and any(arguments.values()):
+            self._take_elements(*arguments.values())
+        elif mode == 'slave':
+            state['slave'] = (state['stamp'], [arguments[axis] for axis in topics.AXES], _rates(arguments),
+                              arguments['moves'], arguments['holds'])
+
+    def admit(self, command):
+        self.authority.admit(command)
 
     def request(self, name):
-        """The Reply to a mode or reset_faults; a refusal names the reason."""
+        """The Reply to a mode, acknowledge or reset_faults; a refusal names the reason."""
         mode = name.removeprefix('acu/')
         m, outputs = self.parts, self.parts['outputs']
         if mode == 'reset_faults':
-            m['state']['unasked']['moves'] = m['state']['divergence']['diverged'] = 0
-            return Reply(True, 'cleared')
+            return self.reset()
+        if mode == 'acknowledge':
+            return self.acknowledge()
         if self.silent and mode != 'standby':
             return Reply(False, f'refused: no {JOINTS}, the drive is silent; mode is {modes.MODES[outputs["mode"]]}')
-        m['inputs']['drive_ready'] = self.inputs[0][DRIVE] <= READY
-        granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, self.memory.program,
-                                       modes.MODES.index(mode))
-        refusal = '' if granted else f'refused: {modes.REASONS[outputs["reason"]]}; '
+        m['inputs']['drive_ready'] = self.inputs[0][DRIVE] <= signals.READY
+        code = modes.MODES.index(mode)
+        granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, self.memory.tables, code)
+        refusal = '' if granted else f'refused: {self._refusal(code, outputs["reason"])}; '
         return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
+
+    def _refusal(self, mode, reason):
+        """Why a mode is refused, in words."""
+        more = self.predictor.explained(mode, reason, self._now * 1e-9) if mode in (modes.TLE, modes.SUN) else ''
+        return modes.REASONS[reason] + (f', {more}' if more else '')
+
+    def reset(self):
+        """The Reply to a reset of all that is latched; refused while a cause is there."""
+        cause = supervision.reset(self.parts['state'])
+        if cause == annunciator.NONE:
+            return Reply(True, 'cleared')
+        return Reply(False, f'refused: the cause of {table.NAMES[cause]} is still there')
+
+    def acknowledge(self, name=''):
+        """The Reply to an acknowledgement of the alarm of a name, with all that stands under it; '': of every alarm.
+        Raises ValueError for a name that there is not."""
+        chosen = [index(name)] if name else range(annunciator.COUNT)
+        done = sum([annunciator.acknowledge(self.alarms, i, self.parts['state']['stamp']) for i in chosen])
+        return Reply(done > 0, 'acknowledged' if done else 'refused: there is nothing to acknowledge')
+
+    def shelve(self, name, seconds, reason):
+        """The Reply to putting the alarm of a name away for some seconds, and why. Raises ValueError for a name that
+        there is not."""
+        i = index(name)
+        self.reasons[i] = reason
+        annunciator.shelve(self.alarms, i, self.parts['state']['stamp'], seconds)
+        return Reply(True, f'{table.NAMES[i]} is shelved for {seconds:g} s: {reason}')
+
+    def unshelve(self, name):
+        """The Reply to taking the alarm of a name back. Raises ValueError for a name that there is not."""
+        i = index(name)
+        if annunciator.put(self.alarms, i, machine.UNSHELVE, self.parts['state']['stamp']):
+            return Reply(True, f'{table.NAMES[i]} is back')
+        return Reply(False, f'refused: {table.NAMES[i]} is not shelved')
 
     def requests_for(self, topic, text):
         """[the mode's service] for a text on acu/mode, else []."""
@@ -180,28 +381,36 @@ class Acu(Unit):
         mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
         invalid = [name for i, name in enumerate(signals.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
         self.parts['invalid'] = 0
-        values = [('mode', mode), ('reason', reason), ('faults', ', '.join(self.faults)),
+        values = [('mode', mode), ('reason', reason), ('fallback', modes.FALLBACK_OF[int(state['fallback'])]),
+                  ('control', self.authority.holder), ('faults', ', '.join(self.faults)),
                   ('locked', str(int(outputs['locked']))), ('coasting', str(int(outputs['coasting']))),
                   ('drive', 'silent' if self.silent else self.drive_state),
+                  *((('stow_pins', self._pins_told()),) if self.parameters.stow_pins else ()),
                   ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
                   ('rates gated', str(int(outputs['rates_gated']))),
                   ('ranges gated', str(int(outputs['ranges_gated'])))]
+        values += [(f'{axis} limit_s', f'{time:.1f}') for axis, time in zip(topics.AXES, outputs['time_to_limit'])]
         kinds = ('angle', 'rate', 'acceleration')
         values += [(f'{axis} limited', ' '.join(kind for kind in kinds if outputs[f'{kind}_limited'][i]))
                    for i, axis in enumerate(topics.AXES)]
         for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
         values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead'])]
-        if faults.MOVES_UNASKED in self.faults:
+        if 'moves unasked' in self.faults:
             rates = ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded' for axis, (
                 rate, low, high) in zip(topics.AXES, state['unasked']['measured']))
             return Diagnosis(ERROR, f'the antenna moves unasked: {rates}; acu/reset_faults once it is known why',
                              values)
-        if faults.DIVERGED in self.faults:
+        if 'drive frozen' in self.faults:
+            return Diagnosis(ERROR, 'the drive repeats its numbers though it is told to move; acu/reset_faults once '
+                             'it is known why', values)
+        if 'diverged' in self.faults:
             return Diagnosis(ERROR, "autotrack diverged: the receiver's errors led away from the target; "
                              'acu/reset_faults once their slope, phase and sign are right', values)
         if invalid == ['error_gated']:
             return Diagnosis(WARN, 'an error of the receiver was too far off to be believed', values)
+        if invalid in (['error_noisy'], ['error_gated', 'error_noisy']):
+            return Diagnosis(WARN, 'the errors of the receiver are noise, and not used', values)
         if invalid:
             return Diagnosis(ERROR, f'invalid input: {" ".join(invalid)}', values)
         if state['overtravel']:
@@ -209,22 +418,31 @@ class Acu(Unit):
                              values)
         return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
 
+    def _pins_told(self):
+        """Where the stow pins are, as the drive says."""
+        code = int(self.parts['inputs']['pins'])
+        return topics.BY_NAME[PINS].texts[code] if code != topics.SILENT else 'unknown'
+
     @property
     def calls(self):
         return self.CALLS if self.parts['state']['unasked']['moves'] else ()
 
     @property
+    def alarms(self):
+        """The record of all alarms."""
+        return self.parts['state']['supervision']['alarms']
+
+    @property
     def faults(self):
         """Names of the faults that wait for acu/reset_faults."""
         state = self.parts['state']
-        latched = state['unasked']['moves'], state['divergence']['diverged']
-        return tuple(fault.name for fault, on in zip(faults.FAULTS, latched) if on)
+        latched = {'moves unasked': state['unasked']['moves'], 'drive frozen': state['frozen']['frozen'],
+                   'diverged': state['divergence']['diverged']}
+        return tuple(name for name, on in latched.items() if on)
 
     @property
     def alarm(self):
-        state = self.parts['state']
-        return bool(state['unasked']['moves'] or state['divergence']['diverged']
-                    or self.parts['outputs']['reason'] == modes.SILENCE)
+        return bool(self.faults or self.parts['outputs']['reason'] == modes.SILENCE)
 
     @staticmethod
     def idle(numbers):
@@ -232,6 +450,11 @@ class Acu(Unit):
         if not np.isfinite(numbers[ERRORS][:, 0]).any():
             return 'the receiver never locked'
         return '' if 'autotrack' in numbers[MODE] else 'the ACU was never in autotrack'
+
+
+def _rates(arguments):
+    """The rates (2,) [rad/s] among the arguments of a command."""
+    return [arguments[f'{axis}_rate'] for axis in topics.AXES]
 
 
 def rows(message):
@@ -246,3 +469,12 @@ def rows(message):
     times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 for point in message.points]
     angles = [[point.positions[column] for column in columns] for point in message.points]
     return np.array(times), np.reshape(angles, (-1, len(columns)))
+
+
+def index(name):
+    """The place of an alarm in the table; raises ValueError for a name that there is not."""
+    name = name.replace('_', ' ')
+    if name not in table.INDEX:
+        raise ValueError(f'alarm = {name!r}:{did_you_mean(name, table.NAMES)} must be one of '
+                         f'{", ".join(table.NAMES)}')
+    return table.INDEX[name]

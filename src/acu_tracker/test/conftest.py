@@ -9,6 +9,7 @@ from acu_tracker import control_unit, signals
 from acu_tracker.modes import MODES, REASONS
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
+from acu_tracker.program.tables import Tables
 from acu_tracker.signals import INVALID_INPUTS
 from pedestal_common import line_of_sight
 from pedestal_common.parameters import as_dict, build
@@ -82,7 +83,7 @@ class Rig:
         u['quaternion'], u['deck_rate'] = self.attitude(t).as_quat(), self.body_rate(self.attitude, t)
         for name, value in changes.items():
             u[name] = value
-        control_unit.step(self.state[0], self.constants[0], u[0], self.outputs[0], self.track)
+        control_unit.step(self.state[0], self.constants[0], u[0], self.outputs[0], self.tables)
         self.commands.append(tuple(self.outputs['rate'][0]))
         self.velocity = np.array(self.commands[-1 - round(self.delay / self.T)])
         self.angle = self.angle + self.T * self.velocity
@@ -90,8 +91,12 @@ class Rig:
         return self.outputs[0]
 
     def ask(self, mode):
-        return control_unit.request(self.state[0], self.constants[0], self.inputs[0], self.outputs[0], self.track,
+        return control_unit.request(self.state[0], self.constants[0], self.inputs[0], self.outputs[0], self.tables,
                                     mode)
+
+    @property
+    def tables(self):
+        return Tables(self.track, NO_TRACK, NO_TRACK)
 
     def run(self, seconds, **changes):
         """Steps of this many seconds; columns: rates (2), pointing error (2)."""

@@ -187,5 +187,5 @@ def test_an_error_that_is_a_mean_over_several_steps_is_met_with_the_mean_of_thei
     for k in range(400):
         rig.angle = np.array([0.5 + rate * k * rig.T - 0.001, 0.0])
         error = 0.001 + rate * np.average(stairs * rig.T - ages, weights=weights)
-        o = rig.step(cross_elevation=error, elevation=0.0)
+        o = rig.step(cross_elevation=error, elevation=0.0, cn0_dbhz=70.0 + 1e-9 * k)
     assert o['estimate'][0, 0] == pytest.approx(0.5 + rate * 399 * rig.T, abs=1e-6)

@@ -7,12 +7,15 @@ import pytest
 from acu_tracker.estimation import tracker
 from acu_tracker.estimation.measurement import AxisMeasurement, Measurement
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters, UkfParameters
-from pedestal_common.parameters import record
+from pedestal_common.parameters import build, record
 
 DEG = math.pi / 180.0
 T = 0.02
 SIGMA, RANGE_SIGMA = 0.03 * DEG, 1.0
 BOTH = ('imm_ukf', 'imm_ukf')
+MANOEUVRES = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0, 'imm.cv.noise': 0.003 * DEG,
+              'imm.ca.noise': 0.1 * DEG, 'imm.current_statistical.a_max': 15.0 * DEG}
+"""A bank for the axes that expects a manoeuvre any time, and so knows the rate worse than the Cartesian filter."""
 
 
 class Pass:
@@ -31,7 +34,8 @@ class Pass:
         self.put(kinds)
 
     def put(self, kinds):
-        self.c = tracker.constants(self.params, [FilterParameters(kind=kind) for kind in kinds])[0]
+        filters = [build(FilterParameters, {'kind': kind, **MANOEUVRES}) for kind in kinds]
+        self.c = tracker.constants(self.params, filters)[0]
         tracker.transfer(self.state[0], self.p, self.c)
 
     def now(self, stamp=None):

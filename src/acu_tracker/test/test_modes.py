@@ -3,42 +3,81 @@ import pytest
 from acu_tracker import modes
 from acu_tracker.modes import (
     ACCEPTED,
+    ACQUIRE,
     AFTER_PROGRAM,
     ATTITUDE_INVALID,
     AUTOTRACK,
     BEFORE_PROGRAM,
+    BELOW_HORIZON,
     DRIVE_NOT_READY,
     ENCODER_INVALID,
+    FOUND,
     INS_ALIGNING,
     LOCKED,
+    NO_DIRECTION,
     NO_PROGRAM,
     NO_REQUEST,
     NONE,
+    NOT_FOUND,
     NOT_LOCKED,
     OUTSIDE_LIMITS,
+    PIN_FAILED,
+    PINNED,
+    PINS_OUT,
     PRESET,
     PROGRAM,
+    PROGRAM_GAP,
+    RATE,
     REFUSED,
     REQUESTED,
+    SEARCH,
+    SIDE_LOBE,
     SIGNAL_LOST,
+    SLAVE,
     STANDBY,
+    STEPTRACK,
+    STOP,
     STOW,
+    SUN,
+    TLE,
+    TOO_OLD,
     UNKNOWN_MODE,
+    UNSTOW,
 )
 
 
 def next_mode(mode, request=NO_REQUEST, encoder_ok=True, drive_ready=True, attitude=NONE, program=NONE, stow=NONE,
-              preset=NONE, locked=True, lost=False, handover=False):
+              preset=NONE, slave=NONE, locked=True, lost=NONE, level=NONE, handover=False, chosen=PROGRAM, pins=NONE,
+              tle=NONE, sun=NONE, table=PROGRAM):
     """Of a situation in which all is well but for what is named."""
-    now = modes.situation(encoder_ok, drive_ready, attitude, stow, preset, program, NONE if locked else NOT_LOCKED,
-                          SIGNAL_LOST if lost else NONE)
-    return modes.next_mode(mode, request, now, handover)
+    obstacle = (NONE, NONE, stow, PINS_OUT, preset, NONE, slave, program, tle, sun, NONE if locked else NOT_LOCKED,
+                NONE, NONE, NONE)
+    now = modes.situation((encoder_ok, drive_ready), attitude, pins, table, obstacle, (lost, level))
+    return modes.next_mode(mode, request, now, handover, chosen)
+
+
+MOVING = tuple(mode for mode, row in enumerate(modes.TABLE) if not row.pinned and mode != STANDBY)
+"""Modes in which the axes move, or may."""
 
 
 @pytest.mark.parametrize('mode', range(len(modes.MODES)))
 @pytest.mark.parametrize('request_', range(len(modes.MODES)))
 def test_every_mode_is_reached_from_every_mode(mode, request_):
-    assert next_mode(mode, request_) == (request_, REQUESTED, ACCEPTED)
+    if request_ == UNSTOW:                              # what is not stowed cannot be unstowed
+        assert next_mode(STANDBY, UNSTOW) == (STANDBY, PINS_OUT, REFUSED)
+    else:
+        assert next_mode(mode, request_) == (request_, REQUESTED, ACCEPTED)
+
+
+@pytest.mark.parametrize('mode', range(len(modes.MODES)))
+@pytest.mark.parametrize('request_', range(len(modes.MODES)))
+def test_with_a_pin_not_out_only_stow_and_unstow_are_entered(mode, request_):
+    able, stays = request_ in (STANDBY, STOW, UNSTOW), mode if mode not in MOVING else STANDBY
+    for ready in (False, True):
+        got = next_mode(mode, request_, drive_ready=ready, pins=PINNED)
+        assert got == ((request_, REQUESTED, ACCEPTED) if able else (stays, PINNED, REFUSED))
+        failed = next_mode(mode, request_, drive_ready=ready, pins=PIN_FAILED)
+        assert failed == ((STANDBY, REQUESTED, ACCEPTED) if request_ == STANDBY else (STANDBY, PIN_FAILED, REFUSED))
 
 
 @pytest.mark.parametrize('request_, changes, reason', [
@@ -48,11 +87,21 @@ def test_every_mode_is_reached_from_every_mode(mode, request_):
     (PROGRAM, dict(program=BEFORE_PROGRAM), BEFORE_PROGRAM),
     (PROGRAM, dict(program=AFTER_PROGRAM), AFTER_PROGRAM),
     (PROGRAM, dict(program=OUTSIDE_LIMITS), OUTSIDE_LIMITS),
+    (PROGRAM, dict(program=PROGRAM_GAP), PROGRAM_GAP),
+    (TLE, dict(tle=TOO_OLD), TOO_OLD),
+    (TLE, dict(tle=BELOW_HORIZON), BELOW_HORIZON),
+    (TLE, dict(attitude=ATTITUDE_INVALID), ATTITUDE_INVALID),
+    (SUN, dict(sun=BELOW_HORIZON), BELOW_HORIZON),
+    (SUN, dict(attitude=INS_ALIGNING), INS_ALIGNING),
     (PROGRAM, dict(attitude=ATTITUDE_INVALID), ATTITUDE_INVALID),
     (AUTOTRACK, dict(attitude=ATTITUDE_INVALID), ATTITUDE_INVALID),
     (PROGRAM, dict(attitude=INS_ALIGNING), INS_ALIGNING),
     (AUTOTRACK, dict(attitude=INS_ALIGNING), INS_ALIGNING),
     (AUTOTRACK, dict(locked=False), NOT_LOCKED),
+    (SLAVE, dict(slave=NO_DIRECTION), NO_DIRECTION),
+    (SLAVE, dict(attitude=ATTITUDE_INVALID), ATTITUDE_INVALID),
+    (STOP, dict(encoder_ok=False), ENCODER_INVALID),
+    (RATE, dict(drive_ready=False), DRIVE_NOT_READY),
     (STOW, dict(encoder_ok=False), ENCODER_INVALID),
     (STOW, dict(drive_ready=False), DRIVE_NOT_READY),
     (PRESET, dict(drive_ready=False), DRIVE_NOT_READY),
@@ -80,21 +129,62 @@ def test_standby_is_never_refused():
     (PROGRAM, dict(program=NO_PROGRAM), (STANDBY, NO_PROGRAM)),
     (PROGRAM, dict(program=OUTSIDE_LIMITS), (PROGRAM, NONE)),
     (PROGRAM, dict(attitude=ATTITUDE_INVALID), (STANDBY, ATTITUDE_INVALID)),
-    (AUTOTRACK, dict(lost=True), (PROGRAM, SIGNAL_LOST)),
-    (AUTOTRACK, dict(lost=True, program=AFTER_PROGRAM), (STANDBY, SIGNAL_LOST)),
+    (PROGRAM, dict(program=PROGRAM_GAP), (STANDBY, PROGRAM_GAP)),
+    (TLE, dict(handover=True), (AUTOTRACK, LOCKED)),
+    (TLE, dict(tle=BELOW_HORIZON), (STANDBY, BELOW_HORIZON)),
+    (TLE, dict(tle=OUTSIDE_LIMITS), (TLE, NONE)),
+    (TLE, dict(attitude=ATTITUDE_INVALID), (STANDBY, ATTITUDE_INVALID)),
+    (SUN, dict(handover=True), (SUN, NONE)),
+    (SUN, dict(sun=BELOW_HORIZON), (STANDBY, BELOW_HORIZON)),
+    (SUN, dict(tle=BELOW_HORIZON, program=NO_PROGRAM), (SUN, NONE)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, table=TLE), (TLE, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, chosen=TLE), (TLE, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, chosen=TLE, tle=BELOW_HORIZON), (STANDBY, SIGNAL_LOST)),
+    (SEARCH, dict(level=NOT_FOUND, table=TLE), (TLE, NOT_FOUND)),
+    (STOW, dict(pins=PINNED, drive_ready=False), (STOW, NONE)),
+    (STOW, dict(pins=PIN_FAILED, drive_ready=False), (STANDBY, PIN_FAILED)),
+    (UNSTOW, dict(pins=PINNED, drive_ready=False), (UNSTOW, NONE)),
+    (UNSTOW, dict(drive_ready=False), (STANDBY, PINS_OUT)),
+    (UNSTOW, {}, (STANDBY, PINS_OUT)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST), (PROGRAM, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, program=AFTER_PROGRAM), (STANDBY, SIGNAL_LOST)),
     (AUTOTRACK, dict(locked=False), (AUTOTRACK, NONE)),
     (PROGRAM, dict(attitude=INS_ALIGNING), (STANDBY, INS_ALIGNING)),
     (STOW, dict(attitude=INS_ALIGNING), (STOW, NONE)),
     (AUTOTRACK, dict(attitude=ATTITUDE_INVALID), (STANDBY, ATTITUDE_INVALID)),
     (PRESET, dict(attitude=ATTITUDE_INVALID), (PRESET, NONE)),
-    (STOW, dict(attitude=ATTITUDE_INVALID, lost=True), (STOW, NONE)),
+    (STOW, dict(attitude=ATTITUDE_INVALID, lost=SIGNAL_LOST), (STOW, NONE)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, chosen=STOP), (STOP, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, chosen=PRESET), (PRESET, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, chosen=PRESET, preset=OUTSIDE_LIMITS), (STANDBY, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, chosen=STANDBY), (STANDBY, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, chosen=AUTOTRACK), (AUTOTRACK, SIGNAL_LOST)),
+    (AUTOTRACK, dict(drive_ready=False, lost=SIGNAL_LOST, chosen=AUTOTRACK), (STANDBY, DRIVE_NOT_READY)),
+    (SLAVE, dict(slave=NO_DIRECTION), (STOP, NO_DIRECTION)),
+    (SLAVE, dict(attitude=ATTITUDE_INVALID), (STANDBY, ATTITUDE_INVALID)),
+    (STOP, dict(attitude=ATTITUDE_INVALID, lost=SIGNAL_LOST), (STOP, NONE)),
+    (RATE, dict(program=AFTER_PROGRAM, lost=SIGNAL_LOST), (RATE, NONE)),
     (STANDBY, dict(encoder_ok=False, handover=True), (STANDBY, NONE)),
     (STANDBY, dict(drive_ready=False, handover=True), (STANDBY, NONE)),
-] + [(mode, dict(encoder_ok=False), (STANDBY, ENCODER_INVALID)) for mode in (STOW, PRESET, PROGRAM, AUTOTRACK)]
-  + [(mode, dict(drive_ready=False), (STANDBY, DRIVE_NOT_READY)) for mode in (STOW, PRESET, PROGRAM, AUTOTRACK)])
+] + [(mode, dict(encoder_ok=False), (STANDBY, ENCODER_INVALID)) for mode in range(STOP, len(modes.MODES))]
+  + [(mode, dict(drive_ready=False), (STANDBY, DRIVE_NOT_READY)) for mode in range(STOP, len(modes.MODES))
+     if mode != UNSTOW]
+  + [(mode, dict(pins=PINNED), (STANDBY, PINNED)) for mode in MOVING])
 def test_what_happens_by_itself(mode, changes, expected):
     assert next_mode(mode, **changes) == (*expected, NO_REQUEST)
 
 
+@pytest.mark.parametrize('mode, changes, expected', [
+    (SEARCH, dict(handover=True), (ACQUIRE, FOUND)), (SEARCH, dict(level=NOT_FOUND), (PROGRAM, NOT_FOUND)),
+    (SEARCH, dict(level=NOT_FOUND, program=NO_PROGRAM), (STANDBY, NOT_FOUND)),
+    (ACQUIRE, dict(handover=True), (AUTOTRACK, LOCKED)), (ACQUIRE, dict(level=SIGNAL_LOST), (SEARCH, SIGNAL_LOST)),
+    (ACQUIRE, dict(handover=True, locked=False), (ACQUIRE, NONE)),
+    (STEPTRACK, {}, (STEPTRACK, NONE)), (STEPTRACK, dict(level=SIGNAL_LOST), (SEARCH, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIGNAL_LOST, chosen=SEARCH), (SEARCH, SIGNAL_LOST)),
+    (AUTOTRACK, dict(lost=SIDE_LOBE, chosen=STANDBY), (ACQUIRE, SIDE_LOBE))])
+def test_what_happens_by_the_level(mode, changes, expected):
+    assert next_mode(mode, **changes) == (*expected, NO_REQUEST)
+
+
 def test_a_refused_request_does_not_stop_a_fault():
-    assert next_mode(AUTOTRACK, 9, encoder_ok=False) == (STANDBY, ENCODER_INVALID, REFUSED)
+    assert next_mode(AUTOTRACK, 99, encoder_ok=False) == (STANDBY, ENCODER_INVALID, REFUSED)

@@ -33,13 +33,14 @@ def test_what_does_not_go_together_is_refused(values, line):
 def test_what_a_beam_does_not_keep_does_not_limit_it():
     """80 periods on their way; the encoders of then must still be there for the receiver's errors."""
     beam = {'azimuth.controller': 'beam', 'elevation.controller': 'beam', 'period': 0.001, 'command_delay': 0.08}
-    build(AcuParameters, beam).check_graph(1)
+    build(AcuParameters, beam).check_graph(1, True)
     for more in ({'azimuth.controller': 'adrc'}, {'receiver_latency': 0.061}, {'tracker.receiver.beam_age': 0.061}):
         with pytest.raises(ParameterError, match='must be 0 to 60 periods'):
             build(AcuParameters, beam | more)
 
 
 def test_constants_hold_the_parameters():
-    c = control_unit.constants(build(AcuParameters, {'azimuth.filter.current_statistical.a_max': 0.123,
-                                                       'command_delay': 0.01}))
+    c = control_unit.constants(build(AcuParameters, {
+        'azimuth.filter.kind': 'current_statistical', 'azimuth.filter.current_statistical.a_max': 0.123,
+        'command_delay': 0.01}))
     assert c['tracker']['filter']['axis'][0, 0]['models'][0]['a_max'] == 0.123 and c['lead'] == 0.0125

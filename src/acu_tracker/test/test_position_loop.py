@@ -8,6 +8,7 @@ from acu_tracker import control_unit
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.params import AxisParameters
 from acu_tracker.servo import feedforward, position_loop
+from acu_tracker.servo.ends import Ends
 from acu_tracker.servo.params import FeedforwardParameters
 from acu_tracker.servo.position_loop import Feedback, Instants
 from pedestal_common.parameters import build, record
@@ -33,7 +34,7 @@ class Axis:
     def put(self, **parameters):
         """Change live parameters."""
         self.values.update(parameters)
-        self.c = control_unit.axis_constants(build(AxisParameters, self.values), T)[0]
+        self.c = control_unit.axis_constants(build(AxisParameters, self.values), T, 0.0)[0]
 
     def move(self, command, acceleration):
         if not self.lag:
@@ -51,7 +52,9 @@ class Axis:
         for _ in range(steps):
             now = Instants(self.k * T, (self.k + 0.5) * T, T)
             raw = AxisMotion(*self.target(position_loop.instant(self.c['p'], now.t_k, now.t_m)))
-            feedback = Feedback(float(self.angle), float(self.velocity), math.nan, 0.0, False)
+            limits = self.c['p']['limits']
+            feedback = Feedback(float(self.angle), float(self.velocity), math.nan, 0.0, False,
+                                Ends(float(limits['low']), float(limits['high'])))
             self.command = position_loop.follow(self.state[0], self.c, raw, feedback, now)
             s = self.state[0]
             rows.append((self.angle, self.command.rate, s['integral'], s['z'][2]))

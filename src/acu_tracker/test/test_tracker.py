@@ -38,7 +38,7 @@ class Target:
         self.put(**filter_params)
 
     def put(self, **filter_params):
-        params = build(FilterParameters, {'current_statistical.a_max': 0.02, **filter_params})
+        params = build(FilterParameters, {'kind': 'current_statistical', **filter_params})
         self.c = tracker.constants(self.params, (params, params))[0]
         tracker.transfer(self.state[0], self.p, self.c)
 

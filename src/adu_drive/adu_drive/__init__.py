@@ -2,11 +2,15 @@
 
     drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
     drive_state   enable, brakes and faults: the state machine of both axes
+    stow_pins     the pins that hold the stowed axes: when they move, when one has failed
     axis          one axis: sensors, speed loop, two current loops, plant, what it trips on
     unit          the unit of the drive: its messages in, its law, its messages out
     timekeeper_node   the node that owns the drive's time
     speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    the controller's laws
     motor, thermal, brake, gear_train, friction, structure, wind                         the plant's laws
+    wind_field        one wind over both axes, as they stand to it
+    gimbal            bodies that turn about two axes on a moving deck
+    mount             from the angles of the axes to where the beam points
     electronic_beam, beam_unit    in the drive's place: the beam of a phased array, delay and hold; its unit
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
@@ -31,6 +35,7 @@ Symbols
     T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]
     x, tau            thermal load of a motor (1: T_rated for ever), time constant of its winding [s]
     alpha, dT         temperature coefficient of copper [1/K], rise of the winding at x = 1 [K]
+    A, E              angles of the azimuth and the elevation axis [rad]
     v, V              turbulence along the mean wind, and the mean wind [m/s]
     h                 plant sub-step 50 us; current loops 100 us, speed loop 0.5 ms
 """

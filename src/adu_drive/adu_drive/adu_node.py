@@ -61,6 +61,7 @@ class AduNode(Timekeeper):
 
 
 def main(args=None):
+    """Run the node to its end; the exit code."""
     return shell.main(AduNode, args)
 
 

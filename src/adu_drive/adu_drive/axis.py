@@ -5,6 +5,8 @@ the records `s` (state) and `c` (constants) of the axis, built here as nested di
 """
 import math
 
+import numpy as np
+
 from adu_drive import (
     bias,
     brake,
@@ -21,13 +23,20 @@ from adu_drive import (
     thermal,
     travel,
 )
+from adu_drive.lanes import inlined
 from adu_drive.params import SPEED_PERIOD
 from pedestal_common.compiled import compiled
 
 CURRENT_TICKS = 5
 """Current-loop periods in one speed-loop period."""
 
+BRAKES = WORKS, STUCK_ON, STUCK_OFF = range(3)
+"""What a brake does: what it is told, or whatever that is."""
+
 CURRENT_PERIOD = SPEED_PERIOD / CURRENT_TICKS
+
+QUARTER_TURN = 0.5 * math.pi
+"""By which the second pinion is mounted further than the first: their runouts do not add."""
 
 
 def _motor_constants(m, loop, heat, per_rad, h):
@@ -39,6 +48,7 @@ def _motor_constants(m, loop, heat, per_rad, h):
             'per_rated': 1.0 / heat.rated_torque, 'heat_gain': 1.0 - math.exp(-SPEED_PERIOD / heat.time_constant),
             'h_brake_J': h * m.brake / m.inertia, 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
             'h_J': h / m.inertia, 'q_B': 1.0 / (1.0 + h * m.viscous / m.inertia),
+            'T_cog': m.cogging, 'cogs': float(m.cogging_per_turn),
             'psi_hat': m.flux_linkage, 'K_t_hat': m.torque_constant, 'per_K_t_hat': 1.0 / m.torque_constant,
             'gain': 1.0 + m.drift.current_gain, 'offset': m.drift.current_offset,
             'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_PERIOD, 'v_max': m.voltage,
@@ -51,8 +61,18 @@ def _dish(p):
     return J_dish, *structure.spring_and_damper(J_dish, p.structure.frequency, p.structure.damping)
 
 
-def constants(p, h):
-    """Hoisted constants of one axis (AxisParameters) for a plant sub-step h [s]: nested dictionary."""
+def _uneven(p):
+    """Constants of what changes with the angle of motors and pinions."""
+    g = p.gear_train
+    return {'uneven': int(g.runout + g.tooth_error + p.motor_1.cogging + p.motor_2.cogging > 0.0), 'runout': g.runout,
+            'tooth_error': g.tooth_error, 'teeth': float(g.pinion_teeth), 'per_reducer': 1.0 / g.reducer_ratio}
+
+
+def constants(p, h, varying=False):
+    """Hoisted constants of one axis (AxisParameters) for a plant sub-step h [s]: nested dictionary.
+
+    varying: change_inertia tells its inertia, the first time before the first plant_step.
+    """
     per_rad = 2.0 ** p.encoder.load_bits / (2.0 * math.pi)
     motor_per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     N = p.gear_train.ratio
@@ -60,6 +80,7 @@ def constants(p, h):
     T_b, out, per_fade = bias.line(p.bias)
     J_dish, k_dish, c_dish = _dish(p)
     J_base = p.load.inertia - J_dish
+    final, emergency, buffer = p.limits.switches
     l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_PERIOD)
     return {
         'motor_1': _motor_constants(p.motor_1, p.current_loop, p.thermal, motor_per_rad, h),
@@ -71,21 +92,25 @@ def constants(p, h):
         'T_b': T_b, 'out': out, 'per_fade': per_fade,
         'bias_gain': 1.0 - math.exp(-SPEED_PERIOD / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
         'k': p.gear_train.stiffness, 'c': p.gear_train.damping, 'half_lash': 0.5 * p.gear_train.lash,
-        'flexible': int(J_dish > 0.0), 'k_dish': k_dish, 'c_dish': c_dish, 'h_J_dish': h / J_dish if J_dish else 0.0,
-        'base_share': 1.0 - p.structure.inertia_share,
-        'h': h, 'J': p.load.inertia, 'h_J': h / J_base,
+        'pinion_ratio': p.gear_train.pinion_ratio, **_uneven(p),
+        'flexible': int(J_dish > 0.0), 'k_dish': k_dish, 'c_dish': c_dish,
+        'h_J_dish': h / J_dish if J_dish else 0.0, 'base_share': 1.0 - p.structure.inertia_share,
+        'varying': int(varying), 'h': h, 'J': p.load.inertia, 'B': p.load.viscous, 'h_J': h / J_base,
         'q_B': 1.0 / (1.0 + h * p.load.viscous / J_base), 'unbalance': p.load.unbalance,
         'T_c': p.friction.coulomb, 'T_sc': p.friction.breakaway - p.friction.coulomb,
         'per_v2': p.friction.stribeck_rate ** -2, 'sigma_0': p.friction.stiffness,
         'h_sigma_0': h * p.friction.stiffness, 'sigma_1_h': p.friction.damping / h,
+        'encoder': encoder.errors(p.encoder.error),
         'rate_max': p.limits.rate, 'a': p.limits.deceleration, 'ramp': p.limits.deceleration * SPEED_PERIOD,
         'lower': p.limits.lower, 'upper': p.limits.upper, 'K': p.limits.approach,
-        'stop_lower': p.limits.lower - p.limits.buffer, 'stop_upper': p.limits.upper + p.limits.buffer,
+        'stop_lower': p.limits.lower - buffer, 'stop_upper': p.limits.upper + buffer,
         'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping,
         'faults': {'current_2': p.faults.overcurrent ** 2, 'omega': N * p.faults.overspeed,
                    'disagreement': p.faults.encoder_disagreement, 'error': N * p.faults.following_error,
                    'late_periods': math.ceil(p.faults.following_time / SPEED_PERIOD - 1e-6),
-                   'heat': p.faults.overtemperature}}
+                   'heat': p.faults.overtemperature, 'final_low': p.limits.lower - final,
+                   'final_high': p.limits.upper + final, 'emergency_low': p.limits.lower - emergency,
+                   'emergency_high': p.limits.upper + emergency}}
 
 
 def _motor_at_rest(m, g, T, total, theta, per_rad):
@@ -103,7 +128,14 @@ def _motor_at_rest(m, g, T, total, theta, per_rad):
 
 
 def initial_state(p, theta, external):
-    """State of one axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary."""
+    """State of one axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary.
+
+    reading: counts of the load encoder at t_k; external: torque [Nm] on the load, constant over a control period;
+    asked_rate, asked_torque: command obeyed in a speed-loop period [rad/s, Nm]. What is broken: motor_lost: 1 of a
+    motor whose amplifier is off, and says so; jump: counts that the load encoder reads too many, stuck: 1 when it
+    stays at its reading; brake_stuck: of BRAKES; toothless: 1 where a pinion has lost one of its `teeth`, of which a
+    whole one has 0 here; gust: torque [Nm] on the load beside the wind.
+    """
     per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     _, k_dish, _ = _dish(p)
     T = -0.5 * external / p.gear_train.ratio
@@ -112,70 +144,94 @@ def initial_state(p, theta, external):
     T_b = bias.scheduled.py_func(T, *bias.line(p.bias))
     return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, total, theta, per_rad),
             'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, total, theta, per_rad),
-            'theta': theta, 'omega': 0.0, 'z': 0.0,
-            'dish': theta + external / k_dish if k_dish else theta, 'omega_dish': 0.0, 'deck': 0.0,
+            'theta': theta, 'omega': 0.0, 'z': 0.0, 'h_J': 0.0, 'q_B': 0.0, 'h_J_dish': 0.0,
+            'dish': theta + external / k_dish if k_dish else theta, 'omega_dish': 0.0, 'external': external,
+            'deck': 0.0, 'asked_rate': 0.0, 'asked_torque': 0.0,
             'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0,
-            'faults': 0, 'present': 0, 'late': 0, 'slewing': 0, 'braked': 0}
+            'faults': 0, 'present': 0, 'late': 0, 'slewing': 0, 'braked': 0, 'reading': 0.0,
+            'motor_lost': np.zeros(2, np.int64), 'jump': 0.0, 'stuck': 0, 'brake_stuck': WORKS, 'toothless': 0,
+            'teeth': np.zeros(2), 'gust': 0.0}
 
 
-@compiled
+@inlined
+def _load_counts(s, c):
+    """What the load encoder reads [counts]."""
+    return s.reading if s.stuck else encoder.counts(encoder.told(s.theta, c.encoder), c.per_rad) + s.jump
+
+
+@inlined
 def _measured_speed(m, k):
     """Motor speed [rad/s]: encoder difference over the last speed-loop period (0.25 ms old on average)."""
     return (encoder.counts(m.theta, k.per_rad) - m.count) * k.speed
 
 
-@compiled
+@inlined
 def _sense(m, k):
     m.measured = _measured_speed(m, k)
     m.heat = thermal.load(m.heat, k.K_t * m.i_q, k.per_rated, k.heat_gain)
     m.count = encoder.counts(m.theta, k.per_rad)
 
 
-@compiled
+@inlined
 def _measured_torque(m, k):
     """Torque [Nm] as the current sensor and the believed torque constant have it."""
     return k.K_t_hat * (k.gain * m.i_q + k.offset)
 
 
-@compiled
+@inlined
 def _realised(m, k):
     """Torque [Nm] the motor made of what was asked: the current's own once the voltage circle has cut it."""
     return _measured_torque(m, k) if m.limited else m.torque_ref
 
 
-@compiled
+@inlined
+def _mean(s, omega_1, omega_2):
+    """Mean speed [rad/s] of the motors that work."""
+    if s.faults & faults.MOTOR_1_LOST:
+        return omega_2
+    if s.faults & faults.MOTOR_2_LOST:
+        return omega_1
+    return 0.5 * (omega_1 + omega_2)
+
+
+@inlined
 def _torque_control(s, c, omega, feed_forward):
     """Torque references of both motors from the rate s.rate, the mean speed and a torque [Nm] added to each; whether
-    one is at its limit."""
+    one is at its limit. A motor that is alone makes the torque of both, as far as it can."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    omega_1, omega_2 = (m1.measured, m2.measured) if c.independent else (omega, omega)
+    alone = s.faults & faults.MOTORS_LOST
+    omega_1, omega_2 = (m1.measured, m2.measured) if c.independent and not alone else (omega, omega)
     error_1, error_2 = c.N * s.rate - omega_1, c.N * s.rate - omega_2
     T_1 = speed_loop.torque(error_1, m1.sum, c.K_p, feed_forward)
     T_2 = speed_loop.torque(error_2, m2.sum, c.K_p, feed_forward)
-    s.bias += c.bias_gain * (bias.scheduled(0.5 * (T_1 + T_2), c.T_b, c.out, c.per_fade) - s.bias)
-    T_1, T_2 = speed_loop.shared(T_1, T_2, s.bias, m1.measured, m2.measured, c.K_d)
+    if alone:
+        s.bias, total = 0.0, T_1 + T_2
+        T_1, T_2 = (0.0, total) if alone & faults.MOTOR_1_LOST else (total, 0.0)
+    else:
+        s.bias += c.bias_gain * (bias.scheduled(0.5 * (T_1 + T_2), c.T_b, c.out, c.per_fade) - s.bias)
+        T_1, T_2 = speed_loop.shared(T_1, T_2, s.bias, m1.measured, m2.measured, c.K_d)
     m1.torque_ref, m2.torque_ref = speed_loop.limited(T_1, k1.limit), speed_loop.limited(T_2, k2.limit)
 
     limited = m1.torque_ref != T_1 or m2.torque_ref != T_2
     excess_1 = excess_2 = 0.0
     if limited or m1.limited or m2.limited:
         excess_1, excess_2 = T_1 - _realised(m1, k1), T_2 - _realised(m2, k2)
-        if not c.independent:
+        if alone or not c.independent:
             excess_1 = excess_2 = 0.5 * (excess_1 + excess_2)
     m1.sum = pi.integral(m1.sum, error_1, c.K_iT, excess_1)
     m2.sum = pi.integral(m2.sum, error_2, c.K_iT, excess_2)
     return limited
 
 
-@compiled
+@inlined
 def _current_2(m, k):
     """Square of the measured current [A2]."""
     i_d, i_q = k.gain * m.i_d, k.gain * m.i_q + k.offset
     return i_d * i_d + i_q * i_q
 
 
-@compiled
+@inlined
 def _supervise(s, c, omega, free):
     """Trip on what the drive measures; `free`: the motors may turn, so they must follow."""
     m1, m2, k = s.motor_1, s.motor_2, c.faults
@@ -183,12 +239,13 @@ def _supervise(s, c, omega, free):
     s.present |= faults.detected(
         max(_current_2(m1, c.motor_1), _current_2(m2, c.motor_2)),
         max(abs(m1.measured), abs(m2.measured)),
-        c.rad * encoder.counts(s.theta, c.per_rad) - c.per_2N * (c.motor_1.rad * m1.count + c.motor_2.rad * m2.count),
+        c.rad * _load_counts(s, c) - c.encoder.zero - c.per_2N * (c.motor_1.rad * m1.count + c.motor_2.rad * m2.count),
         s.late, max(m1.heat, m2.heat), s.faults, k)
+    s.present |= faults.lost(s.motor_lost) | faults.at_end(s.theta, c.per_N * omega, k)
     s.faults |= s.present
 
 
-@compiled
+@inlined
 def _let_go(s, omega, free):
     """No torque. Once the brakes hold, what the motors held before is kept: they need it when the brakes open."""
     s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
@@ -198,7 +255,7 @@ def _let_go(s, omega, free):
         s.motor_1.sum = s.motor_2.sum = s.d_hat = 0.0
 
 
-@compiled
+@inlined
 def speed_control(s, c, rate, torque, enable, powered, free):
     """One speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references.
 
@@ -207,12 +264,12 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     _sense(m1, k1)
     _sense(m2, k2)
-    omega = 0.5 * (m1.measured + m2.measured)
+    omega = _mean(s, m1.measured, m2.measured)
     _supervise(s, c, omega, powered and free)
-    if not powered or s.faults & faults.OVERCURRENT:
+    if not powered or faults.drops(s.faults):
         _let_go(s, omega, free)
         return
-    m1.inhibited = m2.inhibited = 0
+    m1.inhibited, m2.inhibited = s.faults & faults.MOTOR_1_LOST, s.faults & faults.MOTOR_2_LOST
     s.omega_hat, s.d_hat = disturbance_observer.update(
         s.omega_hat, s.d_hat, omega, 0.5 * (_realised(m1, k1) + _realised(m2, k2)), c.l_1, c.l_2, c.h_J_shaft)
 
@@ -228,7 +285,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     else:
         wanted = s.rate - min(max(s.rate, -c.ramp), c.ramp)
         s.stopping = s.slewing = 1
-    position = c.rad * encoder.counts(s.theta, c.per_rad)
+    position = c.rad * _load_counts(s, c)
     s.rate = min(max(wanted, -travel.approach_rate(position - c.lower, c.K, c.a)),
                  travel.approach_rate(c.upper - position, c.K, c.a))
     if s.rate != wanted:
@@ -247,32 +304,45 @@ def speed_control(s, c, rate, torque, enable, powered, free):
 
 @compiled
 def begin_period(s, c, grip):
-    """Once per control period: brakes, winding temperature, and the marks of what happens within it."""
+    """Once per control period: brakes, winding temperature, an inertia that does not vary, and the marks of what
+    happens within it."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    s.braked = 1 if grip else 0
+    if not c.varying:
+        s.h_J, s.q_B, s.h_J_dish = c.h_J, c.q_B, c.h_J_dish
+    s.braked = (1 if grip else 0) if s.brake_stuck == WORKS else 1 if s.brake_stuck == STUCK_ON else 0
     m1.q_R = thermal.damping(k1.h_R_L, k1.rise, m1.heat)
     m2.q_R = thermal.damping(k2.h_R_L, k2.rise, m2.heat)
     s.torque_limited = s.voltage_limited = s.end_stop = s.stopping = s.present = 0
 
 
-@compiled
+@inlined
 def current_control(m, k):
     """One current-loop period of one motor: current reference to phase voltages.
 
     Without torque the inverter is off, whatever a current sensor says: no current, the open terminals show the
     back-EMF. The diodes that empty the inductance within a millisecond are not modelled.
     """
-    if m.inhibited:
-        m.i_d = m.i_q = m.sum_d = m.sum_q = m.v_d = 0.0
-        m.v_q = k.p * m.omega * k.psi
-        return
-    m.v_d, m.v_q, m.sum_d, m.sum_q, limited = current_loop.voltages(
+    v_d, v_q, sum_d, sum_q, limited = current_loop.voltages(
         k.gain * m.i_d, k.gain * m.i_q + k.offset, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L,
         k.psi_hat, k.v_max)
+    i_d, i_q = m.i_d, m.i_q
+    if m.inhibited:
+        i_d = i_q = v_d = sum_d = sum_q = 0.0
+        v_q, limited = k.p * m.omega * k.psi, False
+    m.i_d, m.i_q, m.v_d, m.v_q, m.sum_d, m.sum_q = i_d, i_q, v_d, v_q, sum_d, sum_q
     m.limited |= limited
 
 
 @compiled
+def change_inertia(s, c, J):
+    """A varying load has the inertia J [kg m2] from now on; the part that swings on it keeps its share and spring."""
+    J_base = c.base_share * J
+    s.h_J, s.q_B = c.h / J_base, 1.0 / (1.0 + c.h * c.B / J_base)
+    if c.flexible:
+        s.h_J_dish = c.h / (J - J_base)
+
+
+@inlined
 def plant_step(s, c, external):
     """One plant sub-step h under an external load torque [Nm], which holds s.deck from the deck's acceleration.
 
@@ -283,22 +353,34 @@ def plant_step(s, c, external):
     m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, m1.q_R)
     m2.i_d, m2.i_q = motor.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, m2.q_R)
 
-    mesh_1 = gear_train.mesh_torque(m1.theta * c.per_N - s.theta, m1.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
-    mesh_2 = gear_train.mesh_torque(m2.theta * c.per_N - s.theta, m2.omega * c.per_N - s.omega, c.k, c.c, c.half_lash)
+    delta_1, delta_2 = m1.theta * c.per_N - s.theta, m2.theta * c.per_N - s.theta
+    if c.uneven:
+        delta_1 += gear_train.transmission_error(m1.theta * c.per_reducer, c)
+        delta_2 += gear_train.transmission_error(m2.theta * c.per_reducer + QUARTER_TURN, c)
+    half_1 = half_2 = c.half_lash
+    if s.toothless:
+        half_1 += gear_train.gap(m1.theta * c.per_reducer, s.teeth[0], c.pinion_ratio)
+        half_2 += gear_train.gap(m2.theta * c.per_reducer, s.teeth[1], c.pinion_ratio)
+    mesh_1 = gear_train.mesh_torque(delta_1, m1.omega * c.per_N - s.omega, c.k, c.c, half_1)
+    mesh_2 = gear_train.mesh_torque(delta_2, m2.omega * c.per_N - s.omega, c.k, c.c, half_2)
     bearing, s.z = friction.lugre(s.z, s.omega, c.T_c, c.T_sc, c.per_v2, c.sigma_0, c.h_sigma_0, c.sigma_1_h, c.h)
     stop = travel.buffer_torque(s.theta, s.omega, c.stop_lower, c.stop_upper, c.k_stop, c.c_stop)
 
     if c.flexible:
         on_base = c.base_share * s.deck
         s.dish, s.omega_dish, twist = structure.swing(
-            s.dish, s.omega_dish, s.theta, s.omega, external - on_base, c.k_dish, c.c_dish, c.h, c.h_J_dish)
+            s.dish, s.omega_dish, s.theta, s.omega, external - on_base, c.k_dish, c.c_dish, c.h, s.h_J_dish)
         external = on_base + twist
 
-    m1.omega = motor.speed(m1.omega, k1.K_t * m1.i_q - mesh_1 * c.per_N, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
-    m2.omega = motor.speed(m2.omega, k2.K_t * m2.i_q - mesh_2 * c.per_N, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
+    T_1, T_2 = k1.K_t * m1.i_q - mesh_1 * c.per_N, k2.K_t * m2.i_q - mesh_2 * c.per_N
+    if c.uneven:
+        T_1 += motor.cogging(m1.theta, k1.T_cog, k1.cogs)
+        T_2 += motor.cogging(m2.theta, k2.T_cog, k2.cogs)
+    m1.omega = motor.speed(m1.omega, T_1, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
+    m2.omega = motor.speed(m2.omega, T_2, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
     if s.braked:
         m1.omega, m2.omega = brake.braked(m1.omega, k1.h_brake_J), brake.braked(m2.omega, k2.h_brake_J)
-    s.omega = (s.omega + c.h_J * (mesh_1 + mesh_2 + external + stop - bearing)) * c.q_B
+    s.omega = (s.omega + s.h_J * (mesh_1 + mesh_2 + external + stop - bearing)) * s.q_B
 
     m1.theta += c.h * m1.omega
     m2.theta += c.h * m2.omega
@@ -309,12 +391,13 @@ def plant_step(s, c, external):
 def read(s, c, y):
     """Outputs of the axis now: what its sensors and controllers know, and the true load beside it."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    y.position = c.rad * encoder.counts(s.theta, c.per_rad)
+    s.reading = _load_counts(s, c)
+    y.position = c.rad * s.reading
     y.motor_position[0] = k1.rad * encoder.counts(m1.theta, k1.per_rad)
     y.motor_position[1] = k2.rad * encoder.counts(m2.theta, k2.per_rad)
     y.motor_velocity[0] = _measured_speed(m1, k1)
     y.motor_velocity[1] = _measured_speed(m2, k2)
-    y.velocity = c.per_2N * (y.motor_velocity[0] + y.motor_velocity[1])
+    y.velocity = c.per_N * _mean(s, y.motor_velocity[0], y.motor_velocity[1])
     y.motor_torque[0] = _measured_torque(m1, k1)
     y.motor_torque[1] = _measured_torque(m2, k2)
     y.torque = c.N * (y.motor_torque[0] + y.motor_torque[1])

@@ -27,6 +27,7 @@ class BeamSteeringNode(Timekeeper):
 
 
 def main(args=None):
+    """Run the node to its end; the exit code."""
     return shell.main(BeamSteeringNode, args)
 
 

@@ -6,16 +6,17 @@ import numpy as np
 
 from adu_drive import electronic_beam
 from pedestal_common import nodes, topics
+from pedestal_common.commands import Reply
 from pedestal_common.compiled import compiled
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
 
 COMMAND, JOINTS, TRUTH = 'acu/reference', 'joint_states', 'adu/truth'
 CLOCK, STATE = 'clock', 'adu/state'
 
-ENABLED, DISABLED, EMERGENCY_STOP = range(3)
-CONDITIONS = ('enabled', 'disabled', 'emergency stop')
-"""Texts of adu/state."""
+CONDITIONS = topics.BY_NAME[STATE].texts
+ENABLED, DISABLED, EMERGENCY_STOP = map(CONDITIONS.index, ('enabled', 'disabled', 'emergency stop'))
+"""Codes of adu/state."""
 
 SWITCHES = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('invalid', 'i8')])
 """wanted: 0 when it was asked to be disabled; emergency: 1 while a stop is latched; stamp: of the last step [ns];

@@ -5,7 +5,7 @@ a torque demand `hold` (one pinion would let go without it), none from `out` on 
 """
 import math
 
-from pedestal_common.compiled import compiled
+from adu_drive.lanes import inlined
 
 
 def line(p):
@@ -18,7 +18,7 @@ def line(p):
     return p.torque, p.out, 1.0 / (p.out - hold)
 
 
-@compiled
+@inlined
 def scheduled(torque, T_b, out, per_fade):
     """Bias [Nm] at a torque demand per motor [Nm]; per_fade = 1 / (out - hold)."""
     return T_b * min(max((out - abs(torque)) * per_fade, 0.0), 1.0)

@@ -2,10 +2,10 @@
 import math
 
 from adu_drive import pi
-from pedestal_common.compiled import compiled
+from adu_drive.lanes import inlined
 
 
-@compiled
+@inlined
 def voltages(i_d, i_q, i_ref, omega_e, sum_d, sum_q, K_p, K_iT, L, psi, v_max):
     """Phase voltages v_d, v_q [V], the two integral parts after them, and whether the circle cut them.
 

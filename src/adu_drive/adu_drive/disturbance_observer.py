@@ -6,7 +6,7 @@ Linear extended state observer, Gao, American Control Conference 2003: both pole
 """
 import math
 
-from pedestal_common.compiled import compiled
+from adu_drive.lanes import inlined
 
 
 def gains(w_o, h):
@@ -15,7 +15,7 @@ def gains(w_o, h):
     return (1.0 - p * p, (1.0 - p) ** 2) if w_o > 0.0 else (1.0, 0.0)
 
 
-@compiled
+@inlined
 def update(omega_hat, d_hat, omega, T, l_1, l_2, h_J):
     """Speed [rad/s] and disturbance torque [Nm] one period h later, from the measured speed and the torque T [Nm]
     made within the period; h_J = h / J."""

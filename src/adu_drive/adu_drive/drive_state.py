@@ -2,11 +2,15 @@
 
     enabled -> stopping -> engaging brakes -> disabled -> releasing brakes -> enabled
 
-The drive wants to be enabled while it is asked to be, no fault and no emergency stop is latched. It stops under
-control, lets the brakes grip while the motors still hold, and only then takes their torque away. Overcurrent, and a
-stop that takes too long, take the torque away at once and let the brakes fall in.
+The drive wants to be enabled while it is asked to be, no fault and no emergency stop is latched and the stow pins are
+out. It stops under control, lets the brakes grip while the motors still hold, and only then takes their torque away;
+then stow pins may move. Overcurrent, and a stop that takes too long, take the torque away at once and let the brakes
+fall in.
 """
-from adu_drive.faults import ALL, FAULTS, OVERCURRENT, names
+import math
+
+from adu_drive import faults, stow_pins
+from pedestal_common import topics
 from pedestal_common.compiled import compiled
 
 PHASES = ('enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brakes')
@@ -25,42 +29,56 @@ REFUSALS = {
     CAUSE_PERSISTS: 'the cause is still there'}
 """Answers to a request, and why it is not granted."""
 
-PHASE, PREVENTED, EMERGENCY = 7, 8, 16
-AZIMUTH_FAULTS = 5
-ELEVATION_FAULTS = AZIMUTH_FAULTS + len(FAULTS)
-"""Bits of the code of adu/state: phase, whether following is not permitted, emergency stop, fault words."""
+TOLD = topics.BY_NAME['adu/state'].texts
+STOPPED = TOLD.index('emergency stop')
+FIRST_PHASE = TOLD.index(PHASES[STOPPING]) - STOPPING
+"""Codes of adu/state below len(TOLD) are places in it: which motors are lost while it is enabled, then the phases."""
+
+FAULTY, EMERGENCY = 16, 32
+AZIMUTH_FAULTS = 6
+ELEVATION_FAULTS = AZIMUTH_FAULTS + len(faults.FAULTS)
+"""Bits of the other codes: that there are faults, emergency stop, fault words."""
 
 STANDSTILL = 1e-3
 """Load rate [rad/s] below which an axis stands."""
 
 
 @compiled
+def tripped(s):
+    """Whether an axis has a fault that stops the drive."""
+    return faults.stops(s.azimuth.faults) or faults.stops(s.elevation.faults)
+
+
+@compiled
 def permitted(s):
     """Whether the drive may follow commands."""
-    return s.wanted and not s.emergency and not (s.azimuth.faults | s.elevation.faults)
+    return s.wanted and not s.emergency and not tripped(s) and stow_pins.clear(s.pins)
 
 
 @compiled
 def condition(s):
     """Code of adu/state, 0 for 'enabled': all that `described` tells, in one number, so that it changes when something
     of it does."""
-    return (s.phase | (0 if permitted(s) else PREVENTED) | (EMERGENCY if s.emergency else 0)
-            | s.azimuth.faults << AZIMUTH_FAULTS | s.elevation.faults << ELEVATION_FAULTS)
+    if tripped(s):
+        return (FAULTY | (EMERGENCY if s.emergency else 0)
+                | s.azimuth.faults << AZIMUTH_FAULTS | s.elevation.faults << ELEVATION_FAULTS)
+    if s.emergency:
+        return STOPPED
+    if s.phase == ENABLED and permitted(s):
+        return ((1 if s.azimuth.faults & faults.MOTORS_LOST else 0)
+                | (2 if s.elevation.faults & faults.MOTORS_LOST else 0))
+    if permitted(s):
+        return FIRST_PHASE + (RELEASING if s.phase == DISABLED else s.phase)
+    return FIRST_PHASE + (STOPPING if s.phase == ENABLED else s.phase)
 
 
 def described(condition):
-    """'enabled' when the drive follows commands, otherwise why it does not."""
-    phase = condition & PHASE
-    if not condition & PREVENTED:
-        return PHASES[RELEASING if phase == DISABLED else phase]
+    """'enabled' when the drive follows commands, with what it lacks; otherwise why it does not."""
+    if condition < len(TOLD):
+        return TOLD[condition]
     tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', AZIMUTH_FAULTS), ('elevation', ELEVATION_FAULTS))
-               for kind in names(condition >> shift & ALL)]
-    why = ['emergency stop'] if condition & EMERGENCY else []
-    if tripped:
-        why.append('fault: ' + ', '.join(tripped))
-    if why:
-        return '; '.join(why)
-    return PHASES[STOPPING if phase == ENABLED else phase]
+               for kind in faults.names(condition >> shift & faults.ALL)]
+    return ('emergency stop; ' if condition & EMERGENCY else '') + 'fault: ' + ', '.join(tripped)
 
 
 @compiled
@@ -72,7 +90,7 @@ def moves(axis, c):
 @compiled
 def _next(s, c):
     allowed = permitted(s)
-    if (s.azimuth.faults | s.elevation.faults) & OVERCURRENT:
+    if faults.drops(s.azimuth.faults) or faults.drops(s.elevation.faults):
         return DISABLED
     if s.phase == ENABLED:
         return ENABLED if allowed else STOPPING
@@ -92,8 +110,21 @@ def _next(s, c):
 
 
 @compiled
-def advance(s, c):
-    """One control period: the phase, and whether the brakes grip in it."""
+def _advance_pins(s, c, wanted):
+    """One control period of the stow pins, which move while the drive is off; wanted: code of acu/stow_pins."""
+    az, el, k = s.azimuth, s.elevation, c.pins
+    stow_pins.order(s.pins, k, wanted, math.nan if moves(az, c.azimuth) else c.azimuth.rad * az.reading,
+                    math.nan if moves(el, c.elevation) else c.elevation.rad * el.reading)
+    if s.phase == DISABLED and not s.emergency:
+        az.faults |= stow_pins.advance(s.pins, k, 0)
+        el.faults |= stow_pins.advance(s.pins, k, 1)
+
+
+@compiled
+def advance(s, c, pins):
+    """One control period: the phase, and whether the brakes grip in it; pins: code of acu/stow_pins."""
+    if c.pins.fitted:
+        _advance_pins(s, c, pins)
     phase = _next(s, c)
     s.age = s.age + 1 if phase == s.phase else 0
     s.phase = phase
@@ -115,7 +146,7 @@ def request(s, c, what):
     elif what == EMERGENCY_STOP:
         s.emergency = 1
     elif what == ENABLE:
-        if s.azimuth.faults | s.elevation.faults:
+        if tripped(s):
             return FAULT_LATCHED
         if s.emergency:
             return EMERGENCY_LATCHED
@@ -126,4 +157,5 @@ def request(s, c, what):
         if s.azimuth.present | s.elevation.present:
             return CAUSE_PERSISTS
         s.azimuth.faults = s.elevation.faults = s.emergency = 0
+        stow_pins.retry(s.pins)
     return GRANTED

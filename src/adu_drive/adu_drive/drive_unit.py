@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 
-from adu_drive import axis, drive_state, wind
+from adu_drive import axis, drive_state, gimbal, mount, stow_pins, wind, wind_field
+from adu_drive.lanes import at, count, inlined
 from adu_drive.params import AduParameters, whole_speed_periods
 from pedestal_common.compiled import compiled
 
-RING = 128
-"""Commands kept for the transport delay: more than MAX_DELAY over the shortest period."""
+RING = 256
+"""Commands kept for the transport delay: more than twice MAX_DELAY over the shortest period, once of its own and once
+injected."""
 
 LONG_AGO = 1 << 40
 """Periods since the brakes were last moved, at the start."""
@@ -22,10 +24,11 @@ LARGEST = 1e6
 _AXIS_INPUTS = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
 
 INPUTS = np.dtype([('azimuth', _AXIS_INPUTS), ('elevation', _AXIS_INPUTS),
-                   ('base_acceleration', 'f8', (3,)), ('enable', 'i8')], align=True)
+                   ('base_acceleration', 'f8', (3,)), ('enable', 'i8'), ('base_rate', 'f8', (3,)), ('pins', 'i8')],
+                  align=True)
 """Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm].
-base_acceleration: angular acceleration of the deck, FLU [rad/s2].
-enable 1: follow, 0: controlled stop, at once whatever the delay."""
+base_acceleration, base_rate: angular acceleration [rad/s2] and rate [rad/s] of the deck, FLU.
+enable 1: follow, 0: controlled stop, at once whatever the delay. pins: code of acu/stow_pins."""
 
 _AXIS_OUTPUTS = np.dtype([
     ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
@@ -36,7 +39,7 @@ _AXIS_OUTPUTS = np.dtype([
 
 OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8'),
                     ('phase', 'i8'), ('following', 'i8'), ('wanted', 'i8'), ('emergency', 'i8'), ('braked', 'i8'),
-                    ('condition', 'i8')], align=True)
+                    ('condition', 'i8'), ('pins', 'i8')], align=True)
 """At t_k+1, per axis:
 
 position          load encoder [rad]
@@ -60,7 +63,7 @@ phase             of drive_state.PHASES; following: 1 when enabled and nothing s
 wanted            1 unless the drive was asked to be disabled
 emergency         1 when an emergency stop is latched
 braked            1 when the brakes grip
-condition         see drive_state.condition
+condition         see drive_state.condition; pins: stow_pins.told
 """
 
 
@@ -77,8 +80,12 @@ def _record(values):
 
 def _constants(params, substeps):
     h = axis.CURRENT_PERIOD / substeps
-    return _record({'azimuth': axis.constants(params.azimuth, h), 'elevation': axis.constants(params.elevation, h),
-                    'wind': wind.constants(params.wind), 'period': params.period,
+    bodies = gimbal.constants(params)
+    return _record({'azimuth': axis.constants(params.azimuth, h, bodies['rigid']),
+                    'elevation': axis.constants(params.elevation, h), 'bodies': bodies,
+                    'wind': wind.constants(params.wind), 'field': wind_field.constants(params.wind.field),
+                    'mount': mount.constants(params.mount), 'pins': stow_pins.constants(params),
+                    'period': params.period,
                     'speed_ticks': whole_speed_periods('period', params.period),
                     'delay_ticks': whole_speed_periods('transport_delay', params.transport_delay),
                     **{f'{name}_periods': math.ceil(getattr(params.brakes, f'{name}_time') / params.period - 1e-6)
@@ -87,16 +94,18 @@ def _constants(params, substeps):
 
 
 def _initial_state(params):
-    axes, enabled = {}, params.initially_enabled
-    for name, torque in zip(('azimuth', 'elevation'), wind.initial_torques(params.wind)):
+    axes, enabled = {}, params.initially_enabled and not (params.stow_pins and params.pins.initially_in)
+    of_field = wind_field.initial_torques(params.wind.field, params.initial_azimuth, params.initial_elevation)
+    for name, torque, field in zip(('azimuth', 'elevation'), wind.initial_torques(params.wind), of_field):
         p, theta = getattr(params, name), getattr(params, f'initial_{name}')
-        external = torque - p.load.unbalance * math.cos(theta)
+        external = torque + field - p.load.unbalance * math.cos(theta)
         axes[name] = axis.initial_state(p, theta, external)
     return _record({**axes, 'rate': np.zeros((RING, 2)), 'torque': np.zeros((RING, 2)),
-                    'enable': np.ones(RING, np.int64), 'k': 0,
+                    'enable': np.ones(RING, np.int64), 'k': 0, 'last_rate': np.zeros(2),
                     'phase': drive_state.ENABLED if enabled else drive_state.DISABLED, 'age': 0,
-                    'wanted': int(enabled), 'emergency': 0,
-                    'applied': int(not enabled), 'brake_age': LONG_AGO, 'braked': int(not enabled)})
+                     'wanted': int(params.initially_enabled), 'emergency': 0, 'tick': -LONG_AGO, 'late_ticks': 0,
+                     'applied': int(not enabled), 'brake_age': LONG_AGO, 'braked': int(not enabled), 'following': 0,
+                     'pins': stow_pins.initial_state(params)})
 
 
 CONSTANTS = _constants(AduParameters(), 2).dtype
@@ -130,17 +139,39 @@ def inertial_torques(azimuth, J_azimuth, J_elevation, x, y, z):
 
 
 @compiled
+def _turn(s, c, w, w_dot):
+    """Set the inertia of azimuth and the torques that turning bodies put on both axes, constant over the period.
+
+    An axis feels the other's acceleration of the period before: M_AE^2 < M_AA M_EE, so that dies out.
+    """
+    az, el = s.azimuth, s.elevation
+    M_AA, M_AE = gimbal.inertia(c.bodies, el.theta)
+    axis.change_inertia(az, c.azimuth, M_AA)
+    h_azimuth, h_elevation = gimbal.gyroscopic(c.bodies, (az.theta, el.theta), (az.omega, el.omega), w, w_dot)
+    A_ddot, E_ddot = ((az.omega - s.last_rate[0]) * c.bodies.per_period,
+                      (el.omega - s.last_rate[1]) * c.bodies.per_period)
+    s.last_rate[0], s.last_rate[1] = az.omega, el.omega
+    az.deck, el.deck = -h_azimuth - M_AE * E_ddot, -h_elevation - M_AE * A_ddot
+
+
+@compiled
 def _external(s, c, u):
     """External torques [Nm] on the two loads, constant over the period, and whether every input was believable."""
     x, y, z = u.base_acceleration[0], u.base_acceleration[1], u.base_acceleration[2]
     azimuth, elevation = s.azimuth.theta, s.elevation.theta
     T_azimuth, T_elevation = wind.torques(c.wind, s.k * c.period)
-    T_azimuth -= c.azimuth.unbalance * math.cos(azimuth)
-    T_elevation -= c.elevation.unbalance * math.cos(elevation)
+    if c.field.blows:
+        of_field = wind_field.torques(c.field, s.k * c.period, azimuth, elevation)
+        T_azimuth, T_elevation = T_azimuth + of_field[0], T_elevation + of_field[1]
+    T_azimuth += s.azimuth.gust - c.azimuth.unbalance * math.cos(azimuth)
+    T_elevation += s.elevation.gust - c.elevation.unbalance * math.cos(elevation)
     believed = _believed(x) and _believed(y) and _believed(z)
     if not believed:
         x = y = z = 0.0
-    s.azimuth.deck, s.elevation.deck = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
+    if c.bodies.rigid:
+        _turn(s, c, u.base_rate, (x, y, z))
+    else:
+        s.azimuth.deck, s.elevation.deck = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
     return T_azimuth + s.azimuth.deck, T_elevation + s.elevation.deck, believed
 
 
@@ -158,13 +189,24 @@ def _receive(s, u, disturbance_believed):
 
 
 @compiled
+def _point(c, azimuth, elevation):
+    """Turn the angles and rates of the axes into those of the beam, in the outputs of both."""
+    angles, rates = mount.beam(c.mount, azimuth.load_position, elevation.load_position, azimuth.load_velocity,
+                               elevation.load_velocity)
+    azimuth.load_position, elevation.load_position = angles
+    azimuth.load_velocity, elevation.load_velocity = rates
+
+
+@compiled
 def read(s, c, y):
     """Outputs y as they are now, nothing integrated: at t_0, before the first step. Records of this module."""
     axis.read(s.azimuth, c.azimuth, y.azimuth)
     axis.read(s.elevation, c.elevation, y.elevation)
+    if not c.mount.true:
+        _point(c, y.azimuth, y.elevation)
     y.phase, y.wanted, y.emergency, y.braked = s.phase, s.wanted, s.emergency, s.braked
     y.following = s.phase == drive_state.ENABLED and drive_state.permitted(s)
-    y.condition = drive_state.condition(s)
+    y.condition, y.pins = drive_state.condition(s), stow_pins.told(s.pins, c.pins)
 
 
 @compiled
@@ -176,29 +218,64 @@ def request(s, c, y, what):
 
 
 @compiled
-def step(s, c, u, y):
-    """One control period from t_k to t_k+1. Records STATE, CONSTANTS, INPUTS, OUTPUTS; s and y are written."""
-    az, el, c_az, c_el = s.azimuth, s.elevation, c.azimuth, c.elevation
-    T_az, T_el, believed = _external(s, c, u)
+def _begin(s, c, u, y):
+    """What happens once in a period, at its beginning: external torques, the command, brakes and windings."""
+    s.azimuth.external, s.elevation.external, believed = _external(s, c, u)
     y.invalid_command = 0 if _receive(s, u, believed) else 1
-    s.braked = drive_state.advance(s, c)
-    enabled = s.phase == drive_state.ENABLED and u.enable == 1
-    powered, free = s.phase != drive_state.DISABLED, not s.braked
-    axis.begin_period(az, c_az, s.braked)
-    axis.begin_period(el, c_el, s.braked)
-    for j in range(c.speed_ticks):
-        tick = s.k * c.speed_ticks + j - c.delay_ticks
-        slot = (tick // c.speed_ticks) % RING     # before the first command: a slot still empty, rate 0
-        enable = s.enable[slot] if enabled else 0
-        axis.speed_control(az, c_az, s.rate[slot, 0], s.torque[slot, 0], enable, powered, free)
-        axis.speed_control(el, c_el, s.rate[slot, 1], s.torque[slot, 1], enable, powered, free)
-        for _ in range(axis.CURRENT_TICKS):
-            axis.current_control(az.motor_1, c_az.motor_1)
-            axis.current_control(az.motor_2, c_az.motor_2)
-            axis.current_control(el.motor_1, c_el.motor_1)
-            axis.current_control(el.motor_2, c_el.motor_2)
-            for _ in range(c.substeps):
-                axis.plant_step(az, c_az, T_az)
-                axis.plant_step(el, c_el, T_el)
-    s.k += 1
-    read(s, c, y)
+    s.braked = drive_state.advance(s, c, u.pins)
+    axis.begin_period(s.azimuth, c.azimuth, s.braked)
+    axis.begin_period(s.elevation, c.elevation, s.braked)
+    s.azimuth.braked |= stow_pins.holds(s.pins, c.pins, 0)
+    s.elevation.braked |= stow_pins.holds(s.pins, c.pins, 1)
+
+
+@compiled
+def _obey(s, c, u, j):
+    """Take the command that is obeyed in speed-loop period j out of the ring; 1 where that enables the drive."""
+    s.tick = max(s.tick, s.k * c.speed_ticks + j - c.delay_ticks - s.late_ticks)    # late: the last one stays
+    slot = (s.tick // c.speed_ticks) % RING     # before the first command: a slot still empty, rate 0
+    s.following = s.enable[slot] if s.phase == drive_state.ENABLED and u.enable == 1 else 0
+    az, el = s.azimuth, s.elevation
+    az.asked_rate, az.asked_torque = s.rate[slot, 0], s.torque[slot, 0]
+    el.asked_rate, el.asked_torque = s.rate[slot, 1], s.torque[slot, 1]
+
+
+@inlined
+def _speed_control(s, a, c):
+    """One speed-loop period of axis a of a drive s."""
+    axis.speed_control(a, c, a.asked_rate, a.asked_torque, s.following, s.phase != drive_state.DISABLED,
+                       not s.braked)
+
+
+@compiled
+def between_speed_periods(s, c, substeps):
+    """Current loops and plant of one axis, or of lanes of them, from one speed-loop period to the next."""
+    axes = range(count(s))
+    for _ in range(axis.CURRENT_TICKS):
+        for i in axes:
+            axis.current_control(at(s, i).motor_1, at(c, i).motor_1)
+            axis.current_control(at(s, i).motor_2, at(c, i).motor_2)
+        for _ in range(substeps):
+            for i in axes:
+                axis.plant_step(at(s, i), at(c, i), at(s, i).external)
+
+
+@compiled
+def step(s, c, u, y):
+    """One control period from t_k to t_k+1. Records STATE, CONSTANTS, INPUTS, OUTPUTS, or lanes.Lanes of them, whose
+    periods and sub-steps are those of the first; s and y are written."""
+    drives = range(count(s))
+    for i in drives:
+        _begin(at(s, i), at(c, i), at(u, i), at(y, i))
+    for j in range(at(c, 0).speed_ticks):
+        for i in drives:
+            _obey(at(s, i), at(c, i), at(u, i), j)
+        for i in drives:
+            _speed_control(at(s, i), at(s, i).azimuth, at(c, i).azimuth)
+        for i in drives:
+            _speed_control(at(s, i), at(s, i).elevation, at(c, i).elevation)
+        between_speed_periods(s.azimuth, c.azimuth, at(c, 0).substeps)
+        between_speed_periods(s.elevation, c.elevation, at(c, 0).substeps)
+    for i in drives:
+        at(s, i).k += 1
+        read(at(s, i), at(c, i), at(y, i))

@@ -2,10 +2,10 @@
 same bits on every machine (reference/performance.md)."""
 import math
 
-from pedestal_common.compiled import compiled
+from adu_drive.lanes import inlined
 
 
-@compiled
+@inlined
 def exp_minus(y):
     """exp(-y) for y >= 0, absolute error < 6e-9: the Taylor series of degree 5 of exp(-y / 32), to the power 32."""
     x = min(y, 32.0) * -0.03125
@@ -18,14 +18,14 @@ def exp_minus(y):
     return e * e
 
 
-@compiled
+@inlined
 def tanh(x):
     """tanh(x), absolute error < 1.2e-8: (1 - e) / (1 + e) with e = exp(-2 |x|)."""
     e = exp_minus(2.0 * abs(x))
     return math.copysign((1.0 - e) / (1.0 + e), x)
 
 
-@compiled
+@inlined
 def lugre(z, v, T_c, T_sc, per_v2, sigma_0, h_sigma_0, sigma_1_h, h):
     """LuGre friction [Nm] at the rate v [rad/s] and the bristle deflection z one sub-step later.
 

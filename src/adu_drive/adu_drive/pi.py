@@ -1,8 +1,8 @@
 """The integral of a PI controller, held while its actuator cannot follow."""
-from pedestal_common.compiled import compiled
+from adu_drive.lanes import inlined
 
 
-@compiled
+@inlined
 def integral(total, error, K_iT, excess):
     """Integral part after one period T: total + K_i T e, held while e would push further into the limit.
 

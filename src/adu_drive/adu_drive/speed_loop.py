@@ -4,16 +4,16 @@ for comparison, one PI for each motor on its own speed (the other structure the 
 Seen in sum and difference, two loops are the one on the mean and a second one of half its gains on omega_1 - omega_2,
 whose integral holds whatever makes the motors differ: an offset of a current sensor, or the bias itself.
 """
-from pedestal_common.compiled import compiled
+from adu_drive.lanes import inlined
 
 
-@compiled
+@inlined
 def torque(error, total, K_p, feed_forward):
     """Torque demand per motor [Nm] from a speed error [rad/s] on the motor shaft."""
     return K_p * error + total + feed_forward
 
 
-@compiled
+@inlined
 def shared(T_1, T_2, T_b, omega_1, omega_2, K_d):
     """Torques [Nm] asked of the two motors: T_1,2 +- T_b -+ K_d (omega_1 - omega_2).
 
@@ -23,7 +23,7 @@ def shared(T_1, T_2, T_b, omega_1, omega_2, K_d):
     return T_1 + split, T_2 - split
 
 
-@compiled
+@inlined
 def limited(T, limit):
     """Torque [Nm] inside +-limit."""
     return min(max(T, -limit), limit)

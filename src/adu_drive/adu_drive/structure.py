@@ -4,7 +4,7 @@ The gear, the motors and the load encoder see the base; the beam goes where the 
 """
 import math
 
-from pedestal_common.compiled import compiled
+from adu_drive.lanes import inlined
 
 
 def spring_and_damper(inertia, frequency, damping):
@@ -14,7 +14,7 @@ def spring_and_damper(inertia, frequency, damping):
     return inertia * w * w, 2.0 * damping * inertia * w
 
 
-@compiled
+@inlined
 def swing(dish, omega_dish, theta, omega, torque, k, c, h, h_J):
     """Angle and rate of the dish one sub-step h later under an external torque [Nm], and the torque it puts on the
     base (theta, omega); h_J = h / inertia of the dish."""

@@ -5,7 +5,7 @@
 
 x follows the torque the motor truly makes, so what trips on it stands for a sensor in the winding.
 """
-from pedestal_common.compiled import compiled
+from adu_drive.lanes import inlined
 
 COPPER = 0.00393
 """Temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)."""
@@ -14,14 +14,14 @@ WARM = 0.8
 """Thermal load of a motor that is worth a warning."""
 
 
-@compiled
+@inlined
 def load(x, torque, per_rated, gain):
     """Thermal load one period later under a torque [Nm]; gain = 1 - exp(-h / tau)."""
     relative = torque * per_rated
     return x + gain * (relative * relative - x)
 
 
-@compiled
+@inlined
 def damping(h_R_L, rise, x):
     """Factor 1 / (1 + h R / L) of the current's implicit step with the winding at load x; rise = alpha dT."""
     return 1.0 / (1.0 + h_R_L * (1.0 + rise * x))

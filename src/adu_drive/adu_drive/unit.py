@@ -5,14 +5,17 @@ import typing
 
 import numpy as np
 
-from adu_drive import drive_state, drive_unit, faults, resting, thermal
+from adu_drive import drive_state, drive_unit, faults, injected, lanes, resting, stow_pins, thermal
 from pedestal_common import nodes, topics
+from pedestal_common.commands import Reply
 from pedestal_common.compiled import compiled
+from pedestal_common.injection import schedule, table
+from pedestal_common.injection.simulated import Simulated
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Reply, Unit, joined
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, joined
 
 CLOCK, COMMAND, SHIP, JOINTS, MOTORS = 'clock', 'acu/rate_command', 'ship/truth', 'joint_states', 'adu/motor_states'
-TRUTH, STATE = 'adu/truth', 'adu/state'
+TRUTH, STATE, PINS, PINS_ASKED = 'adu/truth', 'adu/state', 'adu/stow_pins', 'acu/stow_pins'
 
 INVALID = ('', COMMAND, SHIP)
 """Topics that can hold what the drive does not believe."""
@@ -24,7 +27,8 @@ which a command is stale; period T [ns]; stale: 1 while it is; invalid: of INVAL
 
 
 RECORD = np.dtype([('state', drive_unit.STATE), ('constants', drive_unit.CONSTANTS), ('inputs', drive_unit.INPUTS),
-                   ('outputs', drive_unit.OUTPUTS), ('link', LINK)], align=True)
+                   ('outputs', drive_unit.OUTPUTS), ('link', LINK), ('schedule', schedule.SCHEDULE),
+                   ('injected', injected.INJECTED)], align=True)
 
 
 class Memory(typing.NamedTuple):
@@ -42,13 +46,14 @@ def deck_acceleration(u, m, ship):
     if math.isfinite(w[0]) and math.isfinite(w[1]) and math.isfinite(w[2]) and ship.stamp != last:
         m.truth_stamp = ship.stamp
         for i in range(3):
-            m.deck_rate[i] = w[i]
+            m.deck_rate[i] = u.base_rate[i] = w[i]
 
 
 @compiled
-def decode(u, m, command, ship):
-    """Records of the messages -> inputs of the drive, which is at the stamp of the last step."""
-    if command.stamp != NEVER:
+def decode(u, m, dropped, command, ship):
+    """Records of the messages -> inputs of the drive, which is at the stamp of the last step; dropped: the command
+    does not reach it."""
+    if command.stamp != NEVER and dropped == 0:
         m.command_stamp = command.stamp
         u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
         u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
@@ -79,22 +84,41 @@ def encode(y, stamp, outputs):
             motors.position[2 * i + j] = axis.motor_position[j]
             motors.velocity[2 * i + j] = axis.motor_velocity[j]
             motors.effort[2 * i + j] = axis.motor_torque[j]
-    outputs[STATE] = y.condition
+    outputs[STATE], outputs[PINS] = y.condition, y.pins
+
+
+@compiled
+def listen(m, stamp, inputs):
+    """Take what was said of step k - 1; False in the first step, where nothing was."""
+    if m.link.stamp == NEVER:
+        m.state.k = stamp // m.link.period
+        return False
+    decode(m.inputs, m.link, m.injected.drop, inputs[COMMAND], inputs[SHIP])
+    m.inputs.pins = inputs[PINS_ASKED]
+    return True
+
+
+@compiled
+def tell(m, stamp, moved, outputs):
+    """Say how the drive is at t_k, to which it moved or at which it began."""
+    if moved and m.outputs.invalid_command:
+        note_invalid(m.inputs, m.link)
+    m.link.stamp = stamp
+    encode(m.outputs, stamp, outputs)
 
 
 @compiled
 def law(memory, stamp, inputs, outputs):
     """Step k: from t_k-1 to t_k, obeying what was said of step k - 1."""
     m = memory.record[0]
-    if m.link.stamp == NEVER:
-        m.state.k = stamp // m.link.period
-    else:
-        decode(m.inputs, m.link, inputs[COMMAND], inputs[SHIP])
+    if schedule.pending(m.schedule, stamp):
+        injected.take(m, stamp)
+    moved = listen(m, stamp, inputs)
+    if moved:
         drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
-        if m.outputs.invalid_command:
-            note_invalid(m.inputs, m.link)
-    m.link.stamp = stamp
-    encode(m.outputs, stamp, outputs)
+    tell(m, stamp, moved, outputs)
+    if m.schedule.pending != 0:
+        injected.spoil_messages(m.injected, stamp, outputs)
 
 
 @compiled
@@ -104,10 +128,32 @@ def laws(memory, stamps, inputs, outputs):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
-class Adu(Unit):
+ON_LANES = {'uneven': 0, 'toothless': 0, 'stuck': 0, 'exact': 1}
+"""Flags of RECORD that drives on lanes have so: even gears and motors, whole pinions, encoders without errors. Their
+other values bring in sines, of which there are none for vectors."""
+
+LANES = lanes.view(RECORD, ON_LANES)
+"""Drives in a flat array of lanes.beside(RECORD), for compiled code."""
+
+
+@compiled
+def law_of_lanes(drives, stamp, inputs, outputs):
+    """`law` of the first len(inputs) of LANES, which are at the same step and fit them (Adu.fits_lanes)."""
+    moved = False
+    for i in range(len(inputs)):
+        m = lanes.at(drives, i)
+        m.schedule.stamp = stamp
+        moved = listen(m, stamp, inputs[i])
+    if moved:
+        drive_unit.step(drives.state, drives.constants, drives.inputs, drives.outputs)
+    for i in range(len(inputs)):
+        tell(lanes.at(drives, i), stamp, moved, outputs[i])
+
+
+class Adu(Simulated):
     """The drive of an AduNodeParameters."""
     NODE, COMMAND, LAWS = nodes.row(nodes.DRIVE), COMMAND, {Memory: (law, laws)}
-    REQUESTS = tuple(drive_state.REQUESTS)
+    REQUESTS, VERBS = tuple(drive_state.REQUESTS), table.VERBS[NODE.name]
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
@@ -116,11 +162,20 @@ class Adu(Unit):
         link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
         link['period'] = round(parameters.period * 1e9)
         self.memory = Memory(joined(RECORD, state=drive_unit.initial_state(parameters),
-                                    constants=drive_unit.constants(parameters), link=link))
+                                    constants=drive_unit.constants(parameters), link=link,
+                                    schedule=schedule.empty()))
         drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
 
     def latency(self, topic):
         return self.parameters.period
+
+    @property
+    def fits_lanes(self):
+        """Whether it can run on lanes: its flags are those of ON_LANES, and no fault will be injected."""
+        axes = [self.parts[part][axis] for part in ('state', 'constants') for axis in topics.AXES]
+        flags = [flags[name] == value for name, value in ON_LANES.items()
+                 for flags in (*axes, *(c['encoder'] for c in axes[2:])) if name in flags.dtype.names]
+        return all(flags) and not self.parameters.inject
 
     @property
     def rests(self):
@@ -132,7 +187,8 @@ class Adu(Unit):
         was."""
         angles = {f'initial_{axis}': min(max(getattr(left, axis), limits.lower), limits.upper) for axis, limits in (
             (axis, getattr(self.parameters, axis).limits) for axis in topics.AXES)}
-        parameters = dataclasses.replace(self.parameters, initially_enabled=False, **angles)
+        pins = dataclasses.replace(self.parameters.pins, initially_in=left.pinned)
+        parameters = dataclasses.replace(self.parameters, initially_enabled=False, **angles, pins=pins)
         self.memory.record['state'] = drive_unit.initial_state(parameters)
         self.parts['state']['wanted'] = left.enabled
         drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
@@ -140,11 +196,17 @@ class Adu(Unit):
     def left(self):
         """Where it is and whether it is enabled, as `resume` takes it."""
         o = self.parts['outputs']
-        enabled = o['wanted'] and not (o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults'])
-        return resting.Left(*(float(o[axis]['position']) for axis in topics.AXES), bool(enabled))
+        enabled = o['wanted'] and not (o['emergency'] or self.tripped)
+        pinned = not stow_pins.clear(self.parts['state']['pins'])
+        return resting.Left(*(float(o[axis]['position']) for axis in topics.AXES), bool(enabled), pinned)
 
     def encode(self, topic, code):
-        return drive_state.described(code)
+        return drive_state.described(code) if topic == STATE else super().encode(topic, code)
+
+    @property
+    def tripped(self):
+        """Whether an axis has a fault that stops the drive."""
+        return any(faults.stops(int(self.parts['outputs'][axis]['faults'])) for axis in topics.AXES)
 
     @property
     def condition(self):
@@ -161,11 +223,11 @@ class Adu(Unit):
     def requests_for(self, topic, text):
         o = self.parts['outputs']
         tripped, stopped = 'fault' in text, 'emergency stop' in text
-        latched = o['emergency'] or o['azimuth']['faults'] | o['elevation']['faults']
+        latched = o['emergency'] or self.tripped
         wanted = {'adu/emergency_stop': stopped and not o['emergency'],
                   'adu/reset_faults': latched and not tripped and not stopped,
                   'adu/disable': text in ('stopping', 'disabled') and o['wanted'],
-                  'adu/enable': text in ('releasing brakes', 'enabled') and not o['wanted']}
+                  'adu/enable': text in ('releasing brakes', *topics.ENABLED) and not o['wanted']}
         return [service for service, due in wanted.items() if due]
 
     def diagnose(self):
@@ -179,7 +241,9 @@ class Adu(Unit):
                    for i, load in enumerate(axis['thermal_load'], 1)]
         values += [('state', self.condition), ('phase', drive_state.PHASES[outputs['phase']]),
                    ('brakes', 'on' if outputs['braked'] else 'off')]
-        if outputs['emergency'] or any(axis['faults'] for axis in axes.values()):
+        if self.parameters.stow_pins:
+            values.append(('stow_pins', self.encode(PINS, int(outputs['pins']))))
+        if outputs['emergency'] or self.tripped:
             return Diagnosis(ERROR, self.condition, values)
         if invalid:
             largest = f'{drive_unit.LARGEST:g}'

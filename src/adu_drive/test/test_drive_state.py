@@ -40,7 +40,12 @@ CAUSES = {
 2 * 64 * 90 Nm and friction."""
 
 
-@pytest.mark.parametrize('kind', [fault.name for fault in faults.FAULTS])
+def test_every_fault_is_caused():
+    assert {*CAUSES, 'final limit', 'emergency limit', 'stow pin'} == {
+        fault.name for fault in faults.FAULTS if fault.stops}
+
+
+@pytest.mark.parametrize('kind', CAUSES)
 def test_each_fault_trips_latches_and_stops_both_axes(drive, kind):
     values, command = CAUSES[kind]
     d = made(drive, **values).run(3.0, elevation=0.05, **command)
@@ -64,6 +69,39 @@ def test_overcurrent_takes_the_torque_away_at_once_and_the_brakes_fall_in(drive)
     torque, braked = np.abs(d.log['azimuth']['true_torque']).max(axis=1), d.log['braked']
     assert torque[tripped:tripped + 2].min() < 5.0 and torque[tripped + 3:].max() < 0.5
     assert not braked[:tripped + 10].any() and braked[tripped + 12:].all()      # 50 ms later
+
+
+def beyond_its_end(drive, rate):
+    """A drive whose load encoder reads 0.6 rad too little, sent beyond the end of travel at a rate [rad/s]."""
+    limits = AduParameters().azimuth.limits
+    d = made(drive, azimuth__faults__encoder_disagreement=1.0, initial_azimuth=limits.upper - 0.1)
+    d.state['azimuth']['jump'] = -0.6 * d.constants['azimuth']['per_rad']
+    return d.run(1.5 + 0.1 / rate, azimuth=rate), limits
+
+
+def test_the_final_switch_takes_the_torque_away_whatever_the_encoder_says_and_the_drive_leads_back(drive):
+    d, limits = beyond_its_end(drive, 0.5)
+    final, emergency, _ = limits.switches
+    y = d.log
+    tripped = np.flatnonzero(y['azimuth']['faults'])[0]
+    assert faults.names(y['azimuth']['faults'][-1]) == ('final limit',) and phases(d) == ['enabled', 'disabled']
+    assert y['azimuth']['load_position'][tripped] == pytest.approx(limits.upper + final, abs=0.5 * 0.006)
+    assert np.abs(y['azimuth']['true_torque'][tripped + 3:]).max() < 0.5 and y['braked'][-1]
+    assert y['azimuth']['load_position'][-1] < limits.upper + emergency
+    d.state['azimuth']['jump'] = 0.0
+    assert request(d, 'RESET_FAULTS') == drive_state.GRANTED
+    d.run(3.5)
+    led = d.log['azimuth'][-700:]
+    assert not led['faults'][-1] and led['load_velocity'].min() > -0.3        # 0.1 rad/s at once: it overshoots
+    assert led['load_position'][-1] == pytest.approx(limits.upper, abs=1e-3) and d.log['following'][-1]
+
+
+def test_the_emergency_switch_is_not_reset_while_it_is_pressed(drive):
+    d, limits = beyond_its_end(drive, 2.4)
+    assert faults.names(d.log['azimuth']['faults'][-1]) == ('final limit', 'emergency limit')
+    assert d.log['azimuth']['load_position'].max() < limits.upper + 1.2 * limits.switches[2]
+    assert np.abs(d.log['azimuth']['load_velocity'][-20:]).max() < 1e-3
+    assert request(d, 'RESET_FAULTS') == drive_state.CAUSE_PERSISTS
 
 
 def test_a_runaway_ends_in_the_brakes(drive):

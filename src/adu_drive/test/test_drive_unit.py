@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from adu_drive import drive_unit
+from adu_drive import drive_unit, faults
 from adu_drive.params import (
     AduParameters,
     AxisParameters,
@@ -16,7 +16,7 @@ from adu_drive.params import (
     WindParameters,
 )
 from pedestal_common.line_of_sight import direction
-from pedestal_common.parameters import build
+from pedestal_common.parameters import ParameterError, build
 
 LOAD_STEP = 2.0 * math.pi / 2 ** 22
 MOTOR_STEP = 2.0 * math.pi / 2 ** 20
@@ -131,12 +131,29 @@ def test_buffer_stops_a_load_the_drive_cannot_hold(drive):
     limits = LimitParameters()
     gust = GustParameters(kind='step', azimuth=20000.0, start=0.005)
     d = drive(dataclasses.replace(
-        build(AduParameters, {'azimuth.faults.following_time': 100.0, 'azimuth.faults.encoder_disagreement': 1.0}),
+        build(AduParameters, {'azimuth.faults.following_time': 100.0, 'azimuth.faults.encoder_disagreement': 1.0,
+                              'azimuth.faults.overcurrent': 1000.0, 'azimuth.faults.overspeed': 50.0}),
         initial_azimuth=limits.upper - 0.05, wind=WindParameters(gust=gust))).run(2.0, azimuth=0.0)
     a = d.log['azimuth']
-    rest = limits.upper + limits.buffer + (20000.0 - 2.0 * 64.0 * 90.0) / limits.buffer_stiffness
-    assert a['load_position'][-1] == pytest.approx(rest, abs=2e-4) and a['end_stop'][-1]
-    assert a['load_position'].max() < limits.upper + 2.0 * limits.buffer
+    final, emergency, buffer = limits.switches
+    brakes = 2.0 * 64.0 * 45.0 + 80.0
+    pressed = (a['load_position'][-1] - limits.upper - buffer) * limits.buffer_stiffness
+    assert 20000.0 - brakes <= pressed <= 20000.0 + brakes and abs(a['load_velocity'][-1]) < 1e-6
+    assert a['load_position'].max() < limits.upper + 1.2 * buffer
+    told = [faults.names(word) for word in a['faults'][[np.flatnonzero(a['faults'])[0], -1]]]
+    assert told == [('final limit',), ('final limit', 'emergency limit')]
+    assert a['load_position'][np.flatnonzero(a['faults'])[0] - 1] < limits.upper + final < limits.upper + emergency
+
+
+def test_switches_stand_behind_the_way_in_which_the_axis_stops():
+    limits = LimitParameters()
+    way = 2.45**2 / 40.0 + 2.45 * 0.01
+    assert limits.switches == pytest.approx((way, 1.5 * way, 1.5 * way + math.radians(2.0)))
+    with pytest.raises(ParameterError, match=r'final = 0.1 rad: must be at least 0.1746 rad, in which the axis stops '
+                       r'from rate = 2.45 rad/s with deceleration = 20 rad/s2'):
+        LimitParameters(final=0.1)
+    with pytest.raises(ParameterError, match='final = 0.2, emergency = 0.19, buffer = '):
+        LimitParameters(final=0.2, emergency=0.19)
 
 
 def test_rate_command_is_limited(drive):

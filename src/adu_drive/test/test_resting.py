@@ -41,7 +41,7 @@ def test_a_plant_stands_on_its_brakes_where_it_was_left(enabled, state):
     outputs = adu.parts['outputs']
     assert outputs['azimuth']['position'] == pytest.approx(1.25, abs=2e-6)
     assert outputs['elevation']['position'] == pytest.approx(0.75, abs=2e-6)
-    assert adu.left() == (outputs['azimuth']['position'], outputs['elevation']['position'], enabled)
+    assert adu.left() == (outputs['azimuth']['position'], outputs['elevation']['position'], enabled, False)
 
 
 def test_an_angle_beyond_the_travel_is_at_its_end():

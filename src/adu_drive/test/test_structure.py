@@ -80,6 +80,7 @@ def test_deck_acceleration_acts_on_dish_and_base_alike(drive):
 def ring(state, constants, log):
     """Plant alone, both motors clamped: the dish and the base on the meshes after a blow on the dish."""
     s, c = state[0].azimuth, constants[0].azimuth
+    axis.begin_period(s, c, False)
     s.omega_dish = 0.02
     for k in range(len(log)):
         s.motor_1.omega = s.motor_2.omega = 0.0

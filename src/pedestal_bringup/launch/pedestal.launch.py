@@ -38,6 +38,7 @@ def start(context):
 
 
 def generate_launch_description():
+    """The launch description of a scenario, as ros2 launch asks for it."""
     return LaunchDescription([
         DeclareLaunchArgument('scenario', default_value='leo_pass'),
         DeclareLaunchArgument('pacing', default_value=''),

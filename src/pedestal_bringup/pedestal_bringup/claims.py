@@ -20,7 +20,7 @@ def _of(study, *claims):
 
 
 PAPER_000 = (
-    Claim('figures 1 to 4: block diagrams, gear train, simulation model', 'built: README, The chain; adu_drive'),
+    Claim('figures 1 to 4: block diagrams, gear train, simulation model', 'built: graph.md, The chain; adu_drive'),
     Claim('table 1: 30 Nm, 1500 rpm, 4.7 kW; 1.736 and 1.731 ohm, 20.199 and 20.149 mH between the terminals',
           'half of each is that of a phase: defaults of `adu`'),
     *_of('servo', *(

@@ -13,8 +13,8 @@ import sys
 from pedestal_bringup.console import EXIT_STOPPED, STDOUT
 from pedestal_common.parameters import ParameterError
 
-VERBS = ('run', 'scenarios', 'parameters', 'program', 'verify', 'recover', 'rerun', 'report', 'study', 'export',
-         'recompute', 'tune', 'replay', 'bench')
+VERBS = ('run', 'scenarios', 'samples', 'new', 'parameters', 'status', 'mode', 'ask', 'operate', 'live', 'program',
+         'verify', 'recover', 'rerun', 'report', 'study', 'trials', 'export', 'recompute', 'tune', 'replay', 'bench')
 """In the order of the help."""
 
 

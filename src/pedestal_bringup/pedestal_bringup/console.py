@@ -54,6 +54,34 @@ def progress_of_share():
         yield lambda share, text: bar.update(task, completed=share, description=text)
 
 
+@contextlib.contextmanager
+def progress_of_trials():
+    """Context with a function progress(trials done, in all): a bar with rate and time left on a terminal, nothing in a
+    pipe."""
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn('trials, {task.fields[rate]}'), TimeElapsedColumn(),
+               TextColumn('left'), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task('', total=None, rate='compiling the laws (the first time)')
+
+        def advance(done, total):
+            speed = bar.tasks[0].speed
+            rate = {'rate': f'{speed:.1f} a second'} if speed else {}
+            bar.update(task, completed=done, total=total, **rate)
+        yield advance
+
+
 def add_json(parser):
     """The option --json FILE of a verb that measures."""
     parser.add_argument('--json', type=lambda text: STDOUT if text == '-' else pathlib.Path(text), metavar='FILE',
@@ -90,9 +118,9 @@ def show_list(rows):
             print(f'{head:{indent - 2}}  {first}', *(' ' * indent + line for line in more), sep='\n')
 
 
-def show_results(title, columns, results, whole):
+def show_results(title, columns, results, whole, marks=()):
     """Print a table of metrics. columns: heads, '' for a single one; results: {metric: (value, unit)} of each column;
-    whole: {metric: (value, unit)} of the run."""
+    whole: {metric: (value, unit)} of the run; marks: {metric: what is off about it} of each column."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -101,15 +129,45 @@ def show_results(title, columns, results, whole):
     for column in columns:
         table.add_column(column or 'value', justify='right')
     table.add_column('unit')
+    marked = {}
+    for column, of in zip(columns, marks):
+        for metric, text in of.items():
+            marked.setdefault(metric, []).append(f'{column}: {text}' if column else text)
+    if marked:
+        table.add_column('off')
     for metric, (_, unit) in results[0].items():
-        table.add_row(metric, *(_measured(values[metric][0]) for values in results), unit)
+        table.add_row(metric, *(measured(values[metric][0]) for values in results), unit,
+                      *([', '.join(marked.get(metric, ()))] if marked else ()))
     for metric, (value, unit) in whole.items():
-        table.add_row(metric, _measured(value), *[''] * (len(columns) - 1), unit)
+        table.add_row(metric, measured(value), *[''] * (len(columns) - 1), unit)
     Console(width=max(Console().width, TABLE_WIDTH) if len(columns) > 1 else None).print(table)
 
 
-def _measured(value):
-    return f'{value:.6g}' if math.isfinite(value) else 'not measured'
+def measured(value):
+    """A number of a run as text: four digits, a large count whole."""
+    if not math.isfinite(value):
+        return 'not measured'
+    return f'{value:,.0f}' if abs(value) >= 1e4 and value == int(value) else number(value)
+
+
+def add_explain(parser):
+    """The option --explain of a verb that prints results."""
+    parser.add_argument('--explain', action='store_true', help='say of each result what it is, in a sentence')
+
+
+def explain(table, names):
+    """Print what each result is, those of `names`. table: rows with name and sentence, such as results.RESULTS."""
+    show_list((row.name, row.sentence) for row in table if row.name in names)
+
+
+def number(value):
+    """A number of a study's row as text, '-' for None."""
+    return '-' if value is None else f'{value:.4g}'
+
+
+def interval(row):
+    """The interval of a study's row as text, '' where it is of one run."""
+    return f'{number(row["ci_low"])} to {number(row["ci_high"])}' if 'runs' in row else ''
 
 
 def show_study(title, rows, missed):
@@ -117,16 +175,38 @@ def show_study(title, rows, missed):
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
-
-    def number(value):
-        return '-' if value is None else f'{value:.4g}'
-
     table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     for name, justify in (('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'),
                           ('95 % interval', 'right'), ('target', 'left'), ('unit', 'left'), ('', 'left')):
         table.add_column(name, justify=justify, no_wrap=True)
     for row in rows:
-        interval = f'{number(row["ci_low"])} to {number(row["ci_high"])}' if 'runs' in row else ''
-        table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), interval,
+        table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), interval(row),
                       row['target'] or '', row['unit'], 'MISSED' if missed(row) else '')
     Console(width=max(Console().width, TABLE_WIDTH)).print(table)
+
+
+def show_trials(title, rows):
+    """Print what trials say of each result: rows of trials.statistics."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+    of_results, others = {}, []
+    for row in rows:
+        metric, _, key = row['metric'].rpartition('/')
+        if key in ('mean', 'p05', 'p50', 'p95', 'max'):
+            of_results.setdefault((row['case'], metric, row['unit']), {})[key] = row
+        elif key in ('rate', 'difference', 'gain', 'wins'):
+            others.append(row)
+    table = Table(title=Text(title), title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    for name in ('case', 'result', 'mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials', 'unit'):
+        table.add_column(name, justify='left' if name in ('case', 'result', 'unit') else 'right', no_wrap=True)
+    for (case, metric, unit), found in of_results.items():
+        mean = found['mean']
+        table.add_row(case, metric, number(mean['value']), interval(mean),
+                      *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), str(mean['runs']), unit)
+    for row in others:
+        table.add_row(row['case'], row['metric'], number(row['value']), interval(row), '', '', '', '',
+                      str(row['runs']), row['unit'])
+    longest = max((len(row['case']) for row in rows), default=0)
+    Console(width=max(Console().width, TABLE_WIDTH + longest)).print(table)

@@ -1,7 +1,7 @@
 """The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made of them.
 
-`python -m pedestal_bringup.published` (make numbers) runs the studies and writes the rows that the tables use; make
-docs writes the tables from those.
+`python -m pedestal_bringup.published` (make numbers) runs the studies and writes the rows that the tables use, with
+names of studies those of them only; make docs writes the tables from those.
 """
 import inspect
 import json
@@ -11,7 +11,9 @@ import sys
 
 from pedestal_bringup import claims, console, studies
 from pedestal_bringup.studies import (
+    acquisition,
     alignment,
+    budget,
     filters,
     imm_feedforward,
     manoeuvre,
@@ -50,7 +52,15 @@ SEEN = (
     ('at 60 m (`pedestal study scenarios` says how), cross-elevation', 'uav_flyby-60m',
      'noise_reduction_cross_elevation'),
     ('the same, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
-"""(what, case, metric) of the study scenarios in README.md."""
+"""(what, case, metric) of the study scenarios in docs/measured.md."""
+HEADLINE = (
+    ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
+    ("the same over the receiver's single-sample noise", 'leo_pass', 'pointing_to_noise'),
+    ('a UAV at 500 m: noise of a sample over that of the estimate, elevation', 'uav_flyby',
+     'noise_reduction_elevation'),
+    ('the pass from a ship in sea state 5: its rms over that ashore', 'ship_pass', 'pointing_to_leo_pass'),
+    ('from a ship in sea state 6: isolation from its rotation', 'ship_pass_ss6', 'isolation_db'))
+"""The few of them in README.md."""
 
 
 class Rows(dict):
@@ -86,16 +96,10 @@ def write(rows, root='.'):
     pathlib.Path(root, FILE).write_text('{\n' + content + '\n}\n')
 
 
-def _number(value):
-    return '-' if value is None else f'{value:.4g}'
-
-
 def _cells(row):
     """Texts of a row: its value with the unit, its interval, its runs."""
-    value = f'{_number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
-    if 'runs' not in row:
-        return value, '', ''
-    return value, f'{_number(row["ci_low"])} to {_number(row["ci_high"])}', str(row['runs'])
+    value = f'{console.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
+    return value, console.interval(row), str(row.get('runs', ''))
 
 
 def _asked(row):
@@ -106,16 +110,18 @@ def _spread(row):
     """The mean of a row and half its interval to two digits, 'a +- b'; the mean alone where all runs give the same."""
     half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
     if half <= 1e-9 * abs(row['value']):
-        return _number(row['value'])
+        return console.number(row['value'])
     decimals = max(0, 1 - math.floor(math.log10(half)))
     return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
 
 
-def seen_table(rows):
-    """What README.md says of the scenarios."""
-    of = [rows['scenarios', case, metric] for _, case, metric in SEEN]
-    return ('what', 'mean', '95 % interval', 'seeds', 'asked'), [
-        (what, *_cells(row), _asked(row)) for (what, *_), row in zip(SEEN, of)]
+def seen_table(seen):
+    """rows -> the table of what is said of the scenarios, SEEN or HEADLINE."""
+    def table(rows):
+        of = [rows['scenarios', case, metric] for _, case, metric in seen]
+        return ('what', 'mean', '95 % interval', 'seeds', 'asked'), [
+            (what, *_cells(row), _asked(row)) for (what, *_), row in zip(seen, of)]
+    return table
 
 
 def claim_table(paper):
@@ -175,7 +181,7 @@ def feedforward_numbers(rows):
 def matrix_table(rows):
     """The matrices of paper 004's proof of stability, in seconds, with rank and condition."""
     lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
-              *(_number(rows['telemetry-flight', name, metric]['value'])
+              *(console.number(rows['telemetry-flight', name, metric]['value'])
                 for metric in ('rank', 'condition', 'condition_in_seconds')))
              for name, (matrix, _) in telemetry_flight.matrices().items()]
     return ('matrix', 'its lines, in seconds', 'rank', 'condition, time in T', 'in seconds'), lines
@@ -210,6 +216,23 @@ def alignment_numbers(rows):
         *lines, ('limit', *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
 
 
+def acquisition_numbers(rows):
+    """How long acquisition takes, and how often it succeeds."""
+    lines = []
+    for case in acquisition.CASES:
+        if case == 'steptrack_geo':
+            continue
+        time, found, least = (rows['acquisition', case, metric] for metric in (
+            'tracked_after_s', 'found_percent', 'found_percent_low'))
+        lines.append((f'`{case}`', *_cells(time), f'{found["value"]:.0f} %', f'{least["value"]:.1f} %',
+                      _asked(found)))
+    loss, off = (rows['acquisition', 'steptrack_geo', metric] for metric in (
+        'level_loss_rms_db', 'pointing_max_beamwidths'))
+    return ('case', 'tracked after', '95 % interval', 'runs', 'found', 'at least', 'asked'), [
+        *lines, ('`steptrack_geo`: level lost after 90 s, rms', *_cells(loss), '', '', _asked(loss)),
+        ('the same: largest error', *_cells(off), '', '', '')]
+
+
 ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms', 'best')
 
 
@@ -226,22 +249,66 @@ def array_numbers(rows):
     return ('loop', 'largest error without noise, deg', 'isolation dB', 'jitter rms deg'), lines
 
 
-TABLES = {'results over seeds': seen_table,
+MILLI = 1e3
+
+
+def _milli(row):
+    """A row in degrees as millidegrees, mean and half its interval."""
+    return _spread({key: value * MILLI if key in ('value', 'ci_low', 'ci_high') else value
+                    for key, value in row.items()})
+
+
+def budget_table(mode):
+    """rows -> the error budget of a mode: each term alone, then what they add up to."""
+    sums = {'systematic': ('', 'the systematic ones, added as signed vectors'),
+            'whole': ('', 'the run with everything on')}
+
+    def table(rows):
+        kinds = {**{name: ('systematic', doc) for name, doc in budget.documented(mode, random=False).items()},
+                 **{name: ('random', doc) for name, doc in budget.documented(mode, random=True).items()}, **sums}
+        lines = [(name, kind, doc, *(_milli(rows['budget', f'{mode}/{name}', metric]) for metric in (
+            'cross_elevation_rms_deg', 'elevation_rms_deg', 'rms_deg'))) for name, (kind, doc) in kinds.items()]
+        whole = lines.pop()
+        ratio = rows['budget', f'{mode}/combined', 'to_whole']
+        combined = ('combined', '', f'all of it; over the whole {_spread(ratio)}, asked {_asked(ratio)}', '', '',
+                    _milli(rows['budget', f'{mode}/combined', 'rms_deg']))
+        return ('term', 'kind', 'what it is', 'cross-elevation, mdeg rms', 'elevation', 'together'), [
+            *lines, combined, whole]
+    return table
+
+
+def direction_table(mode):
+    """rows -> the systematic contributions of a mode along the pass, both axes with their signs."""
+    def table(rows):
+        cases = [f'{mode}/{time}s' for time in budget.TIMES]
+        head = [f'az {rows["budget", case, "azimuth_deg"]["value"]:.0f}, '
+                f'el {rows["budget", case, "elevation_deg"]["value"]:.0f} deg' for case in cases]
+        names = [*budget.documented(mode, random=False), 'systematic']
+        return ('term', *head), [
+            (name, *(', '.join(f'{MILLI * rows["budget", case, f"{name}_{axis}_deg"]["value"]:+.2f}'
+                               for axis in budget.ACROSS) for case in cases)) for name in names]
+    return table
+
+
+TABLES = {'results over seeds': seen_table(SEEN), 'headline results': seen_table(HEADLINE),
+          **{f'budget of {mode}': budget_table(mode) for mode in budget.MODES},
+          **{f'directions of {mode}': direction_table(mode) for mode in budget.MODES},
           **{f'claims of paper {paper}': claim_table(paper) for paper in claims.PAPERS},
           'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
           'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
-          'array loops': array_numbers, 'matrices': matrix_table}
+          'acquisition': acquisition_numbers, 'array loops': array_numbers, 'matrices': matrix_table}
 """{name: rows -> (head, lines)}."""
 
 STUDIES = tuple(dict.fromkeys((*(claim.study for of in claims.PAPERS.values() for claim in of if claim.study),
-                               'filters', 'pareto', 'scenarios')))
+                               'filters', 'pareto', 'scenarios', 'budget', 'acquisition')))
 
 
-def main(root='.') -> int:
-    """Run STUDIES with their own number of runs and write FILE."""
-    rows_of = {}
+def main(names=(), root='.') -> int:
+    """Run the STUDIES of these names, by default all, with their own number of runs, and write FILE; the rows of the
+    others stay."""
+    rows_of = json.loads(pathlib.Path(root, FILE).read_text()) if names else {}
     with monte_carlo.Pool() as pool, console.progress_of_share() as progress:
-        for name in STUDIES:
+        for name in names or STUDIES:
             study = studies.study(name)
             many = {'pool': pool} if 'pool' in inspect.signature(study.run).parameters else {}
             print(name, flush=True)
@@ -251,4 +318,4 @@ def main(root='.') -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

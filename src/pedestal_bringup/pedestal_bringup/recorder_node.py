@@ -41,6 +41,8 @@ class RecorderNode(shell.Shell):
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
         beams, flags = self.graph.beams, [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
         recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
+        if self.graph.lockstep:  # where commands have no place between two steps, but the replies, which repeat them
+            recorded = [link for link in recorded if link.rate != 'command']
         self._end = round(self.parameters.duration * SECOND) or None
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
@@ -67,16 +69,19 @@ class RecorderNode(shell.Shell):
     def _record(self, index, topic):
         """Subscribe with a history that drops nothing in lockstep, whatever the writer keeps, and holds seconds in
         realtime."""
-        profile = middleware.qos(topic.rate, 'lockstep' if self.graph.lockstep else 'recorded')
+        take = self._taker(index, topic)
         if self.graph.lockstep:
+            profile = middleware.qos(topic.rate)
             profile.history = HistoryPolicy.KEEP_ALL
-        self.create_subscription(middleware.message_class(topic.type), topic.name, self._callback(index, topic),
-                                 profile, raw=True)
+            self.create_subscription(middleware.message_class(topic.type), topic.name, listening.pair(take), profile,
+                                     raw=True)
+        else:
+            listening.subscribe(self, topic, topic.name, take, 'recorded')
 
-    def _callback(self, index, topic):
+    def _taker(self, index, topic):
         put = self._in_step(index, topic) if self.graph.lockstep else self._as_it_comes(index, topic)
         counted = self._unbroken(index, topic) if self.graph.lockstep else self._by_writer(index, topic)
-        checked = len(topic.writers) == 1
+        checked = len(topic.writers) == 1 and (self.graph.lockstep or topic.rate != 'once')
         taken = self._taken
 
         def take(data, info):
@@ -87,7 +92,7 @@ class RecorderNode(shell.Shell):
                 put(data, info)
             except (BagError, OrderError) as error:
                 self._fail(str(error))
-        return listening.pair(take)
+        return take
 
     def _unbroken(self, index, topic):
         """Lockstep: the numbers of the one writer go up by one. A topic that is always there begins with the first."""
@@ -267,6 +272,7 @@ class RecorderNode(shell.Shell):
 
 
 def main(args=None):
+    """Run the node to its end; the exit code."""
     return shell.main(RecorderNode, args)
 
 

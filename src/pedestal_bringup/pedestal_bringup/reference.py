@@ -6,31 +6,37 @@ import pathlib
 import re
 import sys
 
-from acu_tracker import faults as acu_faults
 from acu_tracker import modes
+from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.kinds import KINDS
 from adu_drive import faults
 from pedestal_bringup import published, studies
 from pedestal_bringup.again import what_if
 from pedestal_bringup.analysis import results
 from pedestal_bringup.run import scenario
+from pedestal_bringup.studies.rigs.fault_expectations import EXPECTED
 from pedestal_common import nodes, parameters, topics
+from pedestal_common.injection.table import FAULTS
 
-FILES = ('README.md', 'docs/graph.md', 'docs/papers.md')
+FILES = ('README.md', *(f'docs/{name}.md' for name in (
+    'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools')))
 FIRST = (
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
     'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
     'adu.azimuth.speed_loop.disturbance_observer', 'adu.azimuth.structure.inertia_share', 'adu.wind.gust.kind',
+    'adu.wind.field.speed', 'adu.mount.collimation', 'adu.azimuth.encoder.error.zero',
     'adu.azimuth.gear_train.lash', 'acu.azimuth.filter.kind', 'acu.azimuth.filter.current_statistical.a_max',
     'acu.azimuth.filter.current_statistical.alpha', 'acu.tracker.ukf.cv_noise',
     'acu.azimuth.feedforward.acceleration_feedforward', 'acu.azimuth.filter.imm.models', 'acu.tracker.gate',
     'acu.azimuth.controller', 'acu.azimuth.feedforward.bandwidth', 'acu.azimuth.notch.frequency',
     'acu.azimuth.shaper.acceleration', 'acu.initial_mode', 'tracking_receiver.receiver.cn0_dbhz',
-    'tracking_receiver.antenna.beamwidth', 'tracking_receiver.receiver.latency', 'ship_motion.ship.motion',
-    'ship_motion.ship.sea_state', 'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
-"""The parameters in the table of README.md."""
+    'tracking_receiver.antenna.beamwidth', 'tracking_receiver.path.refractivity',
+    'tracking_receiver.receiver.latency', 'ship_motion.ship.motion', 'ship_motion.ship.sea_state',
+    'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
+"""The parameters in the table of docs/parameters.md."""
 
-RATES = {'step': 'step', 'once': 'once, latched', 'second': '1 Hz', 'change': 'on change, latched'}
+RATES = {'step': 'step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
+         'command': 'when somebody asks'}
 
 
 def _table(head, rows):
@@ -64,6 +70,43 @@ def service_table():
     return _table(('node', 'services (std_srvs/Trigger)'), rows)
 
 
+def command_table():
+    """What every node can be asked for on its topic of commands."""
+    rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
+            for node in nodes.UNITS if node.obeys and node.name not in FAULTS for verb in node.unit_type().VERBS]
+    return _table(('topic', 'verb', 'arguments', 'what it does'), rows)
+
+
+def injection_table():
+    """What every simulated node can be broken by."""
+    rows = [(f'`{node}`', f'`{fault.name}`', ', '.join(map(_defaulted, fault.arguments[:-1])), fault.doc,
+             '' if fault.lockstep else 'no') for node, faults in FAULTS.items() for fault in faults]
+    return _table(('node', 'fault', 'arguments', 'what it breaks', 'in lockstep'), rows)
+
+
+def _defaulted(argument):
+    """An argument of a fault: its default, range, unit and meaning."""
+    text = f'{argument.name} = {argument.default}' if argument.options else f'{argument.name} = {argument.default:g}'
+    return f'`{text}` ({argument.range} {argument.unit}; {argument.doc})'.replace(' ;', ';')
+
+
+def expectation_table():
+    """What is expected of every fault; modes of which the same is expected together."""
+    rows = []
+    for fault, of_modes in EXPECTED.items():
+        alike = {}
+        for mode, expected in of_modes.items():
+            alike.setdefault(expected.sentence('the same mode'), []).append(mode)
+        rows += [(f'`{fault}`', ', '.join(modes), sentence) for sentence, modes in alike.items()]
+    return _table(('fault', 'in', 'expected'), rows)
+
+
+def _argument(argument):
+    """An argument with its range and unit; in brackets where it may be left out."""
+    text = f'{argument.name} = {argument.range} {argument.unit}'.rstrip()
+    return f'`{text}`' if argument.default is None else f'[`{text}`]'
+
+
 def mode_table():
     """The modes of the control unit."""
     return _table(('mode', 'the axes follow', 'entered', 'left by itself'),
@@ -82,10 +125,22 @@ def fault_table():
                    for fault in faults.FAULTS])
 
 
-def acu_fault_table():
-    """The faults of the control unit."""
-    return _table(('fault', 'from', 'what it does'),
-                  [(f'`{fault.name}`', fault.doc, fault.effect) for fault in acu_faults.FAULTS])
+def alarm_table():
+    """The alarms of the control unit; those of both axes in one line."""
+    def both(text):
+        return text.replace(f'{topics.AXES[0]} ', 'AXIS ')
+    return _table(('alarm', 'priority', 'delay on, off [s]', 'latched', 'stands under', 'what is wrong',
+                   'what the operator shall do'),
+                  [(f'`{both(alarm.name)}`', alarm.priority, f'{alarm.on_delay:g}, {alarm.off_delay:g}',
+                    'yes' if alarm.latched else '', ', '.join(both(name) for name in alarm.cause
+                                                              if not name.startswith(topics.AXES[1])),
+                    alarm.meaning, alarm.action)
+                   for alarm in alarms.ALARMS if not alarm.name.startswith(topics.AXES[1])])
+
+
+def scenario_table():
+    """The scenarios that come with the product."""
+    return _table(('scenario', 'what happens'), [(f'`{name}`', title) for name, title in scenario.available().items()])
 
 
 def study_table():
@@ -115,10 +170,12 @@ def result_table(table=results.RESULTS):
                    results.documented(table)])
 
 
-TABLES = {'nodes': node_table, 'studies': study_table, 'topics': topic_table, 'services': service_table,
-          'modes': mode_table,
+TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
+          'services': service_table,
+          'modes': mode_table, 'commands': command_table, 'faults that can be injected': injection_table,
+         'expected of faults': expectation_table,
           'filter kinds': filter_table, 'drive faults': fault_table,
-          'control unit faults': acu_fault_table, 'results': result_table,
+          'alarms': alarm_table, 'results': result_table,
           'recomputed results': lambda: result_table(what_if.NUMBERS),
           'first parameters': parameter_table}
 

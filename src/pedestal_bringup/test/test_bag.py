@@ -12,12 +12,12 @@ from rosbags.highlevel import AnyReader
 from pedestal_bringup.bags import bag, columns
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.bags.writer import Writer
-from pedestal_common import messages, nodes, topics
+from pedestal_common import commands, messages, nodes, topics
 
 T = 5_000_000
 METADATA = {'scenario': 'test', 'pacing': 'lockstep', 'seed': 7}
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
-RECORDED = nodes.recorded(NODES)
+RECORDED = [topic for topic in nodes.recorded(NODES) if topic.rate != 'command']
 NAMES = [topic.name for topic in RECORDED]
 
 
@@ -31,6 +31,10 @@ def made(name, k, rng):
         return message
     if kind == 'String':
         return messages.String(data='autotrack' if k else 'standby')
+    if kind == 'DiagnosticStatus':
+        return commands.reply_message(commands.Command('stop', 'test', str(k)), commands.Reply(True, 'mode is stop'))
+    if kind == 'DiagnosticArray':
+        return diagnostics('acu', k)
     if kind == 'JointState':
         message = messages.template(name)
         for values in (message.position, message.velocity, message.effort):

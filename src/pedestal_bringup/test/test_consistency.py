@@ -54,8 +54,11 @@ def test_a_filter_is_what_it_was_made(factor, words, freedoms):
             np.diff(stats.chi2.cdf(np.array([low, high]) / factor**2, freedoms))[0], abs=0.01)
         assert judged.nees == pytest.approx(2.0 * factor**2, rel=0.35)
     values = results.measured({'filter': found})
-    assert values['azimuth_nis_mean'] == (consistency.axis(found, 0).nis, '')
-    assert values['elevation_nees_mean'] == (consistency.axis(found, 1).nees, '')
+    assert values['azimuth_nis_mean'] == (consistency.axis(found, 0).nis, '-')
+    assert values['elevation_nees_mean'] == (consistency.axis(found, 1).nees, '-')
+    said = {1.0: None, 2.0: 'too sure', 0.5: 'too careful'}[factor]
+    assert {results.marks({'filter': found}).get(f'{axis}_{name}_mean') for axis in ('azimuth', 'elevation')
+            for name in ('nis', 'nees')} == {said}
 
 
 def test_the_band_holds_honest_filters_and_no_more():

@@ -43,7 +43,7 @@ def flyby(filters_result):
 
 
 def test_every_filter_has_its_rows(flyby):
-    for name in filters.SHOWN_FILTERS:
+    for name in set(filters.SHOWN_FILTERS) - set(filters.EXPECTING):
         assert 1.0 < flyby(name, 'reduction') < 30.0
         assert 0.03 / flyby(name, 'angle_rms_deg') == pytest.approx(flyby(name, 'reduction'), rel=0.03)
 
@@ -56,8 +56,19 @@ def test_a_measured_rate_helps_the_more_the_better_it_is(flyby):
 
 
 def test_no_filter_reduces_coloured_noise_as_much(flyby):
-    for name in filters.FILTERS:
+    for name in set(filters.FILTERS) - set(filters.EXPECTING):
         assert flyby(name, 'reduction', 'coloured-0.03') < 0.7 * flyby(name, 'reduction')
+
+
+def test_a_filter_that_expects_coloured_noise_knows_its_error_better(flyby):
+    """At 60 m the tuned filters are biased beside, and the default one, whose widest rung follows a quarter of this
+    target's acceleration, more than they; what an unbiased one reaches is in test_axis_filter."""
+    for name, most in (('ca', 2.0), ('imm', 10.0)):
+        expecting, not_expecting = (flyby(filter_name, 'nees_mean', 'coloured-0.03')
+                                    for filter_name in (f'{name}-expecting', name))
+        print(f'{name}: NEES {expecting:.2f}, noise taken for white {not_expecting:.2f}')
+        assert expecting < most < not_expecting
+    assert flyby('ca-expecting', 'reduction', 'coloured-0.03') > flyby('ca', 'reduction', 'coloured-0.03')
 
 
 def test_a_model_of_the_flight_beats_models_of_the_angle(flyby):

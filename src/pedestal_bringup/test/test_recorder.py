@@ -23,6 +23,7 @@ from pedestal_common import messages, nodes, topics  # noqa: E402
 from pedestal_common.middleware import message_class  # noqa: E402
 
 LIMIT = 30.0
+RECORDED = nodes.recorded(nodes.NAMES)
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
 
 _spec = importlib.util.spec_from_file_location('bag_test_messages', pathlib.Path(__file__).with_name('test_bag.py'))
@@ -92,7 +93,7 @@ class Graph:
         rclpy.init(args=[], context=self.context, domain_id=domain)
         self.node = rclpy.create_node('graph', context=self.context)
         self.publishers = {}
-        for topic in nodes.recorded(nodes.NAMES):
+        for topic in RECORDED:
             latched = topics.QOS[topic.rate].latched
             durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
             profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE,
@@ -100,8 +101,10 @@ class Graph:
             self.publishers[topic.name] = self.node.create_publisher(message_class(topic.type), topic.name, profile)
 
     def await_recorder(self):
+        """Until it reads everything but commands, of which a lockstep recorder has the replies only."""
         end = time.monotonic() + LIMIT
-        while any(not publisher.get_subscription_count() for publisher in self.publishers.values()):
+        while any(not self.publishers[topic.name].get_subscription_count() for topic in RECORDED
+                  if topic.rate != 'command'):
             assert time.monotonic() < end, 'the recorder never subscribed'
             time.sleep(0.01)
         time.sleep(0.3)  # the recorder's side of the discovery
@@ -139,8 +142,10 @@ def rows():
     return [(name, stamp, data + bytes(-len(data) % 4)) for name, stamp, data in made]
 
 
-ANSWERS = {'acu/mode': 'acu/rate_command', 'acu/keyhole': 'acu/rate_command', 'acu/blockage': 'acu/rate_command',
-           'adu/state': 'clock', 'ins/state': 'ship/imu/data'}
+ANSWERS = {topic.name: next(answer.name for answer in RECORDED
+                            if answer.rate == 'step' and answer.writers == topic.writers)
+           for topic in RECORDED if topic.rate == 'change'}
+"""{topic that changes now and then: what its writer says in every step}."""
 
 
 def shuffled(rows, seed):

@@ -87,13 +87,13 @@ def test_start_and_duration_count_from_the_first_step_and_keep_what_holds(tmp_pa
 
 
 HEARD_BY_ACU = (ERROR, 'tracking_receiver/angle_rate', 'tracking_receiver/range', 'ship/imu/data', 'ins/state',
-                'acu/program_track')
+                'acu/program_track', 'acu/command')
 
 
 @pytest.mark.parametrize('nodes, expected', [
-    (['acu'], {'joint_states', 'adu/state', *HEARD_BY_ACU}),
-    (['adu'], {'acu/rate_command', 'ship/truth'}),
-    (['acu', 'adu'], {'ship/truth', *HEARD_BY_ACU}),
+    (['acu'], {'joint_states', 'adu/state', 'adu/stow_pins', *HEARD_BY_ACU}),
+    (['adu'], {'acu/rate_command', 'acu/stow_pins', 'ship/truth', 'adu/inject'}),
+    (['acu', 'adu'], {'ship/truth', 'adu/inject', *HEARD_BY_ACU}),
     (['recorder'], {topic.name for topic in topics.TOPICS} | {OTHER.name}),
     ([], {topic.name for topic in topics.TOPICS} | {OTHER.name})])
 def test_a_node_gets_what_it_reads_and_no_node_under_test_writes(tmp_path, nodes, expected):

@@ -1,12 +1,14 @@
 import html.parser
 import io
 import math
+import pathlib
 import re
 import shutil
 
 import numpy as np
 import pytest
 
+from pedestal_bringup import cli
 from pedestal_bringup.analysis import consistency, results, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.writer import Writer
@@ -14,6 +16,7 @@ from pedestal_bringup.report import figures, filter_figures, run_data, run_figur
 from pedestal_bringup.report.page import write as write_report
 from pedestal_common import messages, topics
 
+REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
 T = 5_000_000
 STEPS = 1000
 NOISE = math.radians(0.03)
@@ -202,6 +205,18 @@ def test_numbers_are_those_of_the_summary(page, whole):
     assert rows['recording'][0].startswith('complete')
 
 
+def test_the_page_says_when_where_what_and_through_which_beam(page, tmp_path):
+    assert 'beamwidth' not in page[0].rows
+    leo = page_of(REFERENCES / 'leo_pass', output=tmp_path / 'leo.html')
+    assert leo.rows['target'] == ['satellite 25544, by its TLE']
+    assert leo.rows['station'] == ['latitude 47.4, longitude 8.5 deg, height 500 m']
+    assert leo.rows['beamwidth'] == ['1.003 deg']
+    assert leo.rows['0 s is'][0].startswith('2019-12-09 16:4') and leo.rows['0 s is'][0].endswith(' UTC')
+    assert re.fullmatch(r'\d\d\.\d deg at 2019-12-09 16:\d\d:\d\d UTC, [0-9.]+ s', leo.rows['highest'][0])
+    flyby = page_of(REFERENCES / 'uav_flyby', output=tmp_path / 'uav.html')
+    assert flyby.rows['target'][0].startswith('straight flight at 15 m/s') and 'station' not in flyby.rows
+
+
 def test_the_filter_is_judged(page, whole):
     found = consistency.read(bags.read(whole), tracking.read(bags.read(whole)))
     for axis, i in (('azimuth', 0), ('elevation', 1)):
@@ -350,3 +365,13 @@ def test_an_aborted_run_and_lost_steps_stand_on_the_first_page(tmp_path):
     first = page.text[:page.text.index('Results')]
     assert f'Aborted: ends at {(STEPS - 1) * T / 1e9:.6f} s, planned end 10.000000 s.' in first
     assert 'Aborted' not in page_of(make_bag(tmp_path / 'whole', planned_end_ns=(STEPS - 1) * T)).text
+
+
+def test_vector_copies_on_request(tmp_path, capsys):
+    bag = make_bag(tmp_path / 'bag', ('clock', 'acu/mode', 'diagnostics'), steps=400)
+    assert cli.main(['report', str(bag), '--png', str(tmp_path / 'figures'), '--vector', 'pdf']) == 0
+    drawn = sorted(path.stem for path in (tmp_path / 'figures').glob('*.png'))
+    assert drawn == sorted(path.stem for path in (tmp_path / 'figures').glob('*.pdf')) == ['timeline']
+    assert (tmp_path / 'figures' / 'timeline.pdf').read_bytes().startswith(b'%PDF')
+    assert cli.main(['report', str(bag), '--vector', 'svg']) == 1
+    assert '--vector svg: needs --png DIR' in capsys.readouterr().err

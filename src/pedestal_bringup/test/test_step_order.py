@@ -10,8 +10,9 @@ T = 5_000_000
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
 RECORDED = nodes.recorded(NODES)
 NAMES = [topic.name for topic in RECORDED]
-ANSWERS = {'acu/mode': 'acu/rate_command', 'acu/keyhole': 'acu/rate_command', 'acu/blockage': 'acu/rate_command',
-           'adu/state': 'clock'}
+ANSWERS = {topic.name: next(other.name for other in RECORDED
+                            if other.rate == 'step' and other.writers == topic.writers)
+           for topic in RECORDED if topic.rate == 'change'}
 """The first step topic of whoever writes a `change` topic."""
 SPEAKERS = [node for node in nodes.links()['diagnostics'].writers if node in NODES]
 

@@ -42,7 +42,7 @@ def digest(packages) -> str:
 
 
 @functools.cache
-def _cache_folder(package) -> str | None:
+def _folder_of(package) -> str | None:
     """The cache of one package's laws: named after its own sources and all it may call."""
     columns = () if package == 'pedestal_common' else (package,) if package in COLUMNS else COLUMNS
     folder = _ROOT / f'{package}-{digest(("pedestal_common", *columns, package))}'
@@ -57,11 +57,16 @@ def _cache_folder(package) -> str | None:
     return str(folder) if os.access(folder, os.W_OK) else None
 
 
+def _cache_folder(thing):
+    """The cache of the package that a law or a type is of; None where there is none."""
+    return _folder_of(thing.__module__.partition('.')[0])
+
+
 def _done(unit):
     """The file that says that the laws of a unit, which its memory tells apart, are in the cache; None where there is
     no cache."""
     memory_type = type(unit.memory)
-    folder = _cache_folder(memory_type.__module__.partition('.')[0])
+    folder = _cache_folder(memory_type)
     return pathlib.Path(folder, f'{memory_type.__module__}.{memory_type.__name__}.done') if folder else None
 
 
@@ -98,7 +103,7 @@ class _Place(UserProvidedCacheLocator):
 
     def __init__(self, law, file):
         super().__init__(law, file)
-        self._cache_path = os.path.join(_cache_folder(law.__module__.partition('.')[0]), law.__module__)
+        self._cache_path = os.path.join(_cache_folder(law), law.__module__)
 
     @classmethod
     def from_function(cls, law, file):
@@ -123,7 +128,7 @@ def compiled(law):
     """Decorator of a law. Division by zero gives inf or NaN as in numpy, never an exception. Nobody calls a law from
     C: without the wrappers for it a tenth of the time to compile is saved."""
     dispatcher = numba.njit(error_model='numpy', no_cfunc_wrapper=True)(law)
-    if _cache_folder(law.__module__.partition('.')[0]) is not None:
+    if _cache_folder(law) is not None:
         dispatcher._cache = _Cache(law)
     return dispatcher
 

@@ -48,15 +48,23 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
 
 
 @contextlib.contextmanager
-def opened(path):
-    """Context with a csv.DictReader of a file of at most LARGEST bytes. What cannot be read raises TableError."""
+def stream(path):
+    """Context with the bytes of a file of at most LARGEST. What cannot be read raises TableError."""
     try:
-        with io.TextIOWrapper(files.open_regular(path, LARGEST), newline='', encoding='utf-8-sig') as file:
-            yield csv.DictReader(file)
+        with files.open_regular(path, LARGEST) as file:
+            yield file
     except OSError as error:
         raise TableError(f'{path}: {error.strerror}') from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise TableError(f'{path}: not a CSV text file: {error}') from None
+
+
+@contextlib.contextmanager
+def opened(path):
+    """Context with a csv.DictReader of a file, see `stream`."""
+    with stream(path) as file:
+        try:
+            yield csv.DictReader(io.TextIOWrapper(file, newline='', encoding='utf-8-sig'))
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise TableError(f'{path}: not a CSV text file: {error}') from None
 
 
 def require(path, reader, columns):

@@ -56,6 +56,11 @@ def deserialize(data, type_name):
         raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
 
 
+def definition(type_name) -> bytes:
+    """The definition of a message type and of those in it, as a reader of `ros2msg` schemas wants it."""
+    return TYPESTORE.generate_msgdef(type_name, ros_version=2)[0].encode()
+
+
 def nanoseconds(stamp) -> int:
     """A Time as integer nanoseconds."""
     return stamp.sec * 1_000_000_000 + stamp.nanosec

@@ -29,6 +29,7 @@ class Node(typing.NamedTuple):
     reads         topics, of a unit the one first that begins its steps
     writes        topics, the one first that others wait for
     answer        topic by which it answers every step, stamped alike; '' of one that answers late
+    obeys         topic of the commands it obeys, by whomever; replies: topic on which it tells what came of them
     doc           what it is; stands_for: what takes its place on a real antenna
     of_beam       whether each beam of an array has one of its own
     optional      whether the others do without it in a graph that does not name it
@@ -40,6 +41,8 @@ class Node(typing.NamedTuple):
     reads: tuple = ()
     writes: tuple = ()
     answer: str = ''
+    obeys: str = ''
+    replies: str = ''
     doc: str = ''
     stands_for: str = ''
     of_beam: bool = False
@@ -72,11 +75,12 @@ NODES = (
          'ship_motion_sim.ship_unit:ShipMotion',
          reads=('clock',),
          writes=('ship/truth', 'ship/imu/data_raw'),
-         answer='ship/truth',
+         answer='ship/truth', obeys='ship_motion/inject', replies='ship_motion/injected',
          doc='ship on a seaway, its IMU', stands_for='ship and IMU', optional=True),
     Node('ins', 'ship_motion_sim.ins_node', 'ship_motion_sim.params:InsParameters', 'ship_motion_sim.ins_unit:Ins',
          reads=('ship/imu/data_raw',),
          writes=('ship/imu/data', 'ins/state'),
+         obeys='ins/inject', replies='ins/injected',
          doc='attitude with parametrised error and latency, or from its IMU: aligns by itself, then navigates',
          stands_for='INS', optional=True),
     Node('tracking_receiver', 'tracking_receiver_sim.tracking_receiver_node',
@@ -84,19 +88,21 @@ NODES = (
          reads=('adu/truth', 'ship/truth'),
          writes=('tracking_receiver/angle_error', 'tracking_receiver/angle_rate', 'tracking_receiver/range',
                  'target/truth'),
-         answer='target/truth',
+         answer='target/truth', obeys='tracking_receiver/inject', replies='tracking_receiver/injected',
          doc='target and monopulse receiver', stands_for='receiver and RF', of_beam=True),
     Node('acu', 'acu_tracker.acu_node', 'acu_tracker.params:AcuParameters', 'acu_tracker.unit:Acu',
          reads=('joint_states', 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate',
-                'tracking_receiver/range', 'ship/imu/data', 'adu/state', 'ins/state', 'acu/program_track'),
+                'tracking_receiver/range', 'ship/imu/data', 'adu/state', 'adu/stow_pins', 'ins/state',
+                'acu/program_track'),
          writes=('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode', 'acu/keyhole',
-                 'acu/blockage'),
+                 'acu/blockage', 'acu/alarms', 'acu/stow_pins'),
          answer='acu/rate_command',
+         obeys='acu/command', replies='acu/command_result',
          doc='antenna control unit: filter, modes, position loop', stands_for='the product itself', of_beam=True),
     Node(DRIVE, 'adu_drive.adu_node', 'adu_drive.params:AduNodeParameters', 'adu_drive.unit:Adu',
-         reads=('clock', 'acu/rate_command', 'ship/truth'),
-         writes=('joint_states', 'adu/truth', 'clock', 'adu/motor_states', 'adu/state'),
-         answer='joint_states',
+         reads=('clock', 'acu/rate_command', 'ship/truth', 'acu/stow_pins'),
+         writes=('joint_states', 'adu/truth', 'clock', 'adu/motor_states', 'adu/state', 'adu/stow_pins'),
+         answer='joint_states', obeys='adu/inject', replies='adu/injected',
          doc='antenna drive unit: two axes, two motors each, and the plant; owns the time',
          stands_for='servo drive and pedestal'),
     Node('recorder', 'pedestal_bringup.recorder_node', 'pedestal_bringup.run.recorder_params:RecorderParameters',
@@ -119,7 +125,8 @@ NAMES = tuple(node.name for node in NODES)
 UNITS = (*(node for node in NODES if node.unit), ARRAY)
 
 OF_BEAM = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
-                     *(topic for node in NODES if node.of_beam for topic in node.writes)))
+                     *(topic for node in NODES if node.of_beam
+                       for topic in (*node.writes, node.obeys, node.replies) if topic)))
 """Topics that each beam of several has of its own: what its nodes write, and what shared nodes write for each."""
 
 
@@ -173,11 +180,12 @@ def links(beams=0) -> dict:
     rows = [row(node.name, beams > 0) for node in NODES]
     links = {}
     for topic in TOPICS:
-        writers = [node.name for node in rows if topic.name in node.writes
+        writers = [node.name for node in rows if topic.name in (*node.writes, node.replies)
                    or (topic.name == 'diagnostics' and node.unit)]
-        if not writers:
+        readers = [node.name for node in rows if topic.name in (*node.reads, node.obeys)
+                   and node.name not in writers]
+        if not writers and not (readers and topic.rate == 'command'):
             continue
-        readers = [node.name for node in rows if topic.name in node.reads and node.name not in writers]
         for prefix in prefixes(beams) if topic.name in OF_BEAM else ('',):
             of_this = [tuple(name for name in members(names, beams)
                              if not prefix or beam_of(name) in ('', prefix[:-1])) for names in (writers, readers)]
@@ -186,8 +194,10 @@ def links(beams=0) -> dict:
 
 
 def recorded(names, flags=(), beams=0) -> list:
-    """The Links that a graph of these nodes has a writer for; flags: those of topics.FLAGS that are set."""
-    return [link for link in links(beams).values() if any(writer in names for writer in link.writers)
+    """The Links that a graph of these nodes has a writer for, or that anybody may write; flags: those of topics.FLAGS
+    that are set."""
+    return [link for link in links(beams).values()
+            if any(name in names for name in (link.readers if link.rate == 'command' else link.writers))
             and (not link.flag or link.flag in flags)]
 
 

@@ -56,8 +56,9 @@ class Parameters:
     def check(self):
         """Cross-checks between fields; overridden where two fields limit each other."""
 
-    def check_graph(self, beams):
-        """Overridden where parameters must fit the graph; beams as in nodes.links. Raises ParameterError."""
+    def check_graph(self, beams, lockstep):
+        """Overridden where parameters must fit the graph; beams as in nodes.links, lockstep: its pacing. Raises
+        ParameterError."""
 
 
 def _check_field(field, value):

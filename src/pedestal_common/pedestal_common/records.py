@@ -4,7 +4,7 @@ A unit reads and writes one record that has a field for each of its topics:
 
     stamped message     stamp [ns], then the fields of its layout; one that did not come, or is not to be sent, has
                         stamp NEVER
-    text                a whole number, its code; topics.SILENT before the first
+    text, list of texts a whole number, its code; topics.SILENT before the first
 
 A Decoder takes the numbers out of the CDR bytes of a message, an Encoder puts numbers into them, both by the places at
 which they lie (cdr.Places); neither builds a message object.
@@ -18,13 +18,16 @@ from pedestal_common import cdr, layouts, messages, topics
 NEVER = -2**63
 """Stamp [ns] of a message that did not come."""
 
+TEXTS = ('std_msgs/msg/String', 'diagnostic_msgs/msg/DiagnosticArray')
+"""Types of a text and of a list of texts."""
+
 _STAMP = struct.Struct('<iI')
 _FORMATS = {'f8': 'd', 'f4': 'f'}
 
 
 def _type(topic):
     row = topics.BY_NAME[topic]
-    if row.type == 'std_msgs/msg/String':
+    if is_text(topic):
         return 'i8'
     sizes = [(field.name, 'f8', (len(field.components or row.names),)) for field in layouts.fields(topic)]
     return np.dtype([('stamp', 'i8'), *sizes])
@@ -36,8 +39,8 @@ def of(*names) -> np.dtype:
 
 
 def is_text(topic) -> bool:
-    """Whether a topic of the table is a text, told by its code."""
-    return topics.BY_NAME[topic].type == 'std_msgs/msg/String'
+    """Whether a topic of the table is a text, or a list of them, told by its code."""
+    return topics.BY_NAME[topic].type in TEXTS and topics.BY_NAME[topic].rate == 'change'
 
 
 def empty(record_type, count) -> np.ndarray:

@@ -24,7 +24,7 @@ from pedestal_common import messages, middleware, nodes, parameters
 from pedestal_common.compiled import compiled_once
 from pedestal_common.graph_parameters import GraphParameters
 from pedestal_common.realtime import utc
-from pedestal_common.realtime.listening import Listener
+from pedestal_common.realtime.listening import Listener, subscribe
 from pedestal_common.steps import SECOND, GraphError
 from pedestal_common.unit import OK, WARN, Diagnosis
 
@@ -147,7 +147,7 @@ class Shell(Node):
                    if name not in known and not name.startswith('qos_overrides')]
         self.parameters = parameters.build(self._parameters_type, {**own, **dict.fromkeys(unknown)})
         self.graph = parameters.build(GraphParameters, graph, 'graph.')
-        self.parameters.check_graph(self.graph.beams)
+        self.parameters.check_graph(self.graph.beams, self.graph.lockstep)
         if '--params-file' in sys.argv and not self._parameter_overrides:
             self.get_logger().warning(f'no parameter of {self.get_fully_qualified_name()} is in the parameter file: a '
                                       'section /**/NODE is for a node in any namespace, NODE for one in none')
@@ -166,7 +166,7 @@ class Shell(Node):
         values = parameters.as_dict(self.parameters)
         values.update({change.name: change.value for change in changes if change.name in values})
         changed = parameters.build(self._parameters_type, values)
-        changed.check_graph(self.graph.beams)
+        changed.check_graph(self.graph.beams, self.graph.lockstep)
         return changed
 
     def _on_set(self, changes):
@@ -214,15 +214,14 @@ class Shell(Node):
         dropped, as is all that an Intake does not take; anew: it does not continue the one before."""
         link, ros_name = self._link(name)
 
-        def subscribe(callback, role):
-            return self.create_subscription(middleware.message_class(link.type), ros_name, self._guarded(callback),
-                                            middleware.qos(link.rate, role), raw=True)
         if self.graph.lockstep:
-            subscribe(lambda data: take(decode(data)[1], False), 'lockstep')
+            self.create_subscription(middleware.message_class(link.type), ros_name,
+                                     self._guarded(lambda data: take(decode(data)[1], False)),
+                                     middleware.qos(link.rate), raw=True)
         else:
             listener = Listener(self, link, ros_name, decode, take)
             self._listeners.append(listener)
-            listener.open(lambda: subscribe(listener.callback, 'read'))
+            listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
 
     def writers_of(self, ros_name):
         """Names of the nodes that write a topic now."""
@@ -328,12 +327,12 @@ class Shell(Node):
             if not publisher.wait_for_all_acked(Duration(seconds=self.graph.deadline)):
                 raise GraphError(f'a reader of {link.name} took nothing for {self.graph.deadline:g} s', ('recorder',))
 
-    def announce(self, publish, text):
-        """Publish a text, which has no stamp. In lockstep it keeps its place between two steps: what was published
+    def announce(self, publish, message):
+        """Publish what has no stamp. In lockstep it keeps its place between two steps: what was published
         before has arrived everywhere before it, and it has before anything that follows."""
         if self.graph.lockstep:
             self.await_acknowledged()
-        publish(messages.serialize(messages.String(data=text)))
+        publish(messages.serialize(message))
         if self.graph.lockstep:
             self.await_acknowledged()
 

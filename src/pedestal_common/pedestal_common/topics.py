@@ -4,7 +4,8 @@ Rate
     step    one message per drive step, stamped with the step (or the step it measured, where latency is modelled)
     once    one before the first step
     second  one per writer at every whole second of the drive's time
-    change  a text, whenever it changes; it has no stamp and belongs to the step that its writer answers next
+    change  whenever it changes; it belongs to the step that its writer answers next
+    command whenever somebody asks; what it did, and before which step, is told by the reply
 The rate gives the quality of service: see QOS.
 """
 import typing
@@ -18,8 +19,16 @@ FILTER = {'innovation': 'rad', 'rate_innovation': 'rad/s', 'nis': '', 'sigma': '
           'correlation': '', 'innovation_sigma': 'rad', **dict.fromkeys(MOTION_MODELS, '')}
 """{number: unit} that acu/filter tells of the filter of one axis; of a model its probability."""
 
+ENABLED = ('enabled', 'enabled: azimuth motor lost', 'enabled: elevation motor lost',
+           'enabled: azimuth and elevation motor lost')
+"""Texts of adu/state with which the drive follows commands: bit 0 of their place says that the azimuth has one motor
+of its pair only, bit 1 that the elevation has."""
+
+PINS = ('out', 'moving', 'in', 'failed')
+"""Of a stow pin: it lets its axis move, is on its way, holds it; it is not where it was sent."""
+
 SILENT = -1
-"""In records the code of a text that was never published."""
+"""In records the code of a text or a list that was never published."""
 
 
 class Qos(typing.NamedTuple):
@@ -32,6 +41,8 @@ class Qos(typing.NamedTuple):
                 through what is old, and a stranger who writes much faster does not push out what belongs here
     reliable    whether that node has lost ones sent again
     recorded    by a recorder: those of seconds, it may be held up by its disk
+    unlatched   whether readers in realtime also hear writers that do not latch, by a second subscription: the writer
+                is a person with `ros2 topic pub`
     """
     latched: bool
     lockstep: int
@@ -39,11 +50,13 @@ class Qos(typing.NamedTuple):
     read: int
     reliable: bool
     recorded: int
+    unlatched: bool = False
 
 
 QOS = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reliable=False, recorded=4000),
-       'once': Qos(latched=True, lockstep=1, written=1, read=1, reliable=True, recorded=100),
+       'once': Qos(latched=True, lockstep=1, written=1, read=1, reliable=True, recorded=100, unlatched=True),
        'change': Qos(latched=True, lockstep=1, written=1, read=8, reliable=True, recorded=1000),
+       'command': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
        'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000)}
 
 
@@ -55,8 +68,7 @@ class Topic(typing.NamedTuple):
     frame    header.frame_id; child: child_frame_id
     units    {column: unit} where the type alone does not tell (see layouts)
     texts    of a text: those that a reader tells apart, in the order of their codes
-    measured  the parameter of its writer that says whether it is measured; flag: that of its readers; '': it is always
-             there
+    measured  the parameter of its writer that says whether it is there; flag: that of its readers; '': it always is
     """
     name: str
     type: str
@@ -82,8 +94,14 @@ TOPICS = (
           '`azimuth_motor_1` ... `elevation_motor_2`: shaft angle [rad], rate [rad/s], torque [Nm]', names=MOTORS,
           frame='base_link'),
     Topic('adu/state', 'std_msgs/msg/String', 'change',
-          '`enabled` when the drive follows commands, otherwise why not: `stopping`, `engaging brakes`, `disabled`, '
-          '`releasing brakes`, `emergency stop`, `fault: azimuth overspeed, ...`', texts=('enabled',)),
+          '`enabled` when the drive follows commands, `enabled: azimuth motor lost` when with one motor of a pair; '
+          'otherwise why not: `stopping`, `engaging brakes`, `disabled`, `releasing brakes`, `emergency stop`, '
+          '`fault: azimuth overspeed, ...`',
+          texts=(*ENABLED, 'stopping', 'engaging brakes', 'disabled', 'releasing brakes', 'emergency stop')),
+    Topic('adu/stow_pins', 'std_msgs/msg/String', 'change',
+          'where the stow pin of each axis is: `azimuth out, elevation out`, ...; `out`, `moving`, `in`, `failed`',
+          texts=tuple(f'azimuth {azimuth}, elevation {elevation}' for azimuth in PINS for elevation in PINS),
+          measured='stow_pins', flag='stow_pins'),
     Topic('ship/truth', 'nav_msgs/msg/Odometry', 'step',
           'pose of `base_link` (FLU) in `earth` (ENU), twist in `base_link`', frame='earth', child='base_link'),
     Topic('ship/imu/data_raw', 'sensor_msgs/msg/Imu', 'step',
@@ -124,16 +142,33 @@ TOPICS = (
           names=tuple(f'{axis}_{name}' for axis in AXES for name in FILTER), frame='earth',
           units={f'{axis}_{name}.position': unit for axis in AXES for name, unit in FILTER.items()}),
     Topic('acu/mode', 'std_msgs/msg/String', 'change', 'the mode'),
+    Topic('acu/stow_pins', 'std_msgs/msg/String', 'change',
+          'where the stow pins shall be: `out` or `in`; nothing until one of the modes `stow` and `unstow` says so',
+          texts=('out', 'in'), measured='stow_pins', flag='stow_pins'),
     Topic('acu/keyhole', 'std_msgs/msg/String', 'change',
           'how the azimuth will go through the zenith of the deck: when, which way round, expected loss; the numbers '
           'are in the diagnostics (`keyhole_begins_s`, `keyhole_ends_s`, `keyhole_loss_s`, `keyhole_worst_deg`, '
           '`keyhole_needed_deg_s`, `deck_motion_deg`)'),
     Topic('acu/blockage', 'std_msgs/msg/String', 'change',
           'from when until when the superstructure will hide the target'),
+    Topic('acu/alarms', 'diagnostic_msgs/msg/DiagnosticArray', 'change',
+          'the alarms that are not normal, a status each: those that are annunciated first; `values` tell state, '
+          'priority, when raised, first-out, the cause that it stands under, what to do, until when and why shelved'),
     Topic('acu/program_track', 'trajectory_msgs/msg/JointTrajectory', 'once',
           'two or more points: time-tagged azimuth and elevation (earth); one point: a preset (deck)', frame='earth'),
+    Topic('acu/command', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
+          'name = verb, hardware_id = who, message = number of the request, values = arguments; see commands'),
+    Topic('acu/command_result', 'diagnostic_msgs/msg/DiagnosticStatus', 'change',
+          'every command that was obeyed or refused, by topic, service or schedule, with `granted` and `reply`; it '
+          'took effect in the step that is answered next'),
+    *(topic for node in ('ship_motion', 'ins', 'tracking_receiver', 'adu') for topic in (
+        Topic(f'{node}/inject', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
+              'a fault to inject: name = fault, values = its arguments; see the faults that can be injected'),
+        Topic(f'{node}/injected', 'diagnostic_msgs/msg/DiagnosticStatus', 'change',
+              'every fault that was injected or refused, as on `acu/command_result`'
+              + ('; services too' if node == 'adu' else '')))),
     Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'second', 'state of each node'),
 )
 
 BY_NAME = {topic.name: topic for topic in TOPICS}
-FLAGS = tuple(topic.flag for topic in TOPICS if topic.flag)
+FLAGS = tuple(dict.fromkeys(topic.flag for topic in TOPICS if topic.flag))

@@ -4,14 +4,19 @@ Drive, beam, receiver, control unit, ship and INS are units. The same unit runs 
 recomputed recording and in many trials; who runs it gives it a record of what its topics hold (see records) and takes
 another one back. No ROS here.
 """
+import collections
 import typing
 
 import numpy as np
 
-from pedestal_common import messages, nodes, records, topics
+from pedestal_common import commands, messages, nodes, records, topics
+from pedestal_common.commands import Reply
 from pedestal_common.parameters import as_dict
 
 OK, WARN, ERROR = 0, 1, 2
+
+NEVER_DUE = 2**63 - 1
+"""Time [ns] of a command that does not come."""
 
 BLOCK = 2000
 """Steps for which a unit holds noise ready at most."""
@@ -22,12 +27,6 @@ class Diagnosis(typing.NamedTuple):
     level: int
     message: str
     values: list
-
-
-class Reply(typing.NamedTuple):
-    """The answer to a request: whether it was granted, and one line for people."""
-    granted: bool
-    text: str
 
 
 def joined(record_type, **parts) -> np.ndarray:
@@ -51,35 +50,46 @@ class Unit(typing.Protocol):
     LAWS         {type of its memory: (law, the same over arrays of stamps and records)}, compiled
     LIVE         prefixes of the parameters that may change while it runs
     REQUESTS     names of the services it answers
+    VERBS        commands.Verb of each command it obeys on NODE.obeys
     CALLS        names of the services of others that it may call for
     MOMENTARY    texts that `encode` knows only right after the step that says them; a recomputation of many steps
                  leaves them out
 
     parameters   an instance of the parameter class of NODE
     reads        topics that it hears in its graph, a part of NODE.reads
+    writes       topics that it writes with these parameters, a part of NODE.writes
     memory       a named tuple of arrays, all that a step reads or changes beside its records: `record` (1,) with the
                  records of its law, then what is no record (noise, a track)
     inputs, outputs     records (1,) of one step in a node
     messages     {topic: message} of the stamped topics it writes, of which only the numbers change
+    epoch        UTC [ns] of stamp 0, 0 where stamps are no UTC; told by its node
     silent       whether its trigger stays away; told by a realtime node
+    lockstep     whether its graph runs in lockstep; told by its node
+    answered     (Command, Reply) of what was asked lately, the newest last; whoever tells of them takes them away
     """
     NODE: nodes.Node
     LAWS: typing.Mapping
     LIVE: tuple = ()
     REQUESTS: tuple = ()
+    VERBS: tuple = ()
     CALLS: tuple = ()
     MOMENTARY: tuple = ()
     parameters: object
     memory: tuple
+    epoch: int = 0
     silent: bool = False
+    lockstep: bool = False
+    _last: int | None = None
 
     def __init__(self, parameters, reads):
         self.parameters, self.reads = parameters, tuple(reads)
         self.inputs = records.empty(self.inputs_type(), 1)
         self.outputs = records.empty(self.outputs_type(), 1)
         values = as_dict(parameters)
-        self.messages = {name: messages.template(name) for name in self.NODE.writes if not records.is_text(name)
-                         and values.get(topics.BY_NAME[name].measured, True)}
+        self.writes = tuple(name for name in self.NODE.writes if values.get(topics.BY_NAME[name].measured, True))
+        self.messages = {name: messages.template(name) for name in self.writes if not records.is_text(name)}
+        self.answered = collections.deque(maxlen=1000)
+        self._due = collections.deque(self.schedule())
 
     @classmethod
     def inputs_type(cls) -> np.dtype:
@@ -116,11 +126,54 @@ class Unit(typing.Protocol):
         return self.memory
 
     def step(self, stamps, inputs, outputs):
-        """Make the steps of stamps (n,) [ns], from inputs (n,) to outputs (n,)."""
+        """Make the steps of stamps (n,) [ns], from inputs (n,) to outputs (n,), and what is due before each."""
         _, law_of_many = self.LAWS[type(self.memory)]
-        for first in range(0, len(stamps), BLOCK):
-            part = slice(first, first + BLOCK)
-            law_of_many(self.block(len(stamps[part])), stamps[part], inputs[part], outputs[part])
+        first = 0
+        while first < len(stamps):
+            self.obey_due(stamps[first])
+            last = min(first + BLOCK, len(stamps), int(np.searchsorted(stamps, self.next_due)))
+            part = slice(first, last)
+            law_of_many(self.block(last - first), stamps[part], inputs[part], outputs[part])
+            first = last
+
+    def schedule(self) -> list:
+        """[(at [ns], Command)] that it is to obey at times, in order; overridden by a unit whose parameters say so."""
+        return []
+
+    @property
+    def next_due(self):
+        """Time [ns] of the next command of its schedule."""
+        return self._due[0][0] if self._due else NEVER_DUE
+
+    def obey_due(self, stamp):
+        """Obey what its schedule says for the step of a stamp [ns] and before. A unit that begins later than its
+        schedule leaves out what it has missed."""
+        while self._due and self._due[0][0] <= stamp:
+            at, command = self._due.popleft()
+            if self._last is not None or at == stamp:
+                self.command(command)
+        self._last = stamp
+
+    def command(self, command) -> Reply:
+        """Ask for a Command between two steps; it acts in the next. Whatever comes of it is in `answered`."""
+        try:
+            self.admit(command)
+            if command.verb in self.REQUESTS:
+                reply = self.request(command.verb)
+            else:
+                reply = self.obey(command, commands.values(self.VERBS, command))
+        except ValueError as error:
+            reply = Reply(False, f'refused: {error}')
+        self.answered.append((command, reply))
+        return reply
+
+    def admit(self, command):
+        """Raise ValueError where a Command is not to be heard; overridden by a unit that knows who is in control."""
+
+    def obey(self, command, arguments) -> Reply:
+        """Obey a Command of VERBS with its arguments {name: number or text}; overridden where there are verbs. Raises
+        ValueError where it cannot be."""
+        raise KeyError(command.verb)
 
     def decode(self, topic, message):
         """Take a message that comes once. Raises ValueError for one that is refused."""
@@ -130,8 +183,8 @@ class Unit(typing.Protocol):
         """A text topic that it reads says this from now on."""
         self.inputs[topic] = records.code_of(topic, text)
 
-    def encode(self, topic, code) -> str:
-        """The text of a code of a text topic that it writes."""
+    def encode(self, topic, code):
+        """The text of a code of a text topic that it writes, or the message of a list of texts."""
         return topics.BY_NAME[topic].texts[code]
 
     def configure(self, parameters):
@@ -139,7 +192,7 @@ class Unit(typing.Protocol):
         self.parameters = parameters
 
     def request(self, name) -> Reply:
-        """Ask for one of REQUESTS between two steps; it acts in the next."""
+        """Do one of REQUESTS between two steps; it acts in the next. From outside it is asked for by `command`."""
         raise KeyError(name)
 
     def requests_for(self, topic, text) -> list:

@@ -4,12 +4,13 @@ One class runs every unit. A node of its own kind adds what is no law: the drive
 (adu_drive.timekeeper_node), the ship speaks NMEA.
 """
 import collections
+import dataclasses
 import time
 
 import numpy as np
 from std_srvs.srv import Trigger
 
-from pedestal_common import messages, nodes, records, shell, topics
+from pedestal_common import commands, messages, nodes, records, shell, topics
 from pedestal_common.steps import SECOND, Steps
 from pedestal_common.unit import ERROR, WARN
 
@@ -23,14 +24,15 @@ class Port:
                          for name in (unit.trigger, *unit.latencies)}
         self.stamps = np.zeros(1, np.int64)
         self._initial = unit.memory.record.copy()
-        written = [name for name in unit.NODE.writes if not prefix or name in nodes.OF_BEAM
+        written = [name for name in unit.writes if not prefix or name in nodes.OF_BEAM
                    or prefix == nodes.prefixes(node.graph.beams)[0]]
         self._encoders = [(records.Encoder(name, message, unit.outputs), node.writer(self.named(name)))
                           for name, message in unit.messages.items() if name in written]
         self._texts = {name: [node.writer(self.named(name)), topics.SILENT, '']
                        for name in written if records.is_text(name)}
+        self._reply = node.writer(self.named(unit.NODE.replies)) if unit.NODE.replies else None
         self._announce, self._epoch_of = node.announce, node.epoch
-        self._epoch = 0
+        self._clock, self._epoch, self._last = node.clock, 0, None
 
     def named(self, topic):
         """The topic as the graph names it."""
@@ -39,7 +41,8 @@ class Port:
     def step(self, stamp, values):
         """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing came}. The unit counts
         its time from the epoch on: its numbers keep their places however late it is."""
-        self._epoch = self._epoch_of(stamp)
+        self._epoch, self._last = self._epoch_of(stamp), stamp
+        self.unit.epoch = self._epoch
         for name, decoder in self.decoders.items():
             came, numbers = values.get(name) or (records.NEVER, None)
             decoder.put(came - self._epoch, numbers)
@@ -51,20 +54,45 @@ class Port:
         self.unit.memory.record[...] = self._initial
         self.unit.configure(self.unit.parameters)
 
+    def command(self, command):
+        """Ask the unit for a Command and tell what came of it: the Reply."""
+        reply = self.unit.command(command)
+        self.reply()
+        return reply
+
+    def reply(self):
+        """Tell what came of what was asked."""
+        while self.unit.answered:
+            answer = commands.reply_message(*self.unit.answered.popleft())
+            if self._reply:
+                self._announce(self._reply, answer)
+
     def publish(self):
-        """The texts that have changed, then every message that is due."""
+        """What was asked since the last step, the texts that have changed, then every message that is due."""
+        self.reply()
+        self.announce()
+        for encoder, publish in self._encoders:
+            if encoder.due:
+                publish(encoder.encoded(self._epoch))
+
+    def announce(self):
+        """The texts that have changed; a list of them has the stamp of the step."""
         outputs = self.unit.outputs[0]
         for name, last in self._texts.items():
             code = outputs[name]
             if code != last[1]:
                 last[1] = code
-                text = self.unit.encode(name, int(code))
-                if text != last[2]:
-                    last[2] = text
-                    self._announce(last[0], text)
-        for encoder, publish in self._encoders:
-            if encoder.due:
-                publish(encoder.encoded(self._epoch))
+                said = self.unit.encode(name, int(code))
+                if said != last[2]:
+                    last[2] = said
+                    self._announce(last[0], messages.String(data=said) if isinstance(said, str)
+                                   else self._stamped(said))
+
+    def _stamped(self, message):
+        """A message with the stamp of the last step, of now before the first."""
+        header = messages.header('')
+        messages.put_stamp(header.stamp, self._clock()[1] if self._last is None else self._last)
+        return dataclasses.replace(message, header=header)
 
 
 class UnitNode(shell.Shell):
@@ -80,6 +108,7 @@ class UnitNode(shell.Shell):
         self.ports = []
         for prefix in prefixes:
             unit = unit_type(self.parameters, reads)
+            unit.lockstep = self.graph.lockstep
             self.prepare(unit)
             self.ports.append(Port(self, unit, prefix))
         self.unit = self.ports[0].unit
@@ -99,7 +128,9 @@ class UnitNode(shell.Shell):
         self.begin()
 
     def _listen(self, port):
-        """Subscribe to what does not belong to a step: texts, and what comes once."""
+        """Subscribe to what does not belong to a step: texts, what comes once, commands."""
+        if self.row.obeys:
+            self.message_reader(port.named(self.row.obeys), self._command_taker(port))
         for name in port.unit.reads:
             rate = topics.BY_NAME[name].rate
             if rate == 'change':
@@ -109,6 +140,15 @@ class UnitNode(shell.Shell):
                 if self.graph.lockstep and any(writer in self.graph.members for writer in self.links[
                         self.beam + name if self.beam + name in self.links else name].writers):
                     self._waiting_for_once.add(name)
+
+    def _command_taker(self, port):
+        def take(message):
+            try:
+                port.command(commands.of_message(message))
+            except ValueError as error:
+                self.refused = f'{self.row.obeys} refused: {error}'
+                self.get_logger().warning(self.refused)
+        return take
 
     @staticmethod
     def _text_taker(port, name):
@@ -219,6 +259,7 @@ class UnitNode(shell.Shell):
         if silent != self.unit.silent:
             for port in self.ports:
                 port.unit.silent = silent
+                port.announce()
             if silent:
                 self.alarm()
 
@@ -235,7 +276,7 @@ class UnitNode(shell.Shell):
     def _service(self, name):
         """The callback of a service: asks every unit between two steps and answers with what it reads back."""
         def serve(_request, response):
-            [reply] = {port.unit.request(name) for port in self.ports}
+            [reply] = {port.command(commands.Command(name, commands.SERVICE)) for port in self.ports}
             if name.endswith('/reset_faults') and reply.granted:
                 self.refused = ''
             response.success, response.message = reply

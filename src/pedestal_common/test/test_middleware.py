@@ -40,6 +40,10 @@ def test_every_reader_hears_every_writer(rate, reader, writer):
     assert compatible != QoSCompatibility.ERROR, reason
 
 
+def test_a_writer_that_does_not_latch_is_heard_where_a_person_writes():
+    assert [rate for rate, row in topics.QOS.items() if row.unlatched] == ['once']
+
+
 @pytest.mark.parametrize('rate', ['once', 'change'])
 def test_who_comes_late_gets_the_last(rate):
     for role in ROLES:

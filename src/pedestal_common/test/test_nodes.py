@@ -5,13 +5,14 @@ import pytest
 
 from pedestal_common import nodes, topics, unit
 
-SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'diagnostics'}
+SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'diagnostics',
+          *(f'{node}/{name}' for node in ('ship_motion', 'ins') for name in ('inject', 'injected'))}
 
 
 def test_every_topic_is_written_by_one_node_and_every_name_is_in_the_table_of_topics():
     for topic in topics.TOPICS:
-        writers = [node.name for node in nodes.NODES if topic.name in node.writes]
-        assert len(writers) == (0 if topic.name == 'diagnostics' else 1), topic.name
+        writers = [node.name for node in nodes.NODES if topic.name in (*node.writes, node.replies)]
+        assert len(writers) == (0 if topic.name == 'diagnostics' or topic.rate == 'command' else 1), topic.name
     for node in (*nodes.NODES, nodes.ARRAY):
         assert set(node.reads) | set(node.writes) <= set(topics.BY_NAME), node.name
         assert node.answer in ('', *node.writes)
@@ -38,7 +39,7 @@ def test_a_graph_with_a_drive_holds_every_topic():
 
 def test_one_beam_keeps_every_name_and_obeys_the_reference():
     graph = nodes.links(1)
-    assert set(topics.BY_NAME) - set(graph) == {'adu/motor_states'}
+    assert set(topics.BY_NAME) - set(graph) == {'adu/motor_states', 'adu/stow_pins', 'adu/inject', 'adu/injected'}
     assert {name for name, link in graph.items() if 'adu' in link.readers} == {'acu/reference'}
     assert all(graph[name].writers == link.writers for name, link in nodes.links().items() if name in graph)
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from pedestal_common import nodes, noise
 from pedestal_common.compiled import compiled
+from pedestal_common.injection import schedule, table
+from pedestal_common.injection.simulated import Simulated
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
-from ship_motion_sim import aligning_ins, ins, navigator
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, joined
+from ship_motion_sim import aligning_ins, injected, ins, navigator
 
 RAW, DATA, STATE = 'ship/imu/data_raw', 'ship/imu/data', 'ins/state'
 
@@ -20,7 +22,8 @@ def _record_of(state, constants):
     """The record of an INS. row: of the noise that the next step takes; worst: the highest status since the last
     diagnosis."""
     return np.dtype([('state', state), ('constants', constants), ('inputs', ins.INPUTS), ('outputs', ins.OUTPUTS),
-                     ('row', 'i8'), ('worst', 'i8')], align=True)
+                     ('row', 'i8'), ('worst', 'i8'), ('schedule', schedule.SCHEDULE), ('injected', injected.INS)],
+                    align=True)
 
 
 MODEL_RECORD = _record_of(ins.STATE, ins.CONSTANTS)
@@ -64,22 +67,30 @@ def encode(o, outputs):
 def model_law(memory, stamp, inputs, outputs):
     """Step k of method `model`."""
     m = memory.record[0]
+    if schedule.pending(m.schedule, stamp):
+        injected.take_ins(m, stamp)
     decode(m.inputs, inputs[RAW])
     ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
     m.row += 1
     m.worst = max(m.worst, m.outputs.status)
     encode(m.outputs, outputs)
+    if m.schedule.pending != 0:
+        injected.spoil_ins(m.injected, stamp, outputs)
 
 
 @compiled
 def aligning_law(memory, stamp, inputs, outputs):
     """Step k of an INS that aligns."""
     m = memory.record[0]
+    if schedule.pending(m.schedule, stamp):
+        injected.take_ins(m, stamp)
     decode(m.inputs, inputs[RAW])
     aligning_ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
     m.row += 1
     m.worst = max(m.worst, m.outputs.status)
     encode(m.outputs, outputs)
+    if m.schedule.pending != 0:
+        injected.spoil_ins(m.injected, stamp, outputs)
 
 
 @compiled
@@ -96,9 +107,10 @@ def aligning_laws(memory, stamps, inputs, outputs):
         aligning_law(memory, stamps[k], inputs[k], outputs[k])
 
 
-class Ins(Unit):
+class Ins(Simulated):
     """The INS of an InsParameters."""
     NODE = nodes.row('ins')
+    VERBS = table.VERBS[NODE.name]
     LAWS = {ModelMemory: (model_law, model_laws), AligningMemory: (aligning_law, aligning_laws)}
 
     def __init__(self, parameters, reads):
@@ -106,13 +118,15 @@ class Ins(Unit):
         self._noise = noise.generator(parameters.seed, self.NODE.name)
         normals = np.zeros((1, ins.NORMALS))
         model = parameters.method == 'model'
+        constants = ins.constants(parameters) if model else aligning_ins.constants(parameters)
+        faults = {'schedule': schedule.empty(),
+                  'injected': injected.initial(constants['latency_ns'])}
         if model:
-            self.memory = ModelMemory(joined(MODEL_RECORD, state=ins.initial_state(),
-                                             constants=ins.constants(parameters)), normals)
+            self.memory = ModelMemory(joined(MODEL_RECORD, state=ins.initial_state(), constants=constants, **faults),
+                                      normals)
         else:
-            constants = aligning_ins.constants(parameters)
             self.memory = AligningMemory(joined(ALIGNING_RECORD, state=aligning_ins.initial_state(constants),
-                                                constants=constants), normals)
+                                                constants=constants, **faults), normals)
         rate_noise = parameters.rate_noise if model else 0.0     # zeros: unknown
         self.messages[DATA].angular_velocity_covariance = (np.eye(3) * rate_noise**2).ravel()
 

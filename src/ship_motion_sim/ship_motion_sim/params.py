@@ -2,6 +2,7 @@
 both hold the group `ship`, which must be the same in both (ins.step says when it is not)."""
 import dataclasses
 
+from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
 
 SEED_MAX = 2 ** 31 - 1
@@ -129,6 +130,15 @@ class ShipMotionParameters(Parameters):
     ship: ShipParameters = group(ShipParameters)
     imu: ImuParameters = group(ImuParameters)
     nmea: NmeaParameters = group(NmeaParameters)
+    inject: str = text('', table.DOC)
+
+    def check(self):
+        """Raise ParameterError for faults that cannot be injected."""
+        table.due('ship_motion', self.inject)
+
+    def check_graph(self, beams, lockstep):
+        super().check_graph(beams, lockstep)
+        table.check_pacing('ship_motion', self.inject, lockstep)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -190,10 +200,16 @@ class InsParameters(Parameters):
     alignment: AlignmentParameters = group(AlignmentParameters)
     aid: AidParameters = group(AidParameters)
     ship: ShipParameters = group(ShipParameters)
+    inject: str = text('', table.DOC)
 
     def check(self):
-        """Raise ParameterError for a GNSS velocity with a method that needs the heading before it can use one."""
+        """Raise ParameterError for a GNSS velocity with a method that needs the heading before it can use one, and for
+        faults that cannot be injected."""
+        table.due('ins', self.inject)
         if self.aid.source == 'gnss' and self.method not in ('model', 'oba'):
             raise ParameterError("aid.source = 'gnss': must be none or log unless method = oba, for its velocity is "
                                  'of no use before the heading is known')
 
+    def check_graph(self, beams, lockstep):
+        super().check_graph(beams, lockstep)
+        table.check_pacing('ins', self.inject, lockstep)

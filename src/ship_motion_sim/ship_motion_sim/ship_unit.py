@@ -5,9 +5,11 @@ import numpy as np
 
 from pedestal_common import nodes, noise
 from pedestal_common.compiled import compiled
+from pedestal_common.injection import schedule, table
+from pedestal_common.injection.simulated import Simulated
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
-from ship_motion_sim import imu, motion
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, joined
+from ship_motion_sim import imu, injected, motion
 
 TRUTH, RAW = 'ship/truth', 'ship/imu/data_raw'
 
@@ -17,7 +19,7 @@ NOMINAL_PERIOD = 5e-3
 
 RECORD = np.dtype([('ship', motion.CONSTANTS), ('truth', motion.OUTPUTS), ('imu_state', imu.STATE),
                    ('imu', imu.CONSTANTS), ('imu_inputs', imu.INPUTS), ('felt', imu.OUTPUTS), ('last', 'i8'),
-                   ('row', 'i8')], align=True)
+                   ('row', 'i8'), ('schedule', schedule.SCHEDULE), ('injected', injected.IMU)], align=True)
 """last: stamp of the last step [ns]; row: of the noise that the next step takes."""
 
 
@@ -45,6 +47,8 @@ def encode(truth, felt, stamp, outputs):
 def law(memory, stamp, inputs, outputs):
     """Step k."""
     m = memory.record[0]
+    if schedule.pending(m.schedule, stamp):
+        injected.take_imu(m, stamp)
     m.imu_inputs.t = stamp * 1e-9
     m.imu_inputs.dt = (stamp - m.last) * 1e-9 if m.last != NEVER else NOMINAL_PERIOD
     m.last = stamp
@@ -52,6 +56,8 @@ def law(memory, stamp, inputs, outputs):
     imu.step(m.imu_state, m.imu, m.ship, m.imu_inputs, m.truth, m.felt, memory.normals[m.row])
     m.row += 1
     encode(m.truth, m.felt, stamp, outputs)
+    if m.schedule.pending != 0:
+        injected.spoil_imu(m.injected, stamp, outputs)
 
 
 @compiled
@@ -61,15 +67,18 @@ def laws(memory, stamps, inputs, outputs):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
-class ShipMotion(Unit):
+class ShipMotion(Simulated):
     """The ship and its IMU of a ShipMotionParameters."""
     NODE, LAWS = nodes.row('ship_motion'), {Memory: (law, laws)}
+    VERBS = table.VERBS[NODE.name]
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         self._noise = noise.generator(parameters.imu.seed, self.NODE.name)
         self.memory = Memory(joined(RECORD, ship=motion.constants(parameters.ship), imu_state=imu.initial_state(),
-                                    imu=imu.constants(parameters), last=NEVER), np.zeros((1, imu.NORMALS)))
+                                    imu=imu.constants(parameters), last=NEVER,
+                                    schedule=schedule.empty()),
+                             np.zeros((1, imu.NORMALS)))
 
     def block(self, steps):
         """The memory with the IMU's noise (steps, NORMALS) drawn for the next steps."""

@@ -59,5 +59,5 @@ def test_cross_coupling_rotates_the_error(beta):
 def test_detector_is_the_real_part_of_difference_times_conjugate_sum():
     phi, sum_voltage, noise = 0.7, 1.3 - 0.4j, 0.2 + 0.5j
     expected = ((0.9 * cmath.exp(1j * phi) + noise) * sum_voltage.conjugate()).real
-    got = monopulse.detect(0.9, sum_voltage.real, sum_voltage.imag, math.cos(phi), math.sin(phi), 0.2, 0.5)
+    got = monopulse.detect(0.9, 0.0, sum_voltage.real, sum_voltage.imag, math.cos(phi), math.sin(phi), 0.2, 0.5)
     assert got == pytest.approx(expected, abs=1e-12)

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pedestal_common.line_of_sight import ashore_matrix
 from pedestal_common.parameters import ParameterError, build
 from tracking_receiver_sim import monopulse, receiver, smoothing, target
 from tracking_receiver_sim.params import TrackingReceiverParameters
@@ -18,43 +17,13 @@ QUIET = FIXED | {'receiver.cn0_dbhz': 110.0}
 MEASURED = {'receiver.rate.measured': True, 'receiver.ranging.measured': True}
 
 
-class Bench:
-    """A receiver with a beam to point; `run` takes steps and gives the outputs as an array."""
-
-    def __init__(self, values, period=PERIOD, duration=1000.0):
-        self.params = build(TrackingReceiverParameters, values)
-        self.target = target.build(self.params.target, duration)
-        self.constants = receiver.constants(self.params, period, self.target)
-        self.state = receiver.initial_state()
-        self.inputs = np.zeros(1, receiver.INPUTS)
-        self.inputs['mat_ed'], self.inputs['valid'], self.inputs['stamp_ns'] = ashore_matrix(), 1, -1
-        self.period_ns, self.next_ns = round(period * 1e9), 0
-        self.point(0.3, 0.6)
-
-    def point(self, azimuth, elevation):
-        self.inputs['azimuth'], self.inputs['elevation'] = azimuth, elevation
-
-    def run(self, steps=1, rng=None, stamps=None):
-        stamps = self.next_ns + self.period_ns * np.arange(steps) if stamps is None else stamps
-        count = receiver.normals_per_step(self.params)
-        outputs, out = np.zeros(1, receiver.OUTPUTS), np.zeros(len(stamps), receiver.OUTPUTS)
-        for k, stamp in enumerate(stamps):
-            self.inputs['stamp_ns'] = stamp
-            normals = np.zeros(count) if rng is None else rng.standard_normal(count)
-            receiver.step(self.state[0], self.constants[0], self.inputs[0], outputs[0], self.target.breaks,
-                          self.target.coefficients, normals)
-            out[k] = outputs[0]
-        self.next_ns = int(stamps[-1]) + self.period_ns
-        return out
-
-
 def errors(out):
     return np.stack([out['cross_elevation'], out['elevation']], axis=1)
 
 
 @pytest.mark.parametrize('cn0_dbhz', [45.0, 52.0, 65.0])
 @pytest.mark.parametrize('samples', [1, 5])
-def test_noise_law(cn0_dbhz, samples):
+def test_noise_law(Bench, cn0_dbhz, samples):
     bench = Bench(FIXED | {'receiver.cn0_dbhz': cn0_dbhz, 'receiver.samples_per_step': samples})
     out = bench.run(8000, np.random.default_rng(3))[200:]
     law = BEAMWIDTH / (1.6 * math.sqrt(2.0 * 10.0**(cn0_dbhz / 10.0) * PERIOD))
@@ -70,7 +39,7 @@ def test_default_noise_is_about_30_millidegrees():
     assert math.degrees(sigma) == pytest.approx(0.03, abs=5e-4)
 
 
-def test_noise_grows_off_axis():
+def test_noise_grows_off_axis(Bench):
     bench = Bench(FIXED | {'receiver.cn0_dbhz': 60.0})
     v = 0.45
     bench.point(0.3, 0.6 - v * BEAMWIDTH)
@@ -83,7 +52,7 @@ def test_noise_grows_off_axis():
     assert along > 1.15 * across > 1.15 * 1.2 * on_axis
 
 
-def test_noise_in_the_sum_channel_does_not_lower_the_slope():
+def test_noise_in_the_sum_channel_does_not_lower_the_slope(Bench):
     bench = Bench(FIXED | {'receiver.cn0_dbhz': 40.0, 'receiver.acquire_level_dbhz': 30.0,
                            'receiver.lose_level_dbhz': 30.0})
     bench.point(0.3, 0.6 - 0.2 * BEAMWIDTH)
@@ -91,7 +60,7 @@ def test_noise_in_the_sum_channel_does_not_lower_the_slope():
     assert error == pytest.approx(monopulse.difference_pattern(0.2, 1.6) / monopulse.sum_pattern(0.2) / 1.6, rel=0.03)
 
 
-def test_recursion_noise_as_predicted():
+def test_recursion_noise_as_predicted(Bench):
     bench = Bench(FIXED | {'receiver.cn0_dbhz': 55.0, 'receiver.smoothing': 'recursion'})
     out = bench.run(12000, np.random.default_rng(5))[200:]
     predicted = receiver.angle_noise(bench.params, 55.0, PERIOD)
@@ -99,7 +68,7 @@ def test_recursion_noise_as_predicted():
 
 
 @pytest.mark.parametrize('elevation', [0.0, 1.0, 1.4])
-def test_azimuth_error_is_seen_as_cross_elevation(elevation):
+def test_azimuth_error_is_seen_as_cross_elevation(Bench, elevation):
     bench = Bench(QUIET | {'target.angle.elevation': elevation})
     offset = 2e-3
     bench.point(0.3 - offset, elevation)
@@ -108,7 +77,7 @@ def test_azimuth_error_is_seen_as_cross_elevation(elevation):
     assert out['cross_elevation'] == pytest.approx(offset * math.cos(elevation), rel=0.01)
 
 
-def test_error_signs_and_slope_factor():
+def test_error_signs_and_slope_factor(Bench):
     bench = Bench(QUIET | {'antenna.slope_factor': 1.5})
     bench.point(0.3, 0.6 - 1e-3)
     out = bench.run(300)[-1]
@@ -116,7 +85,7 @@ def test_error_signs_and_slope_factor():
     assert out['elevation'] == pytest.approx(1.5e-3, rel=0.01)
 
 
-def test_phase_error_and_cross_coupling():
+def test_phase_error_and_cross_coupling(Bench):
     bench = Bench(QUIET | {'antenna.phase_error': 0.5, 'antenna.cross_coupling': 0.2})
     bench.point(0.3, 0.6 - 1e-3)
     out = bench.run(300)[-1]
@@ -126,7 +95,7 @@ def test_phase_error_and_cross_coupling():
 
 @pytest.mark.parametrize('v, sense', [(0.2, 1), (-0.3, -1), (0.9, 1), (-1.2, -1), (1.3, -1), (1.5, -1), (1.66, -1),
                                       (1.7, 1), (1.9, 1)])
-def test_s_curve_saturates_reverses_and_has_a_false_null(v, sense):
+def test_s_curve_saturates_reverses_and_has_a_false_null(Bench, v, sense):
     u = 3.735243 * v
     S, D = math.cos(u) / (1.0 - (2.0 * u / math.pi)**2), math.sin(u) / (1.0 - (u / math.pi)**2)
     expected = max(-0.7, min(D / S / 3.735243, 0.7))
@@ -140,7 +109,7 @@ def test_s_curve_saturates_reverses_and_has_a_false_null(v, sense):
     assert abs(out['cross_elevation']) < 1e-12
 
 
-def test_geometry_on_a_tilted_moving_deck():
+def test_geometry_on_a_tilted_moving_deck(Bench):
     bench = Bench(QUIET)
     rotation = Rotation.from_euler('ZYX', [0.7, -0.2, 0.3])
     antenna = np.array([30.0, -20.0, 12.0])
@@ -154,7 +123,7 @@ def test_geometry_on_a_tilted_moving_deck():
     assert out['elevation'] == pytest.approx(1e-3, rel=0.01)
 
 
-def test_lock_has_two_levels_and_two_times():
+def test_lock_has_two_levels_and_two_times(Bench):
     bench = Bench(FIXED | {'receiver.cn0_dbhz': 60.0, 'receiver.acquire_level_dbhz': 50.0,
                            'receiver.lose_level_dbhz': 45.0, 'receiver.cn0_time_constant': 1e-3,
                            'receiver.acquire_time': 0.1, 'receiver.lose_time': 0.05})
@@ -184,7 +153,7 @@ def test_lock_has_two_levels_and_two_times():
 
 
 @pytest.mark.parametrize('latency', [0.0, 0.005, 0.012, 0.1])
-def test_latency_is_exact(latency):
+def test_latency_is_exact(Bench, latency):
     rng = np.random.default_rng(6)
     stamps = np.cumsum(rng.integers(1, 9_000_000, 400))
     prompt = Bench(FIXED | MEASURED).run(stamps=stamps, rng=np.random.default_rng(7))
@@ -205,13 +174,13 @@ def test_latency_is_exact(latency):
     assert given >= 0 and late['locked'].any()
 
 
-def smoothing_bench(**changes):
+def smoothing_bench(Bench, **changes):
     return Bench(QUIET | {'receiver.smoothing': 'recursion', 'receiver.samples_per_step': 1} | changes, period=1e-3)
 
 
-def test_smoothing_minus_3_db_is_at_8_17_hz():
-    bench = smoothing_bench(**{'target.kind': 'sine', 'target.angle.start': 0.0, 'target.angle.frequency': 8.17,
-                               'target.angle.azimuth_amplitude': 0.0, 'target.angle.elevation_amplitude': 1e-4})
+def test_smoothing_minus_3_db_is_at_8_17_hz(Bench):
+    bench = smoothing_bench(Bench, **{'target.kind': 'sine', 'target.angle.start': 0.0, 'target.angle.frequency': 8.17,
+                                      'target.angle.azimuth_amplitude': 0.0, 'target.angle.elevation_amplitude': 1e-4})
     out = bench.run(3000)[1000:]
     phase = 2.0 * math.pi * 8.17 * 1e-9 * out['stamp_ns']
     basis = np.stack([np.sin(phase), np.cos(phase)], axis=1)
@@ -219,22 +188,22 @@ def test_smoothing_minus_3_db_is_at_8_17_hz():
     assert amplitude / 1e-4 == pytest.approx(math.sqrt(0.5), abs=0.002)
 
 
-def test_smoothing_step_response():
-    bench = smoothing_bench(**{'target.angle.start': 1.0, 'target.angle.azimuth_amplitude': 0.0,
-                               'target.angle.elevation_amplitude': 1e-4})
+def test_smoothing_step_response(Bench):
+    bench = smoothing_bench(Bench, **{'target.angle.start': 1.0, 'target.angle.azimuth_amplitude': 0.0,
+                                      'target.angle.elevation_amplitude': 1e-4})
     out = bench.run(1100)[1000:]
     assert out['elevation'] == pytest.approx(1e-4 * (1.0 - (1.0 - 1.0 / 20.0)**np.arange(1, 101)), abs=2e-8)
 
 
-def test_moving_average_step_response():
+def test_moving_average_step_response(Bench):
     """A ramp of n samples, where the recursion is a low-pass; n - 1 over 2 of delay."""
-    bench = smoothing_bench(**{'receiver.smoothing': 'moving_average', 'target.angle.start': 1.0,
-                               'target.angle.azimuth_amplitude': 0.0, 'target.angle.elevation_amplitude': 1e-4})
+    bench = smoothing_bench(Bench, **{'receiver.smoothing': 'moving_average', 'target.angle.start': 1.0,
+                                      'target.angle.azimuth_amplitude': 0.0, 'target.angle.elevation_amplitude': 1e-4})
     out = bench.run(1100)[1000:]
     assert out['elevation'] == pytest.approx(1e-4 * np.minimum(np.arange(1, 101) / 20.0, 1.0), abs=2e-8)
 
 
-def test_moving_average_over_several_steps_is_the_mean_of_their_samples():
+def test_moving_average_over_several_steps_is_the_mean_of_their_samples(Bench):
     """Also while it is not yet full, and once its ring has gone round."""
     values = FIXED | {'receiver.cn0_dbhz': 60.0, 'receiver.samples_per_step': 4, 'receiver.acquire_time': 0.0}
     steps = Bench(values).run(400, np.random.default_rng(4))
@@ -252,7 +221,7 @@ def test_moving_average_over_several_steps_is_the_mean_of_their_samples():
 
 
 @pytest.mark.parametrize('samples', [1, 4])
-def test_a_held_beam_jumps_at_the_step_and_only_the_target_moves(samples):
+def test_a_held_beam_jumps_at_the_step_and_only_the_target_moves(Bench, samples):
     """The mean of a step is the error of the target in the middle of its samples off the beam that stood."""
     bench = Bench(QUIET | {'target.kind': 'ramp', 'target.angle.start': 1.0, 'target.angle.azimuth_rate': 0.0,
                            'target.angle.elevation_rate': 0.02, 'receiver.beam': 'held',
@@ -295,14 +264,14 @@ def test_age_of_the_beam_is_that_of_the_steps_its_samples_were_taken_in(kind, n,
     assert receiver.beam_age(params, PERIOD) == pytest.approx(expected, abs=1e-12)
 
 
-def test_samples_follow_the_error_between_steps():
+def test_samples_follow_the_error_between_steps(Bench):
     bench = Bench(QUIET | {'receiver.samples_per_step': 4})
     bench.run(200)
     bench.point(0.3, 0.6 - 1e-3)
     assert bench.run(1)[0]['elevation'] == pytest.approx(1e-3 * (0.25 + 0.5 + 0.75 + 1.0) / 4.0, rel=0.01)
 
 
-def test_level_falls_with_range():
+def test_level_falls_with_range(Bench):
     bench = Bench({'target.kind': 'flyby', 'target.flyby.speed': 200.0, 'target.flyby.closest_time': 0.0,
                    'receiver.reference_range': 1000.0, 'receiver.cn0_dbhz': 60.0}, duration=20.0)
     levels = []
@@ -318,7 +287,7 @@ def test_level_falls_with_range():
     assert levels[2][0] > 2.5 * levels[0][0] > 2500.0
 
 
-def test_target_below_the_horizon_gives_no_signal():
+def test_target_below_the_horizon_gives_no_signal(Bench):
     bench = Bench(FIXED | {'target.kind': 'ramp', 'target.angle.start': 1.0, 'target.angle.elevation': 0.01,
                            'target.angle.azimuth_rate': 0.0, 'target.angle.elevation_rate': -0.01})
     rng = np.random.default_rng(8)
@@ -330,7 +299,7 @@ def test_target_below_the_horizon_gives_no_signal():
     assert np.all(np.isfinite(out['true_elevation'])) and np.all(np.isfinite(out['cn0_dbhz']))
 
 
-def test_past_the_track_the_target_is_not_valid():
+def test_past_the_track_the_target_is_not_valid(Bench):
     bench = Bench({'target.kind': 'flyby', 'receiver.reference_range': 1000.0}, duration=0.1)
     out = bench.run(2000)
     inside = 1e-9 * out['stamp_ns'] <= 0.1 + target.MARGIN
@@ -342,7 +311,7 @@ def test_past_the_track_the_target_is_not_valid():
 
 @pytest.mark.parametrize('field, value', [('valid', 0), ('azimuth', math.nan), ('elevation', math.inf),
                                           ('mat_ed', math.nan), ('position', math.nan)])
-def test_bad_inputs_unlock_and_leave_no_trace(field, value):
+def test_bad_inputs_unlock_and_leave_no_trace(Bench, field, value):
     bench = Bench(FIXED | {'receiver.cn0_dbhz': 60.0, 'receiver.smoothing': 'recursion'})
     assert bench.run(200)[-1]['locked'] == 1
     good = bench.inputs.copy()
@@ -358,7 +327,7 @@ def test_bad_inputs_unlock_and_leave_no_trace(field, value):
     assert np.abs(errors(out[19:])).max() < 1e-9
 
 
-def test_stamps_that_do_not_increase_are_named_and_change_nothing():
+def test_stamps_that_do_not_increase_are_named_and_change_nothing(Bench):
     bench = Bench(FIXED)
     bench.run(200)
     before = bench.state.tobytes()
@@ -368,14 +337,14 @@ def test_stamps_that_do_not_increase_are_named_and_change_nothing():
     assert bench.run(stamps=np.array([1_000_000_000]))[0]['status'] == receiver.LOCKED
 
 
-def test_same_normals_give_the_same_bits():
+def test_same_normals_give_the_same_bits(Bench):
     values = {'receiver.latency': 0.02, 'receiver.smoothing': 'recursion'}
     runs = [Bench(values, duration=60.0).run(500, np.random.default_rng(9)).tobytes() for _ in range(2)]
     assert runs[0] == runs[1]
     assert runs[0] != Bench(values, duration=60.0).run(500, np.random.default_rng(10)).tobytes()
 
 
-def test_rate_on_a_moving_deck_is_how_fast_the_error_changes():
+def test_rate_on_a_moving_deck_is_how_fast_the_error_changes(Bench):
     """Against the difference of the true errors two steps apart; a flyby seen from a turning, sailing deck."""
     bench = Bench(MEASURED | {'target.kind': 'flyby', 'receiver.range_exponent': 0.0, 'receiver.cn0_dbhz': 60.0},
                   period=1e-3)
@@ -405,7 +374,7 @@ def test_rate_on_a_moving_deck_is_how_fast_the_error_changes():
     assert np.isnan(out['rate'][out['locked'] == 0]).all() and np.isnan(out['range'][out['locked'] == 0]).all()
 
 
-def test_rate_and_range_have_the_noise_they_say_and_leave_the_errors_alone():
+def test_rate_and_range_have_the_noise_they_say_and_leave_the_errors_alone(Bench):
     plain = Bench(FIXED | {'receiver.cn0_dbhz': 60.0}).run(100, np.random.default_rng(5))
     assert np.isnan(plain['rate']).all() and np.isnan(plain['range']).all()
     bench = Bench(FIXED | MEASURED | {'receiver.cn0_dbhz': 60.0, 'receiver.rate.sigma': 0.002,
@@ -420,7 +389,7 @@ def test_rate_and_range_have_the_noise_they_say_and_leave_the_errors_alone():
     assert np.abs(np.corrcoef(every.T) - np.eye(5)).max() < 0.1
 
 
-def test_latency_that_does_not_fit_the_ring_is_refused():
+def test_latency_that_does_not_fit_the_ring_is_refused(Bench):
     with pytest.raises(ParameterError, match='latency = 0.5 s: must be below 511 periods of 0.0005 s'):
         Bench(FIXED | {'receiver.latency': 0.5}, period=5e-4)
 
@@ -436,7 +405,7 @@ def test_bad_parameters_are_refused(values, message):
         build(TrackingReceiverParameters, values)
 
 
-def test_the_antenna_stands_at_the_end_of_its_arm():
+def test_the_antenna_stands_at_the_end_of_its_arm(Bench):
     """Error, range and rate of a moving deck against scipy's rotation and differences of the true error."""
     arm = np.array([12.0, -4.0, 25.0])
     bench = Bench(QUIET | MEASURED | {'target.angle.range': 800.0, 'receiver.samples_per_step': 1,
@@ -462,7 +431,7 @@ def test_the_antenna_stands_at_the_end_of_its_arm():
     np.testing.assert_allclose(out['rate'], (after - before) / (2 * h), atol=1e-6)
 
 
-def test_no_signal_through_the_superstructure():
+def test_no_signal_through_the_superstructure(Bench):
     bench = Bench(QUIET | {'blockage': '0.2 0.4 0.7'})
     out = bench.run(200)[-1]
     assert out['status'] == receiver.HIDDEN and not out['locked']

@@ -7,7 +7,7 @@ import pytest
 from sgp4.io import compute_checksum
 from skyfield.api import EarthSatellite, load, wgs84
 
-from pedestal_common import csv_table
+from pedestal_common import csv_table, orbit
 from pedestal_common.parameters import build
 from tracking_receiver_sim import target
 from tracking_receiver_sim.params import LeoPassParameters, TargetParameters
@@ -66,10 +66,10 @@ def test_leo_pass_agrees_with_skyfield(leo, ut1_is_utc, allowed_mdeg, allowed_m)
 
 def test_hermite_pieces_agree_with_sgp4(leo):
     params = TargetParameters()
-    satrec = target.satellite(params.leo_pass)
+    satrec = orbit.satellite(params.leo_pass)
     julian, fraction = target._start(params, satrec, 120.0)
     times = np.random.default_rng(1).uniform(-5.0, 125.0, 500)
-    position, velocity = target._satellite_enu(satrec, params.station, julian, fraction, times)
+    position, velocity = orbit.enu(satrec, params.station, julian, fraction, times)
     got = states(leo, times)
     assert np.linalg.norm(got[:, 1:4] - position, axis=1).max() < 2e-3
     assert np.linalg.norm(got[:, 4:7] - velocity, axis=1).max() < 0.03
@@ -84,7 +84,7 @@ def test_run_is_centred_on_the_culmination(leo):
 
 def test_pass_finder_takes_the_first_that_fits():
     params = build(TargetParameters, {'leo_pass.culmination_low_deg': 40.0, 'leo_pass.culmination_high_deg': 60.0})
-    satrec = target.satellite(params.leo_pass)
+    satrec = orbit.satellite(params.leo_pass)
     when = target.culmination(params, satrec)
     scale = load.timescale(builtin=True)
     sky = EarthSatellite(LINE_1, LINE_2, 'ISS', scale)
@@ -122,7 +122,7 @@ def altered(line, first, text):
     (LINE_1, altered(LINE_2, 52, '17.50103472'), 'TLE .*25544.*: mrt is less than 1.0|decayed'),
     (LINE_1, altered(LINE_2, 26, '9999999'), 'TLE .*25544')])
 def test_broken_tle(line_1, line_2, message):
-    with pytest.raises(target.TargetError, match=message) as raised:
+    with pytest.raises(orbit.TargetError, match=message) as raised:
         built(leo_pass__line_1=line_1, leo_pass__line_2=line_2)
     assert '\n' not in str(raised.value)
 
@@ -134,7 +134,7 @@ def test_broken_tle(line_1, line_2, message):
     ({'leo_pass__start_time': '2026-01-01T00:00:00'}, 'days from the TLE epoch 2019-12-09T16:38:29.363Z, must be'),
     ({'leo_pass__start_time': '2019-12-09T17:20:00'}, 'below the horizon from 2019-12-09T17:20:00.000Z for 120 s')])
 def test_pass_that_cannot_be(values, message):
-    with pytest.raises(target.TargetError, match=message):
+    with pytest.raises(orbit.TargetError, match=message):
         built(**values)
 
 

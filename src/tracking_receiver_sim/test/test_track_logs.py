@@ -5,7 +5,7 @@ import pytest
 
 from pedestal_common import csv_table
 from tracking_receiver_sim.params import TrackFileParameters
-from tracking_receiver_sim.track import fixes, instant
+from tracking_receiver_sim.track import files, fixes, instant
 
 N = 8
 BEGIN = 1532340000
@@ -75,7 +75,7 @@ LOGS = {'own': own, 'traffic': traffic, 'opensky': opensky, 'gpx': gpx, 'nmea': 
 def read(tmp_path, content, **values):
     path = tmp_path / 'flight.log'
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return fixes.read(TrackFileParameters(path=str(path), **values))
+    return files.read(TrackFileParameters(path=str(path), **values))[1]
 
 
 def refused(tmp_path, content, **values):
@@ -107,20 +107,20 @@ def test_lines_are_those_of_the_file(tmp_path):
 
 def test_rows_without_a_position_are_counted(tmp_path):
     assert 'ADS-B of 4b1812 RGA3, passed over 1 x row without time, position or aircraft' in read(
-        tmp_path, traffic()).said
+        tmp_path, traffic()).description
 
 
 def test_barometric_altitude_is_said(tmp_path):
     content = traffic().replace('geoaltitude', 'other').replace('9999.0', '2500.0')
     got = read(tmp_path, content)
-    assert got.altitude == pytest.approx(np.full(N, 762.0)) and 'barometric altitude' in got.said
+    assert got.altitude == pytest.approx(np.full(N, 762.0)) and 'barometric altitude' in got.description
 
 
 def test_one_of_several_aircraft(tmp_path):
     content = traffic(('4b1812,RGA3', '3c6444,DLH9'))
     for asked in ('3C6444', 'dlh9'):
         got = read(tmp_path, content, aircraft=asked)
-        assert got.said.startswith('flight.log: ADS-B of 3c6444 DLH9') and len(got.time) == N
+        assert got.description.startswith('flight.log: ADS-B of 3c6444 DLH9') and len(got.time) == N
     for asked in ('', 'SWR1'):
         message = refused(tmp_path, content, aircraft=asked)
         assert f'aircraft = {asked!r}: must name one of the 2 in the file: 4b1812 RGA3, 3c6444 DLH9' in message
@@ -135,9 +135,9 @@ def test_one_of_several_tracks(tmp_path):
 
 def test_a_point_without_geoidheight_or_ele(tmp_path):
     got = read(tmp_path, gpx(points=[trkpt(k, geoid='') for k in range(N)]))
-    assert got.altitude == pytest.approx(np.array(ALTITUDE) - 47.5) and 'ele taken as height' in got.said
+    assert got.altitude == pytest.approx(np.array(ALTITUDE) - 47.5) and 'ele taken as height' in got.description
     got = read(tmp_path, gpx(points=[trkpt(k, ele='' if k == 3 else None) for k in range(N)]))
-    assert len(got.time) == N - 1 and 'passed over 1 x point without time or ele' in got.said
+    assert len(got.time) == N - 1 and 'passed over 1 x point without time or ele' in got.description
 
 
 def test_the_known_gga(tmp_path):
@@ -157,7 +157,8 @@ def test_a_log_of_nmea_as_it_comes(tmp_path):
     got = read(tmp_path, ('\n'.join(['$GPGGA', '$GPGGA,', '!AIVDM,1', damaged, gga(6, quality='0'), *good])
                           + '\r\n').encode() + b'\xff\xfe$GP\n')
     assert np.diff(got.time).tolist() == [0.5] * 4
-    assert 'passed over 2 x GGA without a fix' in got.said and 'passed over 1 x damaged sentence' in got.said
+    assert 'passed over 2 x GGA without a fix' in got.description
+    assert 'passed over 1 x damaged sentence' in got.description
 
 
 @pytest.mark.parametrize('text, expected', [
@@ -249,4 +250,4 @@ def test_too_many_aircraft(tmp_path, monkeypatch):
 
 def test_a_text_as_long_as_the_file_is_cut(tmp_path):
     got = read(tmp_path, gpx((f'{"n" * 3_000_000}',)))
-    assert len(got.time) == N and len(got.said) < 200
+    assert len(got.time) == N and len(got.description) < 200

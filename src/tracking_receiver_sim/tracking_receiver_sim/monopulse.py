@@ -54,10 +54,11 @@ def channels(v_x, v_e, k_m, cos_beta, sin_beta):
 
 
 @compiled
-def detect(d, s_real, s_imag, cos_phi, sin_phi, d_noise_real, d_noise_imag):
-    """Re(d conj(s)) of a real difference voltage d that the receiver rotated by phi and added noise to; voltages with
-    unit noise power."""
-    return (d * cos_phi + d_noise_real) * s_real + (d * sin_phi + d_noise_imag) * s_imag
+def detect(d_real, d_imag, s_real, s_imag, cos_phi, sin_phi, d_noise_real, d_noise_imag):
+    """Re(d conj(s)) of a difference voltage d that the receiver rotated by phi and added noise to; voltages with unit
+    noise power."""
+    return ((d_real * cos_phi - d_imag * sin_phi + d_noise_real) * s_real
+            + (d_real * sin_phi + d_imag * cos_phi + d_noise_imag) * s_imag)
 
 
 def thermal_noise(beamwidth, k_m, cn0, tau):

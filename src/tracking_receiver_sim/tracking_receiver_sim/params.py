@@ -4,8 +4,11 @@ import math
 
 from pedestal_common.blockage import DOC as SECTORS_DOC
 from pedestal_common.blockage import sectors
+from pedestal_common.geodesy import StationParameters
+from pedestal_common.injection import table
 from pedestal_common.lever_arm import LeverArm
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
+from tracking_receiver_sim.path.params import PathParameters, PolarisationParameters
 from tracking_receiver_sim.smoothing import SMOOTHINGS, WINDOW
 
 KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp')
@@ -13,14 +16,6 @@ LEO_PASS, TRACK_FILE, FLYBY, SINE, STEP, RAMP = range(6)
 
 BEAMS = ('moving', 'held')
 MOVING, HELD = range(len(BEAMS))
-
-
-@dataclasses.dataclass(frozen=True)
-class StationParameters(Parameters):
-    """Where the pedestal stands (WGS84); used by leo_pass and track_file."""
-    latitude_deg: float = parameter(47.4, -90.0, 90.0, 'deg', 'geodetic latitude')
-    longitude_deg: float = parameter(8.5, -180.0, 360.0, 'deg', 'longitude, east positive')
-    height: float = parameter(500.0, -500.0, 9000.0, 'm', 'height above the ellipsoid')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +29,8 @@ class LeoPassParameters(Parameters):
     culmination_low_deg: float = parameter(30.0, 0.0, 90.0, 'deg', 'lowest culmination the pass finder takes')
     culmination_high_deg: float = parameter(70.0, 0.0, 90.0, 'deg', 'highest culmination the pass finder takes')
     search_days: float = parameter(3.0, 0.1, 30.0, 'd', 'how far past the TLE epoch the pass finder looks')
+    ut1_offset: float = parameter(0.0, -0.9, 0.9, 's', 'UT1 - UTC, by which the earth has truly turned further; IERS '
+                                  'Bulletin A; a program track takes 0')
 
     def check(self):
         """Raise ParameterError where the limits of the culmination are not in order."""
@@ -44,12 +41,14 @@ class LeoPassParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class TrackFileParameters(Parameters):
-    """A recorded flight: CSV, ADS-B (CSV of traffic or OpenSky), GPX or NMEA, see docs/tracks.md."""
-    path: str = text('', 'file: CSV, ADS-B as CSV, GPX, NMEA')
-    aircraft: str = text('', 'which one, where the file holds several: icao24, callsign, or name of a GPX track')
-    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first fix')
-    max_gap: float = parameter(10.0, 0.01, 600.0, 's', 'largest time between two fixes')
-    max_speed: float = parameter(400.0, 1.0, 12e3, 'm/s', 'a track that is faster is refused')
+    """A track from a file: a recorded flight (CSV, ADS-B, GPX, NMEA), a predicted orbit (CCSDS OEM, STK) or a table of
+    azimuth and elevation (CSV, program.txt), see docs/tracks.md."""
+    path: str = text('', 'file: CSV, ADS-B as CSV, GPX, NMEA, OEM, STK .e, program.txt')
+    aircraft: str = text('', 'which one, where the file holds several: icao24, callsign, name of a GPX track, object '
+                         'of an OEM')
+    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first fix, state or row')
+    max_gap: float = parameter(10.0, 0.01, 600.0, 's', 'largest time between two fixes of a flight')
+    max_speed: float = parameter(400.0, 1.0, 12e3, 'm/s', 'a flight that is faster is refused')
     max_acceleration: float = parameter(50.0, 0.1, 1000.0, 'm/s2', 'a track that needs more is refused')
     smooth: bool = flag(False, 'Rauch-Tung-Striebel smoother of a constant-velocity model on each axis')
     sigma_horizontal: float = parameter(10.0, 1e-3, 1e4, 'm', 'smooth: 1-sigma of a fix east and north')
@@ -90,6 +89,7 @@ class TargetParameters(Parameters):
     track_file: TrackFileParameters = group(TrackFileParameters)
     flyby: FlybyParameters = group(FlybyParameters)
     angle: AngleParameters = group(AngleParameters)
+    polarisation: PolarisationParameters = group(PolarisationParameters)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,6 +100,9 @@ class AntennaParameters(Parameters):
     slope_factor: float = parameter(1.0, 0.1, 5.0, '1', 'true slope over the slope the receiver assumes')
     cross_coupling: float = parameter(0.0, -math.pi, math.pi, 'rad', 'beta: rotation of the error axes')
     phase_error: float = parameter(0.0, -math.pi, math.pi, 'rad', 'phi: post-comparator phase error')
+    boresight_cross_elevation: float = parameter(0.0, -0.1, 0.1, 'rad', 'null of the differences off the beam')
+    boresight_elevation: float = parameter(0.0, -0.1, 0.1, 'rad', 'null of the differences off the beam')
+    polarisation: PolarisationParameters = group(PolarisationParameters)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -153,6 +156,7 @@ class TrackingReceiverParameters(Parameters):
     lever_arm: LeverArm = group(LeverArm)
     blockage: str = text('', SECTORS_DOC)
     target: TargetParameters = group(TargetParameters)
+    path: PathParameters = group(PathParameters)
     antenna: AntennaParameters = group(AntennaParameters)
     receiver: ReceiverParameters = group(ReceiverParameters)
     seed: int = parameter(1, 0, 2**31 - 1, '1', 'of the receiver noise')
@@ -167,3 +171,12 @@ class TrackingReceiverNodeParameters(TrackingReceiverParameters):
     """Parameters of tracking_receiver_node: the receiver and the run it is built for."""
     period: float = parameter(5e-3, 1e-4, 1.0, 's', 'drive step T')
     duration: float = parameter(3600.0, 0.1, 86400.0, 's', 'how long the target is laid out for')
+    inject: str = text('', table.DOC)
+
+    def check(self):
+        super().check()
+        table.due('tracking_receiver', self.inject)
+
+    def check_graph(self, beams, lockstep):
+        super().check_graph(beams, lockstep)
+        table.check_pacing('tracking_receiver', self.inject, lockstep)

@@ -24,6 +24,7 @@ from tracking_receiver_sim import smoothing, target
 from tracking_receiver_sim.error_rate import error_rate
 from tracking_receiver_sim.monopulse import channels, detect, thermal_noise
 from tracking_receiver_sim.params import BEAMS, HELD
+from tracking_receiver_sim.path import arrival, multipath, polarisation, scintillation
 from tracking_receiver_sim.smoothing import SMOOTHINGS
 
 STATUSES = ('locked', 'no lock', 'target below the horizon', 'target outside its track',
@@ -51,7 +52,7 @@ STATE = np.dtype([
     ('ring_stamp_ns', 'i8', RING), ('ring_locked', 'i8', RING),
     ('ring_cross_elevation', 'f8', RING), ('ring_elevation', 'f8', RING), ('ring_cn0_dbhz', 'f8', RING),
     ('ring_rate', 'f8', (RING, 2)), ('ring_range', 'f8', RING),
-    ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3)], align=True)
+    ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3), ('scintillation', 'f8', scintillation.NORMALS)], align=True)
 """error_known: cross_elevation, elevation hold the true error at stamp_ns, direction the target in FLU [m];
 timer_ns: time past a lock level; written, released: results put into the ring and taken from it since the start;
 antenna: its ENU position against the station [m], antenna_velocity: FLU [m/s]."""
@@ -59,7 +60,10 @@ antenna: its ENU position against the station [m], antenna_velocity: FLU [m/s]."
 CONSTANTS = np.dtype([
     ('target', target.TARGET),
     ('beamwidth', 'f8'), ('slope', 'f8'), ('angle_scale', 'f8'), ('full_scale', 'f8'),
-    ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'),
+    ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('sign', 'f8', 2),
+    ('boresight', 'f8', 2),
+    ('path', arrival.PATH), ('multipath', multipath.MULTIPATH), ('scintillation', scintillation.SCINTILLATION),
+    ('first_noise', 'i8', 2),
     ('samples', 'i8'), ('tau', 'f8'), ('period_ns', 'i8'), ('agc_gain', 'f8'), ('level_gain', 'f8'),
     ('smoothing', 'i8'), ('smoothing_gain', 'f8'), ('smoothing_samples', 'i8'), ('held', 'i8'),
     ('power', 'f8'), ('reference_range', 'f8'), ('half_exponent', 'f8'), ('horizon_mask', 'f8'),
@@ -67,7 +71,9 @@ CONSTANTS = np.dtype([
     ('latency_ns', 'i8'),
     ('rate_measured', 'i8'), ('rate_sigma', 'f8'), ('range_measured', 'i8'), ('range_sigma', 'f8'),
     ('range_variance', 'f8'), ('lever_arm', 'f8', 3), ('sectors', 'f8', (blockage.MOST, 3))], align=True)
-"""slope: true k_m; angle_scale: theta3 over the k_m the receiver assumes;
+"""slope: true k_m; angle_scale: theta3 over the k_m the receiver assumes; sign: 1 or -1 of either difference channel;
+boresight: null of the differences off the beam, cross-elevation and elevation [rad]; first_noise: index of the first
+normal of rate and range, and of the scintillation;
 powers: carrier power in one sample over noise power in one sample; range_variance: in single precision."""
 
 INPUTS = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
@@ -102,13 +108,19 @@ def constants(params, period, built) -> np.ndarray:
     c['full_scale'] = receiver.full_scale * antenna.beamwidth
     c['cos_beta'], c['sin_beta'] = math.cos(antenna.cross_coupling), math.sin(antenna.cross_coupling)
     c['cos_phi'], c['sin_phi'] = math.cos(antenna.phase_error), math.sin(antenna.phase_error)
+    c['sign'] = 1.0
     c['samples'], c['tau'], c['period_ns'] = receiver.samples_per_step, tau, round(period * 1e9)
     c['agc_gain'] = -math.expm1(-tau / receiver.agc_time_constant)
     c['level_gain'] = -math.expm1(-tau / receiver.cn0_time_constant)
     c['smoothing'] = SMOOTHINGS.index(receiver.smoothing)
     c['smoothing_gain'], c['smoothing_samples'] = 1.0 / receiver.smoothing_samples, receiver.smoothing_samples
     c['held'] = BEAMS.index(receiver.beam) == HELD
-    c['power'] = _hertz(receiver.cn0_dbhz) * tau
+    c['boresight'] = antenna.boresight_cross_elevation, antenna.boresight_elevation
+    c['path'], c['multipath'] = arrival.constants(params.path), multipath.constants(params.path.multipath)
+    c['scintillation'] = scintillation.constants(params.path.scintillation, period)
+    c['first_noise'] = NORMALS_PER_SAMPLE * receiver.samples_per_step, _measured_normals(receiver)
+    c['power'] = _hertz(receiver.cn0_dbhz) * tau * polarisation.efficiency(params.target.polarisation,
+                                                                           antenna.polarisation)
     c['reference_range'], c['half_exponent'] = receiver.reference_range, 0.5 * receiver.range_exponent
     c['horizon_mask'] = receiver.horizon_mask
     c['acquire_power'] = _hertz(receiver.acquire_level_dbhz) * tau
@@ -130,10 +142,14 @@ def initial_state() -> np.ndarray:
     return s
 
 
-def normals_per_step(params) -> int:
-    """How many standard normals `step` takes of TrackingReceiverParameters' receiver."""
-    receiver = params.receiver
+def _measured_normals(receiver) -> int:
+    """How many standard normals a step of ReceiverParameters takes for what it measures."""
     return NORMALS_PER_SAMPLE * receiver.samples_per_step + 2 * receiver.rate.measured + receiver.ranging.measured
+
+
+def normals_per_step(params) -> int:
+    """How many standard normals `step` takes of TrackingReceiverParameters."""
+    return _measured_normals(params.receiver) + scintillation.NORMALS * params.path.scintillation.on
 
 
 def angle_noise(params, cn0_dbhz, period):
@@ -195,6 +211,16 @@ def place_antenna(s, c, i):
 
 
 @compiled
+def seen_from(s, c, true):
+    """The TargetState that the antenna sees of a true one: ENU of the station, bent and late."""
+    if c.path.refractivity == 0.0 and c.path.light_time == 0:
+        return true
+    e, n, u = true.position
+    r, v = arrival.seen(c.path, (e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]), true.velocity)
+    return target.TargetState(true.valid, (s.antenna[0] + r[0], s.antenna[1] + r[1], s.antenna[2] + r[2]), v)
+
+
+@compiled
 def carrier_amplitude(c, e, n, u, hidden):
     """Sum voltage on axis from a target at an ENU vector [m] of the antenna; 0 below the horizon mask and hidden."""
     _, elevation = earth_angles(e, n, u)
@@ -205,27 +231,33 @@ def carrier_amplitude(c, e, n, u, hidden):
 
 
 @compiled
-def sample(s, c, amplitude, v_x, v_e, normals, first):
+def sample(s, c, amplitude, v_x, v_e, image, normals, first):
     """Take one sample of the channels: (cross-elevation, elevation) error [rad]; updates the AGC and level filters.
 
     amplitude: of the carrier on axis [-]; v_x, v_e: offsets in beamwidths; normals: from index `first` on."""
     half = math.sqrt(0.5)
     S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
-    s_real, s_imag = amplitude * S + half * normals[first], half * normals[first + 1]
+    S_imag = D_x_imag = D_e_imag = 0.0
+    if c.multipath.reflection != 0.0:
+        S_g, D_xg, D_eg = channels((image.dX - c.boresight[0]) / c.beamwidth,
+                                   (image.dE - c.boresight[1]) / c.beamwidth, c.slope, c.cos_beta, c.sin_beta)
+        S, D_x, D_e = S + image.real * S_g, D_x + image.real * D_xg, D_e + image.real * D_eg
+        S_imag, D_x_imag, D_e_imag = image.imaginary * S_g, image.imaginary * D_xg, image.imaginary * D_eg
+    s_real, s_imag = amplitude * S + half * normals[first], amplitude * S_imag + half * normals[first + 1]
     power = s_real * s_real + s_imag * s_imag
     s.agc_power += c.agc_gain * (power - s.agc_power)
     s.level_power += c.level_gain * (power - s.level_power)
     # The AGC's range ends where the carrier is no stronger than the noise.
     gain = c.angle_scale / max(s.agc_power - 1.0, 1.0)
-    x = gain * detect(amplitude * D_x, s_real, s_imag, c.cos_phi, c.sin_phi,
-                      half * normals[first + 2], half * normals[first + 3])
-    e = gain * detect(amplitude * D_e, s_real, s_imag, c.cos_phi, c.sin_phi,
-                      half * normals[first + 4], half * normals[first + 5])
+    x = gain * detect(c.sign[0] * amplitude * D_x, c.sign[0] * amplitude * D_x_imag, s_real, s_imag, c.cos_phi,
+                      c.sin_phi, half * normals[first + 2], half * normals[first + 3])
+    e = gain * detect(c.sign[1] * amplitude * D_e, c.sign[1] * amplitude * D_e_imag, s_real, s_imag, c.cos_phi,
+                      c.sin_phi, half * normals[first + 4], half * normals[first + 5])
     return max(-c.full_scale, min(x, c.full_scale)), max(-c.full_scale, min(e, c.full_scale))
 
 
 @compiled
-def measure(s, c, amplitude, dX, dE, normals):
+def measure(s, c, amplitude, dX, dE, image, normals):
     """(cross-elevation, elevation) [rad] measured in one step, while the true error goes from the state's to dX,
     dE."""
     from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (dX, dE)
@@ -234,8 +266,9 @@ def measure(s, c, amplitude, dX, dE, normals):
     smoothing.begin(smooth_e)
     for k in range(c.samples):
         part = (k + 1.0) / c.samples
-        x, e = sample(s, c, amplitude, (from_X + part * (dX - from_X)) / c.beamwidth,
-                      (from_E + part * (dE - from_E)) / c.beamwidth, normals, NORMALS_PER_SAMPLE * k)
+        x, e = sample(s, c, amplitude, (from_X + part * (dX - from_X) - c.boresight[0]) / c.beamwidth,
+                      (from_E + part * (dE - from_E) - c.boresight[1]) / c.beamwidth, image, normals,
+                      NORMALS_PER_SAMPLE * k)
         smoothing.put(smooth_x, x, c.smoothing_gain)
         smoothing.put(smooth_e, e, c.smoothing_gain)
     return (smoothing.smoothed(smooth_x, c.smoothing, c.samples, c.smoothing_samples),
@@ -261,7 +294,7 @@ def rate_and_range(s, c, i, target_state, normals):
     """((cross-elevation rate, elevation rate) [rad/s], range [m]) of a TargetState as measured; NaN for what is
     not."""
     rates, distance = NOT_MEASURED, math.nan
-    first = NORMALS_PER_SAMPLE * c.samples
+    first = c.first_noise[0]
     if c.rate_measured != 0:
         rate_x, rate_e = error_rate(i, s.antenna, s.antenna_velocity, target_state)
         rates = rate_x + c.rate_sigma * normals[first], rate_e + c.rate_sigma * normals[first + 1]
@@ -323,11 +356,13 @@ def step(s, c, i, o, breaks, coefficients, normals):
     error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
     if inputs_known(i):
         dX, dE, amplitude = 0.0, 0.0, 0.0
+        image = multipath.Image(0.0, 0.0, 0.0, 0.0)
         hidden = False
         if true.valid:
             place_antenna(s, c, i)
-            rates, distance = rate_and_range(s, c, i, true, normals)
-            e, n, u = true.position
+            seen = seen_from(s, c, true)
+            rates, distance = rate_and_range(s, c, i, seen, normals)
+            e, n, u = seen.position
             e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
             x, y, z = to_deck(i.mat_ed, e, n, u)
             if c.held and s.error_known:
@@ -337,8 +372,13 @@ def step(s, c, i, o, breaks, coefficients, normals):
             dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
             hidden = blockage.blocked(c.sectors, *angles(x, y, z))
             amplitude = carrier_amplitude(c, e, n, u, hidden)
+            image = multipath.image(c.multipath, i, e, n, u)
             o.true_cross_elevation, o.true_elevation = dX, dE
-        error = measure(s, c, amplitude, dX, dE, normals)
+            if c.scintillation.on != 0:
+                sin_E = u / math.sqrt(e * e + n * n + u * u)
+                fading, X, E = scintillation.wander(c.scintillation, s.scintillation, sin_E, normals, c.first_noise[1])
+                amplitude, dX, dE = fading * amplitude, dX + X, dE + E
+        error = measure(s, c, amplitude, dX, dE, image, normals)
         s.cross_elevation, s.elevation = dX, dE
         s.error_known = true.valid
         lock(s, c, elapsed_ns)

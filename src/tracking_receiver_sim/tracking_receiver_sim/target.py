@@ -6,15 +6,16 @@ the first and past the last break a trajectory is not valid: no position, rather
 
 leo_pass: SGP4 position and velocity at every KNOT_SPACING, joined by cubic Hermite pieces: within 1 mm and
 15 mm/s of SGP4 itself, whose velocity is 10 mm/s off the derivative of its own position. Against skyfield:
-0.3 mdeg with UT1 = UTC, which is taken here; the true UT1 - UTC (up to 0.9 s of earth rotation) moves an ISS
+0.3 mdeg with UT1 = UTC, the default; the true UT1 - UTC (`ut1_offset`, up to 0.9 s of earth rotation) moves an ISS
 pass by up to 0.04 deg (7 mdeg on the default pass). SGP4's own error is kilometres within days.
 
-track_file: a cubic spline through the fixes of a log, or smoothed: the room `track`. Measured on a real 1 Hz
+track_file: an orbit or a table of directions that was predicted (the room `ephemeris`), or a cubic spline through the
+fixes of a log, or smoothed: the room `track`. Measured on a real 1 Hz
 helicopter flight it predicts left-out fixes as well as PCHIP or Akima pieces (9 m, the jitter of the fixes), with
 half their peak acceleration; in a 3 m/s^2 turn its velocity is right to 1e-4 m/s where PCHIP, flattening every
 extremum, is 1.3 m/s off.
 """
-import datetime
+import functools
 import math
 import typing
 from collections import namedtuple
@@ -22,42 +23,27 @@ from collections import namedtuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import minimize_scalar
-from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
-from sgp4.io import compute_checksum
-from sgp4.propagation import gstime
 
+from pedestal_common import orbit
 from pedestal_common.compiled import compiled
 from pedestal_common.interval import interval
 from pedestal_common.line_of_sight import earth_angles, earth_direction
+from pedestal_common.orbit import TargetError
 from pedestal_common.parameters import record, record_type
-from tracking_receiver_sim.geodesy import station_frame
 from tracking_receiver_sim.params import KINDS, RAMP, SINE, STEP, AngleParameters
-from tracking_receiver_sim.track import flight as recorded
+from tracking_receiver_sim.track import files
 
-EARTH_RATE = 7.29211514670698e-5
-"""Of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
 KNOT_SPACING = 1.0
 """Between SGP4 knots [s]."""
 SEARCH_SPACING = 20.0
 """Between the pass finder's looks [s]; a LEO pass lasts minutes."""
 MARGIN = 5.0
-"""Time before and after the run [s] that every kind but a track_file covers, for a program track."""
-TLE_AGE = 30.0
-"""Largest time between TLE epoch and start_time [days]: beyond it SGP4 is useless."""
-TLE_NUMBERS = (
-    {'epoch year': (18, 20), 'epoch day': (20, 32)},
-    {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
-     'mean anomaly': (43, 51), 'mean motion': (52, 63)})
-"""Columns of the fields of both TLE lines that must be numbers."""
+"""Time before and after the run [s] that every kind covers, for a program track; a track_file as far as it goes."""
 
 TargetState = namedtuple('TargetState', 'valid position velocity')
 """valid: 0 or 1; position: ENU of the station [m], velocity [m/s], three floats each, NaN where it is not valid."""
 
 TARGET = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))], align=True)
-
-
-class TargetError(ValueError):
-    """A target cannot be built; one line naming file or TLE line, row, field and value."""
 
 
 class Target(typing.NamedTuple):
@@ -145,10 +131,10 @@ def look_angles(built, times):
 def build(params, duration) -> Target:
     """A Target from TargetParameters for a run of `duration` [s] from stamp 0; raises TargetError."""
     builder = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}.get(params.kind, _angles)
-    breaks, coefficients, *said = builder(params, duration)
+    breaks, coefficients, *known = builder(params, duration)
     constants = np.zeros(1, TARGET)
     constants['kind'], constants['angle'] = KINDS.index(params.kind), record(params.angle)
-    return Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *said)
+    return Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *known)
 
 
 def _angles(params, duration):
@@ -168,67 +154,21 @@ def _flyby(params, duration):
 
 # leo_pass
 
-def satellite(leo_pass) -> Satrec:
-    """The SGP4 record of a LeoPassParameters; raises TargetError when the TLE is not one."""
-    lines = leo_pass.line_1.rstrip(), leo_pass.line_2.rstrip()
-    for number, line in enumerate(lines, 1):
-        name = f'TLE line {number}'
-        if len(line) != 69 or not line.isascii():
-            raise TargetError(f'{name}: {len(line)} characters, must be 69 of ASCII: {line!r}')
-        if not line.startswith(f'{number} '):
-            raise TargetError(f'{name}: line number {line[:2]!r}, must be {f"{number} "!r}')
-        checksum = str(compute_checksum(line))
-        if line[68] != checksum:
-            raise TargetError(f'{name}: checksum {line[68]!r}, must be {checksum!r}: {line!r}')
-        for field, (first, end) in TLE_NUMBERS[number - 1].items():
-            if not line[first:end].replace('.', '', 1).strip().isdigit():
-                raise TargetError(f'{name}: {field} {line[first:end]!r} is not a number')
-    if lines[0][2:7] != lines[1][2:7]:
-        raise TargetError(f'TLE line 2: satellite {lines[1][2:7]!r}, must be {lines[0][2:7]!r} as in line 1')
-    satrec = Satrec.twoline2rv(*lines, WGS72)
-    if satrec.error:
-        raise TargetError(f'TLE of satellite {lines[0][2:7]}: {SGP4_ERRORS[satrec.error]}')
-    return satrec
-
-
-def _satellite_enu(satrec, station, julian, fraction, times):
-    """ENU position [m] and velocity against the earth [m/s], each (n, 3), at times [s] past julian + fraction."""
-    fractions = fraction + times / 86400.0
-    error, position, velocity = satrec.sgp4_array(np.full(len(times), julian), fractions)
-    if error.any():
-        i = int(np.argmax(error != 0))
-        raise TargetError(f'TLE of satellite {satrec.satnum_str}: {_iso(julian, fractions[i])}: '
-                          f'{SGP4_ERRORS[int(error[i])]}')
-    theta = gstime(julian) + EARTH_RATE * 86400.0 * fractions
-    c, s = np.cos(theta), np.sin(theta)
-    to_fixed = np.zeros((len(times), 3, 3))
-    to_fixed[:, 0, 0], to_fixed[:, 0, 1], to_fixed[:, 1, 0], to_fixed[:, 1, 1], to_fixed[:, 2, 2] = c, s, -s, c, 1.0
-    r = np.einsum('nij,nj->ni', to_fixed, 1e3 * position)
-    v = np.einsum('nij,nj->ni', to_fixed, 1e3 * velocity) - np.cross([0.0, 0.0, EARTH_RATE], r)
-    origin, to_enu = station_frame(station)
-    return (r - origin) @ to_enu.T, v @ to_enu.T
-
-
-def _elevations(satrec, station, julian, fraction, times):
-    enu, _ = _satellite_enu(satrec, station, julian, fraction, times)
-    return np.degrees(np.arctan2(enu[:, 2], np.hypot(enu[:, 0], enu[:, 1])))
-
-
 def culmination(params, satrec):
     """Time [s] past the TLE epoch of the first culmination between the two limits of LeoPassParameters.
 
-    params: TargetParameters; satrec: as of `satellite`. Raises TargetError where there is none within search_days.
+    params: TargetParameters; satrec: as of orbit.satellite. Raises TargetError where there is none within search_days.
     """
     leo_pass, low, high = params.leo_pass, params.leo_pass.culmination_low_deg, params.leo_pass.culmination_high_deg
 
     def depth(t):
-        return -_elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, np.array([t]))[0]
+        return -orbit.elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, np.array([t]))[0]
 
     best = -math.inf
     for day in np.arange(0.0, leo_pass.search_days, 1.0):
         seconds = 86400.0 * min(1.0, leo_pass.search_days - day)
         times = 86400.0 * day + np.arange(-SEARCH_SPACING, seconds + 1.5 * SEARCH_SPACING, SEARCH_SPACING)
-        elevation = _elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, times)
+        elevation = orbit.elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, times)
         for i in range(1, len(times) - 1):
             if elevation[i] > max(0.0, elevation[i - 1]) and elevation[i] >= elevation[i + 1]:
                 peak = minimize_scalar(depth, bounds=(times[i - 1], times[i + 1]), method='bounded',
@@ -246,51 +186,32 @@ def _start(params, satrec, duration):
     """(Julian day, fraction) of stamp 0; the pass finder's is a whole second of UTC."""
     if not params.leo_pass.start_time:
         start = culmination(params, satrec) - 0.5 * duration + 0.5
-        return _julian(_datetime(satrec.jdsatepoch, satrec.jdsatepochF + start / 86400.0).replace(microsecond=0))
-    try:
-        start = datetime.datetime.fromisoformat(params.leo_pass.start_time.replace('Z', '+00:00'))
-    except ValueError:
-        raise TargetError(f'start_time = {params.leo_pass.start_time!r}: must be UTC as ISO 8601, '
-                          'for example 2019-12-10T06:00:00') from None
-    if start.tzinfo is not None:
-        start = start.astimezone(datetime.timezone.utc)
-    julian, fraction = _julian(start)
+        when = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF + start / 86400.0)
+        return orbit.julian_date(when.replace(microsecond=0))
+    julian, fraction = orbit.julian_date(orbit.instant('start_time', params.leo_pass.start_time))
     age = julian - satrec.jdsatepoch + fraction - satrec.jdsatepochF
-    if abs(age) > TLE_AGE:
+    if abs(age) > orbit.TLE_AGE:
         raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the TLE epoch '
-                          f'{_iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within {TLE_AGE:g}')
+                          f'{orbit.iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within {orbit.TLE_AGE:g}')
     return julian, fraction
 
 
-def _datetime(julian, fraction):
-    """Calendar time of a Julian date, to the millisecond."""
-    since_2000 = datetime.timedelta(days=julian - 2451544.5) + datetime.timedelta(days=fraction)
-    return datetime.datetime(2000, 1, 1) + datetime.timedelta(milliseconds=round(since_2000.total_seconds() * 1e3))
-
-
-def _julian(when):
-    return jday(when.year, when.month, when.day, when.hour, when.minute, when.second + when.microsecond * 1e-6)
-
-
-def _iso(julian, fraction):
-    return _datetime(julian, fraction).isoformat(timespec='milliseconds') + 'Z'
-
-
+@functools.lru_cache(8)
 def _leo_pass(params, duration):
-    satrec = satellite(params.leo_pass)
+    satrec = orbit.satellite(params.leo_pass)
     julian, fraction = _start(params, satrec, duration)
     knots = np.arange(-MARGIN, duration + MARGIN + KNOT_SPACING, KNOT_SPACING)
-    position, velocity = _satellite_enu(satrec, params.station, julian, fraction, knots)
+    position, velocity = orbit.enu(satrec, params.station, julian, fraction, knots, params.leo_pass.ut1_offset)
     if position[:, 2].max() < 0.0:
-        raise TargetError(f'satellite {satrec.satnum_str}: below the horizon from {_iso(julian, fraction)} for '
+        raise TargetError(f'satellite {satrec.satnum_str}: below the horizon from {orbit.iso(julian, fraction)} for '
                           f'{duration:g} s at latitude {params.station.latitude_deg:g}, longitude '
                           f'{params.station.longitude_deg:g} deg')
     spline = CubicHermiteSpline(knots, position, velocity)
-    return spline.x, spline.c, _iso(julian, fraction)
+    return spline.x, spline.c, orbit.iso(julian, fraction)
 
 
 # track_file
 
 def _track_file(params, duration):
-    laid = recorded.read(params)
+    laid = files.lay_out(params, duration, MARGIN)
     return laid.breaks, laid.coefficients, laid.start_time, laid.summary

@@ -7,9 +7,11 @@ import numpy as np
 
 from pedestal_common import line_of_sight, nodes, noise
 from pedestal_common.compiled import compiled
+from pedestal_common.injection import schedule, table
+from pedestal_common.injection.simulated import Simulated
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
-from tracking_receiver_sim import receiver, target
+from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, joined
+from tracking_receiver_sim import injected, receiver, target
 
 BEAM, SHIP, ERRORS, TARGET = 'adu/truth', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
@@ -19,7 +21,8 @@ FAULTS = (receiver.NO_TARGET, receiver.NO_BEAM, receiver.STAMP_ORDER)
 
 
 RECORD = np.dtype([('state', receiver.STATE), ('constants', receiver.CONSTANTS), ('inputs', receiver.INPUTS),
-                   ('outputs', receiver.OUTPUTS), ('row', 'i8'), ('fault', 'i8')], align=True)
+                   ('outputs', receiver.OUTPUTS), ('row', 'i8'), ('fault', 'i8'), ('schedule', schedule.SCHEDULE),
+                   ('injected', injected.INJECTED)], align=True)
 """row: of the noise that the next step takes; fault: the last of FAULTS since the last diagnosis, else LOCKED."""
 
 
@@ -66,6 +69,8 @@ def encode(o, c, stamp, outputs):
 def law(memory, stamp, inputs, outputs):
     """Step k."""
     m = memory.record[0]
+    if schedule.pending(m.schedule, stamp):
+        injected.take(m, stamp)
     decode(m.inputs, stamp, inputs[BEAM], inputs[SHIP])
     receiver.step(m.state, m.constants, m.inputs, m.outputs, memory.breaks, memory.coefficients,
                   memory.normals[m.row])
@@ -73,6 +78,8 @@ def law(memory, stamp, inputs, outputs):
     if m.outputs.status in FAULTS:
         m.fault = m.outputs.status
     encode(m.outputs, m.constants, stamp, outputs)
+    if m.schedule.pending != 0:
+        injected.spoil_messages(m.injected, stamp, outputs)
 
 
 @compiled
@@ -82,16 +89,20 @@ def laws(memory, stamps, inputs, outputs):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
-class TrackingReceiver(Unit):
+class TrackingReceiver(Simulated):
     """The receiver of a TrackingReceiverNodeParameters."""
     NODE, LAWS = nodes.row('tracking_receiver'), {Memory: (law, laws)}
+    VERBS = table.VERBS[NODE.name]
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         self.target = target.build(parameters.target, parameters.duration)
         self._noise = noise.generator(parameters.seed, self.NODE.name)
+        self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)
-        record = joined(RECORD, state=receiver.initial_state(), constants=constants, fault=receiver.LOCKED)
+        record = joined(RECORD, state=receiver.initial_state(), constants=constants, fault=receiver.LOCKED,
+                        schedule=schedule.empty(),
+                        injected=injected.initial(constants))
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         self.memory = Memory(record, self.target.breaks, self.target.coefficients,
                              np.zeros((1, receiver.normals_per_step(parameters))))
@@ -99,9 +110,14 @@ class TrackingReceiver(Unit):
             self.messages[RANGE].field_of_view = parameters.antenna.beamwidth
 
     def block(self, steps):
-        """The memory with noise (steps, normals_per_step) drawn for the next steps."""
+        """The memory with noise (steps, normals_per_step) drawn for the next steps; the air has a stream of its own,
+        so that the receiver's noise is the same in still air."""
         self.parts['row'] = 0
-        return self.memory._replace(normals=self._noise.standard_normal((steps, self.memory.normals.shape[1])))
+        of_receiver, of_both = int(self.parts['constants']['first_noise'][1]), self.memory.normals.shape[1]
+        drawn = self._noise.standard_normal((steps, of_receiver))
+        if of_both > of_receiver:
+            drawn = np.hstack((drawn, self._air.standard_normal((steps, of_both - of_receiver))))
+        return self.memory._replace(normals=drawn)
 
     def diagnose(self):
         """ERROR with the last of FAULTS since the last diagnosis, WARN while not locked; values: C/N0, angle noise."""

@@ -22,10 +22,10 @@ def predict(f, c, T):
 
 
 @compiled
-def innovation(f, m):
+def innovation(f, c, m):
     """Innovation of a Measurement against the prediction; its range is NaN, as these filters have none."""
-    return Innovation((axis_filter.innovation(f[0], m.axis[0]), axis_filter.innovation(f[1], m.axis[1])), math.nan,
-                      math.nan)
+    return Innovation((axis_filter.innovation(f[0], c[0], m.axis[0]), axis_filter.innovation(f[1], c[1], m.axis[1])),
+                      math.nan, math.nan)
 
 
 @compiled

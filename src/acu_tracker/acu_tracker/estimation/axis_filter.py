@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import constant_gain, imm, kalman, motion_models
-from acu_tracker.estimation.kalman import Gaussian, Symmetric
+from acu_tracker.estimation.kalman import Gaussian, Past, Symmetric
 from acu_tracker.estimation.kinds import KINDS
 from acu_tracker.estimation.measurement import AxisInnovation, AxisMeasurement, AxisVariances
 from acu_tracker.estimation.motion_models import MODELS
@@ -17,20 +17,21 @@ from pedestal_common.compiled import compiled
 BANK = len(MODELS)
 
 CONSTANTS = np.dtype([('count', 'i8'), ('bank', 'i8'), ('models', motion_models.MODEL, (BANK,)), ('states', 'i8'),
-                      ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'), ('rate_measurement', 'i8')],
-                     align=True)
+                      ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'), ('rate_measurement', 'i8'),
+                      ('colour', 'f8')], align=True)
 """count: models in use, the first of `models`; bank: a number that tells which; states: the most of any of them;
-alpha: 0 but for constant gains."""
+alpha: 0 but for constant gains; colour: bandwidth of the noise of the angle [rad/s], 0 where it is white."""
 
 FILTER = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
                    ('x', 'f8', (BANK, 3)), ('p', 'f8', (BANK, 6)), ('mu', 'f8', (BANK,)),
                    ('x_prior', 'f8', (BANK, 3)), ('p_prior', 'f8', (BANK, 6)), ('mu_prior', 'f8', (BANK,)),
-                   ('weights', 'f8', (BANK,))], align=True)
+                   ('y', 'f8'), ('follows', 'i8'), ('past', 'f8', (BANK, 5)), ('weights', 'f8', (BANK,))], align=True)
 """bank, count, states: of the constants that x, p, mu belong to: estimate, covariance (as in kalman.Symmetric) and
 probability of each model, after the last measurement.
 
 x_prior, p_prior, mu_prior: predicted by T [s] from there. `predict` sets them, `expected`, `innovation`, `correct` use
-them. weights: scratch.
+them. y: the last measured angle [rad]; follows: 1 where the noise of the next one is correlated with its; past: the
+kalman.Past of each model, of the same prediction. weights: scratch.
 """
 
 ESTIMATE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
@@ -40,14 +41,14 @@ ESTIMATE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('
 [rad/s] and nu' S^-1 nu, NaN where nothing was measured; probability of each of MODELS, NaN if not in the bank."""
 
 
-def constants(params) -> np.ndarray:
-    """Constants (1,) of FilterParameters."""
+def constants(params, noise_bandwidth=0.0) -> np.ndarray:
+    """Constants (1,) of FilterParameters; noise_bandwidth [Hz]: of the measured angle's noise, 0 where it is white."""
     c, bank = np.zeros(1, CONSTANTS), KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models
     c['bank'], c['states'] = np.sum(1 << bank.models['kind']), bank.models['states'].max()
     c['dwell'], (c['alpha'], c['beta'], c['gamma']) = bank.dwell, bank.gains
-    c['rate_measurement'] = params.rate_measurement
+    c['rate_measurement'], c['colour'] = params.rate_measurement, 2.0 * math.pi * noise_bandwidth
     return c
 
 
@@ -80,6 +81,7 @@ def start(f, c, y, R, rate_sigma):
     """Begin at a measured angle y [rad] of variance R, the rate unknown to rate_sigma [rad/s]."""
     _fill(f, c, Gaussian(AxisMotion(y, 0.0, 0.0), Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
     _open_acceleration(f, c, rate_sigma)
+    f.y, f.follows = y, 1
 
 
 @compiled
@@ -100,6 +102,7 @@ def move(f, c, motion):
     """Shift the models so that together they estimate this AxisMotion, as far as they have an acceleration; their
     covariances stay."""
     x = outlook(f, c, 0.0)
+    f.follows = 0
     for j in range(c.count):
         f.x[j, 0] += motion.angle - x.angle
         f.x[j, 1] += motion.rate - x.rate
@@ -118,6 +121,8 @@ def predict(f, c, T):
         model = motion_models.discretised(c.models[j], g.x.acceleration, T)
         _put(f.x_prior, f.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
                                                kalman.predicted_covariance(g.P, model.F, model.Q, T)))
+        o, past = f.past[j], kalman.past(g, model.F, T)
+        o[0], o[1], o[2], o[3], o[4] = past
 
 
 @compiled
@@ -133,26 +138,46 @@ def variances(g):
 
 
 @compiled
-def innovation(f, m):
-    """AxisInnovation of an AxisMeasurement against the prediction."""
+def _correlation(f, c):
+    """rho: correlation of the noise of a measurement now with that of the last one, of noise through a first-order
+    lag; 0 where it is white."""
+    return math.exp(-c.colour * f.T) if c.colour > 0.0 and f.follows else 0.0
+
+
+@compiled
+def innovation(f, c, m):
+    """AxisInnovation of an AxisMeasurement against the prediction, y_k - rho y_k-1 in the place of the angle."""
+    rho = _correlation(f, c)
     x, P = expected(f)
-    nu, nu_rate, S = m.angle - x.angle, m.rate - x.rate, P.p11 + m.variance
+    u = U = p12 = 0.0
+    for j in range(c.count):
+        u += f.mu_prior[j] * (f.x_prior[j, 0] - rho * f.past[j, 0])
+    for j in range(c.count):
+        w, p, o = f.mu_prior[j], f.p_prior[j], f.past[j]
+        d1, d2 = f.x_prior[j, 0] - rho * o[0] - u, f.x_prior[j, 1] - x.rate
+        U += w * (p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + d1 * d1)
+        p12 += w * (p[1] - rho * o[3] + d1 * d2)
+    nu, nu_rate, S = m.angle - rho * f.y - u, m.rate - x.rate, U + (1.0 - rho * rho) * m.variance
     # The rate given the angle.
-    more = nu_rate - P.p12 / S * nu
-    return AxisInnovation(nu, S, nu * nu / S, nu_rate, more * more / (P.p22 + m.rate_variance - P.p12 * P.p12 / S))
+    more = nu_rate - p12 / S * nu
+    return AxisInnovation(nu, S, nu * nu / S, nu_rate, more * more / (P.p22 + m.rate_variance - p12 * p12 / S))
 
 
 @compiled
 def correct(f, c, m):
     """Correct the prediction with an AxisMeasurement."""
+    rho = _correlation(f, c)
+    own = (1.0 - rho * rho) * m.variance
     for j in range(c.count):
-        x, p = f.x_prior[j], f.p_prior[j]
+        x, p, o = f.x_prior[j], f.p_prior[j], f.past[j]
         g = Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
-        nu, S = m.angle - g.x.angle, g.P.p11 + m.variance
+        nu, S = m.angle - rho * f.y - (x[0] - rho * o[0]), p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + own
         f.weights[j] = kalman.log_likelihood(nu, S)
         # Constant gains, but for a start (or after a gap) that deserves more: a growing memory until alpha is reached.
         if g.P.p11 < c.alpha * S:
             g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
+        elif rho > 0.0:
+            g = kalman.update_correlated(g, Past(o[0], o[1], o[2], o[3], o[4]), rho, nu, S)
         else:
             g = kalman.update(g, nu, m.variance)
         if not math.isnan(m.rate):
@@ -161,6 +186,7 @@ def correct(f, c, m):
             g = kalman.update_rate(g, nu, m.rate_variance)
         _put(f.x, f.p, j, g)
     imm.weigh(f.mu_prior, f.weights, c.count, f.mu)
+    f.y, f.follows = m.angle, 1
 
 
 @compiled
@@ -200,7 +226,7 @@ def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
         elif measured and T > 0.0:
             m = AxisMeasurement(y[k], R[k], y_rate[k] if model.rate_measurement else math.nan, R_rate[k])
             predict(f, model, T)
-            i = innovation(f, m)
+            i = innovation(f, model, m)
             o.innovation, o.rate_innovation, o.nis = i.nu, i.rate, i.chi_square
             if not math.isnan(i.rate_chi_square):
                 o.nis += i.rate_chi_square

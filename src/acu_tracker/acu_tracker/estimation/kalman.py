@@ -19,6 +19,9 @@ Gaussian = namedtuple('Gaussian', 'x P')
 Transition = namedtuple('Transition', 'f13 f23 f33')
 """Third column of F = [[1, T, f13], [0, 1, f23], [0, 0, f33]]."""
 
+Past = namedtuple('Past', 'x1 p11 c1 c2 c3')
+"""What is known of the angle at the last measurement: its mean x1 [rad], its variance p11, and the covariances
+c1, c2, c3 of angle, rate and acceleration now with it."""
 
 
 @compiled
@@ -41,6 +44,13 @@ def predicted_covariance(P, F, Q, T):
 
 
 @compiled
+def past(g, F, T):
+    """The Past of a Gaussian g at the last measurement, T [s] before the prediction: c = F P H'."""
+    P = g.P
+    return Past(g.x.angle, P.p11, P.p11 + T * P.p12 + F.f13 * P.p13, P.p12 + F.f23 * P.p13, F.f33 * P.p13)
+
+
+@compiled
 def _corrected(x, k1, k2, k3, nu):
     """x + K nu."""
     return AxisMotion(x.angle + k1 * nu, x.rate + k2 * nu, x.acceleration + k3 * nu)
@@ -56,6 +66,20 @@ def update(g, nu, R):
     k1, k2, k3 = P.p11 / S, P.p12 / S, P.p13 / S
     return Gaussian(_corrected(g.x, k1, k2, k3, nu),
                     Symmetric(k1 * R, k2 * R, k3 * R, P.p22 - k2 * P.p12, P.p23 - k2 * P.p13, P.p33 - k3 * P.p13))
+
+
+@compiled
+def update_correlated(g, o, rho, nu, S):
+    """The Gaussian after a measured angle whose noise is rho times that of the last one, and noise of its own.
+
+    y_k - rho y_k-1 is H X_k - rho H X_k-1 and the noise of its own alone (Bryson, Henrikson 1968): nu [rad] is its
+    innovation, S the variance of that; o: the Past. K = (P H' - rho c) / S, P -= K S K'.
+    """
+    P = g.P
+    k1, k2, k3 = (P.p11 - rho * o.c1) / S, (P.p12 - rho * o.c2) / S, (P.p13 - rho * o.c3) / S
+    return Gaussian(_corrected(g.x, k1, k2, k3, nu),
+                    Symmetric(P.p11 - k1 * k1 * S, P.p12 - k1 * k2 * S, P.p13 - k1 * k3 * S, P.p22 - k2 * k2 * S,
+                              P.p23 - k2 * k3 * S, P.p33 - k3 * k3 * S))
 
 
 @compiled

@@ -53,15 +53,19 @@ class CurrentStatisticalParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ImmParameters(Parameters):
-    """Several interacting models, each with its own parameters."""
+    """Several interacting models, each with its own parameters.
 
-    models: str = text('cv ca current_statistical', 'two or more of cv, ca, singer, current_statistical')
-    dwell: float = parameter(5.0, 1e-3, 1e6, 's', 'mean time that one model holds')
-    cv: CvParameters = group(CvParameters, noise=0.003 * _DEG)
-    ca: CaParameters = group(CaParameters)
-    singer: SingerParameters = group(SingerParameters)
+    The defaults are rungs of a ladder of noise levels, from a satellite that stands still to a target that turns
+    round, each 30 to 300 times as noisy as the one before: their probabilities adapt Q to the innovations.
+    """
+
+    models: str = text('cv ca singer current_statistical', 'two or more of cv, ca, singer, current_statistical')
+    dwell: float = parameter(3000.0, 1e-3, 1e6, 's', 'mean time that one model holds')
+    cv: CvParameters = group(CvParameters, noise=1e-5 * _DEG)
+    ca: CaParameters = group(CaParameters, noise=2.5e-3 * _DEG)
+    singer: SingerParameters = group(SingerParameters, alpha=0.1, sigma=0.25 * _DEG)
     current_statistical: CurrentStatisticalParameters = group(CurrentStatisticalParameters, alpha=2.0,
-                                                              a_max=15.0 * _DEG)
+                                                              a_max=0.6 * _DEG)
 
     def check(self):
         """Raise ParameterError unless `models` names two or more models, each once."""
@@ -72,7 +76,7 @@ class ImmParameters(Parameters):
 class FilterParameters(Parameters):
     """Filter of an axis: its kind, and for every kind its parameters; all may be changed while it runs."""
 
-    kind: str = choice('current_statistical', KINDS, 'of the filter; may be changed while it runs')
+    kind: str = choice('imm', KINDS, 'of the filter; may be changed while it runs')
     rate_measurement: bool = flag(False, 'use the measured rate of the target, where there is one (paper 004); '
                                   'imm_ukf does while it has no range')
     alpha_beta: AlphaBetaParameters = group(AlphaBetaParameters)
@@ -105,6 +109,7 @@ class ReceiverModelParameters(Parameters):
     slope: float = parameter(1.6, 0.1, 10.0, '', 'monopulse slope k_m: difference over sum per beamwidth')
     integration: float = parameter(0.005, 1e-6, 10.0, 's', 'integration time tau of one error')
     sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not fall with C/N0 (encoder, phase)')
+    noise_bandwidth: float = parameter(0.0, 0.0, 1000.0, 'Hz', 'of the lag that the noise has been through; 0: white')
     age: float = parameter(0.0, 0.0, 0.5, 's', 'an error is the one of this long before its stamp: of a beam that '
                            'stands, the middle of the samples it is the mean of')
     beam_age: float = parameter(0.0, 0.0, 0.5, 's', 'the encoders that belong to it are those of this long before: of '

@@ -28,7 +28,7 @@ from pedestal_common.compiled import compiled
 TARGET = np.dtype([('tracker', tracker.TRACKER), ('frame', estimate_frame.FRAME),
                    ('lever_arm', lever_arm.LEVER_ARM)], align=True)
 
-GATED, STALE, NO_ATTITUDE = tracker.GATED, tracker.STALE, tracker.STALE + 1
+GATED, STALE, NOISY, NO_ATTITUDE = tracker.GATED, tracker.STALE, tracker.NOISY, tracker.NOISY + 1
 """Outcomes of `take`: those of the tracker, or NO_ATTITUDE."""
 
 Source = namedtuple('Source', 'framed motion')
@@ -71,7 +71,8 @@ def _measured_rates(g, deck, u, at):
 
 @compiled
 def take(g, p, c, deck, u, at, measured, restart_gap):
-    """Filter the receiver's error of INPUTS u: (STARTED, ACCEPTED, GATED, STALE or NO_ATTITUDE; its Innovation).
+    """Filter the receiver's error of INPUTS u: (STARTED, ACCEPTED, GATED, STALE, NOISY or NO_ATTITUDE; its
+    Innovation).
 
     p, c: records of SharedParameters and of tracker.CONSTANTS; deck: ATTITUDE; at: Pointing of the antenna when the
     error was measured; measured: deck angles (azimuth, elevation) [rad] of the target, the antenna displaced by the

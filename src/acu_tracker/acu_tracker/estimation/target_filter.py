@@ -25,10 +25,11 @@ FILTER = np.dtype([('axis', axis_filter.FILTER, (2,)), ('cartesian', unscented.S
 by which the prior fields are predicted from the present estimate, NaN where they belong to an older one."""
 
 
-def constants(ukf, axes) -> np.ndarray:
-    """Constants (1,) of UkfParameters and the FilterParameters of both axes."""
+def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
+    """Constants (1,) of UkfParameters and the FilterParameters of both axes; noise_bandwidth [Hz]: of the measured
+    angles, 0 where their noise is white, as the Cartesian filter takes it to be."""
     c = np.zeros(1, CONSTANTS)
-    c['axis'] = np.concatenate([axis_filter.constants(params) for params in axes])
+    c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
     c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
     c['wanted'] = [KINDS[params.kind].cartesian for params in axes]
     return c
@@ -60,9 +61,9 @@ def axes_azimuth(f):
 
 
 @compiled
-def innovation(f, m):
+def innovation(f, c, m):
     """Innovation of a Measurement against the prediction; rate_chi_square is always that of the axis's filter."""
-    axes = axes_filter.innovation(f.axis, m)
+    axes = axes_filter.innovation(f.axis, c.axis, m)
     if not f.running:
         return axes
     cartesian = unscented.innovation(f.cartesian, m)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation import target_filter
+from acu_tracker.estimation import roughness, target_filter
 from acu_tracker.estimation.measurement import (
     NO_INNOVATION,
     Measurement,
@@ -19,12 +19,13 @@ CONSTANTS = np.dtype([('filter', target_filter.CONSTANTS), ('gates', 'f8', (2,))
 """gates: largest nu' S^-1 nu that is accepted, of the two angles, of one rate or range."""
 
 TRACKER = np.dtype([('filter', target_filter.FILTER), ('stamp', 'f8'), ('running', 'i8'), ('converged', 'i8'),
+                    ('roughness', roughness.ROUGHNESS),
                     ('accepted_in_a_row', 'i8'), ('gated_in_a_row', 'i8'), ('rates_in_a_row', 'i8', (2,)),
                     ('gated', 'i8'), ('rates_gated', 'i8'), ('ranges_gated', 'i8')], align=True)
 """stamp: of the last accepted measurement [s]; accepted_in_a_row, gated_in_a_row: measurements since the other
 happened; rates_in_a_row: rates of an axis that agreed with its angles; gated, rates_gated, ranges_gated: in all."""
 
-STARTED, ACCEPTED, GATED, STALE = range(4)
+STARTED, ACCEPTED, GATED, STALE, NOISY = range(5)
 """Outcomes of `observe`."""
 
 
@@ -49,7 +50,7 @@ def gate_of_one(gate):
 def constants(params, axes) -> np.ndarray:
     """Constants (1,) of TrackerParameters and the FilterParameters of both axes."""
     c = np.zeros(1, CONSTANTS)
-    c['filter'] = target_filter.constants(params.ukf, axes)
+    c['filter'] = target_filter.constants(params.ukf, axes, params.receiver.noise_bandwidth)
     c['gates'] = params.gate, gate_of_one(params.gate)
     return c
 
@@ -97,10 +98,10 @@ def _with_accepted_rates(t, p, c, m, innovation):
 
 @compiled
 def observe(t, p, c, m, restart_gap):
-    """Take a Measurement: (STARTED, ACCEPTED, GATED or STALE; its Innovation, NaN unless there was a prediction).
+    """Take a Measurement: (STARTED, ACCEPTED, GATED, STALE or NOISY; its Innovation, NaN where nothing was predicted).
 
-    The direction is accepted or gated, and then each of range and rates by itself. The filter restarts after
-    gate_restart gated ones in a row, and after restart_gap [s] without any.
+    Errors that are noise (`roughness`) are left alone. The direction is accepted or gated, and then each of range and
+    rates by itself. The filter restarts after gate_restart gated ones in a row, and after restart_gap [s] without any.
     """
     T = m.stamp - t.stamp
     if t.running and T <= 0.0:
@@ -111,7 +112,11 @@ def observe(t, p, c, m, restart_gap):
     if t.running and T <= restart_gap:
         target_filter.predict(f, k, T)
         m = with_azimuth_near(m, target_filter.axes_azimuth(f))
-        innovation = target_filter.innovation(f, m)
+        innovation = target_filter.innovation(f, k, m)
+        if roughness.take(t.roughness, innovation, m) > p.gate:
+            t.gated += 1
+            t.accepted_in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
+            return NOISY, innovation
         if innovation.range_nu * innovation.range_nu > c.gates[1] * innovation.range_S:
             t.ranges_gated += 1
             m = Measurement(m.stamp, m.axis, math.nan, m.range_variance)
@@ -129,6 +134,7 @@ def observe(t, p, c, m, restart_gap):
         near = outlook(t, c, t.stamp).azimuth.angle if t.running else math.nan
         target_filter.start(f, k, with_azimuth_near(m, near if math.isfinite(near) else m.axis[0].angle),
                             p.initial_rate)
+        roughness.restart(t.roughness)
         t.accepted_in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
     t.running, t.stamp, t.gated_in_a_row = 1, m.stamp, 0
     target_filter.select(f, k, m)

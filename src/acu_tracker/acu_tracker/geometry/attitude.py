@@ -3,17 +3,23 @@ import math
 
 import numpy as np
 
+from acu_tracker.geometry import attitude_jump
 from acu_tracker.geometry.deck_reference import Attitude
 from acu_tracker.geometry.vector import vector
 from acu_tracker.history import bracket, history_type, push
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import ASHORE, rotation
 
-ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)),
+ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('told', 'f8', (7,)),
+                     ('aligned', 'i8'), ('jump', attitude_jump.JUMP),
                      ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,))], align=True)
 """stabilised: 1 on a ship, 0 ashore, where the attitude never changes; history: quaternion (x, y, z, w) deck -> earth,
-w [rad/s], dw [rad/s2] of the last steps. mat_ed (deck -> earth), w, dw: at the instant that `at` was last called for.
+w [rad/s], dw [rad/s2] of the last steps, as they are believed; told: the last q and w as they came; aligned: whether
+the INS was. mat_ed (deck -> earth), w, dw: at the instant that `at` was last called for.
 """
+
+TURNS = 1e-6
+"""Rate [rad/s] of a deck from which its attitude changes from one measurement to the next."""
 
 INVALID, REPEATED, NEW = range(3)
 """What `take` makes of an attitude."""
@@ -45,10 +51,31 @@ def rotated(q, r):
 
 
 @compiled
-def take(s, p, t_k, stamp, q, w):
+def _same(s, q, w):
+    """Whether an INS says once more what it said before, though it says that the deck turns. Keeps what it says."""
+    same, turns = True, False
+    for i in range(7):
+        x = q[i] if i < 4 else w[i - 4]
+        same &= x == s.told[i]
+        turns |= i >= 4 and abs(x) > TURNS
+        s.told[i] = x
+    return same and turns
+
+
+@compiled
+def _believe(s, row, last, T):
+    """Turn the quaternion in a row of the history into the one that is believed, T [s] after that in row `last`."""
+    a, b = s.history.sample[last], s.history.sample[row]
+    predicted = rotated(a, (0.5 * T * (a[4] + b[4]), 0.5 * T * (a[5] + b[5]), 0.5 * T * (a[6] + b[6])))
+    b[0], b[1], b[2], b[3] = attitude_jump.believed(s.jump, predicted, (b[0], b[1], b[2], b[3]), T)
+
+
+@compiled
+def take(s, p, t_k, stamp, q, w, aligning):
     """Take a measured quaternion q (4,) and rate w (3,) [rad/s] into the history: INVALID, REPEATED or NEW.
 
-    INVALID: not finite, no unit quaternion, older than the last or younger than the step t_k [s].
+    INVALID: not finite, no unit quaternion, older than the last or younger than the step t_k [s], or the numbers of
+    the last though the deck turns. aligning: whether the INS is, so that its attitude may jump.
     """
     norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if not (abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
@@ -58,6 +85,8 @@ def take(s, p, t_k, stamp, q, w):
     T = stamp - h.stamp[last] if h.count > 0 else math.inf
     if not (T > 0.0 and stamp <= t_k):
         return REPEATED if T == 0.0 else INVALID
+    if _same(s, q, w):
+        return INVALID
     row = push(h, stamp)
     # One sign of the quaternion, so that neighbours can be averaged.
     dot = 0.0
@@ -71,6 +100,11 @@ def take(s, p, t_k, stamp, q, w):
         if T <= p.attitude_timeout:
             h.sample[row, 7 + i] = smoothed_acceleration(
                 h.sample[last, 7 + i], w[i], h.sample[last, 4 + i], T, p.attitude_smoothing)
+    if T <= p.attitude_timeout and s.aligned and not aligning:
+        _believe(s, row, last, T)
+    else:
+        attitude_jump.forget(s.jump)
+    s.aligned = not aligning
     return NEW
 
 

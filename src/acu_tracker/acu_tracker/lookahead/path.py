@@ -2,6 +2,7 @@
 import math
 from collections import namedtuple
 
+from acu_tracker.geometry.great_circle import turned
 from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back
 from acu_tracker.program import bridge as program_bridge
 from acu_tracker.program import program_track
@@ -38,9 +39,7 @@ def along_great_circle(path, mat, u, du):
     """Lay out the path of an ENU unit vector u that keeps its rate du [1/s]: how many rows it covers, all."""
     W = math.sqrt(dot(du, du))
     for i in range(len(path.rows)):
-        cos, sin = math.cos(W * i * path.h), math.sin(W * i * path.h) / W if W > 0.0 else 0.0
-        v = Vector(cos * u.x + sin * du.x, cos * u.y + sin * du.y, cos * u.z + sin * du.z)
-        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(mat, v)
+        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(mat, turned(u, du, W, W * i * path.h))
     return len(path.rows)
 
 

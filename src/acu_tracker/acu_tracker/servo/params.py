@@ -77,12 +77,19 @@ class ShaperParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class LimitsParameters(Parameters):
-    """Limits of the axis; the rate command never leaves them."""
+    """Limits of the axis; the rate command never leaves them, and stops the axis before low and high."""
 
     low: float = parameter(-1.5 * math.pi, -20.0, 20.0, 'rad', 'lowest deck angle')
     high: float = parameter(1.5 * math.pi, -20.0, 20.0, 'rad', 'highest deck angle')
     rate: float = parameter(2.45, 1e-4, 100.0, 'rad/s', 'largest rate command')
     acceleration: float = parameter(40.0, 1e-4, 1e5, 'rad/s2', 'largest change of the rate command over time')
+    braking: float = parameter(0.0, 0.0, 1e5, 'rad/s2', 'deceleration with which the axis stops before low and high: '
+                               'what the drive has in any wind; 0: half of `acceleration`')
+
+    @property
+    def deceleration(self):
+        """With which the axis stops before low and high [rad/s2]."""
+        return self.braking or 0.5 * self.acceleration
 
     def check(self):
         """Raise ParameterError where low is not below high."""

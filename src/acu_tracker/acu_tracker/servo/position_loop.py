@@ -12,7 +12,7 @@ import numpy as np
 
 from acu_tracker.estimation import constant_gain
 from acu_tracker.geometry.motion import AxisMotion
-from acu_tracker.servo import adrc, beam_loop, feedforward, notch, pid, reference
+from acu_tracker.servo import adrc, beam_loop, ends, feedforward, notch, pid, reference
 from pedestal_common.compiled import compiled
 
 CONTROLLERS = ('pid', 'feedforward', 'adrc', 'beam')
@@ -31,11 +31,11 @@ Instants = namedtuple('Instants', 't_k t_m dt')
 """t_k: stamp of the drive step, t_m: middle of the interval in which its command is in force; dt since the step
 before [s]."""
 
-Feedback = namedtuple('Feedback', 'y dy error V closed')
+Feedback = namedtuple('Feedback', 'y dy error V closed ends')
 """Of one axis at t_k: encoder angle y [rad] and rate dy [rad/s].
 
 error: of the receiver in this angle [rad], NaN where none came; V: rate [rad/s] at which the deck's motion moves a
-fixed target; closed: whether a beam closes its own loop on both."""
+fixed target; closed: whether a beam closes its own loop on both; ends: the Ends of its travel now."""
 
 Command = namedtuple('Command', 'rate torque reference angle_limited rate_limited acceleration_limited')
 """rate [rad/s] and load torque [Nm]; reference: the AxisMotion that is compared with the encoder at t_k, of a beam
@@ -64,6 +64,12 @@ def limited(wanted, before, dt, rate, acceleration):
     step = acceleration * dt
     command = min(max(u, before - step), before + step)
     return command, rate_limited, command != u
+
+
+@compiled
+def realised(command, dy):
+    """What an axis at a rate dy makes of its command, both [rad/s]: no more than that, and no motion against it."""
+    return min(max(dy, min(command, 0.0)), max(command, 0.0))
 
 
 @compiled
@@ -110,7 +116,8 @@ def instant(p, t_k, t_m):
 def follow(axis, c, target, feedback, now):
     """Command of one step towards a raw target, an AxisMotion at `instant`; now: the Instants.
 
-    c: record of the axis's constants, p its AxisParameters and notch its coefficients.
+    c: record of the axis's constants, p its AxisParameters, notch its coefficients, reaction the time [s] given
+    in front of a limit, braking the deceleration [rad/s2] there.
     """
     if c.p.controller == BEAM:
         return _steer(axis, c.p, target, feedback, now.dt)
@@ -128,9 +135,10 @@ def _steer(axis, p, target, feedback, T):
         reference.put(r, target)
     else:
         r.angle, r.rate = beam_loop.step(b.form, r.angle, r.rate, feedback.error, b.alpha, beta, T, compensation)
-    angle_limited = not p.limits.low <= r.angle <= p.limits.high
+    low, high = feedback.ends
+    angle_limited = not low <= r.angle <= high
     if angle_limited:
-        reference.put(r, AxisMotion(min(max(r.angle, p.limits.low), p.limits.high), 0.0, 0.0))
+        reference.put(r, AxisMotion(min(max(r.angle, low), high), 0.0, 0.0))
     axis.command = r.rate
     return Command(axis.command, 0.0, reference.now(r), angle_limited, False, False)
 
@@ -148,9 +156,10 @@ def _step(axis, c, target, feedback, now):
         reference.initialise(r, now.t_k, y, dy, axis.command)
     torque, rate_limited, acceleration_limited = 0.0, False, False
     if p.controller == PID:
-        v, angle_limited = _held_inside(target, p.limits.low, p.limits.high)
+        v, angle_limited = _held_inside(target, feedback.ends.low, feedback.ends.high)
     else:
-        angle_limited, rate_limited, acceleration_limited = reference.follow(r, p, target, now.t_m, axis.command)
+        angle_limited, rate_limited, acceleration_limited = reference.follow(r, p, target, now.t_m, axis.command,
+                                                                                 feedback.ends)
         torque = feedforward.torque(r.rate, r.acceleration, p.feedforward)
         v = reference.planned(r, now.t_k)
     e = v.angle - y
@@ -162,10 +171,13 @@ def _step(axis, c, target, feedback, now):
         _update(axis, p, e, y, now)
     u, fed = _control_law(axis, p, e, v)
     u -= notch.removed(u - fed, axis.notch, c.notch)
-    axis.command, rate_cut, acceleration_cut = limited(u, axis.command, now.dt, p.limits.rate, p.limits.acceleration)
+    kept = ends.inside(u, y, feedback.ends, c.braking, c.reaction)
+    axis.command, rate_cut, acceleration_cut = limited(kept, axis.command, now.dt, p.limits.rate,
+                                                       p.limits.acceleration)
     reference.commanded(r, axis.command)
     if (axis.command - u) * e < 0.0:
         axis.integral = integral
+    angle_limited |= kept != u and abs(kept) < p.limits.rate
     return Command(axis.command, torque, v, angle_limited, rate_limited or rate_cut,
                    acceleration_limited or acceleration_cut)
 

@@ -46,14 +46,14 @@ def initialise(r, stamp, y, dy, command):
 
 
 @compiled
-def follow(r, p, target, stamp, command):
-    """Shape an AxisMotion that is to be met at a stamp [s]: (angle, rate, acceleration limited).
+def follow(r, p, target, stamp, command, ends):
+    """Shape an AxisMotion that is to be met at a stamp [s], between its Ends: (angle, rate, acceleration limited).
 
     p: record of AxisParameters.
     """
     k = p.shaper
     dt = stamp - r.planned.stamp[r.planned.newest]
-    target, angle_limited = shaper.held_inside(target, p.limits.low, p.limits.high, k.acceleration,
+    target, angle_limited = shaper.held_inside(target, ends.low, ends.high, k.acceleration,
                                                k.h0 + k.acceleration / k.jerk)
     shaped, rate_limited, acceleration_limited = shaper.shape(now(r), target, dt, k)
     put(r, shaped)

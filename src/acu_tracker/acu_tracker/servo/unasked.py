@@ -42,18 +42,24 @@ def restart(s, t):
 def watch(s, t, velocity, threshold):
     """Take the rates (2,) [rad/s] of a step at t [s], that obey the commands of the steps before; whether the antenna
     moves unasked."""
-    beyond = False
+    outside = False
     for i in range(2):
         allowed = threshold + OVERSHOOT * (s.high[i] - s.low[i])
         low, high = min(s.low[i], 0.0) - allowed, max(s.high[i], 0.0) + allowed
-        beyond |= velocity[i] > high or velocity[i] < low
+        outside |= velocity[i] > high or velocity[i] < low
         if s.moves == 0:
             s.measured[i, 0], s.measured[i, 1], s.measured[i, 2] = velocity[i], low, high
-    if not beyond or t - s.since < SETTLING:
+    if not outside or t - s.since < SETTLING:
         s.beyond = t
     elif t - s.beyond >= TIME:
         s.moves = 1
     return s.moves != 0
+
+
+@compiled
+def beyond(s, t):
+    """Whether a rate was beyond the envelope in the step at t [s]."""
+    return s.beyond < t
 
 
 @compiled

@@ -17,7 +17,7 @@ from pedestal_bringup.again import difference, recompute
 from pedestal_bringup.run import parameter_file
 from pedestal_bringup.run.graph import Operator, sole_run
 from pedestal_bringup.run.processes import RunError, command_line
-from pedestal_common import middleware, nodes, parameters, records
+from pedestal_common import commands, messages, middleware, nodes, parameters, records
 from pedestal_common.steps import SECOND
 
 START = 300.0
@@ -39,6 +39,12 @@ class Feeder(Operator):
         self.publishers_of = {name: self._publisher(self.links[name]) for name in inputs}
         self.answers = {name: [] for name in written}
         self.readers = []
+        row = nodes.row(node)
+        self.replies = []
+        if row.obeys:
+            self.asks = self._publisher(self.links[row.obeys])
+            self.create_subscription(middleware.message_class(self.links[row.replies].type), row.replies,
+                                     self.replies.append, middleware.qos('change'), raw=True)
 
     def stand_in(self, names):
         """Make nodes of these names, those the process is told of, which read what it writes."""
@@ -67,8 +73,8 @@ class Feeder(Operator):
 class Live:
     """The node's process and the feeder, spun until what is waited for has come."""
 
-    def __init__(self, feeder, process, log):
-        self.feeder, self.process, self.log = feeder, process, log
+    def __init__(self, feeder, process, log, services):
+        self.feeder, self.process, self.log, self.services = feeder, process, log, services
         self.executor = SingleThreadedExecutor()
         for node in (feeder, *feeder.readers):
             self.executor.add_node(node)
@@ -83,7 +89,14 @@ class Live:
                 raise RunError(f'{self.feeder.node}: no {what()} within {limit:g} s')
             self.executor.spin_once(timeout_sec=0.1)
 
-    def ask(self, service):
+    def ask(self, command):
+        """Ask for a Command, by the service of this name or by the topic, and wait for the answer."""
+        if command.verb not in self.services:
+            before = len(self.feeder.replies)
+            self.feeder.asks.publish(messages.serialize(commands.message(command)))
+            self.until(lambda: len(self.feeder.replies) > before, PATIENCE, lambda: f'reply to {command}')
+            return
+        service = command.verb
         client = self.feeder.create_client(Trigger, service)
         self.until(client.service_is_ready, PATIENCE, lambda: f'service {service}')
         future = client.call_async(Trigger.Request())
@@ -127,7 +140,7 @@ def _run(recording, done, params, folder):
                                    stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                                    env={**os.environ, 'ROS_LOG_DIR': str(folder)})
         try:
-            live = Live(feeder, process, log)
+            live = Live(feeder, process, log, done.unit.REQUESTS)
             live.until(lambda: all(publisher.get_subscription_count() for publisher in feeder.publishers_of.values())
                        and feeder.count_publishers('diagnostics'), START, lambda: 'reader of its inputs')
             time.sleep(0.5)  # the other side of the discovery
@@ -163,8 +176,8 @@ def _feed(recording, done, live):
     for step in range(len(feed.stamps)):
         for name, row in events[step]:
             feeder.announce_now(name, recording.data(name)[row])
-        for service, _ in done.requests.get(step, ()):
-            live.ask(service)
+        for command, _ in done.requests.get(step, ()):
+            live.ask(command)
         for name, rows in feed.rows.items():
             if rows[step] >= 0 and name in feeder.publishers_of:
                 feeder.publishers_of[name].publish(recording.data(name)[rows[step]])

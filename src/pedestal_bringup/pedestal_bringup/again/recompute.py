@@ -6,8 +6,9 @@ Inputs are matched to steps by the code the nodes use (pedestal_common.steps), t
 lockstep   inputs belong to steps by their stamps, so the same version on the same machine gives the same bits
 realtime   a step gets what had been sent (in a foreign recording: recorded) when the next one began. That is what the
            node had, but for messages that were on their way to it just then
-both       services are not recorded: a change of acu/mode or adu/state that the node would not make by itself is asked
-           for at that step; a parameter changed while running and a mode asked for again leave no trace.
+both       commands and services are asked for again before the step that the node's replies say. Of a node that tells
+           no replies, a change of adu/state that it would not make by itself is asked for at that step; a parameter
+           changed while running leaves no trace.
            A recording that begins in the middle of a run starts from the initial state: it differs until the filter
            has converged
 """
@@ -19,7 +20,7 @@ import numpy as np
 from pedestal_bringup.again import difference
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.run import parameter_file, scenario
-from pedestal_common import messages, nodes, parameters, records, topics
+from pedestal_common import commands, messages, nodes, parameters, records, topics
 from pedestal_common.steps import SECOND, GraphError, Steps
 from pedestal_common.unit import announced
 
@@ -40,7 +41,7 @@ def row_of(recording, node) -> nodes.Node:
 
 def writer_of(topic) -> nodes.Node:
     """The Node that writes a topic."""
-    return next(node for node in nodes.NODES if topic in node.writes)
+    return next(node for node in nodes.NODES if topic in (*node.writes, node.replies))
 
 
 class RecomputeError(ValueError):
@@ -108,6 +109,20 @@ class Recording:
             return log
         after = np.searchsorted(self.arrival(answer), self.arrival(topic))
         return np.append(self.output(answer).stamps, AFTER_ALL)[after]
+
+    def commands(self, topic, stamps):
+        """{step: [Command]} of a topic of replies, but those of a schedule, which the parameters hold; steps are rows
+        of stamps (n,) [ns]. Raises RecomputeError."""
+        asked = {}
+        rows = np.searchsorted(stamps, self.steps(topic)).tolist() if self.has(topic) else ()
+        for step, data in zip(rows, self.data(topic) if self.has(topic) else ()):
+            try:
+                command, _ = commands.of_reply(messages.deserialize(data, topics.BY_NAME[topic].type))
+            except ValueError as error:
+                raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
+            if command.who != commands.SCHEDULE:
+                asked.setdefault(step, []).append(command)
+        return asked
 
     def states(self, topic, stamps):
         """{step: text} of a recorded acu/mode or adu/state; steps are rows of stamps (n,) [ns]."""
@@ -209,10 +224,10 @@ def state_of(unit) -> str:
 
 
 def compute(recording, unit, fed, states=None, requests=None):
-    """(outputs (n,), requests made {step: [(service, granted)]}) of a unit on a Feed.
+    """(outputs (n,), requests made {step: [(Command, granted)]}) of a unit on a Feed.
 
     states: {step: text} of the unit's state as recorded; where it does not come to it by itself, it is asked to.
-    requests: {step: [service]} that are asked for whatever happens.
+    requests: {step: [Command]} that are asked for whatever happens.
     """
     states, requests, made, events = states or {}, requests or {}, {}, {}
     state = state_of(unit)
@@ -224,9 +239,9 @@ def compute(recording, unit, fed, states=None, requests=None):
     def advance(first, last):
         unit.step(fed.stamps[first:last], fed.inputs[first:last], outputs[first:last])
 
-    def ask(services, step):
+    def ask(asked, step):
         unit.inputs[0] = fed.inputs[step]
-        return [(service, unit.request(service).granted) for service in services]
+        return [(command, unit.command(command).granted) for command in asked]
 
     last = 0
     for step in sorted({*events, *states, *requests, len(outputs)}):
@@ -248,7 +263,8 @@ def compute(recording, unit, fed, states=None, requests=None):
             last = step + 1
             if unit.encode(state, int(outputs[step][state])) != states[step]:
                 unit.memory.record[...] = before
-                made[step] = ask(unit.requests_for(state, states[step]), step)
+                made[step] = ask([commands.Command(service, commands.SERVICE)
+                                  for service in unit.requests_for(state, states[step])], step)
                 last = step
     return outputs, {step: done for step, done in made.items() if done}
 
@@ -256,7 +272,7 @@ def compute(recording, unit, fed, states=None, requests=None):
 def outputs_of(unit, fed, outputs):
     """{topic: Output} of what a unit wrote in outputs (n,)."""
     written = {}
-    for name in unit.NODE.writes:
+    for name in unit.writes:
         if not records.is_text(name):
             sent = outputs[name]['stamp'] != records.NEVER
             written[name] = difference.Output(outputs[name]['stamp'][sent], records.numbers(outputs, name)[sent])
@@ -282,15 +298,21 @@ def unit_of(recording, node, params):
     row = row_of(recording, node)
     names = [other.name for other in nodes.NODES if any(map(recording.has, other.writes))]
     flags = [flag for flag in topics.FLAGS if getattr(params, flag, False)]
-    return row.unit_type()(params, nodes.reads(row, names, flags))
+    unit = row.unit_type()(params, nodes.reads(row, names, flags))
+    unit.epoch = recording.bag.start
+    return unit
 
 
 def recompute(recording, node, params, requests=None) -> Recomputed:
-    """Recompute a node with parameters of its dataclass. requests {step: [service]}: what was asked of it; None: what
-    its recorded states tell."""
+    """Recompute a node with parameters of its dataclass. requests {step: [Command]}: what was asked of it; None: what
+    its recorded replies tell, or without these its states."""
     unit = unit_of(recording, node, params)
     fed = feed(recording, unit)
-    states = recording.states(state_of(unit), fed.stamps) if requests is None and unit.REQUESTS else None
+    states = None
+    if requests is None and recording.has(unit.NODE.replies):
+        requests = recording.commands(unit.NODE.replies, fed.stamps)
+    elif requests is None and unit.REQUESTS:
+        states = recording.states(state_of(unit), fed.stamps)
     outputs, made = compute(recording, unit, fed, states, requests)
     return Recomputed(node, unit, fed, outputs, outputs_of(unit, fed, outputs), made)
 
@@ -372,7 +394,7 @@ def parameters_of(recording, node, file_values=None, changes=()):
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
         params = parameters.build(row_of(recording, node).parameters_type(), {**values, **dict(changes)})
-        params.check_graph(recording.bag.beams)
+        params.check_graph(recording.bag.beams, recording.bag.metadata.get('pacing') == 'lockstep')
         return params
     except parameters.ParameterError as error:
         raise RecomputeError(f'{node}: {error}') from None

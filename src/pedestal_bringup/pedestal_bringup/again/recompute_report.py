@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from pedestal_bringup import console
 from pedestal_bringup.again import difference, recompute, what_if
 from pedestal_bringup.analysis import tracking
 from pedestal_bringup.analysis.results import row
@@ -59,7 +60,7 @@ def _node_report(recording, node, given, changes, options):
     tolerance = difference.Tolerance(options.absolute, options.relative, tuple(options.ignore))
     if changes:
         new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes),
-                                  {step: [service for service, _ in made] for step, made in done.requests.items()})
+                                  {step: [command for command, _ in made] for step, made in done.requests.items()})
         report = _old_against_new(recording, done, new, tolerance, changes)
     elif options.live:
         from pedestal_bringup.again import live
@@ -105,14 +106,14 @@ def _input_problems(done):
 
 
 def _requests(done):
-    """Lines on the services that were asked for."""
+    """Lines on what was asked for."""
     lines = [line for step, made in done.requests.items() for line in _requests_of_step(done, step, made)]
     return lines + ([f'{len(lines)} requests fed'] if lines else [])
 
 
 def _requests_of_step(done, step, made):
-    return [f'{service} asked for at {done.feed.stamps[step] / SECOND:.6f} s{"" if granted else ", and refused"}'
-            for service, granted in made]
+    return [f'{command} asked for at {done.feed.stamps[step] / SECOND:.6f} s{"" if granted else ", and refused"}'
+            for command, granted in made]
 
 
 def _against_recorded(recording, outputs, done, tolerance):
@@ -147,7 +148,7 @@ def _new_numbers(recording, outputs, done):
     if done.node == 'acu' and len(done.feed.stamps):
         numbers = what_if.numbers(recording.bag, [done.outputs])
         lines += _by_encoders(recording)
-        lines += [f'{name:42} {_text(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
+        lines += [f'{name:42} {console.measured(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
         rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
     return NodeReport(lines, rows, outputs, done.unit.messages, not done.feed.problem)
 
@@ -155,10 +156,6 @@ def _new_numbers(recording, outputs, done):
 def _by_encoders(recording):
     """A line on errors that are not those of the dish, in a list; none where its true direction was recorded."""
     return [f'note: {tracking.BY_ENCODERS}'] if tracking.by_encoders(recording.bag) else []
-
-
-def _text(value):
-    return f'{value:.6g}' if math.isfinite(value) else 'not measured'
 
 
 def _old_against_new(recording, old, new, tolerance, changes):
@@ -173,7 +170,7 @@ def _old_against_new(recording, old, new, tolerance, changes):
                   f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']
         for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
             ratio = f'{b / a:9.4g}' if a and math.isfinite(b / a) else f'{"":9}'
-            lines.append(f'{name:42} {_text(a):>12} {_text(b):>12} {ratio} {unit}'.rstrip())
+            lines.append(f'{name:42} {console.measured(a):>12} {console.measured(b):>12} {ratio} {unit}'.rstrip())
             rows += [row(new.node, f'{name} old', a, unit), row(new.node, f'{name} new', b, unit)]
     lines += difference.lines([difference.compare(name, before[name], output, tolerance)
                                for name, output in new.outputs.items() if not tolerance.ignores(name)])

@@ -65,7 +65,7 @@ class ReplayResult:
 
 
 @contextlib.contextmanager
-def _stop_by_signal():
+def stop_by_signal():
     """stopped() -> whether a signal to end has come: rclpy must not be left in the middle of a call."""
     signals = []
     before = {number: signal.signal(number, lambda *_: signals.append(True))
@@ -96,7 +96,7 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
         raise ValueError('--paused: standard input is no terminal, no key could end the pause')
     middleware.initialise([])
     try:
-        with _stop_by_signal() as stopped, keyboard:
+        with stop_by_signal() as stopped, keyboard:
             player = Player(playlist, companion, options, keyboard, stopped)
             try:
                 begun = time.monotonic()

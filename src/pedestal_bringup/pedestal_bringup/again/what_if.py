@@ -127,7 +127,7 @@ NUMBERS = (
            'Largest of estimate less truth on either axis.'),
     Result('single_sample_noise_deg', 'deg', 'truth', lambda acu: acu.noise * DEGREES,
            "Rms of the receiver's error less the true one."),
-    Result('noise_reduction', '', 'truth', lambda acu: acu.noise / rms(acu.error),
+    Result('noise_reduction', '-', 'truth', lambda acu: acu.noise / rms(acu.error),
            "The receiver's noise over the error of the estimate."),
     Result('estimate_lag_s', 's', 'truth', lambda acu: acu.motion[0], 'How late the estimate is.'),
     Result('estimate_rate_error_rms_deg_s', 'deg/s', 'truth', lambda acu: acu.motion[1] * DEGREES,

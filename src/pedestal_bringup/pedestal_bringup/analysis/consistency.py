@@ -22,6 +22,10 @@ FREEDOMS = 2
 PART = 0.95
 """Share of honest filters inside a band."""
 
+NOTABLE = 0.1
+"""Share of its expectation by which a mean is off, beside lying outside of its band, where a table marks it: over
+minutes the band is narrower than any model is true."""
+
 NAMES = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
 
 
@@ -50,6 +54,11 @@ class Consistency:
     def freedoms(self):
         """Degrees of freedom (n, 2) of the NIS."""
         return 1.0 + np.isfinite(self.rate_innovation)
+
+    @functools.cached_property
+    def axes(self):
+        """The Axis of azimuth and that of elevation."""
+        return Axis(self, 0), Axis(self, 1)
 
 
 @compiled
@@ -111,7 +120,10 @@ def independent(values):
 
 def bounds(freedoms):
     """(low, high) that hold a chi-square value with this many degrees of freedom, a number or an array, with PART."""
-    return special.chdtri(freedoms, 0.5 + 0.5 * PART), special.chdtri(freedoms, 0.5 - 0.5 * PART)
+    # A long run has few different numbers, and each is found by iteration.
+    different, places = np.unique(freedoms, return_inverse=True)
+    places = places.reshape(np.shape(freedoms))
+    return tuple(special.chdtri(different, tail)[places] for tail in (0.5 + 0.5 * PART, 0.5 - 0.5 * PART))
 
 
 def band(freedoms, count):
@@ -119,24 +131,44 @@ def band(freedoms, count):
     return tuple(float(bound / count) for bound in bounds(freedoms * count))
 
 
-@dataclasses.dataclass(frozen=True)
 class Axis:
-    """One axis over the evaluated part; NaN where nothing was measured.
+    """One axis, 0 azimuth or 1 elevation, of a Consistency over the evaluated part; NaN where nothing was measured.
 
-    nis: mean, nis_expected: degrees of freedom, nis_inside: share of single values inside their band; nees: mean,
-    nees_band: of the mean, count: independent errors it is over; error, rate_error: rms [rad, rad/s]; sigma,
-    rate_sigma: rms of what the filter states.
+    nis: mean, nis_expected: degrees of freedom; nees: mean; error, rate_error: rms [rad, rad/s]; sigma, rate_sigma:
+    rms of what the filter states.
     """
-    nis: float
-    nis_expected: float
-    nis_inside: float
-    nees: float
-    nees_band: tuple
-    count: float
-    error: float
-    rate_error: float
-    sigma: float
-    rate_sigma: float
+
+    def __init__(self, known, i):
+        on = known.tracking
+        nis, freedoms, nees = known.nis[on, i], known.freedoms[on, i], known.nees[on, i]
+        self._freedoms, self._nis, self._nees = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)], nees[
+            np.isfinite(nees)]
+        self.nis, self.nis_expected, self.nees = _mean(self._nis), _mean(self._freedoms), _mean(self._nees)
+        self.error, self.rate_error, self.sigma, self.rate_sigma = (
+            tracking.rms(values[on, i]) for values in (known.error, known.rate_error, known.sigma, known.rate_sigma))
+
+    @functools.cached_property
+    def nis_inside(self):
+        """Share of single values of the NIS inside their band."""
+        if not self._nis.size:
+            return math.nan
+        low, high = bounds(self._freedoms)
+        return float(np.mean((self._nis >= low) & (self._nis <= high)))
+
+    @functools.cached_property
+    def nis_band(self):
+        """Of the mean of the NIS."""
+        return band(self.nis_expected, independent(self._nis)) if self._nis.size else (math.nan, math.nan)
+
+    @functools.cached_property
+    def count(self):
+        """Independent errors that the NEES is over."""
+        return independent(self._nees) if self._nees.size else math.nan
+
+    @functools.cached_property
+    def nees_band(self):
+        """Of the mean of the NEES."""
+        return band(FREEDOMS, self.count) if self._nees.size else (math.nan, math.nan)
 
     @property
     def verdict(self):
@@ -153,21 +185,17 @@ class Axis:
         return f'honest: its errors are what it states ({where})'
 
 
+def mark(mean, expected, band):
+    """'too sure' or 'too careful' where a mean of squared errors is off its expectation by more than NOTABLE and
+    outside of its band, else ''."""
+    if mean > max(band[1], (1.0 + NOTABLE) * expected):
+        return 'too sure'
+    return 'too careful' if mean < min(band[0], (1.0 - NOTABLE) * expected) else ''
+
+
 def axis(known, i) -> Axis:
     """The Axis i (0 azimuth, 1 elevation) of a Consistency."""
-    on = known.tracking
-    nis, freedoms, nees = known.nis[on, i], known.freedoms[on, i], known.nees[on, i]
-    freedoms, nis, nees = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)], nees[np.isfinite(nees)]
-    inside, count, nees_band = math.nan, math.nan, (math.nan, math.nan)
-    if nis.size:
-        low, high = bounds(freedoms)
-        inside = float(np.mean((nis >= low) & (nis <= high)))
-    if nees.size:
-        count = independent(nees)
-        nees_band = band(FREEDOMS, count)
-    return Axis(_mean(nis), _mean(freedoms), inside, _mean(nees), nees_band, count,
-                *(tracking.rms(values[on, i]) for values in (known.error, known.rate_error, known.sigma,
-                                                             known.rate_sigma)))
+    return known.axes[i]
 
 
 def _mean(values):

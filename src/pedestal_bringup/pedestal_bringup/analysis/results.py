@@ -19,7 +19,8 @@ from pedestal_bringup.analysis.tracking import DEGREES, largest, rms
 
 class Result(typing.NamedTuple):
     """name and unit; the part it is measured on and measure(part) -> value, NaN where it was not measured; what it is,
-    a sentence; label: its name in the report, '' where the report does not show it; target, or None."""
+    a sentence; label: its name in the report, '' where the report does not show it; target, or None; mark(part) ->
+    what is off about it, '' where nothing is."""
     name: str
     unit: str
     part: str
@@ -27,6 +28,21 @@ class Result(typing.NamedTuple):
     sentence: str
     label: str = ''
     target: str | None = None
+    mark: typing.Callable = lambda part: ''
+
+
+def _nis_mark(i):
+    def mark(known):
+        axis = consistency.axis(known, i)
+        return consistency.mark(axis.nis, axis.nis_expected, axis.nis_band)
+    return mark
+
+
+def _nees_mark(i):
+    def mark(known):
+        axis = consistency.axis(known, i)
+        return consistency.mark(axis.nees, consistency.FREEDOMS, axis.nees_band)
+    return mark
 
 
 RESULTS = (
@@ -65,15 +81,15 @@ RESULTS = (
            'Largest pointing error that the encoders show in elevation.'),
     Result('single_sample_noise_deg', 'deg', 'tracking', lambda run: rms(run.noise),
            "Rms of the receiver's error less the true one.", "receiver's single-sample noise"),
-    Result('pointing_to_noise', '', 'tracking', lambda run: run.pointing(rms) / rms(run.noise),
+    Result('pointing_to_noise', '-', 'tracking', lambda run: run.pointing(rms) / rms(run.noise),
            'pointing_rms_deg over single_sample_noise_deg.', target='<= 0.4'),
-    Result('noise_reduction_cross_elevation', '', 'tracking',
+    Result('noise_reduction_cross_elevation', '-', 'tracking',
            lambda run: rms(run.noise[:, 0]) / rms(run.filter_error[:, 0]),
            "The receiver's noise over the error of the filtered line of sight, in cross-elevation."),
-    Result('noise_reduction_elevation', '', 'tracking',
+    Result('noise_reduction_elevation', '-', 'tracking',
            lambda run: rms(run.noise[:, 1]) / rms(run.filter_error[:, 1]),
            "The receiver's noise over the error of the filtered line of sight, in elevation."),
-    Result('noise_reduction', '', 'tracking', lambda run: rms(run.noise) / rms(run.filter_error),
+    Result('noise_reduction', '-', 'tracking', lambda run: rms(run.noise) / rms(run.filter_error),
            "The receiver's noise over the error of the filtered line of sight, both axes together."),
     Result('lock_time_s', 's', 'tracking', lambda run: run.lock_time,
            'When the receiver locked for the first time.', 'first lock'),
@@ -86,14 +102,18 @@ RESULTS = (
            'time further than half a beamwidth off, once tracking'),
     Result('evaluated_time_s', 's', 'tracking', lambda run: float(np.sum(run.tracking) * run.period),
            f'How long the run was in autotrack, from {tracking.SETTLING:g} s after its start.', 'time evaluated'),
-    Result('azimuth_nis_mean', '', 'filter', lambda known: consistency.axis(known, 0).nis,
-           "Mean squared innovation of azimuth in units of the filter's variance; 1 for each number measured."),
-    Result('azimuth_nees_mean', '', 'filter', lambda known: consistency.axis(known, 0).nees,
-           "Mean squared error of azimuth and its rate in units of the filter's covariance; 2 where that is true."),
-    Result('elevation_nis_mean', '', 'filter', lambda known: consistency.axis(known, 1).nis,
-           "Mean squared innovation of elevation in units of the filter's variance; 1 for each number measured."),
-    Result('elevation_nees_mean', '', 'filter', lambda known: consistency.axis(known, 1).nees,
-           "Mean squared error of elevation and its rate in units of the filter's covariance; 2 where that is true."),
+    Result('azimuth_nis_mean', '-', 'filter', lambda known: consistency.axis(known, 0).nis,
+           "Mean squared innovation of azimuth in units of the filter's variance; 1 for each number measured.",
+           mark=_nis_mark(0)),
+    Result('azimuth_nees_mean', '-', 'filter', lambda known: consistency.axis(known, 0).nees,
+           "Mean squared error of azimuth and its rate in units of the filter's covariance; 2 where that is true.",
+           mark=_nees_mark(0)),
+    Result('elevation_nis_mean', '-', 'filter', lambda known: consistency.axis(known, 1).nis,
+           "Mean squared innovation of elevation in units of the filter's variance; 1 for each number measured.",
+           mark=_nis_mark(1)),
+    Result('elevation_nees_mean', '-', 'filter', lambda known: consistency.axis(known, 1).nees,
+           "Mean squared error of elevation and its rate in units of the filter's covariance; 2 where that is true.",
+           mark=_nees_mark(1)),
     Result('keyhole_loss_predicted_s', 's', 'keyholes', lambda slews: sum(loss for _, _, loss in slews),
            'How long the ACU announced that it would lose the target in keyholes.'),
     Result('ship_line_of_sight_rms_deg', 'deg', 'isolation', lambda ship: ship.motion * DEGREES,
@@ -118,12 +138,12 @@ RESULTS = (
     Result('level_error_rms_deg', 'deg', 'attitude', lambda ins: rms(ins.error[ins.after, :2]) * DEGREES,
            'Rms of the level error of the INS since it was aligned, per axis.',
            'level error from then on, rms per axis'),
-    Result('lost_steps', '', 'run', lambda run: float(run.drive.get('lost_steps', math.nan)),
+    Result('lost_steps', 'steps', 'run', lambda run: float(run.drive.get('lost_steps', math.nan)),
            'Steps that the drive made without the command for them.', target='0'),
-    Result('realtime_factor', '', 'run', lambda run: run.drive.get('realtime_factor', math.nan),
+    Result('realtime_factor', 's/s', 'run', lambda run: run.drive.get('realtime_factor', math.nan),
            "The drive's time over wall time.", target='>= 4 in lockstep'),
-    Result('messages', '', 'run', lambda run: float(run.recorder['messages']), 'Messages that were recorded.'),
-    Result('restarts', '', 'supervised', lambda run: float(run.restarts),
+    Result('messages', 'messages', 'run', lambda run: float(run.recorder['messages']), 'Messages that were recorded.'),
+    Result('restarts', 'restarts', 'supervised', lambda run: float(run.restarts),
            'How often `pedestal run` started a node again that had died, in realtime.'),
 )
 
@@ -149,6 +169,12 @@ def measured(parts, table=RESULTS) -> dict:
     """{name: (value, unit)} of the results of a table whose part is there, in its order."""
     return {result.name: (result.measure(parts[result.part]), result.unit) for result in table
             if parts.get(result.part)}
+
+
+def marks(parts, table=RESULTS) -> dict:
+    """{name: what is off about it} of the results whose part is there; only those about which something is."""
+    found = {result.name: result.mark(parts[result.part]) for result in table if parts.get(result.part)}
+    return {name: text for name, text in found.items() if text}
 
 
 def row(case, metric, value, unit='', target=None):

@@ -8,6 +8,9 @@ import numpy as np
 
 from pedestal_common import line_of_sight
 from pedestal_common.compiled import compiled
+from pedestal_common.parameters import build
+from tracking_receiver_sim.path import arrival
+from tracking_receiver_sim.path.params import PathParameters
 
 SETTLING = 2.0
 """Seconds after the first hand-over to autotrack that are left out of every statistic."""
@@ -173,8 +176,10 @@ def beamwidth(bag):
 
 def on_grid(bag, t, topic, columns):
     """Columns of a topic at the stamps t; NaN where it has no message of that stamp."""
-    out = np.full((t.size, len(columns)), np.nan)
     table = bag.table(topic) if topic in bag.topics else {'t': ()}
+    if np.array_equal(table['t'], t) and (np.diff(t) > 1e-9).all():     # a message in every step
+        return np.column_stack([table[column] for column in columns])
+    out = np.full((t.size, len(columns)), np.nan)
     if len(table['t']):
         _, here, there = np.intersect1d(np.round(t * 1e9), np.round(table['t'] * 1e9), return_indices=True)
         for i, column in enumerate(columns):
@@ -192,6 +197,15 @@ def _lever_arm(bag, attitude):
             line_of_sight.rotation(*quaternion, mat_ed)
             row[:] = mat_ed @ arm
     return enu
+
+
+def _arriving(bag, relative, velocity):
+    """(n, 3) ENU [m] from the antenna to where the target is seen, which is at `relative` with the velocity (n, 3):
+    refracted and late as the bag says."""
+    of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
+    given = {key: of_receiver[key] for key in ('path.refractivity', 'path.light_time') if key in of_receiver}
+    path = build(PathParameters, given, 'path.')
+    return arrival.all_seen(path, relative, velocity) if given else relative
 
 
 def by_encoders(bag):
@@ -223,7 +237,8 @@ def read(bag) -> Tracking:
     measured = at_steps('tracking_receiver/angle_error', ('x', 'y', 'z'))
     estimate = at_steps('acu/estimate', ('azimuth.position', 'elevation.position'))
     error, encoder_error, filtered, beam_earth = np.full((4, t.size, 2), np.nan)
-    relative = target - ship
+    velocity = at_steps('target/truth', ('twist.linear.x', 'twist.linear.y', 'twist.linear.z'))
+    relative = _arriving(bag, target - ship, velocity)
     _true_error(beam, relative, attitude, error)
     if beam is not encoders and not bag.beams:
         _true_error(encoders, relative, attitude, encoder_error)

@@ -259,6 +259,11 @@ class Bag:
         return start(self.metadata_records)
 
     @property
+    def end(self):
+        """Log time of its last message [s]."""
+        return self.index.log.max() / 1e9
+
+    @property
     def planned_end(self):
         """When the run was to end, a stamp [ns]; None when the bag does not say."""
         return planned_end(self.metadata_records)

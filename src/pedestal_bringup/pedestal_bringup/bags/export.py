@@ -44,13 +44,13 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
             yield None, reason, name
             continue
         content = table(bag, name)
-        with _whole(file) as part:
+        with whole(file) as part:
             write(part, content, {'topic': name, 'type': bag.topics[name], **bag.metadata})
         yield file, len(content[NANOSECONDS]), len(content)
 
 
 @contextlib.contextmanager
-def _whole(file):
+def whole(file):
     """The path of a file that becomes `file` once it is whole, and nothing otherwise."""
     part = file.with_name(file.name + '.part')
     try:

@@ -72,6 +72,12 @@ class Report:
         """The steps that the drive lost, as text; '' where none is known of."""
         return '{} of {}'.format(*self.lost) if self.lost and self.lost[0] else ''
 
+    @property
+    def loss(self):
+        """A line on them, '' where none is known of."""
+        return f'lost steps: {self.lost_steps}, made by the drive without the command for them' if (
+            self.lost_steps) else ''
+
     def lines(self):
         """The report as text: a row per topic, the gaps under it, the verdict last."""
         width = max([len(check.name) for check in self.topics], default=5)
@@ -80,8 +86,8 @@ class Report:
             lines.append(f'{check.name:{width}} {check.count:9} {check.first:14.6f} {check.last:14.6f}')
             lines += [f'  {problem}' for problem in check.problems]
         lines += [*self.problems, self.made]
-        if self.lost_steps:
-            lines.append(f'lost steps: {self.lost_steps}, made by the drive without the command for them')
+        if self.loss:
+            lines.append(self.loss)
         if self.aborted:
             lines.append(self.ending)
         total = sum(check.count for check in self.topics)
@@ -134,12 +140,16 @@ def verify(path) -> Report:
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
     drive = bag.last_values(nodes.DRIVE)
-    lost = tuple(int(number) for number in (drive.get('lost_steps', ''), drive.get('step', ''))
-                 if number.isdecimal() and len(number) < 20)
+    lost = count(drive.get('lost_steps', '')), count(drive.get('step', ''))
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(path), checks, bag.breaks + problems, grid.steps, grid.period / 1e9 if grid.period else np.nan,
                   configuration.line(bag), grid.last, planned,
-                  lost if len(lost) == 2 else None)
+                  None if None in lost else lost)
+
+
+def count(text):
+    """The whole number that a value of the diagnostics is, None for any other text."""
+    return int(text) if text.isdecimal() and len(text) < 20 else None
 
 
 def _problems(bag, rows, name, stamp, grid):

@@ -317,9 +317,8 @@ class Writer(BagFile):
 
     def __init__(self, directory, rows, metadata, more=()):
         super().__init__(directory, _earlier_files(directory, metadata))
-        schemas = {name: self.add_schema(
-            name, 'ros2msg', messages.TYPESTORE.generate_msgdef(name, ros_version=2)[0].encode())
-            for name in dict.fromkeys(topic.type for topic in rows)}
+        schemas = {name: self.add_schema(name, 'ros2msg', messages.definition(name))
+                   for name in dict.fromkeys(topic.type for topic in rows)}
         self._channels = [self.add_channel('/' + topic.name, schemas[topic.type], {
             'offered_qos_profiles': yaml.safe_dump(_qos(topic.rate), sort_keys=False),
             'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)}) for topic in rows]

@@ -1,5 +1,6 @@
 """The compiled core on this machine, against its targets, the same axis through scipy and the filters of filterpy."""
 import math
+import time
 
 import llvmlite.binding
 import numba
@@ -10,16 +11,20 @@ from acu_tracker.estimation import axis_filter, unscented
 from acu_tracker.estimation.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
-from adu_drive import axis, drive_unit
+from adu_drive import axis, drive_unit, lanes
+from adu_drive import unit as adu_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup.analysis.results import row
 from pedestal_bringup.bench import solve_ivp_axis
 from pedestal_bringup.bench.table import best_of, show
-from pedestal_bringup.run import closed_loop, scenario
+from pedestal_bringup.run import closed_loop, scenario, side_by_side
+from pedestal_bringup.trials import ensemble
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import build
 
-CORE_SECONDS = 20.0
+CORE_SECONDS, TRIAL_SECONDS = 20.0, 10.0
+SHORT, ROUNDS = 40, 100
+"""Drive steps that nobody else is likely to interrupt, and how often."""
 SUBSTEPS = 2 * 100
 """Plant sub-steps of both axes in one drive step of 5 ms."""
 SOLVE_IVP_TICKS = 100
@@ -31,14 +36,21 @@ def _drive_steps(state, constants, inputs, outputs, count):
         drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
+@compiled
+def _steps_on_lanes(drives, count):
+    moving = adu_unit.LANES(drives)
+    for _ in range(count):
+        drive_unit.step(moving.state, moving.constants, moving.inputs, moving.outputs)
+
+
 FILTER_STEPS = 20_000
 FILTERPY_STEPS = 500
 FILTER_PERIOD = 0.01
 
 
-def filter_step(kind):
-    """Time [us] of one prediction and correction of an axis_filter kind on a noisy ramp."""
-    constants = axis_filter.constants(build(FilterParameters, {'kind': kind}))
+def filter_step(**parameters):
+    """Time [us] of one prediction and correction of an axis_filter of FilterParameters on a noisy ramp."""
+    constants = axis_filter.constants(build(FilterParameters, parameters))
     t = FILTER_PERIOD * np.arange(FILTER_STEPS)
     y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
     variance, state = np.full(FILTER_STEPS, 2.5e-7), np.zeros(1, axis_filter.FILTER)
@@ -119,7 +131,8 @@ def filterpy_steps():
 
 def filter_rows():
     """One step of one filter, of three interacting and of two unscented ones, against filterpy's in the same run."""
-    steps = filter_step('current_statistical'), filter_step('imm'), unscented_step()
+    steps = (filter_step(kind='current_statistical'),
+             filter_step(**{'kind': 'imm', 'imm.models': 'cv ca current_statistical'}), unscented_step())
     rows = []
     for metric, ours, target, theirs in zip(('kalman', 'imm3', 'imm_ukf'), steps, ('<= 2', '<= 10', None),
                                             filterpy_steps()):
@@ -129,27 +142,45 @@ def filter_rows():
     return rows
 
 
+def drive_rows():
+    """One drive beside as many as there are lanes, by turns; whole trials on lanes, by the time of one core."""
+    params = AduParameters(initial_elevation=0.7)
+    one = np.zeros(1, adu_unit.RECORD)
+    one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)
+    one['inputs']['azimuth']['rate'], one['inputs']['elevation']['rate'], one['inputs']['enable'] = 0.02, -0.01, 1
+    drives, (state, constants, inputs, outputs) = lanes.beside(one), (
+        one[name] for name in ('state', 'constants', 'inputs', 'outputs'))
+    _drive_steps(state, constants, inputs, outputs, 200)
+    _steps_on_lanes(drives, 200)
+    alone, together = zip(*((best_of(lambda: _drive_steps(state, constants, inputs, outputs, SHORT), 1),
+                             best_of(lambda: _steps_on_lanes(drives, SHORT), 1)) for _ in range(ROUNDS)))
+    substep = min(alone) / SHORT / SUBSTEPS * 1e9
+    on_lanes = min(together) / SHORT / SUBSTEPS / lanes.WIDTH * 1e9
+    trials = [scenario.load('leo_pass', seed=seed, duration=TRIAL_SECONDS) for seed in range(lanes.WIDTH)]
+    side_by_side.runs([closed_loop.Loop(trial) for trial in trials], ensemble.TOPICS)
+    seconds = math.inf
+    for _ in range(3):
+        loops, begun = [closed_loop.Loop(trial) for trial in trials], time.process_time()
+        side_by_side.runs(loops, ensemble.TOPICS)
+        seconds = min(seconds, time.process_time() - begun)
+    return [row('core', 'substep_ns', substep, 'ns', '<= 45'), row('lanes', 'substep_ns', on_lanes, 'ns', '<= 8'),
+            row('lanes', 'ratio', substep / on_lanes, '-', '>= 4'),
+            row('lanes', 'realtime_factor', lanes.WIDTH * TRIAL_SECONDS / seconds, '', '>= 1000')]
+
+
 def run():
     """Print the table and return its rows."""
-    params = AduParameters(initial_elevation=0.7)
-    state, constants = drive_unit.initial_state(params), drive_unit.constants(params)
-    inputs, outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
-    inputs['azimuth']['rate'], inputs['elevation']['rate'], inputs['enable'] = 0.02, -0.01, 1
-    _drive_steps(state, constants, inputs, outputs, 200)
-    count = 500
-    substep = best_of(lambda: _drive_steps(state, constants, inputs, outputs, count)) / count / SUBSTEPS * 1e9
-
+    drives = drive_rows()
     loop = scenario.load('ship_pass', duration=CORE_SECONDS)
     closed_loop.Loop(loop).run()
     loops = [closed_loop.Loop(loop) for _ in range(5)]
     factor = CORE_SECONDS / best_of(lambda: loops.pop().run())
 
     tick = axis.CURRENT_PERIOD
-    scipy_time = best_of(lambda: solve_ivp_axis.run(params.azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)
+    scipy_time = best_of(lambda: solve_ivp_axis.run(AduParameters().azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)
     scipy_substep = scipy_time / SOLVE_IVP_TICKS / 2 * 1e9
-    rows = [row('core', 'substep_ns', substep, 'ns', '<= 45'),
-            row('core', 'realtime_factor', factor, '', '>= 200'),
+    rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'),
             row('solve_ivp', 'substep_ns', scipy_substep, 'ns'),
-            row('solve_ivp', 'ratio', scipy_substep / substep, ''), *filter_rows()]
+            row('solve_ivp', 'ratio', scipy_substep / drives[0]['value'], ''), *filter_rows()]
     show(f'compiled core, one core of {llvmlite.binding.get_host_cpu_name()}, numba {numba.__version__}', rows)
     return rows

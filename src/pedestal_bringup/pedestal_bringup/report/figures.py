@@ -2,12 +2,14 @@
 
 Grey is what was measured, blue what was filtered or commanded, orange the truth.
 """
+import pathlib
 import re
 import typing
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter
 
 INK = '#20242a'
 RAW, FILTERED, TRUTH = '#8d949e', '#1f6fd1', '#e57a00'
@@ -79,16 +81,54 @@ def outside_legend(figure, axes, **options):
     figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4, **options)
 
 
+METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},
+            'svg': {'Date': None, 'Creator': None, 'Format': None, 'Type': None}}
+"""What a file of each format does not say, so that equal data give equal bytes."""
+VECTOR = ('pdf', 'svg')
+"""Formats beside PNG."""
+
+DASHES = {TRUTH: (0, (6.0, 1.5)), MOTOR_1: (0, (3.0, 1.0, 1.0, 1.0)), MOTOR_2: (0, (2.0, 1.2))}
+"""{colour: dashes} by which lines are told apart where colours are not; every other colour is solid."""
+
+
+WIDE = 2.0
+"""Line width [pt] from which a line is told apart by that."""
+
+
+def tidy(figure):
+    """Give the solid lines of a figure the dashes of their colours, where a panel has several, and logarithmic axes of
+    less than three decades plain numbers."""
+    for axes in figure.axes:
+        lines = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
+        _dash(lines if len(lines) > 1 else ())
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            if axis.get_scale() == 'log' and 0.0 < high < 1e3 * low and not isinstance(axis.get_major_locator(),
+                                                                                        FixedLocator):
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                axis.set_major_formatter('{x:g}')
+                axis.set_minor_formatter(NullFormatter())
+    for legend in figure.legends:
+        _dash(legend.get_lines())
+
+
+def _dash(lines):
+    for line in lines:
+        if line.get_linestyle() == '-' and line.get_linewidth() < WIDE and line.get_color() in DASHES:
+            line.set_linestyle(DASHES[line.get_color()])
+
+
+def store(figure, output, dpi=150):
+    """Write a figure into a path by its suffix (.png, .pdf on white), or into a stream as transparent SVG."""
+    kind = str(output).rpartition('.')[2] if isinstance(output, pathlib.Path) else 'svg'
+    colours = {'transparent': True} if kind == 'svg' else {'facecolor': 'white'}
+    figure.savefig(output, format=kind, dpi=dpi, metadata=METADATA[kind], **colours)
+
+
 def render(spec, data, output):
-    """Draw the figure of a Spec into a path or stream: .png on white, else transparent SVG. Equal data give equal
-    bytes."""
+    """Draw the figure of a Spec into a path or stream, as `store` does. Equal data give equal bytes."""
     with matplotlib.rc_context({**STYLE, 'svg.hashsalt': spec.key}):
-        figure = spec.draw(data)
-        if str(output).endswith('.png'):
-            figure.savefig(output, dpi=spec.dpi, facecolor='white', metadata={'Software': None})
-        else:
-            figure.savefig(output, format='svg', transparent=True,
-                           metadata={'Date': None, 'Creator': None, 'Format': None, 'Type': None})
+        store(spec.draw(data), output, spec.dpi)
 
 
 def inline(svg):

@@ -35,7 +35,7 @@ def estimate(data):
             shown = shown[np.isfinite(shown)]
             if shown.size and shown.max() > 0.0:
                 axes.set_ylim(-1.25 * shown.max(), 1.25 * shown.max())
-            axes.set_ylabel(f'[{unit}]')
+            axes.set_ylabel(f'error [{unit}]')
         row[0].set_title(f'{axis}: angle')
         row[1].set_title(f'{axis}: rate')
     for axes in panels[1]:
@@ -50,7 +50,8 @@ def innovations(data):
     figure, panels = new_panels(2, 2, sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
         draw_line(row[0], known.t, np.degrees(known.innovation[:, i]), color=RAW, linewidth=0.7)
-        row[0].set_ylabel('[deg]')
+        row[0].set_ylabel('innovation [deg]')
+        row[1].set_ylabel('mean NIS')
         row[0].set_title(f'{axis}: innovation')
         t, nis, expected, low, high = _averaged(known.t, known.nis[:, i], known.freedoms[:, i])
         row[1].fill_between(t, low, high, color=FILTERED, alpha=0.2, linewidth=0.0,

@@ -1,8 +1,6 @@
 """The page that `pedestal report` writes: a recording as one HTML file that needs nothing else, its figures as PNG."""
 import html
-import io
 import itertools
-import math
 import pathlib
 
 import numpy as np
@@ -11,7 +9,7 @@ from pedestal_bringup.analysis import consistency, isolation, results, tracking
 from pedestal_bringup.analysis.tracking import DEGREES
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.verify import verify
-from pedestal_bringup.report import attitude_figures, figures, filter_figures, run_data, run_figures
+from pedestal_bringup.report import attitude_figures, elements, figures, filter_figures, run_data, run_figures, subject
 from pedestal_common import topics
 from pedestal_common.files import sha256
 from pedestal_common.topics import AXES
@@ -19,38 +17,11 @@ from pedestal_common.topics import AXES
 SHOWN = 200
 """Rows of the table of diagnostics at the most."""
 
-STYLE = """
-:root { color-scheme: light dark; --ink: #20242a; --soft: #626a75; --line: #d5dae0; --paper: #ffffff; --bad: #b3261e; }
-@media (prefers-color-scheme: dark) {
-  :root { --ink: #dfe3e8; --soft: #9aa3ae; --line: #3a414a; --paper: #16191d; --bad: #ff8a80; } }
-@media print {
-  :root { color-scheme: light; --ink: #000000; --soft: #444444; --line: #bbbbbb; --paper: #ffffff; --bad: #b3261e; }
-  figure { break-inside: avoid; } body { padding: 0; max-width: none; } }
-body { margin: 0 auto; padding: 1.2rem; max-width: 60rem; color: var(--ink); background: var(--paper);
-       font: 1rem/1.45 system-ui, sans-serif; }
-h1 { font-size: 1.6rem; margin: 0 0 .2rem; }
-h2 { font-size: 1.15rem; margin: 2rem 0 .4rem; padding-top: .8rem; border-top: 1px solid var(--line); }
-p, figcaption { margin: .3rem 0; } .soft, figcaption { color: var(--soft); font-size: .92rem; }
-.bad { color: var(--bad); font-weight: 600; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; margin: .5rem 0; font-size: .95rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .22rem 1.4rem .22rem 0; text-align: left; vertical-align: top;
-         border-bottom: 1px solid var(--line); }
-th { font-weight: 600; } tbody th { font-weight: 400; } td.n, th.n { text-align: right; }
-.n tbody th { min-width: 8rem; }
-.meta th { color: var(--soft); } .meta td { overflow-wrap: anywhere; }
-figure { margin: 0 0 1.4rem; } figure h3 { font-size: 1rem; margin: 1.2rem 0 .1rem; }
-figure svg { display: block; width: 100%; height: auto; min-width: 26rem; }
-@media (max-width: 40rem) {
-  body { padding: .6rem; } th, td { padding-right: .7rem; } .n tbody th { min-width: 6rem; } }
-"""
-
-
-def write(bag_path, output=None, png_folder=None, beam='') -> pathlib.Path:
+def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathlib.Path:
     """Write the report of a bag and return where: output, default report.html in the bag (beside a bare .mcap).
 
-    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there. The same bag
-    gives the same bytes.
+    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there; vector: one of
+    figures.VECTOR, as that too. The same bag gives the same bytes.
     Raises bag.BagError when the bag cannot be read to its end, OSError when the report cannot be written.
     """
     bag = bags.read(bag_path, beam)
@@ -64,31 +35,14 @@ def write(bag_path, output=None, png_folder=None, beam='') -> pathlib.Path:
         folder.mkdir(parents=True, exist_ok=True)
         for spec in (*run_figures.FIGURES, *filter_figures.FIGURES, *attitude_figures.FIGURES, run_figures.OVERVIEW):
             if not data.lacks(spec.needs):
-                figures.render(spec, data, folder / f'{spec.key}.png')
+                for kind in ('png', *([vector] if vector else ())):
+                    figures.render(spec, data, folder / f'{spec.key}.{kind}')
     return output
-
-
-def _number(value, unit=''):
-    """A value with its unit as text."""
-    text = f'{value:#.4g}'.rstrip('.') if math.isfinite(value) else 'not measured'
-    return f'{text}\N{NO-BREAK SPACE}{unit}'.rstrip() if math.isfinite(value) else text
-
-
-def _rows(head, rows, kind=''):
-    """An HTML table; the first cell of a row is its name, the others are right-aligned in one of numbers, kind 'n'.
-    """
-    def line(cells, tag):
-        rest = ''.join(f'<{tag} class="{kind}">{html.escape(cell)}</{tag}>' if kind != 'meta' and kind else
-                       f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells[1:])
-        return f'<tr><th>{html.escape(cells[0])}</th>{rest}</tr>'
-    top = f'<thead>{line(head, "th")}</thead>' if head else ''
-    return (f'<div class="wide"><table class="{kind}">{top}<tbody>{"".join(line(row, "td") for row in rows)}'
-            '</tbody></table></div>')
 
 
 def _of_axes(name, values, last=''):
     """A row of numbers [(value, unit)] of azimuth and elevation."""
-    return [name, *(_number(*value) for value in values), last]
+    return [name, *(elements.number(*value) for value in values), last]
 
 
 def _pointing(bag, data, values):
@@ -96,7 +50,7 @@ def _pointing(bag, data, values):
     noise = values['single_sample_noise_deg'][0]
 
     def row(name, *keys, scale=1.0, unit='deg'):
-        return [name, *(_number(values[key][0] / scale, unit) for key in keys)]
+        return [name, *(elements.number(values[key][0] / scale, unit) for key in keys)]
 
     rms = ('cross_elevation_rms_deg', 'elevation_rms_deg', 'pointing_rms_deg')
     largest = ('cross_elevation_max_deg', 'elevation_max_deg', 'pointing_max_deg')
@@ -122,7 +76,7 @@ def _torques(data):
 def _labelled(parts, *names):
     """Rows [label, number] of the results of some parts: those named, else all that have a label."""
     values = results.measured(parts)
-    return [[results.BY_NAME[name].label, _number(*values[name])] for name in names or values
+    return [[results.BY_NAME[name].label, elements.number(*values[name])] for name in names or values
             if results.BY_NAME[name].label]
 
 
@@ -132,13 +86,13 @@ def _loop(bag, check):
     joints = run_data.table(bag, 'joint_states')
     if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
         t = joints['t']
-        rows.append(["loop rate achieved (drive's time)", _number((t.size - 1) / (t[-1] - t[0]), 'Hz')])
+        rows.append(["loop rate achieved (drive's time)", elements.number((t.size - 1) / (t[-1] - t[0]), 'Hz')])
         if bag.metadata.get('pacing') == 'realtime':
             wall = bag.rows('joint_states').publish
             jitter = (np.diff(wall) - check.period * 1e9) / 1e6
             late = np.percentile(np.abs(jitter), 99.0)
             rate = (t.size - 1) / max(wall[-1] - wall[0], 1) * 1e9
-            rows += [['loop rate achieved (wall time)', _number(rate, 'Hz')],
+            rows += [['loop rate achieved (wall time)', elements.number(rate, 'Hz')],
                      ['jitter of the step, wall time',
                       f'{tracking.rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
                       f'largest {np.abs(jitter).max():.3g} ms']]
@@ -158,7 +112,7 @@ def _results(bag, data, check):
     if data.run is None:
         parts.append(f'<p class="bad">Not compared with the truth: {html.escape(data.no_truth)}.</p>')
         if data.motors:
-            parts.append(_rows(['', 'azimuth', 'elevation', ''], _torques(data), 'n'))
+            parts.append(elements.table(['', 'azimuth', 'elevation', ''], _torques(data), 'n'))
     else:
         known = results.of_tracking(data.run)
         if tracking.by_encoders(bag):
@@ -166,14 +120,14 @@ def _results(bag, data, check):
         if not data.run.tracking.any():
             parts.append('<p class="bad">The run was never in autotrack for longer than the settling time, so nothing '
                          'was evaluated.</p>')
-        parts.append(_rows(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
-                           _pointing(bag, data, results.measured(known)), 'n'))
+        parts.append(elements.table(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
+                                    _pointing(bag, data, results.measured(known)), 'n'))
         parts.append('<p class="soft">Pointing and noise over the evaluated part: autotrack, from '
                      f'{tracking.SETTLING:g} s after its start. Both axes: all samples of both, per axis.'
                      '</p>')
         rows = _labelled(known, 'single_sample_noise_deg', 'lock_time_s', 'autotrack_time_s', 'evaluated_time_s',
                          'loss_s')
-    return [*parts, _rows(None, rows + _loop(bag, check), 'n')]
+    return [*parts, elements.table(None, rows + _loop(bag, check), 'n')]
 
 
 def _gaps(bag, check):
@@ -192,39 +146,35 @@ def _gaps(bag, check):
 
 def _warnings(check):
     """What a reader must know before any number: that the run was aborted, and that steps were lost."""
-    return [line for line in (check.ending, check.lost_steps and f'lost steps: {check.lost_steps}, made by the drive '
-                              'without the command for them') if line]
+    return [line for line in (check.ending, check.loss) if line]
 
 
-def _figure(spec, data):
-    caption = f'<h3>{html.escape(spec.title)}</h3>'
-    reason = data.lacks(spec.needs)
-    if reason:
-        return f'<figure id="{spec.key}">{caption}<p class="bad">Not drawn: {html.escape(reason)}.</p></figure>'
-    stream = io.StringIO()
-    figures.render(spec, data, stream)
-    return (f'<figure id="{spec.key}">{caption}<figcaption>{html.escape(spec.caption)}</figcaption>'
-            f'<div class="wide">{figures.inline(stream.getvalue())}</div></figure>')
+def _figures(module, data):
+    return [elements.figure(spec, data, data.lacks(spec.needs)) for spec in module.FIGURES]
 
 
 def _honesty(known):
     """The table of a consistency.Consistency, and a sentence for each axis."""
     judged = [consistency.axis(known, i) for i in range(2)]
 
-    def row(name, field, unit='', scale=1.0):
-        return _of_axes(name, [(scale * getattr(axis, field), unit) for axis in judged])
+    def row(name, field, marks=(), unit='', scale=1.0):
+        return _of_axes(name, [(scale * getattr(axis, field), unit) for axis in judged], ', '.join(marks))
 
-    rows = [row('mean NIS', 'nis'), row('expected of an honest filter', 'nis_expected'),
-            row(f'NIS inside their {100.0 * consistency.PART:g} % band', 'nis_inside', '%', 100.0),
-            row('mean NEES (angle and rate)', 'nees'),
+    marks = [[f'{name}: {consistency.mark(*of)}' for name, of in zip(AXES, means) if consistency.mark(*of)]
+             for means in ([(axis.nis, axis.nis_expected, axis.nis_band) for axis in judged],
+                           [(axis.nees, consistency.FREEDOMS, axis.nees_band) for axis in judged])]
+    rows = [row('mean NIS', 'nis', marks[0]), row('expected of an honest filter', 'nis_expected'),
+            row(f'NIS inside their {100.0 * consistency.PART:g} % band', 'nis_inside', unit='%', scale=100.0),
+            row('mean NEES (angle and rate)', 'nees', marks[1]),
             [f'{100.0 * consistency.PART:g} % band of the mean, 2 expected',
-             *(' to '.join(map(_number, axis.nees_band)) for axis in judged), ''],
+             *(' to '.join(map(elements.number, axis.nees_band)) for axis in judged), ''],
             row('independent errors', 'count'),
-            row('angle error, rms', 'error', 'deg', DEGREES), row('sigma it states', 'sigma', 'deg', DEGREES),
-            row('rate error, rms', 'rate_error', 'deg/s', DEGREES),
-            row('rate sigma it states', 'rate_sigma', 'deg/s', DEGREES)]
+            row('angle error, rms', 'error', unit='deg', scale=DEGREES),
+            row('sigma it states', 'sigma', unit='deg', scale=DEGREES),
+            row('rate error, rms', 'rate_error', unit='deg/s', scale=DEGREES),
+            row('rate sigma it states', 'rate_sigma', unit='deg/s', scale=DEGREES)]
     verdicts = ''.join(f'<p>{name.capitalize()}: {html.escape(axis.verdict)}.</p>' for name, axis in zip(AXES, judged))
-    return _rows(['', 'azimuth', 'elevation', ''], rows, 'n') + verdicts + (
+    return elements.table(['', 'azimuth', 'elevation', ''], rows, 'n') + verdicts + (
         '<p class="soft">Over the evaluated part. NIS: innovations in units of what the filter expects of them; NEES: '
         'errors against the truth in units of what it states. On a ship the attitude error of the INS is among them, '
         'which no filter of the target knows.</p>')
@@ -236,8 +186,8 @@ def _deck(bag, data):
         return []
     ship = isolation.read(bag, data.run) if data.run is not None else None
     return ['<h2 id="attitude">The deck</h2>',
-            _rows(None, _labelled({'attitude': data.attitude}) + _labelled({'isolation': ship}), 'n'),
-            *(_figure(spec, data) for spec in attitude_figures.FIGURES)]
+            elements.table(None, _labelled({'attitude': data.attitude}) + _labelled({'isolation': ship}), 'n'),
+            *_figures(attitude_figures, data)]
 
 
 def _diagnostics(statuses):
@@ -254,22 +204,23 @@ def _diagnostics(statuses):
     if not rows:
         return [title, '<p>None.</p>' if statuses else '<p class="soft">No diagnostics in the bag.</p>']
     more = [f'<p class="soft">and {len(rows) - SHOWN} more.</p>'] if len(rows) > SHOWN else []
-    return [title, _rows(['time [s]', 'node', 'level', 'message'], [rows[place] for place in sorted(rows)][:SHOWN]),
-            *more]
+    shown = [rows[place] for place in sorted(rows)][:SHOWN]
+    return [title, elements.table(['time [s]', 'node', 'level', 'message'], shown), *more]
 
 
-def _made(bag):
-    """The table of how a bag was made and what its file is."""
+def _made(bag, data):
+    """The table of what a bag is of, how it was made and what its file is."""
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in bag.metadata.items()
                          if key.startswith('version.'))
-    rows = [[key, value] for key, value in bag.metadata.items() if not key.startswith('version.')]
-    rows += [['duration', f'{duration:g} s'], ['versions', versions or 'not in the bag'],
-             ['file', f'{", ".join(file.name for file in bag.files)}, '
-              f'{sum(file.stat().st_size for file in bag.files) / 1e6:.2f} MB, {stamps.size} messages'],
-             ['sha256', ', '.join(map(sha256, bag.files))]]
-    return _rows(None, rows, 'meta')
+    rows = [[key, value] for key, value in bag.metadata.items() if not key.startswith(('version.', 'beamwidth'))]
+    rows = [*subject.rows(bag, data), *rows, ['duration', f'{duration:g} s'],
+            ['versions', versions or 'not in the bag'],
+            ['file', f'{", ".join(file.name for file in bag.files)}, '
+             f'{sum(file.stat().st_size for file in bag.files) / 1e6:.2f} MB, {stamps.size} messages'],
+            ['sha256', ', '.join(map(sha256, bag.files))]]
+    return elements.table(None, rows, 'meta')
 
 
 def _page(bag, data):
@@ -277,15 +228,12 @@ def _page(bag, data):
     name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',
-        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)), _made(bag),
+        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)), _made(bag, data),
         *_results(bag, data, check), *_gaps(bag, check),
         '<h2 id="figures">Figures</h2><p class="soft">The paper: antenna tracking with a Kalman filter and a '
         'dual-motor anti-backlash drive, its UAV experiment. Grey: measured, blue: filtered or achieved, '
         'orange: truth.</p>',
-        *(_figure(spec, data) for spec in run_figures.FIGURES),
+        *_figures(run_figures, data),
         '<h2 id="filter">Is the filter honest?</h2>', *([_honesty(data.filter)] if data.filter is not None else []),
-        *(_figure(spec, data) for spec in filter_figures.FIGURES), *_deck(bag, data), *_diagnostics(data.statuses)]
-    return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-            '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f'<title>Tracking run: {html.escape(name)}</title><style>{STYLE}</style></head>\n<body>\n'
-            + '\n'.join(parts) + '\n</body></html>\n')
+        *_figures(filter_figures, data), *_deck(bag, data), *_diagnostics(data.statuses)]
+    return elements.page(f'Tracking run: {name}', parts)

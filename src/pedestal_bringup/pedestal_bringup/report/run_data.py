@@ -4,10 +4,9 @@ import typing
 
 import numpy as np
 
-from pedestal_bringup.analysis import consistency, known_attitude, tracking
+from pedestal_bringup.analysis import consistency, known_attitude, measured, tracking
 from pedestal_bringup.bags import bag as bags
-from pedestal_common import line_of_sight, topics
-from pedestal_common.compiled import compiled
+from pedestal_common import topics
 
 
 @dataclasses.dataclass
@@ -99,27 +98,13 @@ def _tracking(bag):
         return None, f'no number {error.args[0]} where the graph would have one'
 
 
-@compiled
-def _displaced(azimuth, elevation, errors, quaternions, earth):
-    """Fill the earth angles (n, 2) of the directions that a receiver at deck angles (n,) measures at errors (n, 2)."""
-    mat_ed = np.empty((3, 3))
-    for k in range(azimuth.size):
-        line_of_sight.rotation(quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3], mat_ed)
-        at, up = line_of_sight.displaced(azimuth[k], elevation[k], errors[k, 0], errors[k, 1])
-        x, y, z = line_of_sight.direction(at, up)
-        east, north, height = line_of_sight.to_earth(mat_ed, x, y, z)
-        earth[k, 0], earth[k, 1] = line_of_sight.earth_angles(east, north, height)
-
-
 def _raw_angles(run, ship):
     """Earth angles (n, 2) [rad] of the target as measured, before any filter. ship: table of ship/truth or None."""
-    quaternions = np.tile(np.array(line_of_sight.ASHORE), (run.t.size, 1))
+    quaternions = None
     if ship is not None:
         at = np.searchsorted(ship['t'], run.t - 1e-9).clip(0, ship['t'].size - 1)
         quaternions = np.column_stack([ship[f'orientation.{axis}'][at] for axis in 'xyzw'])
-    earth = np.empty((run.t.size, 2))
-    _displaced(run.azimuth, run.elevation, run.measured, quaternions, earth)
-    return earth
+    return measured.earth_angles(np.column_stack((run.azimuth, run.elevation)), run.measured, quaternions)
 
 
 def _filter(bag, run):
@@ -143,10 +128,9 @@ def _modes(bag):
     changes = table(bag, 'acu/mode')
     if changes is None:
         return []
-    end = bag.index.log.max() / 1e9
     starts, names = [], []
     for start, name in zip(changes['t'].tolist(), changes['data']):
         if not names or names[-1] != name:
             starts.append(start)
             names.append(name)
-    return list(zip(starts, [*starts[1:], end], names))
+    return list(zip(starts, [*starts[1:], bag.end], names))

@@ -22,7 +22,8 @@ from pedestal_bringup.report.figures import (
 )
 
 MODES = dict(zip(modes.MODES, itertools.cycle((
-    '#9aa0a6', '#a87b51', '#8364c8', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#5b6abf', '#7a8b2a', '#c46aa8'))))
+    '#9aa0a6', '#a87b51', '#8364c8', '#b9a3e3', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#e58a95', '#f2b84b',
+    '#5b6abf', '#7a8b2a', '#c46aa8', '#4f4f4f'))))
 """{mode: colour}."""
 LEVELS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
 LOCKED = '#5f93c4'
@@ -75,7 +76,9 @@ def _scale_to(axes, t, values, tracking):
 AXES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
 
 
-def _draw_errors(axes, data, i, window=None):
+def draw_errors(axes, data, i, window=None):
+    """Draw what the receiver put out and what the filter made of it [deg], i: 0 cross-elevation, 1 elevation; with the
+    truth in a window (first, last time [s])."""
     run = data.run
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
     draw_line(axes, run.t, raw, window, color=RAW, linewidth=0.7, label='receiver, before the filter')
@@ -92,7 +95,7 @@ def _draw_errors(axes, data, i, window=None):
 def _errors(data, window=None):
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
-        _draw_errors(panels[i, 0], data, i, window)
+        draw_errors(panels[i, 0], data, i, window)
     panels[1, 0].set_xlabel('time [s]')
     outside_legend(figure, panels[0, 0])
     return figure
@@ -138,17 +141,21 @@ def angle_zoom(data):
     return _angles(data, True)
 
 
-def azimuth(data):
-    """Azimuth of antenna and target in earth angles [deg]."""
+def draw_azimuth(axes, data):
+    """Draw the azimuth of antenna and target in earth angles [deg]."""
     run = data.run
-    figure, panels = new_panels(1, height=2.4)
-    axes = panels[0, 0]
     beam = _continuous(run.beam_earth[:, 0])
     draw_line(axes, run.t, _continuous(run.target_earth[:, 0], beam), color=TRUTH, linewidth=2.5, label='target')
     draw_line(axes, run.t, beam, color=FILTERED, label='antenna')
     axes.set_xlabel('time [s]')
     axes.set_ylabel('azimuth [deg]')
-    outside_legend(figure, axes)
+
+
+def azimuth(data):
+    """Azimuth of antenna and target in earth angles [deg]."""
+    figure, panels = new_panels(1, height=2.4)
+    draw_azimuth(panels[0, 0], data)
+    outside_legend(figure, panels[0, 0])
     return figure
 
 
@@ -159,7 +166,8 @@ def _shade_modes(axes, data):
         axes.axvline(start, color=INK, linewidth=0.6, linestyle=':')
 
 
-def _draw_pointing(axes, data, i):
+def draw_pointing(axes, data, i):
+    """Draw the true pointing error [deg], i: 0 cross-elevation, 1 elevation; dashed: a tenth of the beamwidth."""
     run = data.run
     error = np.degrees((run.cross_elevation, run.elevation_error)[i])
     draw_line(axes, run.t, error, color=TRUTH, linewidth=0.8)
@@ -177,7 +185,7 @@ def pointing(data):
     figure, panels = new_panels(3, sharex=True)
     distance = np.degrees(np.hypot(run.cross_elevation, run.elevation_error))
     for i in range(2):
-        _draw_pointing(panels[i, 0], data, i)
+        draw_pointing(panels[i, 0], data, i)
     axes = panels[2, 0]
     draw_line(axes, run.t, np.where(distance > 0.0, distance, np.nan), color=TRUTH, linewidth=0.8)
     axes.set_yscale('log' if np.any(distance > 0.0) else 'linear')
@@ -197,7 +205,8 @@ def _mode_legend(figure, data):
                       loc='outside upper right', ncols=len(names))
 
 
-def _draw_torques(axes, data, axis, window=None):
+def draw_torques(axes, data, axis, window=None):
+    """Draw the torques of both motors of an axis, 'azimuth' or 'elevation', and their bias [Nm]."""
     motors = data.motors
     first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
     width = 0.7 if window is None else 1.0
@@ -219,8 +228,8 @@ def torques(data):
     window = _start(data)
     figure, panels = new_panels(2, 2, height=2.0, sharex='col', sharey='row', width_ratios=(3, 2))
     for row, axis in zip(panels, ('azimuth', 'elevation')):
-        _draw_torques(row[0], data, axis)
-        _draw_torques(row[1], data, axis, window)
+        draw_torques(row[0], data, axis)
+        draw_torques(row[1], data, axis, window)
         row[1].set_title(f'{axis}, first {ZOOM:g} s')
         row[1].set_ylabel('')
     for axes in panels[1]:
@@ -229,23 +238,28 @@ def torques(data):
     return figure
 
 
-def carrier(data):
-    """C/N0 [dB-Hz] and where the receiver was locked."""
+def draw_carrier(axes, data):
+    """Draw C/N0 [dB-Hz]; shaded where the receiver was locked."""
     table = data.receiver
-    figure, panels = new_panels(1, height=2.2)
-    axes = panels[0, 0]
     draw_line(axes, table['t'], table['z'], color=RAW, linewidth=0.8, label='C/N0')
     for first, last in spans(np.isfinite(table['x'])):
         axes.axvspan(table['t'][first], table['t'][last], color=LOCKED, alpha=0.15, linewidth=0.0)
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend([*handles, Patch(color=LOCKED, alpha=0.3, linewidth=0.0)], [*labels, 'locked'],
-                  loc='outside upper right', ncols=2)
     axes.set_xlabel('time [s]')
     axes.set_ylabel('C/N0 [dB-Hz]')
+
+
+def carrier(data):
+    """C/N0 [dB-Hz] and where the receiver was locked."""
+    figure, panels = new_panels(1, height=2.2)
+    draw_carrier(panels[0, 0], data)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend([*handles, Patch(color=LOCKED, alpha=0.3, linewidth=0.0)], [*labels, 'locked'],
+                  loc='outside upper right', ncols=2)
     return figure
 
 
-def _draw_sky(axes, data):
+def draw_sky(axes, data):
+    """Draw target and beam over the station, north up, on polar axes."""
     run = data.run
     axes.set_theta_zero_location('N')
     axes.set_theta_direction(-1)
@@ -268,7 +282,7 @@ def sky(data):
     """Target and beam over the station, north up."""
     figure = Figure(figsize=(WIDTH, 4.2), layout='constrained')
     axes = figure.subplots(subplot_kw={'projection': 'polar'})
-    _draw_sky(axes, data)
+    draw_sky(axes, data)
     axes.legend(loc='center left', bbox_to_anchor=(1.2, 0.5))
     return figure
 
@@ -310,12 +324,12 @@ def overview(data):
     figure = Figure(figsize=(13.0, 7.0), layout='constrained')
     grid = figure.add_gridspec(4, 3, width_ratios=(1.05, 1.0, 1.0))
     polar = figure.add_subplot(grid[:2, 0], projection='polar')
-    _draw_sky(polar, data)
+    draw_sky(polar, data)
     polar.set_anchor('W')
     bottom = []
     for i, axis in enumerate(('azimuth', 'elevation')):
         axes = figure.add_subplot(grid[2 + i, 0])
-        _draw_torques(axes, data, axis, _start(data))
+        draw_torques(axes, data, axis, _start(data))
         axes.set_title(f'{axis}: motor torques, first {ZOOM:g} s')
         if i == 0:
             axes.tick_params(labelbottom=False)
@@ -329,9 +343,9 @@ def overview(data):
         legend.set_in_layout(False)
     for i in range(2):
         column = [figure.add_subplot(grid[2 * i:2 * i + 2, 1]), figure.add_subplot(grid[2 * i:2 * i + 2, 2])]
-        _draw_errors(column[0], data, i)
+        draw_errors(column[0], data, i)
         column[0].set_title(f'{AXES[i][0]}: measured error')
-        _draw_pointing(column[1], data, i)
+        draw_pointing(column[1], data, i)
         column[1].set_title(f'{AXES[i][0]}: pointing error against truth')
         if i == 0:
             column[0].legend(loc='upper right')

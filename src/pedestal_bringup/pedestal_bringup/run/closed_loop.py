@@ -11,6 +11,7 @@ import numpy as np
 from numba.core import types
 from numba.extending import overload
 
+from acu_tracker import announcement
 from adu_drive import beam_unit
 from adu_drive import unit as drive_unit
 from pedestal_bringup.run.program import program_messages
@@ -21,8 +22,8 @@ from pedestal_common.unit import BLOCK, Unit, announced
 
 COMMAND, REFERENCE = 'acu/rate_command', 'acu/reference'
 
-STEP = records.of(*(topic.name for topic in topics.TOPICS if topic.rate in ('step', 'change')))
-"""One step: every topic but the program track and the diagnostics."""
+STEP = records.of(*(topic.name for topic in topics.TOPICS if topic.rate == 'step' or records.is_text(topic.name)))
+"""One step: every topic but the program track, commands and the diagnostics."""
 
 TRUTH = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
 """What no topic tells of t_k: bias torques [Nm], the true error of the beam (cross-elevation, elevation) [rad]."""
@@ -87,7 +88,9 @@ ORDER = ('adu', 'ship_motion', 'ins', 'tracking_receiver', 'acu')
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """A run in memory: steps (n,) of STEP, truth (n,) of TRUTH, the stamps (n,) [ns] of the steps; units {name: Unit}.
+    """A run in memory: steps (n,) of STEP, or of some of its topics, truth (n,) of TRUTH, the stamps (n,) [ns] of the
+    steps; units {name: Unit}; forecasts [(stamp [ns], announcement.numbers)] at every whole second, as the control
+    unit's diagnostics tell them.
 
     `table` reads it as a recording of the run is read.
     """
@@ -95,6 +98,7 @@ class Run:
     truth: np.ndarray
     stamps: np.ndarray
     units: dict
+    forecasts: list
 
     @property
     def t(self):
@@ -112,18 +116,22 @@ class Run:
     @property
     def topics(self):
         """{name: type} of what its nodes said."""
-        written = [name for unit in self.units.values() for name in unit.NODE.writes]
-        return {topic.name: topic.type for topic in topics.TOPICS
-                if topic.name in written and (records.is_text(topic.name)
-                                              or (self.steps[topic.name]['stamp'] != records.NEVER).any())}
+        written = [name for unit in self.units.values() for name in unit.writes]
+        kept = [topic for topic in topics.TOPICS if topic.name in written and topic.name in self.steps.dtype.names]
+        return {topic.name: topic.type for topic in kept
+                if records.is_text(topic.name) or (self.steps[topic.name]['stamp'] != records.NEVER).any()}
 
     def table(self, topic):
         """{column: array (n,)} of a topic, a row per message, as of a bag (columns.table)."""
         if records.is_text(topic):
             unit = next(unit for unit in self.units.values() if topic in unit.NODE.writes)
+            if topics.BY_NAME[topic].type != 'std_msgs/msg/String':
+                # A list: what it said is not kept, only when it changed.
+                return {'t': self.t[np.flatnonzero(np.diff(self.steps[topic], prepend=topics.SILENT))]}
             stamps, texts = announced(unit, topic, self.stamps, self.steps)
             return {'t': stamps / SECOND, 'data': texts}
         sent = self.steps[topic]['stamp'] != records.NEVER
+        sent = slice(None) if sent.all() else sent
         numbers = records.numbers(self.steps, topic)[sent]
         return {'t': self.steps[topic]['stamp'][sent] / SECOND,
                 **{column.name: numbers[:, i] for i, column in enumerate(layouts.columns(topic))}}
@@ -149,15 +157,32 @@ class Loop:
         self.period_ns = round(period * SECOND)
         self.steps = round(scenario.header.duration / period) + 1
 
-    def run(self, injected=None) -> Run:
-        """Every step of the scenario. injected (steps, 2): see `loop`. To be called once."""
+    def attend(self, first, forecasts):
+        """Before step `first`: add to forecasts where a second begins, obey what the units' schedules say."""
+        stamp = first * self.period_ns
+        if stamp // SECOND > (stamp - self.period_ns) // SECOND:
+            forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['lookahead'])))
+        for unit in self.units.values():
+            unit.obey_due(stamp)
+
+    def free_until(self, first):
+        """The step after `first` before which to `attend` again."""
+        due = min((first * self.period_ns // SECOND + 1) * SECOND, *(unit.next_due for unit in self.units.values()))
+        return min(-(-due // self.period_ns), self.steps)
+
+    def run(self, injected=None, watch=None) -> Run:
+        """Every step of the scenario. injected (steps, 2): see `loop`. watch(steps made) -> steps until it is called
+        again: sees the units in between. To be called once."""
         if injected is None:
             injected = np.zeros((self.steps, 2))
         steps, truth = records.empty(STEP, self.steps), np.zeros(self.steps, TRUTH)
-        before = records.empty(STEP, 1)
-        for first in range(0, self.steps, BLOCK):
-            part = slice(first, min(first + BLOCK, self.steps))
-            memories = tuple(self.units[name].block(part.stop - first) if name in self.units else None
-                             for name in ORDER)
+        before, forecasts = records.empty(STEP, 1), []
+        first = 0
+        while first < self.steps:
+            self.attend(first, forecasts)
+            last = min(first + (watch(first) if watch else BLOCK), first + BLOCK, self.free_until(first))
+            part = slice(first, last)
+            memories = tuple(self.units[name].block(last - first) if name in self.units else None for name in ORDER)
             loop(memories, first, self.period_ns, before, injected[part], steps[part], truth[part])
-        return Run(steps, truth, np.arange(self.steps) * self.period_ns, self.units)
+            first = last
+        return Run(steps, truth, np.arange(self.steps) * self.period_ns, self.units, forecasts)

@@ -100,4 +100,5 @@ class Operator(Shell):
 
 
 def another_graph(domain_id):
+    """The RunError where somebody else runs a graph on this ROS domain."""
     return RunError(f'another graph runs on ROS_DOMAIN_ID {domain_id}; set a free one')

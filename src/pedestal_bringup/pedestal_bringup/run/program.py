@@ -1,31 +1,64 @@
 """The program track an operator sends before a pass: the predicted target as time-tagged azimuth and elevation."""
+import dataclasses
+import datetime
+
 import numpy as np
 
-from pedestal_common import messages
+from pedestal_common import messages, orbit
 from tracking_receiver_sim import target
+from tracking_receiver_sim.path import arrival
 
 
 def program_table(scenario, prefix=''):
     """(times (n,) s, angles (n, 2) earth azimuth (unwrapped), elevation [rad]) of a scenario's prediction; prefix: of
-    the beam.
+    the beam. The operator knows neither UT1 nor how late the target is seen, and of the air what `refractivity` says.
 
     From stamp 0 until two intervals past the end, so that the end of the run lies inside; where the target is not
     known, it stands at its first or last known place. Times to the last bit as the ACU reads them from the message.
     """
     program, duration = scenario.header.program, scenario.header.duration
-    built = target.build(scenario.node_parameters(prefix + 'tracking_receiver').target, duration)
+    true = scenario.node_parameters(prefix + 'tracking_receiver').target
+    believed = dataclasses.replace(true, leo_pass=dataclasses.replace(true.leo_pass, ut1_offset=0.0))
+    built = target.build(believed, duration)
     nanoseconds = np.round(np.arange(0.0, duration + 2.0 * program.interval, program.interval) * 1e9)
     times = nanoseconds // 1e9 + nanoseconds % 1e9 * 1e-9
     known = np.clip(times - program.time_offset, built.breaks[0], built.breaks[-1])
     azimuth, elevation, _ = target.look_angles(built, known)
+    if program.refractivity > 0.0:
+        elevation = elevation + [arrival.refraction(program.refractivity, E)[0] for E in elevation]
     return times, np.column_stack((np.unwrap(azimuth) + program.azimuth_offset, elevation + program.elevation_offset))
 
 
-def flights(scenario):
-    """Lines on the recorded flights that are the targets of a scenario's beams, each once; [] where there is none."""
-    built = (target.build(scenario.node_parameters(prefix + 'tracking_receiver').target, scenario.header.duration)
-             for prefix in scenario.prefixes)
-    return list(dict.fromkeys(line for made in built for line in made.summary))
+def announced(scenario):
+    """Lines on the targets of a scenario's beams, each once: what a flight is, when a satellite is highest."""
+    lines = []
+    for prefix in scenario.prefixes:
+        built = target.build(scenario.node_parameters(prefix + 'tracking_receiver').target, scenario.header.duration)
+        lines += built.summary or _highest(built, scenario.header.duration)
+    return list(dict.fromkeys(lines))
+
+
+def begins(scenario):
+    """UTC [ns] of the time 0 of a scenario by its target. Raises ValueError where the target has no date."""
+    built = target.build(scenario.node_parameters(f'{scenario.prefixes[0]}tracking_receiver').target,
+                         scenario.header.duration)
+    if not built.start_time:
+        raise ValueError(f'--start file: the target of {scenario.name} has no date; say a UTC instead')
+    begin = orbit.instant('start', built.start_time).replace(tzinfo=datetime.timezone.utc)
+    return round(begin.timestamp() * 1e3) * 1_000_000
+
+
+def _highest(built, duration):
+    """The line on the UTC of a target that has a date, and of its highest place in a run of `duration` [s]."""
+    if not built.start_time:
+        return ()
+    times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))
+    elevation = np.degrees(target.look_angles(built, times)[1])
+    top = int(np.argmax(elevation))
+    begin = orbit.instant('start', built.start_time)
+    when = begin + datetime.timedelta(seconds=float(times[top]))
+    return (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the satellite is highest, {elevation[top]:.1f} deg, after '
+            f'{times[top]:.1f} s, at {when:%H:%M:%S} UTC',)
 
 
 def program_messages(scenario):

@@ -16,6 +16,7 @@ PATIENCE = 20.0
 
 
 def main():
+    """Read the numbers of the nodes, wait for the end of the input, end who is left."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     nodes = []

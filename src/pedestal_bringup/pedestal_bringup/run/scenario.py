@@ -6,6 +6,7 @@ that `pedestal run` leaves beside the bag, parameters.yaml.
 """
 import contextlib
 import dataclasses
+import functools
 import importlib.resources
 import json
 import pathlib
@@ -25,6 +26,8 @@ class ProgramParameters(parameters.Parameters):
     time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
     azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
     elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
+    refractivity: float = parameters.parameter(0.0, 0.0, 500.0, 'N', 'of the air as the operator measures it: its '
+                                               'refraction is added to the prediction; 0: none is')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,18 +81,23 @@ SHARED = (
     ('tracking_receiver', 'antenna.beamwidth', 'acu', 'tracker.receiver.beamwidth'),
     ('tracking_receiver', 'antenna.slope', 'acu', 'tracker.receiver.slope'),
     ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
+    ('tracking_receiver', 'receiver.cn0_time_constant', 'acu', 'acquisition.time_constant'),
     ('ins', 'latency', 'acu', 'attitude_latency'),
     ('ins', 'tilt_noise', 'acu', 'tracker.attitude.tilt_noise'),
     ('ins', 'heading_noise', 'acu', 'tracker.attitude.heading_noise'),
     ('ship_motion', 'imu.output', 'ins', 'imu_output'),
     *(('tracking_receiver', f'lever_arm.{axis}', 'acu', f'lever_arm.{axis}') for axis in 'xyz'),
     ('tracking_receiver', 'blockage', 'acu', 'blockage'),
+    ('tracking_receiver', 'target.leo_pass.start_time', 'acu', 'prediction.start_time'),
+    *(('tracking_receiver', f'target.station.{name}', 'acu', f'prediction.station.{name}')
+      for name in ('latitude_deg', 'longitude_deg', 'height')),
 )
 """(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
 
 
-MEASURED = tuple((topic.measured, topic.flag) for topic in topics.TOPICS if topic.measured)
-"""(parameter of the receiver, that of its readers): whether one of its topics is there at all."""
+MEASURED = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
+                 for topic in map(topics.BY_NAME.get, node.writes) if topic.measured)
+"""(node, its parameter, that of its readers): whether one of its topics is there at all."""
 
 
 class ScenarioError(ValueError):
@@ -130,7 +138,7 @@ class Scenario:
 
     def node_parameters(self, node):
         """The parameter dataclass of one node as this scenario sets it."""
-        return parameters.build(self.row(node).parameters_type(), self.given(node))
+        return _built(self.row(node).parameters_type(), self.given(node))
 
     def unit(self, node, parameters=None):
         """The unit of one of its nodes; parameters: in the place of the scenario's."""
@@ -158,7 +166,8 @@ def available():
     return titles
 
 
-def _text(name_or_path):
+def text(name_or_path):
+    """(name, YAML text) of a scenario that comes with the product, or of a .yaml file. Raises ScenarioError."""
     path = pathlib.Path(name_or_path)
     if path.suffix in ('.yaml', '.yml'):
         try:
@@ -224,15 +233,23 @@ def parse_override(text):
         raise ScenarioError(f'--param {text!r}: {plain_yaml.problem(error)}') from None
 
 
+def override(name, value):
+    """'node.key=value' of a value, a text without quotes where it reads back as itself."""
+    with contextlib.suppress(yaml.YAMLError):
+        if isinstance(value, str) and plain_yaml.parse(value) == value:
+            return f'{name}={value}'
+    return f'{name}={json.dumps(value, ensure_ascii=False)}'
+
+
 def file_overrides(path):
     """Texts 'node.key=value' of a ROS 2 parameter file."""
-    return [f'{node}.{key}={json.dumps(value, ensure_ascii=False)}'
+    return [override(f'{node}.{key}', value)
             for node, values in parameter_file.read(path).items() for key, value in values.items()]
 
 
 def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
     """A Scenario from a name or a YAML path; see parse."""
-    return parse(*_text(name_or_path), overrides, seed, duration, pacing)
+    return parse(*text(name_or_path), overrides, seed, duration, pacing)
 
 
 def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
@@ -267,7 +284,7 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     for node, values in sections.items():
         checked = _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
         with _named(name, node):
-            checked.check_graph(header.graph_beams)
+            checked.check_graph(header.graph_beams, header.pacing == 'lockstep')
         typed = parameters.as_dict(checked)
         sections[node] = {key: typed[key] for key in values}
     return Scenario(name, header, sections)
@@ -280,10 +297,10 @@ def _follow_flight(name, receiver_values, header_values):
                       receiver_values).target
     if target.kind != 'track_file' or not target.track_file.path:
         return
-    from tracking_receiver_sim.track import place  # with scipy, which only a flight needs
-    said = {*receiver_values, *({'duration'} & set(header_values))}
-    if not said.issuperset(place.OPEN):
-        for key, value in place.left_open(target, said).items():
+    from tracking_receiver_sim.track import files  # with scipy, which only a flight needs
+    given = {*receiver_values, *({'duration'} & set(header_values))}
+    if not given.issuperset(files.OPEN):
+        for key, value in files.left_open(target, given).items():
             (header_values if key == 'duration' else receiver_values).setdefault(key, value)
 
 
@@ -314,8 +331,8 @@ def _spread(name, sections, header, seed):
     for node in ('acu', 'tracking_receiver'):
         share(node, 'period', sections['adu'].get(
             'period', parameters.defaults(nodes.row(nodes.DRIVE, header.beam).parameters_type())['period']))
-    for key, flag in MEASURED:
-        measured = sections['tracking_receiver'].get(key, False)
+    for owner, key, flag in MEASURED:
+        measured = sections[owner].get(key, False)
         for node in ('acu', 'recorder'):
             if measured or any(flag in values for section, values in sections.items()
                                if nodes.plain(section) == node):
@@ -347,7 +364,7 @@ def _spread_to_beam(name, node, sections, header, seed):
         own = sections.get(f'{beam}/{owner}', {})
         if nodes.plain(node) == other and key in own:
             values.setdefault(known_as, own[key])
-    for key, _ in MEASURED:
+    for _, key, _ in MEASURED:
         if key in sections[own_receiver]:
             raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: is the same for every beam; say it in '
                                 'tracking_receiver')
@@ -355,7 +372,19 @@ def _spread_to_beam(name, node, sections, header, seed):
 
 def _checked(name, section, parameters_type, values):
     with _named(name, section):
-        return parameters.build(parameters_type, values)
+        return _built(parameters_type, values)
+
+
+def _built(parameters_type, values):
+    """parameters.build, once for the same values: trials of a scenario have most of theirs in common."""
+    key = tuple((name, type(value), value) for name, value in values.items())
+    hashable = all(isinstance(value, int | float | str | None) for value in values.values())
+    return _built_once(parameters_type, key) if hashable else parameters.build(parameters_type, values)
+
+
+@functools.lru_cache(256)
+def _built_once(parameters_type, key):
+    return parameters.build(parameters_type, {name: value for name, _, value in key})
 
 
 @contextlib.contextmanager

@@ -7,6 +7,7 @@ import time
 
 from rclpy.executors import SingleThreadedExecutor
 
+from pedestal_bringup.bags.verify import count
 from pedestal_bringup.run.processes import RunError, how
 from pedestal_bringup.run.restarts import Losses, Restarts, Silence
 from pedestal_common import nodes
@@ -122,8 +123,8 @@ class Supervisor:
         self._silence.note(node, now)
         if node == nodes.DRIVE:
             for value in status.values:
-                if value.key == 'lost_steps' and value.value.isdecimal():
-                    self.losses.note(int(value.value), now)
+                if value.key == 'lost_steps' and (lost := count(value.value)) is not None:
+                    self.losses.note(lost, now)
         if node in self._called:
             self._called.discard(node)
             report(f'{node} is heard again')

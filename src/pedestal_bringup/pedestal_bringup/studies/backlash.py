@@ -190,8 +190,7 @@ def standstill_figure(done):
     axes[0, 0].set_ylabel('azimuth [\N{MICRO SIGN}rad]')
     axes[1, 0].set_ylim(-20.0, 20.0)
     axes[1, 0].set_ylabel('torque [Nm]')
-    figure.legend(*axes[1, 0].get_legend_handles_labels(), loc='outside lower right', ncols=2)
-    return figure
+    return drawing.legend(figure)
 
 
 def reversal_figure(done):
@@ -227,8 +226,7 @@ def torques_figure(done):
         panel.set_ylabel('torque [Nm]')
     axes[2, 0].set_xlim(*reversal_window())
     axes[2, 0].set_xlabel('time [s]')
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside upper right', ncols=2)
-    return figure
+    return drawing.legend(figure)
 
 
 def schedules_figure(done):
@@ -262,5 +260,4 @@ def structures_figure(done):
     axes[0, 0].set_xlim(0.0, 1.0)
     axes[0, 0].set_ylabel('torque [Nm]')
     axes[1, 0].set_ylabel('fight torque [Nm]')
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside upper right', ncols=2)
-    return figure
+    return drawing.legend(figure)

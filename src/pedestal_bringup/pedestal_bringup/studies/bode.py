@@ -95,8 +95,9 @@ def response(sweep, sent, returned):
     """Response of a loop from the signals sent on from its break point and returned to it, two records (n,)."""
     E, Y = (np.fft.rfft(x.reshape(sweep.dropped + sweep.kept, -1)[sweep.dropped:], axis=1)[:, sweep.bins()]
             for x in (sent, returned))
-    L = Y.mean(axis=0) / E.mean(axis=0)
-    return Response(sweep.frequencies(), L, np.std(Y / E / L, axis=0) / math.sqrt(sweep.kept - 1))
+    with np.errstate(invalid='ignore'):  # nothing comes back of a drive that has tripped
+        L = Y.mean(axis=0) / E.mean(axis=0)
+        return Response(sweep.frequencies(), L, np.std(Y / E / L, axis=0) / math.sqrt(sweep.kept - 1))
 
 
 @compiled
@@ -274,23 +275,26 @@ def drawings(responses, drive):
     w_c = 2.0 * math.pi * p.current_loop.bandwidth
     J = p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
 
-    def chosen(curves, design=None):
+    def chosen(title, curves, design=None):
         measured = {label: (responses[name], colour) for label, (name, colour) in curves.items()}
-        return lambda: bode_figure(measured, design)
+        return lambda: bode_figure(title, measured, design)
 
     return {
-        'current': chosen({'motor 1': ('current/motor_1', MOTOR_1), 'motor 2': ('current/motor_2', MOTOR_2)},
+        'current': chosen('current loops of the azimuth motors',
+                          {'motor 1': ('current/motor_1', MOTOR_1), 'motor 2': ('current/motor_2', MOTOR_2)},
                           lambda s: w_c / s),
-        'speed': chosen({'azimuth': ('speed/azimuth', FILTERED), 'elevation': ('speed/elevation', TRUTH)},
+        'speed': chosen('speed loops',
+                        {'azimuth': ('speed/azimuth', FILTERED), 'elevation': ('speed/elevation', TRUTH)},
                         lambda s: (p.speed_loop.proportional + p.speed_loop.integral / s) / (J * s)),
-        'position': chosen({'feed-forward (and pid)': ('position/azimuth/feedforward', FILTERED),
+        'position': chosen('position loops', {'feed-forward (and pid)': ('position/azimuth/feedforward', FILTERED),
                             'the same, elevation': ('position/elevation/feedforward', TRUTH),
                             'adrc': ('position/azimuth/adrc', MOTOR_2)},
                            lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
-        'structure': chosen({'rigid': ('position/azimuth/rigid', RAW),
+        'structure': chosen('position loop, azimuth, with a flexible load', {'rigid': ('position/azimuth/rigid', RAW),
                              'flexible': ('position/azimuth/structure', TRUTH),
                              'flexible, notch': ('position/azimuth/structure-notch', FILTERED)}),
-        'paper': chosen({'paper': ('position/azimuth/paper-r1', RAW), 'best': ('position/azimuth/best', FILTERED)})}
+        'paper': chosen("position loop, azimuth, paper 000's and ours",
+                        {'paper': ('position/azimuth/paper-r1', RAW), 'best': ('position/azimuth/best', FILTERED)})}
 
 
 def decibel(x):
@@ -304,24 +308,36 @@ def degrees(x):
     return phase - 360.0 * math.ceil(phase[0] / 360.0)
 
 
-def bode_figure(curves, design):
-    """Bode diagrams of the open and the closed loop: {label: (Response, colour)}, design(s) the open loop or None."""
-    figure, axes = drawing.panels(2, 2, sharex=True)
-    reliable = {label: measured.deviation < 0.2 for label, (measured, _) in curves.items()}
-    for column, title in enumerate(('open loop', 'closed loop')):
+def bode_figure(title, curves, design):
+    """Bode diagrams of the open and the closed loop: {label: (Response, colour)}, design(s) the open loop or None.
+
+    Crosses mark the crossover in gain and phase; the margins stand beside the name. The first of two curves that
+    coincide is drawn wide, so that it shows behind the second.
+    """
+    figure, axes = drawing.panels(2, 2, size=(7.4, 5.4), sharex=True)
+    figure.suptitle(title)
+    for column, loop in enumerate(('open loop', 'closed loop')):
         gain, phase = axes[:, column]
         if design:
             f = next(iter(curves.values()))[0].frequency
             L = design(2j * math.pi * f)
             x = L / (1.0 + L) if column else L
-            gain.semilogx(f, decibel(x), color=RAW, lw=0.8, label='as designed')
-            phase.semilogx(f, degrees(x), color=RAW, lw=0.8)
-        for label, (measured, colour) in curves.items():
-            keep = reliable[label]
-            x = (measured.closed_loop if column else measured.open_loop)[keep]
-            gain.semilogx(measured.frequency[keep], decibel(x), '.-', color=colour, ms=3.0, lw=0.7, label=label)
-            phase.semilogx(measured.frequency[keep], degrees(x), '.-', color=colour, ms=3.0, lw=0.7)
-        gain.set_title(title)
+            gain.semilogx(f, decibel(x), color=INK, lw=0.8, ls='--', label='as designed')
+            phase.semilogx(f, degrees(x), color=INK, lw=0.8, ls='--')
+        for i, (label, (measured, colour)) in enumerate(curves.items()):
+            keep = measured.deviation < 0.2
+            f, x = measured.frequency[keep], (measured.closed_loop if column else measured.open_loop)[keep]
+            width = 3.2 if i == 0 and len(curves) > 1 else 1.1
+            gain.semilogx(f, decibel(x), color=colour, lw=width, alpha=0.6 if width > 2.0 else 1.0,
+                          label=f'{label}: {margin_text(measured)}')
+            phase.semilogx(f, degrees(x), color=colour, lw=width, alpha=0.6 if width > 2.0 else 1.0)
+            at = margins(measured)['crossover_hz'][0]
+            if not column and math.isfinite(at):
+                phase_there = float(np.interp(math.log(at), np.log(f), degrees(x)))
+                gain.plot(at, 0.0, 'x', color=INK, ms=6.0)
+                phase.plot(at, phase_there, 'x', color=INK, ms=6.0)
+                phase.plot([at, at], [-180.0, phase_there], color=colour, lw=0.8, ls=':')
+        gain.set_title(loop)
         gain.axhline(-3.0 if column else 0.0, color=INK, lw=0.6, ls=':')
         gain.set_ylim(bottom=-40.0)
         if not column:
@@ -331,5 +347,11 @@ def bode_figure(curves, design):
         phase.set_xlabel('frequency [Hz]')
     axes[0, 0].set_ylabel('gain [dB]')
     axes[1, 0].set_ylabel('phase [deg]')
-    axes[0, 0].legend()
-    return figure
+    return drawing.legend(figure)
+
+
+def margin_text(measured):
+    """Gain and phase margin of a Response in words, for a legend."""
+    gain, phase = (margins(measured)[name][0] for name in ('gain_margin_db', 'phase_margin_deg'))
+    parts = [f'{value:.0f} {unit}' for value, unit in ((gain, 'dB'), (phase, 'deg')) if math.isfinite(value)]
+    return f'margins {", ".join(parts)}' if parts else 'no margin in the band'

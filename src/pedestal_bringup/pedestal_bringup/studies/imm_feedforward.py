@@ -213,14 +213,13 @@ def miss_figure(axis, those, misses):
         case = f'{axis}/{name}'
         one = feedforward_loop.steps_of(*CASES[case], 0, 1)['miss'][0, counts]
         panel.plot(t, np.degrees(one), color=RAW, linewidth=0.7, label='one run')
-        panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=COLOURS[name], linewidth=1.4,
+        panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=FILTERED, linewidth=1.4,
                    label='mean of the runs')
         panel.set_title(f'{name}: {misses[case].mean("miss_rms_deg"):.3f} deg rms')
         panel.set_ylabel('miss [deg]')
-        panel.legend(loc='upper right', ncols=2)
     axes[0, 0].set_title(f'{axis}, {those} of the paper. {axes[0, 0].get_title(loc="left")}')
     axes[-1, 0].set_xlabel('time [s]')
-    return figure
+    return drawing.legend(figure)
 
 
 def feedforward_figure():
@@ -237,9 +236,8 @@ def feedforward_figure():
     reversal = t[np.argmax(np.abs(target[counts, 2]))]
     axes[0, 0].set_xlim(reversal - 1.5, reversal + 2.5)
     axes[0, 0].set_title('fed forward through a reversal of the azimuth')
-    axes[0, 0].legend()
     axes[1, 0].set_xlabel('time [s]')
-    return figure
+    return drawing.legend(figure)
 
 
 def probability_figure():
@@ -254,9 +252,8 @@ def probability_figure():
         axes[1, 0].plot(t, mu[:, MODELS.index(model)], color=colour, label=model)
     axes[1, 0].set_ylabel('probability')
     axes[1, 0].set_ylim(0.0, 1.0)
-    axes[1, 0].legend(loc='center right')
     axes[1, 0].set_xlabel('time [s]')
-    return figure
+    return drawing.legend(figure)
 
 
 def tuning_figure(misses):
@@ -275,8 +272,7 @@ def tuning_figure(misses):
         panel.set_ylim(0.012, 0.3)
         panel.set_xlabel('noise of the rate fed forward [deg/s]')
     axes[0, 0].set_ylabel('miss rms [deg]')
-    axes[0, 0].legend()
-    return figure
+    return drawing.legend(figure)
 
 
 def drive_figure():
@@ -289,9 +285,8 @@ def drive_figure():
         panel.set_xlim(DRIVE_START, DRIVE_START + 8.0)
         panel.set_ylabel('miss [deg]')
         panel.set_title(f'{axis}: control unit, motors and gears, target in reversals of {REVERSALS[axis]:g} s')
-    axes[0, 0].legend(loc='upper right', ncols=3)
     axes[1, 0].set_xlabel('time [s]')
-    return figure
+    return drawing.legend(figure)
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:

@@ -132,8 +132,7 @@ def _panels(sums_of, what, label, names):
     axes[1, 0].set_ylabel(f'error of the {label}')
     axes[1, 0].set_xlabel('time [s]')
     axes[1, 0].set_xlim(LEAD - 1.0, t[-1])
-    axes[0, 0].legend(loc='lower left', ncols=len(names) + 1)
-    return figure
+    return drawing.legend(figure)
 
 
 def rate_figure(sums_of):
@@ -156,5 +155,6 @@ def sharpness_figure(values):
             panel.loglog(x, y, 'o-', ms=3.5, color=colour, label=name)
         panel.set_ylabel(label)
         panel.set_xlabel('peak acceleration of the reversal [deg/s2]')
-    axes[0, 0].legend()
-    return figure
+        panel.set_xticks(x, [f'{value:.2g}' for value in x])
+        panel.set_xticks([], minor=True)
+    return drawing.legend(figure)

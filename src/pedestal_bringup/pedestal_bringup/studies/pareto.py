@@ -141,12 +141,11 @@ def miss_figure(points):
         values = TUNINGS[name][1]
         for value in (values[0], values[len(values) // 2], values[-1]):
             panel.annotate(f'{value:g}', points[name, value], xytext=(3, 3), textcoords='offset points', color=colour,
-                           fontsize=6)
+                           fontsize=8)
     panel.loglog(*points['reference', 0.0], 'o', ms=7.0, color=MOTOR_1, fillstyle='none', label='imm-predicted')
     panel.set_xlabel('noise of the rate fed forward, uniform part [deg/s]')
     panel.set_ylabel('miss rms [deg]')
     noise, miss = points['reference', 0.0]
     panel.axvline(noise, color=INK, linewidth=0.6, linestyle=':')
     panel.axhline(miss, color=INK, linewidth=0.6, linestyle=':')
-    panel.legend()
-    return figure
+    return drawing.legend(figure)

@@ -248,8 +248,7 @@ def bode_figure():
         axes[1, column].set_xlabel('frequency [Hz]')
     axes[0, 0].set_ylabel('gain [dB]')
     axes[1, 0].set_ylabel('dynamic error |1 - G|')
-    axes[0, 0].legend(loc='lower left')
-    return figure
+    return drawing.legend(figure)
 
 
 def sigma_a_figure():
@@ -261,10 +260,9 @@ def sigma_a_figure():
         for panel, metric in zip(axes[0], ('rate_bandwidth_hz', 'dynamic_error_0p2hz')):
             panel.loglog(sigma_a, [value[metric][0] for value in values], color=colour, label=name)
             panel.set_xlabel('sigma_a [deg/s2]')
-    axes[0, 0].set_title('bandwidth of the rate [Hz]')
-    axes[0, 1].set_title(f'dynamic error of the angle at {FREQUENCY:g} Hz')
-    axes[0, 0].legend()
-    return figure
+    axes[0, 0].set_ylabel('bandwidth of the rate [Hz]')
+    axes[0, 1].set_ylabel(f'dynamic error of the angle at {FREQUENCY:g} Hz')
+    return drawing.legend(figure)
 
 
 def flyby_figure():
@@ -288,15 +286,12 @@ def flyby_figure():
         panel.plot(t[near], np.degrees(values[near]), color=INK, linestyle='--', label='truth')
         panel.set_ylabel(label)
     axes[0, 0].set_title(f'{PROFILE}, one run')
-    axes[0, 0].legend()
     axes[-1, 0].set_xlabel('time [s]')
-    return figure
+    return drawing.legend(figure)
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
     """Identify the filters of CASES and run `runs` flybys; pool: monte_carlo.Pool, None for this process."""
-    pieces = monte_carlo.batches(runs, BATCH)
-    done = (pool or monte_carlo.Pool(1)).map(batch, [(name, *piece) for name in FLYBYS for piece in pieces], progress)
-    errors = {name: np.concatenate([next(done) for _ in pieces]) for name in FLYBYS}
+    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, FLYBYS, runs, BATCH, progress)
     measured = {name: measures(*case) for name, case in CASES.items()}
     return Result(rows(measured, errors), figures(), remarks(measured, errors))

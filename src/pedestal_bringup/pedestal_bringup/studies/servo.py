@@ -249,10 +249,8 @@ def step_figure(done):
     top.set_xlim(0.0, 0.6)
     top.set_ylabel('azimuth [rad]')
     top.set_title('step of 0.174 rad (figure 5 of the paper)')
-    top.legend(loc='lower right')
-    axes[1, 0].legend(loc='lower right', ncols=2)
     axes[-1, 0].set_xlabel('time [s]')
-    return figure
+    return drawing.legend(figure)
 
 
 def sine_figure(done):
@@ -263,7 +261,7 @@ def sine_figure(done):
     t = record.t / period
     axes[0, 0].plot(t, AMPLITUDE * np.sin(FREQUENCIES['0p4hz'] * record.t), color=INK, linestyle='--',
                     label='reference')
-    axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=COLOURS['paper-r1'], linewidth=1.4,
+    axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=TRUTH, linewidth=1.4,
                     label='paper-r1, 0.4 Hz')
     axes[0, 0].set_title('sine of 0.87 rad (figure 6 of the paper)')
     axes[0, 0].set_ylabel('azimuth [rad]')
@@ -279,9 +277,7 @@ def sine_figure(done):
     axes[2, 0].set_ylim(-100.0, 100.0)
     axes[2, 0].set_xlim(0.0, PERIODS)
     axes[2, 0].set_xlabel('time [periods of the sine]')
-    for panel in axes[:, 0]:
-        panel.legend(loc='lower left', bbox_to_anchor=(0.5, 1.0), ncols=2, borderaxespad=0.1)
-    return figure
+    return drawing.legend(figure)
 
 
 def gust_figure(done):
@@ -300,8 +296,7 @@ def gust_figure(done):
     axes.set_ylabel('azimuth off its place [\N{MICRO SIGN}rad]')
     axes.set_xlabel('time [s]')
     axes.set_title(f'gust: a step of {GUST:g} Nm at {GUST_START:g} s')
-    axes.legend(loc='upper right')
-    return figure
+    return drawing.legend(figure)
 
 
 def inertia_figure(done):
@@ -323,8 +318,7 @@ def inertia_figure(done):
     axes[1, 0].set_ylabel('torque [Nm]')
     axes[1, 0].set_title('mean torque of the two motors')
     axes[1, 0].set_xlabel('time [s]')
-    axes[1, 0].legend(loc='lower right')
-    return figure
+    return drawing.legend(figure)
 
 
 def run(progress) -> Result:

@@ -179,15 +179,11 @@ def axis_figure(axis, first):
         panel.set_ylabel(f'{name} [{unit}]')
         panel.set_title(f'{axis}: {name} (figure {first + i} of the paper)')
     axes[3, 0].set_ylim(*np.degrees(2.0 * np.abs(target[axis][:, 2]).max() * np.array((-1.0, 1.0))))
-    axes[0, 0].legend()
     axes[-1, 0].set_xlabel('time [s]')
-    return figure
+    return drawing.legend(figure)
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
     """Fly `runs` flights; pool: monte_carlo.Pool, None for this process."""
-    items = [(axis, *piece) for axis in AXES for piece in monte_carlo.batches(runs, BATCH)]
-    errors = {}
-    for (axis, *_), of_batch in zip(items, (pool or monte_carlo.Pool(1)).map(batch, items, progress)):
-        errors.setdefault(axis, []).append(of_batch)
-    return Result(rows({axis: np.concatenate(parts) for axis, parts in errors.items()}), figures(), remarks())
+    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, AXES, runs, BATCH, progress)
+    return Result(rows(errors), figures(), remarks())

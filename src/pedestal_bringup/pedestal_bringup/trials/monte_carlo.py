@@ -13,6 +13,7 @@ import threading
 import warnings
 
 import joblib
+import numpy as np
 from joblib.externals import loky
 
 from pedestal_common.compiled import COLUMNS, digest
@@ -71,6 +72,13 @@ class Pool:
         for done, result in enumerate(results, 1):
             progress(done / len(items), f'{done} of {len(items)} batches')
             yield result
+
+    def of_cases(self, function, cases, runs, size, progress=lambda share, text: None):
+        """{case: the values of its runs, arrays (runs, ...)}: function((case, first, count)) gives those of a batch
+        of at most `size` runs."""
+        pieces = batches(runs, size)
+        done = self.map(function, [(case, *piece) for case in cases for piece in pieces], progress)
+        return {case: np.concatenate([next(done) for _ in pieces]) for case in cases}
 
 
 @contextlib.contextmanager

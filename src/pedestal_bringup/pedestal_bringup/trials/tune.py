@@ -82,7 +82,7 @@ class Recorded:
         self.of_beams = self.recording.bag.beam != ''
         done = recompute.recompute(self.recording, 'acu', self.params)
         self.feed = done.feed
-        self.requests = {step: [service for service, _ in made] for step, made in done.requests.items()}
+        self.requests = {step: [command for command, _ in made] for step, made in done.requests.items()}
         present = self.feed.inputs[RANGE]['stamp'] != records.NEVER
         self.ranged = np.isfinite(self.feed.inputs[RANGE]['range'][present]).any()
         t = self.feed.stamps / SECOND

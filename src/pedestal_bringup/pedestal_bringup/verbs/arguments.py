@@ -1,4 +1,5 @@
 """Arguments that several verbs take."""
+import os
 import pathlib
 
 
@@ -14,6 +15,11 @@ def add_beam(parser):
                         'default: the first')
 
 
+def add_vector(parser):
+    """--vector FORMAT of a verb that draws."""
+    parser.add_argument('--vector', choices=('pdf', 'svg'), help='write each figure in this format too, for print')
+
+
 def add_new_bag(parser):
     """--bag DIR, where a run is recorded."""
     parser.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='of the new run; default: '
@@ -27,3 +33,36 @@ def new_bag(given, scenario):
     if bag.exists():
         raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
     return bag
+
+
+def add_remote(parser):
+    """Who asks a running graph, which beam, and how long to wait."""
+    parser.add_argument('--who', metavar='NAME', help='by which name to ask; default: login@host')
+    parser.add_argument('--beam', default='', metavar='NAME', help='of an array of several, for example beam_2')
+    parser.add_argument('--timeout', type=float, default=5.0, metavar='S', help='to wait for the graph and for its '
+                        'reply; default: 5')
+
+
+def remote(options, node='acu'):
+    """A remote_node.Spun of the node `terminal`, by the options of add_remote."""
+    from pedestal_common import nodes
+    from pedestal_operator.remote_node import Remote, Spun, user
+    if options.beam and options.beam + '/' not in nodes.prefixes(nodes.MAX_BEAMS):
+        raise ValueError(f'--beam {options.beam}: must be beam_1 to beam_{nodes.MAX_BEAMS}')
+    return Spun(lambda: Remote(f'terminal_{os.getpid()}', options.who or user(), node, options.beam))
+
+
+def add_workers(parser):
+    """--workers N or --scheduler ADDRESS of many runs."""
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument('--workers', type=int, metavar='N', help='processes for the runs; default: one per core')
+    workers.add_argument('--scheduler', metavar='ADDRESS', help="Dask cluster for the runs, for example "
+                         "tcp://host:8786; needs pip install 'pedestal_bringup[cluster]' here and the pedestal "
+                         "packages there")
+
+
+def add_params_file(parser):
+    """--params-file FILE."""
+    parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
+                        help='ROS 2 parameter file whose values replace those of the scenario, for example one of '
+                        '`pedestal tune`')

@@ -3,18 +3,24 @@ import datetime
 
 from pedestal_bringup.verbs import arguments
 
+FILE = 'file'
+"""--start at the UTC of the target."""
+
 
 def add_arguments(parser):
     """Scenario, duration, parameters."""
     parser.add_argument('scenario')
     parser.add_argument('--duration', type=float, metavar='S', help='of the run it is for')
-    parser.add_argument('--start', type=_utc, metavar='UTC', help='when its time is 0, as 2026-11-22T12:00:00 or now; '
-                        'default: when the graph began, which the ACU is asked for')
+    parser.add_argument('--start', type=_utc, metavar='UTC', help='when its time is 0, as 2026-11-22T12:00:00, now, '
+                        'or file: when its file or its TLE says; default: when the graph began, which the ACU is '
+                        'asked for')
     arguments.add_param(parser)
 
 
 def _utc(text):
-    """ISO 8601 in UTC, or `now` -> ns."""
+    """ISO 8601 in UTC, or `now` -> ns; `file` as it is."""
+    if text == FILE:
+        return text
     if text == 'now':
         moment = datetime.datetime.now(datetime.timezone.utc)
     else:
@@ -26,6 +32,6 @@ def _utc(text):
 
 def main(options):
     """Send the program track; exit code of graph.send_program."""
-    from pedestal_bringup.run import graph, scenario
+    from pedestal_bringup.run import graph, program, scenario
     chosen = scenario.load(options.scenario, options.param, duration=options.duration)
-    return graph.send_program(chosen, options.start)
+    return graph.send_program(chosen, program.begins(chosen) if options.start == FILE else options.start)

@@ -39,6 +39,7 @@ def add_arguments(parser):
     parser.add_argument('--allow-idle', action='store_true', help='compare also where the node was never exercised')
     parser.add_argument('--live', action='store_true', help='feed the real node process, in lockstep over DDS')
     console.add_json(parser)
+    console.add_explain(parser)
     parser.add_argument('--output', type=pathlib.Path, metavar='BAG',
                         help='write the recording again, with the recomputed outputs in place of the recorded')
 
@@ -48,5 +49,8 @@ def main(options):
     from pedestal_bringup.again import recompute_report
     lines, rows, well = recompute_report.main(options)
     print('\n'.join(lines))
+    if options.explain:
+        from pedestal_bringup.again import what_if
+        console.explain(what_if.NUMBERS, {line.split()[0] for line in lines if line})
     console.write_json(options.json, {'name': 'recompute', 'rows': rows})
     return 0 if well else 1

@@ -17,10 +17,18 @@ def add_arguments(parser):
     parser.add_argument('--seed', type=int, metavar='N', help='seed of every noise stream')
     arguments.add_new_bag(parser)
     console.add_json(parser)
+    console.add_explain(parser)
     arguments.add_param(parser)
-    parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
-                        help='ROS 2 parameter file whose values replace those of the scenario, for example one of '
-                        '`pedestal tune`')
+    parser.add_argument('--tle', type=pathlib.Path, metavar='FILE', help='track this satellite: TLE, or OMM as KVN, '
+                        'XML, JSON, CSV')
+    parser.add_argument('--satellite', default='', metavar='NAME', help='name or number, where the file has '
+                        'several')
+    parser.add_argument('--station', metavar='LAT,LON,H', help='where the antenna stands: degrees, degrees, metres')
+    parser.add_argument('--pass', dest='which', metavar='WHICH', help='from rise to set: next, the number N or a UTC '
+                        '(2019-12-10T12:35) of a pass; list: print the passes. Default with --tle: next')
+    arguments.add_params_file(parser)
+    from pedestal_bringup.run import beside
+    beside.add_arguments(parser)
 
 
 LARGEST_LOSS = 0.01
@@ -32,15 +40,22 @@ def main(options):
     from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read
     from pedestal_bringup.bags.verify import verify
-    from pedestal_bringup.run import graph, program, scenario
+    from pedestal_bringup.run import beside, graph, program, scenario
     from pedestal_common import nodes
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
-    chosen = scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
+    if options.tle or options.station or options.which:
+        changes, duration = _own_sky(options, changes)
+        if changes is None:
+            return 0
+    else:
+        duration = options.duration
+    chosen = scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
     bag = arguments.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
-    for line in program.flights(chosen):
+    for line in program.announced(chosen):
         print(line)
-    with console.progress_of_run(chosen.header.duration) as progress:
+    with (beside.servers(options, chosen.header, bag),
+          console.progress_of_run(chosen.header.duration) as progress):
         outcome = graph.run(chosen, bag, progress)
     if outcome.stopped:
         print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
@@ -48,12 +63,16 @@ def main(options):
             return console.EXIT_STOPPED
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
-    of_beams = [results.measured(results.of_bag(recording.view(beam))) for beam in beams]
+    parts = [results.of_bag(recording.view(beam)) for beam in beams]
+    of_beams = [results.measured(of) for of in parts]
     realtime = chosen.header.pacing == 'realtime'
     whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
     console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
-                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else '')})
+                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')},
+                         [results.marks(of) for of in parts])
+    if options.explain:
+        console.explain(results.RESULTS, {*of_beams[0], *whole})
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
@@ -75,3 +94,25 @@ def main(options):
     for reason in disturbed:
         print(f'pedestal: {reason}', file=sys.stderr)
     return console.EXIT_DISTURBED if disturbed else 0
+
+
+def _own_sky(options, changes):
+    """(changes, duration) with the satellite, the station and the pass that the options name; (None, None) where the
+    passes were listed instead."""
+    import datetime
+
+    from pedestal_bringup.run import satellite, scenario
+    if options.station:
+        changes = satellite.station_changes(options.station) + changes
+    if options.tle:
+        changes = satellite.tle_changes(options.tle, options.satellite) + changes
+    if not (options.tle or options.which):
+        return changes, options.duration
+    now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
+    sky = satellite.Sky(scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing), now)
+    if options.which == 'list':
+        sky.list()
+        return None, None
+    start, duration, line = sky.choose(options.which or 'next')
+    print(line)
+    return start + changes, options.duration or duration

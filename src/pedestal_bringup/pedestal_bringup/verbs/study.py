@@ -1,10 +1,12 @@
 """measure the compiled closed loop against the papers: rows and figures"""
 import contextlib
+import functools
 import inspect
 import pathlib
 import sys
 
 from pedestal_bringup import console
+from pedestal_bringup.verbs import arguments
 from pedestal_common.parameters import did_you_mean
 
 
@@ -14,11 +16,10 @@ def add_arguments(parser):
     console.add_json(parser)
     parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
     parser.add_argument('--runs', type=int, metavar='N', help='of each case; default: what the study says')
-    workers = parser.add_mutually_exclusive_group()
-    workers.add_argument('--workers', type=int, metavar='N', help='processes for the runs; default: one per core')
-    workers.add_argument('--scheduler', metavar='ADDRESS', help="Dask cluster for the runs, for example "
-                         "tcp://host:8786; needs pip install 'pedestal_bringup[cluster]' here and the pedestal "
-                         "packages there")
+    arguments.add_vector(parser)
+    parser.add_argument('--scenario', metavar='SCENARIO', help='servo, backlash, bode: of your own plant, a name or a '
+                        "path of a .yaml, in the place of the paper's")
+    arguments.add_workers(parser)
 
 
 def main(options):
@@ -33,17 +34,19 @@ def main(options):
               f'there are {", ".join(studies.NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
     from pedestal_bringup.studies.rigs import drawing, rows
+    kinds = ['png', options.vector] if options.vector else ['png']
     output = options.output or pathlib.Path('studies', options.name)
     console.check_json(options.json)
     study = studies.study(options.name)
     with contextlib.ExitStack() as stack:
-        many = _many_runs(options, study, stack)
+        run = _of_scenario(options) if options.scenario else study.run
+        many = {} if options.scenario else _many_runs(options, study, stack)
         output.mkdir(parents=True, exist_ok=True)
         progress = stack.enter_context(console.progress_of_share())
-        result = study.run(progress, **many)
+        result = run(progress, **many)
         for name, draw in result.figures.items():
             progress(None, f'drawing {name}')
-            drawing.save(draw, output / f'{name}.png')
+            drawing.save(draw, *(output / f'{name}.{kind}' for kind in kinds))
     console.show_study(f'study {options.name}', result.rows if result.shown is None else result.shown,
                        rows.missed)
     for remark in result.remarks:
@@ -51,6 +54,18 @@ def main(options):
     print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')
     console.write_json(options.json, {'name': options.name, 'rows': result.rows})
     return 0
+
+
+def _of_scenario(options):
+    """function(progress) of the study for the plant of --scenario."""
+    from pedestal_bringup.studies.rigs import own_plant
+    if options.name not in own_plant.STUDIES:
+        raise ValueError(f"--scenario: study {options.name} is of the papers' plant; any plant have "
+                         f'{", ".join(own_plant.STUDIES)}')
+    for name in ('runs', 'workers', 'scheduler'):
+        if getattr(options, name) is not None:
+            raise ValueError(f'--{name}: does not go with --scenario, which is one run of each case')
+    return functools.partial(own_plant.STUDIES[options.name], options.scenario)
 
 
 def _many_runs(options, study, stack):

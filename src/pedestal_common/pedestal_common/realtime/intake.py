@@ -37,13 +37,15 @@ class Intake:
     them. None in its place: the topic is everybody's, who is not told apart.
     paced: whether its messages come at a pace, which tells writers apart. Where they do not, nothing is taken while
     the graph shows a stranger: what was said before it came still holds.
+    oldest: the longest time from sent to heard [ns] of what is taken; None: any.
 
     dropped: {reason: count}; reason: of the last message that was dropped, detail: in numbers; dropped_at: when [ns];
     anew: whether the message just taken does not continue the one taken before it.
     """
 
-    def __init__(self, decode, future, strangers=lambda: 0, paced=True):
+    def __init__(self, decode, future, strangers=lambda: 0, paced=True, oldest=None):
         self._decode, self._future, self._strangers, self._paced = decode, future, strangers, paced
+        self._oldest = oldest
         self.writers = Streams()
         self.in_charge = None
         self.dropped = collections.Counter()
@@ -63,6 +65,8 @@ class Intake:
                 return self._drop(ANOTHER_WRITER, '', now)
         elif self._strangers and not self._of_charge(self.writers.of(number, source, now), now):
             return None
+        if self._oldest is not None and utc - source > self._oldest:
+            return self._drop(STALE, f'{(utc - source) * 1e-9:.3f} s on its way', now)
         try:
             stamp, message = self._decode(data)
         except ValueError as error:

@@ -2,7 +2,11 @@
 import collections
 import inspect
 
-from pedestal_common import nodes
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import DurabilityPolicy
+
+from pedestal_common import middleware, nodes, topics
+from pedestal_common.commands import LATEST
 from pedestal_common.realtime import intake
 from pedestal_common.unit import ERROR, WARN
 
@@ -22,6 +26,9 @@ LOOK = 0.02
 HELD = 1000
 """Texts that wait at the most."""
 
+REMEMBERED = 100
+"""Messages of a topic with two subscriptions that are known again when the other one brings them."""
+
 
 def pair(function):
     """function(data, info) as a callback of a subscription: EventsExecutor (rclpy 7.1.6) hands a callback of two
@@ -32,6 +39,32 @@ def pair(function):
     return call
 
 
+def subscribe(node, link, ros_name, take, role):
+    """Call take(data, info) once for each message on the topic of a nodes.Link, which ROS calls ros_name: the list of
+    the subscriptions of the node for it. role: in realtime, `read` or `recorded`.
+
+    A latched reader does not match a writer that does not latch, so where topics.Qos says `unlatched` there is a
+    second subscription. A latched writer matches both; what it says comes twice and is taken once.
+    """
+    def open_with(profile, callback, **events):
+        return node.create_subscription(middleware.message_class(link.type), ros_name, pair(callback), profile,
+                                        raw=True, **events)
+    latched = middleware.qos(link.rate, role)
+    if not topics.QOS[link.rate].unlatched:
+        return [open_with(latched, take)]
+    heard = collections.deque(maxlen=REMEMBERED)
+
+    def take_once(data, info):
+        message = info['source_timestamp'], info['publication_sequence_number']
+        if message not in heard:
+            heard.append(message)
+            take(data, info)
+    volatile = middleware.qos(link.rate, role)
+    volatile.durability = DurabilityPolicy.VOLATILE
+    unmatched = SubscriptionEventCallbacks(use_default_callbacks=False)  # rclpy's would warn of every volatile writer
+    return [open_with(latched, take_once, event_callbacks=unmatched), open_with(volatile, take_once)]
+
+
 class Listener:
     """Hears one topic and hands on what its Intake takes: take(message, whether it begins anew).
 
@@ -40,20 +73,20 @@ class Listener:
 
     def __init__(self, node, link, ros_name, decode, take):
         self.link, self._node, self._ros_name, self._take = link, node, ros_name, take
-        everybodys = len(link.writers) > 1 or link.rate == 'once'
+        everybodys = len(link.writers) > 1 or link.rate in ('once', 'command')
         self._expected = any(writer in node.graph.members for writer in link.writers)
         text = link.rate == 'change' and self._expected
         self.intake = intake.Intake(decode, round(node.graph.future * 1e9), None if everybodys else self._count,
-                                    paced=not text)
+                                    paced=not text, oldest=LATEST if link.rate == 'command' else None)
         self._held, self._missed = collections.deque(maxlen=HELD), 0
-        self.callback = pair(self._hold if text else self._hear)
+        self.callback = self._hold if text else self._hear
         if text:
             node.every(LOOK, self._look)
 
     def open(self, subscribe):
-        """Begin to hear. subscribe() makes a subscription with `callback`."""
+        """Begin to hear. subscribe() makes the subscriptions with `callback`."""
         self._subscribe = subscribe
-        self._subscription = subscribe()
+        self._subscriptions = subscribe()
 
     def _hold(self, data, info):
         self._held.append((self._node.clock()[0], data, info))
@@ -67,8 +100,9 @@ class Listener:
         missed = self.intake.dropped[intake.ANOTHER_WRITER]
         if missed > self._missed and not self.strangers():
             self._missed = missed
-            self._node.destroy_subscription(self._subscription)
-            self._subscription = self._subscribe()
+            for subscription in self._subscriptions:
+                self._node.destroy_subscription(subscription)
+            self._subscriptions = self._subscribe()
 
     def _undiscovered(self):
         return any(UNKNOWN in name for name in self._node.writers_of(self._ros_name))

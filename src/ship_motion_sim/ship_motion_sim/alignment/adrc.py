@@ -4,6 +4,7 @@ Once level, the commands only cancel the tilt by the earth's rotation, so (14), 
 sin az = w_cE / w_N, cos az = 1 + w_cN / w_N. The commands are noisy; the least-squares slope of their integral since
 `start` removes the noise (a plain mean does not: reference/nav.md section 1.3).
 """
+import cmath
 import math
 
 import numpy as np
@@ -12,13 +13,12 @@ from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import extended_observer, levelling, slope, steady_state
 from ship_motion_sim.alignment.conditions import SIGMA_UNKNOWN
 
-CALM = 1.2      # surprise of a sea as expected, its own noise included [-]
-
 CONSTANTS = np.dtype([
     ('w_o', 'f8'), ('w_c', 'f8'),           # bandwidth of observer and of level control [rad/s]
     ('start', 'f8'),                        # the commands count from here on [s]
     ('velocity_variance', 'f8'),            # of the settled loop [m2/s2]
     ('innovation_variance', 'f8'),          # of its observer [m2/s2]
+    ('swell', 'f8'),                        # variance of the velocity over that of the innovations, on swell [-]
     ('level', 'f8'),                        # 1 sigma once settled [rad]
 ], align=True)
 
@@ -53,20 +53,23 @@ def constants(k, p, h) -> np.ndarray:
     P = steady_state.covariance(A, Q)
     record['velocity_variance'] = P[0, 0]
     record['innovation_variance'] = innovation @ P @ innovation + r
+    z = cmath.exp(1j * extended_observer.SWELL * h)
+    state = np.linalg.solve(z * np.eye(5) - A, noise)
+    record['swell'] = abs(state[0] / (innovation @ state + 1.0))**2
     record['level'] = math.sqrt(P[1, 1] + float(k['accelerometer_bias'])**2) / g
     return record
 
 
 @compiled
-def azimuth_sigma(c, k, window, surprise):
-    """1 sigma [rad] of the azimuth from the slope over a window [s]; surprise as in extended_observer.
+def azimuth_sigma(c, k, o, window):
+    """1 sigma [rad] of the azimuth from the slope over a window [s]; o: STATE of the extended_observer.
 
     The gyros' random walk has 1.2 / window under the parabola's weights. The commands' own noise is the second
     derivative of the velocity's integral, so that only the ends of the window count: 2 x 6^2 / window^4 of the
-    velocity's variance. What the observer did not expect (swell) is added to that variance.
+    velocity's variance. What the observer did not expect is taken for swell, which the loop makes larger.
     """
     g, w_north = k.gravity, k.earth_rate[1]
-    variance = c.velocity_variance + max(surprise - CALM, 0.0) * c.innovation_variance
+    variance = c.velocity_variance + c.swell * extended_observer.swell_variance(o, c.innovation_variance)
     noise = 72.0 * variance / (g * window * window)**2
     return min(math.sqrt(noise + 1.2 * k.gyro_noise**2 / window + k.gyro_bias**2) / w_north, SIGMA_UNKNOWN)
 
@@ -101,4 +104,4 @@ def step(s, c, k, v_east, v_north, h):
     w_east = slope.slope(s.first[0], s.second[0], count)
     w_north = slope.slope(s.first[1], s.second[1], count)
     s.azimuth = math.atan2(w_east, k.earth_rate[1] + w_north)
-    s.azimuth_sigma = azimuth_sigma(c, k, count * h, o.surprise)
+    s.azimuth_sigma = azimuth_sigma(c, k, o, count * h)

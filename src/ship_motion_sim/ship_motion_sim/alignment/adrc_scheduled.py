@@ -38,5 +38,5 @@ def step(s, k, v_east, v_north, h):
     extended_observer.correct_covariance(o, l1, l2, l3, r)
     levelling.level(o, k, s.v1, s.v2, max(W_C_MIN, w_o), s.command)
     s.azimuth = extended_observer.azimuth(o, k)
-    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k)
+    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, 0.0)
     s.level_sigma = math.hypot(level_sigma, extended_observer.tilt(o, k))

@@ -17,6 +17,8 @@ STATE = np.dtype([
 ], align=True)
 
 SURPRISE_TIME = 30.0    # time constant of that mean [s]
+CALM = 1.2              # surprise of a sea as expected, its own noise included [-]
+SWELL = 2.0 * math.pi / 16.0    # slowest swell that a stated 1 sigma is honest on [rad/s]
 
 
 @compiled
@@ -44,6 +46,12 @@ def surprised(surprise, e_east, e_north, s, h):
     """The running mean, h [s] later, of innovation^2 [m2/s2] over its expected variance s: 1 where the disturbance is
     as expected."""
     return surprise + h / SURPRISE_TIME * (0.5 * (e_east * e_east + e_north * e_north) / s - surprise)
+
+
+@compiled
+def swell_variance(o, s):
+    """Variance of the innovations [m2/s2] beyond that of a sea as expected, s: taken for a swell."""
+    return max(o.surprise - CALM, 0.0) * s
 
 
 VELOCITY_SIGMA, LEVEL_SIGMA, AZIMUTH_SIGMA = 0.1, math.radians(5.0), 2.0
@@ -126,10 +134,10 @@ def tilt(o, k):
 
 
 @compiled
-def sigmas(o, k):
-    """(azimuth, level) 1 sigma [rad]: from the covariance, widened where innovations are larger than expected, and
-    from the biases of the sensors."""
+def sigmas(o, k, swell):
+    """(azimuth, level) 1 sigma [rad]: from the covariance, widened where innovations are larger than expected, from
+    what swell adds to the variance of z3 [m2/s6], and from the biases of the sensors."""
     wider = max(o.surprise, 1.0)
-    azimuth_variance = (wider * o.p[5] / k.gravity**2 + k.gyro_bias**2) / k.earth_rate[1]**2
+    azimuth_variance = ((wider * o.p[5] + swell) / k.gravity**2 + k.gyro_bias**2) / k.earth_rate[1]**2
     level_variance = (wider * o.p[3] + k.accelerometer_bias**2) / k.gravity**2
     return min(math.sqrt(azimuth_variance), math.pi), math.sqrt(level_variance)

@@ -51,7 +51,7 @@ def step(s, k, a, v, h):
         # The innovations show how the sea differs from the expected; with a GNSS b has the ship's motion already.
         extended_observer.predict(o, h)
         extended_observer.correct(o, a[0], a[1], l1, l2, l3, variance, h)
-    s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k)
+    s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k, 0.0)
     north, up = k.earth_rate[1], k.earth_rate[2]
     cx, cy, cz = strapdown.cross(0.0, north, up, v[0], v[1], v[2])
     s.coriolis[0] += h * cx

@@ -43,5 +43,8 @@ def step(s, k, v_east, v_north, h, w_c):
     extended_observer.correct(o, v_east, v_north, l1, l2, l3, variance, h)
     levelling.level(o, k, s.v1, s.v2, w_c, s.command)
     s.azimuth = extended_observer.azimuth(o, k)
-    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k)
+    # z3 is the integral of l3 / h times the innovations, and so swings with a swell in them.
+    swing = l3 / (h * extended_observer.SWELL)
+    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, swing * swing
+                                                            * extended_observer.swell_variance(o, variance))
     s.level_sigma = math.hypot(level_sigma, extended_observer.tilt(o, k))

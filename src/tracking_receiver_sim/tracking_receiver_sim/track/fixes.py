@@ -1,7 +1,4 @@
-"""The fixes of a log: read as they come, of one aircraft, in order of time.
-
-What a file is, its content says: it begins with < as GPX, with $ or ! as NMEA, and is CSV otherwise.
-"""
+"""The fixes of a log: read as they come, of one aircraft, in order of time."""
 import array
 import collections
 import pathlib
@@ -9,11 +6,8 @@ import typing
 
 import numpy as np
 
-from pedestal_common import csv_table, files
-from tracking_receiver_sim.track import gpx, instant, nmea, tables
-
-BEGINNING = 4096
-"""Bytes that say what a file is."""
+from pedestal_common import csv_table
+from tracking_receiver_sim.track import instant
 
 LISTED = 12
 """Aircraft that are named where a file holds several."""
@@ -41,7 +35,7 @@ class Fixes(typing.NamedTuple):
     """The fixes of one aircraft, n of them.
 
     line: (n,) in the file; time: (n,) [s], growing, UTC since 1970 where `dated`; latitude, longitude: (n,) WGS84
-    [deg]; altitude: (n,) above the ellipsoid [m]; said: what the file is and what was passed over.
+    [deg]; altitude: (n,) above the ellipsoid [m]; description: what the file is and what was passed over.
     """
     path: str
     line: np.ndarray
@@ -50,15 +44,13 @@ class Fixes(typing.NamedTuple):
     longitude: np.ndarray
     altitude: np.ndarray
     dated: bool
-    said: str
+    description: str
 
 
-def read(track) -> Fixes:
-    """The fixes of the file of a TrackFileParameters. Raises csv_table.TableError."""
-    if not track.path:
-        raise csv_table.TableError('track_file.path is empty: must name a file: CSV, ADS-B, GPX or NMEA')
+def read(track, rows) -> Fixes:
+    """The fixes of the file of a TrackFileParameters; rows: the reader of its form. Raises csv_table.TableError."""
     log, numbers, names = Log(), array.array('d'), {}
-    for line, who, *fix in _reader(track.path)(track.path, log):
+    for line, who, *fix in rows(track.path, log):
         if len(numbers) >= 6 * csv_table.MOST_ROWS:
             raise csv_table.too_long(track.path, line)
         if len(names) > MOST_AIRCRAFT:
@@ -66,34 +58,26 @@ def read(track) -> Fixes:
         number, known_as = names.setdefault(who[:1], (len(names), set()))
         known_as.update(who)
         numbers.extend((line, number, *fix))
-    rows = np.array(numbers).reshape(-1, 6)
+    table = np.array(numbers).reshape(-1, 6)
     aircraft, number = _chosen(track, names)
-    line, _, time, latitude, longitude, altitude = rows[rows[:, 1] == number].T
+    line, time, *position = table[table[:, 1] == number][:, (0, 2, 3, 4, 5)].T
     if len(line) < LEAST:
         raise csv_table.TableError(f'{track.path}: {len(line)} rows, must be at least {LEAST}{_passed_over(log)}')
-    fixes = Fixes(track.path, line.astype(int), time + log.offset, latitude, longitude, altitude, log.dated,
+    fixes = Fixes(track.path, line.astype(int), time + log.offset, *position, log.dated,
                   f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
     _check_order(fixes, track, log)
     return fixes
 
 
-def _reader(path):
-    try:
-        with files.open_regular(path, csv_table.LARGEST) as stream:
-            beginning = stream.read(BEGINNING).removeprefix(b'\xef\xbb\xbf').lstrip()[:1]
-    except OSError as error:
-        raise csv_table.TableError(f'{path}: {error.strerror}') from None
-    return {b'<': gpx.rows, b'$': nmea.rows, b'!': nmea.rows}.get(beginning, tables.rows)
-
-
 def _chosen(track, names):
     """(' of' its names, its number) of the aircraft that is asked for or alone; names: {identity: (number, names)}."""
     asked = track.aircraft.strip().lower()
-    found = [row for row in names.values() if not asked or asked in {name.lower() for name in row[1]}]
-    if len(found) == 1:
-        label = _label(found[0][1])
-        return f' of {label}' if label else '', found[0][0]
+    matches = [row for row in names.values() if not asked or asked in {name.lower() for name in row[1]}]
+    if len(matches) == 1:
+        number, known_as = matches[0]
+        label = _label(known_as)
+        return f' of {label}' if label else '', number
     if not names:
         return '', 0
     labels = [_label(known_as) or 'one without a name' for _, known_as in names.values()]

@@ -17,9 +17,7 @@ import typing
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
-from pedestal_common import csv_table
-from tracking_receiver_sim import geodesy
-from tracking_receiver_sim.track import fixes as logs
+from pedestal_common import csv_table, geodesy
 from tracking_receiver_sim.track import instant
 
 SAMPLES = 4
@@ -56,7 +54,7 @@ def lay_out(fixes, track, station) -> Flight:
     spline = smoothed(time, enu, track) if track.smooth else CubicSpline(time, enu)
     speed, acceleration = _check_limits(kept, spline, track)
     distance = np.linalg.norm(spline(_samples(spline.x)), axis=1)
-    log = (f'{fixes.said}: {len(kept.line)} of {len(fixes.line)} fixes, {dropped} held positions dropped'
+    log = (f'{fixes.description}: {len(kept.line)} of {len(fixes.line)} fixes, {dropped} held positions dropped'
            f'{_quantisation(fixes, speed)}{_residual(spline(time) - enu) if track.smooth else ""}')
     path = (f'{time[-1]:.10g} s, at most {speed:.4g} m/s and {acceleration:.3g} m/s2, {distance.min() / 1e3:.4g} to '
             f'{distance.max() / 1e3:.4g} km from the station at latitude {station.latitude_deg:.5f}, longitude '
@@ -121,7 +119,3 @@ def _residual(apart):
     size = np.linalg.norm(apart, axis=1)
     return f', smoothed: off the fixes by {np.sqrt(np.mean(size**2)):.3g} m rms, {size.max():.3g} m at most'
 
-
-def read(target) -> Flight:
-    """The Flight of a TargetParameters; raises csv_table.TableError."""
-    return lay_out(logs.read(target.track_file), target.track_file, target.station)

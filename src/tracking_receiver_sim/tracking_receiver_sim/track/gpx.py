@@ -6,7 +6,7 @@ ele + geoidheight where the point says so, otherwise ele is taken for it, and th
 """
 from xml.parsers import expat
 
-from pedestal_common import csv_table, files
+from pedestal_common import csv_table
 from tracking_receiver_sim.track import instant
 
 PIECE = 1 << 20
@@ -25,13 +25,11 @@ def rows(path, log):
     log.form, log.time_name, log.dated = 'GPX', 'time', True
     points = _Points(path, log)
     try:
-        with files.open_regular(path, csv_table.LARGEST) as stream:
+        with csv_table.stream(path) as stream:
             while piece := stream.read(PIECE):
                 points.parser.Parse(piece)
                 yield from points.taken()
             points.parser.Parse(b'', True)
-    except OSError as error:
-        raise csv_table.TableError(f'{path}: {error.strerror}') from None
     except expat.ExpatError as error:
         raise csv_table.TableError(f'{path}: line {error.lineno}: not well-formed XML: '
                                    f'{expat.ErrorString(error.code)}') from None

@@ -7,19 +7,19 @@ from pedestal_common import csv_table
 UNIX = (0.0, 4102444800.0)
 """Seconds since 1970 that an instant may have: until 2100."""
 
-ISO = re.compile(r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?(?: ?(?:(Z|UTC)|([+-]\d\d):?(\d\d)))?',
+ISO = re.compile(r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-]\d\d):?(\d\d)))?',
                  re.ASCII)
 
 
 def seconds(path, line, name, text):
     """UTC seconds since 1970 of a text: ISO 8601 (without a zone: UTC) or the number itself. Raises TableError."""
     text = (text or '').strip()
-    found = ISO.fullmatch(text)
+    match = ISO.fullmatch(text)
     try:
-        if not found:
+        if not match:
             value = float(text)
         else:
-            date, time, fraction, _, hours, minutes = found.groups()
+            date, time, fraction, hours, minutes = match.groups()
             zone = f'{hours}:{minutes}' if hours else '+00:00'
             value = datetime.datetime.fromisoformat(f'{date}T{time}{zone}').timestamp() + float(f'0.{fraction or 0}')
     except ValueError:

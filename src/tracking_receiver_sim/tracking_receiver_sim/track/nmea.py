@@ -8,7 +8,7 @@ import re
 
 import pynmea2
 
-from pedestal_common import csv_table, files
+from pedestal_common import csv_table
 
 DAY = 86400.0
 SENTENCE = re.compile(r'\$..(?:GGA|RMC),.*', re.ASCII)
@@ -23,11 +23,11 @@ def rows(path, log):
     log.form, log.time_name, log.dated = 'NMEA', 'time', False
     days, last, without_separation = 0, None, False
     for line, text in _lines(path):
-        found = SENTENCE.search(text)
-        if not found:
+        match = SENTENCE.search(text)
+        if not match:
             continue
         try:
-            sentence = pynmea2.parse(found[0])
+            sentence = pynmea2.parse(match[0])
         except pynmea2.ParseError:
             log.passed_over['damaged sentence'] += 1
             continue
@@ -54,16 +54,13 @@ def rows(path, log):
 
 
 def _lines(path):
-    try:
-        with files.open_regular(path, csv_table.LARGEST) as stream:
-            number = 0
-            while line := stream.readline(LONGEST):
-                number += 1
-                if len(line) == LONGEST and not line.endswith(b'\n'):
-                    raise csv_table.TableError(f'{path}: line {number}: longer than {LONGEST} characters')
-                yield number, line.decode('ascii', 'replace').strip()
-    except OSError as error:
-        raise csv_table.TableError(f'{path}: {error.strerror}') from None
+    with csv_table.stream(path) as stream:
+        number = 0
+        while line := stream.readline(LONGEST):
+            number += 1
+            if len(line) == LONGEST and not line.endswith(b'\n'):
+                raise csv_table.TableError(f'{path}: line {number}: longer than {LONGEST} characters')
+            yield number, line.decode('ascii', 'replace').strip()
 
 
 def _time_of_day(path, line, sentence):

@@ -11,9 +11,8 @@ import math
 
 import numpy as np
 
-from tracking_receiver_sim import geodesy
-from tracking_receiver_sim.params import StationParameters
-from tracking_receiver_sim.track import fixes as logs
+from pedestal_common import geodesy
+from pedestal_common.geodesy import StationParameters
 from tracking_receiver_sim.track import flight
 
 AZIMUTH_RATE = 0.05
@@ -28,8 +27,6 @@ SHORTEST, LONGEST = 0.1, 86400.0
 """Run [s]."""
 
 STATION = {f'target.station.{field.name}': field.name for field in dataclasses.fields(StationParameters)}
-OPEN = (*STATION, 'receiver.reference_range', 'duration')
-"""What a scenario may leave open: parameters of the receiver, and the duration of the run."""
 
 
 def beside(fixes, track) -> StationParameters:
@@ -62,18 +59,18 @@ def _clear_of(along, across, clearance):
     return float(s)
 
 
-def left_open(target, said):
-    """{name of OPEN: value} that follow from the file of a TargetParameters; said: the names that are given, of which
-    only those of the station matter here. Raises csv_table.TableError.
+def run(fixes, target, given):
+    """{parameter: value} that follow from Fixes for a TargetParameters; given: the names that are, of which only those
+    of the station matter here. Raises csv_table.TableError.
 
     The C/N0 holds at the greatest range, so that it is nowhere less; the run ends at the last tenth of a second before
     the last fix.
     """
-    fixes = logs.read(target.track_file)
-    found = beside(fixes, target.track_file)
-    station = dataclasses.replace(target.station, **{field: getattr(found, field) for name, field in STATION.items()
-                                                     if name not in said})
+    derived = beside(fixes, target.track_file)
+    station = dataclasses.replace(target.station, **{field: getattr(derived, field) for name, field in STATION.items()
+                                                     if name not in given})
     laid = flight.lay_out(fixes, target.track_file, station)
     reference_range = max(10.0, 10.0 * math.ceil(0.1 * laid.greatest_range))
     duration = max(SHORTEST, min(LONGEST, (math.ceil(10.0 * laid.breaks[-1]) - 1) / 10.0))
-    return dict(zip(OPEN, (*dataclasses.astuple(station), reference_range, duration)))
+    return {**dict(zip(STATION, dataclasses.astuple(station))), 'receiver.reference_range': reference_range,
+            'duration': duration}

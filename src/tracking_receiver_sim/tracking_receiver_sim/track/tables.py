@@ -55,13 +55,13 @@ def rows(path, log):
             log.remarks.append('barometric altitude taken as height above the ellipsoid')
         for row in reader:
             line = reader.line_num
-            said = {name: (row[name] or '').strip() for name in (*names, *identities)} if form.adsb else row
-            if form.adsb and any(said[name].lower() in EMPTY for name in (*names, *identities[:1])):
+            cells = {name: (row[name] or '').strip() for name in (*names, *identities)} if form.adsb else row
+            if form.adsb and any(cells[name].lower() in EMPTY for name in (*names, *identities[:1])):
                 log.passed_over['row without time, position or aircraft'] += 1
                 continue
-            time = (instant.seconds(path, line, form.time, said[form.time]) if form.adsb else
-                    csv_table.number(path, line, form.time, said[form.time], -1e12, 1e12))
-            yield (line, tuple(said[name] for name in identities), time,
-                   csv_table.number(path, line, form.latitude, said[form.latitude], -90.0, 90.0),
-                   csv_table.number(path, line, form.longitude, said[form.longitude], -180.0, 360.0),
-                   form.unit * csv_table.number(path, line, altitude, said[altitude], *form.limits))
+            time = (instant.seconds(path, line, form.time, cells[form.time]) if form.adsb else
+                    csv_table.number(path, line, form.time, cells[form.time], -1e12, 1e12))
+            yield (line, tuple(cells[name] for name in identities), time,
+                   csv_table.number(path, line, form.latitude, cells[form.latitude], -90.0, 90.0),
+                   csv_table.number(path, line, form.longitude, cells[form.longitude], -180.0, 360.0),
+                   form.unit * csv_table.number(path, line, altitude, cells[altitude], *form.limits))

@@ -183,7 +183,7 @@ def _better(constants, target, smoothers, filters, plant, beam, errors):
             if running:
                 m = AxisMeasurement(y, constants.variance, math.nan, 0.0)
                 axis_filter.predict(f, c, period * GRID)
-                errors[i] = axis_filter.innovation(f, m).nu
+                errors[i] = axis_filter.innovation(f, c, m).nu
                 axis_filter.correct(f, c, m)
             else:
                 axis_filter.start(f, c, y, constants.variance, 1.0)

@@ -24,9 +24,9 @@ INITIAL_RATE = TrackerParameters().initial_rate
 
 MOMENTS = np.dtype([('runs', 'f8'), ('angle', 'f8'), ('angle2', 'f8'), ('rate', 'f8'), ('rate2', 'f8'),
                     ('acceleration', 'f8'), ('acceleration2', 'f8'), ('raw2', 'f8'), ('variance', 'f8'),
-                    ('rate_variance', 'f8'), ('nis', 'f8'), ('mu', 'f8', (axis_filter.BANK,))])
+                    ('rate_variance', 'f8'), ('nis', 'f8'), ('nees', 'f8'), ('mu', 'f8', (axis_filter.BANK,))])
 """Sums over runs at one time: errors of angle, rate, acceleration and of the raw angle, their squares, the filter's
-own variances, normalised innovations squared, mode probabilities."""
+own variances, normalised innovations squared, normalised errors squared of angle and rate, mode probabilities."""
 
 Series = namedtuple('Series', 't y R y_rate R_rate')
 """What a filter measures of one axis: times (n,) [s], angles (runs, n) [rad], their variance (n,), rates (runs, n)
@@ -41,11 +41,13 @@ R_range."""
 class Noise:
     """Noise of the measured angle: rms sigma [rad]; bandwidth of a first-order lag [Hz], None for white noise.
 
-    rate_sigma: of an independent, white rate measurement [rad/s], None without one.
+    rate_sigma: of an independent, white rate measurement [rad/s], None without one. expected: whether the filter knows
+    the bandwidth.
     """
     sigma: float
     bandwidth: float | None = None
     rate_sigma: float | None = None
+    expected: bool = False
 
 
 def drawn(seed, first, count, n, sensors=2):
@@ -75,10 +77,11 @@ def records(truth, noise, seed, first, count):
 def moments(params, t, truth, noise, measured):
     """MOMENTS (runs, n) of a filter (FilterParameters) at times t (n,) [s], of measured records as of `records`.
 
-    The filter knows sigma and rate_sigma, and assumes white noise.
+    The filter knows sigma and rate_sigma, and takes noise whose bandwidth it does not know for white.
     """
     y, y_rate = measured
-    c = axis_filter.constants(dataclasses.replace(params, rate_measurement=noise.rate_sigma is not None))
+    c = axis_filter.constants(dataclasses.replace(params, rate_measurement=noise.rate_sigma is not None),
+                              noise.bandwidth if noise.expected else 0.0)
     series = Series(t, y, np.full(len(t), noise.sigma**2), y_rate, np.full(len(t), (noise.rate_sigma or 0.0) ** 2))
     sums = np.zeros(y.shape, MOMENTS)
     _add_runs(c, AxisMotion(*truth), series, INITIAL_RATE, np.zeros(len(t), axis_filter.ESTIMATE), sums)
@@ -110,6 +113,8 @@ def _add(s, o, truth, k, y):
     s.variance += o.variance
     s.rate_variance += o.rate_variance
     s.nis += o.nis
+    s.nees += ((o.rate_variance * d1 * d1 - 2.0 * o.covariance * d1 * d2 + o.variance * d2 * d2)
+               / (o.variance * o.rate_variance - o.covariance * o.covariance))
     for j in range(len(o.mu)):
         s.mu[j] += o.mu[j]
 

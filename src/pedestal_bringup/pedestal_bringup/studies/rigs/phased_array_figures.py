@@ -30,9 +30,8 @@ def steps(done, label, title, seconds):
         panel.set_xlabel('time [s]')
     axes[0, 0].set_ylim(-0.05, 2.3)
     axes[0, 0].set_ylabel('beam over step')
-    axes[0, -1].legend(loc='lower right')
     figure.suptitle(title)
-    return figure
+    return drawing.legend(figure)
 
 
 def lags(done, title, seconds):
@@ -48,9 +47,8 @@ def lags(done, title, seconds):
     axes[1, 0].set_ylabel('true error [deg]')
     for panel in axes[1]:
         panel.set_xlabel('time [s]')
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside lower center', ncols=4)
     figure.suptitle(title)
-    return figure
+    return drawing.legend(figure)
 
 
 def stability(limits):
@@ -74,9 +72,8 @@ def stability(limits):
     axes[0, 2].set_xlabel('true slope over assumed')
     axes[0, 2].set_ylim(0.0, 220.0)
     axes[0, 0].set_ylabel('largest stable delay [ms]')
-    axes[0, 0].legend(loc='upper right')
     figure.suptitle('delay until the loop is unstable: bisection (lines) and eigenvalues (dots)')
-    return figure
+    return drawing.legend(figure)
 
 
 def better(errors, seconds):
@@ -96,10 +93,9 @@ def better(errors, seconds):
         panel.set_ylim(1e-5, 1.0)
     axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][first]))), color=TRUTH, linewidth=1.1,
                         label='best with INS, 5 ms late')
-    figure.legend(*axes[2, 0].get_legend_handles_labels(), loc='outside lower center', ncols=3)
     axes[2, 0].set_xlabel('time [s]')
     figure.suptitle('true error without noise, 20 ms of delay (best on the ramp: none)')
-    return figure
+    return drawing.legend(figure)
 
 
 def envelope(x, width=10):
@@ -119,5 +115,4 @@ def loss(records, seconds):
     panel.set_xlabel('time [s]')
     panel.set_ylabel('true error [beamwidths]')
     panel.set_title('no signal beyond half a beamwidth (dashed)')
-    panel.legend(loc='lower left')
-    return figure
+    return drawing.legend(figure)

@@ -1,10 +1,21 @@
 """WGS84: earth-fixed positions and the east-north-up frame of a station."""
+import dataclasses
 import math
 
 import numpy as np
 
+from pedestal_common.parameters import Parameters, parameter
+
 EARTH_RADIUS, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
 """WGS84 [m], [-]."""
+
+
+@dataclasses.dataclass(frozen=True)
+class StationParameters(Parameters):
+    """Where the pedestal stands (WGS84)."""
+    latitude_deg: float = parameter(47.4, -90.0, 90.0, 'deg', 'geodetic latitude')
+    longitude_deg: float = parameter(8.5, -180.0, 360.0, 'deg', 'longitude, east positive')
+    height: float = parameter(500.0, -500.0, 9000.0, 'm', 'height above the ellipsoid')
 
 
 def geocentric(latitude, longitude, height):

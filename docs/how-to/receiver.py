@@ -1,0 +1,48 @@
+"""A receiver of your own: angle errors that arrive by UDP become the topic tracking_receiver/angle_error.
+
+    python receiver.py 5005
+
+A datagram is 'CROSS_ELEVATION ELEVATION CN0' in rad, rad, dB-Hz; 'nan nan 20' says that it is not locked.
+"""
+import math
+import socket
+import sys
+
+import rclpy
+from geometry_msgs.msg import Vector3Stamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from pedestal_common import middleware
+
+
+class Receiver(Node):
+    """Publishes one error for each joint state of the drive, stamped with its time: the newest that has come."""
+
+    def __init__(self, port):
+        super().__init__('tracking_receiver')
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(('127.0.0.1', port))
+        self.socket.setblocking(False)
+        self.publisher = self.create_publisher(Vector3Stamped, 'tracking_receiver/angle_error', middleware.qos('step'))
+        self.create_subscription(JointState, 'joint_states', self.step, middleware.qos('step'))
+
+    def step(self, joints):
+        error = Vector3Stamped(header=joints.header)
+        error.header.frame_id = 'beam'
+        error.vector.x, error.vector.y, error.vector.z = self.newest()
+        self.publisher.publish(error)
+
+    def newest(self):
+        """The newest datagram as three numbers; no lock where none has come since the last step."""
+        text = b'nan nan 0'
+        try:
+            while True:
+                text = self.socket.recv(100)
+        except BlockingIOError:
+            numbers = [float(part) for part in text.split()]
+            return numbers if len(numbers) == 3 else (math.nan, math.nan, 0.0)
+
+
+middleware.initialise()
+rclpy.spin(Receiver(int(sys.argv[1])))

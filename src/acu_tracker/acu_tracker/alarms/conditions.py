@@ -1,0 +1,165 @@
+"""Which alarms have their condition in a step: detectors on both axes, and what the control unit knows otherwise."""
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from acu_tracker import modes, signals
+from acu_tracker.alarms import annunciator, detectors, table
+from acu_tracker.servo import position_loop
+from pedestal_common.compiled import compiled
+
+SUPERVISION = np.dtype([('axis', detectors.AXIS, (2,)), ('said', 'f8', (3,)), ('ready', 'f8'), ('lost', 'i8'),
+                        ('alarms', annunciator.ALARMS)], align=True)
+"""said: errors [rad] and C/N0 [dB-Hz] of the receiver in the step before; ready: stamp at which the drive was ready
+last [s]; lost: bits of the axes that had one motor when it was."""
+
+INVALID = signals.ENCODER | signals.ERROR | signals.ERROR_STAMP | signals.PROGRAM | signals.PRESET
+"""Flags of inputs that were not believed, but of the attitude, which is lost when that goes on."""
+
+OFF_TIME = 2.5
+"""Time after the drive is ready no more until its brakes must hold [s]: longer than its longest stop."""
+
+ALWAYS, MOTORS, MOVING, FOLLOWING = table.JUDGED_WHEN
+
+Facts = namedtuple('Facts', 'dt gap latched attitude_lost attitude_jumped signal_lost unasked_rate beamwidth')
+"""Of a step: dt, time since the one before, and 0 after a gap, whose length is `gap` [s], infinite in the first step;
+bits of the alarms that wait for a reset; whether the attitude of a ship is lost, or has jumped, and whether the signal
+of autotrack is lost. Beside that the rate at which an axis moves unasked [rad/s] and the beamwidth [rad]."""
+
+SILENCE = 0.3
+"""Gap between two steps [s] beyond which the drive was silent."""
+
+
+def initialise(s):
+    """Nothing is wrong; s: view of SUPERVISION."""
+    s['ready'] = -np.inf
+    s['axis']['y'] = np.nan
+    annunciator.initialise(s['alarms'])
+
+
+@compiled
+def _of_motors(d, i, u, envelope, p, facts):
+    """Bits of the alarms of axis i that its encoder, motors and commands give away. d: its detectors; envelope:
+    servo.unasked.ENVELOPE; p: record of its AxisParameters."""
+    y, dy, high, low = u.position[i], u.velocity[i], envelope.high[i], envelope.low[i]
+    bits = 0
+    if detectors.encoder_jump(d, y, dy, facts.dt):
+        bits |= table.ENCODER_JUMP
+    if detectors.encoder_stuck(d, y, dy, facts.dt):
+        bits |= table.ENCODER_STUCK
+    if detectors.disagreement(d, y, dy, facts.dt):
+        bits |= table.DISAGREEMENT
+    if detectors.pushes(d, u.torque[i], p.feedforward.friction):
+        bits |= table.BRAKE_NOT_RELEASED
+    if detectors.immobile(d, dy, high, low):
+        bits |= table.IMMOBILE
+    if detectors.against(dy, high, low, facts.unasked_rate):
+        bits |= table.RUNAWAY
+    return bits << i
+
+
+@compiled
+def _of_loop(d, i, e, o, facts):
+    """Bits of the alarms of axis i that its following error e [rad] and its limits give away. Where its command is
+    limited it cannot follow."""
+    bits, limited = 0, o.rate_limited[i] or o.acceleration_limited[i]
+    if o.angle_limited[i]:
+        bits |= table.AT_LIMIT
+    if detectors.following_error(d, 0.0 if limited else e, facts.beamwidth):
+        bits |= table.FOLLOWING_ERROR
+    if detectors.oscillation(d, e, facts.dt):
+        bits |= table.OSCILLATION
+    return bits << i
+
+
+@compiled
+def _of_axes(s, mode, u, o, c, envelope, facts):
+    """Bits of the alarms of both axes. c: records (2,) of their constants."""
+    bits, off = 0, u.stamp - s.ready > OFF_TIME
+    for i in range(2):
+        p, d, y, dy = c[i].p, s.axis[i], u.position[i], u.velocity[i]
+        if p.controller == position_loop.BEAM:
+            continue
+        if facts.gap > 0.0 or not math.isfinite(d.y + d.dy):
+            detectors.initialise(d, y, dy)
+        if math.isfinite(y + dy):
+            bits |= _of_motors(d, i, u, envelope, p, facts)
+            if detectors.moves(d, dy) and off:
+                bits |= table.BRAKE_NOT_GRIPPING << i
+            if mode != modes.STANDBY:
+                bits |= _of_loop(d, i, o.reference[i, 0] - y, o, facts)
+        d.y, d.dy = y, dy
+    return bits
+
+
+@compiled
+def _of_drive(s, u):
+    """Bits of the alarms that the drive tells itself, by u.drive, a code of adu/state."""
+    if u.drive_ready:
+        s.ready, s.lost = u.stamp, max(u.drive, 0)
+    bits = s.lost * table.MOTOR_LOST
+    if u.drive == signals.EMERGENCY_STOP:
+        bits |= table.EMERGENCY_STOP
+    elif u.drive >= signals.DRIVE_FAULT:
+        bits |= table.DRIVE_FAULT
+    return bits
+
+
+@compiled
+def _repeated(s, u):
+    """Whether the receiver tells the numbers of the step before once more: it has noise."""
+    said = s.said
+    again = (u.error_valid and u.cross_elevation == said[0] and u.elevation == said[1] and u.cn0_dbhz == said[2])
+    said[0], said[1], said[2] = u.cross_elevation, u.elevation, u.cn0_dbhz
+    return again
+
+
+@compiled
+def _of_unit(s, u, o, facts):
+    """Bits of the alarms of the inputs, and of what the control unit has found elsewhere."""
+    bits = facts.latched
+    if 0.0 < facts.gap < math.inf:
+        bits |= table.TIME_JUMP | (table.DRIVE_SILENT if facts.gap > SILENCE else 0)
+    if not u.error_came or _repeated(s, u):
+        bits |= table.RECEIVER_SILENT
+    if facts.attitude_lost:
+        bits |= table.INS_LOST
+    if facts.attitude_jumped:
+        bits |= table.INS_JUMP
+    if facts.signal_lost:
+        bits |= table.SIGNAL_LOST
+    if o.invalid_input & signals.ERROR_NOISY:
+        bits |= table.RECEIVER_NOISY
+    if o.invalid_input & INVALID:
+        bits |= table.INVALID_INPUT
+    return bits | o.pins_wrong * table.STOW_PIN | _of_program(u, o)
+
+
+@compiled
+def _of_program(u, o):
+    """Bits of the alarms of the program track, by the reason that it is not followed."""
+    bits = table.PROGRAM_TURNAROUND if u.turnaround else 0
+    if o.reason == modes.BEFORE_PROGRAM:
+        return bits | table.PROGRAM_EARLY
+    if o.reason == modes.PROGRAM_GAP:
+        return bits | table.PROGRAM_GAP
+    return bits | (table.PROGRAM_ENDED if o.reason == modes.AFTER_PROGRAM else 0)
+
+
+@compiled
+def _judged(mode, c):
+    """Bits of the alarms that mean something in a mode. c: records (2,) of the axes' constants."""
+    motors = c[0].p.controller != position_loop.BEAM or c[1].p.controller != position_loop.BEAM
+    return (ALWAYS | (MOTORS if motors else 0) | (MOVING if mode != modes.STANDBY else 0)
+            | (FOLLOWING if modes.FOLLOWS[mode] else 0))
+
+
+@compiled
+def take(s, mode, u, o, c, envelope, facts):
+    """Bring the alarms to a step with Facts. s: record of SUPERVISION; c: records (2,) of the axes' constants;
+    envelope: servo.unasked.ENVELOPE of their commands."""
+    bits = _of_drive(s, u) | _of_unit(s, u, o, facts) | _of_axes(s, mode, u, o, c, envelope, facts)
+    if facts.gap > 0.0:
+        annunciator.restart(s.alarms, u.stamp)
+    annunciator.update(s.alarms, u.stamp, bits, _judged(mode, c))

@@ -1,0 +1,155 @@
+"""Laws that tell what is wrong with an axis from its encoder, its motors and its command.
+
+Each is true from a first level on until it falls below a second one, half of the first where nothing else is said.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+AXIS = np.dtype([
+    ('y', 'f8'), ('dy', 'f8'),                              # of the step before [rad], [rad/s]; NaN: it was none
+    ('apart', 'f8'), ('disagrees', 'i8'),                           # of `disagreement` [rad]
+    ('turned', 'f8'), ('moved', 'f8'), ('stuck', 'i8'),             # of motors and encoder in this look [rad]
+    ('immobile', 'i8'), ('pushes', 'i8'), ('late', 'i8'), ('moves', 'i8'),
+    ('e', 'f8'), ('area', 'f8'), ('loads', 'f8'), ('oscillates', 'i8'),         # of `oscillation` [rad], [rad s], [-]
+], align=True)
+
+JUMP = 3e-3
+"""Difference of encoder and motors over one step [rad]; wind-up and lash of a gear leave less than 1 mrad."""
+
+LOOK = 3e-3
+"""Travel of the motors over which the encoder must move as well [rad]: more than the lash."""
+
+STUCK, FREE = 0.1, 0.5
+"""Shares of LOOK: the encoder is stuck below the first, and moves from the second on."""
+
+ASKED = 5e-3
+"""Rate command beyond which an axis must move [rad/s]."""
+
+IDLE = 0.1
+"""Share of the command below which an axis does not obey it."""
+
+PUSHES = 50.0
+"""Torque over the Coulomb friction that no free axis needs for long: half of what brakes hold, twice a strong wind."""
+
+DIFFERENCE = 1e-2
+"""Difference of encoder and motors within APART [rad]: five times what lash and wind-up of a gear leave."""
+
+APART = 2.0
+"""Time in which a difference of encoder and motors is forgotten [s]."""
+
+STANDS = 2e-3
+"""Rate [rad/s] beyond which an axis moves."""
+
+LATE = 0.25
+"""Following error that is too large, in beamwidths."""
+
+AREA = 1e-4
+"""Area of the following error between two of its zeros [rad s] from which a half wave counts: 2 a / w, 1 mrad at
+3 Hz."""
+
+SUPERVISED = 5.0
+"""Time over which half waves are counted [s]."""
+
+LOADS = 10.0
+"""Half waves within SUPERVISED that are an oscillation: faster than 1 Hz."""
+
+
+@compiled
+def beyond(was, x, on, off):
+    """Whether x is beyond its level: `off` where it was, else `on`. NaN is not."""
+    return x > (off if was else on)
+
+
+@compiled
+def initialise(d, y, dy):
+    """Begin at the encoder's angle [rad] and the motors' rate [rad/s]: after a gap, or an encoder that was invalid."""
+    d.y, d.dy, d.turned, d.moved, d.apart, d.e, d.area = y, dy, 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@compiled
+def encoder_jump(d, y, dy, dt):
+    """Whether the encoder moved otherwise than the motors in this step: |y - y' - (dy + dy') dt / 2| > JUMP."""
+    return abs(y - d.y - 0.5 * (dy + d.dy) * dt) > JUMP
+
+
+@compiled
+def encoder_stuck(d, y, dy, dt):
+    """Whether the encoder stands while the motors turn. Looks end when the motors have turned by LOOK, one way."""
+    d.turned += 0.5 * (dy + d.dy) * dt
+    d.moved += y - d.y
+    if abs(d.turned) > LOOK:
+        share = abs(d.moved) / LOOK
+        d.stuck = share < (FREE if d.stuck else STUCK)
+        d.turned = d.moved = 0.0
+    return d.stuck != 0
+
+
+@compiled
+def disagreement(d, y, dy, dt):
+    """Whether encoder and motors have moved differently of late: x' = y' - dy - x / APART, |x| > DIFFERENCE."""
+    d.apart += y - d.y - 0.5 * (dy + d.dy) * dt - d.apart * dt / APART
+    d.disagrees = beyond(d.disagrees, abs(d.apart), DIFFERENCE, 0.5 * DIFFERENCE)
+    return d.disagrees != 0
+
+
+@compiled
+def immobile(d, dy, high, low):
+    """Whether the motors do not obey commands that were all beyond ASKED of late, and of one sign: less than IDLE of
+    the smallest of them, until it is three times that; motion against them is none of that. high, low: envelope of the
+    commands (servo.unasked)."""
+    u = low if low > ASKED else high
+    if low <= ASKED and high >= -ASKED:
+        d.immobile = 0
+    else:
+        d.immobile = abs(dy / u) < (3.0 * IDLE if d.immobile else IDLE)
+    return d.immobile != 0
+
+
+@compiled
+def pushes(d, T, friction):
+    """Whether a torque on the load is far more than the Coulomb friction, both [Nm]."""
+    d.pushes = beyond(d.pushes, abs(T), PUSHES * friction, 0.5 * PUSHES * friction)
+    return d.pushes != 0
+
+
+@compiled
+def moves(d, dy):
+    """Whether an axis moves."""
+    d.moves = beyond(d.moves, abs(dy), STANDS, 0.5 * STANDS)
+    return d.moves != 0
+
+
+@compiled
+def against(dy, high, low, threshold):
+    """Whether a rate goes against its commands, which were of one sign of late.
+
+    high, low: envelope of the commands (servo.unasked); threshold: rate that is expected of nobody [rad/s].
+    """
+    return dy > threshold and high <= 0.0 and low < -STANDS or dy < -threshold and low >= 0.0 and high > STANDS
+
+
+@compiled
+def following_error(d, e, limit):
+    """Whether the following error is beyond LATE of a limit [rad], the beamwidth."""
+    d.late = beyond(d.late, abs(e), LATE * limit, 0.5 * LATE * limit)
+    return d.late != 0
+
+
+@compiled
+def oscillation(d, e, dt):
+    """Whether the following error [rad] oscillates (T. Haegglund, A control-loop performance monitor, Control
+    Engineering Practice 3, 1995): half waves whose area is beyond AREA are counted and forgotten within SUPERVISED;
+    LOADS of them are an oscillation."""
+    d.loads *= math.exp(-dt / SUPERVISED)
+    if e * d.e < 0.0:
+        if d.area > AREA:
+            d.loads = min(d.loads + 1.0, 2.0 * LOADS)
+        d.area = 0.0
+    if e != 0.0:
+        d.e = e
+    d.area += abs(e) * dt
+    d.oscillates = beyond(d.oscillates, d.loads, LOADS, 0.5 * LOADS)
+    return d.oscillates != 0

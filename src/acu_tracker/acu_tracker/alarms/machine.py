@@ -1,0 +1,57 @@
+"""The states of one alarm and what leads from one to the other: ANSI/ISA-18.2-2016, section 6.2 (IEC 62682).
+
+An alarm that is not latched never is in a latched state: its row of `alarms.table` says whether it is.
+"""
+from pedestal_common.compiled import compiled
+
+STATES = ('normal', 'unacknowledged', 'acknowledged', 'returned unacknowledged', 'latched unacknowledged',
+          'latched acknowledged', 'shelved', 'suppressed by design')
+(NORMAL, UNACKNOWLEDGED, ACKNOWLEDGED, RETURNED, LATCHED_UNACKNOWLEDGED, LATCHED_ACKNOWLEDGED, SHELVED,
+ SUPPRESSED) = range(len(STATES))
+
+EVENTS = ('raise', 'clear', 'acknowledge', 'reset', 'shelve', 'unshelve', 'suppress', 'release')
+RAISE, CLEAR, ACKNOWLEDGE, RESET, SHELVE, UNSHELVE, SUPPRESS, RELEASE = range(len(EVENTS))
+"""raise, clear: the condition is there, or gone, in this step; suppress, release: the alarm means nothing now, or does
+again; the others are asked for."""
+
+REFUSED = -1
+"""An event that a state does not take."""
+
+_N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(STATES)), REFUSED)
+
+NEXT = (
+    # raise, clear, acknowledge, reset, shelve, unshelve, suppress, release
+    (_U, _N, _x, _x, _SH, _x, _SU, _N),        # normal
+    (_U, _R, _A, _x, _SH, _x, _U, _U),         # unacknowledged
+    (_A, _N, _x, _x, _SH, _x, _A, _A),         # acknowledged
+    (_U, _R, _N, _x, _SH, _x, _R, _R),         # returned unacknowledged
+    (_U, _LU, _LA, _R, _SH, _x, _LU, _LU),     # latched unacknowledged
+    (_U, _LA, _x, _N, _SH, _x, _LA, _LA),      # latched acknowledged
+    (_SH, _SH, _x, _x, _SH, _N, _SH, _SH),     # shelved
+    (_SU, _SU, _x, _x, _SH, _x, _SU, _N),      # suppressed by design
+)
+"""NEXT[state][event] of an alarm that is not latched. An alarm that is there is never suppressed: its condition counts
+as gone, so that it returns, and is acknowledged, before."""
+
+ANNUNCIATED = (False, True, True, True, True, True, False, False)
+"""States in which an alarm is told."""
+
+LISTED = (False, True, True, True, True, True, True, False)
+"""States in which it is in the list of alarms: told, or shelved."""
+
+WAITING = (False, True, False, True, True, False, False, False)
+"""States in which it waits for an acknowledgement."""
+
+LATCHED = (False, False, False, False, True, True, False, False)
+"""States that only a reset ends."""
+
+
+@compiled
+def next_state(state, event, latched):
+    """The state after an event, REFUSED where the state does not take it; latched: 1 for an alarm that is reset."""
+    if latched and event == CLEAR:
+        if state == UNACKNOWLEDGED:
+            return LATCHED_UNACKNOWLEDGED
+        if state == ACKNOWLEDGED:
+            return LATCHED_ACKNOWLEDGED
+    return NEXT[state][event]

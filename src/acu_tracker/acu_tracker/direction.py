@@ -1,0 +1,28 @@
+"""A direction that somebody gives, a person, a program or another antenna; moved on by its rates for a while."""
+import math
+
+import numpy as np
+
+from acu_tracker.geometry.motion import AxisMotion, Motion
+from pedestal_common.compiled import compiled
+
+DIRECTION = np.dtype([('stamp', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('moves', 'f8'), ('holds', 'f8')],
+                     align=True)
+"""Azimuth and elevation [rad] at a stamp [s], -inf: none was given, and their rates [rad/s], which go on for `moves`
+[s]; it is good for `holds` [s]."""
+
+
+@compiled
+def there(d, t):
+    """Whether a direction is good at t [s]."""
+    return t - d.stamp <= d.holds
+
+
+@compiled
+def motion_at(d, t):
+    """Its Motion at t [s]."""
+    since = t - d.stamp if math.isfinite(d.stamp) else 0.0
+    moved = min(max(since, 0.0), d.moves)
+    goes = 1.0 if since < d.moves else 0.0
+    return Motion(AxisMotion(d.angle[0] + d.rate[0] * moved, d.rate[0] * goes, 0.0),
+                  AxisMotion(d.angle[1] + d.rate[1] * moved, d.rate[1] * goes, 0.0))

@@ -1,0 +1,79 @@
+"""An attitude that jumps: what the rates of the deck do not explain is kept apart, and let in slowly.
+
+    p_k = b_k-1 (x) exp(w T / 2)    predicted by the rate w from the attitude b believed before
+    b_k = c (x) q_k                 believed of the attitude q that is told; c = 1 as long as nothing has jumped
+    c = p_k (x) q_k*                after a jump, the angle between b_k and p_k is beyond JUMP
+
+(quaternions deck -> earth, so that c turns about axes of the earth). The angle of c then goes to 0 by RATE. Whoever
+tracks by the receiver does not feel a jump, whatever its size and whether it is the error or the end of one; whoever
+points by the attitude goes to the new one slowly enough that somebody can look.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+JUMP = np.dtype([('c', 'f8', (4,)), ('apart', 'i8')], align=True)
+"""c: quaternion (x, y, z, w) earth -> earth; apart: 1 while it is not that of no rotation."""
+
+ANGLE = 3e-3
+"""That the rates must explain in a step [rad]: a rate that is wrong by 0.5 rad/s, or a hundred times the noise of an
+INS."""
+
+RATE = 1e-3
+"""With which a jump is let in [rad/s]."""
+
+
+@compiled
+def product(a, b):
+    """Quaternion a (x) b."""
+    ax, ay, az, aw = a[0], a[1], a[2], a[3]
+    bx, by, bz, bw = b[0], b[1], b[2], b[3]
+    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
+
+
+@compiled
+def conjugate(q):
+    """The inverse of a unit quaternion."""
+    return -q[0], -q[1], -q[2], q[3]
+
+
+@compiled
+def _half_angle(q):
+    """Half of the angle [rad] of a unit quaternion, 0 to pi / 2."""
+    return math.atan2(math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), abs(q[3]))
+
+
+@compiled
+def forget(s):
+    """Believe what is told."""
+    s.apart = 0
+
+
+@compiled
+def _let_in(s, T):
+    """Take the angle of c down by RATE for T [s]."""
+    half = _half_angle(s.c)
+    left = half - 0.5 * RATE * T
+    if left <= 0.0:
+        s.apart = 0
+        return
+    k = math.sin(left) / math.sin(half) * math.copysign(1.0, s.c[3])
+    s.c[0], s.c[1], s.c[2], s.c[3] = k * s.c[0], k * s.c[1], k * s.c[2], math.cos(left)
+
+
+@compiled
+def believed(s, predicted, told, T):
+    """The quaternion that is believed of one that is told, T [s] after the one before; predicted: by the rates."""
+    q = told
+    if s.apart:
+        _let_in(s, T)
+        if s.apart:
+            q = product(s.c, told)
+    if 2.0 * _half_angle(product(conjugate(predicted), q)) <= ANGLE:
+        return q
+    s.c[0], s.c[1], s.c[2], s.c[3] = product(predicted, conjugate(told))
+    s.apart = 1
+    return predicted

@@ -1,0 +1,63 @@
+"""The expected place of a target without a program: from where it was last known to be on along its great circle.
+
+Of a rate that is not measured any more nothing is known in the end: it is expected to fade, as that of a Singer model
+does (Singer 1970, with the rate in the place of the acceleration), so that the target has moved by
+
+    W tau (1 - exp(-T/tau)),    W: its rate when it was last seen, T ago.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.geometry.great_circle import turned
+from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, earth_angles
+from acu_tracker.geometry.vector import Vector, dot, times, vector
+from pedestal_common import line_of_sight
+from pedestal_common.compiled import compiled
+
+PLACE = np.dtype([('u', 'f8', (3,)), ('du', 'f8', (3,)), ('stamp', 'f8')], align=True)
+"""ENU unit vector u [-] of the target at a stamp [s], and its rate du [1/s]."""
+
+STILL = Vector(0.0, 0.0, 0.0)
+
+TAU = 10.0
+"""Time constant with which the expected rate fades [s]."""
+
+
+@compiled
+def remember(s, t, u, du):
+    """The target is at the ENU unit Vector u with its rate du [1/s] at t [s]."""
+    s.u[0], s.u[1], s.u[2] = u
+    s.du[0], s.du[1], s.du[2] = du
+    s.stamp = t
+
+
+@compiled
+def motion_at(s, t):
+    """Motion in earth angles at t [s], not before it was last known."""
+    u, du = vector(s.u), vector(s.du)
+    W, left = math.sqrt(dot(du, du)), math.exp((s.stamp - t) / TAU)
+    angle = W * TAU * (1.0 - left)
+    ahead = turned(u, du, W, angle)
+    # d/d angle (u cos + du/W sin) = (du cos - u W sin) / W, and the angle grows by W left; the second derivative is
+    # that of a circle and of the rate that fades.
+    rate = times(left, turned(du, times(-W * W, u), W, angle))
+    bend, fading = times(-(W * left)**2, ahead), times(-1.0 / TAU, rate)
+    return earth_angles(LineOfSight(ahead, rate, Vector(bend.x + fading.x, bend.y + fading.y, bend.z + fading.z)))
+
+
+@compiled
+def track(motion):
+    """Direction [rad] in which a target with this Motion moves, from cross-elevation towards elevation; 0 at rest."""
+    return math.atan2(motion.elevation.rate, motion.azimuth.rate * math.cos(motion.elevation.angle))
+
+
+@compiled
+def displaced(motion, p):
+    """The Motion of a beam at an offset from a target: a pattern.Point p in cross-elevation and elevation. What the
+    pattern adds to the accelerations is left out."""
+    n = line_of_sight.displaced_motion(motion.azimuth.angle, motion.elevation.angle, motion.azimuth.rate,
+                                       motion.elevation.rate, p.x, p.y, p.dx, p.dy)
+    beam = angles(LineOfSight(Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]), STILL))
+    return Motion(AxisMotion(beam.azimuth.angle, beam.azimuth.rate, motion.azimuth.acceleration),
+                  AxisMotion(beam.elevation.angle, beam.elevation.rate, motion.elevation.acceleration))

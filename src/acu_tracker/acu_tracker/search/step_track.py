@@ -1,0 +1,75 @@
+"""Step track: the beam climbs the hill of the level, for a receiver that measures no angle errors.
+
+Once a cycle the beam stands one step d to either side of its place, first in cross-elevation, then in elevation, and
+averages the level z there. The main lobe is a parabola in decibels, 12 (theta/b)^2, so that the peak is at
+
+    theta0 = (z+ - z-) b^2 / (48 d)
+
+from where the beam was. It goes there by one step at most, and stays where theta0 is within the deadband. Step, cycle
+and deadband are those of the GD 7200 (operations.md 2.2): 8 % of the beamwidth, 2 min, as large as the step.
+"""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+STEP_TRACK = np.dtype([('place', 'f8', (2,)), ('began', 'f8'), ('phase', 'i8'), ('since', 'f8'),
+                       ('sum', 'f8'), ('samples', 'i8'), ('plus', 'f8')], align=True)
+"""place: offset of the beam between its steps [rad]; began: the cycle [s]; phase: one of the following; since: when
+the beam went to its place of the phase [s]; sum of so many levels there [dB-Hz]; plus: the mean on the plus side."""
+
+PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus', 'elevation minus', 'rest')
+REST = len(PHASES) - 1
+
+SETTLED = 5.0
+"""Time constants of the level after which it is that of a new place."""
+
+
+@compiled
+def start(s, t, x, e):
+    """Begin at t [s] at an offset [rad], with a cycle at once."""
+    s.place[0], s.place[1] = x, e
+    s.began = t
+    _enter(s, 0, t)
+
+
+@compiled
+def _enter(s, phase, t):
+    s.phase, s.since, s.sum, s.samples = phase, t, 0.0, 0
+
+
+@compiled
+def peak(z_plus, z_minus, step, beamwidth):
+    """theta0 [rad]: where the peak is by the levels one step [rad] to either side [dB]."""
+    return (z_plus - z_minus) * beamwidth * beamwidth / (48.0 * step)
+
+
+@compiled
+def step(s, p, beamwidth, tau, t, z, present):
+    """(x, e) offset of the beam [rad] at t [s]; z: level that was measured since the last step, NaN where there is
+    none; present: whether there is a signal to step on. p: record of StepTrackParameters; tau: of the level [s]."""
+    d = p.step * beamwidth
+    if not present or (s.phase == REST and t - s.began < p.cycle):
+        if not present:
+            _enter(s, REST, t)
+        return s.place[0], s.place[1]
+    if s.phase == REST:
+        s.began = t
+        _enter(s, 0, t)
+    settled = SETTLED * tau
+    if z == z and t - s.since > settled:
+        s.sum += z
+        s.samples += 1
+    if t - s.since >= settled + p.dwell and s.samples > 0:
+        mean, axis = s.sum / s.samples, s.phase // 2
+        if s.phase % 2 == 0:
+            s.plus = mean
+        else:
+            move = peak(s.plus, mean, d, beamwidth)
+            if abs(move) > p.deadband * beamwidth:
+                s.place[axis] += min(max(move, -d), d)
+        _enter(s, s.phase + 1, t)
+    x, e = s.place[0], s.place[1]
+    if s.phase == REST:
+        return x, e
+    aside = d if s.phase % 2 == 0 else -d
+    return (x + aside, e) if s.phase < 2 else (x, e + aside)

@@ -1,0 +1,129 @@
+"""The floor of the elevation over the azimuth, for every mode: straight lines through the points of a table.
+
+Where the floor rises, the elevation does before the azimuth goes there, and the azimuth waits in front of it.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.servo.ends import Ends, braking_distance
+from pedestal_common.compiled import compiled
+from pedestal_common.parameters import ParameterError
+
+MOST = 64
+DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
+       'clockwise within a turn, straight lines between; empty: elevation.limits.low')
+
+CELLS = 720
+"""Of a turn, in which the floor is looked up: half a degree."""
+
+CELL = 2.0 * math.pi / CELLS
+
+FLOOR = np.dtype([('given', 'i8'), ('highest', 'f8', (CELLS,))], align=True)
+"""given: whether there is one; highest: of the floor in each cell [rad], that of azimuth 0 to CELL first."""
+
+FAR = 1e3
+"""Azimuth [rad] that no travel holds: an infinite one has no cell, its conversion to a whole number is undefined."""
+
+ALLOWANCE = 1e-3
+"""Elevation [rad] by which the floor is cleared, so that the azimuth does not wait for the last encoder step."""
+
+
+def points(text):
+    """Azimuths and elevations (n,) [rad] of a text as in DOC, ((), ()) of an empty one. Raises ParameterError."""
+    parts = [part.split() for part in text.split(';') if part.strip()]
+    if len(parts) > MOST:
+        raise ParameterError(f'floor = {text!r}: {len(parts)} points; must be at most {MOST}')
+    try:
+        rows = [(float(azimuth), float(elevation)) for azimuth, elevation in parts]
+    except ValueError:
+        raise ParameterError(f'floor = {text!r}: must be azimuth elevation [rad], separated by semicolons') from None
+    A, f = zip(*rows) if rows else ((), ())
+    if rows and not (all(a < b for a, b in zip(A, A[1:])) and A[-1] - A[0] < 2.0 * math.pi
+                     and all(abs(a) <= 2.0 * math.pi and abs(e) <= 0.5 * math.pi for a, e in rows)):
+        raise ParameterError(f'floor = {text!r}: azimuths must grow, within one turn and 6.2832 rad, elevations be '
+                             'within 1.5708 rad')
+    return A, f
+
+
+def at(text, A):
+    """The floor of a text as in DOC at an azimuth [rad]; -inf where there is none."""
+    azimuths, elevations = points(text)
+    return np.interp(A, azimuths, elevations, period=2.0 * math.pi) if azimuths else -math.inf
+
+
+def table(text) -> np.ndarray:
+    """FLOOR (1,) of a text as in DOC: in each cell the highest of its ends and of the points in it."""
+    A, f = points(text)
+    floor = np.zeros(1, FLOOR)
+    if A:
+        edges = np.interp(CELL * np.arange(CELLS + 1), A, f, period=2.0 * math.pi)
+        highest = np.maximum(edges[:-1], edges[1:])
+        np.maximum.at(highest, (np.mod(A, 2.0 * math.pi) / CELL).astype(int) % CELLS, f)
+        floor['given'], floor['highest'] = 1, highest
+    return floor
+
+
+@compiled
+def _cell(A):
+    """The cell of an azimuth [rad], not yet brought into one turn; one beyond every travel counts as FAR away."""
+    return math.floor(min(max(A, -FAR), FAR) / CELL)
+
+
+@compiled
+def highest(floor, A, B):
+    """The highest of the floor [rad] between two azimuths [rad]."""
+    first, last = _cell(min(A, B)), _cell(max(A, B))
+    top = -math.inf
+    for i in range(first, min(last, first + CELLS - 1) + 1):
+        top = max(top, floor.highest[i % CELLS])
+    return top
+
+
+@compiled
+def above(floor, A, E):
+    """Whether the floor is above an elevation at an azimuth [rad]."""
+    return floor.given != 0 and floor.highest[_cell(A) % CELLS] > E
+
+
+@compiled
+def of_azimuth(floor, limits, A, E):
+    """Ends of the azimuth at A: its limits, or where the floor gets above the elevation E [rad]. Where it is above it
+    already, the azimuth may leave."""
+    if not floor.given or above(floor, A, E):
+        return Ends(limits.low, limits.high)
+    first = last = _cell(A)
+    while last - first < CELLS and floor.highest[(first - 1) % CELLS] <= E and first * CELL > limits.low:
+        first -= 1
+    while last - first < CELLS and floor.highest[(last + 1) % CELLS] <= E and (last + 1) * CELL < limits.high:
+        last += 1
+    if last - first >= CELLS:
+        return Ends(limits.low, limits.high)
+    return Ends(max(limits.low, first * CELL), min(limits.high, (last + 1) * CELL))
+
+
+@compiled
+def of_elevation(floor, limits, A, ahead, target):
+    """Ends of the elevation at azimuth A: above the floor from there to where the azimuth stops, `ahead`, and to its
+    target [rad]."""
+    if not floor.given:
+        return Ends(limits.low, limits.high)
+    top = max(highest(floor, A, ahead), highest(floor, A, target)) + ALLOWANCE
+    return Ends(max(limits.low, min(top, limits.high)), limits.high)
+
+
+@compiled
+def ends(c, u, azimuth):
+    """(Ends of the azimuth, of the elevation) now, with the azimuth on its way to an angle [rad]. c, u: constants and
+    inputs of the control unit."""
+    a, e, A, dA = c.axis[0].p.limits, c.axis[1].p.limits, u.position[0], u.velocity[0]
+    ahead = A + math.copysign(braking_distance(abs(dA), c.axis[0].braking, c.axis[0].reaction), dA)
+    return of_azimuth(c.floor, a, A, u.position[1]), of_elevation(c.floor, e, A, ahead, azimuth)
+
+
+@compiled
+def by_hand(c, u, azimuth):
+    """Ends of a point that is moved by hand, now at an azimuth [rad]: as of `ends`, but that the azimuth goes on where
+    the elevation can rise above the floor."""
+    _, of_elevation_now = ends(c, u, azimuth)
+    return of_azimuth(c.floor, c.axis[0].p.limits, u.position[0], c.axis[1].p.limits.high), of_elevation_now

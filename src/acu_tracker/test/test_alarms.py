@@ -1,0 +1,300 @@
+"""What raises the alarms, from the laws to the whole control unit, and what an operator can do about them."""
+import math
+
+import numpy as np
+import pytest
+
+from acu_tracker import signals, supervision
+from acu_tracker.alarms import annunciator, conditions, detectors, machine, report, table
+from acu_tracker.modes import MODES, PRESET, STANDBY
+from acu_tracker.params import AcuParameters
+from acu_tracker.unit import ALARMS, DRIVE, JOINTS, Acu
+from pedestal_common.commands import Command
+from pedestal_common.parameters import build
+
+T = 0.005
+
+
+def detector():
+    d = np.zeros(1, detectors.AXIS)
+    return d[0]
+
+
+def encoders(d, y, dy):
+    """(jumps, stuck) over angles and motors' rates (n,)."""
+    found = []
+    detectors.initialise(d, y[0], dy[0])
+    for angle, rate in zip(y[1:], dy[1:]):
+        found.append((detectors.encoder_jump(d, angle, rate, T), detectors.encoder_stuck(d, angle, rate, T)))
+        d['y'], d['dy'] = angle, rate
+    return np.array(found).T
+
+
+@pytest.mark.parametrize('rate', (0.0, 0.01, -2.0))
+def test_a_jump_of_the_encoder_is_seen_in_its_step(rate):
+    t = T * np.arange(200)
+    y = rate * t
+    assert not encoders(detector(), y, np.full(200, rate)).any()
+    y[120:] += 0.004
+    jumps, stuck = encoders(detector(), y, np.full(200, rate))
+    assert np.flatnonzero(jumps).tolist() == [119] and not stuck.any()
+
+
+def test_an_acceleration_is_no_jump():
+    t = T * np.arange(200)
+    assert not encoders(detector(), 10.0 * t * t, 20.0 * t).any()
+
+
+@pytest.mark.parametrize(('share', 'lash', 'expected'), ((1.0, 1e-3, False), (0.9, 0.0, True), (-1.0, 0.0, True)))
+def test_encoder_and_motors_that_go_different_ways_disagree(share, lash, expected):
+    d, t = detector(), T * np.arange(2000)
+    y, dy = share * 0.1 * t + lash * np.sign(np.sin(t)), np.full(2000, 0.1)
+    detectors.initialise(d, y[0], dy[0])
+    found = []
+    for angle, rate in zip(y[1:], dy[1:]):
+        found.append(detectors.disagreement(d, angle, rate, T))
+        d['y'], d['dy'] = angle, rate
+    assert any(found) == expected
+
+
+@pytest.mark.parametrize('rate', (0.004, -0.5))
+def test_an_encoder_that_stands_while_the_motors_turn_is_stuck(rate):
+    t = T * np.arange(1000)
+    y = rate * np.minimum(t, 2.0)
+    _, stuck = encoders(detector(), y, np.full(1000, rate))
+    found = np.flatnonzero(stuck)[0] * T
+    assert 2.0 < found < 2.0 + 2.1 * detectors.LOOK / abs(rate) + 0.01
+    assert not encoders(detector(), 1e-5 * np.sin(t), np.zeros(1000)).any()
+
+
+@pytest.mark.parametrize(('dy', 'high', 'low', 'expected'), (
+    (0.0, 0.1, 0.1, True), (0.02, 0.1, 0.1, False), (-0.1, 0.1, 0.1, False), (-0.005, 0.1, 0.1, True),
+    (0.0, 0.1, 0.0, False),
+    (0.0, 0.0, -0.1, False), (0.0, -0.05, -0.1, True), (-0.05, -0.05, -0.1, False), (0.0, 0.004, 0.004, False)))
+def test_who_is_told_to_move_must(dy, high, low, expected):
+    assert detectors.immobile(detector(), dy, high, low) == expected
+
+
+@pytest.mark.parametrize(('dy', 'high', 'low', 'expected'), (
+    (0.1, 0.0, -0.1, True), (-0.1, 0.1, 0.0, True), (0.1, 0.1, 0.0, False), (0.1, 0.0, 0.0, False),
+    (0.01, 0.0, -0.1, False), (-0.1, 0.1, -0.1, False)))
+def test_against_the_commands(dy, high, low, expected):
+    assert detectors.against(dy, high, low, 0.05) == expected
+
+
+@pytest.mark.parametrize(('frequency', 'amplitude', 'expected'), (
+    (3.0, 2e-3, True), (8.0, 5e-3, True), (0.3, 2e-2, False), (3.0, 1e-4, False)))
+def test_oscillation_is_fast_and_more_than_noise(frequency, amplitude, expected):
+    d = detector()
+    found = [detectors.oscillation(d, e, T) for e in amplitude * np.sin(2 * np.pi * frequency * T * np.arange(4000))]
+    assert found[-1] == expected
+    still = [detectors.oscillation(d, 0.0, T) for _ in range(2000)]
+    assert not still[-1]
+
+
+def test_noise_is_no_oscillation():
+    d = detector()
+    assert not any(detectors.oscillation(d, e, T) for e in 1e-3 * np.random.default_rng(1).standard_normal(20_000))
+
+
+def alarms(rig):
+    return rig.state['supervision'][0]['alarms']
+
+
+def told(rig):
+    """Names of the alarms that are there."""
+    return {table.NAMES[i] for i in report.order(alarms(rig)) if alarms(rig)['alarm'][i]['active']}
+
+
+def annunciated(rig):
+    return [table.NAMES[i] for i in report.annunciated(alarms(rig))]
+
+
+@pytest.fixture(name='moving')
+def _moving(Rig):
+    """In a preset 0.5 rad away, on the way."""
+    rig = Rig(initial_mode='preset', **{'azimuth.preset': 1.5, 'elevation.preset': 1.0, 'azimuth.shaper.rate': 0.2,
+                                        'elevation.shaper.rate': 0.2})
+    rig.run(1.0)
+    assert rig.mode == 'preset' and abs(rig.velocity[0]) > 0.1 and not told(rig)
+    return rig
+
+
+def test_nothing_is_wrong_with_a_good_axis(Rig):
+    rig = Rig(Rig.moving, attitude=Rig.rolling, stabilised=True, initial_mode='autotrack', at=(0.5, 0.6), **Rig.QUICK)
+    rig.inputs['error_came'] = 1
+    rig.run(10.0)
+    assert rig.mode == 'autotrack' and report.listed(alarms(rig)) == []
+    assert rig.outputs['alarms'][0] == 1
+
+
+def test_a_jump_of_the_encoder_is_latched_and_its_error_stands_under_it(moving):
+    moving.angle = moving.angle + (0.05, 0.0)
+    moving.run(0.1)
+    assert annunciated(moving) == ['azimuth encoder jump'] and 'azimuth encoder disagreement' in told(moving)
+    moving.run(20.0)
+    i = table.INDEX['azimuth encoder jump']
+    assert alarms(moving)['alarm'][i]['state'] == machine.LATCHED_UNACKNOWLEDGED
+    assert supervision.reset(moving.state[0]) == annunciator.NONE
+    assert alarms(moving)['alarm'][i]['state'] == machine.RETURNED and moving.mode == 'preset'
+
+
+def test_an_axis_that_does_not_move_and_one_that_pushes(moving):
+    for torque, expected in ((0.0, 'azimuth immobile'), (5000.0, 'azimuth brake not released')):
+        for _ in range(400):
+            moving.velocity[0] = 0.0
+            moving.angle[0] = 0.6
+            moving.step(torque=(torque, 0.0))
+        assert annunciated(moving) == [expected], expected
+    assert told(moving) >= {'azimuth immobile', 'azimuth brake not released'}
+
+
+def test_brakes_that_do_not_hold(Rig):
+    rig = Rig()
+    rig.run(1.0)
+    rig.run(2.0, drive_ready=0, drive=signals.DRIVE_STATES.index('disabled'))
+    assert not told(rig)
+    for _ in range(400):
+        rig.velocity[:] = 0.01, 0.0
+        rig.step(drive_ready=0)
+    assert 'azimuth brake not gripping' in told(rig) and 'elevation brake not gripping' not in told(rig)
+
+
+def test_a_runaway_is_the_first_and_what_it_leads_to_stands_under_it(moving):
+    for _ in range(40):
+        moving.velocity[0] = -0.3
+        moving.angle[0] -= 0.3 * T
+        moving.step()
+    assert annunciated(moving) == ['azimuth runaway'] and 'moves unasked' in told(moving)
+    assert (moving.mode, moving.reason) == ('standby', 'moves unasked')
+    assert table.NAMES[supervision.reset(moving.state[0])] == 'moves unasked'
+    moving.velocity[:] = 0.0
+    moving.run(0.5)
+    assert table.NAMES[supervision.reset(moving.state[0])] == 'azimuth runaway'        # its time off is not over
+    moving.run(1.0)
+    assert supervision.reset(moving.state[0]) == annunciator.NONE and not moving.state['unasked']['moves']
+    moving.run(1.0)
+    assert moving.mode == 'standby' and np.abs(moving.velocity).max() == 0.0
+    assert moving.ask(PRESET)
+
+
+def test_reset_forgets_a_mode_that_waited(Rig):
+    rig = Rig(initial_mode='autotrack')
+    rig.receiver_on = False
+    rig.run(1.0)
+    rig.angle = rig.angle + (0.05, 0.0)
+    rig.run(8.0)
+    rig.ask(STANDBY)
+    assert supervision.reset(rig.state[0]) == annunciator.NONE
+    rig.receiver_on = True
+    rows = rig.run(3.0)
+    assert rig.mode == 'standby' and not rows[:, :2].any()
+
+
+def test_receiver_and_ins_are_missed(Rig):
+    rig = Rig(attitude=Rig.rolling, stabilised=True, initial_mode='autotrack', at=(0.5, 0.6), **Rig.QUICK)
+    rig.run(2.0, error_came=1)
+    assert rig.mode == 'autotrack'
+    rig.receiver_on = False
+    rig.run(2.0, error_came=0)
+    assert told(rig) == {'receiver silent', 'signal lost'} and annunciated(rig) == ['receiver silent']
+    rig.run(0.5, attitude_valid=0)
+    assert 'INS lost' in told(rig) and rig.mode == 'standby'
+
+
+def test_a_gap_between_steps_is_a_time_jump(moving):
+    moving.k += 20
+    moving.step()
+    assert told(moving) == {'time jump'}
+    moving.k += 100
+    moving.step()
+    assert told(moving) == {'time jump', 'drive silent'} and annunciated(moving) == ['drive silent']
+
+
+@pytest.mark.parametrize(('text', 'expected'), (
+    ('enabled: azimuth motor lost', {'azimuth motor lost'}),
+    ('enabled: elevation motor lost', {'elevation motor lost'}),
+    ('enabled: azimuth and elevation motor lost', {'azimuth motor lost', 'elevation motor lost'}),
+    ('emergency stop', {'emergency stop'}), ('fault: azimuth overspeed', {'drive fault'}), ('stopping', set()),
+    ('enabled', set())))
+def test_what_the_drive_says_itself(text, expected):
+    acu = Acu(build(AcuParameters, {}), (JOINTS, DRIVE))
+    acu.take_text(DRIVE, text)
+    step(acu, 3)
+    assert names(acu) == expected
+    details = {status.name: value.value for status in list_of(acu).status for value in status.values
+               if value.key == 'detail'}
+    assert set(details.values()) <= {text}
+
+
+def step(acu, count):
+    for _ in range(count):
+        stamp = int(acu.inputs[0][JOINTS]['stamp']) + 5_000_000 if acu.inputs[0][JOINTS]['stamp'] >= 0 else 0
+        acu.inputs[0][JOINTS]['stamp'] = stamp
+        acu.step(np.array([stamp]), acu.inputs, acu.outputs)
+
+
+def list_of(acu):
+    return acu.encode(ALARMS, int(acu.outputs[0][ALARMS]))
+
+
+def names(acu):
+    return {status.name for status in list_of(acu).status}
+
+
+def test_commands_and_services():
+    acu = Acu(build(AcuParameters, {}), (JOINTS, DRIVE))
+    acu.take_text(DRIVE, 'fault: azimuth overspeed')
+    step(acu, 3)
+    assert not acu.command(Command('acknowledge', 'page', '1', {'alarm': 'drive falt'})).granted
+    assert "did you mean 'drive fault'" in acu.answered[-1][1].text
+    assert acu.command(Command('acknowledge', 'page', '2', {'alarm': 'drive_fault'})) == (True, 'acknowledged')
+    assert not acu.request('acu/acknowledge').granted
+    why = {'alarm': 'drive fault', 'seconds': '60', 'reason': 'in repair'}
+    assert not acu.command(Command('shelve', 'page', '3', {**why, 'seconds': '-1'})).granted
+    assert not acu.command(Command('shelve', 'page', '4', {'alarm': 'drive fault', 'seconds': '60'})).granted
+    assert acu.command(Command('shelve', 'page', '5', why)).granted
+    [status] = list_of(acu).status
+    values = {value.key: value.value for value in status.values}
+    assert (values['state'], values['shelved_reason'], status.level) == ('shelved', 'in repair', 0)
+    assert acu.command(Command('unshelve', 'page', '6', {'alarm': 'drive fault'})).granted
+    assert not acu.command(Command('unshelve', 'page', '7', {'alarm': 'drive fault'})).granted
+    step(acu, 1)
+    assert names(acu) == {'drive fault'} and acu.request('acu/acknowledge').granted
+    acu.take_text(DRIVE, 'enabled')
+    step(acu, 1)
+    assert names(acu) == set() and acu.command(Command('reset', 'page', '8')) == (True, 'cleared')
+
+
+def test_a_schedule_obeys_alarm_verbs():
+    schedule = '0.01 shelve alarm=INS_lost seconds=5 reason=tests; 0.02 reset'
+    acu = Acu(build(AcuParameters, {'commands': schedule}), (JOINTS,))
+    step(acu, 6)
+    assert names(acu) == {'INS lost'} and [reply.granted for _, reply in acu.answered] == [True, True]
+
+
+def test_the_silence_of_the_drive_is_told_without_a_step():
+    acu = Acu(build(AcuParameters, {}), (JOINTS,))
+    acu.silent = True
+    assert names(acu) == {'drive silent'}
+    acu.silent = False
+    step(acu, 300)
+    assert not acu.silent and names(acu) == {'drive silent'}
+    assert acu.request('acu/acknowledge').granted and names(acu) == set()
+
+
+def test_an_invalid_encoder_is_no_jump(moving):
+    moving.step(position=(math.nan, moving.angle[1]))
+    moving.run(0.5)
+    assert not any('encoder' in name for name in told(moving)) and MODES[0] == moving.mode
+    assert np.isfinite(moving.state['supervision']['axis']['y']).all()
+
+
+def test_an_array_has_no_motors(Rig):
+    rig = Rig(initial_mode='preset', **{'azimuth.controller': 'beam', 'elevation.controller': 'beam'})
+    rig.angle = rig.angle + 0.05
+    rig.run(2.0)
+    assert not told(rig)
+    state = alarms(rig)['alarm'][table.INDEX['azimuth encoder jump']]['state']
+    assert state == machine.SUPPRESSED
+    assert conditions.OFF_TIME > 0.0

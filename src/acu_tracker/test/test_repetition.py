@@ -1,0 +1,20 @@
+"""Whether the receiver says the same while the beam moves."""
+import numpy as np
+
+from acu_tracker import signals
+from acu_tracker.estimation import repetition
+from acu_tracker.geometry.encoders import Pointing
+
+
+def test_the_same_numbers_count_once_the_beam_has_moved_and_until_they_change():
+    s, u = np.zeros(1, repetition.REPETITION)[0], np.zeros(1, signals.INPUTS)[0]
+    u['cross_elevation'], u['elevation'], u['cn0_dbhz'] = 1e-4, -2e-5, 46.0
+
+    def said(A, E):
+        return repetition.take(s, u, Pointing(A, E, 0.0, 0.0))
+
+    assert not any(said(0.5, 0.6) for _ in range(1000))
+    assert not said(0.5 + 0.9 * repetition.LOOK, 0.6 - 0.9 * repetition.LOOK)
+    assert said(0.5, 0.6 - 1.1 * repetition.LOOK) and said(0.5 + 1.1 * repetition.LOOK, 0.6)
+    u['cn0_dbhz'] = 46.1
+    assert not said(0.7, 0.6) and not said(0.7, 0.6) and said(0.8, 0.6)

@@ -1,0 +1,261 @@
+"""The laws of the drive on many drives at once, from the same source: records beside each other on lanes.
+
+A record of 8-byte numbers becomes rows of one flat array, row r of lane i at r WIDTH + i (a structure of arrays). A
+law that works on the attributes of a record, `s.omega += c.h * a`, compiles for one Lane as it stands; inlined into a
+loop over the lanes, LLVM turns it into vector instructions, which have the bits of the scalar ones. What works on
+records and on Lanes alike goes over them by
+
+    for i in range(count(s)):
+        law(at(s, i), at(c, i))
+
+where count of a record is 1, and at gives it back. Nothing is boxed: Lanes exist in compiled code only, as pointers
+into the array that `view` was given, which must outlive them.
+"""
+import hashlib
+import operator
+
+import numba
+import numpy as np
+from numba.core import types
+from numba.core.datamodel.models import PointerModel
+from numba.core.errors import NumbaTypeError
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
+from numba.extending import (
+    intrinsic,
+    lower_builtin,
+    lower_getattr_generic,
+    lower_setattr_generic,
+    register_model,
+    type_callable,
+)
+
+from pedestal_common.compiled import compiled
+
+WIDTH = 32
+"""Lanes of an array. With 16 LLVM does not vectorise, 64 need more of the nearest cache than there is."""
+
+WORD = 8
+"""Bytes of every number."""
+
+
+def inlined(law):
+    """Decorator of a law of a sub-step: `compiled`, and made part of whoever calls it, without which no loop over
+    lanes becomes vectors."""
+    dispatcher = compiled(law)
+    dispatcher.targetoptions['forceinline'] = True
+    return dispatcher
+
+
+class _Place(types.Type):
+    """A pointer to the first word of something in one lane. known: ((attribute, number), ...) that are the same in all
+    lanes and constants of the compiled code."""
+    dtype = types.float64
+
+    def __init__(self, what, known):
+        self.what, self.known = what, known
+        digest = hashlib.sha256(f'{what} {known}'.encode()).hexdigest()[:16]
+        super().__init__(f'{type(self).__name__}_{digest}')
+
+
+class Lane(_Place):
+    """One lane of a record; what: its types.Record."""
+
+
+class Lanes(_Place):
+    """All lanes of a record; what: its types.Record."""
+
+
+class LaneArray(_Place):
+    """One lane of an array; what: its types.NestedArray."""
+
+
+for place in (Lane, Lanes, LaneArray):
+    register_model(place)(PointerModel)
+
+
+def count(records):
+    """How many records there are: 1 of a record, WIDTH of Lanes; constant in compiled code."""
+    return 1
+
+
+def at(records, i):
+    """Record i of Lanes, or the record itself."""
+    return records
+
+
+@type_callable(count)
+def _type_count(context):
+    return lambda records: types.intp if isinstance(records, (types.Record, Lanes)) else None
+
+
+@lower_builtin(count, types.Record)
+@lower_builtin(count, Lanes)
+def _count(context, builder, signature, args):
+    return context.get_constant(types.intp, WIDTH if isinstance(signature.args[0], Lanes) else 1)
+
+
+@type_callable(at)
+def _type_at(context):
+    def typer(records, i):
+        if isinstance(records, Lanes):
+            return Lane(records.what, records.known)
+        return records if isinstance(records, types.Record) else None
+    return typer
+
+
+@lower_builtin(at, types.Record, types.Integer)
+@lower_builtin(at, Lanes, types.Integer)
+def _at(context, builder, signature, args):
+    records, i = signature.args
+    if isinstance(records, types.Record):
+        return args[0]
+    return builder.gep(args[0], [context.cast(builder, args[1], i, types.intp)], inbounds=True)
+
+
+def _member(place, attribute):
+    """The type of an attribute of a Lane or of Lanes."""
+    field = place.what.typeof(attribute)
+    if isinstance(field, types.Record):
+        return type(place)(field, place.known)
+    number = field.dtype if isinstance(field, types.NestedArray) else field
+    if not isinstance(number, types.Record) and number.bitwidth != 8 * WORD:
+        raise NumbaTypeError(f'{attribute} is {number}: numbers on lanes have {WORD} bytes')
+    return LaneArray(field, place.known) if isinstance(field, types.NestedArray) else field
+
+
+def _further(context, builder, pointer, words):
+    """A pointer some words, a constant or a value, further down its lane."""
+    if isinstance(words, int):
+        return builder.gep(pointer, [context.get_constant(types.intp, words * WIDTH)], inbounds=True)
+    rows = builder.mul(words, context.get_constant(types.intp, WIDTH))
+    return builder.gep(pointer, [rows], inbounds=True)
+
+
+def _word(context, builder, pointer, field):
+    """A pointer as one to a number of a type."""
+    return builder.bitcast(pointer, context.get_data_type(field).as_pointer())
+
+
+class _Attributes(AttributeTemplate):
+    def generic_resolve(self, place, attribute):
+        """The type of an attribute; a number has no meaning in all Lanes at once."""
+        if attribute in place.what.fields:
+            member = _member(place, attribute)
+            return member if isinstance(place, Lane) or isinstance(member, Lanes) else None
+
+
+for place in (Lane, Lanes):
+    infer_getattr(type(f'{place.__name__}Attributes', (_Attributes,), {'key': place}))
+
+
+@lower_getattr_generic(Lane)
+@lower_getattr_generic(Lanes)
+def _get(context, builder, place, value, attribute):
+    member, known = _member(place, attribute), dict(place.known)
+    if attribute in known and not isinstance(member, _Place):
+        return context.get_constant(member, known[attribute])
+    pointer = _further(context, builder, value, place.what.offset(attribute) // WORD)
+    return pointer if isinstance(member, _Place) else builder.load(_word(context, builder, pointer, member))
+
+
+@lower_setattr_generic(Lane)
+def _set(context, builder, signature, args, attribute):
+    place, given = signature.args
+    member = _member(place, attribute)
+    pointer = _further(context, builder, args[0], place.what.offset(attribute) // WORD)
+    builder.store(context.cast(builder, args[1], given, member), _word(context, builder, pointer, member))
+
+
+def _indices(index):
+    """The types of the indices of a getitem or setitem."""
+    return tuple(index) if isinstance(index, types.BaseTuple) else (index,)
+
+
+def _item(array, index):
+    """(type of an item of a LaneArray, of its index); None for what is no item."""
+    nested, indices = array.what, _indices(index)
+    if len(indices) > nested.ndim or not all(isinstance(i, types.Integer) for i in indices):
+        return None
+    left = nested.shape[len(indices):]
+    item = LaneArray(types.NestedArray(nested.dtype, left), array.known) if left else (
+        Lane(nested.dtype, array.known) if isinstance(nested.dtype, types.Record) else nested.dtype)
+    kind = types.UniTuple(types.intp, len(indices)) if isinstance(index, types.BaseTuple) else types.intp
+    return item, kind
+
+
+@infer_global(operator.getitem)
+class _GetItem(AbstractTemplate):
+    def generic(self, args, keywords):
+        array, index = args
+        found = _item(array, index) if isinstance(array, LaneArray) else None
+        return signature(found[0], array, found[1]) if found else None
+
+
+@infer_global(operator.setitem)
+class _SetItem(AbstractTemplate):
+    def generic(self, args, keywords):
+        array, index, _ = args
+        found = _item(array, index) if isinstance(array, LaneArray) else None
+        if found and not isinstance(found[0], _Place):
+            return signature(types.none, array, found[1], found[0])
+
+
+def _item_pointer(context, builder, array, index_type, pointer, index):
+    """A pointer to an item of a LaneArray."""
+    many = isinstance(index_type, types.BaseTuple)
+    indices = tuple(builder.extract_value(index, i) for i in range(len(index_type))) if many else (index,)
+    shape, words = array.what.shape, context.get_constant(types.intp, 0)
+    size = array.what.dtype.size // WORD if isinstance(array.what.dtype, types.Record) else 1
+    for i, n in zip((*indices, *(None,) * (len(shape) - len(indices))), shape):
+        words = builder.mul(words, context.get_constant(types.intp, n))
+        words = words if i is None else builder.add(words, i)
+    return _further(context, builder, pointer, builder.mul(words, context.get_constant(types.intp, size)))
+
+
+@lower_builtin(operator.getitem, LaneArray, types.Any)
+def _get_item(context, builder, signature, args):
+    array, index = signature.args
+    pointer = _item_pointer(context, builder, array, index, *args)
+    item = signature.return_type
+    return pointer if isinstance(item, _Place) else builder.load(_word(context, builder, pointer, item))
+
+
+@lower_builtin(operator.setitem, LaneArray, types.Any, types.Any)
+def _set_item(context, builder, signature, args):
+    array, index, item = signature.args
+    pointer = _item_pointer(context, builder, array, index, *args[:2])
+    builder.store(args[2], _word(context, builder, pointer, item))
+    return context.get_dummy_value()
+
+
+def view(dtype, known=()):
+    """A function for compiled code: the Lanes of records of this type in a flat array, as `beside` lays them.
+
+    known: {attribute: number} of flags, wherever in the record they stand, that have this number in every lane; the
+    code is compiled without what they switch off.
+    """
+    lanes = Lanes(numba.from_dtype(dtype), tuple(sorted(dict(known).items())))
+
+    @intrinsic
+    def of(typing_context, flat):
+        def pointer(context, builder, signature, args):
+            return context.make_array(signature.args[0])(context, builder, value=args[0]).data
+        return lanes(flat), pointer
+    return of
+
+
+def beside(records):
+    """Records (n,), n <= WIDTH, as the flat array (words WIDTH,) of their Lanes; lanes beyond n hold the last one."""
+    words = _words(records)
+    lane = np.minimum(np.arange(WIDTH), len(records) - 1)
+    return np.ascontiguousarray(words[lane].T).reshape(-1)
+
+
+def take_back(flat, records):
+    """Put the first lanes of a flat array into records (n,)."""
+    _words(records)[...] = flat.reshape(-1, WIDTH).T[:len(records)]
+
+
+def _words(records):
+    """View (n, words) of contiguous records (n,), each a row of 8-byte words."""
+    return records.view(np.float64).reshape(len(records), -1)

@@ -1,0 +1,96 @@
+"""Trials: a scenario many times, its results as arrays."""
+from __future__ import annotations
+
+import pathlib
+import tempfile
+from collections.abc import Mapping
+
+import numpy as np
+
+from pedestal.scenario import Scenario
+from pedestal_bringup.trials import comparison, ensemble, monte_carlo, statistics
+from pedestal_bringup.trials import plan as plans
+from pedestal_bringup.trials import table as tables
+
+
+def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None = None, *, sobol: bool = False,
+           workers: int | None = None, folder: str | pathlib.Path | None = None) -> Trials:
+    """Make trials of a scenario, each with a seed of its own.
+
+    runs: how many; vary: {'node.key': distribution}: uniform(low, high), normal(mean, sigma) or choice(a, b, ...),
+    with an x behind it a factor of what the scenario says; sobol: the points of a Sobol sequence in the place of
+    independent draws; workers: processes, None for one per core; folder: keeps the table, so that a call that was
+    stopped goes on. Raises ValueError, one line, before anything runs.
+
+    >>> scenario = pedestal.load('leo_pass', duration=4.0)
+    >>> made = pedestal.trials(scenario, 3, {'adu.azimuth.load.inertia': 'normal(1, 0.1)x'}, workers=1)
+    >>> made['pointing_rms_deg'].shape, made.parameters['adu.azimuth.load.inertia'].shape
+    ((3,), (3,))
+    """
+    plan = plans.plan(scenario.source, runs, [f'{name}={text}' for name, text in (vary or {}).items()],
+                      scenario.overrides, scenario.given_seed, scenario.given_duration, sobol)
+    with tempfile.TemporaryDirectory() as temporary:
+        with ensemble.table(plan, folder or temporary) as table, monte_carlo.Pool(workers) as pool:
+            ensemble.make([plan], [table], pool)
+    return Trials(plan, table)
+
+
+class Trials(Mapping[str, np.ndarray]):
+    """Trials: made[result] is the array (runs,) of a result, NaN in a trial in which it was not measured."""
+
+    def __init__(self, plan: plans.Plan, table: tables.Table) -> None:
+        self._plan, self._table = plan, table
+
+    def __getitem__(self, result: str) -> np.ndarray:
+        if result not in self._table.there:
+            raise KeyError(f'no trial has {result!r}; there are {", ".join(self._table.there)}')
+        return self._table.column(result)
+
+    def __iter__(self):
+        return iter(self._table.there)
+
+    def __len__(self) -> int:
+        return len(self._table.there)
+
+    @property
+    def seeds(self) -> np.ndarray:
+        """Seeds (runs,) of the trials."""
+        return self._table.column('seed').astype(int)
+
+    @property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """{'node.key': values (runs,)} of what was varied; of texts the place of each in order of appearance."""
+        return {name: self._table.column(name) for name in self._table.varied}
+
+    @property
+    def units(self) -> dict[str, str]:
+        """{result: unit}."""
+        return {name: statistics.unit(name) for name in self}
+
+    def summary(self) -> list[dict]:
+        """The rows of `pedestal trials --json`: percentiles, rates and sensitivities with their intervals.
+
+        >>> rows = pedestal.trials(pedestal.load('leo_pass', duration=4.0), 2, workers=1).summary()
+        >>> {row['metric']: row['value'] for row in rows}['tracked/rate']
+        100.0
+        """
+        case = self._plan.name
+        return [*statistics.of_results(case, self._table), *statistics.of_questions(case, self._table),
+                *statistics.of_sensitivity(case, self._table)]
+
+    def worst(self, by: str = 'pointing_rms_deg', count: int = 10) -> list[str]:
+        """The commands that run the worst trials by a result in the graph, the worst first.
+
+        >>> pedestal.trials(pedestal.load('leo_pass', duration=4.0, seed=7), 1, workers=1).worst()
+        ['pedestal run leo_pass --seed 7 --duration 4.0']
+        """
+        places = statistics.ranking(by, self[by])[:count].tolist()
+        return [self._plan.command(place) for place in places]
+
+    def against(self, other: Trials, by: str = 'pointing_rms_deg') -> str:
+        """One sentence on whether these trials or the others are better by a result, pair by pair. Raises ValueError
+        where their seeds differ."""
+        if not np.array_equal(self.seeds, other.seeds):
+            raise ValueError('the trials have different seeds, so they are no pairs')
+        names = comparison.names(self._plan, other._plan)
+        return comparison.sentence(comparison.Sides(*names, self._table, other._table), by)

@@ -1,0 +1,47 @@
+"""The figures of the report, panel by panel, on axes of the caller's."""
+from __future__ import annotations
+
+import functools
+import typing
+from collections.abc import Callable
+
+from pedestal_bringup.report import run_data, run_figures
+from pedestal_common.parameters import did_you_mean
+
+if typing.TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Panel(typing.NamedTuple):
+    """draw(axes, RunData); needs: what the RunData must not lack; polar: whether it takes polar axes."""
+    draw: Callable[[Axes, run_data.RunData], None]
+    needs: tuple[str, ...]
+    polar: bool = False
+
+
+PANELS: dict[str, Panel] = {
+    'pointing cross-elevation': Panel(functools.partial(run_figures.draw_pointing, i=0), ('truth',)),
+    'pointing elevation': Panel(functools.partial(run_figures.draw_pointing, i=1), ('truth',)),
+    'error cross-elevation': Panel(functools.partial(run_figures.draw_errors, i=0), ('truth', 'lock')),
+    'error elevation': Panel(functools.partial(run_figures.draw_errors, i=1), ('truth', 'lock')),
+    'azimuth': Panel(run_figures.draw_azimuth, ('truth',)),
+    'torques azimuth': Panel(functools.partial(run_figures.draw_torques, axis='azimuth'), ('motors',)),
+    'torques elevation': Panel(functools.partial(run_figures.draw_torques, axis='elevation'), ('motors',)),
+    'carrier': Panel(run_figures.draw_carrier, ('receiver',)),
+    'sky': Panel(run_figures.draw_sky, ('truth',), polar=True),
+}
+"""{name: Panel}: what Run.plot draws."""
+
+
+def draw(name: str, axes: Axes, data: run_data.RunData) -> None:
+    """Draw a panel of PANELS on axes. Raises KeyError, ValueError."""
+    if name not in PANELS:
+        raise KeyError(f'no figure {name!r};{did_you_mean(name, PANELS)} there are {", ".join(PANELS)}')
+    panel = PANELS[name]
+    lack = data.lacks(panel.needs)
+    if lack:
+        raise ValueError(f'{name}: {lack}')
+    if panel.polar != (axes.name == 'polar'):
+        raise ValueError(f'{name}: must be drawn on {"polar" if panel.polar else "rectilinear"} axes, these are '
+                         f'{axes.name}')
+    panel.draw(axes, data)

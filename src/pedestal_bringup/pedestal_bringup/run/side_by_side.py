@@ -1,0 +1,135 @@
+"""The closed loops of trials of one scenario side by side: their drives on lanes, in one compiled call.
+
+The drive takes two thirds of the time of a closed loop; on lanes (adu_drive.lanes) it takes a quarter of that.
+Receivers and control units work one after the other, on the records and with the laws that they have alone, so that
+every number is equal to the last bit to that of closed_loop.Loop.
+"""
+import numpy as np
+
+from acu_tracker import unit as acu_unit
+from acu_tracker.program.program_track import ProgramTrack
+from acu_tracker.program.tables import Tables
+from adu_drive import lanes
+from adu_drive import unit as drive_unit
+from pedestal_bringup.run.closed_loop import STEP, TRUTH, Run
+from pedestal_common import records
+from pedestal_common.compiled import compiled
+from tracking_receiver_sim import unit as receiver_unit
+
+UNITS = {'adu': drive_unit.Adu, 'tracking_receiver': receiver_unit.TrackingReceiver, 'acu': acu_unit.Acu}
+"""The units of a loop ashore, of which each trial has its own."""
+
+FEWEST = 8
+"""Loops that are worth the lanes, most of which would be idle."""
+
+BLOCK = 50
+"""Steps of one call: what all trials say in them stays in the cache."""
+
+
+MEMORY = 2**30
+"""For what trials side by side keep [bytes]."""
+
+
+@compiled
+def _receiver_law(receivers, i, stamp, step):
+    """The step of receiver i."""
+    r = receivers
+    receiver_unit.law(receiver_unit.Memory(r.record[i:i + 1], r.breaks[i], r.coefficients[i], r.normals[i]), stamp,
+                      step, step)
+
+
+@compiled
+def _track(rows, ends, i):
+    """Track i of `_one_after_another`."""
+    return ProgramTrack(rows.times[ends[i]:ends[i + 1]], rows.angles[ends[i]:ends[i + 1]])
+
+
+@compiled
+def _acu_law(acus, ends, i, stamp, step):
+    """The step of control unit i."""
+    of_all = acus.tables
+    tables = Tables(_track(of_all.program, ends[0], i), _track(of_all.tle, ends[1], i), _track(of_all.sun, ends[2], i))
+    acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
+
+
+@compiled
+def _loop(drives, receivers, acus, ends, first, period_ns, steps):
+    """Steps first, first + 1 ... of every trial into steps[1:] (n + 1, trials) of STEP; steps[0]: the ones before.
+
+    drives: as of lanes.beside; receivers: a memory whose arrays have the trials as a further first dimension; acus,
+    ends: a memory whose tables are those of all trials, as `_one_after_another` gives them.
+    """
+    moving = drive_unit.LANES(drives)
+    for k in range(1, len(steps)):
+        stamp = (first + k - 1) * period_ns
+        drive_unit.law_of_lanes(moving, stamp, steps[k - 1], steps[k])
+        for i in range(steps.shape[1]):
+            _receiver_law(receivers, i, stamp, steps[k, i])
+            _acu_law(acus, ends, i, stamp, steps[k, i])
+
+
+def room(scenario, names):
+    """How many trials of a scenario.Scenario can run side by side, which keep the topics named; 0 where none can."""
+    if scenario.header.ship or scenario.header.beam:
+        return 0
+    steps = scenario.header.duration / scenario.node_parameters('adu').period
+    return min(lanes.WIDTH, int(MEMORY / (steps * records.of(*names).itemsize)))
+
+
+def fit(loops):
+    """Whether closed_loop.Loops can run side by side: of drives with motors ashore, alike in period, length and in the
+    shapes of what they work on."""
+    ours = all({name: type(unit) for name, unit in loop.units.items()} == UNITS and loop.units['adu'].fits_lanes
+               for loop in loops)
+    return FEWEST <= len(loops) <= lanes.WIDTH and ours and len(set(map(_shape, loops))) == 1
+
+
+def _shape(loop):
+    receiver = loop.units['tracking_receiver'].memory
+    constants = loop.units['adu'].parts['constants']
+    return (loop.period_ns, loop.steps, int(constants['speed_ticks']), int(constants['substeps']),
+            receiver.breaks.shape, receiver.coefficients.shape, receiver.normals.shape[1])
+
+
+def _stacked(units):
+    """The memories of units as one, and their records in it: each unit goes on with its own part of it."""
+    record = np.empty(len(units), units[0].memory.record.dtype)
+    for i, unit in enumerate(units):
+        record[i:i + 1] = unit.memory.record
+        unit.memory = unit.memory._replace(record=record[i:i + 1])
+    return record
+
+
+def _one_after_another(tracks):
+    """(the rows of ProgramTracks in one, where each ends (n + 1,), 0 first): they may differ in length."""
+    return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
+
+
+def runs(loops, names):
+    """The Run of each of some closed_loop.Loops that `fit`, of the topics named, without what no topic tells."""
+    drives, receivers, acus = ([loop.units[name] for loop in loops] for name in UNITS)
+    drive_record, receiver_record, acu_record = _stacked(drives), _stacked(receivers), _stacked(acus)
+    moving = lanes.beside(drive_record)
+    breaks, coefficients = (np.stack([getattr(unit.memory, name) for unit in receivers])
+                            for name in ('breaks', 'coefficients'))
+    period_ns, count = loops[0].period_ns, loops[0].steps
+    steps = records.empty(STEP, (BLOCK + 1) * len(loops)).reshape(BLOCK + 1, len(loops))
+    kept = np.zeros((len(loops), count), records.of(*names))
+    forecasts = [[] for _ in loops]
+    first = 0
+    while first < count:
+        for loop, told in zip(loops, forecasts):
+            loop.attend(first, told)
+        last = min(first + BLOCK, *(loop.free_until(first) for loop in loops))
+        blocks = [unit.block(last - first) for unit in receivers]
+        tables, ends = zip(*map(_one_after_another, zip(*(unit.memory.tables for unit in acus))))
+        _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
+                                           np.stack([block.normals for block in blocks])),
+              acu_unit.Memory(acu_record, Tables(*tables)), np.array(ends), first, period_ns,
+              steps[:last - first + 1])
+        kept[:, first:last] = steps[1:last - first + 1].T[list(names)]
+        steps[0] = steps[last - first]
+        first = last
+    lanes.take_back(moving, drive_record)
+    return [Run(steps, np.zeros(0, TRUTH), np.arange(count) * period_ns, loop.units, told)
+            for loop, steps, told in zip(loops, kept, forecasts)]

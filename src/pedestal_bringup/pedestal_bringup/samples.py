@@ -1,0 +1,84 @@
+"""Files to begin with: a flight, a ship's motion, a satellite and an antenna, made up by closed forms.
+
+Each has the form in which a user would bring his own; `pedestal samples` writes them.
+"""
+import math
+
+from tracking_receiver_sim.params import LeoPassParameters
+
+FEET = 0.3048
+TIMES = range(91)
+"""Of the flight [s]."""
+ADSB = 'timestamp,icao24,callsign,latitude,longitude,geoaltitude'
+
+
+def flight():
+    """ADS-B of a helicopter as CSV, one row a second: a turn of 2 km radius at 45 m/s that climbs at 2 m/s; rounded as
+    ADS-B is, to 1e-5 deg and 25 ft."""
+    rows = [ADSB]
+    for t in TIMES:
+        phase = 0.0225 * t
+        latitude, longitude = 47.40 + 0.018 * math.sin(phase), 8.50 + 0.0266 * math.cos(phase)
+        altitude = 25 * round((700.0 + 2.0 * t) / (25 * FEET))
+        rows.append(f'2026-05-04 10:{t // 60:02}:{t % 60:02}+00:00,4b1812,RGA3,'
+                    f'{latitude:.5f},{longitude:.5f},{altitude}')
+    return '\n'.join(rows) + '\n'
+
+
+def ship():
+    """Motion of a ship as CSV, four rows a second for 150 s: roll of 6 deg in 9 s, pitch of 2 deg in 7 s, yaw of 1 deg
+    in 13 s about a heading of 60 deg, heave of 1 m."""
+    rows = ['time_s,roll_deg,pitch_deg,heading_deg,heave_m']
+    for k in range(601):
+        t = 0.25 * k
+        roll, pitch, yaw, heave = (a * math.sin(2.0 * math.pi * t / period + phase) for a, period, phase in (
+            (6.0, 9.0, 0.0), (2.0, 7.0, 1.0), (1.0, 13.0, 2.0), (1.0, 8.0, 0.5)))
+        rows.append(f'{t:.2f},{roll:.4f},{pitch:.4f},{60.0 + yaw:.4f},{heave:.4f}')
+    return '\n'.join(rows) + '\n'
+
+
+def tle():
+    """The elements of the ISS on 2019-12-09 that the scenario leo_pass has too."""
+    return f'ISS (ZARYA)\n{LeoPassParameters().line_1}\n{LeoPassParameters().line_2}\n'
+
+
+ANTENNA = """\
+# An antenna of your own: what is not said here has its default; `pedestal parameters NODE` lists what there is.
+scenario:
+  ros__parameters:
+    title: the UAV through a heavier antenna with a narrower beam
+    duration: 60.0
+/**/tracking_receiver:
+  ros__parameters:
+    target:
+      kind: flyby
+    antenna:
+      beamwidth: 0.012        # half power [rad]; the control unit is told the same
+    receiver:
+      cn0_dbhz: 52.0          # on the beam axis at reference_range
+      reference_range: 600.0  # [m]
+/**/adu:
+  ros__parameters:
+    initial_elevation: 0.19   # [rad]
+    azimuth:
+      load:
+        inertia: 320.0        # of dish and yoke about the axis [kg m2]
+      speed_loop:
+        load_inertia: 320.0   # what the speed loop knows of it
+      gear_train:
+        lash: 0.0015          # of one mesh, on the load axis [rad]
+/**/acu:
+  ros__parameters:
+    initial_mode: program
+    azimuth:
+      feedforward:
+        inertia: 390.0        # load and motors together [kg m2]
+      shaper:
+        acceleration: 15.0    # [rad/s2]
+"""
+
+FILES = {'flight.csv': flight, 'ship.csv': ship, 'iss.tle': tle, 'my_antenna.yaml': lambda: ANTENNA}
+"""{name: function that gives its text}."""
+WHAT = {'flight.csv': flight.__doc__, 'ship.csv': ship.__doc__, 'iss.tle': tle.__doc__,
+        'my_antenna.yaml': 'A scenario: another antenna on the flight of uav_flyby.'}
+"""{name: sentence}."""

@@ -1,0 +1,32 @@
+"""A unit of simulated equipment: faults can be injected into it."""
+from pedestal_common.commands import Reply
+from pedestal_common.injection import schedule, table
+from pedestal_common.records import NEVER
+from pedestal_common.steps import SECOND
+from pedestal_common.unit import Unit
+
+
+class Simulated(Unit):
+    """A Unit whose record holds a schedule.SCHEDULE, `schedule`, that its law looks into, and whose parameters have
+    `inject`."""
+
+    def schedule(self):
+        return table.due(self.NODE.name, self.parameters.inject)
+
+    def obey(self, command, arguments):
+        """Inject a fault, from the next step on; the Reply names the stamp of the step before."""
+        part, node = self.parts['schedule'], self.NODE.name
+        since = '' if part['stamp'] == NEVER else f' from the step after {part["stamp"] / SECOND:.6f} s on'
+        if command.verb == table.CLEAR.name:
+            schedule.clear(part)
+            return Reply(True, f'no fault{since}')
+        refusal = self.lockstep and table.refused_in_lockstep(node, command.verb)
+        if refusal:
+            raise ValueError(refusal)
+        *values, duration = [argument.options.index(arguments[argument.name]) if argument.options else
+                             arguments[argument.name] for argument in self._fault(command.verb).arguments]
+        schedule.add(part, table.code(node, command.verb), values, duration)
+        return Reply(True, f'{command.verb}{since}' + (f', for {duration:g} s' if duration < table.LONGEST else ''))
+
+    def _fault(self, name):
+        return table.FAULTS[self.NODE.name][table.code(self.NODE.name, name)]

@@ -1,0 +1,57 @@
+"""How the numbers of a message are spoilt, whatever they are."""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+MOST = 32
+"""Numbers that a node holds at most."""
+
+SPOILT = np.dtype([('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'), ('held', 'f8', (MOST,)), ('sigma', 'f8'),
+                   ('seed', 'i8')], align=True)
+"""freeze, nan: 1 while it is so; held: the numbers of the first frozen step, holds: 1 once they are there; sigma
+and seed of white noise, sigma 0: none."""
+
+
+@compiled
+def restore(e):
+    """Nothing is spoilt from now on; what is held stays, for a freeze that goes on."""
+    e.holds = e.freeze
+    e.freeze, e.nan, e.sigma = 0, 0, 0.0
+
+
+@compiled
+def numbers(e, values, first):
+    """Freeze values (n,) or make them NaN; held from number `first` on."""
+    for i in range(len(values)):
+        if e.freeze != 0:
+            if e.holds != 0:
+                values[i] = e.held[first + i]
+            else:
+                e.held[first + i] = values[i]
+        if e.nan != 0:
+            values[i] = math.nan
+
+
+@compiled
+def _mixed(x):
+    """The finaliser of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), 64 bits to 64 bits."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+@compiled
+def _uniform(seed, stamp, i):
+    """A number in (0, 1) of a key: counter-based, so that it depends on nothing that was drawn before (Salmon et al.,
+    SC 2011)."""
+    x = _mixed(_mixed(_mixed(np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15)) ^ np.uint64(stamp)) ^ np.uint64(i))
+    return (float(x >> np.uint64(11)) + 0.5) * 2.0**-53
+
+
+@compiled
+def noise(e, stamp, i):
+    """White noise number i of a step: e.sigma times a standard normal (Box and Muller 1958)."""
+    u, v = _uniform(e.seed, stamp, 2 * i), _uniform(e.seed, stamp, 2 * i + 1)
+    return e.sigma * math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)

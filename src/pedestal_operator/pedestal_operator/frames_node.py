@@ -1,0 +1,56 @@
+"""ROS node for RViz: the model of the pedestal on `robot_description`, its frames on `tf`."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import sys
+
+from rclpy.qos import QoSProfile
+
+from pedestal_common import messages, middleware, parameters, shell
+from pedestal_operator import frames
+from pedestal_operator.frame_source import FrameSource
+
+PERIOD = 1.0 / 30.0
+"""Time [s] between two messages on tf."""
+
+TF_DEPTH = 100
+"""Messages that tf2 itself keeps for its readers."""
+
+
+class FramesNode(shell.Shell):
+    """Latches the model at its start; where tf2_msgs is installed it tells the frames while somebody listens."""
+
+    def __init__(self):
+        super().__init__('frames', parameters.Parameters)
+        text = messages.String(data=frames.DESCRIPTION)
+        description = self.create_publisher(middleware.message_class(text.__msgtype__), 'robot_description',
+                                            middleware.qos('change', 'written'))
+        description.publish(messages.serialize(text))
+        try:
+            from tf2_msgs.msg import TFMessage
+        except ImportError:
+            self.get_logger().info('tells no frames: tf2_msgs is not installed, robot_state_publisher does it as well')
+            return
+        self._frames, self._told = FrameSource(self), 0
+        self._tf = self.create_publisher(TFMessage, 'tf', QoSProfile(depth=TF_DEPTH))
+        self.every(PERIOD, self._look)
+
+    @property
+    def awaits(self):
+        return 'its end'
+
+    def _look(self):
+        self._frames.want(self._tf.get_subscription_count() > 0)
+        stamp, transforms = self._frames.read()
+        if stamp != self._told:
+            self._told = stamp
+            self._tf.publish(messages.serialize(frames.tf_message(stamp, transforms)))
+
+
+def main(args=None) -> int:
+    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
+    return shell.main(FramesNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,169 @@
+"""ROS node that shows the antenna to a browser and lets it be operated there."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import collections
+import contextlib
+import dataclasses
+import socket
+import sys
+import time
+
+from rcl_interfaces.srv import GetParameters
+
+from pedestal_common import commands, parameters, shell
+from pedestal_operator import page_security, page_sky, page_state
+from pedestal_operator.page_asks import Asks
+from pedestal_operator.page_log import Log
+from pedestal_operator.page_server import PageServer
+from pedestal_operator.remote_node import Remote
+
+FRAME, LOOK, SLOW = 0.05, 0.01, 1.0
+"""Time [s] between two states that pages are sent, two looks at what they ask, two of what changes slowly."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PageParameters(parameters.Parameters):
+    """The server."""
+    address: str = parameters.text('127.0.0.1', 'on which it listens')
+    port: int = parameters.parameter(8080, 0, 65535, '', 'TCP port; 0: a free one, which it says')
+    names: str = parameters.text('', 'by which a browser may call it beside its address, comma separated')
+    clients: int = parameters.parameter(32, 1, 256, '', 'pages at a time')
+
+
+class PageNode(Remote):
+    """Hears the graph for all pages, and asks for each of them under the name of its user."""
+
+    def __init__(self):
+        super().__init__('operator_page', 'page', parameters_type=PageParameters)
+        self.alarms, self.path, self.configuration, self.log = [], None, {}, Log()
+        self._history = collections.deque(maxlen=round(page_state.SPAN / page_state.PERIOD))
+        self._past = collections.deque(maxlen=round(page_state.SPAN / SLOW))
+        self._pages = Asks(self._ask_for, self.replied, lambda client, message: self._server.reply(client, message),
+                           lambda: self.texts.get('acu/mode') == 'rate')
+        self._sheets, self._published = {}, {}
+        p = self.parameters
+        names = [name.strip() for name in p.names.split(',') if name.strip()]
+        if not page_security.is_loopback(p.address):
+            names.append(socket.gethostname())
+            self.get_logger().warning(f'listens on {p.address}: whoever reaches this address and has a token operates '
+                                      'the antenna, and the connection is not encrypted')
+        self._server = PageServer(p.address, p.port, names, p.clients, self._past_of_charts)
+        for topic in page_state.NUMBERS:
+            self.hear(topic)
+        self.message_reader('ins/state', self._text_taker('ins/state'))
+        self.message_reader('acu/blockage', self._text_taker('acu/blockage'))
+        self.message_reader('acu/alarms', self._take_alarms)
+        self.message_reader('acu/program_track', self._take_program)
+        for role in page_security.ROLES:
+            print(f'page, {role}: {self._server.access.url(role)}', flush=True)
+        self.every(LOOK, self._look)
+        self.every(FRAME, self._show)
+        self.every(page_state.PERIOD, self._remember)
+        self.every(SLOW, self._look_slowly)
+
+    @property
+    def awaits(self):
+        return 'pages'
+
+    @property
+    def now(self):
+        """UTC [s]."""
+        return self.clock()[1] * 1e-9
+
+    def _ask_for(self, who, verb, arguments):
+        self.who = who
+        return self.ask(verb, arguments)
+
+    def _take_reply(self, status):
+        """Replies to whomever are events too."""
+        super()._take_reply(status)
+        with contextlib.suppress(ValueError):
+            self.log.replied(self.now, *commands.of_reply(status))
+
+    def _text_taker(self, topic):
+        take = super()._text_taker(topic)
+
+        def logged(message):
+            take(message)
+            self.log.text(self.now, topic, message.data)
+        return logged
+
+    def _take_alarms(self, array):
+        self.alarms = array.status
+        self.log.alarms(self.now, page_state.alarms(self))
+
+    def _take_program(self, message):
+        path = page_sky.path(message, page_state.epoch(self))
+        self.path = self.path if path is None else path
+
+    def _look(self):
+        """Serve what the pages ask."""
+        now = time.monotonic()
+        while not self._server.asked.empty():
+            self._pages.take(self._server.asked.get_nowait(), now)
+        self._pages.look(now)
+
+    def _show(self):
+        """Send the newest state, while anybody looks."""
+        if not self._server.pages:
+            return
+        sections = {'now': page_state.now(self), 'told': page_state.told(self), 'alarms': page_state.alarms(self)}
+        if self._published.get('log') != self.log.revision:
+            sections['log'] = list(self.log.lines)
+            self._published['log'] = self.log.revision
+        self._publish(sections)
+
+    def _publish(self, sections):
+        """Publish those sections that say something else than before."""
+        texts = {name: page_state.encoded(section) for name, section in sections.items()}
+        fresh = {name: text for name, text in texts.items() if self._published.get('of ' + name) != text}
+        self._published |= {'of ' + name: text for name, text in fresh.items()}
+        self._server.publish(fresh)
+
+    def _remember(self):
+        """A point of the strip charts, for pages that come later."""
+        if self.present('joint_states'):
+            self._history.append(page_state.history_row(page_state.now(self)))
+
+    def _past_of_charts(self):
+        return page_state.encoded(list(self._history.copy()))
+
+    def _look_slowly(self):
+        """What changes slowly: where the beam was, what the nodes' parameters are."""
+        for node, names in page_state.WANTED.items():
+            self._ask_parameters(node, names)
+        if self.present('joint_states'):
+            self._past.append(page_state.now(self)['beam'])
+        self._publish({'fixed': page_state.fixed(self), 'sky': page_state.sky(self, list(self._past))})
+
+    def _ask_parameters(self, node, names):
+        """Ask a node for its parameters when it comes, or comes again."""
+        client, future = self._sheets.get(node) or (None, None)
+        if not self.present(node):
+            self._sheets[node] = client, None
+            return
+        client = client or self.create_client(GetParameters, f'{node}/get_parameters')
+        if future is None and client.service_is_ready():
+            future = client.call_async(GetParameters.Request(names=list(names)))
+            future.add_done_callback(lambda done: self._take_parameters(names, done.result()))
+        self._sheets[node] = client, future
+
+    def _take_parameters(self, names, response):
+        for name, value in zip(names, response.values):
+            content = {2: value.integer_value, 3: value.double_value, 4: value.string_value}.get(value.type)
+            if content is not None:
+                self.configuration[name] = content
+
+    def close(self):
+        self._server.close()
+        super().close()
+
+
+def main(args=None) -> int:
+    """Run the server until it is stopped; args: of the command line, None for sys.argv."""
+    return shell.main(PageNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,102 @@
+"""ROS node that Hamlib's clients and gpredict talk to: the rotctld protocol over TCP."""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import dataclasses
+import sys
+
+from pedestal_common import parameters, shell
+from pedestal_operator import controller, rotctld
+from pedestal_operator.line_server import Client
+from pedestal_operator.rotctld import BUSY, INVALID, OK, REJECTED, TIMEOUT
+from pedestal_operator.server_node import ServerNode, ServerParameters, tcp_port
+
+RESULTS = {controller.DONE: OK, controller.REFUSED: REJECTED, controller.OUT_OF_REACH: INVALID,
+           controller.BUSY: BUSY, controller.SILENT: TIMEOUT}
+
+VERBS = {'park': 'stow', 'reset': 'acu/reset_faults'}
+"""{command: verb of the control unit}."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RotctldParameters(ServerParameters):
+    """The server."""
+    port: int = tcp_port(4533)
+    read_only: bool = parameters.flag(False, 'commands that move the antenna are refused')
+    raw_azimuth: bool = parameters.flag(False, 'tell the azimuth as it is, not modulo 360 deg')
+    jog_rate: float = parameters.parameter(5.0, 0.01, 60.0, 'deg/s', 'of `move` at 100 %')
+
+
+class RotctldClient(Client):
+    """request, ask: what it waits for an answer to."""
+    request = ask = None
+
+
+class RotctldNode(ServerNode):
+    """Answers its clients in order."""
+
+    def __init__(self):
+        super().__init__('rotctld', RotctldParameters, rotctld.LONGEST, RotctldClient)
+
+    def serve(self, client, now):
+        """Answer what waits, in order; a request that asks the antenna waits for its reply first."""
+        while client.ask or client.lines:
+            if client.ask:
+                outcome = client.ask.look(self, now)
+                if outcome is None:
+                    return
+                client.ask = None
+                client.say(rotctld.answer(client.request, RESULTS[outcome]))
+                continue
+            line = client.lines.popleft()
+            request = rotctld.read(line) if line is not None else rotctld.Request('', error=INVALID)
+            if request is None:
+                continue
+            if request.error == OK and request.name == 'quit':
+                client.gone = ''
+                client.lines.clear()
+            elif request.error != OK:
+                client.say(rotctld.answer(request, request.error))
+            elif request.name in rotctld.SETS:
+                self._move(client, request, now)
+            else:
+                client.say(rotctld.answer(request, OK, self._lines(request)))
+
+    def _move(self, client, request, now):
+        if self.parameters.read_only:
+            client.say(rotctld.answer(request, REJECTED))
+            return
+        ask, name = self.controller, client.name
+        client.request = request
+        if request.name == 'set_pos':
+            client.ask = ask.go(name, *request.values, now)
+        elif request.name == 'move':
+            way, percent = request.values
+            rate = self.parameters.jog_rate * (50 if percent == -1 else percent) / 100.0
+            client.ask = ask.jog(name, [rate * part for part in rotctld.DIRECTIONS[way]], now)
+        elif request.name == 'stop':
+            client.ask = ask.stop(name, now)
+        else:
+            client.ask = ask.do(name, VERBS[request.name], now)
+
+    def _lines(self, request):
+        """What a request without motion is answered with: [(name, text)]."""
+        pointing, limits = self.controller.pointing, self.controller.pointing.limits
+        if request.name == 'get_pos':
+            return rotctld.position(*pointing.angles_told(), self.parameters.raw_azimuth)
+        if request.name == 'get_info':
+            return [('Info', f'pedestal, {self.texts.get("acu/mode", "no control unit")}'[:63])]
+        if request.name == 'get_status':
+            return [('Status flags', rotctld.flags(self.rates(), pointing.angles_told(), limits))]
+        if request.name == 'dump_caps':
+            return [('', f'Caps of the pedestal: azimuth {limits.azimuth}, elevation {limits.elevation} deg')]
+        return rotctld.state(limits, bool(request.separator))
+
+
+def main(args=None) -> int:
+    """Run the server until it is stopped; args: of the command line, None for sys.argv."""
+    return shell.main(RotctldNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,55 @@
+"""The state of the antenna as an operator reads it: one table for the terminal, for JSON and for other programs."""
+import math
+import typing
+
+from pedestal_common import topics
+from pedestal_common.unit import OK
+
+
+class Row(typing.NamedTuple):
+    """One item: its group, its name, a number or text (None: not heard), its unit."""
+    group: str
+    name: str
+    value: object
+    unit: str = ''
+
+    @property
+    def text(self):
+        """The value as a person reads it."""
+        if self.value is None or isinstance(self.value, float) and math.isnan(self.value):
+            return '-'
+        return f'{self.value:.4f}' if isinstance(self.value, float) else str(self.value)
+
+
+TOLD = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole')
+"""Keys of the control unit's diagnostics."""
+
+
+def rows(remote) -> list:
+    """The Rows of what a remote_node.Remote hears now."""
+    actual, wanted = remote.angles('joint_states'), remote.angles('acu/reference')
+    told = remote.told('acu')
+    found = [Row('angle', axis, angle, 'deg') for axis, angle in zip(topics.AXES, actual)]
+    found += [Row('commanded', axis, angle, 'deg') for axis, angle in zip(topics.AXES, wanted)]
+    found += [Row('deviation', axis, a - b, 'deg') for axis, a, b in zip(topics.AXES, wanted, actual)]
+    found += [Row('rate', axis, rate, 'deg/s') for axis, rate in zip(topics.AXES, remote.rates())]
+    found += [Row('receiver', name, value, unit) for name, value, unit in _receiver(remote)]
+    found += [Row('acu', key, told.get(key)) for key in TOLD]
+    found.append(Row('adu', 'state', remote.texts.get('adu/state')))
+    return found
+
+
+def alarms(remote) -> list:
+    """[(node, text)] of the nodes whose diagnostics say that something is not well, and of those that are silent."""
+    found = [(name, status.message) for name, status in remote.status.items()
+             if status.level != OK and remote.present(name)]
+    return found + [(name, 'silent') for name in remote.status if not remote.present(name)]
+
+
+def _receiver(remote):
+    values = (math.nan,) * 3
+    if remote.present('tracking_receiver/angle_error'):
+        values = remote.numbers['tracking_receiver/angle_error']
+    cross_elevation, elevation, level = values
+    return (('cross_elevation_error', math.degrees(cross_elevation), 'deg'),
+            ('elevation_error', math.degrees(elevation), 'deg'), ('level', float(level), 'dB-Hz'))

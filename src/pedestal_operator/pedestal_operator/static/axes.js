@@ -1,0 +1,141 @@
+// Angles, errors and rates of the axes, their travel, the level of the signal and the dial of its errors.
+import {onState} from './link.js';
+import {draw, set} from './svg.js';
+import {find, number, say, time} from './text.js';
+
+const AXES = ['az', 'el'];
+const SOON = 20;  // s to a limit from which on it is told
+const TRAIL = 60;  // points of the dial's trail
+const EDGE = 0.6;  // beamwidths at the edge of the dial
+
+function axisState(told, now, axis) {
+  const {limit_s: limit, limited} = told.axes[axis];
+  if (limited) return [`${limited} limited`, 'warn'];
+  const left = parseFloat(limit);
+  if (Number.isFinite(left) && left < SOON) return [`limit in ${left.toFixed(0)} s`, 'warn'];
+  if (now.axes[axis].actual === null) return ['silent', 'bad'];
+  return [Math.abs(now.axes[axis].rate) < 0.002 ? 'stands' : 'moves', ''];
+}
+
+function showAxes({now, told, fixed}) {
+  AXES.forEach((name, i) => {
+    const axis = now.axes[i];
+    const wide = fixed && fixed.beamwidth && Math.abs(axis.error) > 0.1 * fixed.beamwidth;
+    say(find(`${name}-actual`), `${number(axis.actual, 3)}°`);
+    say(find(`${name}-commanded`), `${number(axis.commanded, 3)}°`);
+    say(find(`${name}-error`), `${number(axis.error, 4)}°`, wide ? 'warn' : '');
+    say(find(`${name}-rate`), `${number(axis.rate, 3)} °/s`);
+    if (told) say(find(`${name}-state`), ...axisState(told, now, i));
+  });
+}
+
+// A bar from limit to limit; its scale is in degrees, so that whole turns can be counted.
+class Travel {
+  constructor(id) {
+    this.svg = find(id);
+    this.limits = null;
+  }
+
+  scale(limits, stow) {
+    const key = JSON.stringify([limits, stow, this.svg.clientWidth]);
+    if (key === this.limits || !this.svg.clientWidth) return;
+    this.limits = key;
+    this.svg.replaceChildren();
+    const [low, high] = limits;
+    const margin = 0.04 * (high - low);
+    const width = this.svg.clientWidth;
+    this.x = (angle) => (angle - low + margin) / (high - low + 2 * margin) * width;
+    draw(this.svg, 'rect', {x: 0, y: 3, width, height: 9, class: 'bar'});
+    draw(this.svg, 'rect', {x: this.x(low), y: 3, width: this.x(high) - this.x(low), height: 9, class: 'reach'});
+    const step = high - low > 400 ? 180 : high - low > 200 ? 90 : 30;
+    for (let angle = Math.ceil(low / step) * step; angle <= high; angle += step) {
+      draw(this.svg, 'line', {x1: this.x(angle), x2: this.x(angle), y1: 12, y2: 15, class: 'mark'});
+      draw(this.svg, 'text', {x: this.x(angle), y: 24, 'text-anchor': 'middle'}, `${angle}`);
+    }
+    if (stow !== null) draw(this.svg, 'line', {x1: this.x(stow), x2: this.x(stow), y1: 2, y2: 13, class: 'stow'});
+    this.wanted = draw(this.svg, 'line', {y1: 1, y2: 14, class: 'there'});
+    this.actual = draw(this.svg, 'line', {y1: 1, y2: 14, class: 'here'});
+  }
+
+  show({actual, commanded}) {
+    if (!this.actual) return;
+    for (const [line, angle] of [[this.actual, actual], [this.wanted, commanded]]) {
+      line.style.display = angle === null ? 'none' : '';
+      if (angle !== null) set(line, {x1: this.x(angle), x2: this.x(angle)});
+    }
+  }
+}
+
+class Level {
+  constructor() { this.svg = find('level-bar'); }
+
+  show(level, locked, {detect, loss}) {
+    const width = this.svg.clientWidth;
+    if (!width) return;
+    const low = 20;
+    const high = Math.max(80, level || 0);
+    const x = (value) => Math.max(0, Math.min(width, (value - low) / (high - low) * width));
+    this.svg.replaceChildren();
+    draw(this.svg, 'rect', {x: 0, y: 3, width, height: 11, class: 'bar'});
+    if (level !== null) draw(this.svg, 'rect', {x: 0, y: 3, width: x(level), height: 11, class: 'reach'});
+    for (const [name, mark, y] of [['loss', loss, 40], ['lock', detect, 27]]) {
+      if (mark === null || mark === undefined) continue;
+      draw(this.svg, 'line', {x1: x(mark), x2: x(mark), y1: 1, y2: y - 8, class: 'mark'});
+      draw(this.svg, 'text', {x: x(mark) + 2, y}, `${name} ${mark.toFixed(0)}`);
+    }
+    say(find('level'), `${number(level, 1)} dB-Hz`);
+    say(find('lock'), locked ? '● locked' : '○ no lock', locked ? '' : 'warn');
+  }
+}
+
+// Cross-elevation to the right, elevation up, in beamwidths: where the target is, seen from the beam.
+class Dial {
+  constructor() {
+    this.svg = find('dial');
+    const unit = 100 / EDGE;
+    for (const [share, label] of [[0.1, '0.1'], [0.5, '0.5 beamwidth']]) {
+      draw(this.svg, 'circle', {cx: 0, cy: 0, r: share * unit, class: 'ring'});
+      draw(this.svg, 'text', {x: 4, y: -share * unit - 3}, label);
+    }
+    draw(this.svg, 'line', {x1: -100, x2: 100, y1: 0, y2: 0, class: 'line'});
+    draw(this.svg, 'line', {x1: 0, x2: 0, y1: -100, y2: 100, class: 'line'});
+    draw(this.svg, 'text', {x: 108, y: -5, 'text-anchor': 'end'}, 'cross-el');
+    draw(this.svg, 'text', {x: 4, y: 107}, 'el');
+    this.trail = draw(this.svg, 'polyline', {class: 'trail'});
+    this.spot = draw(this.svg, 'circle', {r: 4, class: 'beam'});
+    this.none = draw(this.svg, 'text', {x: 0, y: 45, 'text-anchor': 'middle'}, 'no error signal');
+    this.past = [];
+  }
+
+  show([x, y], beamwidth) {
+    const there = x !== null && y !== null && beamwidth;
+    this.none.style.display = there ? 'none' : '';
+    this.spot.style.display = this.trail.style.display = there ? '' : 'none';
+    if (!there) { this.past = []; return; }
+    const place = [x, -y].map((error) => Math.max(-105, Math.min(105, error / beamwidth * 100 / EDGE)));
+    this.past.push(place.map((value) => value.toFixed(1)).join(','));
+    this.past = this.past.slice(-TRAIL);
+    set(this.spot, {cx: place[0], cy: place[1]});
+    set(this.trail, {points: this.past.join(' ')});
+  }
+}
+
+export function begin() {
+  const travels = AXES.map((name) => new Travel(`${name}-travel`));
+  const level = new Level();
+  const dial = new Dial();
+  onState((came, state) => {
+    if (!came.now) return;
+    showAxes(state);
+    const fixed = state.fixed || {};
+    travels.forEach((travel, i) => {
+      const limits = fixed.limits && fixed.limits[i];
+      if (limits && limits[0] !== null) travel.scale(limits, fixed.stow[i]);
+      travel.show(came.now.axes[i]);
+    });
+    const [x, y, strength] = came.now.receiver;
+    level.show(strength, x !== null, fixed);
+    dial.show([x, y], fixed.beamwidth);
+    say(find('time'), time(came.now.t, 1));
+  });
+}

@@ -1,0 +1,121 @@
+// Strip charts of the last ten minutes.
+import {onState} from './link.js';
+import {find, make, time} from './text.js';
+
+const PERIOD = 0.2;  // s between two points
+const COLOURS = ['--first', '--second', '--third', '--fourth'];
+const STYLES = ['first', 'second', 'third', 'fourth'];
+const CHARTS = {
+  error: [['cross-elevation', 'cross_elevation'], ['elevation', 'elevation']],
+  rate: [['azimuth', 'azimuth_rate'], ['elevation', 'elevation_rate']],
+  torque: [['az 1', 'azimuth_motor_1'], ['az 2', 'azimuth_motor_2'], ['el 1', 'elevation_motor_1'],
+           ['el 2', 'elevation_motor_2']],
+  level: [['C/N0', 'level']],
+};
+
+function colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
+
+function row(now) {
+  const [azimuth, elevation] = now.axes;
+  const torques = [0, 1, 2, 3].map((i) => now.torques[i] ?? null);
+  return [now.t, now.receiver[0], now.receiver[1], azimuth.error, elevation.error, azimuth.rate, elevation.rate,
+          ...torques, now.receiver[2]];
+}
+
+// Lines of 0.05 and 0.1 beamwidths on the chart of the errors.
+function marks(plot, beamwidth) {
+  if (!beamwidth) return;
+  const {ctx, bbox} = plot;
+  ctx.save();
+  ctx.strokeStyle = colour('--edge');
+  ctx.beginPath();
+  for (const share of [-0.1, -0.05, 0.05, 0.1]) {
+    const y = plot.valToPos(share * beamwidth, 'y', true);
+    if (y < bbox.top || y > bbox.top + bbox.height) continue;
+    ctx.moveTo(bbox.left, y);
+    ctx.lineTo(bbox.left + bbox.width, y);
+  }
+  ctx.stroke();
+  ctx.restore();
+}
+
+class Chart {
+  constructor(name, series, beamwidth) {
+    this.place = find(`chart-${name}`);
+    const axis = {stroke: colour('--dim'), grid: {stroke: colour('--edge'), width: 1}, ticks: {show: false},
+                  font: '10px sans-serif'};
+    const heading = this.place.parentElement.querySelector('h2');
+    series.forEach(([label], i) => heading.appendChild(make('i', STYLES[i], label)));
+    this.plot = new uPlot({
+      ...this.size(), cursor: {show: false}, legend: {show: false}, padding: [4, 22, 0, 0],
+      scales: {x: {time: false}, y: {range: (plot, low, high) => Chart.range(low, high)}},
+      axes: [{...axis, size: 17, gap: 1, values: (plot, values) => values.map((value) => time(value))},
+             {...axis, size: 44, gap: 2, space: 22}],
+      series: [{}, ...series.map((_, i) => ({stroke: colour(COLOURS[i]), width: 1.2, points: {show: false}}))],
+      hooks: name === 'error' ? {drawAxes: [(plot) => marks(plot, beamwidth())]} : {},
+    }, [[], ...series.map(() => [])], this.place);
+    new ResizeObserver(() => this.plot.setSize(this.size())).observe(this.place);
+  }
+
+  static range(low, high) {
+    if (low === null || high === null) return [-1, 1];
+    const margin = Math.max(0.08 * (high - low), 1e-3 * Math.max(Math.abs(low), Math.abs(high)), 1e-6);
+    return [low - margin, high + margin];
+  }
+
+  size() { return {width: Math.max(this.place.clientWidth, 60), height: Math.max(this.place.clientHeight, 30)}; }
+}
+
+export function begin() {
+  let beamwidth = 0;
+  let span = 600;
+  let columns = null;
+  let data = [];  // one array for each column of the history
+  let last = -Infinity;
+  const charts = Object.entries(CHARTS).map(
+    ([name, series]) => ({series, chart: new Chart(name, series, () => beamwidth)}));
+
+  function redraw() {
+    const end = data[0].at(-1) ?? 0;
+    const begin = Math.max(end - span, data[0][0] ?? 0);
+    for (const {series, chart} of charts) {
+      const used = [data[0], ...series.map(([, column]) => data[columns.indexOf(column)])];
+      chart.plot.batch(() => {
+        chart.plot.setData(used, true);
+        chart.plot.setScale('x', {min: Math.min(begin, end - 1), max: end});
+      });
+    }
+  }
+
+  async function fetchPast() {
+    const rows = await (await fetch('history', {cache: 'no-store'})).json();
+    data = columns.map((_, i) => rows.map((values) => values[i]));
+    last = data[0].at(-1) ?? -Infinity;
+    redraw();
+  }
+
+  onState((came, state) => {
+    if (came.fixed) {
+      beamwidth = came.fixed.beamwidth;
+      span = came.fixed.span;
+      if (!columns) {
+        columns = came.fixed.history;
+        data = columns.map(() => []);
+        fetchPast();
+      }
+    }
+    const now = came.now;
+    if (!now || !columns) return;
+    if (now.t < last || now.t > last + span) {  // the slider of a recording was moved, or the link was lost for long
+      last = now.t;
+      fetchPast();
+      return;
+    }
+    if (now.t - last < PERIOD) return;
+    last = now.t;
+    row(now).forEach((value, i) => data[i].push(value));
+    const old = data[0].findIndex((t) => t >= last - span);
+    if (old > 50) data.forEach((values) => values.splice(0, old));
+    redraw();
+  });
+}

@@ -1,0 +1,81 @@
+// Alarms and events. All texts come in as texts, never as HTML.
+import {ask, me, onState} from './link.js';
+import {find, make, say, time} from './text.js';
+
+const SHELVES = [600, 3600, 28800];  // s
+const WAITING = ['unacknowledged', 'returned unacknowledged', 'latched unacknowledged'];
+
+function button(text, act) {
+  const made = make('button', '', text);
+  if (me.role === 'monitor') {
+    made.setAttribute('aria-disabled', 'true');
+    made.title = 'this page may only look, and stop';
+  } else {
+    made.onclick = act;
+  }
+  return made;
+}
+
+function shelf(alarm) {
+  const choice = make('select');
+  choice.setAttribute('aria-label', `shelve ${alarm.name}`);
+  choice.appendChild(make('option', '', 'shelve'));
+  for (const seconds of SHELVES) {
+    const option = make('option', '', seconds < 3600 ? `${seconds / 60} min` : `${seconds / 3600} h`);
+    option.value = seconds;
+    choice.appendChild(option);
+  }
+  choice.onchange = () => ask('shelve', {alarm: alarm.name, seconds: choice.value, reason: 'from the page'});
+  choice.disabled = me.role === 'monitor';
+  return choice;
+}
+
+function alarmRow(alarm) {
+  const waits = WAITING.includes(alarm.state);
+  const shelved = alarm.state === 'shelved';
+  const row = make('div', `alarm ${alarm.priority}${waits ? ' waits' : ''}${shelved ? ' shelved' : ''}`
+                          + (alarm.cause ? ' under' : ''));
+  row.dataset.alarm = alarm.name;
+  row.dataset.state = alarm.state;
+  row.appendChild(make('span', 'priority', shelved ? 'shelved' : alarm.priority));
+  const name = make('span', 'name', `${waits ? '◆ ' : ''}${alarm.name}`);
+  const notes = [time(alarm.raised), alarm.state];
+  if (alarm.first_out === '1') notes.push('first');
+  if (alarm.cause) notes.push(`because of ${alarm.cause}`);
+  name.appendChild(make('small', '', notes.join(' · ')));
+  row.appendChild(name);
+  row.appendChild(make('span', 'text', [alarm.detail || alarm.meaning, `→ ${alarm.action}`].join('  ')));
+  const hands = make('span', 'hands');
+  if (waits) hands.appendChild(button('ack', () => ask('acknowledge', {alarm: alarm.name})));
+  hands.appendChild(shelved ? button('unshelve', () => ask('unshelve', {alarm: alarm.name})) : shelf(alarm));
+  row.appendChild(hands);
+  return row;
+}
+
+function showAlarms(alarms) {
+  const waiting = alarms.filter((alarm) => WAITING.includes(alarm.state));
+  const rest = alarms.filter((alarm) => !waiting.includes(alarm));
+  find('alarm-list').replaceChildren(...[...waiting, ...rest].map(alarmRow));
+  if (!alarms.length) find('alarm-list').appendChild(make('div', 'none', 'none'));
+  say(find('alarm-count'), alarms.length ? `${waiting.length} of ${alarms.length} unacknowledged` : '',
+      waiting.length ? 'warn' : '');
+  find('acknowledge-all').hidden = !waiting.length || me.role === 'monitor';
+}
+
+function eventRow({t, who, text, bad}) {
+  const row = make('div', 'event');
+  row.appendChild(make('time', '', time(t)));
+  const line = make('div', bad ? 'warn' : '');
+  line.appendChild(make('em', '', `${who} `));
+  line.appendChild(document.createTextNode(text));
+  row.appendChild(line);
+  return row;
+}
+
+export function begin() {
+  find('acknowledge-all').onclick = () => ask('acknowledge');
+  onState((came) => {
+    if (came.alarms) showAlarms(came.alarms);
+    if (came.log) find('log-list').replaceChildren(...came.log.slice().reverse().map(eventRow));
+  });
+}

@@ -1,0 +1,11 @@
+// The operator's page: each module shows its part of the state, which comes by the link.
+import * as axes from './axes.js';
+import * as charts from './charts.js';
+import * as hands from './hands.js';
+import {connect} from './link.js';
+import * as lists from './lists.js';
+import * as replay from './replay.js';
+import * as sky from './sky.js';
+
+for (const part of [hands, axes, charts, sky, lists, replay]) part.begin();
+connect();

@@ -1,0 +1,169 @@
+"""The rules of the operator's page without a server: who is served, dead men, the event log, the sky."""
+import math
+
+import numpy as np
+import pytest
+
+from pedestal_common import line_of_sight, messages
+from pedestal_common.commands import Command, Reply
+from pedestal_operator import page_log, page_security, page_sky, page_state
+from pedestal_operator.page_asks import BEHIND, PATIENCE, SILENT, Asks
+from pedestal_operator.page_security import Access, Refused, Request
+from pedestal_operator.requests import Requests
+
+GOOD = Request('127.0.0.1:8080', '', '', '', '/', False)
+
+
+@pytest.fixture
+def access():
+    return Access('127.0.0.1', 8080)
+
+
+def status(access, **changes):
+    """200 or what a request is refused with."""
+    cookie = f'{access.cookie}={access.tokens["operator"]}'
+    try:
+        access.role(GOOD._replace(**{'cookie': cookie, **changes}))
+    except Refused as refused:
+        return refused.status
+    return 200
+
+
+def test_who_is_served(access):
+    assert status(access) == status(access, host='LOCALHOST:8080') == status(access, host='[::1]:8080') == 200
+    for host in ('', '127.0.0.1', '127.0.0.1:80', 'evil.example:8080', '127.0.0.1:8080.evil.example', '127.1:8080'):
+        assert status(access, host=host) == 400, host
+    assert status(access, origin='http://127.0.0.1:8080', asks=True) == 200
+    for origin in ('http://evil.example', 'null', 'https://127.0.0.1:8080', 'http://127.0.0.1:8081',
+                   'http://localhost:8080'):
+        assert status(access, origin=origin) == status(access, origin=origin, asks=True) == 403, origin
+    assert status(access, asks=True) == 403                                    # a web socket says where it is from
+    for cookie in ('', 'a', f'{access.cookie}=', f'{access.cookie}=\udcff', 'other=' + access.tokens['operator'],
+                   'x' * 100_000):
+        assert status(access, cookie=cookie) == 401, cookie[:50]
+    assert status(access, cookie='', token=access.tokens['monitor']) == 200
+    assert status(access, cookie='', token=access.tokens['monitor'], path='/history') == 401
+    assert status(access, token='wrong') == 401
+
+
+def test_each_server_and_role_has_a_token_of_its_own(access):
+    tokens = [*access.tokens.values(), *Access('127.0.0.1', 8080).tokens.values()]
+    assert len(set(tokens)) == 6 and min(map(len, tokens)) >= 32
+    assert [access.role(GOOD._replace(token=access.tokens[role])) for role in page_security.ROLES] == [
+        *page_security.ROLES]
+    assert Access('192.0.2.1', 1).cookie != access.cookie                       # browsers share them between ports
+    with pytest.raises(Refused):
+        Access('192.0.2.1', 8080).role(GOOD)                                    # not served as 127.0.0.1
+
+
+def test_roles():
+    assert page_security.may('monitor', 'stop', {}) == ''
+    assert page_security.may('monitor', 'standby', {}) and page_security.may('monitor', 'rate', {})
+    assert page_security.may('operator', 'take', {}) == page_security.may('operator', 'stow', {}) == ''
+    assert page_security.may('operator', 'take', {'role': 'supervisor'})
+    assert page_security.may('supervisor', 'take', {'role': 'supervisor'}) == ''
+
+
+class Desk:
+    """Asks with an antenna behind it that grants, refuses, or is silent. asked: [(who, verb, arguments)]."""
+
+    class Client:
+        role = 'operator'
+
+        def __str__(self):
+            return 'anna@page'
+
+    def __init__(self, *grants):
+        self.requests, self.asked, self.told = Requests('test'), [], []
+        self.grants, self.mode, self.client = list(grants), 'rate', self.Client()
+        self.asks = Asks(self._ask, self.requests.replied, lambda client, message: self.told.append(message),
+                         lambda: self.mode == 'rate')
+
+    def _ask(self, who, verb, arguments):
+        command = self.requests.add(verb, who, arguments)
+        self.asked.append((who, verb, dict(arguments)))
+        granted = self.grants.pop(0) if self.grants else True
+        if granted is not None:
+            self.requests.take(command, Reply(granted, 'so it is'))
+        return command.number
+
+    def take(self, message, now, age=0.0):
+        self.asks.take((self.client, message, age), now)
+        self.asks.look(now)
+
+
+def test_a_jog_ends_in_silence_too_late_and_with_its_page():
+    for end in (lambda desk: desk.asks.look(10.0 + SILENT + 0.01), lambda desk: desk.take(None, 10.1),
+                lambda desk: desk.take({'jog': [1.0, 0]}, 10.1, BEHIND + 0.01),
+                lambda desk: desk.take({'jog': [0, 0]}, 10.1)):
+        desk = Desk()
+        desk.take({'jog': [1.0, -2.0]}, 10.0)
+        assert desk.asked == [('anna@page', 'rate', {'azimuth': math.radians(1.0), 'elevation': math.radians(-2.0)})]
+        desk.asks.look(10.0 + 0.9 * SILENT)
+        assert len(desk.asked) == 1
+        end(desk)
+        assert desk.asked[1:] == [('anna@page', 'rate', {'azimuth': 0.0, 'elevation': 0.0})]
+        desk.asks.look(20.0)
+        assert len(desk.asked) == 2
+
+
+def test_the_end_of_a_jog_disturbs_no_other_mode():
+    desk = Desk()
+    desk.take({'jog': [1.0, 0.0]}, 10.0)
+    desk.mode = 'stow'
+    desk.asks.look(11.0)
+    assert len(desk.asked) == 1
+
+
+def test_a_stop_that_is_refused_or_not_answered_becomes_standby():
+    for grant, later in ((False, 0.0), (None, PATIENCE + 0.1)):
+        desk = Desk(grant, True)
+        desk.take({'ask': 'stop', 'id': 1}, 10.0)
+        desk.asks.look(10.0 + later)
+        desk.asks.look(10.0 + later)
+        assert [verb for _, verb, _ in desk.asked] == ['stop', 'standby']
+        assert [told['granted'] for told in desk.told] == [False, True]
+
+
+def test_the_log_says_a_jog_once_and_what_changes():
+    log = page_log.Log()
+    for t in np.arange(10.0, 14.0, 0.2):
+        log.replied(t, Command('rate', 'anna'), Reply(True, 'mode is rate'))
+    log.replied(14.0, Command('stow', 'anna'), Reply(False, 'refused: no'))
+    for text in ('enabled', 'enabled', 'emergency stop'):
+        log.text(15.0, 'adu/state', text)
+    log.alarms(16.0, [{'name': 'drive silent', 'state': 'unacknowledged'}])
+    log.alarms(17.0, [])
+    assert [(line['text'], line['bad']) for line in log.lines] == [
+        ('rate: mode is rate', False), ('stow: refused: no', True), ('enabled', False), ('emergency stop', True),
+        ('drive silent: unacknowledged', True), ('drive silent: normal', False)]
+
+
+def test_what_is_no_number_is_null():
+    assert page_state.encoded({'a': math.nan, 'b': [math.inf, 1.5], 'c': (None, 'x')}) == (
+        '{"a":null,"b":[null,1.5],"c":[null,"x"]}')
+
+
+def test_the_sky_of_a_deck_is_that_of_the_earth():
+    """A level deck that points east sees north to port; one that lies on its side sees its mast at the horizon."""
+    deck = page_sky.Deck(line_of_sight.quaternion(0.0, 0.0, 0.0))
+    azimuth, elevation = deck.seen(-90.0, 20.0)
+    assert (azimuth + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-3) and elevation == pytest.approx(20.0)
+    assert page_sky.Deck(line_of_sight.quaternion(math.pi / 2, 0.0, 0.0)).seen(0.0, 90.0)[1] == pytest.approx(0.0)
+    assert page_sky.Deck(None).seen(400.0, 20.0) == [400.0, 20.0]
+    assert np.ptp([azimuth for azimuth, _ in page_sky.Deck(None).sector(10.0, 50.0, 30.0)]) == pytest.approx(40.0)
+
+
+def test_a_pass_of_a_program_track():
+    points = []
+    for time, azimuth, elevation in ((0, 3.0, -0.1), (10, 3.2, 0.5), (20, 3.4, 0.8), (30, 3.6, -0.2)):
+        point = messages.trajectory_point(2)
+        point.positions[:] = azimuth, elevation
+        point.time_from_start = messages.Duration(sec=time, nanosec=0)
+        points.append(point)
+    path = page_sky.path(messages.program_track(points), 1000.0)
+    [found] = page_sky.passage(path, '1.5')
+    assert (found['aos'], found['los'], found['loss']) == (1010.0, 1020.0, '1.5')
+    assert found['highest'] == pytest.approx(math.degrees(0.8), abs=0.1)
+    assert found['travel'] == pytest.approx(math.degrees(0.2), abs=0.1)
+    assert page_sky.path(messages.program_track(points[:1]), 0.0) is None and page_sky.passage(None, '') == []

@@ -1,0 +1,150 @@
+"""The faults that can be injected into IMU and INS: what each of them breaks."""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.injection import schedule, spoil, table
+from pedestal_common.line_of_sight import quaternion
+from pedestal_common.records import NEVER
+from pedestal_common.steps import SECOND
+
+IMU_DROP, IMU_FREEZE, IMU_BIAS, IMU_NAN, IMU_NOISE = (
+    table.code('ship_motion', name) for name in ('drop', 'freeze', 'bias', 'nan', 'noise'))
+DROP, DELAY, FREEZE, BIAS, NAN, NOISE, JUMP, CLOCK_STEP = (
+    table.code('ins', name) for name in ('drop', 'delay', 'freeze', 'bias', 'nan', 'noise', 'ins_jump',
+                                             'clock_step'))
+
+IMU = np.dtype([('drop', 'i8'), ('rate', 'f8', (3,)), ('force', 'f8', (3,)), ('said', spoil.SPOILT)], align=True)
+"""drop: 1 while it is silent; rate [rad/s], force [m/s2]: added to what it feels, FLU; said: what spoils it."""
+
+INS = np.dtype([('latency_ns', 'i8'), ('drop', 'i8'), ('clock_ns', 'i8'), ('rate', 'f8', (3,)), ('turn', 'f8', (3,)),
+                ('said', spoil.SPOILT)], align=True)
+"""latency_ns: of the INS when nothing is broken; drop: 1 while it is silent; clock_ns: added to its stamps; rate:
+added to the deck rate, FLU [rad/s]; turn: roll, pitch and yaw added to its attitude [rad]; said: what spoils it."""
+
+RAW, DATA = 'ship/imu/data_raw', 'ship/imu/data'
+
+
+def initial(latency_ns) -> np.ndarray:
+    """INS (1,) of a latency [ns]: nothing is broken."""
+    e = np.zeros(1, INS)
+    e['latency_ns'] = latency_ns
+    return e
+
+
+@compiled
+def turned(q, roll, pitch, yaw):
+    """Quaternion (x, y, z, w) of a deck of attitude q (4,) that is turned by roll and pitch about its own axes and by
+    yaw about the vertical [rad]."""
+    return product(quaternion(0.0, 0.0, yaw), product((q[0], q[1], q[2], q[3]), quaternion(roll, pitch, 0.0)))
+
+
+@compiled
+def product(p, q):
+    """Hamilton product of two quaternions (x, y, z, w)."""
+    px, py, pz, pw = p
+    qx, qy, qz, qw = q
+    return (pw * qx + px * qw + py * qz - pz * qy, pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw, pw * qw - px * qx - py * qy - pz * qz)
+
+
+@compiled
+def take_imu(m, stamp):
+    """Mend the IMU, then break what is broken in the step of a stamp [ns]; m: ship_unit.RECORD."""
+    e = m.injected
+    e.drop = 0
+    for i in range(3):
+        e.rate[i] = e.force[i] = 0.0
+    spoil.restore(e.said)
+    schedule.begin(m.schedule)
+    for i in range(schedule.SLOTS):
+        row = m.schedule.row[i]
+        if schedule.in_force(m.schedule, row, stamp):
+            _break_imu(e, row.fault, row.values)
+
+
+@compiled
+def _break_imu(e, fault, values):
+    if fault == IMU_DROP:
+        e.drop = 1
+    elif fault == IMU_FREEZE:
+        e.said.freeze = 1
+    elif fault == IMU_BIAS:
+        e.rate[int(values[0])] += values[1]
+        e.force[int(values[0])] += values[2]
+    elif fault == IMU_NAN:
+        e.said.nan = 1
+    elif fault == IMU_NOISE:
+        e.said.sigma, e.said.seed = values[0], int(values[1])
+
+
+@compiled
+def spoil_imu(e, stamp, outputs):
+    """What the IMU says of a step, spoilt."""
+    raw = outputs[RAW]
+    for i in range(3):
+        raw.angular_velocity[i] += e.rate[i]
+        raw.linear_acceleration[i] += e.force[i]
+        if e.said.sigma > 0.0:
+            raw.angular_velocity[i] += spoil.noise(e.said, stamp, i)
+    spoil.numbers(e.said, raw.angular_velocity, 0)
+    spoil.numbers(e.said, raw.linear_acceleration, 3)
+    if e.drop != 0:
+        raw.stamp = NEVER
+
+
+@compiled
+def take_ins(m, stamp):
+    """Mend the INS, then break what is broken in the step of a stamp [ns]; m: record of ins_unit."""
+    e = m.injected
+    m.constants.latency_ns = e.latency_ns
+    e.drop = e.clock_ns = 0
+    for i in range(3):
+        e.rate[i] = e.turn[i] = 0.0
+    spoil.restore(e.said)
+    schedule.begin(m.schedule)
+    for i in range(schedule.SLOTS):
+        row = m.schedule.row[i]
+        if schedule.in_force(m.schedule, row, stamp):
+            _break_ins(m.constants, e, row.fault, row.values)
+
+
+@compiled
+def _break_ins(c, e, fault, values):
+    if fault == DROP:
+        e.drop = 1
+    elif fault == DELAY:
+        c.latency_ns += round(values[0] * SECOND)
+    elif fault == FREEZE:
+        e.said.freeze = 1
+    elif fault == BIAS:
+        e.rate[int(values[0])] += values[1]
+    elif fault == NAN:
+        e.said.nan = 1
+    elif fault == NOISE:
+        e.said.sigma, e.said.seed = values[0], int(values[1])
+    elif fault == JUMP:
+        e.turn[0] += values[0]
+        e.turn[1] += values[1]
+        e.turn[2] -= values[2]      # heading grows clockwise
+    elif fault == CLOCK_STEP:
+        e.clock_ns += round(values[0] * SECOND)
+
+
+@compiled
+def spoil_ins(e, stamp, outputs):
+    """What the INS says of a step, spoilt."""
+    data = outputs[DATA]
+    roll, pitch, yaw = e.turn[0], e.turn[1], e.turn[2]
+    if e.said.sigma > 0.0:
+        roll += spoil.noise(e.said, stamp, 0)
+        pitch += spoil.noise(e.said, stamp, 1)
+        yaw += spoil.noise(e.said, stamp, 2)
+    q = turned(data.orientation, roll, pitch, yaw)
+    for i in range(4):
+        data.orientation[i] = q[i]
+    for i in range(3):
+        data.angular_velocity[i] += e.rate[i]
+    spoil.numbers(e.said, data.orientation, 0)
+    spoil.numbers(e.said, data.angular_velocity, 4)
+    if data.stamp != NEVER:
+        data.stamp = NEVER if e.drop != 0 else data.stamp + e.clock_ns

@@ -1,0 +1,247 @@
+"""Orbital elements of many satellites in one file: TLE, and CCSDS OMM (502.0-B) as KVN, XML, JSON or CSV.
+
+What a file is, its content says. Elements of an OMM become the two lines of a TLE, to the digits that these have: they
+are mean elements of SGP4 either way.
+"""
+import json
+import re
+import typing
+from xml.parsers import expat
+
+from sgp4 import omm
+from sgp4.api import Satrec
+from sgp4.exporter import export_tle
+
+from pedestal_common import csv_table
+from pedestal_common.orbit import TargetError
+from pedestal_common.parameters import did_you_mean
+from tracking_receiver_sim.ephemeris import lines
+
+BEGINNING = 4096
+NUMBERS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 'INCLINATION': (0.0, 180.0),
+           'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0), 'MEAN_ANOMALY': (-360.0, 360.0),
+           'BSTAR': (-9.0, 9.0), 'MEAN_MOTION_DOT': (-9.0, 9.0), 'MEAN_MOTION_DDOT': (-9.0, 9.0),
+           'NORAD_CAT_ID': (0, 339_999), 'ELEMENT_SET_NO': (0, 9999), 'REV_AT_EPOCH': (0, 99_999)}
+"""{keyword: its limits} [rev/day], [deg], [1/earth radii], [rev/day^2 / 2], [rev/day^3 / 6]."""
+ANGLES = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
+INTEGERS = ('NORAD_CAT_ID', 'ELEMENT_SET_NO', 'REV_AT_EPOCH')
+USUAL = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0', 'ELEMENT_SET_NO': '999', 'REV_AT_EPOCH': '0'}
+"""Of keywords that an OMM may leave out."""
+MUST_BE = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
+           'MEAN_ELEMENT_THEORY': ('SGP4', 'SGP/SGP4')}
+KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', *MUST_BE, *NUMBERS)
+MOST = 300_000
+"""Satellites in a file: all that are catalogued, some times over."""
+COMPARED = 40_000
+"""Names that are compared with one that is not there: more than are catalogued."""
+DEEPEST, LONGEST = 100, 200
+"""Elements of XML within each other, and characters of a value."""
+PIECE = 1 << 20
+CATALOGUED = re.compile(r'\d{4}-\d{3}[A-Z]{1,3}')
+
+
+class Satellite(typing.NamedTuple):
+    """One of a file. line: where it begins; name, number, designator: what it is called; lines: of its TLE, None of an
+    OMM; fields: {keyword: text} of an OMM."""
+    line: int
+    name: str
+    number: str
+    designator: str
+    lines: tuple | None
+    fields: dict
+
+    def is_called(self, name):
+        """Whether this is its name, its catalogue number or its international designator, in whatever case."""
+        number = self.number.lstrip('0') or '0'
+        return name.strip().upper() in (self.name.upper(), number, self.number, self.designator)
+
+
+def read(path, name=''):
+    """(name, line 1, line 2) of a satellite in a file of elements, see the module.
+
+    name: its name, catalogue number or international designator; only a file of one satellite goes without. Raises
+    TargetError.
+    """
+    try:
+        with csv_table.stream(path) as stream:
+            beginning = stream.read(BEGINNING).removeprefix(b'\xef\xbb\xbf').lstrip()
+        names, found = [], []
+        for satellite in _reader(beginning)(path):
+            names.append(satellite.name)
+            if len(names) > MOST:
+                raise csv_table.TableError(f'{path}: line {satellite.line}: must be at most {MOST} satellites')
+            if not name or satellite.is_called(name):
+                found.append(satellite if not found else None)
+    except csv_table.TableError as error:
+        raise TargetError(f'TLE file {error}') from None
+    if not names:
+        raise TargetError(f'TLE file {path}: no line that begins with "1 " before one that begins with "2 ", and no '
+                          'OMM')
+    if len(found) != 1:
+        listed = ', '.join(names[:5]) + (', ...' if len(names) > 5 else '')
+        said = 'name one with --satellite'
+        if name:
+            said = f'satellite {name!r:.60} is in it {len(found)} times;'
+            near = did_you_mean(name.upper(), list(dict.fromkeys(names))[:COMPARED])
+            said = f'{said}{near}' if not found else f'{said} name it by its number'
+        raise TargetError(f'TLE file {path}: satellites: {len(names)} found, {listed}: {said.removesuffix(";")}')
+    satellite = found[0]
+    return (satellite.name, *(satellite.lines or _tle(path, satellite)))
+
+
+def _reader(beginning):
+    if beginning.startswith(b'<'):
+        return _xml
+    if beginning.startswith((b'{', b'[')):
+        return _json
+    if beginning.startswith(b'CCSDS_OMM_VERS'):
+        return _kvn
+    first = beginning.partition(b'\n')[0]
+    return _csv if b',' in first and b'EPOCH' in first else _tles
+
+
+def _tles(path):
+    """Satellites of TLEs, with or without a line of its name before each."""
+    before, first = (0, ''), (0, '')
+    for number, text in lines.read(path, 'UTF-8'):
+        if first[1].startswith('1 ') and text.startswith('2 '):
+            title = '' if before[1].startswith('2 ') else before[1].removeprefix('0 ').strip()
+            yield Satellite(first[0], title or first[1][2:7].strip(), _number(first[1][2:7]), _designator(first[1]),
+                            (first[1], text), {})
+        before, first = first, (number, text)
+
+
+def _number(text):
+    """The catalogue number in a TLE, whose first digit may be a letter (Alpha-5)."""
+    from sgp4.alpha5 import from_alpha5
+    try:
+        return str(from_alpha5(text.strip()))
+    except (ValueError, IndexError):
+        return text.strip()
+
+
+def _designator(line):
+    year, piece = line[9:11], line[11:17].strip()
+    return f'{"19" if year >= "57" else "20"}{year}-{piece}'
+
+
+def _omm(line, fields):
+    number = fields.get('NORAD_CAT_ID', '')
+    return Satellite(line, fields.get('OBJECT_NAME') or number or fields.get('OBJECT_ID', ''), number,
+                     fields.get('OBJECT_ID', '').upper(), None, fields)
+
+
+def _kvn(path):
+    """Satellites of OMMs one after the other; each begins with its CCSDS_OMM_VERS."""
+    fields, begun = {}, 0
+    for number, text in lines.read(path, 'UTF-8'):
+        keyword, equals, value = text.partition('=')
+        keyword = keyword.strip()
+        if keyword == 'CCSDS_OMM_VERS':
+            if begun:
+                yield _omm(begun, fields)
+            fields, begun = {}, number
+        elif equals and keyword in KEYWORDS:
+            fields[keyword] = value.partition('[')[0].strip()[:LONGEST]
+        elif not equals and keyword.split(None, 1)[0] not in ('COMMENT', 'META_START', 'META_STOP'):
+            raise lines.wrong(path, number, 1, f'{text.strip()!r:.60}: must be KEYWORD = value')
+    if begun:
+        yield _omm(begun, fields)
+
+
+def _csv(path):
+    with csv_table.opened(path) as reader:
+        csv_table.require(path, reader, ('EPOCH', 'NORAD_CAT_ID'))
+        for row in reader:
+            yield _omm(reader.line_num, {keyword: row[keyword].strip()[:LONGEST] for keyword in KEYWORDS
+                                         if isinstance(row.get(keyword), str)})
+
+
+def _json(path):
+    """Satellites of a JSON array of objects, or of one object, decoded one by one."""
+    with csv_table.stream(path) as stream:
+        content = stream.read(csv_table.LARGEST)
+    try:
+        text = content.decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        raise csv_table.TableError(f'{path}: byte {error.start} is no UTF-8') from None
+    decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
+    at, line, counted = between.match(text).end(), 1, 0
+    while at < len(text):
+        line, counted = line + text.count('\n', counted, at), at
+        begun = at
+        try:
+            value, at = decoder.raw_decode(text, at)
+        except json.JSONDecodeError as error:
+            raise lines.wrong(path, error.lineno, error.colno, f'no JSON: {error.msg}') from None
+        except RecursionError:
+            raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'JSON too deep') from None
+        if not isinstance(value, dict):
+            raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'must be an object of an OMM')
+        yield _omm(line, {keyword: str(value[keyword]).strip()[:LONGEST] for keyword in KEYWORDS
+                          if value.get(keyword) is not None})
+        at = between.match(text, at).end()
+
+
+def _xml(path):
+    """Satellites of the segments of an OMM or NDM as XML; expat keeps nothing of what it has read."""
+    made, open_elements, texts = [], [], {}
+    parser = expat.ParserCreate('UTF-8')
+    parser.buffer_text = True
+
+    def doctype(*_):
+        raise lines.wrong(path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1,
+                          'a document type declaration: an OMM has none')
+
+    def start(name, _attributes):
+        if len(open_elements) >= DEEPEST:
+            raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: more than {DEEPEST} elements within '
+                                       'each other')
+        name = name.rpartition(':')[2][:LONGEST]
+        open_elements.append(name)
+        if name == 'segment':
+            texts.clear()
+            texts['line'] = parser.CurrentLineNumber
+
+    def text(data):
+        if open_elements and open_elements[-1] in KEYWORDS:
+            texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:LONGEST]
+
+    def end(_name):
+        if open_elements.pop() == 'segment':
+            line = texts.pop('line', 1)
+            made.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))
+
+    parser.StartDoctypeDeclHandler, parser.CharacterDataHandler = doctype, text
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    try:
+        with csv_table.stream(path) as stream:
+            while piece := stream.read(PIECE):
+                parser.Parse(piece)
+                yield from made
+                made.clear()
+            parser.Parse(b'', True)
+    except expat.ExpatError as error:
+        raise lines.wrong(path, error.lineno, error.offset + 1, 'not well-formed XML: '
+                          f'{expat.ErrorString(error.code)}') from None
+
+
+def _tle(path, satellite):
+    """Two lines of a satellite of an OMM. Raises TargetError."""
+    where, fields = f'TLE file {path}: line {satellite.line}', {**USUAL, **satellite.fields}
+    for keyword, allowed in MUST_BE.items():
+        if fields.get(keyword, allowed[0]).upper() not in allowed:
+            raise TargetError(f'{where}: {keyword} = {fields[keyword]!r:.60}: must be {" or ".join(allowed)}')
+    try:
+        for keyword, (low, high) in NUMBERS.items():
+            value = csv_table.number(path, satellite.line, keyword, fields.get(keyword), low, high)
+            fields[keyword] = str(value % 360.0 if keyword in ANGLES else int(value) if keyword in INTEGERS else value)
+        day, second = lines.instant(path, satellite.line, 1, 'EPOCH', fields.get('EPOCH', ''))
+    except csv_table.TableError as error:
+        raise TargetError(f'TLE file {error}') from None
+    designator = fields.get('OBJECT_ID', '').upper()
+    satrec = Satrec()
+    omm.initialize(satrec, {
+        **fields, 'CLASSIFICATION_TYPE': 'U', 'EPHEMERIS_TYPE': '0', 'EPOCH': lines.text(day, second),
+        'OBJECT_ID': designator if CATALOGUED.fullmatch(designator) else '    '})
+    return export_tle(satrec)

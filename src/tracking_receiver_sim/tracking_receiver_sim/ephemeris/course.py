@@ -1,0 +1,107 @@
+"""What the target flies: the course that an orbit or a table of directions prescribes, and the run that goes with it.
+
+An orbit is a cubic Hermite spline through positions and velocities of its interpolation every KNOTS seconds, within
+1 mm of it. A table of directions is the cubic spline through its unit vectors, which no zenith and no north disturbs,
+at the range target.angle.range.
+"""
+import math
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+from pedestal_common import csv_table, parameters
+from tracking_receiver_sim.ephemeris import horizon
+from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.track.flight import Flight
+
+KNOTS = 10.0
+"""[s], at most."""
+LONGEST = 86400.0
+"""Run [s]."""
+
+
+def of_orbit(ephemeris, target, duration, margin) -> Flight:
+    """The Flight of a states.Ephemeris for a run of `duration` [s], and `margin` [s] more at both ends as far as the
+    file goes; target: TargetParameters. Raises csv_table.TableError."""
+    zero = ephemeris.begin + target.track_file.start
+    horizon.require(ephemeris, zero, zero + duration)
+    begin, end = max(-margin, ephemeris.begin - zero), min(duration + margin, ephemeris.end - zero)
+    knots = np.linspace(begin, end, 2 + int((end - begin) / KNOTS))
+    known = np.clip(zero + knots, ephemeris.begin, ephemeris.end)
+    r, v = horizon.enu(ephemeris, target.station, known)
+    there = np.isfinite(r).all(axis=1)  # a gap may begin where the margin is
+    spline = CubicHermiteSpline(knots[there], r[there], v[there])
+    _check_acceleration(ephemeris, spline, zero, target.track_file.max_acceleration)
+    t = np.linspace(0.0, duration, 2 + int(duration / KNOTS))
+    east, north, up = spline(t).T
+    distance, elevation = np.hypot(np.hypot(east, north), up), np.arctan2(up, np.hypot(east, north))
+    top = int(np.argmax(elevation))
+    start_time = instant.iso(ephemeris.midnight + zero)
+    return Flight(spline.x, spline.c, start_time, (
+        f'{ephemeris.path.rpartition("/")[2]}: {ephemeris.description}',
+        f'{duration:.10g} s from {start_time}, highest {np.degrees(elevation[top]):.1f} deg after '
+        f'{t[top]:.0f} s, {distance.min() / 1e3:.4g} to {distance.max() / 1e3:.4g} km from the station at '
+        f'latitude {target.station.latitude_deg:.5f}, longitude {target.station.longitude_deg:.5f} deg, height '
+        f'{target.station.height:.1f} m'),
+        float(np.linalg.norm(v[there], axis=1).max()), float(distance.max()))
+
+
+def _check_acceleration(ephemeris, spline, zero, limit):
+    """Raise TableError with the line of the state nearest to the peak where the spline needs more than limit [m/s2]:
+    a wrong digit does."""
+    size = np.linalg.norm(spline(spline.x, 2), axis=1)
+    worst = int(np.argmax(size))
+    if not size[worst] <= limit:
+        t = zero + spline.x[worst]
+        near = min(ephemeris.segments, key=lambda segment: np.abs(segment.t - t).min())
+        raise csv_table.TableError(f'{ephemeris.path}: line {near.line[np.argmin(np.abs(near.t - t))]}: acceleration '
+                                   f'= {size[worst]:.4g} m/s2 at this state: must be at most max_acceleration = '
+                                   f'{limit:g} m/s2')
+
+
+def run_of_orbit(ephemeris, target, given):
+    """{parameter: value} of the run of a pass: the first that climbs above horizon.LOWEST, from a whole second after
+    its rise until it sets; given: names of what is said already. Raises csv_table.TableError."""
+    said = 'target.track_file.start' in given
+    start = ephemeris.begin + target.track_file.start if said else None
+    begin, end = horizon.passage(ephemeris, target.station, start)
+    zero = begin if said or begin == ephemeris.begin else math.ceil(begin)
+    duration = max(0.1, min(LONGEST, math.floor(10.0 * (end - zero)) / 10.0))
+    r, _ = horizon.enu(ephemeris, target.station, np.linspace(zero, zero + duration, 1 + int(duration / KNOTS)))
+    return {**_station(target), 'target.track_file.start': float(zero - ephemeris.begin), 'duration': duration,
+            'receiver.reference_range': _upwards(np.nanmax(np.linalg.norm(r, axis=1)))}
+
+
+def of_directions(directions, target, _duration, _margin) -> Flight:
+    """The Flight of a directions.Directions, of all of its rows. Raises csv_table.TableError."""
+    zero = directions.t[0] + target.track_file.start
+    t = directions.t - zero
+    if t[-1] <= 0.0:
+        raise csv_table.TableError(f'{directions.path}: start = {target.track_file.start:g} s: must be before the end '
+                                   f'of the table at {directions.t[-1] - directions.t[0]:g} s')
+    a, e = directions.azimuth, directions.elevation
+    unit = np.column_stack((np.cos(e) * np.sin(a), np.cos(e) * np.cos(a), np.sin(e)))
+    spline = CubicSpline(t, target.angle.range * unit)
+    dated = directions.midnight is not None
+    start_time = instant.iso(directions.midnight + zero) if dated else ''
+    top = int(np.argmax(e))
+    return Flight(spline.x, spline.c, start_time, (
+        f'{directions.path.rpartition("/")[2]}: {directions.description}',
+        f'{t[-1]:.10g} s{" from " + start_time if dated else ""}, highest {np.degrees(e[top]):.1f} deg after '
+        f'{t[top]:.0f} s, at the range {target.angle.range / 1e3:g} km'), 0.0, target.angle.range)
+
+
+def run_of_directions(directions, target, _given):
+    """{parameter: value} of a run from the first row, or from start, to the last."""
+    last = directions.t[-1] - directions.t[0] - target.track_file.start
+    return {**_station(target), 'duration': max(0.1, min(LONGEST, (math.ceil(10.0 * last) - 1) / 10.0)),
+            'receiver.reference_range': target.angle.range}
+
+
+def _station(target):
+    """The station as it is said: it is no matter of the file."""
+    return {f'target.station.{name}': value for name, value in parameters.as_dict(target.station).items()}
+
+
+def _upwards(distance):
+    return max(10.0, 10.0 * math.ceil(0.1 * distance))

@@ -1,0 +1,95 @@
+"""An orbit seen from a station: where it is, what of it a run may use, when it is above the horizon."""
+import numpy as np
+from scipy.optimize import brentq
+
+from pedestal_common import csv_table
+from pedestal_common.geodesy import station_frame
+from tracking_receiver_sim.ephemeris import frames, interpolation, states
+from tracking_receiver_sim.track import instant
+
+LOOK = 20.0
+"""Time between two looks [s]; a pass that is shorter may be missed."""
+LOOKS = 500
+"""Looks at once; no more are taken after the pass that is sought."""
+LOWEST = 10.0
+"""Culmination [deg] below which a pass is not chosen: it stays where refraction and buildings are."""
+ABUTTING = 1e-3
+"""Time between two segments [s] that is no gap."""
+
+
+def enu(ephemeris, station, t):
+    """ENU position [m] and velocity against the earth [m/s], (n, 3) each, at t (n,); NaN where no segment holds t."""
+    r, v = np.full((2, len(t), 3), np.nan)
+    for segment in reversed(ephemeris.segments):
+        mine = (t >= segment.begin - ABUTTING) & (t <= segment.end + ABUTTING)
+        if mine.any():
+            inside = t[mine].clip(segment.t[0], segment.t[-1])
+            r[mine], v[mine] = frames.earth_fixed(segment.frame, ephemeris.midnight + inside,
+                                                  *interpolation.at(segment, inside))
+    origin, to_enu = station_frame(station)
+    return (r - origin) @ to_enu.T, v @ to_enu.T
+
+
+def elevation(ephemeris, station, t):
+    """[rad] (n,) at t (n,); NaN where no segment holds t."""
+    east, north, up = enu(ephemeris, station, np.atleast_1d(t))[0].T
+    return np.arctan2(up, np.hypot(east, north))
+
+
+def require(ephemeris, begin, end):
+    """Raise csv_table.TableError where an orbit does not tell all of the time from begin to end [s]."""
+    def said(t):
+        return instant.iso(ephemeris.midnight + t)
+
+    first, last = ephemeris.segments[0], ephemeris.segments[-1]
+    if begin < ephemeris.begin - ABUTTING or end > ephemeris.end + ABUTTING:
+        line = first.line[0] if begin < ephemeris.begin else last.line[-1]
+        raise csv_table.TableError(f'{ephemeris.path}: line {line}: the run from {said(begin)} to {said(end)} is not '
+                                   f'all inside the file, which may be used from {said(ephemeris.begin)} to '
+                                   f'{said(ephemeris.end)}')
+    gaps = [(before.end, after.begin, after.line[0])
+            for before, after in zip(ephemeris.segments, ephemeris.segments[1:])]
+    for segment in ephemeris.segments:
+        gaps += [(segment.t[i], segment.t[i + 1], segment.line[i + 1]) for i in np.flatnonzero(states.gaps(segment.t))]
+    for since, until, line in gaps:
+        if until - since > ABUTTING and begin < until and end > since:
+            raise csv_table.TableError(f'{ephemeris.path}: line {line}: gap of {until - since:g} s above this state, '
+                                       f'in the run from {said(begin)} to {said(end)}')
+
+
+def passage(ephemeris, station, start=None):
+    """(t of the beginning, t of the end) of the first pass that climbs above LOWEST, from rise to set or as far as the
+    file goes; start: t at which the run begins in any case, None: the run begins with the pass.
+
+    Raises csv_table.TableError where there is none.
+    """
+    t = np.append(np.arange(ephemeris.begin, ephemeris.end, LOOK), ephemeris.end)
+    seen = np.full(len(t), np.nan)
+    for at in range(0, len(t), LOOKS):
+        some = slice(at, at + LOOKS)
+        seen[some] = elevation(ephemeris, station, t[some])
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], seen > 0.0, [False]))))
+        for i, j in zip(edges[::2], edges[1::2]):
+            ended = j < at + LOOKS or at + LOOKS >= len(t)
+            if ended and np.degrees(seen[i:j].max()) >= LOWEST and (start is None or t[j - 1] > start):
+                return _ends(ephemeris, station, t, seen, (i, j), start)
+    raise csv_table.TableError(f'{ephemeris.path}: the orbit does not climb above {LOWEST:g} deg over latitude '
+                               f'{station.latitude_deg:g}, longitude {station.longitude_deg:g} deg from '
+                               f'{instant.iso(ephemeris.midnight + (ephemeris.begin if start is None else start))} to '
+                               f'{instant.iso(ephemeris.midnight + ephemeris.end)}')
+
+
+def _ends(ephemeris, station, t, seen, pass_of, start):
+    """(rise, or start where that is said, and set) of a pass at the looks [i, j), to a millisecond where the looks
+    beside it are below the horizon."""
+    i, j = pass_of
+    rise, down = t[i] if start is None else start, t[j - 1]
+    if start is None and i and np.isfinite(seen[i - 1]):
+        rise = _crossing(ephemeris, station, t[i - 1], t[i])
+    if j < len(t) and np.isfinite(seen[j]):
+        down = _crossing(ephemeris, station, t[j - 1], t[j])
+    return rise, down
+
+
+def _crossing(ephemeris, station, before, after):
+    return brentq(lambda t: elevation(ephemeris, station, t)[0], before, after, xtol=1e-3)

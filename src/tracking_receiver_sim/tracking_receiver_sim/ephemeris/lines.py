@@ -1,0 +1,96 @@
+"""Lines of a text file with their numbers, read so that no file hangs or fills the process; words, numbers, times."""
+import contextlib
+import datetime
+import functools
+import re
+
+from pedestal_common import csv_table
+
+LONGEST = 1024
+"""Characters of a line; the CCSDS books allow 254."""
+
+DAY = 86400.0
+WORD = re.compile(r'\S+')
+NUMBER = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?', re.ASCII)
+TIME = re.compile(r'(\d{4}-(?:\d\d-\d\d|\d{3}))[T ](\d\d):(\d\d):(\d\d)(?:\.(\d{1,18}))?Z?', re.ASCII)
+YEARS = 1957, 2199
+"""Of times."""
+
+
+def wrong(path, line, column, problem):
+    """The TableError at a place in a file, both counted from 1."""
+    return csv_table.TableError(f'{path}: line {line}, column {column}: {problem}')
+
+
+def read(path, encoding='ASCII'):
+    """Iterator of (number, text) of the lines of a file that are not empty. Raises TableError for one that is too long
+    or in another encoding."""
+    with csv_table.stream(path) as stream:
+        number = 0
+        while line := stream.readline(LONGEST + 1):
+            number += 1
+            if len(line) > LONGEST and not line.endswith(b'\n'):
+                raise csv_table.TableError(f'{path}: line {number}: longer than {LONGEST} characters')
+            if number > csv_table.MOST_ROWS:
+                raise csv_table.too_long(path, number)
+            try:
+                text = line.decode(encoding).rstrip()
+            except UnicodeDecodeError as error:
+                raise wrong(path, number, error.start + 1, f'byte {line[error.start]:#04x} is no {encoding}') from None
+            if text:
+                yield number, text
+
+
+def numbers(path, line, text, limits):
+    """The numbers of a text {name: (low, high)}, a name for each, words beyond them passed over. Raises TableError."""
+    if '_' not in text:
+        with contextlib.suppress(ValueError):
+            values = [float(word) for word in text.split()[:len(limits)]]
+            if len(values) == len(limits) and all(
+                    low <= value <= high for value, (low, high) in zip(values, limits.values())):
+                return values
+    values, words = [], WORD.finditer(text)  # word by word, to say which is wrong
+    for name, (low, high) in limits.items():
+        word = next(words, None)
+        if word is None:
+            raise wrong(path, line, len(text) + 1, f'{name} is missing')
+        if not NUMBER.fullmatch(word[0]):
+            raise wrong(path, line, word.start() + 1, f'{name} = {word[0]!r:.60}: must be a number')
+        value = float(word[0])
+        if not low <= value <= high:
+            raise wrong(path, line, word.start() + 1, f'{name} = {value:g}: must be {low:g} to {high:g}')
+        values.append(value)
+    return values
+
+
+def instant(path, line, column, name, text):
+    """(days since 1970, seconds of the day) of a time as CCSDS writes it, YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss, in
+    whatever system. Raises TableError."""
+    match = TIME.fullmatch(text)
+    try:
+        date, hours, minutes, seconds, fraction = match.groups() if match else [''] * 5
+        clock = int(hours), int(minutes), int(seconds)
+        if clock[0] > 23 or clock[1] > 59 or clock[2] > 60:
+            raise ValueError
+        days = _days(date)
+    except ValueError:
+        raise wrong(path, line, column, f'{name} = {text!r:.60}: must be a time such as 2026-11-22T05:00:00.5 or '
+                    f'2026-326T05:00:00.5, from {YEARS[0]} to {YEARS[1]}') from None
+    return days, 3600.0 * clock[0] + 60.0 * clock[1] + clock[2] + float(f'0.{fraction or 0}')
+
+
+@functools.lru_cache(64)
+def _days(text):
+    """Days since 1970 of YYYY-MM-DD or YYYY-DDD. Raises ValueError."""
+    year, *rest = map(int, text.split('-'))
+    date = (datetime.date(year, *rest) if len(rest) == 2 else
+            datetime.date(year, 1, 1) + datetime.timedelta(days=rest[0] - 1))
+    if date.year != year or not YEARS[0] <= year <= YEARS[1]:
+        raise ValueError
+    return (date - datetime.date(1970, 1, 1)).days
+
+
+def text(day, second):
+    """ISO 8601 to the microsecond of a time as `instant` gives it."""
+    begin = datetime.datetime(1970, 1, 1) + datetime.timedelta(days=day)
+    return (begin + datetime.timedelta(microseconds=round(second * 1e6))).isoformat(timespec='microseconds')

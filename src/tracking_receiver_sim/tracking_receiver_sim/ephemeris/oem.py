@@ -1,0 +1,145 @@
+"""CCSDS Orbit Ephemeris Messages, 502.0-B in keyword = value notation, versions 1 to 3."""
+import array
+import re
+
+import numpy as np
+
+from pedestal_common import csv_table
+from tracking_receiver_sim.ephemeris import frames, lines, states
+
+ENTRY = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
+BEGINNING = b'CCSDS_OEM_VERS'
+LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}
+"""Of the numbers in a line of data [km], [km/s]."""
+MOST_SEGMENTS = 1000
+REQUIRED = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
+
+
+class _Entry(str):
+    """The value of a keyword; line, column: where it stands."""
+
+    def __new__(cls, value, line, column):
+        entry = super().__new__(cls, value)
+        entry.line, entry.column = line, column
+        return entry
+
+
+def read(path, wanted='') -> states.Ephemeris:
+    """The orbit of one object in an OEM; wanted: its name or its international designator, '' where there is but one.
+    Raises TableError."""
+    objects, midnight = {}, None
+    for meta, rows in _blocks(path):
+        names = meta['OBJECT_NAME'].upper(), meta['OBJECT_ID'].upper()
+        if midnight is None:
+            midnight = int(rows[0, 1]) if len(rows) else 0
+        objects.setdefault(names, []).append((meta, rows))
+    if not objects:
+        raise csv_table.TableError(f'{path}: no META_START in it')
+    wanted = wanted.strip().upper()
+    found = [names for names in objects if not wanted or wanted in names]
+    if len(found) != 1:
+        raise csv_table.TableError(f'{path}: aircraft = {wanted!r:.60}: must name one of the {len(objects)} objects '
+                                   f'in the file: {", ".join(" ".join(names)[:60] for names in list(objects)[:12])}')
+    of_object = objects[found[0]]
+    segments = tuple(_segment(path, meta, rows, midnight) for meta, rows in of_object)
+    for before, after, (meta, _) in zip(segments, segments[1:], of_object[1:]):
+        if after.begin < before.end:
+            place = meta.get('USEABLE_START_TIME', meta['OBJECT_NAME'])
+            raise lines.wrong(path, place.line, place.column, 'the segment begins before the end of the one above')
+    first = of_object[0][0]
+    count = sum(len(segment.t) for segment in segments)
+    return states.Ephemeris(path, 86400.0 * midnight, segments,
+                            f'CCSDS OEM of {first["OBJECT_NAME"]:.40} ({first["OBJECT_ID"]:.40}): {count} states in '
+                            f'{first["REF_FRAME"]}, {segments[0].method} of degree {segments[0].degree}')
+
+
+def _blocks(path):
+    """Iterator of ({keyword: _Entry}, table (n, 9)) of the segments; a row is line, day, second, numbers of LIMITS."""
+    meta, rows, begun, state, count = {}, array.array('d'), 0, 'header', 0
+    for line, text in lines.read(path):
+        word = text.split(None, 1)[0]
+        if state == 'covariance':
+            state = 'data' if word == 'COVARIANCE_STOP' else state
+        elif word == 'META_START':
+            if state == 'meta':
+                raise lines.wrong(path, line, 1, f'META_START inside the metadata of line {begun}')
+            if state == 'data':
+                yield meta, _table(rows)
+            count += 1
+            if count > MOST_SEGMENTS:
+                raise csv_table.TableError(f'{path}: line {line}: must be at most {MOST_SEGMENTS} segments')
+            meta, rows, begun, state = {}, array.array('d'), line, 'meta'
+        elif word == 'META_STOP' and state == 'meta':
+            missing = [name for name in REQUIRED if name not in meta]
+            if missing:
+                raise csv_table.TableError(f'{path}: line {line}: {missing[0]} is missing in the metadata above')
+            meta['line'], state = line, 'data'
+        elif word == 'COVARIANCE_START' and state == 'data':
+            state = 'covariance'
+        elif state == 'data' and word != 'COMMENT':
+            rows.extend(_row(path, line, text))
+        elif word != 'COMMENT':
+            entry = ENTRY.fullmatch(text.strip())
+            if not entry:
+                raise lines.wrong(path, line, 1, f'{text.strip()!r:.60}: must be KEYWORD = value')
+            meta[entry[1]] = _Entry(entry[3], line, text.index('=') + 1 + len(entry[2].split('=')[1]) + 1)
+    if state == 'meta':
+        raise csv_table.TableError(f'{path}: the file ends inside the metadata of line {begun}')
+    if state in ('data', 'covariance'):
+        yield meta, _table(rows)
+
+
+def _table(rows):
+    return np.array(rows).reshape(-1, 9)
+
+
+def _row(path, line, text):
+    epoch = text.split(None, 1)[0]
+    at = text.index(epoch)
+    rest = ' ' * (at + len(epoch)) + text[at + len(epoch):]
+    return line, *lines.instant(path, line, at + 1, 'epoch', epoch), *lines.numbers(path, line, rest, LIMITS)
+
+
+def _segment(path, meta, rows, midnight):
+    _one_of(path, meta, 'CENTER_NAME', ('EARTH',))
+    frame, system = meta['REF_FRAME'].upper(), meta['TIME_SYSTEM'].upper()
+    if not frames.known(frame):
+        raise lines.wrong(path, meta['REF_FRAME'].line, meta['REF_FRAME'].column,
+                          f'REF_FRAME = {meta["REF_FRAME"]!s:.40}: must be {frames.names()}')
+    if 'REF_FRAME_EPOCH' in meta:
+        entry = meta['REF_FRAME_EPOCH']
+        raise lines.wrong(path, entry.line, entry.column, 'REF_FRAME_EPOCH: must be absent, frames are of date')
+    _one_of(path, meta, 'TIME_SYSTEM', tuple(frames.SYSTEMS))
+    ahead = frames.ahead_of_utc(system, midnight)
+
+    def seconds(day, second):
+        return 86400.0 * (day - midnight) + second - ahead
+
+    span = [seconds(*lines.instant(path, meta[name].line, meta[name].column, name, meta[name]))
+            if name in meta else None for name in ('USEABLE_START_TIME', 'USEABLE_STOP_TIME')]
+    method, degree = _interpolation(path, meta)
+    table = np.column_stack((rows[:, 0], seconds(rows[:, 1], rows[:, 2]), 1e3 * rows[:, 3:]))
+    return states.segment(path, meta['line'], table, frame, method, degree, *span)
+
+
+def _interpolation(path, meta):
+    """(method, degree), '' and None where the file says none."""
+    if 'INTERPOLATION' not in meta:
+        return '', None
+    method, degree = _one_of(path, meta, 'INTERPOLATION', states.METHODS), None
+    entry = meta.get('INTERPOLATION_DEGREE')
+    if entry is not None:
+        low, high = states.DEGREES
+        degree = int(entry) if entry.isdecimal() and len(entry) < 4 else 0
+        odd = method == 'HERMITE'
+        if not low + 2 * odd <= degree <= high or odd and degree % 2 == 0:
+            raise lines.wrong(path, entry.line, entry.column, f'INTERPOLATION_DEGREE = {entry!s:.20}: must be an '
+                              f'{"odd" if odd else "integer"} number from {low + 2 * odd} to {high}')
+    return method, degree
+
+
+def _one_of(path, meta, name, allowed):
+    entry = meta[name]
+    if entry.upper() not in allowed:
+        raise lines.wrong(path, entry.line, entry.column, f'{name} = {entry!s:.40}: must be {" or ".join(allowed)}')
+    return entry.upper()

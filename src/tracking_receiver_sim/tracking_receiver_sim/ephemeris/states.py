@@ -1,0 +1,100 @@
+"""An orbit as a file tells it: states in segments, each with its frame and the polynomial that joins its states."""
+import typing
+
+import numpy as np
+
+from pedestal_common import csv_table
+
+METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
+DEGREES = 1, 19
+USUAL = 'HERMITE', 7
+"""Interpolation where the file says none."""
+
+RADIUS = 6.3e6, 2e9
+"""Distance from the centre of the earth [m]: what is lower is in other units."""
+
+GAP = 3.0
+"""A step that is longer than so many of its neighbours is a gap."""
+
+
+def gaps(t):
+    """Which of the n - 1 steps between times (n,) are more than GAP times as long as both of their neighbours."""
+    step = np.diff(t)
+    longest = np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0))
+    return (step > GAP * longest) & (longest > 0.0)
+
+
+class Segment(typing.NamedTuple):
+    """States that one polynomial after the other joins.
+
+    line: (n,) in the file; t: (n,) [s], growing; r, v: (n, 3) [m], [m/s], v None where the file has none; frame: a
+    name that frames.earth_fixed knows; method: HERMITE or LAGRANGE; degree: of the polynomial; begin, end: t between
+    which it may be used.
+    """
+    line: np.ndarray
+    t: np.ndarray
+    r: np.ndarray
+    v: np.ndarray | None
+    frame: str
+    method: str
+    degree: int
+    begin: float
+    end: float
+
+    @property
+    def nodes(self):
+        """States of a polynomial."""
+        return (self.degree + 1) // 2 if self.method == 'HERMITE' else self.degree + 1
+
+
+class Ephemeris(typing.NamedTuple):
+    """The orbit of one object. midnight: UTC since 1970 [s] of t = 0; segments: in order of time; description: what
+    the file is."""
+    path: str
+    midnight: float
+    segments: tuple
+    description: str
+
+    @property
+    def begin(self):
+        """t of the first state that may be used."""
+        return self.segments[0].begin
+
+    @property
+    def end(self):
+        """t of the last state that may be used."""
+        return self.segments[-1].end
+
+
+def segment(path, place, table, frame, method, degree, begin=None, end=None) -> Segment:
+    """A Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
+
+    place: the line where the segment begins; degree: None where the file says none. Raises TableError where time does
+    not grow, a state is no orbit about the earth, or the states are too few.
+    """
+    if not len(table):
+        raise csv_table.TableError(f'{path}: line {place}: no state in the segment that begins here')
+    line, t, r = table[:, 0].astype(int), table[:, 1], table[:, 2:5]
+    back = np.flatnonzero(~(np.diff(t) > 0.0))
+    if back.size:
+        i = int(back[0]) + 1
+        raise csv_table.TableError(f'{path}: line {line[i]}, column 1: the time is {t[i] - t[i - 1]:g} s after that '
+                                   'of the state above, must be above 0')
+    radius = np.linalg.norm(r, axis=1)
+    outside = np.flatnonzero(~((radius >= RADIUS[0]) & (radius <= RADIUS[1])))
+    if outside.size:
+        i = int(outside[0])
+        raise csv_table.TableError(f'{path}: line {line[i]}: {radius[i] / 1e3:g} km from the centre of the earth, '
+                                   f'must be {RADIUS[0] / 1e3:g} to {RADIUS[1] / 1e3:g} km: in other units?')
+    v = table[:, 5:8] if table.shape[1] == 8 else None
+    chosen = (method or (USUAL[0] if v is not None else 'LAGRANGE')).upper()
+    made = Segment(line, t, r, v, frame, 'LAGRANGE' if chosen == 'LINEAR' else chosen, 1, begin=max(
+        t[0], t[0] if begin is None else begin), end=min(t[-1], t[-1] if end is None else end))
+    if degree is None:
+        most = 2 * len(t) - 1 if made.method == 'HERMITE' else len(t) - 1
+        degree = 1 if chosen == 'LINEAR' else min(USUAL[1], max(1, most))
+    made = made._replace(degree=1 if chosen == 'LINEAR' else degree)
+    if len(t) < max(2, made.nodes):
+        raise csv_table.TableError(f'{path}: line {place}: {len(t)} states in the segment that begins here, must be '
+                                   f'at least {max(2, made.nodes)} for {made.method} of degree {made.degree}')
+    return made

@@ -1,0 +1,129 @@
+"""STK ephemeris files (.e): EphemerisTimePosVel, EphemerisTimePosVelAcc and EphemerisTimePos about the earth.
+
+Keywords are read without regard to case, as STK does. Two states of one instant end a segment and begin the next.
+Blocks inside of the ephemeris (SegmentBoundaryTimes and the like) and what follows its states (covariance) are passed
+over.
+"""
+import array
+import datetime
+import re
+
+import numpy as np
+
+from pedestal_common import csv_table
+from tracking_receiver_sim.ephemeris import lines, states
+
+BEGINNING = re.compile(rb'stk\.v\.\d+', re.IGNORECASE)
+FRAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
+"""{CoordinateSystem: our name}."""
+UNITS = {'meters': 1.0, 'kilometers': 1000.0}
+METHODS = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}
+DATA = {'ephemeristimepos': False, 'ephemeristimeposvel': True, 'ephemeristimeposvelacc': True}
+"""{keyword before the states: whether they have velocities}."""
+KNOWN = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmethod', 'interpolationsamplesm1',
+         'interpolationorder', 'centralbody', 'coordinatesystem', 'distanceunit')
+PASSED_OVER = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
+MOST_SEGMENTS = 1000
+MONTHS = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
+EPOCH = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
+
+
+def read(path, _wanted='') -> states.Ephemeris:
+    """The orbit in an STK ephemeris file. Raises TableError."""
+    head, limits, rows, skipped = {}, None, array.array('d'), ''
+    for line, text in lines.read(path):
+        text = text.split('#', 1)[0].rstrip()
+        words = text.lower().split(None, 2)
+        if not words or line == 1:
+            continue
+        if skipped:
+            skipped = '' if ' '.join(words) == f'end {skipped}' else skipped
+        elif words[0] == 'begin' and words[1:] != ['ephemeris']:
+            skipped = ' '.join(words[1:])
+        elif words[0] == 'end' or limits and words[0].startswith('covariance'):
+            break
+        elif limits:
+            rows.extend((line, *lines.numbers(path, line, text, limits)))
+        elif words[0] in DATA:
+            unit, limits = _limits(path, head, DATA[words[0]])
+        elif words[0] in KNOWN or words[0] in PASSED_OVER:
+            value = text.lstrip()[len(words[0]):].lstrip()
+            head[words[0]] = line, len(text) - len(value) + 1, value.strip('"')
+        elif words[0] != 'begin':
+            column = len(text) - len(text.lstrip()) + 1
+            raise lines.wrong(path, line, column, f'{words[0]!r:.40}: must be one of {", ".join(DATA)}, '
+                              'or a keyword before them')
+    if not limits:
+        raise csv_table.TableError(f'{path}: none of {", ".join(DATA)} in it')
+    table = np.array(rows).reshape(-1, 1 + len(limits))
+    table[:, 2:] *= unit
+    return _ephemeris(path, head, table)
+
+
+def _limits(path, head, with_velocity):
+    """(unit [m], {name of a number in a line: its limits})."""
+    unit = _choice(path, head, 'distanceunit', UNITS, 'meters')
+    limits = {'time': (-1e9, 1e9), **dict.fromkeys('xyz', (-2e9 / unit, 2e9 / unit))}
+    if with_velocity:
+        limits.update(dict.fromkeys(('vx', 'vy', 'vz'), (-1e5 / unit, 1e5 / unit)))
+    return unit, limits
+
+
+def _ephemeris(path, head, table):
+    if 'scenarioepoch' not in head:
+        raise csv_table.TableError(f'{path}: ScenarioEpoch is missing')
+    begin, second = _epoch(path, *head['scenarioepoch'])
+    _choice(path, head, 'centralbody', {'earth': ''}, 'earth')
+    frame = _choice(path, head, 'coordinatesystem', FRAMES, 'fixed')
+    method = _choice(path, head, 'interpolationmethod', METHODS, 'lagrange')
+    if method == 'HERMITE' and table.shape[1] == 5:
+        place = head['interpolationmethod']
+        raise lines.wrong(path, place[0], place[1], 'InterpolationMethod = Hermite: must be Lagrange, the states have '
+                          'no velocity')
+    degree = _degree(path, head, method)
+    table[:, 1] += second
+    ends = np.flatnonzero(np.diff(table[:, 1]) == 0.0) + 1
+    if len(ends) >= MOST_SEGMENTS:
+        raise csv_table.TableError(f'{path}: line {table[ends[MOST_SEGMENTS - 1], 0]:.0f}: must be at most '
+                                   f'{MOST_SEGMENTS} segments')
+    segments = tuple(states.segment(path, int(part[0, 0]) if len(part) else 0, part, frame, method, degree)
+                     for part in np.split(table, ends))
+    return states.Ephemeris(path, begin, segments, f'STK ephemeris: {len(table)} states in {frame}, '
+                            f'{segments[0].method} of degree {segments[0].degree}')
+
+
+def _epoch(path, line, column, text):
+    """(midnight since 1970 [s], seconds past it) of a time as STK writes it."""
+    match = EPOCH.fullmatch(' '.join(text.lower().split()))
+    try:
+        day, month, year, hours, minutes, seconds = match.groups()
+        date = datetime.date(int(year), MONTHS.index(month) + 1, int(day))
+        if not lines.YEARS[0] <= date.year <= lines.YEARS[1] or int(hours) > 23 or int(minutes) > 59:
+            raise ValueError
+    except (AttributeError, ValueError):
+        raise lines.wrong(path, line, column, f'ScenarioEpoch = {text!r:.60}: must be UTC such as 1 Jun 2026 '
+                          '12:00:00.0') from None
+    midnight = 86400.0 * (date - datetime.date(1970, 1, 1)).days
+    return midnight, 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
+
+
+def _choice(path, head, name, choices, default):
+    line, column, text = head.get(name, (0, 0, default))
+    if text.lower() not in choices:
+        raise lines.wrong(path, line, column, f'{name} = {text!r:.40}: must be {" or ".join(choices)}')
+    return choices[text.lower()]
+
+
+def _degree(path, head, method):
+    """Of the polynomial, by the number of its states: InterpolationSamplesM1 is that number less 1."""
+    name = next((name for name in ('interpolationsamplesm1', 'interpolationorder') if name in head), '')
+    if not name:
+        return None
+    line, column, text = head[name]
+    low, high = states.DEGREES
+    samples = int(text) + 1 if text.isdecimal() and len(text) < 4 else 0
+    degree = 2 * samples - 1 if method == 'HERMITE' and name == 'interpolationsamplesm1' else samples - 1
+    if not low <= degree <= high or method == 'HERMITE' and degree % 2 == 0:
+        raise lines.wrong(path, line, column, f'{name} = {text!r:.20}: must make a polynomial of a degree from {low} '
+                          f'to {high}')
+    return degree

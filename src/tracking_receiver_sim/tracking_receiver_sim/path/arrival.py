@@ -1,0 +1,81 @@
+"""Where a target is seen: refracted by the air, and as it was when the wave left it.
+
+The refraction is the VLBI Field System's (file poclb/refrwn.c, for radio waves in moist air, as katpoint gives it):
+
+    R = 5.7295787e-5 N (cot E - 42.5 / (E + 0.4)^2.64) - 40 / (E + 2.7)^4        R, E in deg, E of the target as it is
+
+A line of light needs r / c: a target at a velocity v is seen v r / c behind.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+LIGHT = 299792458.0
+"""Speed of light [m/s]."""
+
+LOWEST = math.radians(1.0)
+"""Below this elevation the refraction stays as it is there."""
+
+PATH = np.dtype([('refractivity', 'f8'), ('light_time', 'i8')], align=True)
+
+
+def constants(p) -> np.ndarray:
+    """PATH (1,) of PathParameters."""
+    return np.array([(p.refractivity, p.light_time)], PATH)
+
+
+@compiled
+def refraction(N, elevation):
+    """(R [rad], its derivative by the elevation) at the elevation [rad] of a target as it is."""
+    E = min(max(elevation, LOWEST), 0.5 * math.pi)
+    degrees, per_N = math.degrees(E), 0.57295787e-4 * N
+    bent = per_N * (1.0 / math.tan(E) - 42.5 / (degrees + 0.4)**2.64) - 40.0 / (degrees + 2.7)**4
+    slope = (per_N * (-math.radians(1.0) / math.sin(E)**2 + 112.2 / (degrees + 0.4)**3.64)
+             + 160.0 / (degrees + 2.7)**5)
+    return math.radians(bent), slope if elevation > LOWEST else 0.0
+
+
+@compiled
+def _bent(N, r, v):
+    """Vector [m] and velocity [m/s], ENU from the antenna, turned up by the refraction."""
+    (e, n, u), (ve, vn, vu) = r, v
+    h = math.hypot(e, n)
+    if h == 0.0:
+        return r, v
+    R, slope = refraction(N, math.atan2(u, h))
+    ce, cn = e / h, n / h
+    vh = ve * ce + vn * cn
+    R_dot = slope * (vu * h - u * vh) / (h * h + u * u)
+    sin_R, cos_R = math.sin(R), math.cos(R)
+    h_seen, u_seen = h * cos_R - u * sin_R, u * cos_R + h * sin_R
+    vh_seen, vu_seen = vh * cos_R - vu * sin_R - R_dot * u_seen, vu * cos_R + vh * sin_R + R_dot * h_seen
+    k = h_seen / h
+    return ((k * e, k * n, u_seen),
+            (vh_seen * ce + k * (ve - vh * ce), vh_seen * cn + k * (vn - vh * cn), vu_seen))
+
+
+@compiled
+def seen(c, r, v):
+    """(vector [m], its velocity [m/s]), ENU from the antenna, at which a target at r with the velocity v is seen;
+    three floats each; c: record of PATH."""
+    if c.light_time != 0:
+        t = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) / LIGHT
+        r = r[0] - v[0] * t, r[1] - v[1] * t, r[2] - v[2] * t
+    if c.refractivity > 0.0:
+        r, v = _bent(c.refractivity, r, v)
+    return r, v
+
+
+@compiled
+def _all_seen(c, r, v, out):
+    for k in range(len(r)):
+        out[k, 0], out[k, 1], out[k, 2] = seen(c[0], (r[k, 0], r[k, 1], r[k, 2]), (v[k, 0], v[k, 1], v[k, 2]))[0]
+
+
+def all_seen(p, r, v):
+    """Vectors (n, 3) [m] at which targets at r (n, 3) with velocities v (n, 3) are seen through PathParameters."""
+    out = np.empty(r.shape)
+    _all_seen(constants(p), np.ascontiguousarray(r), np.ascontiguousarray(v), out)
+    return out

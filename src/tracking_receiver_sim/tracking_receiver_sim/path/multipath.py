@@ -1,0 +1,41 @@
+"""The image of a target below the horizon: a wave that came off level ground.
+
+A far target at the elevation E has its image at -E; the wave is 2 h sin E longer under way, is turned round (-1, both
+polarisations at low angles) and loses amplitude on rough ground:
+
+    Gamma = -rho exp(-2 (2 pi sigma_h sin E / lambda)^2) exp(-j 4 pi h sin E / lambda)
+
+Roughness: W. S. Ament, Proceedings of the IRE 41 (1953) 142; the geometry: Barton, Modern Radar System Analysis,
+chapter on multipath. The wave scattered in all directions, and the curvature of the earth, are left out.
+"""
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.line_of_sight import offsets, to_deck
+
+MULTIPATH = np.dtype([('reflection', 'f8'), ('rough', 'f8'), ('phase', 'f8')], align=True)
+"""rho; 2 pi sigma_h / lambda; 4 pi h / lambda."""
+
+Image = namedtuple('Image', 'real imaginary dX dE')
+"""Gamma, and where the image is off the beam: cross-elevation, elevation [rad]."""
+
+
+def constants(p) -> np.ndarray:
+    """MULTIPATH (1,) of MultipathParameters."""
+    per_m = 2.0 * math.pi / p.wavelength
+    return np.array([(p.reflection, per_m * p.roughness, 2.0 * per_m * p.height)], MULTIPATH)
+
+
+@compiled
+def image(c, i, e, n, u):
+    """The Image of a target seen at an ENU vector from the antenna; i: beam and attitude (receiver.INPUTS)."""
+    if c.reflection == 0.0 or u <= 0.0:
+        return Image(0.0, 0.0, 0.0, 0.0)
+    sin_E = u / math.sqrt(e * e + n * n + u * u)
+    amplitude = c.reflection * math.exp(-2.0 * (c.rough * sin_E)**2)
+    x, y, z = to_deck(i.mat_ed, e, n, -u)
+    dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
+    return Image(-amplitude * math.cos(c.phase * sin_E), amplitude * math.sin(c.phase * sin_E), dX, dE)

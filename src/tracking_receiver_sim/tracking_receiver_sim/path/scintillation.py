@@ -1,0 +1,41 @@
+"""Scintillation: turbulence of the air makes level and direction of the wave wander, a first-order Gauss-Markov
+process each.
+
+Level [dB]: sigma at the elevation E is that of the zenith over sin^1.2 E (ITU-R P.618, section 2.4.1, with its
+factors of humidity, frequency and aperture in the value at the zenith). Direction: its variance goes with the
+length of the path through the turbulence, so sigma with 1 / sqrt(sin E) (Tatarskii, The Effects of the Turbulent
+Atmosphere on Wave Propagation, angle of arrival: 2.91 D^(-1/3) times the integral of C_n^2 along the path).
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+NORMALS = 3
+"""Standard normals of a step: level, two axes."""
+
+LOWEST = math.sin(math.radians(4.0))
+"""Below 4 deg it grows no further: where P.618 ends."""
+
+SCINTILLATION = np.dtype([('level', 'f8'), ('angle', 'f8'), ('keep', 'f8'), ('draw', 'f8'), ('on', 'i8')], align=True)
+"""1-sigma at the zenith [dB], [rad]; the process of unit variance: x = keep x + draw w."""
+
+
+def constants(p, period) -> np.ndarray:
+    """SCINTILLATION (1,) of ScintillationParameters, for steps of period [s]."""
+    keep = math.exp(-period / p.time_constant)
+    return np.array([(p.level_db, p.angle, keep, math.sqrt(1.0 - keep * keep), p.on)], SCINTILLATION)
+
+
+@compiled
+def wander(c, x, sin_E, normals, first):
+    """(factor of the amplitude, cross-elevation, elevation [rad] that the wave is turned by) one step later.
+
+    x (3,): the process, changed; normals: from index `first` on.
+    """
+    for i in range(NORMALS):
+        x[i] = c.keep * x[i] + c.draw * normals[first + i]
+    s = max(sin_E, LOWEST)
+    angle = c.angle / math.sqrt(s)
+    return 10.0**(0.05 * c.level * x[0] / s**1.2), angle * x[1], angle * x[2]

@@ -1,0 +1,88 @@
+"""Alarms in the graph: a drive that trips and a motor that is lost, told, acknowledged and shelved by commands."""
+import numpy as np
+import pytest
+
+from acu_tracker import modes
+from acu_tracker.alarms import report, table
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.run import closed_loop, scenario
+
+TRIP = ['adu.azimuth.faults.overspeed=1.5',
+        'acu.commands=1.0 acknowledge alarm=drive_fault; 1.2 shelve alarm=drive_fault seconds=60 reason=tests; '
+        '1.4 unshelve alarm=drive_fault; 1.6 reset']
+"""The sine of 0.87 rad at 0.4 Hz wants 2.2 rad/s."""
+
+
+@pytest.fixture(scope='module')
+def tripped(start_run):
+    run = start_run('servo_sine', '--duration', '2.0', '--param', TRIP[0], '--param', TRIP[1])
+    result = run.finish()
+    assert result.returncode == 0, result.stderr
+    return bags.read(run.bag)
+
+
+def lists(bag):
+    """[(t, {alarm: {key: text}})] of acu/alarms."""
+    return [(array.header.stamp.sec + array.header.stamp.nanosec * 1e-9,
+             {status.name: {value.key: value.value for value in status.values} for status in array.status})
+            for *_, array in bag.messages('acu/alarms')]
+
+
+def test_the_list_is_told_whenever_it_changes_and_obeys(tripped):
+    told = lists(tripped)
+    assert told[0] == (0.0, {})
+    fault = [(t, rows['drive fault']) for t, rows in told if 'drive fault' in rows]
+    assert fault[0][1]['state'] == 'unacknowledged' and fault[0][1]['annunciated'] == '1'
+    assert fault[0][1]['detail'] == 'fault: azimuth overspeed' and fault[0][1]['action']
+    states = tripped.table('adu/state')
+    assert fault[0][0] == pytest.approx(states['t'][1], abs=1e-9)               # in the very step in which it trips
+    of = {row['state']: t for t, row in reversed(fault)}
+    assert of['acknowledged'] == pytest.approx(1.0) and of['shelved'] == pytest.approx(1.2)
+    assert fault[-1][1]['state'] == 'unacknowledged' and fault[-1][0] == pytest.approx(1.4)
+    assert next(row for _, row in fault if row['state'] == 'shelved')['shelved_reason'] == 'tests'
+
+
+def test_the_closed_loop_tells_it_at_the_same_steps(tripped, differences):
+    run = closed_loop.Loop(scenario.load('servo_sine', TRIP, duration=2.0)).run()
+    assert differences(run, tripped) == {}
+    assert len(run.table('acu/alarms')['t']) == len(lists(tripped))
+
+
+def under_way(*faults, duration=9.0):
+    """The Run of a flyby with faults in its nodes at 6 s, in autotrack, and its control unit."""
+    loop = closed_loop.Loop(scenario.load('uav_flyby', list(faults), duration=duration))
+    return loop.run(), loop.units['acu']
+
+
+def annunciated(acu):
+    return {table.NAMES[i] for i in report.annunciated(acu.alarms)}
+
+
+def raised(acu):
+    """Names of the alarms that were raised."""
+    return {name for name, alarm in zip(table.NAMES, acu.alarms['alarm']) if np.isfinite(alarm['raised'])}
+
+
+@pytest.mark.parametrize(('axis', 'motor'), (('azimuth', 1), ('elevation', 2)))
+def test_with_one_motor_of_a_pair_it_tracks_on_and_says_so(axis, motor):
+    run, acu = under_way(f'adu.inject=6 motor_loss axis={axis} motor={motor}', duration=20.0)
+    assert list(run.table('adu/state')['data']) == ['enabled', f'enabled: {axis} motor lost']
+    assert run['acu/mode'][-1] == modes.AUTOTRACK
+    assert np.hypot(*run.truth['error'][run.t > 7.0].T).max() < 0.25 * 0.0175           # a quarter of the beamwidth
+    assert annunciated(acu) == {f'{axis} motor lost'}
+
+
+@pytest.mark.parametrize(('fault', 'first', 'others'), (
+    ('encoder_jump axis=azimuth size=0.02', 'azimuth encoder jump', {'drive fault'}),
+    ('encoder_stuck axis=azimuth', 'azimuth encoder stuck', {'drive fault'}),
+    ('brake_stuck axis=azimuth state=on', 'azimuth brake not released', set()),
+    ('bias axis=azimuth size=0.05', 'azimuth encoder disagreement', set())))
+def test_a_fault_is_told_with_its_consequences_under_it(fault, first, others):
+    _, acu = under_way(f'adu.inject=6 {fault}')
+    assert first in annunciated(acu) and raised(acu) >= {first, *others} and not annunciated(acu) & others
+
+
+@pytest.mark.parametrize(('fault', 'expected'), (('nan', 'signal lost'), ('freeze', 'receiver silent')))
+def test_a_receiver_without_numbers_or_with_the_same_again_is_told(fault, expected):
+    _, acu = under_way(f'tracking_receiver.inject=6 {fault}')
+    assert expected in annunciated(acu)

@@ -1,0 +1,74 @@
+"""Commands with arguments through the graph: by schedule, topic and service; recorded, recomputed, made again."""
+import signal
+import sys
+
+import pytest
+
+from pedestal_bringup import cli
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.run import closed_loop, scenario
+from pedestal_common import commands, messages
+
+SCHEDULE = 'acu.commands=2 preset azimuth=0.4 elevation=0.6; 2.5 preset azimuth=9; 4 program'
+SECONDS = 6.0
+EXACT = ('--absolute', '0', '--relative', '0')
+
+
+def replies(path):
+    """[(step [s], Command, Reply)] of a recording."""
+    bag = bags.read(path)
+    return [(log / 1e9, *commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus')))
+            for _, log, _, data in bag.raw('acu/command_result')]
+
+
+@pytest.fixture(scope='module')
+def scheduled(start_run):
+    run = start_run('uav_flyby', '--duration', str(SECONDS), '--param', SCHEDULE)
+    result = run.finish()
+    assert result.returncode == 0, result.stderr
+    return run.bag
+
+
+def test_a_schedule_is_obeyed_in_its_steps_and_what_came_of_it_is_recorded(scheduled):
+    told = replies(scheduled)
+    assert [(at, command.verb, command.who, reply.granted) for at, command, reply in told] == [
+        (2.0, 'preset', 'scenario', True), (2.5, 'preset', 'scenario', False), (4.0, 'program', 'scenario', True)]
+    assert told[1][2].text == 'refused: outside limits; mode is preset'
+    modes = bags.read(scheduled).table('acu/mode')
+    assert [(mode, t) for mode, t in zip(modes['data'], modes['t']) if 2.0 <= t <= 4.0] == [
+        ('preset', 2.0), ('program', 4.0)]
+    assert modes['data'][-1] == 'autotrack'
+
+
+def test_a_refused_command_leaves_the_preset_as_it_was(scheduled):
+    table = bags.read(scheduled).table('acu/reference')
+    before_program = (table['t'] > 3.9) & (table['t'] < 4.0)
+    assert table['azimuth.position'][before_program] == pytest.approx(0.4, abs=1e-6)
+    assert table['elevation.position'][before_program] == pytest.approx(0.6, abs=1e-6)
+
+
+def test_the_closed_loop_obeys_it_in_the_same_steps(scheduled, differences):
+    run = closed_loop.Loop(scenario.load('uav_flyby', [SCHEDULE], duration=SECONDS)).run()
+    assert differences(run, bags.read(scheduled)) == {}
+
+
+def test_it_is_recomputed_and_made_again(scheduled, tmp_path, capsys, monkeypatch, environment):
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    assert cli.main(['recompute', str(scheduled), '--node', 'acu', *EXACT]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == 'acu: identical'
+
+
+def test_a_run_with_an_operator_is_made_again_to_the_byte(scheduled, start_process, tmp_path):
+    process = start_process([sys.executable, '-m', 'pedestal_bringup.cli', 'rerun', scheduled,
+                             '--bag', tmp_path / 'again'])
+    said, _ = process.communicate(timeout=180)
+    assert process.returncode == 0 and 'equal to the last byte' in said
+
+
+@pytest.mark.parametrize(('schedule', 'said'), (
+    ('2 presett', "unknown verb 'presett'; did you mean 'preset'?"),
+    ('2 preset azimuth=nan', 'preset: azimuth = nan rad: must be -20 to 20')))
+def test_a_wrong_schedule_is_refused_before_anything_runs(schedule, said, capsys, monkeypatch):
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    assert cli.main(['run', 'uav_flyby', '--param', f'acu.commands={schedule}']) == 1
+    assert said in capsys.readouterr().err

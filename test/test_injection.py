@@ -1,0 +1,91 @@
+"""Injected faults through the graph: by parameter in lockstep, by topic in realtime; recorded and recomputed."""
+import signal
+
+import numpy as np
+import pytest
+
+from pedestal_bringup import cli
+from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.run import closed_loop, scenario
+from pedestal_common import commands, messages
+
+SECONDS = 4.0
+FAULTS = ['adu.inject=2.2 gust torque=-3000 duration=0.3; 3 encoder_jump axis=elevation size=0.02',
+          'tracking_receiver.inject=2 noise sigma=0.01 duration=0.2; 2.5 fade depth=60 duration=0.5',
+          'ship_motion.inject=2.1 bias axis=x rate=0.02 duration=0.2', 'ins.inject=2.6 ins_jump heading=0.02']
+
+
+def replies(path, topic):
+    """[(step [s], Command, Reply)] of a recording."""
+    bag = bags.read(path)
+    return [(log / 1e9, *commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus')))
+            for _, log, _, data in bag.raw(topic)]
+
+
+@pytest.fixture(scope='module')
+def injected(start_run):
+    params = [word for fault in FAULTS for word in ('--param', fault)]
+    run = start_run('ship_pass', '--duration', str(SECONDS), *params)
+    result = run.finish()
+    assert result.returncode == 0, result.stderr
+    return run.bag
+
+
+def test_a_lockstep_run_with_faults_is_the_closed_loop_to_the_last_bit(injected, differences):
+    run = closed_loop.Loop(scenario.load('ship_pass', FAULTS, duration=SECONDS)).run()
+    assert differences(run, bags.read(injected)) == {}
+    plain = closed_loop.Loop(scenario.load('ship_pass', duration=SECONDS)).run()
+    other = np.array([a.tobytes() != b.tobytes() for a, b in zip(run.steps, plain.steps)])
+    assert np.flatnonzero(other)[0] == 400
+    assert list(bags.read(injected).table('adu/state')['data']) == [
+        'enabled', 'fault: elevation encoder disagreement']
+
+
+def test_each_node_tells_of_its_faults_in_their_steps(injected):
+    told = [(at, command.verb, command.who, reply) for at, command, reply in replies(injected, 'adu/injected')]
+    assert told == [
+        (2.2, 'gust', 'scenario', (True, 'gust from the step after 2.195000 s on, for 0.3 s')),
+        (3.0, 'encoder_jump', 'scenario', (True, 'encoder_jump from the step after 2.995000 s on'))]
+    for node, verbs in (('tracking_receiver', ['noise', 'fade']), ('ship_motion', ['bias']), ('ins', ['ins_jump'])):
+        assert [command.verb for _, command, _ in replies(injected, f'{node}/injected')] == verbs
+
+
+@pytest.mark.parametrize('node', ('adu', 'tracking_receiver', 'ins'))
+def test_a_node_with_faults_is_recomputed(injected, node, capsys, monkeypatch):
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    assert cli.main(['recompute', str(injected), '--node', node, '--absolute', '0', '--relative', '0']) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f'{node}: identical'
+
+
+@pytest.mark.parametrize(('inject', 'said'), (
+    ('ins.inject=2 drop', 'ins: inject: drop of ins: its attitude does not come; in lockstep everybody would wait'),
+    ('adu.inject=2 gost', "inject = '2 gost': unknown verb 'gost'; did you mean 'gust'?")))
+def test_a_fault_that_cannot_be_is_refused_before_anything_runs(inject, said, capsys, monkeypatch):
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    assert cli.main(['run', 'ship_pass', '--param', inject]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_a_live_fault_breaks_the_drive_and_is_told_and_recorded(start_run, connect):
+    run = start_run('uav_flyby', '--duration', '8', '--pacing', 'realtime')
+    somebody = connect(run.domain_id)
+    somebody.write('adu/inject')
+    for topic in ('adu/injected', 'adu/state', 'acu/mode'):
+        somebody.read(topic)
+    somebody.until(lambda: somebody.heard['acu/mode'] and somebody.heard['acu/mode'][-1].data == 'autotrack')
+    for command in (commands.Command('encoder_jump', 'anna', '1', {'size': '0.02', 'duration': '0.5'}),
+                    commands.Command('encoder_jump', 'anna', '2', {'size': '9'})):
+        somebody.publish('adu/inject', commands.message(command))
+        somebody.until(lambda command=command: any(status.message == command.number
+                                                   for status in somebody.heard['adu/injected']))
+    somebody.until(lambda: any(said.data == 'fault: azimuth encoder disagreement'
+                               for said in somebody.heard['adu/state']))
+    somebody.until(lambda: somebody.heard['acu/mode'][-1].data == 'standby')
+    result = run.finish()
+    assert result.returncode in (0, 3), result.stderr        # 3: a busy machine lost steps
+    told = [(command.verb, command.who, command.number, reply.granted, reply.text)
+            for _, command, reply in replies(run.bag, 'adu/injected') if command.who == 'anna']
+    assert [row[:4] for row in told] == [('encoder_jump', 'anna', '1', True), ('encoder_jump', 'anna', '2', False)]
+    assert told[0][4].startswith('encoder_jump from the step after ') and told[0][4].endswith(' s on, for 0.5 s')
+    assert 'size = 9 rad: must be -3.2 to 3.2' in told[1][4]
+    assert len(list(bags.read(run.bag).raw('adu/inject'))) == 2

@@ -1,0 +1,159 @@
+"""By hand from a terminal: `pedestal status`, `mode`, `ask` and `operate` on a running realtime graph."""
+import json
+import os
+import pty
+import select
+import signal
+import sys
+import time
+
+import pytest
+
+from pedestal_bringup import cli
+from pedestal_bringup.bags import bag as bags
+from pedestal_common import commands, messages
+
+PEDESTAL = (sys.executable, '-m', 'pedestal_bringup.cli')
+ARROW_RIGHT = b'\x1b[C'
+
+
+def replies(path):
+    """[(Command, Reply)] of a recording."""
+    return [commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus'))
+            for *_, data in bags.read(path).raw('acu/command_result')]
+
+
+@pytest.fixture(scope='module', params=('uav_flyby', 'ship_pass'))
+def running(request, start_run, connect):
+    """(Run in realtime ashore or on a ship, its Client) from the moment in which it tracks."""
+    run = start_run(request.param, '--duration', '600', '--pacing', 'realtime', '--param', 'adu.stow_pins=true',
+                    '--param', 'adu.pins.travel_time=0.5')
+    client = connect(run.domain_id)
+    client.read('acu/mode')
+    client.read('joint_states')
+    client.until(lambda: client.heard['acu/mode'] and client.heard['acu/mode'][-1].data == 'autotrack')
+    yield run, client
+    run.process.send_signal(signal.SIGINT)
+    run.process.communicate(timeout=120)
+
+
+@pytest.fixture
+def terminal(running, run_process):
+    """terminal(*arguments) -> CompletedProcess of `pedestal` beside the running graph."""
+    return lambda *arguments: run_process([*PEDESTAL, *arguments], 60.0, ROS_DOMAIN_ID=str(running[0].domain_id))
+
+
+def mode(client, name):
+    client.until(lambda: client.heard['acu/mode'][-1].data == name, 20.0)
+
+
+def test_one_shot_verbs_ask_wait_and_say(running, terminal, tmp_path):
+    _, client = running
+    said = terminal('mode', 'preset', '--az', '20', '--el', '35')
+    assert (said.returncode, said.stdout) == (0, 'acu: mode is preset\n'), said.stderr
+    mode(client, 'preset')
+    refused = terminal('mode', 'preset', '--el', '1000')
+    assert (refused.returncode, refused.stdout) == (1, 'acu: refused: outside limits; mode is preset\n')
+    assert terminal('ask', 'take', '--who', 'anna').returncode == 0
+    assert 'control is held by anna' in terminal('mode', 'program', '--who', 'bert').stdout
+    assert terminal('mode', 'stop', '--who', 'bert').returncode == 0
+    mode(client, 'stop')
+    assert terminal('ask', 'fallback', 'mode=memory', '--who', 'anna').returncode == 0
+    file = tmp_path / 'status.json'
+    terminal('status', '--json', str(file))
+    rows = {(row['case'], row['metric']): row['value'] for row in json.loads(file.read_text())['rows']}
+    assert rows['acu', 'mode'] == 'stop' and rows['acu', 'control'] == 'anna' and rows['acu', 'fallback'] == 'memory'
+    assert rows['angle', 'elevation'] == pytest.approx(rows['commanded', 'elevation'], abs=0.2)
+    assert terminal('ask', 'release', '--who', 'anna').returncode == 0
+
+
+def test_the_console_stops_jogs_while_a_key_is_held_and_quits(running, environment):
+    run, client = running
+    client.until(lambda: client.heard['joint_states'])
+    child, screen = pty.fork()
+    if child == 0:
+        os.execvpe(PEDESTAL[0], [*PEDESTAL, 'operate', '--who', 'hand'],
+                   {**environment, 'ROS_DOMAIN_ID': str(run.domain_id), 'TERM': 'xterm', 'COLUMNS': '120'})
+    shown = b''
+
+    def watch(condition, seconds=60.0):
+        nonlocal shown
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, shown[-2000:]
+            if select.select([screen], [], [], 0.01)[0]:
+                shown += os.read(screen, 65536)
+            client.executor.spin_once(timeout_sec=0.01)
+    watch(lambda: b'jog' in shown)
+    os.write(screen, b's')
+    watch(lambda: client.heard['acu/mode'][-1].data == 'stop')
+    began = client.heard['joint_states'][-1].position[0]
+    while client.heard['acu/mode'][-1].data != 'rate' or client.heard['joint_states'][-1].position[0] < began + 0.005:
+        os.write(screen, ARROW_RIGHT)
+        held = time.monotonic() + 0.05
+        watch(lambda held=held: time.monotonic() > held)
+    watch(lambda: abs(client.heard['joint_states'][-1].velocity[0]) < 1e-3)               # the key was let go
+    os.write(screen, b'q')
+    assert os.waitpid(child, 0)[1] == 0
+    os.close(screen)
+
+
+def test_the_antenna_is_stowed_with_its_pins_and_unstowed(running, terminal):
+    _, client = running
+    client.read('adu/stow_pins')
+
+    def pins(where):
+        client.until(lambda: client.heard['adu/stow_pins'] and client.heard['adu/stow_pins'][-1].data == (
+            f'azimuth {where}, elevation {where}'))
+    pins('out')
+    assert terminal('mode', 'stow').returncode == 0
+    pins('in')
+    refused = terminal('mode', 'preset', '--az', '10')
+    assert (refused.returncode, refused.stdout) == (1, 'acu: refused: stow pins not out; mode is stow\n')
+    assert terminal('mode', 'unstow').returncode == 0
+    pins('out')
+    mode(client, 'standby')
+
+
+def test_everything_asked_is_in_the_recording_with_who_asked(running):
+    run, _ = running
+    run.process.send_signal(signal.SIGINT)
+    run.process.communicate(timeout=120)
+    asked = {(command.verb, command.who, reply.granted) for command, reply in replies(run.bag)}
+    assert {('take', 'anna', True), ('program', 'bert', False), ('stop', 'bert', True), ('stop', 'hand', True),
+            ('rate', 'hand', True)} <= asked
+
+
+def test_without_a_graph_it_is_said_in_one_line(run_process, reserve_domain, one_line):
+    for arguments in (('status',), ('mode', 'stop')):
+        done = run_process([*PEDESTAL, *arguments, '--timeout', '1'], 60.0, ROS_DOMAIN_ID=str(reserve_domain()))
+        assert done.returncode == 1 and 'is a graph running?' in one_line(done.stderr)
+    done = run_process([*PEDESTAL, 'operate'], 60.0)
+    assert done.returncode == 1 and 'needs a terminal' in one_line(done.stderr)
+
+
+def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, capsys, monkeypatch):
+    """In realtime, by topic and by service, from two who are strangers to the graph."""
+    run = start_run('uav_flyby', '--duration', '8', '--pacing', 'realtime')
+    operator = connect(run.domain_id)
+    operator.write('acu/command')
+    operator.read('acu/command_result')
+    operator.read('acu/mode')
+    operator.until(lambda: operator.heard['acu/mode'] and operator.heard['acu/mode'][-1].data == 'autotrack')
+    asked = (commands.Command('preset', 'anna', '1', {'azimuth': '0.2', 'elevation': '0.4'}),
+             commands.Command('preset', 'anna', '2', {'azimuth': 'nan'}),
+             commands.Command('dance', 'anna', '3'))
+    for command in asked:
+        operator.publish('acu/command', commands.message(command))
+        operator.until(lambda command=command: any(status.message == command.number
+                                                   for status in operator.heard['acu/command_result']))
+    assert operator.trigger('acu/program')[0]
+    result = run.finish()
+    assert result.returncode in (0, 3), result.stderr                   # 3: a busy machine lost steps
+    told = [(command.verb, command.who, reply.granted) for command, reply in replies(run.bag)]
+    assert told == [('preset', 'anna', True), ('preset', 'anna', False), ('dance', 'anna', False),
+                    ('acu/program', 'service', True)]
+    assert len(list(bags.read(run.bag).raw('acu/command'))) == 3
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    cli.main(['recompute', str(run.bag), '--node', 'acu'])
+    assert 'preset azimuth=0.2 elevation=0.4 asked for at' in capsys.readouterr().out

@@ -1,0 +1,421 @@
+"""The operator's page in Debian's Chromium, on a running realtime graph and on a recording; and who is refused."""
+import contextlib
+import http.client
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.parse
+
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect as connect_web_socket
+
+from pedestal_bringup.bags import bag as bags
+from pedestal_common import commands, messages
+
+CHROMIUM = shutil.which('chromium')
+REFERENCE = pathlib.Path(__file__).parents[1] / 'bags' / 'reference' / 'uav_flyby'
+PATIENCE = 120.0
+"""Seconds for what takes one or two on a quiet machine."""
+
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason='chromium is not installed')
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+class Site:
+    """The page's server as a client of it sees it. lines: what was printed when it started."""
+
+    def __init__(self, lines):
+        self.urls = {role: url for role, url in re.findall(r'page, (\w+): (http\S+)', lines)}
+        parts = urllib.parse.urlsplit(self.urls['operator'])
+        self.host, self.port, self.netloc = parts.hostname, parts.port, parts.netloc
+        self.cookies = {role: self.get('/?' + urllib.parse.urlsplit(url).query).getheader('set-cookie').split(';')[0]
+                        for role, url in self.urls.items()}
+
+    def get(self, path, method='GET', **headers):
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE)
+        connection.request(method, path, headers=headers)
+        answer = connection.getresponse()
+        answer.text = answer.read().decode()
+        return answer
+
+    def open(self, role='operator', name='anna', **changes):
+        """A web socket as a page of a role opens it."""
+        wanted = {'origin': f'http://{self.netloc}', 'additional_headers': {'Cookie': self.cookies[role]}, **changes}
+        return connect_web_socket(f'ws://{self.netloc}/socket?name={name}', open_timeout=PATIENCE, **wanted)
+
+
+def hear(web_socket, wanted):
+    """The first section of messages for which wanted(message) is true."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        message = json.loads(web_socket.recv(PATIENCE))
+        web_socket.send(json.dumps({'seen': message['number']}))
+        found = wanted(message)
+        if found:
+            return found
+    raise AssertionError('not heard')
+
+
+def reply(verb):
+    def wanted(message):
+        return [given for given in message.get('replies', ()) if given.get('verb') == verb]
+    return wanted
+
+
+@pytest.fixture(scope='module')
+def lone(reserve_domain, tmp_path_factory):
+    """(Process, Site) of a page without a graph."""
+    folder = tmp_path_factory.mktemp('page')
+    with open(folder / 'errors', 'w') as errors:
+        process = subprocess.Popen(
+            [sys.executable, '-m', 'pedestal_operator.page_node', '--ros-args', '-p', 'port:=0', '-p', 'clients:=12'],
+            env={**os.environ, 'ROS_DOMAIN_ID': str(reserve_domain())}, stdout=subprocess.PIPE, stderr=errors,
+            text=True)
+        process.errors = folder / 'errors'
+        yield process, Site(''.join(process.stdout.readline() for _ in range(3)))
+    process.kill()
+    process.wait()
+    process.stdout.close()
+
+
+def test_who_is_served(lone):
+    _, site = lone
+    good = {'Cookie': site.cookies['operator']}
+    page = site.get('/', **good)
+    assert page.status == 200 and page.getheader('cache-control') == 'no-cache'
+    assert "default-src 'none'" in page.getheader('content-security-policy')
+    assert 'HttpOnly' in site.get('/?token=' + good['Cookie'].partition('=')[2]).getheader('set-cookie')
+    for path in ('/', '/page.js', '/history', '/uplot/LICENSE'):
+        assert site.get(path).status == 401 and site.get(path, **good).status == 200
+        assert site.get(path, **good, Host=f'antenna.example:{site.port}').status == 400
+        assert site.get(path, **good, Origin='http://antenna.example').status == 403
+    assert site.get('/', 'POST', **good).status == 403
+    assert site.get('/?token=wrong').status == 401
+    assert site.get('/../page_node.py', **good).status == 404
+    for status, changes in ((403, {'origin': 'http://antenna.example'}), (403, {'origin': None}),
+                            (401, {'additional_headers': {}}), (401, {'additional_headers': {'Cookie': 'a=b'}})):
+        with pytest.raises(InvalidStatus) as refused:
+            site.open(**changes)
+        assert refused.value.response.status_code == status, changes
+
+
+def test_a_monitor_may_only_look_and_an_operator_takes_nothing_away(lone):
+    _, site = lone
+    with site.open('monitor', '') as monitor, site.open() as operator:
+        assert hear(monitor, lambda message: message.get('replies'))[0]['role'] == 'monitor'
+        monitor.send(json.dumps({'ask': 'preset', 'id': 1}))
+        assert 'only look' in hear(monitor, reply('preset'))[0]['reply']
+        monitor.send(json.dumps({'jog': [1, 0]}))
+        assert 'only look' in hear(monitor, reply('rate'))[0]['reply']
+        operator.send(json.dumps({'ask': 'take', 'arguments': {'role': 'supervisor'}}))
+        assert 'only a supervisor' in hear(operator, reply('take'))[0]['reply']
+        operator.send(json.dumps({'ask': 'stow'}))
+        assert 'did not reply' in hear(operator, reply('stow'))[0]['reply']                  # there is no control unit
+
+
+@pytest.mark.parametrize('text', ('', '[]', '{', 'null', '{"ask": 1}', '{"ask": "\\ud800"}', '{"jog": "x"}',
+                                  '{"jog": [1e9, 0]}', '{"jog": [NaN, 0]}', '[' * 4000,
+                                  '{"ask": "stow", "arguments": {"a": [1]}}', '{"jog": [true, 0]}'))
+def test_what_is_no_message_is_answered_in_a_line(lone, text):
+    process, site = lone
+    with site.open() as page:
+        page.send(text)
+        given = hear(page, lambda message: [given for given in message.get('replies', ()) if 'you' not in given])[0]
+        assert given.get('error') or not given['granted']
+    assert process.poll() is None
+
+
+def test_pages_that_never_read_are_dropped(lone):
+    """Ten of them, and a page beside them is told 20 times a second as before; what they are sent is not kept."""
+    process, site = lone
+    mute = []
+    with site.open() as page:
+        for _ in range(10):
+            connection = socket.create_connection((site.host, site.port))
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            connection.sendall((f'GET /socket HTTP/1.1\r\nHost: {site.netloc}\r\nOrigin: http://{site.netloc}\r\n'
+                                f'Cookie: {site.cookies["monitor"]}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+                                'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n'
+                                ).encode())
+            mute.append(connection)
+        hear(page, lambda message: message.get('now'))
+        with pytest.raises(InvalidStatus) as refused:
+            with site.open(), site.open():
+                pass
+        assert refused.value.response.status_code == 503                                 # there are twelve at the most
+        before = _resident(process.pid)
+
+        def room():
+            with contextlib.suppress(InvalidStatus), site.open(), site.open():
+                return True
+        deadline = time.monotonic() + PATIENCE
+        while not room():
+            assert time.monotonic() < deadline
+            hear(page, lambda message: message.get('now'))
+        assert _resident(process.pid) - before < 20e6
+    for connection in mute:
+        connection.close()
+
+
+def _resident(pid):
+    return int(re.search(r'VmRSS:\s+(\d+)', pathlib.Path(f'/proc/{pid}/status').read_text())[1]) * 1024
+
+
+def test_a_busy_port_is_said_in_one_line(lone, run_process, one_line):
+    _, site = lone
+    done = run_process([sys.executable, '-m', 'pedestal_operator.page_node', '--ros-args', '-p', f'port:={site.port}'],
+                       PATIENCE)
+    assert done.returncode == 1 and 'in use' in one_line(done.stderr)
+
+
+def test_it_ends_without_a_word(lone, complaints):
+    process, site = lone
+    with site.open():
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == 0
+    assert complaints(process.errors.read_text()) == ''
+
+
+@pytest.fixture(scope='module')
+def browser(tmp_path_factory):
+    """(Process, playwright's Browser) of a Chromium."""
+    from playwright.sync_api import sync_playwright
+    folder = tmp_path_factory.mktemp('chromium')
+    process = subprocess.Popen([CHROMIUM, '--headless', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage',
+                                '--remote-debugging-port=0', f'--user-data-dir={folder}', 'about:blank'],
+                               stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                               start_new_session=True)
+    try:
+        address = next(line for line in process.stderr if 'DevTools listening on' in line).split()[-1]
+        with sync_playwright() as playwright:
+            yield process, playwright.chromium.connect_over_cdp(address)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        process.stderr.close()
+
+
+def opened(browser, url, requests=None):
+    """A page of the browser; requests: where the addresses it asks for are put."""
+    page = browser.new_context(viewport={'width': 1280, 'height': 800}).new_page()
+    page.set_default_timeout(PATIENCE * 1e3)
+    page.errors = []
+    page.on('pageerror', lambda error: page.errors.append(str(error)))
+    if requests is not None:
+        page.on('request', lambda request: requests.append(request.url))
+        page.on('websocket', lambda opened: requests.append(opened.url))
+    page.goto(url)
+    return page
+
+
+def reads(page, selector, text):
+    """Wait until an element of the page says a text."""
+    page.wait_for_function('([s, t]) => document.querySelector(s)?.textContent.includes(t)', arg=[selector, text])
+
+
+@needs_chromium
+def test_a_recording_on_the_page(browser, start_process):
+    port = free_port()
+    player = start_process([sys.executable, '-m', 'pedestal_bringup.cli', 'replay', REFERENCE, '--page', port,
+                            '--paused'])
+    page = opened(browser[1], re.search(r'http\S+', player.stdout.readline())[0])
+    joints = bags.read(REFERENCE).table('joint_states')
+    reads(page, '#link', 'recording')
+    assert page.locator('#stop').is_disabled()
+    reads(page, '#play', 'play')
+    for moment in (3.0, 1.0):
+        page.locator('#slider').fill(f'{moment:g}')
+        row = int((joints['t'] - joints['t'][0] > moment + 1e-9).argmax()) - 1
+        reads(page, '#az-actual', f'{math.degrees(joints["azimuth.position"][row]):.3f}')
+        reads(page, '#position', f'{moment:.1f} of')
+    assert page.errors == []
+    page.context.close()
+    player.send_signal(signal.SIGINT)
+    assert player.wait(PATIENCE) == 0
+
+
+@pytest.fixture(scope='module')
+def station(start_run, connect):
+    """(Run, Client of its graph, Site of its page) of an antenna in standby."""
+    run = start_run('uav_flyby', '--duration', '900', '--pacing', 'realtime', '--page', str(free_port()),
+                    '--param', 'acu.initial_mode=standby', '--param', 'acu.tracker.handover=false')
+    site = Site(''.join(run.process.stdout.readline() for _ in range(3)))
+    client = connect(run.domain_id)
+    for name in ('acu/mode', 'joint_states', 'acu/command_result'):
+        client.read(name)
+    client.until(lambda: client.heard['joint_states'] and client.heard['acu/mode'])
+    yield run, client, site
+    if run.process.poll() is None:
+        run.process.send_signal(signal.SIGINT)
+        run.process.communicate(timeout=PATIENCE)
+
+
+def mode(client):
+    return client.heard['acu/mode'][-1].data
+
+
+def press(page, client, selector, done):
+    """Press a button of the page, every 5 s again, until done(): what is refused while the machine is busy is asked
+    for again, as a person would."""
+    pressed = -math.inf
+
+    def come():
+        nonlocal pressed
+        if done():
+            return True
+        if time.monotonic() - pressed > 5.0:
+            pressed = time.monotonic()
+            page.locator(selector).click()
+        return False
+    client.until(come, PATIENCE, lambda: f'{mode(client)}; the page says {page.locator("#said").text_content()!r}')
+
+
+def enters(client, wanted):
+    """Whether the antenna has entered a mode since this was called."""
+    first = len(client.heard['acu/mode'])
+    return lambda: any(said.data == wanted for said in client.heard['acu/mode'][first:])
+
+
+def says(page, selector, text):
+    return lambda: text in page.locator(selector).text_content()
+
+
+def rates(client):
+    return list(client.heard['joint_states'][-1].velocity)
+
+
+@needs_chromium
+def test_an_operator_at_the_page(station, browser):
+    """Modes, preset, control, a greyed button's reason, an alarm acknowledged; nothing is asked of elsewhere."""
+    run, client, site = station
+    requests = []
+    page = opened(browser[1], site.urls['operator'], requests)
+    reads(page, '#link', 'live')
+    page.locator('#name').fill('anna')
+    page.locator('#name').press('Enter')
+    reads(page, '#link', 'live')
+    reads(page, '[data-verb=autotrack] small', 'receiver not locked')
+    assert page.locator('[data-verb=autotrack]').get_attribute('aria-disabled') == 'true'
+    press(page, client, '#take', says(page, '#control', 'anna@page'))
+    page.locator('[name=azimuth]').fill('20')
+    page.locator('[name=elevation]').fill('30')
+    press(page, client, '[data-verb=preset]', enters(client, 'preset'))
+    press(page, client, '[data-verb=preset]', says(page, '#az-actual', '20.000°'))
+    page.locator('[name=elevation]').fill('150')
+    press(page, client, '[data-verb=preset]', says(page, '#said', 'outside limits'))
+    reads(page, '#log-list', 'anna@page')
+    client.trigger('adu/emergency_stop')
+    page.locator('[data-alarm="emergency stop"] button', has_text='ack').click()
+    page.wait_for_selector('[data-alarm="emergency stop"][data-state=acknowledged]')
+    reads(page, '[data-verb=program] small', 'drive not ready: ')
+    client.trigger('adu/reset_faults')
+    page.wait_for_function('() => document.querySelector("[data-verb=program]").ariaDisabled === "false"')
+    press(page, client, '[data-verb=program]', enters(client, 'program'))
+    press(page, client, '#stop', enters(client, 'stop'))
+    press(page, client, '#release', says(page, '#control', 'nobody'))
+    assert {urllib.parse.urlsplit(url).netloc for url in requests} == {site.netloc}
+    assert page.errors == []
+    page.context.close()
+
+
+def moving(client):
+    return abs(rates(client)[0]) > 0.004
+
+
+def stands(client):
+    return rates(client) == pytest.approx([0.0, 0.0], abs=1e-3)
+
+
+def last_rate(client):
+    """The last command of a jog that was replied to, None before."""
+    heard = [status for status in client.heard['acu/command_result'] if status.name == 'rate']
+    return commands.of_reply(heard[-1])[0] if heard else None
+
+
+def test_a_jog_ends_with_its_page_or_its_silence(station):
+    """Held on a web socket: while it is repeated the axis moves; silent but open, late, or gone, it stands."""
+    _, client, site = station
+
+    def hold(page):
+        hear(page, lambda message: message.get('now'))
+        page.send('{"jog": [0.5, 0]}')
+        client.executor.spin_once(timeout_sec=0.02)
+        return moving(client)
+    for silent in (True, False):
+        with site.open(name='bert') as page:
+            client.until(lambda page=page: hold(page))
+            if silent:
+                client.until(lambda: stands(client))
+        client.until(lambda: stands(client))
+        client.until(lambda: (last := last_rate(client)) is not None and last.arguments['azimuth'] == '0')
+        assert last_rate(client).who == 'bert@page 127.0.0.1'
+    with site.open(name='bert') as page:
+        time.sleep(0.6)                                                     # it has seen nothing for so long
+        page.send('{"jog": [0.5, 0]}')
+        assert 'behind the antenna' in hear(page, reply('rate'))[0]['reply']
+
+
+@needs_chromium
+def test_a_jog_ends_with_its_browser(station, browser):
+    """Chromium is killed while the button is held: the page can no longer do anything about it."""
+    _, client, site = station
+    page = opened(browser[1], site.urls['operator'])
+    reads(page, '#link', 'live')
+    page.wait_for_function('() => document.querySelector("[data-jog=\\"1 0\\"]").ariaDisabled === "false"')
+    page.locator('[data-jog="1 0"]').hover()
+    page.mouse.down()
+    client.until(lambda: moving(client))
+    asked = [status for status in client.heard['acu/command_result'] if status.name == 'rate']
+    client.until(lambda: len([status for status in client.heard['acu/command_result'] if status.name == 'rate'])
+                 > len(asked) + 2)                                          # it goes on as long as it is held
+    os.killpg(browser[0].pid, signal.SIGKILL)
+    client.until(lambda: stands(client))
+    assert mode(client) == 'rate'
+
+
+def test_the_antenna_tracks_on_when_the_server_is_killed(station):
+    run, client, site = station
+    with site.open(name='carla') as page:
+        hear(page, lambda message: message.get('told', {}).get('present'))
+        page.send(json.dumps({'ask': 'program', 'id': 3}))
+        assert hear(page, reply('program')) == [{'id': 3, 'verb': 'program', 'granted': True,
+                                                 'reply': 'mode is program'}]
+    [pid] = [int(process.name) for process in pathlib.Path('/proc').glob('[0-9]*')
+             if f'port:={site.port}'.encode() in _arguments(process)]
+    os.kill(pid, signal.SIGKILL)
+    client.until(lambda: mode(client) == 'program')
+    count = len(client.heard['joint_states'])
+    client.until(lambda: len(client.heard['joint_states']) > count + 200)
+    assert mode(client) == 'program' and run.process.poll() is None
+
+
+def _arguments(process):
+    try:
+        return (process / 'cmdline').read_bytes().split(b'\0')
+    except OSError:
+        return []
+
+
+def test_the_recording_says_who_asked_at_which_page(station):
+    run, _, _ = station
+    run.process.send_signal(signal.SIGINT)
+    run.process.communicate(timeout=PATIENCE)
+    told = {command.who: command.verb for command in (
+        commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus'))[0]
+        for *_, data in bags.read(run.bag).raw('acu/command_result'))}
+    assert {'bert@page 127.0.0.1', 'carla@page 127.0.0.1'} <= set(told)

@@ -1,0 +1,97 @@
+"""README.md in its own order: every command line of it is executed from an empty folder, or named below with the
+reason why not; the command lines of docs/ are at least understood."""
+import os
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from pedestal_bringup import cli, samples
+from pedestal_bringup.console import EXIT_DISTURBED
+
+ROOT = pathlib.Path(__file__).parents[1]
+
+NOT_RUN = {
+    'make demo': 'installs; its lines are run, verify and report, which are run',
+    'make test': 'runs this',
+    'pip install': 'colcon: make colcon installs the same',
+    'colcon build': 'colcon: make colcon builds it and starts a node from it',
+    'ros2 launch': 'ros2: the wheels have no command ros2',
+    'ros2 service': 'ros2: test_services.py calls it through rclpy',
+}
+"""{how a line begins: why it is not executed}. Whatever is not here is."""
+
+SHORTER = {
+    'pedestal run uav_flyby': '--duration 8',
+    'pedestal run leo_pass --tle iss.tle --station 47.4,8.5,500 --pass 3': '--duration 3',
+    'pedestal run track_file': '--duration 5',
+    'pedestal run ship_pass': '--duration 5',
+    'pedestal run my_antenna.yaml': '--duration 5',
+    'pedestal run leo_pass --pacing realtime': '--duration 5',
+}
+"""{how a line begins: what makes it short}; the same command, on less time."""
+
+
+def command_lines(text):
+    """The lines of the indented blocks, continued ones joined, comments taken away."""
+    joined = re.sub(r' *\\\n *', ' ', re.sub(r'(?s)```.*?```', '', text))
+    return [re.sub(r' +# .*$', '', line) for line in re.findall(r'^    (\S.*)$', joined, re.MULTILINE)]
+
+
+README = command_lines((ROOT / 'README.md').read_text())
+
+
+def of_table(line, table):
+    """The value of the longest beginning of a line that a table has; None without one."""
+    return max(((len(head), value) for head, value in table.items() if line.startswith(head)), default=(0, None))[1]
+
+
+def disturbed(line):
+    """Beside a busy machine a run in realtime may lose steps and say so: exit code 3."""
+    return f' || [ $? = {EXIT_DISTURBED} ]' if '--pacing realtime' in line else ''
+
+
+def test_nothing_is_excepted_that_is_not_there():
+    for head in (*NOT_RUN, *SHORTER):
+        assert any(line.startswith(head) for line in README), head
+
+
+def test_readme_runs_in_its_own_order(reserve_domain, tmp_path, capsys):
+    """One shell, one empty folder: what a line leaves the next one finds."""
+    (tmp_path / '.venv' / 'bin').mkdir(parents=True)
+    here = shlex.quote(os.path.dirname(sys.executable))
+    (tmp_path / '.venv' / 'bin' / 'activate').write_text(f'export PATH={here}:$PATH\n')
+    lines = [f'{line} {of_table(line, SHORTER) or ""}' for line in README if not of_table(line, NOT_RUN)]
+    assert len(lines) >= 15
+    script = 'set -e\n' + ''.join(f'echo {shlex.quote("$ " + line)} >&2\n{line}{disturbed(line)}\n' for line in lines)
+    done = subprocess.run(['bash', '-c', script], cwd=tmp_path, capture_output=True, text=True, timeout=1800,
+                          env={**os.environ, 'ROS_DOMAIN_ID': str(reserve_domain())})
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert (tmp_path / 'my_flyby' / 'report.html').is_file() and (tmp_path / 'studies' / 'servo').is_dir()
+    assert all((tmp_path / name).is_file() for name in samples.FILES)
+    with capsys.disabled():
+        for line in README:
+            if of_table(line, NOT_RUN):
+                print(f'\nnot executed: {line} ({of_table(line, NOT_RUN)})', end='')
+
+
+@pytest.mark.parametrize('page', ['README.md', *(f'docs/{path.relative_to(ROOT / "docs")}' for path in
+                                                 sorted((ROOT / 'docs').rglob('*.md')))])
+def test_the_commands_of_every_page_are_understood(page):
+    """By the parser of `pedestal`: verb, options and their values."""
+    parser = cli._parser()
+    for line in command_lines((ROOT / page).read_text()):
+        if line.startswith('pedestal '):
+            parser.parse_args(shlex.split(line.removesuffix(' &'))[1:])
+
+
+def test_samples_are_never_overwritten(tmp_path, capsys, one_line):
+    assert cli.main(['samples', str(tmp_path / 'new')]) == 0
+    (tmp_path / 'new' / 'ship.csv').write_text('mine')
+    (tmp_path / 'new' / 'flight.csv').unlink()
+    assert cli.main(['samples', str(tmp_path / 'new')]) == 1
+    assert 'ship.csv is there already' in one_line(capsys.readouterr().err)
+    assert not (tmp_path / 'new' / 'flight.csv').exists()

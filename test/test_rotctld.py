@@ -1,0 +1,219 @@
+"""Hamlib's rotctl, gpredict's exact bytes and clients that misbehave, on a running realtime graph."""
+import contextlib
+import importlib.util
+import math
+import os
+import pathlib
+import pty
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from pedestal_bringup.bags import bag as bags
+from pedestal_common import commands, messages, topics
+
+ROTCTL = shutil.which('rotctl')
+_SPEC = importlib.util.spec_from_file_location('rotator_gpredict',
+                                               pathlib.Path(__file__).parents[1] / 'docs' / 'rotator' / 'gpredict.py')
+gpredict = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(gpredict)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture(scope='module')
+def station(start_run, connect):
+    """(Run, Client of its graph, port of its rotctld) of an antenna in standby, which moves softly: where a busy
+    machine loses steps, a hard start looks like an encoder that jumps."""
+    port = free_port()
+    soft = (f'acu.{axis}.shaper.{name}' for axis in topics.AXES for name in ('rate=0.6', 'acceleration=2', 'jerk=100'))
+    changes = ('acu.initial_mode=standby', 'acu.tracker.handover=false', *soft)
+    run = start_run('uav_flyby', '--duration', '600', '--pacing', 'realtime', '--rotctld', str(port),
+                    *(word for change in changes for word in ('--param', change)))
+    client = connect(run.domain_id)
+    for name in ('acu/mode', 'joint_states'):
+        client.read(name)
+    client.until(lambda: client.heard['joint_states'] and client.heard['acu/mode'])
+    with connected(port) as probe:
+        client.until(lambda: b'no control unit' not in ask(probe, '_') and b'-' not in ask(probe, 'p'), 60.0)
+    yield run, client, port
+    run.process.send_signal(signal.SIGINT)
+    run.process.communicate(timeout=120)
+
+
+def connected(port):
+    deadline = time.monotonic() + 180.0
+    while True:
+        try:
+            connection = socket.create_connection(('127.0.0.1', port), 5.0)
+            connection.settimeout(10.0)
+            return connection
+        except OSError:
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+
+
+def ask(connection, line):
+    """One recv, as gpredict and SatDump do."""
+    connection.sendall(line.encode() + b'\n')
+    return connection.recv(4096)
+
+
+def granted(connection, line):
+    """Ask for a set-point, again while a busy machine keeps the control unit from replying in time; RPRT 0."""
+    said = next(filter(lambda said: said != b'RPRT -5\n', (ask(connection, line) for _ in range(20))), b'RPRT -5\n')
+    return said == b'RPRT 0\n'
+
+
+@pytest.mark.skipif(ROTCTL is None, reason='rotctl is not installed (libhamlib-utils)')
+@pytest.mark.parametrize(('command', 'code', 'said'), (
+    (('P', '20', '40'), 0, ''), (('p',), 0, None), (('P', '20', '200'), 2, 'Invalid parameter'), (('S',), 0, ''),
+    (('M', 'CW', '50'), 0, ''), (('S',), 0, ''), (('K',), 0, ''), (('R', '1'), 0, ''), (('_',), 0, 'pedestal')))
+def test_hamlibs_client_is_served(station, command, code, said):
+    _, _, port = station
+    done = subprocess.run([ROTCTL, '-m', '2', '-r', f'127.0.0.1:{port}', *command], capture_output=True, text=True,
+                          timeout=60.0)
+    assert (done.returncode == 0) == (code == 0), (done.stdout, done.stderr)
+    if said is None:
+        assert len([float(line) for line in done.stdout.split()]) == 2
+    else:
+        assert said in done.stdout + done.stderr
+
+
+def test_a_set_point_moves_the_antenna_from_standby(station):
+    _, client, port = station
+    with connected(port) as gpredict:
+        assert granted(gpredict, 'P 30.00 45.00')
+        client.until(lambda: client.heard['acu/mode'][-1].data == 'preset', 20.0)
+        deadline = time.monotonic() + 30.0
+        while (told := ask(gpredict, 'p')) != b'30.00\n45.00\n':
+            assert time.monotonic() < deadline, told
+            client.executor.spin_once(timeout_sec=0.05)
+        assert ask(gpredict, 'P nan 10') == b'RPRT -1\n' and ask(gpredict, 'P 30 120') == b'RPRT -1\n'
+        assert ask(gpredict, 'Z') == b'RPRT -4\n' and ask(gpredict, 'P 10') == b'RPRT -1\n'
+        client.until(lambda: ask(gpredict, '+p') == b'get_pos:\nAzimuth: 30.00\nElevation: 45.00\nRPRT 0\n', 30.0)
+        gpredict.sendall(b'q\n')
+        assert gpredict.recv(10) == b''
+
+
+def test_a_pass_through_north_in_set_points_is_met_without_unwinding(station):
+    """One each 0.8 s, azimuth 0 to 360, 1 deg/s through north; test_set_points says how evenly."""
+    _, client, port = station
+    with connected(port) as gpredict:
+        assert granted(gpredict, 'P 353.00 45.00')
+        client.until(lambda: abs(client.heard['joint_states'][-1].position[0] + math.radians(7.0)) < 1e-3, 60.0)
+        client.heard['joint_states'].clear()
+        for step in range(16):
+            assert granted(gpredict, f'P {(353.0 + 0.8 * step) % 360.0:.2f} 45.00')
+            ending = time.monotonic() + 0.8
+            while time.monotonic() < ending:
+                client.executor.spin_once(timeout_sec=0.02)
+    angles = [state.position[0] for state in client.heard['joint_states']]
+    assert 0.15 < max(angles) - min(angles) < 0.3                           # 12 deg and no turn the other way
+
+
+@pytest.mark.skipif(bool(gpredict.MISSING), reason=f'not installed: {", ".join(gpredict.MISSING)}')
+def test_gpredict_itself_points_at_a_satellite_that_passes(station, tmp_path):
+    """Debian's, on a screen of its own; against sgp4."""
+    _, client, port = station
+    with connected(port) as probe, contextlib.closing(gpredict.Gpredict(tmp_path, port)) as program:
+        def away():
+            azimuth, elevation = map(float, ask(probe, 'p').split())
+            expected = gpredict.angles(program.satellite, gpredict.now())
+            return max(abs((azimuth - expected[0] + 180.0) % 360.0 - 180.0), abs(elevation - expected[1]))
+        client.until(lambda: away() < 0.5, 60.0)
+        elevation = float(ask(probe, 'p').split()[1])
+        client.until(lambda: float(ask(probe, 'p').split()[1]) > elevation + 0.5, 60.0)
+        client.until(lambda: away() < 0.5, 60.0)
+        assert client.heard['acu/mode'][-1].data == 'preset'
+
+
+def test_one_client_is_in_control_and_the_others_are_told_so(station):
+    _, _, port = station
+    with connected(port) as first, connected(port) as second:
+        assert granted(first, 'P 10 40')
+        assert ask(second, 'P 50 40') == b'RPRT -14\n' and b'\n' in ask(second, 'p')
+        assert ask(second, 'S') == b'RPRT 0\n'                              # to stop is everybody's
+        first.sendall(b'q\n')
+        first.recv(10)
+        time.sleep(0.5)
+        assert granted(second, 'P 12 40')
+
+
+def test_clients_that_misbehave_disturb_nobody(station):
+    _, _, port = station
+    mute = [connected(port) for _ in range(3)]
+    for connection in mute:                                                 # Look4Sat never reads
+        connection.sendall(b'p\n' * 20_000)
+    endless = connected(port)
+    endless.sendall(b'x' * 1_000_000)
+    half = connected(port)
+    half.sendall(b'P 1')
+    with connected(port) as good:
+        for _ in range(5):
+            assert ask(good, 'p').count(b'\n') == 2
+    endless.sendall(b'\np\n')
+    assert endless.recv(100).startswith(b'RPRT -1\n')
+    half.sendall(b'0 20\n')
+    for connection in (*mute, endless, half):
+        connection.close()
+    with connected(port) as good:
+        assert ask(good, 'p').count(b'\n') == 2
+
+
+@pytest.mark.skipif(ROTCTL is None, reason='rotctl is not installed (libhamlib-utils)')
+def test_easycomm_over_tcp_and_a_serial_device(station, start_process):
+    """Hamlib's models 201, 202 and 204, and a pair of pseudo terminals in the place of a serial line."""
+    run, client, _ = station
+    port, (end, device) = free_port(), pty.openpty()
+    node = start_process([sys.executable, '-m', 'pedestal_operator.easycomm_node', '--ros-args', '-p', f'port:={port}',
+                          '-p', f'device:={os.ttyname(device)}'], ROS_DOMAIN_ID=str(run.domain_id))
+    connected(port).close()
+    os.set_blocking(end, False)
+    client.until(lambda: _serial(end, b'AZ EL \n').startswith(b'AZ'), 60.0)
+    assert _serial(end, b'AZ21.0\n') == b''                                  # the elevation stays as it is
+    client.until(lambda: _serial(end, b'AZ \n') == b'AZ21.0\n', 60.0)
+    assert float(_serial(end, b'EL \n')[2:]) > 5.0
+    assert _serial(end, b'AZ21.0 EL37.0\n') == b''
+    client.until(lambda: _serial(end, b'AZ EL \n') == b'AZ21.0 EL37.0\n', 60.0)
+    client.until(lambda: _serial(end, b'GS\n') == b'GS1\n', 60.0)
+    assert client.heard['acu/mode'][-1].data == 'preset'
+    _serial(end, b'EL39.0\n')                                               # the azimuth stays as it was asked for
+    client.until(lambda: _serial(end, b'AZ EL \n') == b'AZ21.0 EL39.0\n', 60.0)
+    for model, words in (('201', 'P'), ('202', 'PpS'), ('204', 'PpS')):        # 201 only points, in Hamlib
+        for command in (('P', '15', '42') if word == 'P' else (word,) for word in words):
+            done = subprocess.run([ROTCTL, '-m', model, '-r', f'127.0.0.1:{port}', *command], capture_output=True,
+                                  text=True, timeout=60.0)
+            assert done.returncode == 0, (model, command, done.stderr)
+    node.send_signal(signal.SIGINT)
+    assert node.wait(30.0) == 0
+    os.close(end)
+    os.close(device)
+
+
+def _serial(end, line):
+    """Write a line, read what has come in 0.3 s."""
+    os.write(end, line)
+    time.sleep(0.3)
+    with contextlib.suppress(BlockingIOError):
+        return os.read(end, 1000)
+    return b''
+
+
+def test_the_recording_says_who_moved_the_antenna(station):
+    run, _, _ = station
+    run.process.send_signal(signal.SIGINT)
+    run.process.communicate(timeout=120)
+    told = [commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus'))[0]
+            for *_, data in bags.read(run.bag).raw('acu/command_result')]
+    assert told and {command.who.split()[0] for command in told} <= {'rotctld', 'easycomm'}
+    assert {'take', 'preset', 'stop', 'stow', 'rate', 'release'} <= {command.verb for command in told}
