@@ -68,7 +68,7 @@ clean:
 
 .venv/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv/bin/pip
 	@echo 'Installing into .venv (the first time this takes some minutes) ...'
-	.venv/bin/python $(PIP) $(ROS) ruff pytest-xdist $(foreach package,$(PACKAGES),--editable 'src/$(package)[test]')
+	.venv/bin/python $(PIP) $(ROS) ruff pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),--editable 'src/$(package)[test]')
 	@touch $@
 
 .venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip

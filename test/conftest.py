@@ -227,11 +227,12 @@ class Client:
 
     def __init__(self, domain_id, name):
         import rclpy
-        from rclpy.executors import SingleThreadedExecutor
+
+        from pedestal_common import middleware
         self.context = rclpy.Context()
         rclpy.init(args=[], context=self.context, domain_id=domain_id)
         self.node = rclpy.create_node(name, context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor = middleware.make_executor(self.context)
         self.executor.add_node(self.node)
         self.heard = {}
         self.publishers = {}

@@ -88,7 +88,9 @@ def test_the_console_stops_jogs_while_a_key_is_held_and_quits(running, environme
     os.write(screen, b's')
     watch(lambda: client.heard['acu/mode'][-1].data == 'stop')
     began = client.heard['joint_states'][-1].position[0]
+    deadline = time.monotonic() + 60.0
     while client.heard['acu/mode'][-1].data != 'rate' or client.heard['joint_states'][-1].position[0] < began + 0.005:
+        assert time.monotonic() < deadline, shown[-2000:]
         os.write(screen, ARROW_RIGHT)
         held = time.monotonic() + 0.05
         watch(lambda held=held: time.monotonic() > held)

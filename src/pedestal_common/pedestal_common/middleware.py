@@ -55,11 +55,11 @@ def initialise(args=None):
                signal_handler_options=SignalHandlerOptions.NO)
 
 
-def make_executor():
-    """The executor every node runs in."""
+def make_executor(context=None):
+    """The executor every node runs in. context: an rclpy.Context, None for the default one."""
     try:
         from rclpy.experimental.events_executor import EventsExecutor
-        return EventsExecutor()
+        return EventsExecutor(context=context)
     except ImportError:
         from rclpy.executors import SingleThreadedExecutor
-        return SingleThreadedExecutor()
+        return SingleThreadedExecutor(context=context)

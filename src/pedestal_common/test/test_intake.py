@@ -222,3 +222,28 @@ def test_beside_a_stranger_nothing_is_taken_of_a_topic_without_a_pace():
     assert take('disabled', 2, 60 * S) is None and taker.reason == intake.ANOTHER_WRITER
     strangers = 0
     assert take('stopping', 2, 70 * S) == 'stopping'
+
+
+def from_the_second_look(strangers):
+    """What the graph shows after the first writer has been taken."""
+    shown = iter([0])
+    return lambda: next(shown, strangers)
+
+
+@pytest.mark.parametrize('number, strangers', [(1730, 0), (700, 1)])
+def test_what_a_stranger_said_comes_late_and_is_not_taken(number, strangers):
+    """The control unit is held up, the stranger's messages were too, some of them lost: they look like a writer's that
+    has just begun. Measured on a busy machine: the graph no longer shows who wrote them (0), or shows one whom the
+    intake takes for another one that speaks beside it (1)."""
+    acu = Writer('acu', end=2 * S)
+    spoken = Writer('spoken', begin=S, end=2 * S + 280 * MS, period=10 * MS)
+    late = Writer('late', begin=2 * S + 300 * MS, end=2 * S + 900 * MS, period=3 * MS, number=number)
+    taker, taken, _ = run(acu, spoken, late, strangers=from_the_second_look(strangers))
+    assert len(taken['acu']) == 400 and not taken['spoken'] and not taken['late']
+
+
+def test_a_writer_that_begins_anew_beside_a_stranger_is_taken():
+    anew = Writer('anew', begin=2 * S + 500 * MS)
+    _, taken, _ = run(Writer('acu', end=2 * S), Writer('stranger', begin=S, period=3 * MS), anew,
+                      strangers=from_the_second_look(1))
+    assert len(taken['acu']) == 400 and len(taken['anew']) > 1400 and not taken['stranger']

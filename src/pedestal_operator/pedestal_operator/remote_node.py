@@ -22,6 +22,9 @@ FRESH = 2.5
 ANSWER = 5.0
 """Time [s] within which a node replies to a command, or is silent."""
 
+AGAIN = 1.0
+"""Time [s] without a reply after which a command is said again: the node may not have discovered us before."""
+
 
 def user():
     """The name by which a person at a terminal asks: login@host."""
@@ -45,7 +48,7 @@ class Remote(Shell):
         self.beam = f'{beam}/' if beam else ''
         self.who, self.node = who, nodes.row(node)
         self.numbers, self.texts, self.status, self.heard = {}, {}, {}, {}
-        self._requests = Requests(os.getpid())
+        self._requests = Requests(f'{os.getpid()}.{time.time_ns()}')
         for topic in NUMBERS:
             self.hear(topic)
         for topic in TEXTS:
@@ -80,9 +83,13 @@ class Remote(Shell):
 
     def ask(self, verb, arguments=None) -> str:
         """Ask for a verb with {argument: value}: the number of the request, by which `replied` finds its reply."""
-        command = self._requests.add(verb, self.who, arguments)
-        self._asks(messages.serialize(commands.message(command)))
-        return command.number
+        number = self._requests.add(verb, self.who, arguments).number
+        self.ask_again(number)
+        return number
+
+    def ask_again(self, number):
+        """Say a request once more, under its number: a node obeys it once."""
+        self._asks(messages.serialize(commands.message(self._requests.asked(number))))
 
     def replied(self, number) -> Reply | None:
         """The Reply to a request, once; None as long as there is none."""
@@ -175,8 +182,10 @@ class Spun:
 
     def ask(self, verb, arguments=None, seconds=ANSWER) -> Reply:
         """Ask and wait for the Reply. Raises GraphError."""
-        number = self.remote.ask(verb, arguments)
-        reply = self.until(lambda: self.remote.replied(number), seconds)
-        if reply is None:
-            raise GraphError(f'{self.remote.node.name} did not reply to {verb} within {seconds:g} s')
+        number, deadline = self.remote.ask(verb, arguments), time.monotonic() + seconds
+        while (reply := self.until(lambda: self.remote.replied(number),
+                                   min(AGAIN, deadline - time.monotonic()))) is None:
+            if time.monotonic() > deadline:
+                raise GraphError(f'{self.remote.node.name} did not reply to {verb} within {seconds:g} s')
+            self.remote.ask_again(number)
         return reply

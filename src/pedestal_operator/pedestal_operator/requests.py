@@ -19,16 +19,22 @@ class Requests:
 
     def add(self, verb, who, arguments=None) -> Command:
         """The Command of a new request by somebody of that name, with {argument: value}."""
-        number = next(self._numbers)
-        self._asked[number] = who
+        command = Command(verb, who, next(self._numbers), {
+            name: f'{value:.9g}' if isinstance(value, float) else str(value)
+            for name, value in (arguments or {}).items()})
+        self._asked[command.number] = command
         if len(self._asked) > MOST:
             self._forget(next(iter(self._asked)))
-        return Command(verb, who, number, {name: f'{value:.9g}' if isinstance(value, float) else str(value)
-                                           for name, value in (arguments or {}).items()})
+        return command
+
+    def asked(self, number) -> Command:
+        """The Command of a request without a reply. Raises KeyError where there is none."""
+        return self._asked[number]
 
     def take(self, command, reply):
         """Keep the Reply to a Command that is one of these requests."""
-        if self._asked.get(command.number) == command.who:
+        asked = self._asked.get(command.number)
+        if asked and asked.who == command.who:
             self._replies[command.number] = reply
 
     def replied(self, number):

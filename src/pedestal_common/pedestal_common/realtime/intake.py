@@ -1,9 +1,10 @@
 """Which messages of a topic a node of a realtime graph takes: of the writer in charge, sound and newer than the last.
 
 The first writer is in charge. Another one is dropped and named, whatever it says. A writer that begins anew is taken
-up once the one in charge was silent for SILENCE. One that spoke together with it is another one, taken up only when
-it has been alone for ABANDONED and the graph shows nobody who should not write. Where nobody can say which is which,
-nothing is taken: what the topic commands comes to a stop. No ROS and no clock here.
+up once the one in charge was silent for SILENCE. One that spoke together with it, or whose numbers are higher than
+that silence explains, is another one, taken up only when it has been alone for ABANDONED and the graph shows nobody
+who should not write. Where nobody can say which is which, nothing is taken: what the topic commands comes to a stop.
+No ROS and no clock here.
 """
 import collections
 
@@ -103,6 +104,8 @@ class Intake:
         """Whether a writer that is not in charge is from now on."""
         charge = self.in_charge
         silent = SILENCE if charge is None else now - charge.arrival
+        # What a stranger that has gone said before may come late: then the graph no longer shows it.
+        stream.known = stream.known or (charge is not None and stream.last > charge.growth(silent))
         if silent < (ABANDONED if stream.known else SILENCE) or stream.mixed:
             return False
         if stream.looked is not None and now - stream.looked < LOOK:

@@ -53,13 +53,17 @@ class Stream:
     def fits(self, number, source):
         """Whether a message can be of this stream."""
         gap = number - self.last
-        return gap == 1 or 0 < gap <= SLACK + 2.0 * (source - self.source) / (self.interval or INTERVAL)
+        return gap == 1 or 0 < gap <= self.growth(source - self.source)
 
     def cost(self, number, source):
         """What speaks against it being of this stream."""
         gap, interval = number - self.last, self.interval or INTERVAL
         late = (source - self.source) / interval - gap
         return (late if late > 0.0 else -EARLY * late) + LOST * (gap - 1)
+
+    def growth(self, elapsed):
+        """By how much its numbers grow at the most in a time [ns]."""
+        return SLACK + 2.0 * elapsed / (self.interval or INTERVAL)
 
     def follow(self, number, source, now):
         """The message is of this stream; how many were left out before it."""
