@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 
-from adu_drive import electronic_beam
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
@@ -453,4 +452,5 @@ class BeamParameters(RunParameters):
         if abs(periods - round(periods)) > 1e-6:
             raise ParameterError(f'transport_delay = {self.transport_delay:g} s: must be a multiple of the period '
                                  f'{self.period:g} s: a beam changes at the steps')
+        from adu_drive import electronic_beam  # with numba, which only the array needs
         electronic_beam.check_delay(self.period, self.transport_delay)
