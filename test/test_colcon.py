@@ -1,12 +1,16 @@
 """The sources as a ROS 2 workspace. `make colcon` builds it, sources its install/ and runs this file."""
 import os
 import pathlib
+import shutil
 import signal
 import time
 
 import pytest
 import rclpy
 from ament_index_python.packages import get_package_prefix
+
+from pedestal_bringup.bags.verify import verify
+from pedestal_bringup.run import launched
 
 EXECUTABLES = {
     'ship_motion_sim': ['ins_node', 'ship_motion_node'],
@@ -43,6 +47,20 @@ def test_ros2_launch_finds_the_launch_and_scenario_files():
     share = pathlib.Path(get_package_prefix('pedestal_bringup')) / 'share' / 'pedestal_bringup'
     assert (share / 'launch' / 'pedestal.launch.py').is_file()
     assert (share / 'config' / 'leo_pass.yaml').is_file()
+
+
+@pytest.mark.skipif(not shutil.which('ros2'), reason='no ros2: the wheels have none')
+def test_ros2_launch_runs_a_scenario_in_a_namespace(start_process, tmp_path):
+    """Started here, its arguments known; a wrong one is refused by name."""
+    command = ['ros2', 'launch', 'pedestal_bringup', 'pedestal.launch.py']
+    shown = start_process([*command, '--show-args']).communicate(timeout=180.0)[0]
+    assert all(f"'{argument.name}':" in shown for argument in launched.ARGUMENTS)
+    refused = start_process([*command, 'duration:=long'])
+    said = ''.join(refused.communicate(timeout=180.0))
+    assert refused.returncode == 1 and 'duration:=long: must be a number of seconds' in said
+    ran = start_process([*command, 'duration:=1', 'namespace:=ship_1', 'bag:=mine'])
+    said = ''.join(ran.communicate(timeout=600.0))
+    assert verify(tmp_path / 'mine').complete, said
 
 
 def test_a_node_starts_and_stops(start_process, node_names, complaints):

@@ -202,6 +202,7 @@ class Acu(Unit):
 
     @property
     def next_due(self):
+        """Time [ns] of the next command of its schedule, or of the next laying of tables."""
         return min(super().next_due, self._laid[1])
 
     def obey_due(self, stamp):
@@ -259,6 +260,7 @@ class Acu(Unit):
         return modes.MODES[code] if topic == MODE else super().encode(topic, code)
 
     def schedule(self):
+        """[(at [ns], Command)] of the parameter `commands`."""
         return schedule('commands', self.parameters.commands, VERBS)
 
     def obey(self, command, arguments):
@@ -319,6 +321,7 @@ class Acu(Unit):
                               arguments['moves'], arguments['holds'])
 
     def admit(self, command):
+        """Raise ValueError where somebody else is in control."""
         self.authority.admit(command)
 
     def request(self, name):
@@ -425,6 +428,7 @@ class Acu(Unit):
 
     @property
     def calls(self):
+        """The services of CALLS that it calls for now: all while the antenna moves unasked, else none."""
         return self.CALLS if self.parts['state']['unasked']['moves'] else ()
 
     @property
@@ -442,6 +446,7 @@ class Acu(Unit):
 
     @property
     def alarm(self):
+        """Whether a fault is latched, or the drive or the receiver has fallen silent."""
         return bool(self.faults or self.parts['outputs']['reason'] == modes.SILENCE)
 
     @staticmethod

@@ -19,6 +19,7 @@ class AduNode(Timekeeper):
         super().__init__('adu_drive.adu_node')
 
     def prepare(self, unit):
+        """Compile the laws; then go on where the state file, if there is one, left the plant."""
         super().prepare(unit)
         left = resting.read(self.parameters.state_file) if self.parameters.state_file else None
         if left is not None:
@@ -27,6 +28,7 @@ class AduNode(Timekeeper):
                                    f'{self.parameters.state_file} left it')
 
     def begin(self):
+        """Begin to make the steps, and to note once a second where the plant is."""
         super().begin()
         if self.parameters.state_file:
             self.every(1.0, self.save)
@@ -44,16 +46,19 @@ class AduNode(Timekeeper):
             self.unsaved = f'{self.parameters.state_file}: {error.strerror}'
 
     def draining(self):
+        """Note where the plant is as soon as the end comes: there may be no time for it in `close`."""
         if self.parameters.state_file and not self.stopping:
             self.save()
         return super().draining()
 
     def close(self):
+        """Note where the plant is, then end."""
         if self.parameters.state_file:
             self.save()
         super().close()
 
     def diagnosed(self):
+        """The Diagnosis of the drive, a WARN where its state could not be written."""
         diagnosis = super().diagnosed()
         if self.unsaved and diagnosis.level < WARN:
             return diagnosis._replace(level=WARN, message=self.unsaved)

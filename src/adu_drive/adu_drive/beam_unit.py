@@ -98,12 +98,14 @@ class Beam(Unit):
         electronic_beam.read(self.parts['state'], self.parts['outputs'])
 
     def latency(self, topic):
+        """How old a command is that a step reads [s]: that of the step before."""
         return self.parameters.period
 
     rests = True
     """An array has nothing that turns."""
 
     def encode(self, topic, code):
+        """The text of a code of adu/state."""
         return CONDITIONS[code]
 
     @property
@@ -112,6 +114,7 @@ class Beam(Unit):
         return CONDITIONS[condition(self.parts['switches'])]
 
     def request(self, name):
+        """Enable, disable, stop or reset; the Reply names the state that follows, or why it is refused."""
         m = self.parts['switches']
         if name == 'adu/enable' and m['emergency']:
             return Reply(False, 'refused: an emergency stop is latched (adu/reset_faults); '
@@ -123,12 +126,14 @@ class Beam(Unit):
         return Reply(True, f'drive is {self.condition}')
 
     def requests_for(self, topic, text):
+        """The services that lead to a text of adu/state."""
         if text == CONDITIONS[EMERGENCY_STOP]:
             return ['adu/emergency_stop']
         latched = self.parts['switches']['emergency']
         return [*(['adu/reset_faults'] if latched else []), 'adu/enable' if text == 'enabled' else 'adu/disable']
 
     def diagnose(self):
+        """How it is: ERROR in an emergency stop or after a command that it did not obey, WARN while disabled."""
         outputs, switches = self.parts['outputs'], self.parts['switches']
         invalid, switches['invalid'] = switches['invalid'], 0
         values = [*((f'{axis}_deg', f'{math.degrees(angle):.4f}')
@@ -145,5 +150,6 @@ class Beam(Unit):
 
     @staticmethod
     def idle(numbers):
+        """Why a recording did not exercise it: its command never changed."""
         angles = numbers[COMMAND][:, :2]
         return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 
-from adu_drive import electronic_beam
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
@@ -60,6 +59,7 @@ class MotorParameters(Parameters):
 
     @property
     def torque_constant(self):
+        """Torque per torque-making current, 3/2 p psi [Nm/A]."""
         return 1.5 * self.pole_pairs * self.flux_linkage
 
 
@@ -90,6 +90,7 @@ class BiasParameters(Parameters):
     lag: float = parameter(0.010, 0.0, 1.0, 's', 'time constant')
 
     def check(self):
+        """Raises ParameterError where the bias would be out before it fades."""
         if self.schedule == 'hold_fade' and self.out <= self.hold:
             raise ParameterError(f'out = {self.out:g} Nm: must be above hold = {self.hold:g}')
 
@@ -108,6 +109,7 @@ class GearTrainParameters(Parameters):
 
     @property
     def ratio(self):
+        """Turns of the motor for one of the axis."""
         return self.reducer_ratio * self.pinion_ratio
 
 
@@ -137,6 +139,7 @@ class FrictionParameters(Parameters):
     damping: float = parameter(400.0, 0.0, 1e6, 'Nms/rad', 'of the bristles')
 
     def check(self):
+        """Raises ParameterError where it takes less torque to break away than to go on."""
         if self.breakaway < self.coulomb:
             raise ParameterError(f'breakaway = {self.breakaway:g} Nm: must be at least coulomb = {self.coulomb:g}')
 
@@ -171,6 +174,7 @@ class LimitParameters(Parameters):
         return final, emergency, self.buffer or emergency + BEHIND_EMERGENCY
 
     def check(self):
+        """Raises ParameterError for an empty travel, or a switch in front of which the axis does not stop."""
         if self.upper <= self.lower:
             raise ParameterError(f'upper = {self.upper:g} rad: must be above lower = {self.lower:g}')
         final, emergency, buffer = self.switches
@@ -222,6 +226,7 @@ class StowPinParameters(Parameters):
     initially_in: bool = flag(False, 'the antenna is stowed at t = 0')
 
     def check(self):
+        """Raises ParameterError where the pins would time out before they have travelled."""
         if self.timeout <= self.travel_time:
             raise ParameterError(f'timeout = {self.timeout:g} s: must be above travel_time = {self.travel_time:g} s')
 
@@ -263,6 +268,7 @@ class AxisParameters(Parameters):
     faults: FaultParameters = group(FaultParameters)
 
     def check(self):
+        """Raises ParameterError for a rate that the motors cannot reach at their voltage."""
         for motor in (self.motor_1, self.motor_2):
             top = 0.98 * motor.voltage / (motor.pole_pairs * motor.flux_linkage * self.gear_train.ratio)
             if self.limits.rate > top:
@@ -308,6 +314,7 @@ class WindParameters(Parameters):
     field: WindFieldParameters = group(WindFieldParameters)
 
     def check(self):
+        """Raises ParameterError for a spectrum without a mean torque, which it scales."""
         if self.gust.kind in ('davenport', 'von_karman') and self.azimuth == self.elevation == 0.0:
             raise ParameterError(f'gust.kind = {self.gust.kind}: the spectra scale the mean torque, '
                                  f'and azimuth = elevation = 0 Nm')
@@ -359,6 +366,7 @@ class AduParameters(Parameters):
         faults=FaultParameters(overspeed=2.1))
 
     def check(self):
+        """Raises ParameterError for times that the speed loop does not divide, no body, a start outside the travel."""
         whole_speed_periods('period', self.period)
         whole_speed_periods('transport_delay', self.transport_delay)
         if self.elevating.about_beam > 0.0:
@@ -405,6 +413,7 @@ class RunParameters(Parameters):
                                      'axes stop, a beam stays')
 
     def check(self):
+        """Raises ParameterError where the run is no whole number of periods."""
         super().check()
         if self.duration and abs(self.duration / self.period - round(self.duration / self.period)) > 1e-6:
             raise ParameterError(f'duration = {self.duration:g} s: must be a multiple of the period {self.period:g} s')
@@ -418,10 +427,12 @@ class AduNodeParameters(RunParameters, AduParameters):
                            'begins at the initial angles')
 
     def check(self):
+        """Raises ParameterError for an `inject` that names no fault of the drive."""
         super().check()
         table.due('adu', self.inject)
 
     def check_graph(self, beams, lockstep):
+        """Raises ParameterError for a fault that its pacing does not have."""
         super().check_graph(beams, lockstep)
         table.check_pacing('adu', self.inject, lockstep)
 
@@ -435,9 +446,11 @@ class BeamParameters(RunParameters):
     initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'of every beam at t = 0')
 
     def check(self):
+        """Raises ParameterError for a delay of no whole number of periods, or longer than commands are kept."""
         super().check()
         periods = self.transport_delay / self.period
         if abs(periods - round(periods)) > 1e-6:
             raise ParameterError(f'transport_delay = {self.transport_delay:g} s: must be a multiple of the period '
                                  f'{self.period:g} s: a beam changes at the steps')
+        from adu_drive import electronic_beam  # with numba, which only the array needs
         electronic_beam.check_delay(self.period, self.transport_delay)

@@ -26,6 +26,7 @@ class Timekeeper(unit_node.UnitNode):
         super().__init__(module, serves_beams=True)
 
     def begin(self):
+        """Begin to count the steps, and with them the graph's time."""
         p = self.parameters
         self.period_ns = round(p.period * SECOND)
         self.last_step = round(p.duration / p.period) if p.duration > 0.0 else None
@@ -49,6 +50,7 @@ class Timekeeper(unit_node.UnitNode):
 
     @property
     def awaits(self):
+        """What it waits for: readers in lockstep, in realtime the time at which the run begins."""
         if self.graph.lockstep:
             return 'the readers of what it writes'
         _, now = self.clock()
@@ -138,6 +140,7 @@ class Timekeeper(unit_node.UnitNode):
         self.finished = True
 
     def close(self):
+        """End; in realtime with the steps made, lost and missed as its result."""
         if not self.graph.lockstep:
             self.result = self._outcome(self.made)
         super().close()
@@ -149,6 +152,7 @@ class Timekeeper(unit_node.UnitNode):
                 'late_ticks': int(self.late_ticks)}
 
     def diagnose(self):
+        """The Diagnosis of the drive with the step and what was lost among its values."""
         diagnosis = super().diagnose()
         values = [*diagnosis.values, ('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
                   ('late_ticks', str(int(self.late_ticks)))]

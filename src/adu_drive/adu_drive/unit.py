@@ -167,6 +167,7 @@ class Adu(Simulated):
         drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
 
     def latency(self, topic):
+        """How old a command is that a step reads [s]: that of the step before."""
         return self.parameters.period
 
     @property
@@ -201,6 +202,7 @@ class Adu(Simulated):
         return resting.Left(*(float(o[axis]['position']) for axis in topics.AXES), bool(enabled), pinned)
 
     def encode(self, topic, code):
+        """The text of a code of adu/state, else as any unit."""
         return drive_state.described(code) if topic == STATE else super().encode(topic, code)
 
     @property
@@ -214,6 +216,7 @@ class Adu(Simulated):
         return drive_state.described(int(self.parts['outputs']['condition']))
 
     def request(self, name):
+        """Do one of REQUESTS; the Reply names the state that follows, and why it is refused."""
         m = self.parts
         answer = drive_unit.request(m['state'], m['constants'], m['outputs'], drive_state.REQUESTS[name])
         granted = answer == drive_state.GRANTED
@@ -221,6 +224,7 @@ class Adu(Simulated):
         return Reply(granted, f'{refusal}drive is {self.condition}')
 
     def requests_for(self, topic, text):
+        """The services that lead to a text of adu/state."""
         o = self.parts['outputs']
         tripped, stopped = 'fault' in text, 'emergency stop' in text
         latched = o['emergency'] or self.tripped
@@ -231,6 +235,7 @@ class Adu(Simulated):
         return [service for service, due in wanted.items() if due]
 
     def diagnose(self):
+        """How it is, with limits, faults and thermal load of both axes; what was refused is told once."""
         outputs, link = self.parts['outputs'], self.parts['link']
         invalid, link['invalid'] = INVALID[link['invalid']], 0
         axes = {axis: outputs[axis] for axis in topics.AXES}
@@ -261,10 +266,12 @@ class Adu(Simulated):
 
     @property
     def alarm(self):
+        """Whether it stands in an emergency stop, has a fault, or does not obey its command."""
         outputs, link = self.parts['outputs'], self.parts['link']
         return bool(outputs['emergency'] or link['stale'] or link['invalid']
                     or outputs['azimuth']['faults'] | outputs['elevation']['faults'])
 
     @staticmethod
     def idle(numbers):
+        """Why a recording did not exercise it: no rate was ever commanded."""
         return '' if (numbers[COMMAND][:, 2:4] != 0.0).any() else 'the drive was never told to move'

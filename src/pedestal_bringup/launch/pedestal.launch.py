@@ -1,47 +1,63 @@
-"""ros2 launch pedestal_bringup pedestal.launch.py scenario:=uav_flyby [pacing:=lockstep] [duration:=60.0] [bag:=D]"""
-import pathlib
-import tempfile
+"""The nodes of a scenario: ros2 launch pedestal_bringup pedestal.launch.py scenario:=uav_flyby
 
-from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction, RegisterEventHandler
+`ros2 launch pedestal_bringup pedestal.launch.py --show-args` lists what may be said. The launch ends with the drive.
+"""
+import sys
+
+from launch.actions import (
+    DeclareLaunchArgument,
+    EmitEvent,
+    ExecuteProcess,
+    GroupAction,
+    LogInfo,
+    OpaqueFunction,
+    RegisterEventHandler,
+)
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import Node, PushRosNamespace
 
 from launch import LaunchDescription
-from pedestal_bringup.run import graph, scenario
+from pedestal_bringup.run import launched
 from pedestal_common import nodes
+
+
+def operator(context, scenario):
+    """What sends the program track, in the namespace of the nodes."""
+    namespace = context.launch_configurations.get('ros_namespace', '')
+    return [ExecuteProcess(cmd=[sys.executable, '-m', 'pedestal_bringup.cli', 'program', str(scenario),
+                                *(['--namespace', namespace] if namespace else [])], output='screen')]
 
 
 def start(context):
     """The nodes of the scenario with the parameters `pedestal run` would give them."""
-    given = {name: LaunchConfiguration(name).perform(context) for name in ('scenario', 'pacing', 'duration', 'bag')}
-    chosen = scenario.load(given['scenario'], pacing=given['pacing'] or None,
-                           duration=float(given['duration']) if given['duration'] else None)
-    file = pathlib.Path(tempfile.mkdtemp(prefix='pedestal-')) / 'parameters.yaml'
-    file.write_text(graph.parameters_of_all(chosen, given['bag'] or graph.free_bag(chosen.name),
-                                         graph.begins(chosen)))
-    actions = []
+    given = {argument.name: LaunchConfiguration(argument.name).perform(context) for argument in launched.ARGUMENTS}
+    chosen = launched.asked(given)
+    servers = launched.servers(given, chosen)
+    file, whole = launched.prepare(given, chosen)
+    actions = [LogInfo(msg=line) for line in launched.mistaken(context.launch_configurations)]
+    actions += [PushRosNamespace(given['namespace'])] if given['namespace'] else []
     for name in chosen.nodes:
         if name == 'operator':
-            send = ['pedestal', 'program', given['scenario'], '--duration', str(chosen.header.duration)]
-            actions.append(ExecuteProcess(cmd=send, output='screen'))
+            actions.append(OpaqueFunction(function=operator, args=[whole]))
             continue
         row = chosen.row(name)
         node = Node(package=row.package, executable=row.executable, name=nodes.plain(name),
                     namespace=nodes.beam_of(name), parameters=[str(file)], output='screen')
         actions.append(node)
-        if name == 'adu':
-            end = OnProcessExit(target_action=node, on_exit=[EmitEvent(event=Shutdown())])
-            actions.append(RegisterEventHandler(end))
-    return actions
+        if name == nodes.DRIVE or chosen.header.pacing == 'lockstep':
+            end = EmitEvent(event=Shutdown(reason=f'{name} has ended'))
+            actions.append(RegisterEventHandler(OnProcessExit(target_action=node, on_exit=[end])))
+    for server, parameters in servers:
+        actions.append(Node(package=server.package, executable=server.executable, parameters=[parameters],
+                            output='screen'))
+    return [GroupAction(actions)]
 
 
 def generate_launch_description():
     """The launch description of a scenario, as ros2 launch asks for it."""
     return LaunchDescription([
-        DeclareLaunchArgument('scenario', default_value='leo_pass'),
-        DeclareLaunchArgument('pacing', default_value=''),
-        DeclareLaunchArgument('duration', default_value=''),
-        DeclareLaunchArgument('bag', default_value=''),
+        *(DeclareLaunchArgument(argument.name, default_value=argument.default, description=argument.doc,
+                                choices=argument.choices or None) for argument in launched.ARGUMENTS),
         OpaqueFunction(function=start)])

@@ -13,6 +13,7 @@ import sys
 from pedestal_bringup import cli
 from pedestal_bringup.run import scenario
 from pedestal_common import nodes, parameters
+from pedestal_common.graph_parameters import GraphParameters
 
 COLUMNS = ('pedestal_common', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive', 'ship_motion_sim')
 """Packages that hold laws, in the order of the signal."""
@@ -22,8 +23,9 @@ def parameter_page():
     """Every parameter of every node: default, range, unit, meaning."""
     lines = ['# Parameters', '', 'Every parameter of every node, as the node declares it. `pedestal parameters NODE` '
              'prints the same. All is SI and radians; a name that ends in `_deg` or `_dbhz` says so.']
-    for node in ('scenario', *(node.name for node in nodes.NODES if node.module), 'beam_steering'):
-        kind = scenario.parameters_of(node)
+    kinds = {node: scenario.parameters_of(node) for node in
+             ('scenario', *(node.name for node in nodes.NODES if node.module), 'beam_steering')}
+    for node, kind in {**kinds, 'graph, of every node': GraphParameters}.items():
         values = parameters.defaults(kind)
         lines += ['', f'## {node}', '', '| parameter | default | range | unit | meaning |', '|---|---|---|---|---|']
         for name, field in parameters.flatten(kind):

@@ -6,6 +6,7 @@ and `main(options)` does the work and returns the exit code.
 import argparse
 import contextlib
 import importlib
+import os
 import shlex
 import signal
 import sys
@@ -28,7 +29,13 @@ def main(args=None) -> int:
     alone = getattr(options, 'json', None) == STDOUT
     try:
         with contextlib.redirect_stdout(sys.stderr) if alone else contextlib.nullcontext():
-            return options.main(options)
+            code = options.main(options)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # Who read it, as `head` does, has enough; a second error, at the end of Python, would tell nobody.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except (ParameterError, ValueError, RuntimeError, OSError) as error:
         print(f'pedestal: error: {error}', file=sys.stderr)
         return 1

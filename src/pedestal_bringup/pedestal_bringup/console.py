@@ -112,7 +112,10 @@ def show_list(rows):
             print(f'{head}  {sentence}')
         elif terminal < indent + SENTENCE:
             # Too narrow for a column of sentences: they go below.
-            print(head.rstrip(), textwrap.indent(textwrap.fill(sentence, terminal - 4), ' ' * 4), sep='\n')
+            fits = len(head.rstrip()) <= terminal
+            below = (sentence,) if fits else ('  '.join(filter(None, cells[1:])), sentence)
+            print(head.rstrip() if fits else cells[0],
+                  *(textwrap.indent(textwrap.fill(text, terminal - 4), ' ' * 4) for text in below if text), sep='\n')
         else:
             first, *more = textwrap.wrap(sentence, terminal - indent) or ['']
             print(f'{head:{indent - 2}}  {first}', *(' ' * indent + line for line in more), sep='\n')

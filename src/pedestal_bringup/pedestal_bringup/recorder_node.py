@@ -241,6 +241,7 @@ class RecorderNode(shell.Shell):
             ('out of order', str(self._order.odd))])
 
     def draining(self):
+        """Whether messages may still come: until all steps are written, nothing came for QUIET, or DRAIN is over."""
         now = time.monotonic()
         if self._error is not None:
             return False
@@ -255,6 +256,7 @@ class RecorderNode(shell.Shell):
         return now < self._drain_end and (unheard or now < self._quiet[0] + QUIET)
 
     def close(self):
+        """Write what waits and finish the bag; messages, losses and SHA-256 are its result."""
         try:
             self._order.finish()
         except BagError as error:

@@ -22,6 +22,26 @@ def test_a_list_stays_within_the_terminal(capsys, monkeypatch, columns):
     assert words == ' '.join(cell for row in ROWS[:2] for cell in row).split()
 
 
+def test_on_a_narrow_terminal_each_cell_goes_below_the_name(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
+    monkeypatch.setattr(console.shutil, 'get_terminal_size', lambda: os.terminal_size((40, 24)))
+    console.show_list([('azimuth.speed_loop.schedule', 'hold_fade', 'off | constant | fade | hold_fade', 'how'),
+                       ('short', '1', '', '')])
+    assert capsys.readouterr().out.splitlines() == [
+        'azimuth.speed_loop.schedule', '    hold_fade  off | constant | fade |', '    hold_fade', '    how',
+        'short                        1']
+
+
+def test_who_reads_may_leave():
+    """As `pedestal scenarios | head` does: nothing is complained of."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([sys.executable, '-m', 'pedestal_bringup.cli', 'scenarios'], stdout=writer,
+                          stderr=subprocess.PIPE, text=True, timeout=300)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (1, '')
+
+
 def test_in_a_pipe_a_row_is_a_line(capsys):
     console.show_list(ROWS)
     lines = capsys.readouterr().out.splitlines()
@@ -29,7 +49,8 @@ def test_in_a_pipe_a_row_is_a_line(capsys):
     assert [line.index(row[1] or row[2]) for line, row in zip(lines, ROWS)][0] == len(ROWS[1][0]) + 2
 
 
-@pytest.mark.parametrize('command', [['scenarios'], ['study'], ['parameters', 'scenario'], ['parameters', 'recorder']])
+@pytest.mark.parametrize('command', [['scenarios'], ['study'], ['parameters', 'scenario'], ['parameters', 'recorder'],
+                                     ['parameters', 'adu']])
 def test_a_verb_that_computes_nothing_imports_no_compiler(command):
     """Nor ROS: each takes longer than the verb itself."""
     code = ('import sys; from pedestal_bringup import cli; assert cli.main(sys.argv[1:]) == 0; '

@@ -23,6 +23,7 @@ class GraphParameters(parameters.Parameters):
                                           'long says so')
 
     def check(self):
+        """Raises ParameterError for a name in `nodes` that is no node."""
         for name in self._names:
             if name not in nodes.NAMES:
                 raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}' is none of "
@@ -39,4 +40,5 @@ class GraphParameters(parameters.Parameters):
 
     @property
     def lockstep(self):
+        """Whether every step waits for everybody."""
         return self.pacing == 'lockstep'

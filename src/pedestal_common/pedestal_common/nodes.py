@@ -50,10 +50,12 @@ class Node(typing.NamedTuple):
 
     @property
     def package(self):
+        """The ROS package that it is in."""
         return self.module.partition('.')[0]
 
     @property
     def executable(self):
+        """The name of its executable in that package."""
         return self.module.rpartition('.')[2]
 
     def parameters_type(self):

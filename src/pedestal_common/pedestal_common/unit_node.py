@@ -180,6 +180,7 @@ class UnitNode(shell.Shell):
 
     @property
     def awaits(self):
+        """What it waits for: its trigger, and the messages that come once and have not come yet."""
         return ', '.join((self.unit.trigger, *sorted(self._waiting_for_once)))
 
     def begin(self):
@@ -284,6 +285,7 @@ class UnitNode(shell.Shell):
         return serve
 
     def reconfigure(self):
+        """Hand the changed parameters to the units."""
         for port in self.ports:
             port.unit.configure(self.parameters)
 

@@ -37,6 +37,7 @@ class EasycommNode(ServerNode):
 
     @property
     def device(self):
+        """The path of the serial line, '' where it serves TCP only."""
         return self.parameters.device
 
     def serve(self, client, now):

@@ -37,6 +37,7 @@ class FramesNode(shell.Shell):
 
     @property
     def awaits(self):
+        """What it waits for, as a person calls it."""
         return 'its end'
 
     def _look(self):

@@ -118,6 +118,7 @@ class LineServer:
         return left
 
     def close(self):
+        """Close every connection and the port."""
         for client in list(self.clients):
             self._drop(client)
         if self._server:

@@ -121,6 +121,7 @@ class LiveNode(shell.Shell):
 
     @property
     def awaits(self):
+        """What it waits for, as a person calls it."""
         return 'clients'
 
     def _look(self):
@@ -143,6 +144,7 @@ class LiveNode(shell.Shell):
             rotation=make.Quaternion(**dict(zip('xyzw', given.rotation)))) for given in transforms]))
 
     def close(self):
+        """Close the server, then the node."""
         self._server.stop()
         super().close()
 

@@ -64,6 +64,7 @@ class PageNode(Remote):
 
     @property
     def awaits(self):
+        """What it waits for, as a person calls it."""
         return 'pages'
 
     @property
@@ -156,6 +157,7 @@ class PageNode(Remote):
                 self.configuration[name] = content
 
     def close(self):
+        """Close the server, then the node."""
         self._server.close()
         super().close()
 

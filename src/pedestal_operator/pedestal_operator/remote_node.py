@@ -141,13 +141,14 @@ class Query:
 
 
 class Spun:
-    """A Remote with its executor, as a context. Raises GraphError where no node of the graph is heard."""
+    """A Remote with its executor, as a context. Raises GraphError where no node of the graph is heard. arguments: of
+    ROS 2, for the Remote."""
 
-    def __init__(self, make):
-        self._make = make
+    def __init__(self, make, arguments=()):
+        self._make, self._arguments = make, arguments
 
     def __enter__(self):
-        middleware.initialise([])
+        middleware.initialise(self._arguments)
         self.remote = self._make()
         self._executor = middleware.make_executor()
         self._executor.add_node(self.remote)

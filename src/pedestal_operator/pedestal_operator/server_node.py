@@ -45,6 +45,7 @@ class ServerNode(Remote):
 
     @property
     def awaits(self):
+        """What it waits for, as a person calls it."""
         return 'clients'
 
     def serve(self, client, now):
@@ -64,5 +65,6 @@ class ServerNode(Remote):
                 self.get_logger().warning(f'{client.name}: {", ".join(filter(None, (client.gone, told)))}')
 
     def close(self):
+        """Close the port, then the node."""
         self._server.close()
         super().close()

@@ -137,6 +137,7 @@ class ShipMotionParameters(Parameters):
         table.due('ship_motion', self.inject)
 
     def check_graph(self, beams, lockstep):
+        """Raises ParameterError for a fault that its pacing does not have."""
         super().check_graph(beams, lockstep)
         table.check_pacing('ship_motion', self.inject, lockstep)
 
@@ -211,5 +212,6 @@ class InsParameters(Parameters):
                                  'of no use before the heading is known')
 
     def check_graph(self, beams, lockstep):
+        """Raises ParameterError for a fault that its pacing does not have."""
         super().check_graph(beams, lockstep)
         table.check_pacing('ins', self.inject, lockstep)

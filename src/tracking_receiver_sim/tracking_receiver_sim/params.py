@@ -174,9 +174,11 @@ class TrackingReceiverNodeParameters(TrackingReceiverParameters):
     inject: str = text('', table.DOC)
 
     def check(self):
+        """Raises ParameterError for an `inject` that names no fault of the receiver."""
         super().check()
         table.due('tracking_receiver', self.inject)
 
     def check_graph(self, beams, lockstep):
+        """Raises ParameterError for a fault that its pacing does not have."""
         super().check_graph(beams, lockstep)
         table.check_pacing('tracking_receiver', self.inject, lockstep)

@@ -80,6 +80,7 @@ class Live:
             self.executor.add_node(node)
 
     def until(self, condition, limit, what):
+        """Spin until condition() holds. Raises RunError where the node dies, or lacks what() after `limit` [s]."""
         deadline = time.monotonic() + limit
         while not condition():
             if self.process.poll() not in (None, 0):

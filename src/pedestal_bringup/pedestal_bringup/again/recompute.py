@@ -58,6 +58,7 @@ class Recording:
         self._rows, self._data, self._outputs = {}, {}, {}
 
     def has(self, topic):
+        """Whether the bag has a message of a topic."""
         return topic in self.bag.topics and len(self.rows(topic)) > 0
 
     def source(self, topic):
@@ -69,6 +70,7 @@ class Recording:
         return self.has(self.source(topic))
 
     def rows(self, topic):
+        """The rows of a topic in the bag, or of what stands for it."""
         if topic not in self._rows:
             self._rows[topic] = self.bag.rows(self.source(topic))
         return self._rows[topic]

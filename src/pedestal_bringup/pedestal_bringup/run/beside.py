@@ -17,27 +17,36 @@ STOP_TIME = 5.0
 class Server(typing.NamedTuple):
     """A row of SERVERS.
 
-    module   of the node
+    module   of the node; executable: its name for ROS 2
     port     by default; 0: it has none
     does     what it does, for the help
     says     lines that it begins with on its standard output, which are for the user
     library  a Python package that it needs; extra: by which pip installs that
     """
     module: str
+    executable: str
     port: int
     does: str
     says: int = 0
     library: str = ''
     extra: str = ''
 
+    @property
+    def package(self):
+        """The ROS package of its node."""
+        return self.module.partition('.')[0]
 
-SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 4533, "serve the protocol of Hamlib's rotctld"),
-           'easycomm': Server('pedestal_operator.easycomm_node', 4535, 'serve EasyComm I, II and III'),
-           'page': Server('pedestal_operator.page_node', 8080, "serve the operator's page for a browser",
-                          says=len(ROLES)),
-           'foxglove': Server('pedestal_operator.live_node', 8765, 'serve every topic to Foxglove',
+
+SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 'rotctld_node', 4533,
+                             "serve the protocol of Hamlib's rotctld"),
+           'easycomm': Server('pedestal_operator.easycomm_node', 'easycomm_node', 4535,
+                              'serve EasyComm I, II and III'),
+           'page': Server('pedestal_operator.page_node', 'operator_page', 8080,
+                          "serve the operator's page for a browser", says=len(ROLES)),
+           'foxglove': Server('pedestal_operator.live_node', 'live_node', 8765, 'serve every topic to Foxglove',
                               library='foxglove', extra='pedestal_operator[live]'),
-           'frames': Server('pedestal_operator.frames_node', 0, 'publish robot_description and tf, for RViz')}
+           'frames': Server('pedestal_operator.frames_node', 'frames_node', 0,
+                            'publish robot_description and tf, for RViz')}
 
 
 def add_arguments(parser):
@@ -58,16 +67,24 @@ def port(text):
     return port
 
 
+def check(names, header, option='--{} '):
+    """Raise ValueError where servers are asked for in lockstep, or one lacks its library. option: how a value is
+    given to whoever asks."""
+    for name in names:
+        asked = option.format(name).strip()
+        if header.pacing != 'realtime':
+            raise ValueError(f'{asked} needs {option.format("pacing")}realtime')
+        library = SERVERS[name].library
+        if library and not importlib.util.find_spec(library):
+            raise ValueError(f"{asked} needs {library}: pip install '{SERVERS[name].extra}'")
+
+
 @contextlib.contextmanager
 def servers(options, header, bag):
     """Run the servers that the options ask for as long as the context is open. Raises ValueError in lockstep, and
     where a library is missing."""
     wanted = {name: getattr(options, name) for name in SERVERS if getattr(options, name) is not None}
-    if wanted and header.pacing != 'realtime':
-        raise ValueError(f'--{next(iter(wanted))} needs --pacing realtime')
-    for name in wanted:
-        if SERVERS[name].library and not importlib.util.find_spec(SERVERS[name].library):
-            raise ValueError(f"--{name} needs {SERVERS[name].library}: pip install '{SERVERS[name].extra}'")
+    check(wanted, header)
     if wanted:
         log_folder(bag).mkdir(parents=True, exist_ok=True)
     processes = []

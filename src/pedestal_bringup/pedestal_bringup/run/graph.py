@@ -36,7 +36,7 @@ class Outcome:
     stopped: bool = False
 
 
-def free_bag(scenario):
+def _free_bag(scenario):
     """bags/runs/SCENARIO-N with the first N that is free."""
     number = 1
     while True:
@@ -44,6 +44,14 @@ def free_bag(scenario):
         if not bag.exists():
             return bag
         number += 1
+
+
+def new_bag(given, scenario):
+    """Where to record: as given, else bags/runs/SCENARIO-N. Raises ValueError where there is one already."""
+    bag = pathlib.Path(given) if given else _free_bag(scenario)
+    if bag.exists():
+        raise ValueError(f'bag {bag} exists already; a recording is never overwritten')
+    return bag
 
 
 def begins(scenario):
@@ -77,6 +85,14 @@ def sole_run(domain_id):
         yield
 
 
+def read_tracks(scenario):
+    """The program tracks {topic: message} of a scenario, its files of target and ship read before anything is started.
+    Raises ValueError, OSError for a file that is not what it should be."""
+    if 'ship_motion' in scenario.nodes:
+        motion.constants(scenario.node_parameters('ship_motion').ship)
+    return program_messages(scenario)
+
+
 def run(scenario, bag, progress):
     """Run a scenario to its end, or until Ctrl-C, and return its Outcome.
 
@@ -84,10 +100,7 @@ def run(scenario, bag, progress):
     then stays readable.
     """
     realtime = scenario.header.pacing == 'realtime'
-    # The files of the target and of the ship are read before anything is started.
-    tracks = program_messages(scenario)
-    if 'ship_motion' in scenario.nodes:
-        motion.constants(scenario.node_parameters('ship_motion').ship)
+    tracks = read_tracks(scenario)
     graph = Graph(scenario, bag)
     middleware.initialise([])
     try:
@@ -132,12 +145,13 @@ def _in_realtime(graph, operator, tracks, progress):
                        stopped)
 
 
-def send_program(scenario, start=None) -> int:
+def send_program(scenario, start=None, ros_arguments=()) -> int:
     """Send a scenario's program track to a running ACU and keep it latched until Ctrl-C.
 
-    start: when its time is 0 [ns UTC]; None: when the graph's is, which the ACU is asked for.
+    start: when its time is 0 [ns UTC]; None: when the graph's is, which the ACU is asked for. ros_arguments: for the
+    node that sends it, in the namespace of the graph.
     """
-    middleware.initialise([])
+    middleware.initialise(ros_arguments)
     try:
         operator = Operator(scenario.header.graph_beams)
         executor = SingleThreadedExecutor()

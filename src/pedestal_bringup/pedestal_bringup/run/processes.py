@@ -113,6 +113,7 @@ class Graph:
             self._reaper.stdin.flush()
 
     def kill(self, node):
+        """Kill the process of a node and wait for its end."""
         self.processes[node].kill()
         self.processes[node].wait()
 

@@ -57,8 +57,8 @@ def _highest(built, duration):
     top = int(np.argmax(elevation))
     begin = orbit.instant('start', built.start_time)
     when = begin + datetime.timedelta(seconds=float(times[top]))
-    return (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the satellite is highest, {elevation[top]:.1f} deg, after '
-            f'{times[top]:.1f} s, at {when:%H:%M:%S} UTC',)
+    return (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the satellite is highest in this run, {elevation[top]:.1f} deg, '
+            f'after {times[top]:.1f} s, at {when:%H:%M:%S} UTC',)
 
 
 def program_messages(scenario):

@@ -19,5 +19,6 @@ class RecorderParameters(Parameters):
     parameters_yaml: str = text('', 'every parameter of every node of the run as YAML, {node: {name: value}}')
 
     def check(self):
+        """Raises ParameterError without a bag."""
         if not self.bag:
             raise ParameterError("bag = '': must be a directory that does not exist")

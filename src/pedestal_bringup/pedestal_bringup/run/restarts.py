@@ -69,6 +69,7 @@ class Silence:
         self._looked = None
 
     def note(self, node, now):
+        """A node was heard at the time now [s]."""
         self._latest[node] = now
 
     def forget(self, node):

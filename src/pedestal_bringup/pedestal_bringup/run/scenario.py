@@ -58,6 +58,7 @@ class ScenarioParameters(parameters.Parameters):
     restart: RestartParameters = parameters.group(RestartParameters)
 
     def check(self):
+        """Raises ParameterError for several beams of a drive that has none."""
         if self.beams > 1 and not self.beam:
             raise parameters.ParameterError(f'beams = {self.beams}: must be 1 unless beam = true')
 

@@ -26,17 +26,29 @@ def add_new_bag(parser):
                         'bags/runs/SCENARIO-N')
 
 
-def new_bag(given, scenario):
-    """Where to record: as given, else bags/runs/SCENARIO-N. Raises ValueError where there is one already."""
-    from pedestal_bringup.run import graph
-    bag = given or graph.free_bag(scenario)
-    if bag.exists():
-        raise ValueError(f'--bag {bag} exists already; a recording is never overwritten')
-    return bag
+def add_namespace(parser):
+    """--namespace NAME of a graph that was launched in one."""
+    parser.add_argument('--namespace', default='', metavar='NAME', help='in which the graph was launched, for example '
+                        'ship_1')
+
+
+def ros_arguments(options):
+    """The arguments of ROS 2 for a node in the namespace of add_namespace. Raises ValueError."""
+    from rclpy.exceptions import InvalidNamespaceException
+    from rclpy.validate_namespace import validate_namespace
+    if not options.namespace:
+        return []
+    name = f'/{options.namespace.strip("/")}'
+    try:
+        validate_namespace(name)
+    except InvalidNamespaceException:
+        raise ValueError(f'--namespace {options.namespace}: must be letters, digits and _, as ship_1') from None
+    return ['--ros-args', '-r', f'__ns:={name}']
 
 
 def add_remote(parser):
     """Who asks a running graph, which beam, and how long to wait."""
+    add_namespace(parser)
     parser.add_argument('--who', metavar='NAME', help='by which name to ask; default: login@host')
     parser.add_argument('--beam', default='', metavar='NAME', help='of an array of several, for example beam_2')
     parser.add_argument('--timeout', type=float, default=5.0, metavar='S', help='to wait for the graph and for its '
@@ -49,7 +61,8 @@ def remote(options, node='acu'):
     from pedestal_operator.remote_node import Remote, Spun, user
     if options.beam and options.beam + '/' not in nodes.prefixes(nodes.MAX_BEAMS):
         raise ValueError(f'--beam {options.beam}: must be beam_1 to beam_{nodes.MAX_BEAMS}')
-    return Spun(lambda: Remote(f'terminal_{os.getpid()}', options.who or user(), node, options.beam))
+    return Spun(lambda: Remote(f'terminal_{os.getpid()}', options.who or user(), node, options.beam),
+                ros_arguments(options))
 
 
 def add_workers(parser):

@@ -15,6 +15,7 @@ def add_arguments(parser):
                         'or file: when its file or its TLE says; default: when the graph began, which the ACU is '
                         'asked for')
     arguments.add_param(parser)
+    arguments.add_namespace(parser)
 
 
 def _utc(text):
@@ -34,4 +35,5 @@ def main(options):
     """Send the program track; exit code of graph.send_program."""
     from pedestal_bringup.run import graph, program, scenario
     chosen = scenario.load(options.scenario, options.param, duration=options.duration)
-    return graph.send_program(chosen, program.begins(chosen) if options.start == FILE else options.start)
+    start = program.begins(chosen) if options.start == FILE else options.start
+    return graph.send_program(chosen, start, arguments.ros_arguments(options))

@@ -18,7 +18,7 @@ def main(options):
     from pedestal_bringup.run import graph
     recording = bag.read(options.recording)
     chosen = rerun.configured(recording)
-    path = arguments.new_bag(options.bag, chosen.name)
+    path = graph.new_bag(options.bag, chosen.name)
     with console.progress_of_run(chosen.header.duration) as progress:
         if graph.run(chosen, path, progress).stopped:
             raise KeyboardInterrupt

@@ -50,7 +50,7 @@ def main(options):
     else:
         duration = options.duration
     chosen = scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
-    bag = arguments.new_bag(options.bag, chosen.name)
+    bag = graph.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
     for line in program.announced(chosen):
         print(line)

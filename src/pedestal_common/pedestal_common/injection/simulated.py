@@ -11,6 +11,7 @@ class Simulated(Unit):
     `inject`."""
 
     def schedule(self):
+        """[(at [ns], Command)] of the parameter `inject`."""
         return table.due(self.NODE.name, self.parameters.inject)
 
     def obey(self, command, arguments):

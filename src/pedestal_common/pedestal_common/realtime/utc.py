@@ -44,4 +44,5 @@ class Utc:
 
     @property
     def ahead(self):
+        """How far it is ahead of the system's clock [ns]."""
         return self._offset - self._system_offset

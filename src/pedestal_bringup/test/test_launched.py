@@ -1,0 +1,75 @@
+"""The arguments of pedestal.launch.py as its texts; test/test_colcon.py starts it where there is a `ros2`."""
+import pytest
+
+from pedestal_bringup.run import beside, launched
+from pedestal_common import plain_yaml
+
+
+def given(**texts):
+    return {**{argument.name: argument.default for argument in launched.ARGUMENTS}, **texts}
+
+
+def test_every_argument_says_what_it_is():
+    assert all(argument.doc for argument in launched.ARGUMENTS)
+    names = [argument.name for argument in launched.ARGUMENTS]
+    assert len(set(names)) == len(names) and set(beside.SERVERS) <= set(names)
+
+
+def test_what_is_said_takes_the_place_of_what_the_scenario_says(tmp_path):
+    file = tmp_path / 'mine.yaml'
+    file.write_text('/**/acu:\n  ros__parameters:\n    azimuth.filter.kind: ca\n')
+    plain, changed = launched.asked(given()), launched.asked(given(
+        pacing='realtime', duration='12.5', seed='7', params_file=str(file)))
+    assert (plain.name, plain.header.pacing, plain.header.seed) == ('leo_pass', 'lockstep', 1)
+    assert (changed.header.pacing, changed.header.duration, changed.header.seed) == ('realtime', 12.5, 7)
+    assert changed.node_parameters('acu').azimuth.filter.kind == 'ca' != plain.node_parameters(
+        'acu').azimuth.filter.kind
+
+
+@pytest.mark.parametrize('texts, told', [
+    ({'scenario': 'leo_pas'}, "did you mean 'leo_pass'?"),
+    ({'duration': 'long'}, 'duration:=long: must be a number of seconds'),
+    ({'duration': '-3'}, 'duration = -3 s: must be 0.1 to 86400'),
+    ({'seed': '1.5'}, 'seed:=1.5: must be a whole number'),
+    ({'params_file': '/nowhere.yaml'}, '/nowhere.yaml: No such file or directory')])
+def test_a_wrong_value_is_named(texts, told):
+    with pytest.raises(ValueError) as refused:
+        launched.asked(given(**texts))
+    assert told in str(refused.value) and '\n' not in str(refused.value)
+
+
+@pytest.mark.parametrize('pacing, texts, told', [
+    ('lockstep', {'page': 'true'}, 'page:= needs pacing:=realtime'),
+    ('realtime', {'rotctld': '70000'}, 'rotctld:=70000: must be false, true or a port, 1 to 65535'),
+    ('realtime', {'page': 'yes'}, 'page:=yes: must be false, true or a port')])
+def test_a_wrong_server_is_named(pacing, texts, told):
+    asked = given(pacing=pacing, **texts)
+    with pytest.raises(ValueError) as refused:
+        launched.servers(asked, launched.asked(asked))
+    assert told in str(refused.value)
+
+
+def test_servers_are_those_that_were_asked_for():
+    asked = given(pacing='realtime', page='true', rotctld='4600', frames='true')
+    started = {server.executable: values for server, values in launched.servers(asked, launched.asked(asked))}
+    assert started == {'operator_page': {'graph.beams': 0, 'port': 8080}, 'frames_node': {'graph.beams': 0},
+                       'rotctld_node': {'graph.beams': 0, 'port': 4600}}
+    assert launched.servers(given(), launched.asked(given())) == []
+
+
+def test_a_misspelt_argument_is_told_apart_from_those_of_other_launch_files():
+    assert launched.mistaken(['scenaro', 'scenario', 'rviz_config']) == [
+        "no argument scenaro:=; did you mean 'scenario'?"]
+
+
+def test_what_the_nodes_start_with_lies_beside_the_bag(tmp_path, monkeypatch):
+    """The operator is given the scenario whole, with every change, under its name."""
+    monkeypatch.chdir(tmp_path)
+    asked = given(scenario='uav_flyby', seed='7', bag='mine')
+    chosen = launched.asked(asked)
+    file, whole = launched.prepare(asked, chosen)
+    assert plain_yaml.read(file)['/**/recorder']['ros__parameters']['bag'] == 'mine'
+    assert launched.asked(given(scenario=str(whole))) == chosen
+    (tmp_path / 'mine').mkdir()
+    with pytest.raises(ValueError, match='bag mine exists already'):
+        launched.prepare(asked, chosen)
