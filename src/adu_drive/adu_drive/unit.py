@@ -260,10 +260,10 @@ class Adu(Simulated):
         return Diagnosis(OK, 'following', values)
 
     @property
-    def alarm(self):
+    def urgent(self):
         outputs, link = self.parts['outputs'], self.parts['link']
-        return bool(outputs['emergency'] or link['stale'] or link['invalid']
-                    or outputs['azimuth']['faults'] | outputs['elevation']['faults'])
+        return (outputs['emergency'], link['stale'], link['invalid'], outputs['azimuth']['faults'],
+                outputs['elevation']['faults'])
 
     @staticmethod
     def idle(numbers):
