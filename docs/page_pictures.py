@@ -86,7 +86,8 @@ def take(browser, name, folder):
 def main(names):
     FOLDER.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path='/usr/bin/chromium', args=['--no-sandbox'])
+        browser = playwright.chromium.launch(executable_path='/usr/bin/chromium',
+                                             args=['--no-sandbox', '--disable-gpu'])
         return 0 if all([take(browser, name, pathlib.Path(folder)) for name in names or PICTURES]) else 1
 
 

@@ -284,6 +284,17 @@ def request(s, c, u, o, of_all, mode):
 
 
 @compiled
+def refusals(s, c, u, of_all, why):
+    """Put into why (len(MODES),) for each mode NONE or why `request` would refuse it now. s: a copy of the state,
+    which the question changes."""
+    for mode in range(len(why)):
+        now, _ = _situation(s, c, u, of_all, mode, s.fallback)
+        why[mode] = modes.obstacle(mode, now)
+        if why[mode] == modes.DRIVE_NOT_READY:
+            why[mode] = supervision.distrust(s)
+
+
+@compiled
 def _source(s, c, program, t):
     """The target.Source of the mode at t [s]; the program bridges an outage that has a reason."""
     if s.mode == modes.SLAVE:

@@ -104,6 +104,10 @@ class Predictor:
             return Predicted(NO_TRACK, modes.NO_UTC)
         return _table(self._sun_angles, stamp, SUN_INTERVAL)
 
+    def sun_at(self, stamp):
+        """Azimuth and elevation [deg] of the sun at a stamp [s]; None where UTC is not known."""
+        return np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._known else None
+
     def explained(self, mode, reason, stamp):
         """What a refusal of a mode for a reason at a stamp [s] should say beside it; '' for nothing."""
         if reason == modes.NO_UTC:

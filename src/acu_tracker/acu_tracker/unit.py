@@ -165,6 +165,7 @@ class Acu(Unit):
                     lambda: self.unshelve(table.NAMES[0]), lambda: self.encode(ALARMS, 0)):
             ask()
         annunciator.know(self.alarms, DRIVE_SILENT, True, 0.0)
+        self.refusals()
         self.memory.record[...] = before
         self.reasons.clear()
 
@@ -345,6 +346,19 @@ class Acu(Unit):
         more = self.predictor.explained(mode, reason, self._now * 1e-9) if mode in (modes.TLE, modes.SUN) else ''
         return modes.REASONS[reason] + (f', {more}' if more else '')
 
+    @property
+    def _drive_told(self):
+        return 'silent' if self.silent else self.drive_state
+
+    def refusals(self):
+        """{mode: why it would be refused now} of the modes that would be."""
+        m, why = self.parts, np.zeros(len(modes.MODES), int)
+        control_unit.refusals(m['state'].copy(), m['constants'], m['inputs'], self.memory.tables, why)
+        words = {code: modes.REASONS[code] for code in set(why) - {modes.NONE}}
+        if modes.DRIVE_NOT_READY in words:
+            words[modes.DRIVE_NOT_READY] += f': {self._drive_told}'
+        return {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
+
     def reset(self):
         """The Reply to a reset of all that is latched; refused while a cause is there."""
         cause = supervision.reset(self.parts['state'])
@@ -387,7 +401,7 @@ class Acu(Unit):
         values = [('mode', mode), ('reason', reason), ('fallback', modes.FALLBACK_OF[int(state['fallback'])]),
                   ('control', self.authority.holder), ('faults', ', '.join(self.faults)),
                   ('locked', str(int(outputs['locked']))), ('coasting', str(int(outputs['coasting']))),
-                  ('drive', 'silent' if self.silent else self.drive_state),
+                  ('drive', self._drive_told),
                   *((('stow_pins', self._pins_told()),) if self.parameters.stow_pins else ()),
                   ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
                   ('rates gated', str(int(outputs['rates_gated']))),
@@ -398,7 +412,8 @@ class Acu(Unit):
                    for i, axis in enumerate(topics.AXES)]
         for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
             values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
-        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead'])]
+        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead']),
+                   *self._predictions(), *((f'refused {mode}', why) for mode, why in self.refusals().items())]
         if 'moves unasked' in self.faults:
             rates = ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded' for axis, (
                 rate, low, high) in zip(topics.AXES, state['unasked']['measured']))
@@ -420,6 +435,12 @@ class Acu(Unit):
             return Diagnosis(WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit',
                              values)
         return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
+
+    def _predictions(self):
+        """[(key, text)]: where the sun is, against the earth, and the elements of mode tle."""
+        sun, elements = self.predictor.sun_at(self._now * 1e-9), self.predictor.parameters
+        told = [] if sun is None else [(f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun)]
+        return told + [(name, getattr(elements, name)) for name in ('line_1', 'line_2') if getattr(elements, name)]
 
     def _pins_told(self):
         """Where the stow pins are, as the drive says."""
@@ -445,9 +466,11 @@ class Acu(Unit):
         return tuple(name for name, on in latched.items() if on)
 
     @property
-    def alarm(self):
-        """Whether a fault is latched, or the drive or the receiver has fallen silent."""
-        return bool(self.faults or self.parts['outputs']['reason'] == modes.SILENCE)
+    def urgent(self):
+        """What is told at once when it changes: faults, the mode, silence, the lock, the drive, pins, alignment."""
+        outputs, inputs = self.parts['outputs'], self.parts['inputs']
+        return (self.faults, outputs['mode'], outputs['reason'] == modes.SILENCE, outputs['locked'], inputs['drive'],
+                inputs['pins'], inputs['aligning'])
 
     @staticmethod
     def idle(numbers):

@@ -39,6 +39,9 @@ def test_the_sun_of_nrel_over_a_station():
     motion = program_track.motion_at(track, 0.0)
     assert math.degrees(motion.azimuth.angle) % 360.0 == pytest.approx(194.34024, abs=0.01)
     assert math.degrees(motion.elevation.angle) == pytest.approx(39.872046, abs=0.01)
+    azimuth, elevation = predictor('2003-10-17T19:30:30', ('', ''), station=station).sun_at(0.0)
+    assert (azimuth % 360.0, elevation) == (pytest.approx(194.34024, abs=0.01), pytest.approx(39.872046, abs=0.01))
+    assert predictor('', ('', '')).sun_at(0.0) is None
 
 
 def test_the_satellite_agrees_with_skyfield():

@@ -265,11 +265,11 @@ class Adu(Simulated):
         return Diagnosis(OK, 'following', values)
 
     @property
-    def alarm(self):
-        """Whether it stands in an emergency stop, has a fault, or does not obey its command."""
+    def urgent(self):
+        """What is told at once when it changes: an emergency stop, what is wrong with its commands, faults."""
         outputs, link = self.parts['outputs'], self.parts['link']
-        return bool(outputs['emergency'] or link['stale'] or link['invalid']
-                    or outputs['azimuth']['faults'] | outputs['elevation']['faults'])
+        return (outputs['emergency'], link['stale'], link['invalid'], outputs['azimuth']['faults'],
+                outputs['elevation']['faults'])
 
     @staticmethod
     def idle(numbers):

@@ -45,7 +45,7 @@ SILENT = 2.5
 AWAY = 1_500_000_000
 """Time [ns] between two diagnostics beyond which a node was held up, and says so."""
 
-ALARM_PAUSE = 100_000_000
+URGENT_PAUSE = 100_000_000
 """Time [ns] between two diagnostics that do not wait for their second."""
 
 STEPPED = 60 * SECOND
@@ -250,17 +250,21 @@ class Shell(Node):
 
     def diagnose_with(self, diagnose):
         """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time,
-        in realtime at every second of the wall and when it becomes worse."""
+        in realtime at every second of the wall and when what is urgent changes."""
         self._diagnose = diagnose
         self._publish_diagnosis = self.writer('diagnostics')
         if not self.graph.lockstep:
             self._diagnosed = time.monotonic_ns()
             self.every(DIAGNOSTICS, self._publish_diagnostics)
 
-    def alarm(self):
-        """Realtime: something has become worse, which its diagnostics tell before their second."""
-        if self._publish_diagnosis and not self.graph.lockstep and time.monotonic_ns() - self._diagnosed > ALARM_PAUSE:
+    def diagnose_now(self):
+        """Realtime: something has changed, which its diagnostics tell before their second; False where that would be
+        too soon after the last ones."""
+        due = bool(self._publish_diagnosis) and not self.graph.lockstep and (
+            time.monotonic_ns() - self._diagnosed > URGENT_PAUSE)
+        if due:
             self._publish_diagnostics()
+        return due
 
     def _publish_diagnostics(self):
         diagnosis, stamp = self._diagnose(), self._stamp

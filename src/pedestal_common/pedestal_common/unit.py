@@ -216,9 +216,9 @@ class Unit(typing.Protocol):
         """How it is now, and what happened since the last diagnosis."""
 
     @property
-    def alarm(self) -> bool:
-        """Whether something is so wrong that its diagnosis should not wait; asked after every step in realtime."""
-        return False
+    def urgent(self) -> tuple:
+        """What its diagnosis tells at once when it changes; asked after every step in realtime."""
+        return ()
 
     @property
     def calls(self) -> tuple:

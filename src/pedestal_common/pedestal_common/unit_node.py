@@ -116,7 +116,7 @@ class UnitNode(shell.Shell):
         self.refused = ''
         self._waiting_for_once, self._held = set(), collections.deque()
         self._settled, self._settling = not self.graph.lockstep, None
-        self._alarming = False
+        self._urgent = [port.unit.urgent for port in self.ports]
         self._callees = {} if self.graph.lockstep else {
             name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
         self._called = set()
@@ -241,10 +241,9 @@ class UnitNode(shell.Shell):
         """Realtime, after a step: tell what has become wrong, call for what a unit wants of others."""
         if self.graph.lockstep:
             return
-        alarming = any([port.unit.alarm for port in self.ports])
-        if alarming and not self._alarming:
-            self.alarm()
-        self._alarming = alarming
+        if [port.unit.urgent for port in self.ports] != self._urgent and self.diagnose_now():
+            # A diagnosis takes notes away: this is what is left of them.
+            self._urgent = [port.unit.urgent for port in self.ports]
         self._answered = time.monotonic_ns()
         if self._callees:
             calls = {name for port in self.ports for name in port.unit.calls}
@@ -262,7 +261,7 @@ class UnitNode(shell.Shell):
                 port.unit.silent = silent
                 port.announce()
             if silent:
-                self.alarm()
+                self.diagnose_now()
 
     def _watch(self):
         pending = self.steps.pending_stamp

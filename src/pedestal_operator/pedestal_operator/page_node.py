@@ -15,10 +15,11 @@ from pedestal_common import commands, parameters, shell
 from pedestal_operator import page_security, page_sky, page_state
 from pedestal_operator.page_asks import Asks
 from pedestal_operator.page_log import Log
+from pedestal_operator.page_passes import Coming
 from pedestal_operator.page_server import PageServer
 from pedestal_operator.remote_node import Remote
 
-FRAME, LOOK, SLOW = 0.05, 0.01, 1.0
+FRAME, LOOK, SLOW = 0.1, 0.01, 1.0
 """Time [s] between two states that pages are sent, two looks at what they ask, two of what changes slowly."""
 
 
@@ -38,7 +39,7 @@ class PageNode(Remote):
         super().__init__('operator_page', 'page', parameters_type=PageParameters)
         self.alarms, self.path, self.configuration, self.log = [], None, {}, Log()
         self._history = collections.deque(maxlen=round(page_state.SPAN / page_state.PERIOD))
-        self._past = collections.deque(maxlen=round(page_state.SPAN / SLOW))
+        self._past, self._coming = page_sky.Past(page_state.SPAN), Coming()
         self._pages = Asks(self._ask_for, self.replied, lambda client, message: self._server.reply(client, message),
                            lambda: self.texts.get('acu/mode') == 'rate')
         self._sheets, self._published = {}, {}
@@ -135,8 +136,9 @@ class PageNode(Remote):
         for node, names in page_state.WANTED.items():
             self._ask_parameters(node, names)
         if self.present('joint_states'):
-            self._past.append(page_state.now(self)['beam'])
-        self._publish({'fixed': page_state.fixed(self), 'sky': page_state.sky(self, list(self._past))})
+            self._past.add(self.now, page_state.now(self)['beam'])
+        self._publish({'fixed': page_state.fixed(self), 'past': self._past.places,
+                       'sky': page_state.sky(self, self._coming.look(self))})
 
     def _ask_parameters(self, node, names):
         """Ask a node for its parameters when it comes, or comes again."""
@@ -159,6 +161,7 @@ class PageNode(Remote):
     def close(self):
         """Close the server, then the node."""
         self._server.close()
+        self._coming.close()
         super().close()
 
 

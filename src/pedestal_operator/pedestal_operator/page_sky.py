@@ -1,4 +1,5 @@
 """What the sky plot of the page shows: in earth angles [deg], whatever the deck does. No ROS here."""
+import collections
 import math
 import typing
 
@@ -11,6 +12,9 @@ STEP = 5.0
 
 MOST = 240
 """Points of a path at the most."""
+
+MOVED = 0.3
+"""Degrees from one place of the past to the next: less than a line is wide."""
 
 
 class Path(typing.NamedTuple):
@@ -52,6 +56,25 @@ def passage(path, loss):
              'highest': round(float(elevation[top]), 1), 'from': round(float(azimuth[rise] % 360.0), 1),
              'to': round(float(azimuth[fall] % 360.0), 1),
              'travel': round(float(azimuth[fall] - azimuth[rise]), 1), 'loss': loss}]
+
+
+class Past:
+    """Where the beam was in the last `span` seconds. places: [[azimuth, elevation], ...] [deg]."""
+
+    def __init__(self, span):
+        self._span, self._rows = span, collections.deque()
+
+    def add(self, t, place):
+        """The beam is there at t [s]; a place of NaN is not known."""
+        while self._rows and self._rows[0][0] < t - self._span:
+            self._rows.popleft()
+        last = self._rows[-1][1] if self._rows else (math.inf, math.inf)
+        if max(abs(a - b) for a, b in zip(place, last)) >= MOVED:
+            self._rows.append((t, place))
+
+    @property
+    def places(self):
+        return [place for _, place in self._rows]
 
 
 class Deck:

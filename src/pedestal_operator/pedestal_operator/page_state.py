@@ -18,22 +18,25 @@ NUMBERS = (MOTORS, ATTITUDE)
 TEXTS = {'mode': 'acu/mode', 'drive': 'adu/state', 'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
 """{what the page calls it: the topic of the text}."""
 
-WANTED = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor',
+STATION, ELEMENTS = ('latitude_deg', 'longitude_deg', 'height'), ('line_1', 'line_2')
+"""Parameters of the station, and of the elements of a satellite."""
+
+WANTED = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor', 'prediction.start_time',
+                  *(f'prediction.station.{name}' for name in STATION),
                   *(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high')),
                   *(f'{axis}.stow' for axis in topics.AXES)),
-          'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz')}
-"""{node: its parameters that are drawn}."""
+          'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz', 'target.kind',
+                                *(f'target.leo_pass.{name}' for name in ELEMENTS))}
+"""{node: its parameters that are shown}."""
 
-MODES = ('standby', 'stow', 'preset', 'program', 'autotrack', 'search', 'acquire', 'steptrack')
+MODES = ('standby', 'stow', 'unstow', 'preset', 'program', 'tle', 'sun', 'autotrack', 'search', 'acquire', 'steptrack')
 """Modes with a button; `stop` has one of its own, `rate` is the jog, `slave` is for programs."""
-
-FOLLOWING = ('program', 'autotrack', 'search', 'acquire', 'steptrack')
-"""Modes that follow a target, for which a ship's attitude must be known."""
-
-EVERYBODYS = ('standby',)
 
 SPAN, PERIOD = 600.0, 0.5
 """Time [s] of the strip charts, and from one of their points to the next."""
+
+REFUSED = 'refused '
+"""Before the name of a mode in the diagnostics of the control unit."""
 
 HISTORY = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate', 'elevation_rate',
            *topics.MOTORS, 'level')
@@ -92,36 +95,12 @@ def told(antenna, heard=('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion'
             'steps': acu.get('clock_steps', ''), 'offset_ms': acu.get('offset joint_states_ms', ''),
             'nodes': {name: antenna.status[name].message if antenna.present(name) else 'silent'
                       for name in heard if name in antenna.status},
-            'refused': {verb: why for verb in ('jog', *MODES) if (why := refusal(antenna, acu, verb))}}
+            'refused': refusals(acu) if acu else dict.fromkeys((*MODES, 'rate'), 'the control unit is silent')}
 
 
-def refusal(antenna, acu, verb) -> str:
-    """Why the control unit would refuse a verb now, in its own words; '' where nothing is known against it. Who is in
-    control is for the page to compare, which knows its name."""
-    if not acu:
-        return 'the control unit is silent'
-    if verb in EVERYBODYS:
-        return ''
-    drive = acu.get('drive', '')
-    if drive != 'unknown' and not drive.startswith('enabled'):
-        return f'drive not ready: {drive}'
-    if acu.get('faults'):
-        return f'{acu["faults"]}: reset first'
-    if verb in FOLLOWING and antenna.texts.get('ins/state') == 'aligning':
-        return 'INS aligning'
-    if verb == 'autotrack' and acu.get('locked') == '0':
-        return 'receiver not locked'
-    if verb == 'program':
-        return _program_refusal(antenna)
-    return ''
-
-
-def _program_refusal(antenna):
-    if antenna.path is None:
-        return 'no program track'
-    if antenna.now < antenna.path.times[0]:
-        return 'before program track'
-    return 'after program track' if antenna.now > antenna.path.times[-1] else ''
+def refusals(acu) -> dict:
+    """{mode: why it would be refused now}, which the control unit asks its own table of modes."""
+    return {key.removeprefix(REFUSED): why for key, why in acu.items() if key.startswith(REFUSED)}
 
 
 def alarms(antenna) -> list:
@@ -155,14 +134,18 @@ def fixed(antenna) -> dict:
             'detect': p.get('receiver.acquire_level_dbhz'), 'loss': p.get('receiver.lose_level_dbhz')}
 
 
-def sky(antenna, past) -> dict:
-    """The sky plot: paths, what hides them and what the antenna cannot reach; past: where the beam was."""
+def sky(antenna, coming) -> dict:
+    """The sky plot: the path, what hides it, what the antenna cannot reach, the sun, and passes; coming: those after
+    the program track, as page_passes.Coming knows them."""
     deck, p, acu = _deck(antenna), antenna.configuration, antenna.told('acu')
     begin = epoch(antenna)
     hole = [begin + float(acu[key]) for key in ('keyhole_begins_s', 'keyhole_ends_s') if key in acu]
     floor = page_sky.numbers(p.get('floor', ''))
     low, high = (math.degrees(p.get(f'elevation.limits.{end}', math.nan)) for end in ('low', 'high'))
-    return {'path': page_sky.thinned(antenna.path), 'past': past, 'hole': hole,
+    sun = [float(acu[key]) for axis in topics.AXES if (key := f'sun_{axis}_deg') in acu]
+    last = antenna.path.times[-1] if antenna.path else -math.inf
+    return {'path': page_sky.thinned(antenna.path), 'hole': hole, 'sun': sun,
+            'coming': [each for each in coming if each['aos'] > last],
             'passes': page_sky.passage(antenna.path, acu.get('keyhole_loss_s', '')),
             'sectors': [deck.sector(*row) for row in page_sky.numbers(p.get('blockage', ''))],
             'floor': deck.line([*floor, [floor[0][0] + 360.0, floor[0][1]]]) if floor else

@@ -1,12 +1,13 @@
 """The rules of the operator's page without a server: who is served, dead men, the event log, the sky."""
 import math
+from time import monotonic, sleep
 
 import numpy as np
 import pytest
 
 from pedestal_common import line_of_sight, messages
 from pedestal_common.commands import Command, Reply
-from pedestal_operator import page_log, page_security, page_sky, page_state
+from pedestal_operator import page_log, page_passes, page_security, page_sky, page_state
 from pedestal_operator.page_asks import BEHIND, PATIENCE, SILENT, Asks
 from pedestal_operator.page_security import Access, Refused, Request
 from pedestal_operator.requests import Requests
@@ -167,3 +168,70 @@ def test_a_pass_of_a_program_track():
     assert found['highest'] == pytest.approx(math.degrees(0.8), abs=0.1)
     assert found['travel'] == pytest.approx(math.degrees(0.2), abs=0.1)
     assert page_sky.path(messages.program_track(points[:1]), 0.0) is None and page_sky.passage(None, '') == []
+
+
+def test_the_past_of_the_beam_is_where_it_moved():
+    past = page_sky.Past(600.0)
+    for t in range(100):
+        past.add(float(t), [0.2 * t, 20.0])
+    past.add(100.0, [math.nan, math.nan])
+    assert len(past.places) == 50 and past.places[0] == [0.0, 20.0]
+    past.add(698.0, [20.0, 30.0])
+    assert past.places == [[0.2 * 98, 20.0], [20.0, 30.0]]
+
+
+def test_a_refusal_is_told_as_the_control_unit_says_it():
+    assert page_state.refusals({'mode': 'stop', 'refused tle': 'no elements', 'refused sun': 'UTC unknown'}) == {
+        'tle': 'no elements', 'sun': 'UTC unknown'}
+
+
+class Station:
+    """An antenna ashore with the elements of the ISS, at a time [s UTC]."""
+    LINES = {'line_1': '1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
+             'line_2': '2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482'}
+    TOLD = {'acu': LINES, 'tracking_receiver': {}}
+    PLACE = dict(zip((f'prediction.station.{name}' for name in page_state.STATION), (47.4, 8.5, 500.0)))
+
+    def __init__(self, now, told=TOLD, **configuration):
+        self.now, self._told, self.configuration = now, told, {**self.PLACE, **configuration}
+
+    def told(self, node):
+        return self._told[node]
+
+
+SKYFIELD = 1575909336.7, 1575909988.3, 1575915162.3, 1575915710.2
+"""Rises and sets [s UTC] of the next two passes above 10 deg after 2019-12-09T16:30, by skyfield's find_events with
+UT1 = UTC."""
+
+
+def coming(antenna):
+    """What page_passes.Coming knows, once it knows it."""
+    looked = page_passes.Coming()
+    deadline = monotonic() + 60.0
+    while not looked.look(antenna) and monotonic() < deadline:
+        sleep(0.01)
+    looked.close()
+    return looked.look(antenna)
+
+
+def test_the_next_passes_are_those_of_skyfield_in_the_time_of_the_graph():
+    """By the elements of the control unit, and in a simulation of another day also by those of the satellite."""
+    begin = 1575909000.0
+    simulated = {f'target.leo_pass.{name}': line for name, line in Station.LINES.items()} | {'target.kind': 'leo_pass'}
+    day, start = {'graph.start': 2 * 10**18}, '2019-12-09T16:30:00Z'
+    for antenna in (Station(begin), Station(2e9 + 10.0, **day, **{'prediction.start_time': start}),
+                    Station(2e9 + 10.0, {'acu': {}, 'tracking_receiver': {'stamp_0_utc': start}}, **day, **simulated)):
+        found, ahead = coming(antenna), 2e9 - begin if antenna.now > 2e9 else 0.0
+        times = [each[name] for each in found[:2] for name in ('aos', 'los')]
+        assert times == pytest.approx([t + ahead for t in SKYFIELD], abs=0.5)
+        assert len(found) == page_passes.MOST and all(each['highest'] >= 10.0 for each in found)
+
+
+def test_without_elements_station_or_utc_no_pass_is_looked_for():
+    assert page_passes.question(Station(1575909000.0, {'acu': {}})) is None
+    assert page_passes.question(Station(100.0)) is None
+    antenna = Station(1575909000.0)
+    del antenna.configuration['prediction.station.height']
+    assert page_passes.question(antenna) is None
+    old = page_passes.question(Station(1575909000.0 + 40.0 * 86400.0))
+    assert page_passes.found(old) == []                                                   # elements of 40 days ago

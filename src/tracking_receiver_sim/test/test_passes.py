@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from skyfield.api import EarthSatellite, load, wgs84
 
-from pedestal_common import orbit
+from pedestal_common import orbit, passes
 from pedestal_common.geodesy import StationParameters
-from tracking_receiver_sim import elements, passes
+from tracking_receiver_sim import elements
 from tracking_receiver_sim.params import LeoPassParameters
 
 LINE_1, LINE_2 = LeoPassParameters().line_1, LeoPassParameters().line_2

@@ -12,10 +12,11 @@ from pedestal_common import commands, messages, records
 from pedestal_common.steps import SECOND
 from pedestal_operator import page_log, page_sky, page_state, remote_node
 from pedestal_operator.page_log import Log
+from pedestal_operator.page_passes import Coming
 from pedestal_operator.page_security import ROLES
 from pedestal_operator.page_server import PageServer
 
-FRAME, SLOW = 0.05, 1.0
+FRAME, SLOW = 0.1, 1.0
 """Time [s] between two states that pages are sent, and two of what changes slowly."""
 
 SLOWEST, FASTEST = 0.05, 50.0
@@ -138,7 +139,7 @@ class Player:
     def __init__(self, recording, port, options):
         self._recording, self._lock = recording, threading.Lock()
         self._playing, self._rate = not options.paused, options.rate
-        self._shown = {}
+        self._shown, self._coming = {}, Coming()
         recording.move(options.start)
         self._server = PageServer('127.0.0.1', port, (), 32, self._past)
         self.url = self._server.access.url(ROLES[0])
@@ -157,6 +158,7 @@ class Player:
             before = now
             time.sleep(FRAME)
         self._server.close()
+        self._coming.close()
 
     def _go(self, position):
         self._recording.move(position)
@@ -192,9 +194,11 @@ class Player:
                     'replay': {'length': recording.length, 'position': recording.position, 'playing': self._playing,
                                'rate': self._rate}}
         if slowly:
-            frames = self._frames(SLOW)
-            sections |= {'fixed': page_state.fixed(recording),
-                         'sky': page_state.sky(recording, [frame['beam'] for frame in frames])}
+            past = page_sky.Past(page_state.SPAN)
+            for frame in self._frames(SLOW):
+                past.add(frame['t'], frame['beam'])
+            sections |= {'fixed': page_state.fixed(recording), 'past': past.places,
+                         'sky': page_state.sky(recording, self._coming.look(recording))}
         texts = {name: page_state.encoded(section) for name, section in sections.items()}
         fresh = {name: text for name, text in texts.items() if self._shown.get(name) != text}
         self._shown |= fresh

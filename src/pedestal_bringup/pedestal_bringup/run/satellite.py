@@ -4,8 +4,8 @@ import json
 
 from pedestal_bringup import console
 from pedestal_bringup.report.subject import place
-from pedestal_common import orbit
-from tracking_receiver_sim import elements, passes
+from pedestal_common import orbit, passes
+from tracking_receiver_sim import elements
 
 STATION = ('latitude_deg', 'longitude_deg', 'height')
 

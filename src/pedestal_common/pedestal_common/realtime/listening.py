@@ -114,7 +114,7 @@ class Listener:
         if message is not None:
             self._take(message, taker.anew)
         elif taker.reason in intake.ALARMING:
-            self._node.alarm()
+            self._node.diagnose_now()
 
     def strangers(self):
         """Names of the nodes that write this topic and should not; none in a graph without those that should."""

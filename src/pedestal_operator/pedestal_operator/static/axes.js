@@ -1,11 +1,11 @@
 // Angles, errors and rates of the axes, their travel, the level of the signal and the dial of its errors.
-import {onState} from './link.js';
-import {draw, set} from './svg.js';
+import {onDraw} from './link.js';
+import {draw, set, show} from './svg.js';
 import {find, number, say, time} from './text.js';
 
 const AXES = ['az', 'el'];
 const SOON = 20;  // s to a limit from which on it is told
-const TRAIL = 60;  // points of the dial's trail
+const TRAIL = 25;  // points of the dial's trail
 const EDGE = 0.6;  // beamwidths at the edge of the dial
 
 function axisState(told, now, axis) {
@@ -60,29 +60,41 @@ class Travel {
   show({actual, commanded}) {
     if (!this.actual) return;
     for (const [line, angle] of [[this.actual, actual], [this.wanted, commanded]]) {
-      line.style.display = angle === null ? 'none' : '';
-      if (angle !== null) set(line, {x1: this.x(angle), x2: this.x(angle)});
+      show(line, angle !== null);
+      if (angle === null) continue;
+      const x = this.x(angle).toFixed(1);
+      set(line, {x1: x, x2: x});
     }
   }
 }
 
 class Level {
-  constructor() { this.svg = find('level-bar'); }
+  constructor() {
+    this.svg = find('level-bar');
+    this.drawn = null;
+  }
 
-  show(level, locked, {detect, loss}) {
+  scale(high, detect, loss) {
     const width = this.svg.clientWidth;
-    if (!width) return;
+    const key = JSON.stringify([width, high, detect, loss]);
+    if (key === this.drawn || !width) return;
+    this.drawn = key;
     const low = 20;
-    const high = Math.max(80, level || 0);
-    const x = (value) => Math.max(0, Math.min(width, (value - low) / (high - low) * width));
+    this.x = (value) => Math.max(0, Math.min(width, (value - low) / (high - low) * width));
     this.svg.replaceChildren();
     draw(this.svg, 'rect', {x: 0, y: 3, width, height: 11, class: 'bar'});
-    if (level !== null) draw(this.svg, 'rect', {x: 0, y: 3, width: x(level), height: 11, class: 'reach'});
+    this.bar = draw(this.svg, 'rect', {x: 0, y: 3, width: 0, height: 11, class: 'reach'});
     for (const [name, mark, y] of [['loss', loss, 40], ['lock', detect, 27]]) {
       if (mark === null || mark === undefined) continue;
-      draw(this.svg, 'line', {x1: x(mark), x2: x(mark), y1: 1, y2: y - 8, class: 'mark'});
-      draw(this.svg, 'text', {x: x(mark) + 2, y}, `${name} ${mark.toFixed(0)}`);
+      draw(this.svg, 'line', {x1: this.x(mark), x2: this.x(mark), y1: 1, y2: y - 8, class: 'mark'});
+      draw(this.svg, 'text', {x: this.x(mark) + 2, y}, `${name} ${mark.toFixed(0)}`);
     }
+  }
+
+  show(level, locked, {detect, loss}) {
+    this.scale(Math.max(80, 10 * Math.ceil((level || 0) / 10)), detect, loss);
+    if (!this.drawn) return;
+    set(this.bar, {width: level === null ? 0 : this.x(level).toFixed(0)});
     say(find('level'), `${number(level, 1)} dB-Hz`);
     say(find('lock'), locked ? '● locked' : '○ no lock', locked ? '' : 'warn');
   }
@@ -109,11 +121,12 @@ class Dial {
 
   show([x, y], beamwidth) {
     const there = x !== null && y !== null && beamwidth;
-    this.none.style.display = there ? 'none' : '';
-    this.spot.style.display = this.trail.style.display = there ? '' : 'none';
+    show(this.none, !there);
+    show(this.spot, there);
+    show(this.trail, there);
     if (!there) { this.past = []; return; }
-    const place = [x, -y].map((error) => Math.max(-105, Math.min(105, error / beamwidth * 100 / EDGE)));
-    this.past.push(place.map((value) => value.toFixed(1)).join(','));
+    const place = [x, -y].map((error) => Math.max(-105, Math.min(105, error / beamwidth * 100 / EDGE)).toFixed(1));
+    this.past.push(place.join(','));
     this.past = this.past.slice(-TRAIL);
     set(this.spot, {cx: place[0], cy: place[1]});
     set(this.trail, {points: this.past.join(' ')});
@@ -124,7 +137,7 @@ export function begin() {
   const travels = AXES.map((name) => new Travel(`${name}-travel`));
   const level = new Level();
   const dial = new Dial();
-  onState((came, state) => {
+  onDraw((came, state) => {
     if (!came.now) return;
     showAxes(state);
     const fixed = state.fixed || {};
@@ -136,6 +149,6 @@ export function begin() {
     const [x, y, strength] = came.now.receiver;
     level.show(strength, x !== null, fixed);
     dial.show([x, y], fixed.beamwidth);
-    say(find('time'), time(came.now.t, 1));
+    say(find('time'), time(came.now.t));
   });
 }

@@ -1,8 +1,10 @@
 // Strip charts of the last ten minutes.
-import {onState} from './link.js';
+import {onDraw} from './link.js';
 import {find, make, time} from './text.js';
 
-const PERIOD = 0.2;  // s between two points
+const PERIOD = 0.5;  // s between two points: a thousand of them, on some hundreds of pixels
+const DRAWN = 1000;  // ms between two drawings, which move the lines by less than a pixel
+const MISSED = 15;  // s without a point, by a page that was hidden or had no link, which are asked for
 const COLOURS = ['--first', '--second', '--third', '--fourth'];
 const STYLES = ['first', 'second', 'third', 'fourth'];
 const CHARTS = {
@@ -72,6 +74,7 @@ export function begin() {
   let columns = null;
   let data = [];  // one array for each column of the history
   let last = -Infinity;
+  let drawn = -Infinity;
   const charts = Object.entries(CHARTS).map(
     ([name, series]) => ({series, chart: new Chart(name, series, () => beamwidth)}));
 
@@ -94,7 +97,7 @@ export function begin() {
     redraw();
   }
 
-  onState((came, state) => {
+  onDraw((came) => {
     if (came.fixed) {
       beamwidth = came.fixed.beamwidth;
       span = came.fixed.span;
@@ -106,7 +109,7 @@ export function begin() {
     }
     const now = came.now;
     if (!now || !columns) return;
-    if (now.t < last || now.t > last + span) {  // the slider of a recording was moved, or the link was lost for long
+    if (now.t < last || now.t > last + MISSED) {  // also where the slider of a recording was moved
       last = now.t;
       fetchPast();
       return;
@@ -116,6 +119,8 @@ export function begin() {
     row(now).forEach((value, i) => data[i].push(value));
     const old = data[0].findIndex((t) => t >= last - span);
     if (old > 50) data.forEach((values) => values.splice(0, old));
+    if (performance.now() - drawn < DRAWN) return;
+    drawn = performance.now();
     redraw();
   });
 }

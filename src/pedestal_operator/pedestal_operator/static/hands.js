@@ -18,10 +18,11 @@ export function refusal(verb) {
   if (me.role === 'monitor') return 'only looks';
   if (!state.told) return 'no state yet';
   if (!FREE.includes(verb) && verb !== 'take' && !holds(state.told)) return `held by ${state.told.control}`;
-  return state.told.refused[verb] || '';
+  return state.told.refused[verb === 'jog' ? 'rate' : verb] || '';
 }
 
 function offer(button, why) {
+  if (button.title === why && button.hasAttribute('aria-disabled')) return;
   button.setAttribute('aria-disabled', String(Boolean(why)));
   button.title = why;
   const small = button.querySelector('small');

@@ -1,5 +1,5 @@
 // Alarms and events. All texts come in as texts, never as HTML.
-import {ask, me, onState} from './link.js';
+import {ask, me, onDraw} from './link.js';
 import {find, make, say, time} from './text.js';
 
 const SHELVES = [600, 3600, 28800];  // s
@@ -74,7 +74,7 @@ function eventRow({t, who, text, bad}) {
 
 export function begin() {
   find('acknowledge-all').onclick = () => ask('acknowledge');
-  onState((came) => {
+  onDraw((came) => {
     if (came.alarms) showAlarms(came.alarms);
     if (came.log) find('log-list').replaceChildren(...came.log.slice().reverse().map(eventRow));
   });

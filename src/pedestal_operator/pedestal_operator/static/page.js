@@ -2,10 +2,9 @@
 import * as axes from './axes.js';
 import * as charts from './charts.js';
 import * as hands from './hands.js';
-import {connect} from './link.js';
+import * as link from './link.js';
 import * as lists from './lists.js';
 import * as replay from './replay.js';
 import * as sky from './sky.js';
 
-for (const part of [hands, axes, charts, sky, lists, replay]) part.begin();
-connect();
+for (const part of [hands, axes, charts, sky, lists, replay, link]) part.begin();

@@ -1,5 +1,5 @@
 // The slider of a recording.
-import {onState, send, state} from './link.js';
+import {onDraw, send, state} from './link.js';
 import {find, make, say} from './text.js';
 
 const SPEEDS = [0.2, 0.5, 1, 2, 5, 10];
@@ -17,7 +17,7 @@ export function begin() {
   slider.oninput = () => send({replay: {position: Number(slider.value)}});
   find('play').onclick = () => send({replay: {playing: !state.replay.playing}});
   find('speed').onchange = (event) => send({replay: {rate: Number(event.target.value)}});
-  onState((came) => {
+  onDraw((came) => {
     if (!came.replay) return;
     const {length, position, playing, rate} = came.replay;
     find('replay').hidden = false;

@@ -1,7 +1,7 @@
 // The sky from above: north up, east to the right, the zenith in the middle.
-import {onState} from './link.js';
-import {draw, points, set} from './svg.js';
-import {find, make, number, say, time} from './text.js';
+import {onDraw} from './link.js';
+import {draw, points, set, show} from './svg.js';
+import {day, find, make, number, say, time} from './text.js';
 
 const RADIUS = 96;
 
@@ -36,11 +36,22 @@ function band(svg, rows, edge, style) {
 }
 
 function passLine(pass) {
+  return words([['rise', `${time(pass.aos)} at ${number(pass.from, 0)}°`], ['highest', `${number(pass.highest, 1)}°`],
+                ['set', `${time(pass.los)} at ${number(pass.to, 0)}°`],
+                ['azimuth turns', `${number(pass.travel, 0)}°`],
+                ['expected loss', pass.loss ? `${number(parseFloat(pass.loss), 1)} s` : 'none']]);
+}
+
+function nextLine(pass, now) {
+  const other = day(pass.aos) === day(now) ? '' : `${day(pass.aos)} `;
+  const minute = (seconds) => time(seconds).slice(0, 5);
+  return words([['next', `${other}${minute(pass.aos)} to ${minute(pass.los)}`], ['', `${number(pass.highest, 0)}°`],
+                ['az', `${number(pass.from, 0)}° to ${number(pass.to, 0)}°`]]);
+}
+
+function words(pairs) {
   const line = make('div');
-  for (const [name, text] of [
-    ['rise', `${time(pass.aos)} at ${number(pass.from, 0)}°`], ['highest', `${number(pass.highest, 1)}°`],
-    ['set', `${time(pass.los)} at ${number(pass.to, 0)}°`], ['azimuth turns', `${number(pass.travel, 0)}°`],
-    ['expected loss', pass.loss ? `${number(parseFloat(pass.loss), 1)} s` : 'none']]) {
+  for (const [name, text] of pairs) {
     const part = make('span');
     part.append(make('em', '', `${name} `), text);
     line.append(part, ' ');
@@ -48,7 +59,8 @@ function passLine(pass) {
   return line;
 }
 
-function redraw(svg, sky) {
+// What stands still, or moves with the deck once a second.
+function drawSky(svg, sky) {
   svg.replaceChildren();
   band(svg, sky.floor, 0, 'floor');
   band(svg, sky.top, 90, 'floor');
@@ -60,43 +72,45 @@ function redraw(svg, sky) {
     draw(svg, 'polyline', {points: line(inside), class: 'hole'});
     if (inside.length) draw(svg, 'text', {x: place(inside[0])[0] + 6, y: place(inside[0])[1] - 4}, 'keyhole');
   }
-  draw(svg, 'polyline', {points: line(sky.past), class: 'past'});
   if (sky.bow.length) {
     const [x, y] = place([sky.bow[0], 0]);
     draw(svg, 'line', {x1: 0.93 * x, y1: 0.93 * y, x2: 1.04 * x, y2: 1.04 * y, class: 'bow'});
     draw(svg, 'text', {x: 0.84 * x, y: 0.84 * y + 3, 'text-anchor': 'middle'}, 'bow');
   }
-  if (sky.sun) {
+  if (sky.sun.length && sky.sun[1] > 0) {
     const [x, y] = place(sky.sun);
-    draw(svg, 'circle', {cx: x, cy: y, r: 3.5, class: 'hole'});
+    draw(svg, 'circle', {cx: x, cy: y, r: 3.5, class: 'sun'});
     draw(svg, 'text', {x: x + 6, y: y + 3}, 'sun');
   }
 }
 
-// What the control unit announces, on ship and ashore.
-function ahead(told) {
-  for (const text of told ? [told.keyhole, told.blockage] : []) {
-    if (text) find('passes').appendChild(make('div', 'note', text));
-  }
+// The passes, and what the control unit announces, on ship and ashore.
+function tell({passes, coming}, {told, now}) {
+  const lines = passes.map(passLine);
+  if (!lines.length) lines.push(make('span', 'none', 'no program track'));
+  lines.push(...coming.map((pass) => nextLine(pass, now ? now.t : 0)));
+  for (const text of told ? [told.keyhole, told.blockage] : []) if (text) lines.push(make('div', 'note', text));
+  find('passes').replaceChildren(...lines);
 }
 
 export function begin() {
   const svg = find('sky-plot');
-  let beam = null;
-  onState((came, state) => {
+  const still = draw(svg, 'g', {});
+  const past = draw(svg, 'polyline', {class: 'past'});
+  const beam = draw(svg, 'circle', {r: 5, class: 'beam'});
+  onDraw((came, state) => {
     if (came.sky) {
-      redraw(svg, came.sky);
-      beam = draw(svg, 'circle', {r: 5, class: 'beam'});
-      const lines = came.sky.passes.map(passLine);
-      find('passes').replaceChildren(...lines.length ? lines : [make('span', 'none', 'no program track')]);
-      ahead(state.told);
+      drawSky(still, came.sky);
       say(find('sky-frame'), came.sky.bow.length ? 'earth angles, on a ship' : 'north up');
     }
-    if ((came.now || came.sky) && beam) {
-      const there = state.now && known(state.now.beam);
-      beam.style.display = there ? '' : 'none';
-      const [cx, cy] = there ? place(state.now.beam) : [0, 0];
-      set(beam, {cx, cy});
+    if (state.sky && (came.sky || came.told)) tell(state.sky, state);
+    if (came.past) set(past, {points: line(came.past)});
+    if (came.now) {
+      show(beam, known(came.now.beam));
+      if (known(came.now.beam)) {
+        const [cx, cy] = place(came.now.beam).map((value) => value.toFixed(1));
+        set(beam, {cx, cy});
+      }
     }
   });
 }

@@ -10,8 +10,13 @@ export function draw(parent, tag, attributes, text) {
   return element;
 }
 
+// Set what is not so already.
 export function set(element, attributes) {
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
+  }
 }
+
+export function show(element, there) { set(element, {visibility: there ? 'visible' : 'hidden'}); }
 
 export const points = (rows) => rows.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(' ');

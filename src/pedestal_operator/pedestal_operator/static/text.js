@@ -16,6 +16,9 @@ export function time(seconds, digits = 0) {
   return new Date(Math.floor(seconds * scale) / scale * 1000).toISOString().slice(11, digits ? 20 + digits : 19);
 }
 
+// The day of a time in UTC.
+export function day(seconds) { return new Date(1000 * seconds).toUTCString().slice(5, 11); }
+
 // Write a text, and nothing where it is there already.
 export function say(element, text, style = '') {
   if (element.textContent !== text) element.textContent = text;

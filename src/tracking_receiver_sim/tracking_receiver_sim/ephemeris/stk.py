@@ -18,8 +18,11 @@ FRAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TE
 """{CoordinateSystem: our name}."""
 UNITS = {'meters': 1.0, 'kilometers': 1000.0}
 METHODS = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}
+"""{InterpolationMethod: our name}; LagrangeVOP, which interpolates what a Kepler orbit leaves over, is refused."""
 DATA = {'ephemeristimepos': False, 'ephemeristimeposvel': True, 'ephemeristimeposvelacc': True}
 """{keyword before the states: whether they have velocities}."""
+GEODETIC = 'lla'
+"""In the keyword before states in latitude, longitude and height."""
 KNOWN = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmethod', 'interpolationsamplesm1',
          'interpolationorder', 'centralbody', 'coordinatesystem', 'distanceunit')
 PASSED_OVER = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
@@ -51,7 +54,8 @@ def read(path, _wanted='') -> states.Ephemeris:
             head[words[0]] = line, len(text) - len(value) + 1, value.strip('"')
         elif words[0] != 'begin':
             column = len(text) - len(text.lstrip()) + 1
-            raise lines.wrong(path, line, column, f'{words[0]!r:.40}: must be one of {", ".join(DATA)}, '
+            geodetic = 'states in latitude, longitude and height are not read: ' if GEODETIC in words[0] else ''
+            raise lines.wrong(path, line, column, f'{words[0]!r:.40}: {geodetic}must be one of {", ".join(DATA)}, '
                               'or a keyword before them')
     if not limits:
         raise csv_table.TableError(f'{path}: none of {", ".join(DATA)} in it')

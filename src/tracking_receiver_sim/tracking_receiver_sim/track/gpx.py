@@ -15,6 +15,8 @@ PIECE = 1 << 20
 DEEPEST, LONGEST = 100, 200
 """Elements within each other, and characters of a text that is read; a longer one is cut."""
 
+NO_XML = '; an OEM must be in the notation KEYWORD = value, not XML'
+
 TEXTS = ('ele', 'time', 'geoidheight', 'name')
 """Elements whose text is read."""
 
@@ -67,7 +69,7 @@ class _Points:
                                        'elements within each other')
         if len(self.path_of_elements) == 1 and name != 'gpx':
             raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: element {name!r:.60}: '
-                                       'must be gpx')
+                                       f'must be gpx{NO_XML if name in ("oem", "ndm") else ""}')
         if name == 'trk':
             self.tracks += 1
             self.track = f'track {self.tracks}'
