@@ -82,6 +82,7 @@ clean:
 	@touch $@
 
 .venv/mkdocs: .venv/installed
+	@echo 'Installing mkdocs into .venv ...'
 	.venv/bin/python $(PIP) mkdocs-material
 	@touch $@
 
