@@ -17,6 +17,11 @@ DEMO := bags/runs/demo
 # Graphs in realtime that are killed, frozen and cut: not beside other tests.
 REALTIME := test/test_field.py test/test_live.py test/test_network.py test/test_operating.py test/test_page.py \
 	test/test_realtime.py test/test_rotctld.py test/test_supervision.py
+# The files in the order of pyproject.toml, where those of graphs come first: a file of few tests, each a graph, would
+# else be the last, and one core idle.
+IN_TURN := --dist loadfile --no-loadscope-reorder
+# Containers often set it: every process would compile the sources again.
+unexport PYTHONDONTWRITEBYTECODE
 
 install: .venv/installed
 	@.venv/bin/python -m pedestal_bringup.run.prepare
@@ -30,8 +35,8 @@ demo: install
 
 test: install
 	.venv/bin/ruff check .
-	.venv/bin/python -m pytest --numprocesses 3 --dist loadfile $(addprefix --ignore=,$(REALTIME))
-	.venv/bin/python -m pytest --numprocesses 2 --dist loadfile $(REALTIME)
+	.venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(addprefix --ignore=,$(REALTIME))
+	.venv/bin/python -m pytest --numprocesses 2 $(IN_TURN) $(REALTIME)
 
 update-references: install
 	.venv/bin/python bags/reference/update.py
@@ -40,9 +45,9 @@ docs: install
 	.venv/bin/python -m pedestal_bringup.reference
 
 # What is made of the code is written beside a copy of docs/; no page may fetch anything from elsewhere.
-book: install .venv-docs/installed
+book: install .venv/mkdocs
 	.venv/bin/python -m pedestal_bringup.book build/book/pages
-	NO_MKDOCS_2_WARNING=1 .venv-docs/bin/mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict
 	! grep --recursive --include='*.html' --extended-regexp --files-with-matches \
 	    '<(script|img|iframe|link)[^>]*(src|href)="?(https?:)?//' build/book/site
 	@echo 'Book: $(CURDIR)/build/book/site/index.html'
@@ -63,7 +68,7 @@ colcon: .venv-colcon/installed
 	. build/colcon/install/local_setup.sh && .venv-colcon/bin/python -m pytest test/test_colcon.py
 
 clean:
-	rm -rf .venv .venv-colcon .venv-docs build install log .pytest_cache .ruff_cache bags/runs src/*/build src/*/*.egg-info
+	rm -rf .venv .venv-colcon build install log .pytest_cache .ruff_cache bags/runs src/*/build src/*/*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv/bin/pip
@@ -76,9 +81,9 @@ clean:
 	.venv-colcon/bin/python $(PIP) $(ROS) colcon-common-extensions colcon-ros numpy numba rosbags sgp4
 	@touch $@
 
-.venv-docs/installed: Makefile constraints.txt | .venv-docs/bin/pip
-	@echo 'Installing into .venv-docs ...'
-	.venv-docs/bin/python $(PIP) mkdocs-material
+.venv/mkdocs: .venv/installed
+	@echo 'Installing mkdocs into .venv ...'
+	.venv/bin/python $(PIP) mkdocs-material
 	@touch $@
 
 # Debian and Ubuntu keep ensurepip in a package of its own, python3-venv. Where that is missing, pip comes from

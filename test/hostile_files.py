@@ -502,8 +502,13 @@ def _do_all(output):
         if verb not in ('replay', 'rerun', 'tune'):
             with open(os.devnull, 'w') as sink, contextlib.redirect_stdout(sink):
                 cli.main([verb.split(',')[0], *arguments])
-    for name in ('pedestal_bringup.again.replay', 'pedestal_bringup.trials.tune', 'pedestal_bringup.run.graph'):
-        importlib.import_module(name)
+    load('again.replay', 'trials.tune', 'run.graph')
+
+
+def load(*modules):
+    """Import modules of bringup once for all children."""
+    for name in modules:
+        importlib.import_module(f'pedestal_bringup.{name}')
 
 
 def attack(folder, names, seed=1, verbs=None):

@@ -1,10 +1,12 @@
-"""Alarms in the graph: a drive that trips and a motor that is lost, told, acknowledged and shelved by commands."""
+"""A drive that trips, in the graph: the ACU falls to standby, everybody can read why, and the recording holds it. Its
+alarm and those of other faults are told, acknowledged and shelved by commands."""
 import numpy as np
 import pytest
 
 from acu_tracker import modes
 from acu_tracker.alarms import report, table
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.run import closed_loop, scenario
 
 TRIP = ['adu.azimuth.faults.overspeed=1.5',
@@ -19,6 +21,23 @@ def tripped(start_run):
     result = run.finish()
     assert result.returncode == 0, result.stderr
     return bags.read(run.bag)
+
+
+def test_the_recording_is_complete_and_says_why(tripped):
+    assert verify(tripped.path).complete
+    states, told = tripped.table('adu/state'), tripped.table('acu/mode')
+    assert list(states['data']) == ['enabled', 'fault: azimuth overspeed']
+    assert list(told['data']) == ['program', 'standby']
+    assert states['t'][1] == pytest.approx(told['t'][1], abs=1e-9)             # in the very step in which it trips
+    last = [message for *_, message in tripped.messages('diagnostics')][-5:]
+    drive = [status for array in last for status in array.status if status.name == 'adu'][0]
+    said = {pair.key: pair.value for pair in drive.values}
+    assert (drive.level, drive.message) == (2, 'fault: azimuth overspeed')
+    assert (said['azimuth faults'], said['elevation faults'], said['brakes']) == ('overspeed', '', 'on')
+
+
+def test_it_stands(tripped):
+    assert np.ptp(tripped.table('joint_states')['azimuth.position'][-200:]) < 1e-6
 
 
 def lists(bag):
@@ -42,7 +61,7 @@ def test_the_list_is_told_whenever_it_changes_and_obeys(tripped):
     assert next(row for _, row in fault if row['state'] == 'shelved')['shelved_reason'] == 'tests'
 
 
-def test_the_closed_loop_tells_it_at_the_same_steps(tripped, differences):
+def test_the_closed_loop_trips_and_tells_it_at_the_same_steps(tripped, differences):
     run = closed_loop.Loop(scenario.load('servo_sine', TRIP, duration=2.0)).run()
     assert differences(run, tripped) == {}
     assert len(run.table('acu/alarms')['t']) == len(lists(tripped))

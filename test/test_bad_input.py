@@ -162,10 +162,11 @@ def test_a_bag_that_is_none(verb, what, capsys, one_line, tmp_path):
 @pytest.fixture(scope='module')
 def graphs(start_run):
     """(run, result) of three runs side by side: one on a disk that is full, where no file grows beyond 2.5 MB; the
-    first and the second on one domain."""
+    first, which lasts in few steps, and the second on one domain."""
     limit = (sys.executable, '-c', 'import os, resource, sys; '
              'resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, 2_500_000)); os.execv(sys.argv[1], sys.argv[1:])')
-    first = start_run('leo_pass', '--pacing', 'realtime', '--duration', '30')
+    first = start_run('leo_pass', '--pacing', 'realtime', '--duration', '30', '--param', 'adu.period=0.02', '--param',
+                      'acu.period=0.02')
     full = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '30', prefix=limit)
     deadline = time.monotonic() + 180.0
     while not first.recorded(10):

@@ -95,12 +95,11 @@ def lines_of(output, topic):
 @pytest.mark.parametrize('name, nodes', [
     ('leo', ('tracking_receiver', 'acu', 'adu')),
     ('ship', ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu'))])
-def test_a_lockstep_recording_comes_out_the_same_to_the_last_bit(runs, name, nodes, run_process, tmp_path):
+def test_a_lockstep_recording_comes_out_the_same_to_the_last_bit(runs, name, nodes, pedestal, tmp_path):
     rows = tmp_path / 'rows.json'
-    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recompute', runs[name].bag, *EXACT, '--json',
-                        rows], 120.0)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert [line for line in done.stdout.splitlines() if line.endswith(': identical')] == [
+    code, said, errors = pedestal(runs[name].bag, *EXACT, '--json', rows)
+    assert code == 0, said + errors
+    assert [line for line in said.splitlines() if line.endswith(': identical')] == [
         f'{node}: identical' for node in nodes]
     values = {(row['case'], row['metric']): row['value'] for row in json.loads(rows.read_text())['rows']}
     assert {case for case, _ in values} == set(nodes)

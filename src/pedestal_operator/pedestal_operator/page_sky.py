@@ -74,6 +74,7 @@ class Past:
 
     @property
     def places(self):
+        """What is drawn of the path, in order of time."""
         return [place for _, place in self._rows]
 
 

@@ -16,8 +16,9 @@ UNITS = (('leo_pass', 'acu'), ('leo_pass', 'adu'), ('leo_pass', 'tracking_receiv
          ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'))
 """(scenario, node) that have the laws of every unit, the slowest first."""
 
-LOOPS = (('leo_pass', 1), ('ship_pass', 1), ('leo_pass', side_by_side.FEWEST))
-"""(scenario, how many side by side) of closed loops that have the laws of one ashore, on a ship and on lanes."""
+LOOPS = (('leo_pass', side_by_side.FEWEST), ('ship_pass', 1), ('leo_pass', 1))
+"""(scenario, how many side by side) of closed loops that have the laws on lanes, on a ship and ashore, the slowest
+first."""
 
 SHORT = 0.1
 """Length [s] of the run that compiles a closed loop."""
