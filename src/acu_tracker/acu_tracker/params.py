@@ -137,7 +137,7 @@ class AcuParameters(SharedParameters):
         for name in ('azimuth', 'elevation'):
             axis = getattr(self, name)
             a = axis.limits.deceleration
-            d = ends.braking_distance.py_func(axis.shaper.rate, a, self.reaction)
+            d = ends.braking_distance(axis.shaper.rate, a, self.reaction)
             if 2.0 * d > axis.limits.high - axis.limits.low:
                 raise ParameterError(f'{name}.limits.braking = {a:g} rad/s2: from shaper.rate = '
                                      f'{axis.shaper.rate:g} rad/s the axis stops in {d:g} rad; must be at most half '

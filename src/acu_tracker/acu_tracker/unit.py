@@ -4,7 +4,7 @@ import typing
 
 import numpy as np
 
-from acu_tracker import announcement, control_unit, manual, modes, signals, supervision
+from acu_tracker import announcement, control_unit, manual, mode_change, modes, signals, supervision
 from acu_tracker.alarms import annunciator, machine, report, table
 from acu_tracker.authority import Authority
 from acu_tracker.prediction import Predictor
@@ -353,7 +353,7 @@ class Acu(Unit):
     def refusals(self):
         """{mode: why it would be refused now} of the modes that would be."""
         m, why = self.parts, np.zeros(len(modes.MODES), int)
-        control_unit.refusals(m['state'].copy(), m['constants'], m['inputs'], self.memory.tables, why)
+        mode_change.refusals(m['state'].copy(), m['constants'], m['inputs'], self.memory.tables, why)
         words = {code: modes.REASONS[code] for code in set(why) - {modes.NONE}}
         if modes.DRIVE_NOT_READY in words:
             words[modes.DRIVE_NOT_READY] += f': {self._drive_told}'

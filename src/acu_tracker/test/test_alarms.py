@@ -75,6 +75,16 @@ def test_who_is_told_to_move_must(dy, high, low, expected):
     assert detectors.immobile(detector(), dy, high, low) == expected
 
 
+def test_who_does_not_obey_is_told_from_then_on_by_smaller_commands():
+    """What it is told is started from where it stands, and so is less than it was."""
+    d = detector()
+    assert not detectors.immobile(d, 0.0, 0.004, 0.004)
+    assert detectors.immobile(d, 0.0, 0.01, 0.006) and detectors.immobile(d, 0.0, 0.01, 0.003)
+    assert not detectors.immobile(d, 0.0, 0.01, 0.002) and not detectors.immobile(d, 0.0, 0.01, 0.003)
+    assert detectors.immobile(d, 0.0, -0.006, -0.01) and detectors.immobile(d, -0.0005, -0.003, -0.01)
+    assert not detectors.immobile(d, -0.001, -0.003, -0.01)
+
+
 @pytest.mark.parametrize(('dy', 'high', 'low', 'expected'), (
     (0.1, 0.0, -0.1, True), (-0.1, 0.1, 0.0, True), (0.1, 0.1, 0.0, False), (0.1, 0.0, 0.0, False),
     (0.01, 0.0, -0.1, False), (-0.1, 0.1, -0.1, False)))

@@ -98,10 +98,11 @@ def disagreement(d, y, dy, dt):
 @compiled
 def immobile(d, dy, high, low):
     """Whether the motors do not obey commands that were all beyond ASKED of late, and of one sign: less than IDLE of
-    the smallest of them, until it is three times that; motion against them is none of that. high, low: envelope of the
-    commands (servo.unasked)."""
-    u = low if low > ASKED else high
-    if low <= ASKED and high >= -ASKED:
+    the smallest of them, until it is three times that, or they are within half of ASKED; motion against them is none
+    of that. high, low: envelope of the commands (servo.unasked)."""
+    asked = 0.5 * ASKED if d.immobile else ASKED
+    u = low if low > asked else high
+    if low <= asked and high >= -asked:
         d.immobile = 0
     else:
         d.immobile = abs(dy / u) < (3.0 * IDLE if d.immobile else IDLE)

@@ -25,6 +25,13 @@ LIMIT = 7.0
 LIMIT_WITHOUT_SIGNAL = 2.0
 """Largest m with which the filter may coast."""
 
+LIMIT_AT_RESTART = 3.5
+"""Largest m with which a filter that knows accelerations may begin anew: 3.1 after 20 errors that were refused, and
+more where those before did not fit either. One that knows none begins anew on every target that turns."""
+
+BEHIND = 0.25
+"""How far the beam may be from where the filter had it led [beamwidths], or its errors say nothing of the filter."""
+
 
 @compiled
 def restart(s):
@@ -41,7 +48,7 @@ def take(s, innovation):
 
 
 @compiled
-def watch(s, without_signal):
-    """Note a filter that has diverged. without_signal: it coasts, and nothing explains why."""
-    if s.m > (LIMIT_WITHOUT_SIGNAL if without_signal else LIMIT):
+def watch(s, limit):
+    """Note a filter that has diverged: m is beyond a limit, LIMIT or a smaller one."""
+    if s.m > limit:
         s.diverged = 1

@@ -100,8 +100,9 @@ def _with_accepted_rates(t, p, c, m, innovation):
 def observe(t, p, c, m, restart_gap):
     """Take a Measurement: (STARTED, ACCEPTED, GATED, STALE or NOISY; its Innovation, NaN where nothing was predicted).
 
-    Errors that are noise (`roughness`) are left alone. The direction is accepted or gated, and then each of range and
-    rates by itself. The filter restarts after gate_restart gated ones in a row, and after restart_gap [s] without any.
+    Errors that are noise (`roughness`) are left alone and do not count. The direction is accepted or gated, and then
+    each of range and rates by itself. The filter restarts after gate_restart gated ones in a row, and after
+    restart_gap [s] without any.
     """
     T = m.stamp - t.stamp
     if t.running and T <= 0.0:

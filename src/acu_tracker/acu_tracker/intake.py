@@ -1,0 +1,110 @@
+"""What a step hears: the encoders, the ship's attitude, the error of the receiver, a preset.
+
+s, c, u, o: records of control_unit.STATE and CONSTANTS, of signals.INPUTS and OUTPUTS.
+"""
+import math
+
+from acu_tracker import by_level, modes, outage, signals, supervision
+from acu_tracker.estimation import divergence, measurement, repetition, target, target_filter
+from acu_tracker.geometry import attitude, encoders
+from acu_tracker.lookahead import levelled_deck, planner
+from pedestal_common import line_of_sight
+from pedestal_common.compiled import compiled
+
+ON_TARGET = 0.5
+"""Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""
+
+
+@compiled
+def take_encoders(s, u):
+    """Take the encoders of this step; signals.ENCODER where they are not valid, else 0."""
+    return 0 if u.encoder_valid and encoders.take(s.encoders, u.stamp, u.position, u.velocity) else signals.ENCODER
+
+
+@compiled
+def take_attitude(s, c, u):
+    """Take the attitude of this step, also into the mean of the look-ahead; signals.ATTITUDE where it is not valid,
+    else 0."""
+    s.aligning = u.aligning
+    if u.stabilised != s.attitude.stabilised:
+        s.attitude.stabilised, s.target.tracker.running = u.stabilised, 0
+        planner.forget(s.lookahead)
+    if not u.stabilised:
+        return 0
+    if not u.attitude_valid:
+        return signals.ATTITUDE
+    outcome = attitude.take(s.attitude, c.p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate, u.aligning)
+    if outcome == attitude.NEW:
+        deck = s.lookahead.deck
+        if s.aligning:
+            # Its heading is not known yet: the mean begins with the first one after the alignment.
+            levelled_deck.restart(deck)
+        h = s.attitude.history
+        levelled_deck.take(deck, u.attitude_stamp, h.sample[h.newest], c.p.keyhole.mean_time)
+    return signals.ATTITUDE if outcome == attitude.INVALID else 0
+
+
+@compiled
+def _led(s, c, u, innovation):
+    """Whether the beam was where the filter had it led: its error is the Innovation then. A beam that is behind, after
+    lost steps or a gust, measures where the slope of the receiver ends."""
+    azimuth, elevation = innovation.axis
+    at = target_filter.expected(s.target.tracker.filter).elevation.angle
+    surprise = math.hypot(azimuth.nu * math.cos(at), elevation.nu)
+    behind = abs(math.hypot(u.cross_elevation, u.elevation) - surprise)
+    return not behind > divergence.BEHIND * c.p.tracker.receiver.beamwidth
+
+
+@compiled
+def take_error(s, c, u, o, program):
+    """Filter y = encoder at the instant of the error, displaced by the error; a flag where it is not accepted, else 0.
+
+    The error is a mean of samples that were taken while a beam jumped from step to step, so that target and beam each
+    have an instant that the mean belongs to. Linear interpolation between two steps is exact for a ramp, whatever the
+    weights of the samples are. No error is used while the beam is intentionally off the target.
+    """
+    s.error[0] = s.error[1] = math.nan
+    receiver = c.p.tracker.receiver
+    if not u.error_valid:
+        return 0
+    if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
+        return signals.ERROR
+    if s.pointing_offset > ON_TARGET * receiver.beamwidth:
+        return 0
+    known, at = encoders.at(s.encoders, u.error_stamp - receiver.beam_age)
+    if not known:
+        return signals.ERROR_STAMP
+    if repetition.take(s.repetition, u, at):
+        return 0
+    measured = line_of_sight.displaced(at.A, at.E, u.cross_elevation, u.elevation)
+    s.error[0], s.error[1] = measured[0] - at.A, measured[1] - at.E
+    by_level.check_slope(s, c, program, at, u.error_stamp - receiver.age, (u.cross_elevation, u.elevation))
+    restart_gap = math.inf if outage.permitted(s, c) else c.p.tracker.restart_gap
+    outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, measured, restart_gap)
+    if outcome != target.NOISY and supervision.obeys(s) and _led(s, c, u, innovation):
+        divergence.take(s.divergence, innovation)
+        restarts = outcome == target.STARTED and s.mode == modes.AUTOTRACK
+        if restarts and target_filter.knows_acceleration(c.tracker.filter):
+            divergence.watch(s.divergence, divergence.LIMIT_AT_RESTART)
+    for i in range(2):
+        one = innovation.axis[i]
+        o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
+        o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(one.S)
+    if outcome == target.NO_ATTITUDE:
+        return signals.ATTITUDE
+    if outcome == target.STALE:
+        return signals.ERROR_STAMP
+    if outcome == target.NOISY:
+        return signals.ERROR_NOISY
+    return signals.ERROR_GATED if outcome == target.GATED else 0
+
+
+@compiled
+def take_preset(s, u):
+    """Take a new preset; signals.PRESET where it is not finite, else 0."""
+    if not u.preset_valid:
+        return 0
+    if not math.isfinite(u.preset[0] + u.preset[1]):
+        return signals.PRESET
+    s.preset.angle[0], s.preset.angle[1], s.preset.moves = u.preset[0], u.preset[1], 0.0
+    return 0
