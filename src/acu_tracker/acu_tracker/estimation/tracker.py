@@ -114,7 +114,7 @@ def observe(t, p, c, m, restart_gap):
         target_filter.predict(f, k, T)
         m = with_azimuth_near(m, target_filter.axes_azimuth(f))
         innovation = target_filter.innovation(f, k, m)
-        if roughness.take(t.roughness, innovation, m) > p.gate:
+        if roughness.take(t.roughness, innovation, m, p.gate):
             t.gated += 1
             t.accepted_in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
             return NOISY, innovation
