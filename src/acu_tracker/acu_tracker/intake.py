@@ -5,7 +5,7 @@ s, c, u, o: records of control_unit.STATE and CONSTANTS, of signals.INPUTS and O
 import math
 
 from acu_tracker import by_level, modes, outage, signals, supervision
-from acu_tracker.estimation import divergence, measurement, repetition, target, target_filter
+from acu_tracker.estimation import divergence, measurement, repetition, roughness, target, target_filter
 from acu_tracker.geometry import attitude, encoders
 from acu_tracker.lookahead import levelled_deck, planner
 from pedestal_common import line_of_sight
@@ -81,11 +81,11 @@ def take_error(s, c, u, o, program):
     by_level.check_slope(s, c, program, at, u.error_stamp - receiver.age, (u.cross_elevation, u.elevation))
     restart_gap = math.inf if outage.permitted(s, c) else c.p.tracker.restart_gap
     outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, measured, restart_gap)
-    if outcome != target.NOISY and supervision.obeys(s) and _led(s, c, u, innovation):
+    if s.target.tracker.roughness.q < roughness.SUSPECT and supervision.obeys(s) and _led(s, c, u, innovation):
         divergence.take(s.divergence, innovation)
-        restarts = outcome == target.STARTED and s.mode == modes.AUTOTRACK
-        if restarts and target_filter.knows_acceleration(c.tracker.filter):
-            divergence.watch(s.divergence, divergence.LIMIT_AT_RESTART)
+    if outcome == target.STARTED:
+        followed = s.mode == modes.AUTOTRACK and target_filter.knows_acceleration(c.tracker.filter)
+        divergence.begin_anew(s.divergence, followed)
     for i in range(2):
         one = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)

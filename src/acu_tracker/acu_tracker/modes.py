@@ -63,7 +63,7 @@ TABLE = (
          follows=True, by_level=True, fallback='search', handover='autotrack'),
     Mode('steptrack', 'the highest level, found by steps to either side', 'always', 'to `search` without a signal',
          follows=True, by_level=True, fallback='search'))
-"""Another mode is a row here, its entries in `situation`, and what it asks of the axes in control_unit."""
+"""Another mode is a row here, its entries in `situation`, and what it asks of the axes in guidance."""
 
 MODES = tuple(row.name for row in TABLE)
 (STANDBY, STOP, STOW, UNSTOW, PRESET, RATE, SLAVE, PROGRAM, TLE, SUN, AUTOTRACK, SEARCH, ACQUIRE,

@@ -12,8 +12,9 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-ROUGHNESS = np.dtype([('nu', 'f8', (2,)), ('d', 'f8', (2,)), ('q', 'f8')], align=True)
-"""nu: innovations of the error before, d: their differences from those before [rad], NaN: there were none; q [-]."""
+ROUGHNESS = np.dtype([('nu', 'f8', (2,)), ('d', 'f8', (2,)), ('q', 'f8'), ('noisy', 'i8')], align=True)
+"""nu: innovations of the error before, d: their differences from those before [rad], NaN: there were none; q [-];
+noisy: 1 from q > gate on until q < SUSPECT."""
 
 ERRORS = 10
 """Number of errors that the mean is taken over."""
@@ -21,17 +22,20 @@ ERRORS = 10
 LARGEST = 80.0
 """More does not count of one error, so that one outlier, which makes three, is left to the gate."""
 
+SUSPECT = 5.0
+"""q from which on an error is not held against the filter. White noise of the variance R reaches 4."""
+
 
 @compiled
 def restart(s):
     """A filter begins: nothing is held against the errors."""
     s.nu[0] = s.nu[1] = s.d[0] = s.d[1] = np.nan
-    s.q = 1.0
+    s.q, s.noisy = 1.0, 0
 
 
 @compiled
-def take(s, innovation, m):
-    """q after the Innovation of a Measurement."""
+def take(s, innovation, m, gate):
+    """Whether the errors are noise, after the Innovation of a Measurement."""
     x = 0.0
     for i in range(2):
         d = innovation.axis[i].nu - s.nu[i]
@@ -39,4 +43,5 @@ def take(s, innovation, m):
             x -= 0.5 * d * s.d[i] / m.axis[i].variance
         s.nu[i], s.d[i] = innovation.axis[i].nu, d
     s.q += (min(x, LARGEST) - s.q) / ERRORS
-    return s.q
+    s.noisy = s.q > (SUSPECT if s.noisy else gate)
+    return s.noisy != 0
