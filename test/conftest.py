@@ -265,6 +265,12 @@ class Client:
         from pedestal_common import messages
         self.publishers[name].publish(messages.serialize(message))
 
+    def spin(self, seconds):
+        """Hear for so long [s] whatever comes."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0.0:
+            self.executor.spin_once(timeout_sec=left)
+
     def until(self, condition, timeout=START, told=lambda: ''):
         """Spin until condition() is true and return what it gave; fails the test after timeout [s], with told()."""
         deadline = time.monotonic() + timeout

@@ -19,7 +19,8 @@ def hurt(start_run):
     """hurt({target: signal}) -> {target: (run, result)} of runs side by side; as soon as one is well under way its
     target, a node or the command `pedestal` itself, gets the signal."""
     def hurt(targets):
-        runs = {target: start_run('leo_pass', '--pacing', 'lockstep', '--param', f'scenario.deadline={DEADLINE}')
+        runs = {target: start_run('leo_pass', '--pacing', 'lockstep', '--duration', '200',
+                                    '--param', f'scenario.deadline={DEADLINE}')
                 for target in targets}
         waiting = set(targets)
         deadline = time.monotonic() + 90.0

@@ -140,7 +140,7 @@ def stranger_writes(field, connect, name, stamp, seconds=1.0, **numbers):
     while time.monotonic() < end:
         messages.put_stamp(message.header.stamp, stamp())
         publisher.publish(messages.serialize(message))
-        field.operator.executor.spin_once(timeout_sec=0.003)
+        field.operator.spin(0.003)
     client.close()
 
 

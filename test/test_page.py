@@ -410,7 +410,7 @@ def test_a_jog_ends_with_its_page_or_its_silence(station):
     def hold(page):
         hear(page, lambda message: message.get('now'))
         page.send('{"jog": [0.5, 0]}')
-        client.executor.spin_once(timeout_sec=0.02)
+        client.spin(0.02)
         return moving(client)
     for silent in (True, False):
         with site.open(name='bert') as page:

@@ -101,7 +101,7 @@ def test_a_set_point_moves_the_antenna_from_standby(station):
         deadline = time.monotonic() + 30.0
         while (told := ask(gpredict, 'p')) != b'30.00\n45.00\n':
             assert time.monotonic() < deadline, told
-            client.executor.spin_once(timeout_sec=0.05)
+            client.spin(0.05)
         assert ask(gpredict, 'P nan 10') == b'RPRT -1\n' and ask(gpredict, 'P 30 120') == b'RPRT -1\n'
         assert ask(gpredict, 'Z') == b'RPRT -4\n' and ask(gpredict, 'P 10') == b'RPRT -1\n'
         client.until(lambda: ask(gpredict, '+p') == b'get_pos:\nAzimuth: 30.00\nElevation: 45.00\nRPRT 0\n', 30.0)
@@ -120,7 +120,7 @@ def test_a_pass_through_north_in_set_points_is_met_without_unwinding(station):
             assert granted(gpredict, f'P {(353.0 + 0.8 * step) % 360.0:.2f} 45.00')
             ending = time.monotonic() + 0.8
             while time.monotonic() < ending:
-                client.executor.spin_once(timeout_sec=0.02)
+                client.spin(0.02)
     angles = [state.position[0] for state in client.heard['joint_states']]
     assert 0.15 < max(angles) - min(angles) < 0.3                           # 12 deg and no turn the other way
 

@@ -247,3 +247,16 @@ def test_a_writer_that_begins_anew_beside_a_stranger_is_taken():
     _, taken, _ = run(Writer('acu', end=2 * S), Writer('stranger', begin=S, period=3 * MS), anew,
                       strangers=from_the_second_look(1))
     assert len(taken['acu']) == 400 and len(taken['anew']) > 1400 and not taken['stranger']
+
+
+@pytest.mark.parametrize('held', [50 * MS, 150 * MS, 500 * MS])
+def test_a_burst_after_a_pause_of_which_most_is_lost_is_the_same_writer(held):
+    """Its writer was held up, and catches up faster than the reader's queue holds."""
+    taker = Intake(decode, FUTURE, lambda: 0)
+
+    def take(number, time):
+        return taker.take(UTC + time, number, UTC + time, time, UTC + time) is not None
+    assert all(take(number, number * T) for number in range(1, 401))
+    began, missed = 400 * T + held, held // T
+    assert take(401, began) and all(take(401 + missed - left, began + 3 * MS) for left in range(7, -1, -1))
+    assert all(take(401 + missed + i, began + i * T) for i in range(1, 400)) and not taker.dropped

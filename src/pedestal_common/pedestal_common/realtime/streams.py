@@ -7,7 +7,11 @@ INTERVAL = 5_000_000
 """Time between two messages [ns] taken for that of a stream of which only one has come."""
 
 SLACK = 4
-"""Numbers by which a stream may be ahead of twice its pace: a writer that catches up, of which some were left out."""
+"""Numbers by which a stream may be ahead of twice its pace and of what it owes."""
+
+OWED = 1_000_000_000
+"""Time [ns] of whose messages a stream may be behind: a writer that was held up catches up, and of its burst some are
+left out."""
 
 PAUSE = 4.0
 """Time between two messages, in intervals of their stream, that is believed of its pace."""
@@ -38,28 +42,28 @@ FORGOTTEN = 30_000_000_000
 
 class Stream:
     """The messages of one writer. last: number of the last one; source: when it was sent, arrival: when it came [ns];
-    interval: mean time between two [ns]; lost: numbers left out.
+    interval: mean time between two [ns]; owed: messages by which it is behind its pace; lost: numbers left out.
 
     An Intake notes on it: known, whether it spoke together with the writer in charge; mixed, whether it may be that
     writer; looked, when it was last asked who else may write [ns]."""
-    __slots__ = ('arrival', 'interval', 'known', 'last', 'looked', 'lost', 'mixed', 'source')
+    __slots__ = ('arrival', 'interval', 'known', 'last', 'looked', 'lost', 'mixed', 'owed', 'source')
 
     def __init__(self, number, source, now):
         self.last, self.source, self.arrival = number, source, now
         self.interval = self.looked = None
-        self.lost = 0
+        self.lost, self.owed = 0, 0.0
         self.known = self.mixed = False
 
     def fits(self, number, source):
         """Whether a message can be of this stream."""
         gap = number - self.last
-        return gap == 1 or 0 < gap <= self.growth(source - self.source)
+        return gap == 1 or 0 < gap <= self.growth(source - self.source) + self.owed
 
     def cost(self, number, source):
         """What speaks against it being of this stream."""
         gap, interval = number - self.last, self.interval or INTERVAL
         late = (source - self.source) / interval - gap
-        return (late if late > 0.0 else -EARLY * late) + LOST * (gap - 1)
+        return (late if late > 0.0 else EARLY * max(-late - self.owed, 0.0)) + LOST * (gap - 1)
 
     def growth(self, elapsed):
         """By how much its numbers grow at the most in a time [ns]."""
@@ -72,6 +76,7 @@ class Stream:
             # A silence, as of a cut cable, says little about the pace: it is taken for PAUSE intervals at the most.
             pace = min(elapsed / gap, RESOLVED if self.interval is None else PAUSE * self.interval)
             self.interval = pace if self.interval is None else self.interval + 0.05 * (pace - self.interval)
+            self.owed = min(max(self.owed + elapsed / self.interval - gap, 0.0), OWED / self.interval)
         self.last, self.source, self.arrival = number, source, now
         self.lost += gap - 1
         return gap - 1
