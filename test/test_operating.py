@@ -134,7 +134,7 @@ def test_without_a_graph_it_is_said_in_one_line(run_process, reserve_domain, one
     assert done.returncode == 1 and 'needs a terminal' in one_line(done.stderr)
 
 
-def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, capfd, monkeypatch):
+def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, capsys, monkeypatch):
     """In realtime, by topic and by service, from two who are strangers to the graph."""
     run = start_run('uav_flyby', '--duration', '8', '--pacing', 'realtime')
     operator = connect(run.domain_id)
@@ -158,4 +158,4 @@ def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, 
     assert len(list(bags.read(run.bag).raw('acu/command'))) == 3
     monkeypatch.setattr(signal, 'signal', lambda *_: None)
     cli.main(['recompute', str(run.bag), '--node', 'acu'])
-    assert 'preset azimuth=0.2 elevation=0.4 asked for at' in capfd.readouterr().out
+    assert 'preset azimuth=0.2 elevation=0.4 asked for at' in capsys.readouterr().out

@@ -246,6 +246,7 @@ def test_a_reader_that_goes_ends_it(run, connect, start_process, one_line, domai
     client.read('joint_states')
     client.until(lambda: len(client.heard['joint_states']) > 10)
     client.node.destroy_subscription(next(iter(client.node.subscriptions)))
+    client.spin(0.1)                                                        # its executor lets go of it
     output, errors = replay.communicate(timeout=60.0)
     assert replay.returncode == 1 and output == ''
     assert 'joint_states is no longer read by anyone, at 0.' in one_line(errors)

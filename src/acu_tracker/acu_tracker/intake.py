@@ -4,8 +4,8 @@ s, c, u, o: records of control_unit.STATE and CONSTANTS, of signals.INPUTS and O
 """
 import math
 
-from acu_tracker import by_level, modes, outage, signals, supervision
-from acu_tracker.estimation import divergence, measurement, repetition, roughness, target, target_filter
+from acu_tracker import by_level, outage, signals, supervision
+from acu_tracker.estimation import divergence, measurement, repetition, target
 from acu_tracker.geometry import attitude, encoders
 from acu_tracker.lookahead import levelled_deck, planner
 from pedestal_common import line_of_sight
@@ -45,17 +45,6 @@ def take_attitude(s, c, u):
 
 
 @compiled
-def _led(s, c, u, innovation):
-    """Whether the beam was where the filter had it led: its error is the Innovation then. A beam that is behind, after
-    lost steps or a gust, measures where the slope of the receiver ends."""
-    azimuth, elevation = innovation.axis
-    at = target_filter.expected(s.target.tracker.filter).elevation.angle
-    surprise = math.hypot(azimuth.nu * math.cos(at), elevation.nu)
-    behind = abs(math.hypot(u.cross_elevation, u.elevation) - surprise)
-    return not behind > divergence.BEHIND * c.p.tracker.receiver.beamwidth
-
-
-@compiled
 def take_error(s, c, u, o, program):
     """Filter y = encoder at the instant of the error, displaced by the error; a flag where it is not accepted, else 0.
 
@@ -81,11 +70,8 @@ def take_error(s, c, u, o, program):
     by_level.check_slope(s, c, program, at, u.error_stamp - receiver.age, (u.cross_elevation, u.elevation))
     restart_gap = math.inf if outage.permitted(s, c) else c.p.tracker.restart_gap
     outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, measured, restart_gap)
-    if s.target.tracker.roughness.q < roughness.SUSPECT and supervision.obeys(s) and _led(s, c, u, innovation):
+    if outcome != target.NOISY and supervision.obeys(s):
         divergence.take(s.divergence, innovation)
-    if outcome == target.STARTED:
-        followed = s.mode == modes.AUTOTRACK and target_filter.knows_acceleration(c.tracker.filter)
-        divergence.begin_anew(s.divergence, followed)
     for i in range(2):
         one = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)

@@ -28,8 +28,7 @@ def _situation(s, c, u, of_all, request, fallback):
     ends = modes.SIGNAL_LOST if lost else modes.SIDE_LOBE if by_level.in_side_lobe(s, c) else modes.NONE
     unfit = modes.NONE if tracker.locked(s.target.tracker, c.p.tracker, since) else modes.NOT_LOCKED
     if s.mode == modes.AUTOTRACK and supervision.obeys(s):
-        alone = outage.coasting(s, c) and silent
-        divergence.watch(s.divergence, divergence.LIMIT_WITHOUT_SIGNAL if alone else divergence.LIMIT)
+        divergence.watch(s.divergence, outage.coasting(s, c) and silent)
     if s.divergence.diverged:
         unfit = ends = modes.DIVERGED
     pins = stow.obstacle(s.stow, c.p.stow_pins, u.pins)

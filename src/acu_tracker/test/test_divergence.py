@@ -34,21 +34,19 @@ def test_mean(state):
 def test_a_burst_of_interference_is_not_held_against_the_filter(state):
     for _ in range(20):
         divergence.take(state, innovation(1e6))
-    for limit in (divergence.LIMIT, divergence.LIMIT_AT_RESTART):
-        divergence.watch(state, limit)
-        assert not state['diverged']
+    divergence.watch(state, False)
+    assert not state['diverged']
 
 
-@pytest.mark.parametrize('limit, errors', [(divergence.LIMIT, 74), (divergence.LIMIT_AT_RESTART, 25),
-                                           (divergence.LIMIT_WITHOUT_SIGNAL, 10)])
-def test_it_stays_until_it_is_reset(state, limit, errors):
-    """m = 1 + 11.5 (1 - 0.99^n) passes 7 with the 74th error that counts 12.5, 3.5 with the 25th, 2 with the 10th."""
+@pytest.mark.parametrize('without_signal, errors', [(False, 74), (True, 10)])
+def test_it_stays_until_it_is_reset(state, without_signal, errors):
+    """m = 1 + 11.5 (1 - 0.99^n) passes 7 with the 74th error that counts 12.5, and 2 with the 10th."""
     for _ in range(errors):
-        divergence.watch(state, limit)
+        divergence.watch(state, without_signal)
         assert not state['diverged']
         divergence.take(state, innovation(100.0))
-    divergence.watch(state, limit)
+    divergence.watch(state, without_signal)
     assert state['diverged']
     divergence.restart(state)
-    divergence.watch(state, limit)
+    divergence.watch(state, without_signal)
     assert state['diverged'] and state['m'] == 1.0

@@ -82,14 +82,3 @@ def test_a_program_track_without_the_axes_is_refused():
     with pytest.raises(ValueError, match='must hold azimuth and elevation'):
         Acu(AcuParameters(), ()).decode(PROGRAM, message)
     assert records.is_text(MODE)
-
-
-def test_a_command_that_is_asked_again_is_replied_to_again_and_obeyed_once():
-    """Whoever has heard no reply asks again under the same number; it may have been obeyed."""
-    unit = Acu(AcuParameters(), ())
-    take, release = Command('take', 'anna', '7-1'), Command('release', 'anna', '7-2')
-    first = unit.command(take)
-    assert first.granted and unit.command(release).granted
-    assert unit.command(take) == first and unit.command(Command('take', 'bert', '7-1')).granted
-    assert [command.who for command, _ in unit.answered] == ['anna', 'anna', 'anna', 'bert']
-    assert not unit.command(take._replace(verb='dance')).granted           # another one under a number once used

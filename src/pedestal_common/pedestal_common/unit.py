@@ -18,9 +18,6 @@ OK, WARN, ERROR = 0, 1, 2
 NEVER_DUE = 2**63 - 1
 """Time [ns] of a command that does not come."""
 
-REPLIED = 100
-"""Commands whose replies are remembered, in case that they are asked again."""
-
 BLOCK = 2000
 """Steps for which a unit holds noise ready at most."""
 
@@ -92,7 +89,6 @@ class Unit(typing.Protocol):
         self.writes = tuple(name for name in self.NODE.writes if values.get(topics.BY_NAME[name].measured, True))
         self.messages = {name: messages.template(name) for name in self.writes if not records.is_text(name)}
         self.answered = collections.deque(maxlen=1000)
-        self._replied = {}
         self._due = collections.deque(self.schedule())
 
     @classmethod
@@ -159,26 +155,17 @@ class Unit(typing.Protocol):
         self._last = stamp
 
     def command(self, command) -> Reply:
-        """Ask for a Command between two steps; it acts in the next. Whatever comes of it is in `answered`. One that is
-        asked again under its number, since the reply was not heard, is replied to again and has no effect."""
-        asked = command.who, command.number
-        same, reply = self._replied.get(asked, (None, None))
-        if not command.number or same != command:
-            reply = self._reply_to(command)
-            self._replied[asked] = command, reply
-            if len(self._replied) > REPLIED:
-                del self._replied[next(iter(self._replied))]
-        self.answered.append((command, reply))
-        return reply
-
-    def _reply_to(self, command):
+        """Ask for a Command between two steps; it acts in the next. Whatever comes of it is in `answered`."""
         try:
             self.admit(command)
             if command.verb in self.REQUESTS:
-                return self.request(command.verb)
-            return self.obey(command, commands.values(self.VERBS, command))
+                reply = self.request(command.verb)
+            else:
+                reply = self.obey(command, commands.values(self.VERBS, command))
         except ValueError as error:
-            return Reply(False, f'refused: {error}')
+            reply = Reply(False, f'refused: {error}')
+        self.answered.append((command, reply))
+        return reply
 
     def admit(self, command):
         """Raise ValueError where a Command is not to be heard; overridden by a unit that knows who is in control."""

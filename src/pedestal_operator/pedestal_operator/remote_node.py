@@ -88,7 +88,7 @@ class Remote(Shell):
         return number
 
     def ask_again(self, number):
-        """Say a request once more, under its number: a node obeys it once."""
+        """Say a request once more, under its number: what came of the first one may be told twice."""
         self._asks(messages.serialize(commands.message(self._requests.asked(number))))
 
     def replied(self, number) -> Reply | None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-DIVERGENCE = np.dtype([('m', 'f8'), ('taken', 'i8'), ('diverged', 'i8')], align=True)
-"""m: the mean [-]; taken: errors since the filter began; diverged: 1 since m was too large, until it is reset."""
+DIVERGENCE = np.dtype([('m', 'f8'), ('diverged', 'i8')], align=True)
+"""m: the mean [-]; diverged: 1 since it was too large, until it is reset."""
 
 ERRORS = 100
 """Number of errors that the mean is taken over. Honest filters reach 1.25 in their worst half second."""
@@ -24,14 +24,6 @@ LIMIT = 7.0
 
 LIMIT_WITHOUT_SIGNAL = 2.0
 """Largest m with which the filter may coast."""
-
-LIMIT_AT_RESTART = 3.5
-"""Largest m with which a filter that knows accelerations, and has had ERRORS, may begin anew: 3.1 after 20 errors that
-were refused, and more where those before did not fit either. One that knows none begins anew on every target that
-turns; one that has hardly begun had nothing to lose touch with."""
-
-BEHIND = 0.25
-"""How far the beam may be from where the filter had it led [beamwidths], or its errors say nothing of the filter."""
 
 
 @compiled
@@ -46,20 +38,10 @@ def take(s, innovation):
     x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
     if x == x:
         s.m += (min(x, LARGEST) - s.m) / ERRORS
-        s.taken += 1
 
 
 @compiled
-def watch(s, limit):
-    """Note a filter that has diverged: m is beyond a limit, LIMIT or a smaller one."""
-    if s.m > limit:
+def watch(s, without_signal):
+    """Note a filter that has diverged. without_signal: it coasts, and nothing explains why."""
+    if s.m > (LIMIT_WITHOUT_SIGNAL if without_signal else LIMIT):
         s.diverged = 1
-
-
-@compiled
-def begin_anew(s, followed):
-    """The filter begins anew, on errors that it refused. followed: the antenna follows it, and it knows
-    accelerations."""
-    if followed and s.taken >= ERRORS:
-        watch(s, LIMIT_AT_RESTART)
-    s.taken = 0

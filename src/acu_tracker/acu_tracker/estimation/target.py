@@ -28,8 +28,7 @@ from pedestal_common.compiled import compiled
 TARGET = np.dtype([('tracker', tracker.TRACKER), ('frame', estimate_frame.FRAME),
                    ('lever_arm', lever_arm.LEVER_ARM)], align=True)
 
-STARTED, GATED, STALE, NOISY, NO_ATTITUDE = (tracker.STARTED, tracker.GATED, tracker.STALE, tracker.NOISY,
-                                             tracker.NOISY + 1)
+GATED, STALE, NOISY, NO_ATTITUDE = tracker.GATED, tracker.STALE, tracker.NOISY, tracker.NOISY + 1
 """Outcomes of `take`: those of the tracker, or NO_ATTITUDE."""
 
 Source = namedtuple('Source', 'framed motion')

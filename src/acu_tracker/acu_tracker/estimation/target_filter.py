@@ -55,12 +55,6 @@ def predict(f, c, T):
 
 
 @compiled
-def knows_acceleration(c):
-    """Whether the filters of both axes estimate an acceleration."""
-    return c.axis[0].states > 2 and c.axis[1].states > 2
-
-
-@compiled
 def axes_azimuth(f):
     """Azimuth [rad] that the axis's own filter predicted; measured azimuths are unwrapped to it."""
     return axis_filter.expected(f.axis[0]).x.angle

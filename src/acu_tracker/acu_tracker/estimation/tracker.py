@@ -100,9 +100,8 @@ def _with_accepted_rates(t, p, c, m, innovation):
 def observe(t, p, c, m, restart_gap):
     """Take a Measurement: (STARTED, ACCEPTED, GATED, STALE or NOISY; its Innovation, NaN where nothing was predicted).
 
-    Errors that are noise (`roughness`) are left alone and do not count. The direction is accepted or gated, and then
-    each of range and rates by itself. The filter restarts after gate_restart gated ones in a row, and after
-    restart_gap [s] without one that was accepted, but never on noise.
+    Errors that are noise (`roughness`) are left alone. The direction is accepted or gated, and then each of range and
+    rates by itself. The filter restarts after gate_restart gated ones in a row, and after restart_gap [s] without any.
     """
     T = m.stamp - t.stamp
     if t.running and T <= 0.0:
@@ -110,11 +109,11 @@ def observe(t, p, c, m, restart_gap):
     f, k = t.filter, c.filter
     m = target_filter.usable(k, m)
     outcome, innovation = STARTED, NO_INNOVATION
-    if t.running and (T <= restart_gap or t.roughness.noisy):
+    if t.running and T <= restart_gap:
         target_filter.predict(f, k, T)
         m = with_azimuth_near(m, target_filter.axes_azimuth(f))
         innovation = target_filter.innovation(f, k, m)
-        if roughness.take(t.roughness, innovation, m, p.gate):
+        if roughness.take(t.roughness, innovation, m) > p.gate:
             t.gated += 1
             t.accepted_in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
             return NOISY, innovation
