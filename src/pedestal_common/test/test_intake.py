@@ -255,7 +255,7 @@ def test_a_burst_after_a_pause_of_which_most_is_lost_is_the_same_writer(held):
     taker = Intake(decode, FUTURE, lambda: 0)
 
     def take(number, time):
-        return taker.take(UTC + time, number, UTC + time, time, UTC + time) is not None
+        return taker.take(UTC + number * T, number, UTC + time, time, UTC + time) is not None
     assert all(take(number, number * T) for number in range(1, 401))
     began, missed = 400 * T + held, held // T
     assert take(401, began) and all(take(401 + missed - left, began + 3 * MS) for left in range(7, -1, -1))
