@@ -73,10 +73,11 @@ class Stream:
         """The message is of this stream; how many were left out before it."""
         gap, elapsed = number - self.last, source - self.source
         if elapsed > 0:
+            interval = self.interval or INTERVAL
+            self.owed = min(max(self.owed + elapsed / interval - gap, 0.0), OWED / interval)
             # A silence, as of a cut cable, says little about the pace: it is taken for PAUSE intervals at the most.
             pace = min(elapsed / gap, RESOLVED if self.interval is None else PAUSE * self.interval)
             self.interval = pace if self.interval is None else self.interval + 0.05 * (pace - self.interval)
-            self.owed = min(max(self.owed + elapsed / self.interval - gap, 0.0), OWED / self.interval)
         self.last, self.source, self.arrival = number, source, now
         self.lost += gap - 1
         return gap - 1
