@@ -34,7 +34,7 @@ def test_errors_that_lead_away_are_recognised_and_left(name, wrong):
     acu = done.units['acu']
     diagnosis = acu.diagnose()
     assert diagnosis.level == ERROR and diagnosis.message.startswith('autotrack diverged')
-    assert 'diverged' in acu.urgent[0]
+    assert acu.faults == ('diverged',)
     assert dict(diagnosis.values)['faults'] == 'diverged'
     assert acu.request('acu/autotrack') == (False, 'refused: diverged; mode is program')
     acu.request('acu/reset_faults')

@@ -12,7 +12,7 @@ import numpy as np
 
 from acu_tracker import modes, sun
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
-from pedestal_common import orbit
+from pedestal_common import orbit, topics
 from pedestal_common.geodesy import StationParameters, station_frame
 from pedestal_common.orbit import TargetError
 from pedestal_common.parameters import ParameterError, Parameters, group, parameter, text
@@ -104,9 +104,12 @@ class Predictor:
             return Predicted(NO_TRACK, modes.NO_UTC)
         return _table(self._sun_angles, stamp, SUN_INTERVAL)
 
-    def sun_at(self, stamp):
-        """Azimuth and elevation [deg] of the sun at a stamp [s]; None where UTC is not known."""
-        return np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._known else None
+    def told(self, stamp):
+        """[(key, text)] at a stamp [s]: where the sun is, unless UTC is not known, and the elements, if any."""
+        sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._known else ()
+        lines = ('line_1', 'line_2') if self._satellite is not None else ()
+        return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
+                *((line, getattr(self.parameters, line)) for line in lines)]
 
     def explained(self, mode, reason, stamp):
         """What a refusal of a mode for a reason at a stamp [s] should say beside it; '' for nothing."""

@@ -4,8 +4,9 @@ import typing
 
 import numpy as np
 
-from acu_tracker import announcement, control_unit, manual, mode_change, modes, signals, supervision
-from acu_tracker.alarms import annunciator, machine, report, table
+from acu_tracker import announcement, control_unit, diagnosis, manual, mode_change, modes, signals, supervision
+from acu_tracker.alarms import annunciator, report, table
+from acu_tracker.alarms.desk import Desk
 from acu_tracker.authority import Authority
 from acu_tracker.prediction import Predictor
 from acu_tracker.program import segments, tables
@@ -13,9 +14,8 @@ from acu_tracker.verbs import ALARM_VERBS, VERBS, points
 from pedestal_common import messages, nodes, topics
 from pedestal_common.commands import Reply, schedule
 from pedestal_common.compiled import compiled
-from pedestal_common.parameters import did_you_mean
 from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, NEVER_DUE, OK, WARN, Diagnosis, Unit, joined
+from pedestal_common.unit import NEVER_DUE, Unit, joined
 
 JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
@@ -141,7 +141,7 @@ class Acu(Unit):
             parameters.azimuth, parameters.elevation)])
         self.predictor, self.predicted = Predictor(parameters.prediction), {}
         self.offset, self._laid = (0.0, 0.0, 0.0), (NEVER_DUE, NEVER)
-        self.reasons = {}
+        self.desk = Desk(self.parts['state'])
         self._silent = False
 
     @property
@@ -161,13 +161,12 @@ class Acu(Unit):
         """Compile what the commands of the alarms call as well."""
         super().prepare()
         before = self.memory.record.copy()
-        for ask in (self.reset, self.acknowledge, lambda: self.shelve(table.NAMES[0], 1.0, 'none'),
-                    lambda: self.unshelve(table.NAMES[0]), lambda: self.encode(ALARMS, 0)):
-            ask()
+        self.desk.prepare()
+        self.encode(ALARMS, 0)
         annunciator.know(self.alarms, DRIVE_SILENT, True, 0.0)
         self.refusals()
+        self.urgent  # noqa: B018  compiles
         self.memory.record[...] = before
-        self.reasons.clear()
 
     def latency(self, topic):
         """Age [s] of a topic's stamp at a step: attitude_latency or receiver_latency."""
@@ -216,7 +215,7 @@ class Acu(Unit):
         super().obey_due(stamp)
 
     @property
-    def _now(self):
+    def now(self):
         """The stamp [ns] of the last step, 0 before the first."""
         stamp = float(self.parts['state']['stamp'])
         return round(stamp * 1e9) if math.isfinite(stamp) else 0
@@ -228,7 +227,7 @@ class Acu(Unit):
     def lay_tables(self, stamp=None):
         """Bring the tables of the law to a stamp [ns], or now: the piece of the program that is due, what is
         predicted, all of them shifted by the offset."""
-        stamp = self._now if stamp is None else int(stamp)
+        stamp = self.now if stamp is None else int(stamp)
         inputs, t = self.parts['inputs'], stamp * 1e-9
         for mode, predict in ((modes.TLE, self.predictor.satellite), (modes.SUN, self.predictor.sun)):
             known = self.predicted.get(mode)
@@ -255,7 +254,7 @@ class Acu(Unit):
             return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
         if topic == ALARMS:
             tripped = dict.fromkeys((DRIVE_FAULT, *MOTORS_LOST), self.drive_state)
-            return report.message(self.alarms, tripped, self.reasons)
+            return report.message(self.alarms, tripped, self.desk.reasons)
         if topic == BLOCKAGE:
             return announcement.hidden(lookahead)
         return modes.MODES[code] if topic == MODE else super().encode(topic, code)
@@ -268,7 +267,7 @@ class Acu(Unit):
         """The Reply to one of VERBS; a refusal names the reason and changes nothing."""
         verb, state = command.verb, self.parts['state']
         if verb in ALARM_VERBS:
-            return getattr(self, verb)(*arguments.values())
+            return getattr(self.desk, verb)(*arguments.values())
         if verb == 'take':
             return self.authority.take(command.who, arguments['role'])
         if verb == 'release':
@@ -330,9 +329,9 @@ class Acu(Unit):
         mode = name.removeprefix('acu/')
         m, outputs = self.parts, self.parts['outputs']
         if mode == 'reset_faults':
-            return self.reset()
+            return self.desk.reset()
         if mode == 'acknowledge':
-            return self.acknowledge()
+            return self.desk.acknowledge()
         if self.silent and mode != 'standby':
             return Reply(False, f'refused: no {JOINTS}, the drive is silent; mode is {modes.MODES[outputs["mode"]]}')
         m['inputs']['drive_ready'] = self.inputs[0][DRIVE] <= signals.READY
@@ -343,11 +342,12 @@ class Acu(Unit):
 
     def _refusal(self, mode, reason):
         """Why a mode is refused, in words."""
-        more = self.predictor.explained(mode, reason, self._now * 1e-9) if mode in (modes.TLE, modes.SUN) else ''
+        more = self.predictor.explained(mode, reason, self.now * 1e-9) if mode in (modes.TLE, modes.SUN) else ''
         return modes.REASONS[reason] + (f', {more}' if more else '')
 
     @property
-    def _drive_told(self):
+    def drive_told(self):
+        """The drive's state as it said it, or that it is silent."""
         return 'silent' if self.silent else self.drive_state
 
     def refusals(self):
@@ -356,37 +356,8 @@ class Acu(Unit):
         mode_change.refusals(m['state'].copy(), m['constants'], m['inputs'], self.memory.tables, why)
         words = {code: modes.REASONS[code] for code in set(why) - {modes.NONE}}
         if modes.DRIVE_NOT_READY in words:
-            words[modes.DRIVE_NOT_READY] += f': {self._drive_told}'
+            words[modes.DRIVE_NOT_READY] += f': {self.drive_told}'
         return {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
-
-    def reset(self):
-        """The Reply to a reset of all that is latched; refused while a cause is there."""
-        cause = supervision.reset(self.parts['state'])
-        if cause == annunciator.NONE:
-            return Reply(True, 'cleared')
-        return Reply(False, f'refused: the cause of {table.NAMES[cause]} is still there')
-
-    def acknowledge(self, name=''):
-        """The Reply to an acknowledgement of the alarm of a name, with all that stands under it; '': of every alarm.
-        Raises ValueError for a name that there is not."""
-        chosen = [index(name)] if name else range(annunciator.COUNT)
-        done = sum([annunciator.acknowledge(self.alarms, i, self.parts['state']['stamp']) for i in chosen])
-        return Reply(done > 0, 'acknowledged' if done else 'refused: there is nothing to acknowledge')
-
-    def shelve(self, name, seconds, reason):
-        """The Reply to putting the alarm of a name away for some seconds, and why. Raises ValueError for a name that
-        there is not."""
-        i = index(name)
-        self.reasons[i] = reason
-        annunciator.shelve(self.alarms, i, self.parts['state']['stamp'], seconds)
-        return Reply(True, f'{table.NAMES[i]} is shelved for {seconds:g} s: {reason}')
-
-    def unshelve(self, name):
-        """The Reply to taking the alarm of a name back. Raises ValueError for a name that there is not."""
-        i = index(name)
-        if annunciator.put(self.alarms, i, machine.UNSHELVE, self.parts['state']['stamp']):
-            return Reply(True, f'{table.NAMES[i]} is back')
-        return Reply(False, f'refused: {table.NAMES[i]} is not shelved')
 
     def requests_for(self, topic, text):
         """[the mode's service] for a text on acu/mode, else []."""
@@ -394,58 +365,9 @@ class Acu(Unit):
 
     def diagnose(self):
         """ERROR for invalid inputs since the last diagnosis, WARN for gated errors, overtravel or coasting."""
-        state, outputs = self.parts['state'], self.parts['outputs']
-        mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
-        invalid = [name for i, name in enumerate(signals.INVALID_INPUTS) if self.parts['invalid'] >> i & 1]
+        told = diagnosis.of(self)
         self.parts['invalid'] = 0
-        values = [('mode', mode), ('reason', reason), ('fallback', modes.FALLBACK_OF[int(state['fallback'])]),
-                  ('control', self.authority.holder), ('faults', ', '.join(self.faults)),
-                  ('locked', str(int(outputs['locked']))), ('coasting', str(int(outputs['coasting']))),
-                  ('drive', self._drive_told),
-                  *((('stow_pins', self._pins_told()),) if self.parameters.stow_pins else ()),
-                  ('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
-                  ('rates gated', str(int(outputs['rates_gated']))),
-                  ('ranges gated', str(int(outputs['ranges_gated'])))]
-        values += [(f'{axis} limit_s', f'{time:.1f}') for axis, time in zip(topics.AXES, outputs['time_to_limit'])]
-        kinds = ('angle', 'rate', 'acceleration')
-        values += [(f'{axis} limited', ' '.join(kind for kind in kinds if outputs[f'{kind}_limited'][i]))
-                   for i, axis in enumerate(topics.AXES)]
-        for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
-            values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
-        values += [('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead']),
-                   *self._predictions(), *((f'refused {mode}', why) for mode, why in self.refusals().items())]
-        if 'moves unasked' in self.faults:
-            rates = ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded' for axis, (
-                rate, low, high) in zip(topics.AXES, state['unasked']['measured']))
-            return Diagnosis(ERROR, f'the antenna moves unasked: {rates}; acu/reset_faults once it is known why',
-                             values)
-        if 'drive frozen' in self.faults:
-            return Diagnosis(ERROR, 'the drive repeats its numbers though it is told to move; acu/reset_faults once '
-                             'it is known why', values)
-        if 'diverged' in self.faults:
-            return Diagnosis(ERROR, "autotrack diverged: the receiver's errors led away from the target; "
-                             'acu/reset_faults once their slope, phase and sign are right', values)
-        if invalid == ['error_gated']:
-            return Diagnosis(WARN, 'an error of the receiver was too far off to be believed', values)
-        if invalid in (['error_noisy'], ['error_gated', 'error_noisy']):
-            return Diagnosis(WARN, 'the errors of the receiver are noise, and not used', values)
-        if invalid:
-            return Diagnosis(ERROR, f'invalid input: {" ".join(invalid)}', values)
-        if state['overtravel']:
-            return Diagnosis(WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit',
-                             values)
-        return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
-
-    def _predictions(self):
-        """[(key, text)]: where the sun is, against the earth, and the elements of mode tle."""
-        sun, elements = self.predictor.sun_at(self._now * 1e-9), self.predictor.parameters
-        told = [] if sun is None else [(f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun)]
-        return told + [(name, getattr(elements, name)) for name in ('line_1', 'line_2') if getattr(elements, name)]
-
-    def _pins_told(self):
-        """Where the stow pins are, as the drive says."""
-        code = int(self.parts['inputs']['pins'])
-        return topics.BY_NAME[PINS].texts[code] if code != topics.SILENT else 'unknown'
+        return told
 
     @property
     def calls(self):
@@ -455,22 +377,20 @@ class Acu(Unit):
     @property
     def alarms(self):
         """The record of all alarms."""
-        return self.parts['state']['supervision']['alarms']
+        return self.desk.alarms
 
     @property
     def faults(self):
         """Names of the faults that wait for acu/reset_faults."""
-        state = self.parts['state']
-        latched = {'moves unasked': state['unasked']['moves'], 'drive frozen': state['frozen']['frozen'],
-                   'diverged': state['divergence']['diverged']}
-        return tuple(name for name, on in latched.items() if on)
+        bits = supervision.latched(self.parts['state'])
+        return tuple(fault for fault in diagnosis.FAULTS if bits >> table.INDEX[fault] & 1)
 
     @property
     def urgent(self):
         """What is told at once when it changes: faults, the mode, silence, the lock, the drive, pins, alignment."""
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
-        return (self.faults, outputs['mode'], outputs['reason'] == modes.SILENCE, outputs['locked'], inputs['drive'],
-                inputs['pins'], inputs['aligning'])
+        return (supervision.latched(self.parts['state']), outputs['mode'], outputs['reason'] == modes.SILENCE,
+                outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])
 
     @staticmethod
     def idle(numbers):
@@ -497,12 +417,3 @@ def rows(message):
     times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 for point in message.points]
     angles = [[point.positions[column] for column in columns] for point in message.points]
     return np.array(times), np.reshape(angles, (-1, len(columns)))
-
-
-def index(name):
-    """The place of an alarm in the table; raises ValueError for a name that there is not."""
-    name = name.replace('_', ' ')
-    if name not in table.INDEX:
-        raise ValueError(f'alarm = {name!r}:{did_you_mean(name, table.NAMES)} must be one of '
-                         f'{", ".join(table.NAMES)}')
-    return table.INDEX[name]

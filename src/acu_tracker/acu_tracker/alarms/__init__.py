@@ -6,6 +6,7 @@
 `machine`      the states of one alarm (ANSI/ISA-18.2-2016, section 6.2; IEC 62682), a pure function
 `annunciator`  the records of all alarms: delays, first-out, causes, shelving, reset
 `report`       the message on acu/alarms
+`desk`         what an operator does with them
 
 Symbols
     y, dy           encoder angle, rate by the motors' encoders                         [rad], [rad/s]
