@@ -23,11 +23,11 @@ def replies(path):
             for *_, data in bags.read(path).raw('acu/command_result')]
 
 
-@pytest.fixture(scope='module')
-def running(start_run, connect):
-    """(Run in realtime, its Client) from the moment in which it tracks. Ashore: the six nodes of a ship and whoever
-    asks them are more than two cores bear."""
-    run = start_run('uav_flyby', '--duration', '600', '--pacing', 'realtime', '--param', 'adu.stow_pins=true',
+@pytest.fixture(scope='module', params=('uav_flyby', 'ship_pass'))
+def running(request, start_run, connect):
+    """(Run in realtime ashore or on a ship, its Client) from the moment in which it tracks. Its pass has its middle in
+    the middle of the run: in a longer one the satellite would have to rise first."""
+    run = start_run(request.param, '--duration', '240', '--pacing', 'realtime', '--param', 'adu.stow_pins=true',
                     '--param', 'adu.pins.travel_time=0.5')
     client = connect(run.domain_id)
     client.read('acu/mode')
