@@ -54,11 +54,18 @@ def _highest(built, duration):
         return ()
     times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))
     elevation = np.degrees(target.look_angles(built, times)[1])
-    top = int(np.argmax(elevation))
+    top, up = int(np.argmax(elevation)), np.flatnonzero(elevation > 0.0)
     begin = orbit.instant('start', built.start_time)
-    when = begin + datetime.timedelta(seconds=float(times[top]))
-    return (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the satellite is highest in this run, {elevation[top]:.1f} deg, '
-            f'after {times[top]:.1f} s, at {when:%H:%M:%S} UTC',)
+
+    def when(row):
+        at = begin + datetime.timedelta(seconds=float(times[row]))
+        return f'after {times[row]:.1f} s, at {at:%H:%M:%S} UTC'
+    highest = (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the satellite is highest in this run, {elevation[top]:.1f} deg, '
+               f'{when(top)}')
+    rises = (f'the satellite rises {when(up[0])}: nothing can be tracked before',) if up.size and up[0] else ()
+    sets = (f'the satellite sets {when(up[-1])}: nothing can be tracked after',) if up.size and (
+        up[-1] < times.size - 1) else ()
+    return (highest, *rises, *sets)
 
 
 def program_messages(scenario):

@@ -1,0 +1,28 @@
+"""What a run says of its targets before it begins."""
+import re
+
+import pytest
+
+from pedestal_bringup.run import program, scenario
+
+
+def lines(name, duration):
+    return program.announced(scenario.load(name, duration=duration))
+
+
+def test_a_run_as_long_as_its_scenario_says_when_the_satellite_is_highest():
+    [line] = lines('leo_pass', None)
+    assert re.fullmatch(r'0 s is \S+ \S+ UTC; the satellite is highest in this run, 69\.\d deg, after [\d.]+ s, '
+                        r'at \S+ UTC', line)
+
+
+def test_a_run_that_is_longer_than_the_pass_says_when_it_rises_and_sets():
+    _, rises, sets = lines('leo_pass', 900.0)
+    up, down = (float(re.search(r'after ([\d.]+) s', line)[1]) for line in (rises, sets))
+    assert rises.startswith('the satellite rises') and sets.startswith('the satellite sets')
+    assert 0.0 < up < 450.0 < down < 900.0
+    assert up == pytest.approx(900.0 - down, abs=10.0)              # a pass is the same to both sides of its highest
+
+
+def test_a_target_without_a_date_says_nothing_of_a_sky():
+    assert lines('uav_flyby', None) == []
