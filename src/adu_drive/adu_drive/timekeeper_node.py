@@ -97,8 +97,8 @@ class Timekeeper(unit_node.UnitNode):
         self.timer.reset()
 
     def _tick(self, k, stamp, now):
-        """Make step k of a stamp [ns] at the time now of the steady clock [ns]. Steps whose time has passed are not
-        made up for: they are missed, and lost."""
+        """Make step k of a stamp [ns] at the time now of the steady clock [ns]. Of steps whose time has passed nothing
+        is told: they are missed, and lost."""
         before = stamp - self.period_ns
         if self.made:
             periods = (now - self.ticked) / self.period_ns

@@ -26,6 +26,9 @@ LINK = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8')
 which a command is stale; period T [ns]; stale: 1 while it is; invalid: of INVALID, since the last diagnosis."""
 
 
+MADE_UP = 2_000_000_000
+"""Time [ns] in which axes that are told nothing have stopped."""
+
 RECORD = np.dtype([('state', drive_unit.STATE), ('constants', drive_unit.CONSTANTS), ('inputs', drive_unit.INPUTS),
                    ('outputs', drive_unit.OUTPUTS), ('link', LINK), ('schedule', schedule.SCHEDULE),
                    ('injected', injected.INJECTED)], align=True)
@@ -50,6 +53,13 @@ def deck_acceleration(u, m, ship):
 
 
 @compiled
+def supervise(u, m):
+    """Commands that stay away, at the stamp of the last step, stop the axes."""
+    m.stale = m.command_stamp == NEVER or m.stamp - m.command_stamp > m.timeout
+    u.enable = 0 if m.stale else 1
+
+
+@compiled
 def decode(u, m, dropped, command, ship):
     """Records of the messages -> inputs of the drive, which is at the stamp of the last step; dropped: the command
     does not reach it."""
@@ -57,8 +67,7 @@ def decode(u, m, dropped, command, ship):
         m.command_stamp = command.stamp
         u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
         u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
-    m.stale = m.command_stamp == NEVER or m.stamp - m.command_stamp > m.timeout
-    u.enable = 0 if m.stale else 1
+    supervise(u, m)
     if ship.stamp != NEVER:
         deck_acceleration(u, m, ship)
 
@@ -108,9 +117,21 @@ def tell(m, stamp, moved, outputs):
 
 
 @compiled
+def make_up(m, stamp):
+    """Make the steps before that of a stamp [ns] for which the node was too late, as in realtime it may be: an antenna
+    goes on meanwhile, by the last command until that is stale. Of a long time MADE_UP, after which it stands."""
+    missed = (min(stamp - m.link.stamp, MADE_UP) // m.link.period - 1) if m.link.stamp != NEVER else 0
+    for _ in range(missed):
+        supervise(m.inputs, m.link)
+        drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
+        m.link.stamp += m.link.period
+
+
+@compiled
 def law(memory, stamp, inputs, outputs):
     """Step k: from t_k-1 to t_k, obeying what was said of step k - 1."""
     m = memory.record[0]
+    make_up(m, stamp)
     if schedule.pending(m.schedule, stamp):
         injected.take(m, stamp)
     moved = listen(m, stamp, inputs)

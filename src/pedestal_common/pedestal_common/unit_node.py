@@ -252,8 +252,11 @@ class UnitNode(shell.Shell):
             self._called = calls
 
     def _watch_trigger(self):
-        """Realtime: whether the trigger stays away; unless it was this node that was held up."""
+        """Realtime: whether the trigger stays away; unless it was this node that was held up, or the graph has not
+        begun."""
         now, limit = time.monotonic_ns(), self.graph.silence * SECOND
+        if self.clock()[1] < self.graph.start:
+            self._answered = self._begun = now
         held_up, self._watched = now - self._watched > limit, now
         silent = now - self._answered > limit and not held_up
         if silent != self.unit.silent:

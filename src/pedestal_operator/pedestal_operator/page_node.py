@@ -19,7 +19,7 @@ from pedestal_operator.page_passes import Coming
 from pedestal_operator.page_server import PageServer
 from pedestal_operator.remote_node import Remote
 
-FRAME, LOOK, SLOW = 0.1, 0.01, 1.0
+FRAME, LOOK, SLOW = 0.05, 0.01, 1.0
 """Time [s] between two states that pages are sent, two looks at what they ask, two of what changes slowly."""
 
 

@@ -22,10 +22,11 @@ OFF_TIME = 2.5
 
 ALWAYS, MOTORS, MOVING, FOLLOWING = table.JUDGED_WHEN
 
-Facts = namedtuple('Facts', 'dt gap latched attitude_lost attitude_jumped signal_lost unasked_rate beamwidth')
+Facts = namedtuple('Facts', 'dt gap lost latched attitude_lost attitude_jumped signal_lost unasked_rate beamwidth')
 """Of a step: dt, time since the one before, and 0 after a gap, whose length is `gap` [s], infinite in the first step;
-bits of the alarms that wait for a reset; whether the attitude of a ship is lost, or has jumped, and whether the signal
-of autotrack is lost. Beside that the rate at which an axis moves unasked [rad/s] and the beamwidth [rad]."""
+whether steps between the two were lost; bits of the alarms that wait for a reset; whether the attitude of a ship is
+lost, or has jumped, and whether the signal of autotrack is lost. Beside that the rate at which an axis moves unasked
+[rad/s] and the beamwidth [rad]."""
 
 SILENCE = 0.3
 """Gap between two steps [s] beyond which the drive was silent."""
@@ -43,12 +44,13 @@ def _of_motors(d, i, u, envelope, p, facts):
     """Bits of the alarms of axis i that its encoder, motors and commands give away. d: its detectors; envelope:
     servo.unasked.ENVELOPE; p: record of its AxisParameters."""
     y, dy, high, low = u.position[i], u.velocity[i], envelope.high[i], envelope.low[i]
-    bits = 0
-    if detectors.encoder_jump(d, y, dy, facts.dt):
+    bits, surge = 0, detectors.SURGE * p.limits.acceleration if facts.lost else 0.0
+    x = detectors.parted(d, y, dy, facts.dt, surge)
+    if detectors.encoder_jump(x):
         bits |= table.ENCODER_JUMP
     if detectors.encoder_stuck(d, y, dy, facts.dt):
         bits |= table.ENCODER_STUCK
-    if detectors.disagreement(d, y, dy, facts.dt):
+    if detectors.disagreement(d, x, facts.dt):
         bits |= table.DISAGREEMENT
     if detectors.pushes(d, u.torque[i], p.feedforward.friction):
         bits |= table.BRAKE_NOT_RELEASED

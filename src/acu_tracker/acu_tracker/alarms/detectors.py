@@ -34,6 +34,9 @@ IDLE = 0.1
 PUSHES = 50.0
 """Torque over the Coulomb friction that no free axis needs for long: half of what brakes hold, twice a strong wind."""
 
+SURGE = 2.0
+"""Acceleration that an axis may reach, in those that are commanded at the most."""
+
 DIFFERENCE = 1e-2
 """Difference of encoder and motors within APART [rad]: five times what lash and wind-up of a gear leave."""
 
@@ -70,9 +73,20 @@ def initialise(d, y, dy):
 
 
 @compiled
-def encoder_jump(d, y, dy, dt):
-    """Whether the encoder moved otherwise than the motors in this step: |y - y' - (dy + dy') dt / 2| > JUMP."""
-    return abs(y - d.y - 0.5 * (dy + d.dy) * dt) > JUMP
+def parted(d, y, dy, dt, acceleration):
+    """By how much [rad] encoder and motors moved otherwise in this step: x = y - y' - (dy + dy') dt / 2.
+
+    acceleration: that an axis may have reached between two steps of which those between were lost [rad/s2], else 0.
+    The motors may have gone acceleration dt^2 / 4 further than the trapezoid then: so much of x says nothing.
+    """
+    x = y - d.y - 0.5 * (dy + d.dy) * dt
+    return math.copysign(max(abs(x) - 0.25 * acceleration * dt * dt, 0.0), x)
+
+
+@compiled
+def encoder_jump(x):
+    """Whether encoder and motors parted by more than JUMP in this step."""
+    return abs(x) > JUMP
 
 
 @compiled
@@ -88,9 +102,9 @@ def encoder_stuck(d, y, dy, dt):
 
 
 @compiled
-def disagreement(d, y, dy, dt):
-    """Whether encoder and motors have moved differently of late: x' = y' - dy - x / APART, |x| > DIFFERENCE."""
-    d.apart += y - d.y - 0.5 * (dy + d.dy) * dt - d.apart * dt / APART
+def disagreement(d, x, dt):
+    """Whether encoder and motors have parted by x of late: X' = x / dt - X / APART, |X| > DIFFERENCE."""
+    d.apart += x - d.apart * dt / APART
     d.disagrees = beyond(d.disagrees, abs(d.apart), DIFFERENCE, 0.5 * DIFFERENCE)
     return d.disagrees != 0
 

@@ -60,8 +60,8 @@ def _highest(built, duration):
     def when(row):
         at = begin + datetime.timedelta(seconds=float(times[row]))
         return f'after {times[row]:.1f} s, at {at:%H:%M:%S} UTC'
-    highest = (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the satellite is highest in this run, {elevation[top]:.1f} deg, '
-               f'{when(top)}')
+    highest = (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the satellite is highest in this run, '
+               f'{elevation[top]:.1f} deg, {when(top)}')
     rises = (f'the satellite rises {when(up[0])}: nothing can be tracked before',) if up.size and up[0] else ()
     sets = (f'the satellite sets {when(up[-1])}: nothing can be tracked after',) if up.size and (
         up[-1] < times.size - 1) else ()

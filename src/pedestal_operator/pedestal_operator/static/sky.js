@@ -1,7 +1,7 @@
 // The sky from above: north up, east to the right, the zenith in the middle.
 import {onDraw} from './link.js';
 import {draw, points, set, show} from './svg.js';
-import {day, find, make, number, say, time} from './text.js';
+import {day, find, make, minute, number, say, time} from './text.js';
 
 const RADIUS = 96;
 
@@ -44,7 +44,6 @@ function passLine(pass) {
 
 function nextLine(pass, now) {
   const other = day(pass.aos) === day(now) ? '' : `${day(pass.aos)} `;
-  const minute = (seconds) => time(seconds).slice(0, 5);
   return words([['next', `${other}${minute(pass.aos)} to ${minute(pass.los)}`], ['', `${number(pass.highest, 0)}°`],
                 ['az', `${number(pass.from, 0)}° to ${number(pass.to, 0)}°`]]);
 }

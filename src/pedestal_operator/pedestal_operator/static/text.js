@@ -16,6 +16,9 @@ export function time(seconds, digits = 0) {
   return new Date(Math.floor(seconds * scale) / scale * 1000).toISOString().slice(11, digits ? 20 + digits : 19);
 }
 
+// The same to the minute, or to the second of a recording.
+export function minute(seconds) { return seconds < 1e8 ? `${seconds.toFixed(0)} s` : time(seconds).slice(0, 5); }
+
 // The day of a time in UTC.
 export function day(seconds) { return new Date(1000 * seconds).toUTCString().slice(5, 11); }
 
