@@ -120,6 +120,18 @@ class Commander:
                     f'said: {self.client.said(-5)}')
 
 
+def test_before_the_graph_begins_the_drive_is_not_silent(start_node, connect):
+    begins = time.time_ns() + 12_000_000_000
+    client = connect(start_node('acu', '-p', f'graph.start:={begins}').domain_id)
+    client.read('diagnostics')
+
+    def told(after):
+        return [status for array in client.heard['diagnostics'] for status in array.status
+                if status.name == 'acu' and (messages.nanoseconds(array.header.stamp) > begins) == after]
+    client.until(lambda: any('no joint_states' in status.message for status in told(True)))
+    assert not any('no joint_states' in status.message for status in told(False))
+
+
 @pytest.fixture(scope='module')
 def drive(start_node, connect):
     """A drive alone, with brakes so weak that a stop takes a second, under a commander."""
