@@ -3,6 +3,7 @@ of `pedestal`, single nodes, and a client that talks to them."""
 import collections
 import contextlib
 import dataclasses
+import fcntl
 import os
 import pathlib
 import random
@@ -178,18 +179,51 @@ def start_run(reserve_domain, tmp_path_factory):
     started = []
 
     def start(scenario, *arguments, domain_id=None, bag=None, prefix=()):
-        folder = tmp_path_factory.mktemp('run')
-        domain = domain_id or reserve_domain()
-        run = Run(None, bag or folder / 'bag', domain)
-        command = [*prefix, sys.executable, '-m', 'pedestal_bringup.cli', 'run', scenario, '--bag', run.bag, '--json',
-                   run.json, *arguments]
-        run.process = _popen(command, folder, _environment(domain, folder))
-        started.append(run)
-        return run
+        started.append(_run(scenario, arguments, domain_id or reserve_domain(), tmp_path_factory.mktemp('run'), bag,
+                            prefix))
+        return started[-1]
 
     yield start
     for run in started:
         run.kill()
+
+
+def _run(scenario, arguments, domain, folder, bag=None, prefix=()):
+    run = Run(None, bag or folder / 'bag', domain)
+    command = [*prefix, sys.executable, '-m', 'pedestal_bringup.cli', 'run', scenario, '--bag', run.bag, '--json',
+               run.json, *arguments]
+    run.process = _popen(command, folder, _environment(domain, folder))
+    return run
+
+
+RECORDED = {'leo_pass': 5.0, 'ship_pass': 3.0}
+"""{scenario: s} of the runs of `recorded`."""
+
+
+@pytest.fixture(scope='session')
+def recorded(reserve_domain, tmp_path_factory):
+    """recorded(scenario) -> (Run, what it printed) of a finished lockstep run of RECORDED seconds that comes to
+    autotrack, to be read only: one for the files of all workers, made by the first that asks."""
+    mine = tmp_path_factory.getbasetemp()
+    everyones = mine.parent if 'PYTEST_XDIST_WORKER' in os.environ else mine
+
+    def make(scenario):
+        folder = everyones / f'recorded-{scenario}'
+        folder.mkdir(exist_ok=True)
+        said = folder / 'said'
+        with open(folder / 'lock', 'w') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not said.exists():
+                run = _run(scenario, ('--pacing', 'lockstep', '--duration', RECORDED[scenario], '--param',
+                                      'acu.tracker.lock_count=20'), reserve_domain(), folder)
+                try:
+                    result = run.finish()
+                finally:
+                    run.kill()
+                assert result.returncode == 0, result.stderr
+                said.write_text(result.stdout)
+        return Run(None, folder / 'bag', None), said.read_text()
+    return make
 
 
 MODULES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'ins': 'ship_motion_sim.ins_node',

@@ -120,7 +120,7 @@ def test_a_node_of_another_beam_is_not_recomputed(runs):
 
 
 def test_ctrl_c_ends_an_array_in_order(start_run):
-    run = start_run(FOUR, *FAST)
+    run = start_run(FOUR, *FAST, '--duration', '200')
     deadline = time.monotonic() + 60.0
     while not run.recorded():
         assert time.monotonic() < deadline

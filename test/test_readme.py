@@ -26,10 +26,11 @@ NOT_RUN = {
 
 SHORTER = {
     'pedestal run uav_flyby': '--duration 8',
-    'pedestal run leo_pass --tle iss.tle --station 47.4,8.5,500 --pass 3': '--duration 3',
-    'pedestal run track_file': '--duration 5',
-    'pedestal run ship_pass': '--duration 5',
-    'pedestal run my_antenna.yaml': '--duration 5',
+    'pedestal run leo_pass --tle iss.tle --station 47.4,8.5,500 --pass 3': '--duration 2',
+    'pedestal run track_file': '--duration 2',
+    'pedestal run ship_pass': '--duration 2',
+    'pedestal run my_antenna.yaml': '--duration 2',
+    'pedestal trials uav_flyby': '--runs 4 --duration 4',
     'pedestal run leo_pass --pacing realtime': '--duration 5',
 }
 """{how a line begins: what makes it short}; the same command, on less time."""

@@ -20,7 +20,7 @@ CLI = [sys.executable, '-m', 'pedestal_bringup.cli']
 ANSWERS = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode')
 INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'ins/state', 'tracking_receiver/angle_error',
           'acu/program_track')
-STEPS = 401
+STEPS = 601
 ENOUGH = {'--lockstep': range(STEPS, STEPS + 1), '--rate 1': range(STEPS // 2, STEPS + 1),
           '--rate 4': range(1, STEPS + 1)}
 """Steps that are answered: in realtime the last one may wait for the message of the INS that was still on its way when
@@ -29,12 +29,9 @@ are sent within half a second."""
 
 
 @pytest.fixture(scope='module')
-def run(start_run):
-    """A finished lockstep run with a ship, 2 s, in which the ACU comes to autotrack."""
-    run = start_run('ship_pass', '--pacing', 'lockstep', '--duration', '2', '--param', 'acu.tracker.lock_count=20')
-    result = run.finish()
-    assert result.returncode == 0, result.stderr
-    return run
+def run(recorded):
+    """A finished lockstep run with a ship, 3 s, in which the ACU comes to autotrack."""
+    return recorded('ship_pass')[0]
 
 
 @pytest.fixture
@@ -192,7 +189,7 @@ def test_pause_step_and_quit_from_the_keyboard(run, connect, terminal, domain):
     replay.press(b' ')
     paused = rests()
     assert 20 < paused < STEPS
-    client.until(lambda: replay.said(f'{(paused - 1) * 0.005:.3f} / 2.000 s  paused'))
+    client.until(lambda: replay.said(f'{(paused - 1) * 0.005:.3f} / 3.000 s  paused'))
     replay.press(b' ')
     client.until(lambda: len(heard) > paused + 20)
     replay.press(b'n')

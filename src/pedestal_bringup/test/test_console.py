@@ -57,3 +57,13 @@ def test_a_verb_that_computes_nothing_imports_no_compiler(command):
             'sys.stderr.write(", ".join({"numba", "rclpy", "scipy"} & set(sys.modules)))')
     done = subprocess.run([sys.executable, '-c', code, *command], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, '')
+
+
+@pytest.mark.parametrize('code, without', [
+    ('import pedestal_bringup.recorder_node', {'numba', 'scipy'}),
+    ('from pedestal_bringup.run import program, scenario; program.program_messages(scenario.load("leo_pass")); '
+     'scenario.load("leo_pass").unit("tracking_receiver").prepare()', {'scipy.linalg'})])
+def test_a_run_imports_before_its_first_step_what_it_needs(code, without):
+    done = subprocess.run([sys.executable, '-c', f'{code}; import sys; print({without} & sys.modules.keys())'],
+                          capture_output=True, text=True, timeout=300)
+    assert (done.stdout, done.stderr) == ('set()\n', '')

@@ -20,6 +20,7 @@ import time
 
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.runtime import rtsys
 from numba.misc.appdirs import user_cache_dir
 
 COLUMNS = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
@@ -116,8 +117,16 @@ class _Contents(CompileResultCacheImpl):
 
 class _Cache(FunctionCache):
     """Of two processes that save a law for two signatures at once one may lose its entry, or find the other's code
-    under it: numba reads the index, chooses a name, writes the index and then the code. Here one waits."""
+    under it: numba reads the index, chooses a name, writes the index and then the code. Here one waits.
+
+    To load a law numba makes ready to compile, for a third of a second and with all of scipy.linalg. What is loaded
+    asks for its runtime only; who compiles makes ready by himself."""
     _impl_class = _Contents
+
+    def load_overload(self, signature, target):
+        rtsys.initialize(target)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(signature, target)
 
     def _save_overload(self, signature, data):
         with _alone(pathlib.Path(self.cache_path).with_name('index.lock')):

@@ -21,7 +21,6 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 
 from pedestal_common import messages, middleware, nodes, parameters
-from pedestal_common.compiled import compiled_once
 from pedestal_common.graph_parameters import GraphParameters
 from pedestal_common.realtime import utc
 from pedestal_common.realtime.listening import Listener, subscribe
@@ -315,6 +314,7 @@ class Shell(Node):
 
     def prepare(self, unit):
         """Compile the laws of a unit, cold half a minute and more, unless told to stop."""
+        from pedestal_common.compiled import compiled_once  # with numba, which a node without a law does not need
         _compiling.append(True)
         try:
             if _stop:

@@ -45,11 +45,14 @@ if __name__ == '__main__':
 TYPES = ('f8', 'f4', 'i8')
 
 
+def environment(folder, cache):
+    return {**os.environ, 'XDG_CACHE_HOME': str(cache),
+            'PYTHONPATH': os.pathsep.join([str(folder), *filter(None, sys.path)])}
+
+
 def compilations(folder, cache, arguments):
     """How often each of the processes with these arguments, which start together, compiled the law."""
-    environment = {**os.environ, 'XDG_CACHE_HOME': str(cache),
-                   'PYTHONPATH': os.pathsep.join([str(folder), *filter(None, sys.path)])}
-    processes = [subprocess.Popen([sys.executable, '-m', 'one_law.law', *argument], env=environment,
+    processes = [subprocess.Popen([sys.executable, '-m', 'one_law.law', *argument], env=environment(folder, cache),
                                   stdout=subprocess.PIPE, text=True) for argument in arguments]
     return [int(process.communicate(timeout=120.0)[0]) for process in processes]
 
@@ -66,6 +69,17 @@ def folder(tmp_path):
 def test_one_of_many_compiles(folder):
     assert sorted(compilations(folder, folder / 'cache', [()] * 4)) == [0, 0, 0, 1]
     assert compilations(folder, folder / 'cache', [()]) == [0]
+
+
+def test_what_is_in_the_cache_is_loaded_without_what_compiles(tmp_path):
+    """To import which takes longer than everything else; it is there for what is compiled afterwards."""
+    code = ('import sys, numba, numpy; from pedestal_common.compiled import assign; x = numpy.zeros((2, 2)); '
+            'assign(x, x); print(sum(assign.stats.cache_misses.values()), "scipy.linalg" in sys.modules); '
+            'numba.njit(lambda x: assign(x, 1.0 + x))(x); print(x.sum())')
+    for said in ('1 True\n4.0\n', '0 False\n4.0\n'):
+        done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=120.0,
+                              env=environment(tmp_path, tmp_path / 'cache'))
+        assert (done.stdout, done.stderr) == (said, '')
 
 
 def test_a_checkout_finds_what_another_of_the_same_sources_compiled(folder):

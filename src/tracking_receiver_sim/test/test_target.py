@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 from sgp4.io import compute_checksum
 from skyfield.api import EarthSatellite, load, wgs84
 
@@ -73,6 +74,12 @@ def test_hermite_pieces_agree_with_sgp4(leo):
     got = states(leo, times)
     assert np.linalg.norm(got[:, 1:4] - position, axis=1).max() < 2e-3
     assert np.linalg.norm(got[:, 4:7] - velocity, axis=1).max() < 0.03
+
+
+def test_the_pieces_are_those_of_scipy_to_the_last_bit():
+    rng = np.random.default_rng(1)
+    x, (y, y_dot) = np.cumsum(rng.uniform(0.5, 2.0, 50)), rng.normal(0.0, 1e6, (2, 50, 3))
+    assert np.array_equal(target._hermite(x, y, y_dot), CubicHermiteSpline(x, y, y_dot).c)
 
 
 def test_run_is_centred_on_the_culmination(leo):

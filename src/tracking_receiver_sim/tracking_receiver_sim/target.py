@@ -21,8 +21,6 @@ import typing
 from collections import namedtuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.optimize import minimize_scalar
 
 from pedestal_common import orbit
 from pedestal_common.compiled import compiled
@@ -31,12 +29,13 @@ from pedestal_common.line_of_sight import earth_angles, earth_direction
 from pedestal_common.orbit import TargetError
 from pedestal_common.parameters import record, record_type
 from tracking_receiver_sim.params import KINDS, RAMP, SINE, STEP, AngleParameters
-from tracking_receiver_sim.track import files
 
 KNOT_SPACING = 1.0
 """Between SGP4 knots [s]."""
 SEARCH_SPACING = 20.0
 """Between the pass finder's looks [s]; a LEO pass lasts minutes."""
+LOOKS = 41
+"""In a row between two of these to find a peak."""
 MARGIN = 5.0
 """Time before and after the run [s] that every kind covers, for a program track; a track_file as far as it goes."""
 
@@ -161,25 +160,35 @@ def culmination(params, satrec):
     """
     leo_pass, low, high = params.leo_pass, params.leo_pass.culmination_low_deg, params.leo_pass.culmination_high_deg
 
-    def depth(t):
-        return -orbit.elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, np.array([t]))[0]
+    def elevations(times):
+        return orbit.elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, times)
 
     best = -math.inf
     for day in np.arange(0.0, leo_pass.search_days, 1.0):
         seconds = 86400.0 * min(1.0, leo_pass.search_days - day)
         times = 86400.0 * day + np.arange(-SEARCH_SPACING, seconds + 1.5 * SEARCH_SPACING, SEARCH_SPACING)
-        elevation = orbit.elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, times)
+        elevation = elevations(times)
         for i in range(1, len(times) - 1):
             if elevation[i] > max(0.0, elevation[i - 1]) and elevation[i] >= elevation[i + 1]:
-                peak = minimize_scalar(depth, bounds=(times[i - 1], times[i + 1]), method='bounded',
-                                       options={'xatol': 1e-3})
-                if low <= -peak.fun <= high:
-                    return peak.x
-                best = max(best, -peak.fun)
+                when, highest = _peak(elevations, times[i - 1], times[i + 1])
+                if low <= highest <= high:
+                    return when
+                best = max(best, highest)
     reached = f'highest outside is {best:.1f} deg' if math.isfinite(best) else 'it never rises'
     raise TargetError(f'satellite {satrec.satnum_str}: no culmination between {low:g} and {high:g} deg within '
                       f'{leo_pass.search_days:g} days of the TLE epoch ({reached}) at latitude '
                       f'{params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg')
+
+
+def _peak(elevations, begin, end):
+    """(time [s], elevation [deg]) of the one peak between begin and end, to a millisecond: looked for in ever narrower
+    rows of LOOKS."""
+    while end - begin > 1e-3:
+        times = np.linspace(begin, end, LOOKS)
+        elevation = elevations(times)
+        top = int(np.argmax(elevation))
+        begin, end = times[max(top - 1, 0)], times[min(top + 1, LOOKS - 1)]
+    return float(times[top]), float(elevation[top])
 
 
 def _start(params, satrec, duration):
@@ -206,12 +215,21 @@ def _leo_pass(params, duration):
         raise TargetError(f'satellite {satrec.satnum_str}: below the horizon from {orbit.iso(julian, fraction)} for '
                           f'{duration:g} s at latitude {params.station.latitude_deg:g}, longitude '
                           f'{params.station.longitude_deg:g} deg')
-    spline = CubicHermiteSpline(knots, position, velocity)
-    return spline.x, spline.c, orbit.iso(julian, fraction)
+    return knots, _hermite(knots, position, velocity), orbit.iso(julian, fraction)
+
+
+def _hermite(x, y, y_dot):
+    """Coefficients (4, n, columns), highest power first, of cubic pieces through y and y_dot (n + 1, columns) at x:
+    those of scipy's CubicHermiteSpline to the last bit, without the third of a second that its import takes."""
+    h = np.diff(x)[:, None]
+    slope = np.diff(y, axis=0) / h
+    bend = (y_dot[:-1] + y_dot[1:] - 2.0 * slope) / h
+    return np.stack((bend / h, (slope - y_dot[:-1]) / h - bend, y_dot[:-1], y[:-1]))
 
 
 # track_file
 
 def _track_file(params, duration):
+    from tracking_receiver_sim.track import files  # with scipy, which only a flight needs
     laid = files.lay_out(params, duration, MARGIN)
     return laid.breaks, laid.coefficients, laid.start_time, laid.summary

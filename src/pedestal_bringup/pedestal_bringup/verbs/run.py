@@ -37,9 +37,6 @@ LARGEST_LOSS = 0.01
 
 def main(options):
     """Run, record and print the results; the exit code. Raises RuntimeError where the recording is not complete."""
-    from pedestal_bringup.analysis import results
-    from pedestal_bringup.bags.bag import read
-    from pedestal_bringup.bags.verify import verify
     from pedestal_bringup.run import beside, graph, program, scenario
     from pedestal_common import nodes
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
@@ -57,6 +54,10 @@ def main(options):
     with (beside.servers(options, chosen.header, bag),
           console.progress_of_run(chosen.header.duration) as progress):
         outcome = graph.run(chosen, bag, progress)
+    # With scipy, which takes half a second: nobody waits for it before the first step.
+    from pedestal_bringup.analysis import results
+    from pedestal_bringup.bags.bag import read
+    from pedestal_bringup.bags.verify import verify
     if outcome.stopped:
         print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
         if not outcome.recorder.get('messages'):
