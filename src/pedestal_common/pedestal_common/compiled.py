@@ -135,7 +135,7 @@ def compiled(law):
 
 def inlined(law):
     """Decorator of a small law: `compiled`, and made part of whoever calls it. Without that no loop over lanes of the
-    drive becomes vectors, and a bank of filters takes a third more."""
+    drive becomes vectors, and a bank of filters is slower."""
     dispatcher = compiled(law)
     dispatcher.targetoptions['forceinline'] = True
     return dispatcher
