@@ -23,9 +23,8 @@ from adu_drive import (
     thermal,
     travel,
 )
-from adu_drive.lanes import inlined
 from adu_drive.params import SPEED_PERIOD
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, inlined
 
 CURRENT_TICKS = 5
 """Current-loop periods in one speed-loop period."""

@@ -5,7 +5,7 @@ a torque demand `hold` (one pinion would let go without it), none from `out` on 
 """
 import math
 
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 def line(p):

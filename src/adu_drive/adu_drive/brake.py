@@ -1,7 +1,7 @@
 """Spring-applied brake on a motor shaft: Coulomb friction, stepped exactly, so that it holds without creep."""
 import math
 
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 @inlined

@@ -2,7 +2,7 @@
 import math
 
 from adu_drive import pi
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 @inlined

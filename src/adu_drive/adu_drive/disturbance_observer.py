@@ -6,7 +6,7 @@ Linear extended state observer, Gao, American Control Conference 2003: both pole
 """
 import math
 
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 def gains(w_o, h):

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from adu_drive import axis, drive_state, gimbal, mount, stow_pins, wind, wind_field
-from adu_drive.lanes import at, count, inlined
+from adu_drive.lanes import at, count
 from adu_drive.params import AduParameters, whole_speed_periods
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, inlined
 
 RING = 256
 """Commands kept for the transport delay: more than twice MAX_DELAY over the shortest period, once of its own and once

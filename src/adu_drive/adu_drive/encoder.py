@@ -1,7 +1,7 @@
 """Absolute encoders: counts of a full turn, continued over the turns."""
 import math
 
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 @inlined

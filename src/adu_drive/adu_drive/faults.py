@@ -2,7 +2,7 @@
 import typing
 
 from adu_drive import thermal
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 class Fault(typing.NamedTuple):

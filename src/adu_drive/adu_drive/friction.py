@@ -2,7 +2,7 @@
 same bits on every machine (reference/performance.md)."""
 import math
 
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 @inlined

@@ -1,7 +1,7 @@
 """Pinion on bull gear: a mesh with lash, its torque on the load axis."""
 import math
 
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 @inlined

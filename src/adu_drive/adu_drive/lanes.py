@@ -29,21 +29,11 @@ from numba.extending import (
     type_callable,
 )
 
-from pedestal_common.compiled import compiled
-
 WIDTH = 32
 """Lanes of an array. With 16 LLVM does not vectorise, 64 need more of the nearest cache than there is."""
 
 WORD = 8
 """Bytes of every number."""
-
-
-def inlined(law):
-    """Decorator of a law of a sub-step: `compiled`, and made part of whoever calls it, without which no loop over
-    lanes becomes vectors."""
-    dispatcher = compiled(law)
-    dispatcher.targetoptions['forceinline'] = True
-    return dispatcher
 
 
 class _Place(types.Type):

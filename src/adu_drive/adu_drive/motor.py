@@ -7,7 +7,7 @@
 import math
 
 from adu_drive import friction
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 @inlined

@@ -1,5 +1,5 @@
 """The integral of a PI controller, held while its actuator cannot follow."""
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 @inlined

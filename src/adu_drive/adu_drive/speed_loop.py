@@ -4,7 +4,7 @@ for comparison, one PI for each motor on its own speed (the other structure the 
 Seen in sum and difference, two loops are the one on the mean and a second one of half its gains on omega_1 - omega_2,
 whose integral holds whatever makes the motors differ: an offset of a current sensor, or the bias itself.
 """
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 @inlined

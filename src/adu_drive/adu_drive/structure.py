@@ -4,7 +4,7 @@ The gear, the motors and the load encoder see the base; the beam goes where the 
 """
 import math
 
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 
 def spring_and_damper(inertia, frequency, damping):

@@ -5,7 +5,7 @@
 
 x follows the torque the motor truly makes, so what trips on it stands for a sensor in the winding.
 """
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 COPPER = 0.00393
 """Temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)."""

@@ -1,7 +1,7 @@
 """Ends of travel: a rate command that stops in time, and the buffer behind it."""
 import math
 
-from adu_drive.lanes import inlined
+from pedestal_common.compiled import inlined
 
 BACK = 0.1
 """Rate [rad/s] at which an axis is led back from far behind an end of its travel."""

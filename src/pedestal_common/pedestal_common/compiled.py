@@ -142,6 +142,14 @@ def compiled(law):
     return dispatcher
 
 
+def inlined(law):
+    """Decorator of a small law: `compiled`, and made part of whoever calls it. Without that no loop over lanes of the
+    drive becomes vectors, and a bank of filters is slower."""
+    dispatcher = compiled(law)
+    dispatcher.targetoptions['forceinline'] = True
+    return dispatcher
+
+
 @compiled
 def assign(target, source):
     """target[:, :] = source; numpy's own check of the shapes takes numba three seconds to compile."""

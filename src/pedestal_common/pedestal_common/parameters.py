@@ -4,6 +4,7 @@ The ROS side (declare, refuse, read) is in shell.py; this file knows no ROS.
 """
 import dataclasses
 import difflib
+import functools
 import math
 import typing
 
@@ -78,12 +79,18 @@ def _check_field(field, value):
         raise ParameterError(f'{name} = {value!r}: must be text')
 
 
+@functools.cache
+def _group_type(field):
+    """The dataclass of a group."""
+    return type(field.default_factory())
+
+
 def flatten(cls, prefix=''):
     """Every leaf of a parameter dataclass as (dotted name, field); groups are walked."""
     for field in dataclasses.fields(cls):
         name = prefix + field.name
         if field.metadata.get('group'):
-            yield from flatten(type(field.default_factory()), name + '.')
+            yield from flatten(_group_type(field), name + '.')
         else:
             yield name, field
 
@@ -149,6 +156,7 @@ def _replace(instance, values, prefix):
         raise ParameterError(f'{prefix}{error}') from None
 
 
+@functools.cache
 def record_type(cls) -> np.dtype:
     """The numpy record of a parameter dataclass: float -> f8, int and bool -> i8, a choice -> i8 (its
     index among the options), a group -> nested record; free text is left out."""
@@ -156,7 +164,7 @@ def record_type(cls) -> np.dtype:
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
         if field.metadata.get('group'):
-            fields.append((field.name, record_type(type(field.default_factory()))))
+            fields.append((field.name, record_type(_group_type(field))))
         elif 'options' in field.metadata or hints[field.name] in (int, bool):
             fields.append((field.name, 'i8'))
         elif hints[field.name] is float:
@@ -169,7 +177,7 @@ def _record_values(instance, cls):
     for field in dataclasses.fields(cls):
         value = getattr(instance, field.name)
         if field.metadata.get('group'):
-            values.append(_record_values(value, type(field.default_factory())))
+            values.append(_record_values(value, _group_type(field)))
         elif 'options' in field.metadata:
             values.append(field.metadata['options'].index(value))
         elif isinstance(value, (bool, int, float)):

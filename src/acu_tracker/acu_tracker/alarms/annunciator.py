@@ -74,19 +74,24 @@ def _raised(s, i, t):
 
 
 @compiled
+def _enter(s, i, state, t):
+    """Alarm i goes into another of machine.STATES."""
+    a = s.alarm[i]
+    if machine.LISTED[a.state] or machine.LISTED[state]:
+        s.revision += 1
+    a.state = state
+    if state == machine.UNACKNOWLEDGED:
+        _raised(s, i, t)
+
+
+@compiled
 def put(s, i, event, t):
     """An event of machine.EVENTS for alarm i at t [s]; whether its state takes it."""
-    a = s.alarm[i]
-    before, after = a.state, machine.next_state(a.state, event, table.LATCHED[i])
-    if after == machine.REFUSED:
-        return False
-    if after != before:
-        a.state = after
-        if machine.LISTED[before] or machine.LISTED[after]:
-            s.revision += 1
-        if after == machine.UNACKNOWLEDGED:
-            _raised(s, i, t)
-    return True
+    before = s.alarm[i].state
+    after = machine.next_state(before, event, table.LATCHED[i])
+    if after != before and after != machine.REFUSED:
+        _enter(s, i, after, t)
+    return after != machine.REFUSED
 
 
 @compiled
@@ -104,6 +109,9 @@ def update(s, t, conditions, judged):
     for i in range(COUNT):
         a = s.alarm[i]
         on, means = conditions & judged & 1 << i != 0, judged & 1 << i != 0
+        if not on and a.active == 0 and a.state == (machine.NORMAL if means else machine.SUPPRESSED):
+            a.since = t     # nothing is wrong, as nearly always: what follows would change no more
+            continue
         _delayed(a, on, t, table.ON_DELAY[i] if on else table.OFF_DELAY[i])
         if a.state == machine.SHELVED and t >= a.until:
             put(s, i, machine.UNSHELVE, t)

@@ -2,6 +2,8 @@
 
 An alarm that is not latched never is in a latched state: its row of `alarms.table` says whether it is.
 """
+import numpy as np
+
 from pedestal_common.compiled import compiled
 
 STATES = ('normal', 'unacknowledged', 'acknowledged', 'returned unacknowledged', 'latched unacknowledged',
@@ -19,7 +21,7 @@ REFUSED = -1
 
 _N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(STATES)), REFUSED)
 
-NEXT = (
+NEXT = np.array((
     # raise, clear, acknowledge, reset, shelve, unshelve, suppress, release
     (_U, _N, _x, _x, _SH, _x, _SU, _N),        # normal
     (_U, _R, _A, _x, _SH, _x, _U, _U),         # unacknowledged
@@ -29,8 +31,8 @@ NEXT = (
     (_U, _LA, _x, _N, _SH, _x, _LA, _LA),      # latched acknowledged
     (_SH, _SH, _x, _x, _SH, _N, _SH, _SH),     # shelved
     (_SU, _SU, _x, _x, _SH, _x, _SU, _N),      # suppressed by design
-)
-"""NEXT[state][event] of an alarm that is not latched. An alarm that is there is never suppressed: its condition counts
+))
+"""NEXT[state, event] of an alarm that is not latched. An alarm that is there is never suppressed: its condition counts
 as gone, so that it returns, and is acknowledged, before."""
 
 ANNUNCIATED = (False, True, True, True, True, True, False, False)
@@ -54,4 +56,4 @@ def next_state(state, event, latched):
             return LATCHED_UNACKNOWLEDGED
         if state == ACKNOWLEDGED:
             return LATCHED_ACKNOWLEDGED
-    return NEXT[state][event]
+    return NEXT[state, event]

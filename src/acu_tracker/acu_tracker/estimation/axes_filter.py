@@ -36,6 +36,18 @@ def correct(f, c, m):
 
 
 @compiled
+def expected(f):
+    """Motion at the instant of the last `predict`."""
+    return Motion(axis_filter.expected_motion(f[0]), axis_filter.expected_motion(f[1]))
+
+
+@compiled
+def outlook(f, c, T):
+    """Motion T [s] >= 0 after the last measurement; the prior fields stay."""
+    return Motion(axis_filter.outlook(f[0], c[0], T), axis_filter.outlook(f[1], c[1], T))
+
+
+@compiled
 def read(f):
     """Estimate at the instant of the last `predict`."""
     azimuth, elevation = axis_filter.expected(f[0]), axis_filter.expected(f[1])

@@ -116,8 +116,11 @@ def predict(f, c, T):
     f.T = T
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
-        f.mu_prior[j] = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
-        g = imm.combine(f.weights, f.x, f.p, c.count)
+        if switch == 0.0:
+            f.mu_prior[j], g = f.mu[j], imm.alone(f.x, f.p, j)
+        else:
+            f.mu_prior[j] = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
+            g = imm.combine(f.weights, f.x, f.p, c.count)
         model = motion_models.discretised(c.models[j], g.x.acceleration, T)
         _put(f.x_prior, f.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
                                                kalman.predicted_covariance(g.P, model.F, model.Q, T)))
@@ -129,6 +132,12 @@ def predict(f, c, T):
 def expected(f):
     """Gaussian of the prediction: mean and covariance of the bank."""
     return imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
+
+
+@compiled
+def expected_motion(f):
+    """The AxisMotion of `expected`."""
+    return imm.mean(f.mu_prior, f.x_prior, f.count)
 
 
 @compiled
@@ -191,9 +200,16 @@ def correct(f, c, m):
 
 @compiled
 def outlook(f, c, T):
-    """Predicted AxisMotion T [s] >= 0 after the last measurement."""
-    predict(f, c, T)
-    return expected(f).x
+    """AxisMotion that `predict` expects T [s] >= 0 after the last measurement; the prior fields stay."""
+    angle = rate = acceleration = 0.0
+    stay, switch = imm.switching(T, c.dwell, c.count)
+    for j in range(c.count):
+        mu = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
+        x = kalman.predicted_mean(imm.mean(f.weights, f.x, c.count), motion_models.of_mean(c.models[j], T), T)
+        angle += mu * x.angle
+        rate += mu * x.rate
+        acceleration += mu * x.acceleration
+    return AxisMotion(angle, rate, acceleration)
 
 
 @compiled

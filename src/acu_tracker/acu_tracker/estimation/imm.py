@@ -8,7 +8,7 @@ import math
 
 from acu_tracker.estimation.kalman import Gaussian, Symmetric
 from acu_tracker.geometry.motion import AxisMotion
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, inlined
 
 
 @compiled
@@ -24,7 +24,7 @@ def switching(T, dwell, count):
     return 1.0 - (count - 1) * switch, switch
 
 
-@compiled
+@inlined
 def mix(mu, count, stay, switch, j, weights):
     """weights[i] = probability that model i held before, given that j holds now; returns cbar_j, that of j now.
 
@@ -42,14 +42,29 @@ def mix(mu, count, stay, switch, j, weights):
     return total
 
 
-@compiled
-def combine(weights, x, p, count):
-    """Gaussian with mean and covariance of the weighted models (eq. 10, 11); x (n, 3), p (n, 6) as in Symmetric."""
+@inlined
+def alone(x, p, j):
+    """What `combine` gives of model j alone, to the sign of a zero."""
+    return Gaussian(AxisMotion(0.0 + x[j, 0], 0.0 + x[j, 1], 0.0 + x[j, 2]),
+                    Symmetric(0.0 + p[j, 0], 0.0 + p[j, 1], 0.0 + p[j, 2], 0.0 + p[j, 3], 0.0 + p[j, 4],
+                              0.0 + p[j, 5]))
+
+
+@inlined
+def mean(weights, x, count):
+    """AxisMotion that is the mean of the weighted models (eq. 10); x (n, 3)."""
     x1 = x2 = x3 = 0.0
     for i in range(count):
         x1 += weights[i] * x[i, 0]
         x2 += weights[i] * x[i, 1]
         x3 += weights[i] * x[i, 2]
+    return AxisMotion(x1, x2, x3)
+
+
+@inlined
+def combine(weights, x, p, count):
+    """Gaussian with mean and covariance of the weighted models (eq. 10, 11); x (n, 3), p (n, 6) as in Symmetric."""
+    x1, x2, x3 = mean(weights, x, count)
     p11 = p12 = p13 = p22 = p23 = p33 = 0.0
     for i in range(count):
         w, d1, d2, d3 = weights[i], x[i, 0] - x1, x[i, 1] - x2, x[i, 2] - x3

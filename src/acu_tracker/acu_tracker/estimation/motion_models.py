@@ -15,7 +15,7 @@ from collections import namedtuple
 import numpy as np
 
 from acu_tracker.estimation.kalman import Symmetric, Transition
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, inlined
 
 
 class MotionModel(typing.NamedTuple):
@@ -88,9 +88,11 @@ def _series(c, x):
     return total
 
 
-@compiled
+@inlined
 def fading(alpha, T):
     """Transition of an acceleration that fades with e^(-alpha T), alpha [1/s], T [s] (paper 000, eq. 2)."""
+    if T == 0.0:
+        return Transition(0.0, 0.0, 1.0)
     x = alpha * T
     if x < SERIES_BELOW:
         return Transition(T * T * _series(_G1, x), T * _series(_G2, x), math.exp(-x))
@@ -98,9 +100,11 @@ def fading(alpha, T):
     return Transition((x - 1.0 + e) / alpha**2, (1.0 - e) / alpha, e)
 
 
-@compiled
+@inlined
 def fading_noise(alpha, T):
     """q in Q = 2 alpha sigma_a^2 q over T [s], alpha [1/s] (paper 000, eq. 4)."""
+    if T == 0.0:
+        return Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     x = alpha * T
     if x < SERIES_BELOW:
         return Symmetric(T**5 * _series(_Q11, x), T**4 * _series(_Q12, x), T**3 * _series(_Q13, x),
@@ -124,46 +128,56 @@ def acceleration_variance(abar, a_max, floor):
     return max((4.0 - math.pi) / math.pi * max(a_max - abs(abar), 0.0)**2, (floor * a_max)**2)
 
 
-@compiled
+@inlined
+def of_mean(m, T):
+    """Transition of the mean over T [s] of a record of MODEL."""
+    if m.kind == CV:
+        return Transition(0.0, 0.0, 0.0)
+    if m.kind == SINGER:
+        return fading(m.alpha, T)
+    return Transition(0.5 * T * T, T, 1.0)
+
+
+@inlined
 def cv(m, T):
     """Discrete of constant rate over T [s]."""
-    F, k = Transition(0.0, 0.0, 0.0), m.noise * m.noise
+    F, k = of_mean(m, T), m.noise * m.noise
     return Discrete(F, F, Symmetric(k * T * T * T / 3.0, k * T * T / 2.0, 0.0, k * T, 0.0, 0.0))
 
 
-@compiled
+@inlined
 def ca(m, T):
     """Discrete of constant acceleration over T [s]."""
-    F, k, T2 = Transition(0.5 * T * T, T, 1.0), m.noise * m.noise, T * T
+    F, k, T2 = of_mean(m, T), m.noise * m.noise, T * T
     return Discrete(F, F, Symmetric(k * T2 * T2 * T / 20.0, k * T2 * T2 / 8.0, k * T2 * T / 6.0, k * T2 * T / 3.0,
                                     k * T2 / 2.0, k * T))
 
 
-@compiled
+@inlined
 def _fading_acceleration(alpha, variance, T):
     """(F, Q) of an acceleration of this variance [rad2/s4] that lasts 1 / alpha [s]."""
     k, q = 2.0 * alpha * variance, fading_noise(alpha, T)
     return fading(alpha, T), Symmetric(k * q.p11, k * q.p12, k * q.p13, k * q.p22, k * q.p23, k * q.p33)
 
 
-@compiled
+@inlined
 def singer(m, T):
     """Discrete of an acceleration of mean 0 over T [s]."""
     F, Q = _fading_acceleration(m.alpha, m.sigma * m.sigma, T)
     return Discrete(F, F, Q)
 
 
-@compiled
+@inlined
 def current_statistical(m, abar, T):
     """Discrete of an acceleration about its mean abar [rad/s2], the estimate, over T [s].
 
     The mean moves by Phi X + U abar = Phi1 X, Phi1 that of constant acceleration (paper 000, eq. 6, 11).
     """
     F, Q = _fading_acceleration(m.alpha, acceleration_variance(abar, m.a_max, m.floor), T)
-    return Discrete(Transition(0.5 * T * T, T, 1.0), F, Q)
+    return Discrete(of_mean(m, T), F, Q)
 
 
-@compiled
+@inlined
 def discretised(m, abar, T):
     """Discrete over T [s] of a record of MODEL; abar: the estimated acceleration [rad/s2]."""
     if m.kind == CV:

@@ -57,7 +57,7 @@ def predict(f, c, T):
 @compiled
 def axes_azimuth(f):
     """Azimuth [rad] that the axis's own filter predicted; measured azimuths are unwrapped to it."""
-    return axis_filter.expected(f.axis[0]).x.angle
+    return axis_filter.expected_motion(f.axis[0]).angle
 
 
 @compiled
@@ -91,7 +91,7 @@ def correct(f, c, m):
 @compiled
 def expected(f):
     """Motion at the instant of the last `predict`; the azimuth on the wrap of the axis's filter."""
-    axes = axes_filter.read(f.axis).motion
+    axes = axes_filter.expected(f.axis)
     if not (f.used[0] or f.used[1]):
         return axes
     cartesian, azimuth = unscented.expected(f.cartesian), axes.azimuth
@@ -99,6 +99,15 @@ def expected(f):
         _, dA, ddA = cartesian.azimuth
         azimuth = AxisMotion(azimuth.angle + wrap(cartesian.azimuth.angle - azimuth.angle), dA, ddA)
     return Motion(azimuth, cartesian.elevation if f.used[1] else axes.elevation)
+
+
+@compiled
+def outlook(f, c, T):
+    """Motion T [s] >= 0 after the last measurement, as `expected` after `predict`, which is spared where it can be."""
+    if f.predicted == T or f.used[0] or f.used[1]:
+        predict(f, c, T)
+        return expected(f)
+    return axes_filter.outlook(f.axis, c.axis, T)
 
 
 @compiled

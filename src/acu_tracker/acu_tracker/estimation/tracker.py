@@ -168,8 +168,7 @@ def locked(t, p, since_accepted):
 @compiled
 def outlook(t, c, stamp):
     """Predicted Motion at a stamp [s]; before the last accepted measurement, the Motion at that measurement."""
-    target_filter.predict(t.filter, c.filter, max(stamp - t.stamp, 0.0))
-    return target_filter.expected(t.filter)
+    return target_filter.outlook(t.filter, c.filter, max(stamp - t.stamp, 0.0))
 
 
 @compiled

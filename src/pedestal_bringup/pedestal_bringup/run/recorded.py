@@ -28,6 +28,7 @@ class Recorded:
         self.metadata = {'beamwidth': str(receiver.antenna.beamwidth)}
         self.configuration = {'parameters': {'tracking_receiver': as_dict(receiver)}}
         self._run, self.end = run, run.t[-1]
+        self._tables = {}
         self._keyholes = [(stamp, values) for stamp, values in run.forecasts if ('keyhole', 'keyhole') in values]
 
     @functools.cached_property
@@ -40,7 +41,9 @@ class Recorded:
         """{column: array (n,)} of a topic, as of a bag (columns.table)."""
         if topic == DIAGNOSTICS:
             return {'t': np.array([stamp for stamp, _ in self._keyholes]) / SECOND}
-        return self._run.table(topic)
+        if topic not in self._tables:
+            self._tables[topic] = self._run.table(topic)
+        return self._tables[topic]
 
     def rows(self, topic):
         """Numbers (n,) of the messages of a topic."""

@@ -22,9 +22,8 @@ UNITS = {'adu': drive_unit.Adu, 'tracking_receiver': receiver_unit.TrackingRecei
 FEWEST = 8
 """Loops that are worth the lanes, most of which would be idle."""
 
-BLOCK = 50
-"""Steps of one call: what all trials say in them stays in the cache."""
-
+BLOCK = 200
+"""Steps of one call at most, for which the noise is drawn at once."""
 
 MEMORY = 2**30
 """For what trials side by side keep [bytes]."""
@@ -53,19 +52,27 @@ def _acu_law(acus, ends, i, stamp, step):
 
 
 @compiled
-def _loop(drives, receivers, acus, ends, first, period_ns, steps):
-    """Steps first, first + 1 ... of every trial into steps[1:] (n + 1, trials) of STEP; steps[0]: the ones before.
+def _loop(drives, receivers, acus, ends, first, period_ns, steps, said, words, kept):
+    """Steps first, first + 1 ... of every trial, some words of which are put into kept (trials, n, words).
 
     drives: as of lanes.beside; receivers: a memory whose arrays have the trials as a further first dimension; acus,
-    ends: a memory whose tables are those of all trials, as `_one_after_another` gives them.
+    ends: a memory whose tables are those of all trials, as `_one_after_another` gives them. steps (2, trials) of STEP:
+    those of even and of odd numbers, the present ones and the ones before by turns; said: the same, as `_words`.
     """
     moving = drive_unit.LANES(drives)
-    for k in range(1, len(steps)):
-        stamp = (first + k - 1) * period_ns
-        drive_unit.law_of_lanes(moving, stamp, steps[k - 1], steps[k])
-        for i in range(steps.shape[1]):
-            _receiver_law(receivers, i, stamp, steps[k, i])
-            _acu_law(acus, ends, i, stamp, steps[k, i])
+    for k in range(kept.shape[1]):
+        stamp, now = (first + k) * period_ns, (first + k) % 2
+        drive_unit.law_of_lanes(moving, stamp, steps[1 - now], steps[now])
+        for i in range(len(kept)):
+            _receiver_law(receivers, i, stamp, steps[now, i])
+            _acu_law(acus, ends, i, stamp, steps[now, i])
+            for j in range(len(words)):
+                kept[i, k, j] = said[now, i, words[j]]
+
+
+def _words(records):
+    """View of records (n, m) as their 8-byte words (n, m, words)."""
+    return records.view(np.int64).reshape(*records.shape, -1)
 
 
 def room(scenario, names):
@@ -105,16 +112,20 @@ def _one_after_another(tracks):
     return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
 
 
-def runs(loops, names):
-    """The Run of each of some closed_loop.Loops that `fit`, of the topics named, without what no topic tells."""
+def runs(loops, names, kept=None):
+    """The Run of each of some closed_loop.Loops that `fit`, of the topics named, without what no topic tells.
+
+    kept: memory (trials, steps) of records.of(names) for what they say, which others in it overwrite; None: new.
+    """
     drives, receivers, acus = ([loop.units[name] for loop in loops] for name in UNITS)
     drive_record, receiver_record, acu_record = _stacked(drives), _stacked(receivers), _stacked(acus)
     moving = lanes.beside(drive_record)
     breaks, coefficients = (np.stack([getattr(unit.memory, name) for unit in receivers])
                             for name in ('breaks', 'coefficients'))
     period_ns, count = loops[0].period_ns, loops[0].steps
-    steps = records.empty(STEP, (BLOCK + 1) * len(loops)).reshape(BLOCK + 1, len(loops))
-    kept = np.zeros((len(loops), count), records.of(*names))
+    steps = records.empty(STEP, 2 * len(loops)).reshape(2, len(loops))
+    kept = np.empty((len(loops), count), records.of(*names)) if kept is None else kept
+    words = np.arange(STEP.itemsize // lanes.WORD).view(STEP)[list(names)].astype(kept.dtype).view(np.int64)
     forecasts = [[] for _ in loops]
     first = 0
     while first < count:
@@ -125,10 +136,8 @@ def runs(loops, names):
         tables, ends = zip(*map(_one_after_another, zip(*(unit.memory.tables for unit in acus))))
         _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
                                            np.stack([block.normals for block in blocks])),
-              acu_unit.Memory(acu_record, Tables(*tables)), np.array(ends), first, period_ns,
-              steps[:last - first + 1])
-        kept[:, first:last] = steps[1:last - first + 1].T[list(names)]
-        steps[0] = steps[last - first]
+              acu_unit.Memory(acu_record, Tables(*tables)), np.array(ends), first, period_ns, steps, _words(steps),
+              words, _words(kept)[:, first:last])
         first = last
     lanes.take_back(moving, drive_record)
     return [Run(steps, np.zeros(0, TRUTH), np.arange(count) * period_ns, loop.units, told)
