@@ -22,9 +22,10 @@ def of(unit):
     """The Diagnosis of an Acu."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     invalid = tuple(name for i, name in enumerate(signals.INVALID_INPUTS) if unit.parts['invalid'] >> i & 1)
-    values = _values(unit, invalid)
-    for fault in unit.faults:
-        return Diagnosis(ERROR, FAULTS[fault].format(unasked=_unasked(state['unasked'])), values)
+    faults = unit.faults
+    values = _values(unit, faults, invalid)
+    if faults:
+        return Diagnosis(ERROR, FAULTS[faults[0]].format(unasked=_unasked(state['unasked'])), values)
     if invalid in GATED:
         return Diagnosis(WARN, GATED[invalid], values)
     if invalid:
@@ -35,12 +36,12 @@ def of(unit):
     return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
 
 
-def _values(unit, invalid):
+def _values(unit, faults, invalid):
     """[(key, text)]."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
               ('fallback', modes.FALLBACK_OF[int(state['fallback'])]), ('control', unit.authority.holder),
-              ('faults', ', '.join(unit.faults)), ('locked', str(int(outputs['locked']))),
+              ('faults', ', '.join(faults)), ('locked', str(int(outputs['locked']))),
               ('coasting', str(int(outputs['coasting']))), ('drive', unit.drive_told)]
     if unit.parameters.stow_pins:
         values.append(('stow_pins', _pins(int(unit.parts['inputs']['pins']))))

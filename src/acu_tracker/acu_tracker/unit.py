@@ -158,14 +158,13 @@ class Acu(Unit):
             self.outputs[ALARMS] = self.alarms['revision']
 
     def prepare(self):
-        """Compile what the commands of the alarms call as well."""
+        """Compile what the commands of the alarms and the diagnosis call as well."""
         super().prepare()
         before = self.memory.record.copy()
         self.desk.prepare()
         self.encode(ALARMS, 0)
         annunciator.know(self.alarms, DRIVE_SILENT, True, 0.0)
-        self.refusals()
-        self.urgent  # noqa: B018  compiles
+        self.diagnose()
         self.memory.record[...] = before
 
     def latency(self, topic):

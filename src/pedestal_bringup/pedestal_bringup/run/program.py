@@ -30,11 +30,12 @@ def program_table(scenario, prefix=''):
 
 
 def announced(scenario):
-    """Lines on the targets of a scenario's beams, each once: what a flight is, when a satellite is highest."""
+    """Lines on the targets of a scenario's beams, each once: what a flight is, when a satellite is highest, rises and
+    sets."""
     lines = []
     for prefix in scenario.prefixes:
         built = target.build(scenario.node_parameters(prefix + 'tracking_receiver').target, scenario.header.duration)
-        lines += built.summary or _highest(built, scenario.header.duration)
+        lines += built.summary or _sky(built, scenario.header.duration)
     return list(dict.fromkeys(lines))
 
 
@@ -48,8 +49,9 @@ def begins(scenario):
     return round(begin.timestamp() * 1e3) * 1_000_000
 
 
-def _highest(built, duration):
-    """The line on the UTC of a target that has a date, and of its highest place in a run of `duration` [s]."""
+def _sky(built, duration):
+    """Lines on a target that has a date: the UTC of its highest place in a run of `duration` [s], of its rise and set
+    where they are within."""
     if not built.start_time:
         return ()
     times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))

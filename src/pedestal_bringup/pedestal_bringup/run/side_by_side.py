@@ -4,6 +4,8 @@ The drive takes two thirds of the time of a closed loop; on lanes (adu_drive.lan
 Receivers and control units work one after the other, on the records and with the laws that they have alone, so that
 every number is equal to the last bit to that of closed_loop.Loop.
 """
+import typing
+
 import numpy as np
 
 from acu_tracker import unit as acu_unit
@@ -51,23 +53,31 @@ def _acu_law(acus, ends, i, stamp, step):
     acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
 
 
+class Kept(typing.NamedTuple):
+    """What is kept of steps. words (m,): which 8-byte words of a STEP; said: the steps as `_words`; rows (trials, n,
+    m): where they are put."""
+    words: np.ndarray
+    said: np.ndarray
+    rows: np.ndarray
+
+
 @compiled
-def _loop(drives, receivers, acus, ends, first, period_ns, steps, said, words, kept):
-    """Steps first, first + 1 ... of every trial, some words of which are put into kept (trials, n, words).
+def _loop(drives, receivers, acus, ends, first, period_ns, steps, kept):
+    """Steps first, first + 1 ... of every trial, of which a Kept keeps what it says.
 
     drives: as of lanes.beside; receivers: a memory whose arrays have the trials as a further first dimension; acus,
     ends: a memory whose tables are those of all trials, as `_one_after_another` gives them. steps (2, trials) of STEP:
-    those of even and of odd numbers, the present ones and the ones before by turns; said: the same, as `_words`.
+    those of even and of odd numbers, the present ones and the ones before by turns.
     """
     moving = drive_unit.LANES(drives)
-    for k in range(kept.shape[1]):
+    for k in range(kept.rows.shape[1]):
         stamp, now = (first + k) * period_ns, (first + k) % 2
         drive_unit.law_of_lanes(moving, stamp, steps[1 - now], steps[now])
-        for i in range(len(kept)):
+        for i in range(len(kept.rows)):
             _receiver_law(receivers, i, stamp, steps[now, i])
             _acu_law(acus, ends, i, stamp, steps[now, i])
-            for j in range(len(words)):
-                kept[i, k, j] = said[now, i, words[j]]
+            for j in range(len(kept.words)):
+                kept.rows[i, k, j] = kept.said[now, i, kept.words[j]]
 
 
 def _words(records):
@@ -136,8 +146,8 @@ def runs(loops, names, kept=None):
         tables, ends = zip(*map(_one_after_another, zip(*(unit.memory.tables for unit in acus))))
         _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
                                            np.stack([block.normals for block in blocks])),
-              acu_unit.Memory(acu_record, Tables(*tables)), np.array(ends), first, period_ns, steps, _words(steps),
-              words, _words(kept)[:, first:last])
+              acu_unit.Memory(acu_record, Tables(*tables)), np.array(ends), first, period_ns, steps,
+              Kept(words, _words(steps), _words(kept)[:, first:last]))
         first = last
     lanes.take_back(moving, drive_record)
     return [Run(steps, np.zeros(0, TRUTH), np.arange(count) * period_ns, loop.units, told)
