@@ -14,7 +14,7 @@ PACKAGES := pedestal_common ship_motion_sim tracking_receiver_sim acu_tracker ad
 ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
 PIP := -m pip --disable-pip-version-check install --quiet --use-pep517 --constraint constraints.txt
 DEMO := bags/runs/demo
-# Graphs in realtime that are killed, frozen and cut: one at a time, not beside other tests.
+# Graphs in realtime that are killed, frozen and cut: one at a time. The other tests run beside them, and give way.
 REALTIME := test/test_field.py test/test_live.py test/test_network.py test/test_operating.py test/test_page.py \
 	test/test_realtime.py test/test_rotctld.py test/test_supervision.py
 # The files in the order of pyproject.toml, where those of graphs come first: a file of few tests, each a graph, would
@@ -35,8 +35,10 @@ demo: install
 
 test: install
 	.venv/bin/ruff check .
-	.venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(addprefix --ignore=,$(REALTIME))
-	.venv/bin/python -m pytest $(REALTIME)
+	@mkdir -p build
+	@.venv/bin/python -m pytest $(REALTIME) > build/realtime.log 2>&1 & realtime=$$!; \
+	    nice -n 19 .venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(addprefix --ignore=,$(REALTIME)); others=$$?; \
+	    wait $$realtime; realtime=$$?; cat build/realtime.log; exit $$((others || realtime))
 
 update-references: install
 	.venv/bin/python bags/reference/update.py

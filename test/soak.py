@@ -1,11 +1,13 @@
 """Lets a realtime graph run for long and says what became of its memory, its steps and its latency.
 
-    python test/soak.py [--hours 2] [--scenario leo_pass]
+    python test/soak.py [--hours 2]
 
-Memory is the resident set of each process, looked at every 10 s; latency is from the publication of joint_states(t_k)
-to that of rate_command(t_k), by the writers' clocks, from the recording. Give it a ROS_DOMAIN_ID of its own.
+A UAV flies ovals beside the antenna, a pass every 87 s, and is to be in its beam throughout. Memory is the resident
+set of each process, looked at every 10 s; latency is from the publication of joint_states(t_k) to that of
+rate_command(t_k), by the writers' clocks, from the recording. Give it a ROS_DOMAIN_ID of its own.
 """
 import argparse
+import csv
 import json
 import pathlib
 import re
@@ -21,6 +23,26 @@ from pedestal_bringup.bags import bag as bags
 
 EDGES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 50.0, np.inf)
 """Of the histogram of latencies [ms]."""
+
+STRAIGHT, RADIUS, SPEED = 3000.0, 700.0, 60.0
+"""Of the ovals [m, m, m/s]."""
+
+
+def flight(path, seconds):
+    """Write a track of ovals, a fix each second."""
+    turn = np.pi * RADIUS
+    with path.open('w', newline='') as file:
+        rows = csv.writer(file)
+        rows.writerow(('time_s', 'latitude_deg', 'longitude_deg', 'altitude_m'))
+        for t in range(int(seconds) + 10):
+            half, along = divmod(SPEED * t, STRAIGHT + turn)
+            angle = max(along - STRAIGHT, 0.0) / RADIUS
+            east = min(along, STRAIGHT) - STRAIGHT / 2.0 + RADIUS * np.sin(angle)
+            north = -RADIUS * np.cos(angle)
+            if half % 2:
+                east, north = -east, -north
+            rows.writerow((t, 47.4 + np.degrees(north / 6.371e6),
+                           8.5 + np.degrees(east / 6.371e6 / np.cos(np.radians(47.4))), 900.0))
 
 
 def resident(pid):
@@ -54,20 +76,23 @@ def latencies(bag):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--hours', type=float, default=2.0)
-    parser.add_argument('--scenario', default='leo_pass')
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        bag, rows = pathlib.Path(folder) / 'soak', pathlib.Path(folder) / 'rows.json'
-        process = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.cli', 'run', options.scenario, '--pacing',
-                                    'realtime', '--duration', str(3600.0 * options.hours), '--bag', str(bag), '--json',
-                                    str(rows)], stdout=subprocess.DEVNULL)
+        bag, rows, track = (pathlib.Path(folder) / name for name in ('soak', 'rows.json', 'flight.csv'))
+        seconds = 3600.0 * options.hours
+        flight(track, seconds)
+        process = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.cli', 'run', 'track_file', '--param',
+                                    f'tracking_receiver.target.track_file.path={track}', '--pacing', 'realtime',
+                                    '--duration', str(seconds), '--bag', str(bag), '--json', str(rows)],
+                                   stdout=subprocess.DEVNULL)
         sizes = watched(process)
-        if process.returncode != 0:
+        if not rows.exists():
             return 1
         results = {row['metric']: row['value'] for row in json.loads(rows.read_text())['rows']}
         delays = latencies(bags.read(bag))
-    print(f'{options.hours:g} h of {options.scenario}, {len(delays)} steps answered, lost {results["lost_steps"]:g}, '
-          f'restarts {results["restarts"]:g}')
+    print(f'{options.hours:g} h, {len(delays)} steps answered, lost {results["lost_steps"]:g}, restarts '
+          f'{results["restarts"]:g}, in autotrack for {results["tracked_percent"]:.2f} %, pointing '
+          f'{results["pointing_rms_deg"]:.4f} deg rms')
     print(f'{"resident set [MB]":20} {"after 1 min":>12} {"half-way":>10} {"at the end":>10} {"largest":>10}')
     for node, found in sizes.items():
         print(f'{node:20} {found[min(6, len(found) - 1)]:12.1f} {found[len(found) // 2]:10.1f} {found[-2]:10.1f} '

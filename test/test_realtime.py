@@ -1,7 +1,10 @@
 """Realtime: the steady timer, the latest command, and what a drive does when its commands stop or are nonsense."""
 import json
+import os
 import re
 import signal
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -33,6 +36,7 @@ def run(start_run, connect):
     def stamp():
         return messages.nanoseconds(heard[-1].header.stamp) * 1e-9
     client.until(lambda: heard and abs(heard[-1].velocity[0]) > 0.2)
+    run.policies = {node: os.sched_getscheduler(pid) for node, pid in run.pids().items()}
     run.signal('acu', signal.SIGSTOP)
     run.stopped = stamp()
     client.until(lambda: stamp() >= run.stopped + PAUSE)
@@ -53,6 +57,14 @@ def test_a_run_goes_at_the_pace_of_the_clock(run):
     assert 0.7 < rows['realtime_factor'] < 1.02
     assert rows['lost_steps'] > 200
     assert verify(run.bag).complete
+
+
+def test_who_has_a_step_to_make_goes_first(run):
+    if subprocess.run([sys.executable, '-c', 'import os; os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(10))'],
+                      stderr=subprocess.DEVNULL).returncode:
+        pytest.skip('this machine allows no priority')
+    assert {node for node, policy in run.policies.items() if policy == os.SCHED_RR} == {'adu', 'acu',
+                                                                                      'tracking_receiver'}
 
 
 def test_stale_commands_stop_the_axes(run):

@@ -22,6 +22,9 @@ class Timekeeper(unit_node.UnitNode):
     In it the units obey what was said of step k - 1, and tell where they are at t_k.
     """
 
+    PRECEDENCE = 1
+    """Others may compute for longer than a step, a search or a pass: never in the way of the drive."""
+
     def __init__(self, module):
         super().__init__(module, serves_beams=True)
 

@@ -1,5 +1,6 @@
 """What every node is: parameters, clock, topics of the table, diagnostics, waiting for its graph, `main`."""
 import contextlib
+import faulthandler
 import gc
 import inspect
 import json
@@ -32,6 +33,9 @@ START_DEADLINE = 300.0
 
 PARTING = 1.0
 """Seconds a node that ends waits for readers to take what it published."""
+
+ENDING = 10.0
+"""Seconds the middleware has to let go of a node that has ended."""
 
 DAY = 86_400 * SECOND
 
@@ -430,6 +434,8 @@ def main(make_node, args=None) -> int:
         # It ends anyway; Python's own end would give a late signal its deadly default back.
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
+        # Seen in 2 of 500 ends: the middleware keeps the process for ever. Then it says where, and is ended.
+        faulthandler.dump_traceback_later(ENDING, exit=True)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()

@@ -11,6 +11,7 @@ import numpy as np
 from std_srvs.srv import Trigger
 
 from pedestal_common import commands, messages, nodes, records, shell, topics
+from pedestal_common.realtime import priority
 from pedestal_common.steps import SECOND, Steps
 from pedestal_common.unit import ERROR, WARN
 
@@ -98,6 +99,9 @@ class Port:
 class UnitNode(shell.Shell):
     """Runs the unit of a module (nodes.Node.module)."""
 
+    PRECEDENCE = 0
+    """Added to graph.priority."""
+
     def __init__(self, module, serves_beams=False):
         self.row = nodes.of_executable(module)
         unit_type = self.row.unit_type()
@@ -126,6 +130,10 @@ class UnitNode(shell.Shell):
             self.create_service(Trigger, name, self._service(name))
         self.diagnose_with(self.diagnose)
         self.begin()
+        if self.graph.priority and not self.graph.lockstep:
+            refusal = priority.take(self.graph.priority + self.PRECEDENCE)
+            if refusal:
+                self.get_logger().info(f'runs like any process: graph.priority = {self.graph.priority}: {refusal}')
 
     def _listen(self, port):
         """Subscribe to what does not belong to a step: texts, what comes once, commands."""

@@ -63,7 +63,8 @@ def parameters_of_all(scenario, bag, start):
     """The scenario as a ROS 2 parameter file, every node told of the graph it is in. start: graph.start [ns UTC]."""
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
-              'graph.deadline': scenario.header.deadline, 'graph.start': start}
+              'graph.deadline': scenario.header.deadline, 'graph.start': start,
+              'graph.priority': scenario.header.priority}
     sections = {node: {**scenario.given(node), **shared} for node in scenario.nodes if node != 'operator'}
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
     if start and not scenario.header.beam:
