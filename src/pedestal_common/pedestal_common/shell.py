@@ -394,9 +394,10 @@ def _say(stream, line):
 
 
 def _leave(node, code):
-    """End the process with an exit code as soon as the endpoints of its node have left the graph. The participant is
-    not destroyed: where others leave at that moment Fast DDS 2.14 may hang in it (DomainParticipant::set_listener waits
-    for a callback, holding the mutex that the callback wants; in 1 of 100 ends of a graph)."""
+    """End the process with an exit code as soon as the endpoints of its node have left the graph.
+
+    The participant is not destroyed: where others leave at that moment Fast DDS 2.14 may hang in it, in 1 of 100 ends
+    of a graph (DomainParticipant::set_listener waits for a callback with the mutex that the callback wants)."""
     with node.handle, contextlib.suppress(OSError):
         node.destroy_node()
         sys.stdout.flush()
