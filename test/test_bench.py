@@ -1,4 +1,4 @@
-"""`pedestal bench`: bags with a shorter recording than the user's, measured once; the floor of the graph with fewer laps."""
+"""`pedestal bench`: bags with a shorter recording than the user's, measured once; the bare ring with fewer laps."""
 import json
 import sys
 

@@ -293,7 +293,8 @@ def drive_figure():
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
-    """Run CASES and, DRIVE_RUNS times at most, DRIVE_CASES `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Run CASES `runs` times, DRIVE_CASES as often but DRIVE_RUNS times at most; pool: monte_carlo.Pool, None for this
+    process."""
     pool = pool or monte_carlo.Pool(1)
     misses = statistics(CASES, runs, pool, lambda share, text: progress(0.5 * share, text))
     driven_runs = min(runs, DRIVE_RUNS)
