@@ -12,7 +12,11 @@ PYTHON ?= python3
 PACKAGES := pedestal_common ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_operator \
 	pedestal_bringup pedestal
 ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
-PIP := -m pip --disable-pip-version-check install --quiet --use-pep517 --constraint constraints.txt
+# pip would write the bytecode of all that it installs on one core, tests of others included; here that of the product is
+# written on all cores, and the rest when it is imported.
+PIP := -m pip --disable-pip-version-check install --quiet --use-pep517 --constraint constraints.txt --no-compile
+# Needs setuptools first; otherwise pip makes an environment for each package that it builds.
+BUILT_HERE := --no-build-isolation
 DEMO := bags/runs/demo
 # Graphs in realtime that are killed, frozen and cut: one at a time. The other tests run beside them, and give way.
 REALTIME := test/test_field.py test/test_live.py test/test_network.py test/test_operating.py test/test_page.py \
@@ -23,10 +27,12 @@ IN_TURN := --dist loadfile --no-loadscope-reorder
 # Containers often set it: every process would compile the sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-install: .venv/installed
+install: .venv/tests laws
+
+laws: .venv/installed
 	@.venv/bin/python -m pedestal_bringup.run.prepare
 
-demo: install
+demo: laws
 	rm -rf $(DEMO) $(DEMO).log
 	.venv/bin/pedestal run leo_pass --bag $(DEMO)
 	.venv/bin/pedestal verify $(DEMO)
@@ -75,15 +81,23 @@ clean:
 
 .venv/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv/bin/pip
 	@echo 'Installing into .venv (the first time this takes some minutes) ...'
-	.venv/bin/python $(PIP) $(ROS) ruff pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),--editable 'src/$(package)[test]')
+	.venv/bin/python $(PIP) setuptools
+	.venv/bin/python $(PIP) $(BUILT_HERE) $(ROS) $(foreach package,$(PACKAGES),--editable src/$(package))
+	.venv/bin/python -m compileall -qq -j 0 -x '/tests?/' .venv/lib
+	@touch $@
+
+.venv/tests: .venv/installed
+	@echo 'Installing what the tests use into .venv ...'
+	.venv/bin/python $(PIP) ruff pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),'$(package)[test]')
 	@touch $@
 
 .venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip
 	@echo 'Installing into .venv-colcon ...'
-	.venv-colcon/bin/python $(PIP) $(ROS) colcon-common-extensions colcon-ros numpy numba rosbags sgp4
+	.venv-colcon/bin/python $(PIP) setuptools
+	.venv-colcon/bin/python $(PIP) $(BUILT_HERE) $(ROS) colcon-common-extensions colcon-ros numpy numba rosbags sgp4
 	@touch $@
 
-.venv/mkdocs: .venv/installed
+.venv/mkdocs: .venv/tests
 	@echo 'Installing mkdocs into .venv ...'
 	.venv/bin/python $(PIP) mkdocs-material
 	@touch $@
@@ -104,4 +118,4 @@ APT := apt-get -qq -o APT::Sandbox::User=root
 	    rm -r usr python3-pip-whl_*.deb ); fi || \
 	    { rm -rf $*; echo 'This Python cannot make an environment with pip: sudo apt-get install python3-venv'; exit 1; }
 
-.PHONY: install demo test update-references docs book numbers bench colcon clean
+.PHONY: install laws demo test update-references docs book numbers bench colcon clean

@@ -22,7 +22,7 @@ def answers(unit, stamps, raw=None):
     inputs, outputs = (records.empty(kind, len(stamps)) for kind in (unit.inputs_type(), unit.outputs_type()))
     if raw is not None:
         inputs[RAW] = raw
-    unit.step(stamps, inputs, outputs)
+    unit.step(np.ascontiguousarray(stamps), inputs, outputs)    # a column of records would compile the laws anew
     return outputs
 
 

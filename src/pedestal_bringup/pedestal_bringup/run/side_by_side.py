@@ -55,23 +55,23 @@ def _acu_law(acus, ends, i, stamp, step):
 
 class Kept(typing.NamedTuple):
     """What is kept of steps. words (m,): which 8-byte words of a STEP; said: the steps as `_words`; rows (trials, n,
-    m): where they are put."""
+    m): where they are put, of all steps, because `_loop` would be compiled anew for a part of the columns."""
     words: np.ndarray
     said: np.ndarray
     rows: np.ndarray
 
 
 @compiled
-def _loop(drives, receivers, acus, ends, first, period_ns, steps, kept):
-    """Steps first, first + 1 ... of every trial, of which a Kept keeps what it says.
+def _loop(drives, receivers, acus, ends, first, last, period_ns, steps, kept):
+    """Steps first ... last - 1 of every trial, of which a Kept keeps what it says.
 
     drives: as of lanes.beside; receivers: a memory whose arrays have the trials as a further first dimension; acus,
     ends: a memory whose tables are those of all trials, as `_one_after_another` gives them. steps (2, trials) of STEP:
     those of even and of odd numbers, the present ones and the ones before by turns.
     """
     moving = drive_unit.LANES(drives)
-    for k in range(kept.rows.shape[1]):
-        stamp, now = (first + k) * period_ns, (first + k) % 2
+    for k in range(first, last):
+        stamp, now = k * period_ns, k % 2
         drive_unit.law_of_lanes(moving, stamp, steps[1 - now], steps[now])
         for i in range(len(kept.rows)):
             _receiver_law(receivers, i, stamp, steps[now, i])
@@ -136,6 +136,7 @@ def runs(loops, names, kept=None):
     steps = records.empty(STEP, 2 * len(loops)).reshape(2, len(loops))
     kept = np.empty((len(loops), count), records.of(*names)) if kept is None else kept
     words = np.arange(STEP.itemsize // lanes.WORD).view(STEP)[list(names)].astype(kept.dtype).view(np.int64)
+    keeps = Kept(words, _words(steps), _words(kept))
     forecasts = [[] for _ in loops]
     first = 0
     while first < count:
@@ -146,8 +147,7 @@ def runs(loops, names, kept=None):
         tables, ends = zip(*map(_one_after_another, zip(*(unit.memory.tables for unit in acus))))
         _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
                                            np.stack([block.normals for block in blocks])),
-              acu_unit.Memory(acu_record, Tables(*tables)), np.array(ends), first, period_ns, steps,
-              Kept(words, _words(steps), _words(kept)[:, first:last]))
+              acu_unit.Memory(acu_record, Tables(*tables)), np.array(ends), first, last, period_ns, steps, keeps)
         first = last
     lanes.take_back(moving, drive_record)
     return [Run(steps, np.zeros(0, TRUTH), np.arange(count) * period_ns, loop.units, told)
