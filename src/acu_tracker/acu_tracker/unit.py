@@ -1,4 +1,5 @@
 """The unit of the control unit: encoders, receiver and attitude in, rate command, estimate and mode out."""
+import functools
 import math
 import typing
 
@@ -119,6 +120,13 @@ def laws(memory, stamps, inputs, outputs):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
+@functools.lru_cache(1)
+def _initial(parameters):
+    """The record (1,) of a control unit before its first step, made once for trials in a row that differ in no
+    parameter of it."""
+    return joined(RECORD, state=control_unit.initial_state(parameters), constants=control_unit.constants(parameters))
+
+
 class Acu(Unit):
     """The control unit of an AcuParameters, on a ship where its graph has ship/imu/data."""
     NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
@@ -130,8 +138,7 @@ class Acu(Unit):
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
-        self.memory = Memory(joined(RECORD, state=control_unit.initial_state(parameters),
-                                    constants=control_unit.constants(parameters)), tables.NO_TABLES)
+        self.memory = Memory(_initial(parameters).copy(), tables.NO_TABLES)
         self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE in self.reads, 1
         self.parts['outputs']['mode'], self.parts['outputs']['pins'] = modes.STANDBY, topics.SILENT
         signals.clear(self.parts['outputs'])

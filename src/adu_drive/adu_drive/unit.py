@@ -1,5 +1,6 @@
 """The unit of the drive: rate commands and the ship's motion in, encoders and motors out, enable and faults."""
 import dataclasses
+import functools
 import math
 import typing
 
@@ -171,6 +172,20 @@ def law_of_lanes(drives, stamp, inputs, outputs):
         tell(lanes.at(drives, i), stamp, moved, outputs[i])
 
 
+@functools.lru_cache(1)
+def _initial(parameters):
+    """The record (1,) of a drive before its first step, made once for trials in a row that differ in no parameter of
+    it."""
+    link = np.zeros(1, LINK)
+    link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NEVER
+    link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
+    link['period'] = round(parameters.period * 1e9)
+    record = joined(RECORD, state=drive_unit.initial_state(parameters), constants=drive_unit.constants(parameters),
+                    link=link, schedule=schedule.empty())
+    drive_unit.read(*(record[0][name] for name in ('state', 'constants', 'outputs')))
+    return record
+
+
 class Adu(Simulated):
     """The drive of an AduNodeParameters."""
     NODE, COMMAND, LAWS = nodes.row(nodes.DRIVE), COMMAND, {Memory: (law, laws)}
@@ -178,14 +193,7 @@ class Adu(Simulated):
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
-        link = np.zeros(1, LINK)
-        link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NEVER
-        link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
-        link['period'] = round(parameters.period * 1e9)
-        self.memory = Memory(joined(RECORD, state=drive_unit.initial_state(parameters),
-                                    constants=drive_unit.constants(parameters), link=link,
-                                    schedule=schedule.empty()))
-        drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
+        self.memory = Memory(_initial(parameters).copy())
 
     def latency(self, topic):
         """How old a command is that a step reads [s]: that of the step before."""

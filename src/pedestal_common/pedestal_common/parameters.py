@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import functools
 import math
+import operator
 import typing
 
 import numpy as np
@@ -95,21 +96,26 @@ def flatten(cls, prefix=''):
             yield name, field
 
 
+@functools.cache
+def _default(cls):
+    """An instance of a parameter dataclass with every default."""
+    return cls()
+
+
 def defaults(cls):
     """{dotted name: default} of a parameter dataclass, a group's own defaults included."""
-    return as_dict(cls())
+    return as_dict(_default(cls))
+
+
+@functools.cache
+def _readers(cls):
+    """[(dotted name, function that reads it from an instance)] of every leaf of a parameter dataclass."""
+    return [(name, operator.attrgetter(name)) for name, _ in flatten(cls)]
 
 
 def as_dict(instance, prefix=''):
     """{dotted name: value} of an instance."""
-    values = {}
-    for field in dataclasses.fields(instance):
-        value = getattr(instance, field.name)
-        if field.metadata.get('group'):
-            values.update(as_dict(value, f'{prefix}{field.name}.'))
-        else:
-            values[prefix + field.name] = value
-    return values
+    return {prefix + name: read(instance) for name, read in _readers(type(instance))}
 
 
 def did_you_mean(name, known):
@@ -128,7 +134,7 @@ def build(cls, values, prefix=''):
         if name not in known:
             hint = did_you_mean(name, known)
             raise ParameterError(f'unknown parameter {name!r}' + (f';{hint}' if hint else ''))
-    return _replace(cls(), values, prefix)
+    return _replace(_default(cls), values, prefix)
 
 
 def _number(value):
