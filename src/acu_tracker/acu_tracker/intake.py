@@ -89,7 +89,7 @@ def take_error(s, c, u, o, program):
 
 @compiled
 def _watch_slope(s, c, u, at):
-    """Note an error that shows that the slope of autotrack is reversed; at: Pointing of the beam that it belongs to."""
+    """Note an error that shows that the slope is reversed; at: Pointing of the beam that it belongs to."""
     p = c.p.tracker
     t = u.error_stamp - p.receiver.age
     attitude.at(s.attitude, c.p, t)
