@@ -27,7 +27,7 @@ def first(state, angles, errors, t=None, sigma=SIGMA):
         state, t[k], slope_sign.beam(ASHORE, *at), tuple(e), sigma**2, GAP)), None)
 
 
-def loop(target, slope, noise, bandwidth=6.0):
+def loop(target, slope, noise, bandwidth=12.0):
     """(angles, errors) of a beam in elevation, driven as a type II loop on a target (n,) [rad]; slope: 1 or -1."""
     beam, rate, angles, errors = target[0], 0.0, [], []
     for r, n in zip(target, noise):

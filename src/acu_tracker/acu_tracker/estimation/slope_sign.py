@@ -6,10 +6,10 @@ straight line is fitted to the last errors of each, and its innovations squared 
     J+ = mean of (nu_b + nu_e)^2 / R,    J- = mean of (nu_b - nu_e)^2 / R
 
 A target may turn as it likes: the beam is H z+ of what it follows, so that z- = (2 H - 1) z+ is at least as rough, H
-being the closed loop of type II, and an outlier or noise is in both alike. Reversed errors drive the beam away from a
-target that stays smooth in z-, while z+ runs away twice as fast: a likelihood ratio of two hypotheses (Willsky, A
-survey of design methods for failure detection in dynamic systems, Automatica 12 (1976) 601). Each axis of the receiver
-for itself, the beam in earth axes, where the deck's motion does not count.
+being the closed loop of type II, but for the while that H lags; an outlier or noise is in both alike. Reversed errors
+drive the beam away from a target that stays smooth in z-, while z+ runs away twice as fast: a likelihood ratio of two
+hypotheses (Willsky, A survey of design methods for failure detection in dynamic systems, Automatica 12 (1976) 601).
+Each axis of the receiver for itself, the beam in earth axes, where the deck's motion does not count.
 """
 import math
 from collections import namedtuple
@@ -29,8 +29,9 @@ LINE = 200
 ERRORS = 100
 """Number of errors that J is taken over; a reversal of the target is over in the mean of them."""
 
-RATIO, LEAST = 2.5, 0.5
-"""Slope reversed: J+ > RATIO J- and J+ > J- + LEAST. Targets that reverse at 11 deg/s2 reach 1.6."""
+RATIO, LEAST = 5.0, 0.5
+"""Slope reversed: J+ > RATIO J- and J+ > J- + LEAST. A target that reverses is a while ahead of the beam: at 11 deg/s2
+J+ reaches 1.6 J- in the closed loop of uav_flyby, and without noise 2.9 at a bandwidth of 20 rad/s, 4.6 at 10."""
 
 Beam = namedtuple('Beam', 'u across up')
 """Unit Vectors (ENU) along a beam, and of its cross-elevation and elevation."""
