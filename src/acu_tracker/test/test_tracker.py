@@ -14,12 +14,10 @@ from acu_tracker.estimation.measurement import (
     error_variance,
     nis,
 )
-from acu_tracker.estimation.params import (
-    AttitudeModelParameters,
-    FilterParameters,
-    ReceiverModelParameters,
-    TrackerParameters,
-)
+from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters, TrackerParameters
+from acu_tracker.geometry import estimate_frame
+from acu_tracker.geometry.vector import Vector
+from pedestal_common import line_of_sight
 from pedestal_common.parameters import build, record
 
 DEG = math.pi / 180
@@ -240,12 +238,19 @@ def test_receiver_law():
 
 
 @pytest.mark.parametrize('elevation', [0.1, 0.7, 1.3])
-def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation):
-    """Oracle: scipy turns the direction by 20,000 small rotations about deck axes and the vertical."""
-    attitude = record(AttitudeModelParameters(tilt_noise=2e-4, heading_noise=5e-4))[0]
+@pytest.mark.parametrize('tilted', [False, True])
+def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation, tilted):
+    """Oracle: scipy turns the direction by 20,000 small rotations about deck axes and the vertical; in the frame of a
+    target that climbs to the north-east it moves along the axes of that."""
+    azimuth, f = 0.3, np.zeros(1, estimate_frame.FRAME)[0]
+    estimate_frame.level(f)
+    u = Vector(*line_of_sight.earth_direction(azimuth, elevation))
+    if tilted:
+        estimate_frame.tilt(f, u, Vector(*np.cross(u, (1.0, -1.0, 0.2))))
     generator = np.random.default_rng(1)
     tilt, heading = 2e-4 * generator.standard_normal((2, 20_000)), 5e-4 * generator.standard_normal(20_000)
-    east, north, up = Rotation.from_rotvec(np.column_stack((*tilt, heading))).apply(
-        [0.0, math.cos(elevation), math.sin(elevation)]).T
-    measured = (math.cos(elevation) * np.arctan2(east, north)).var(), np.arcsin(up).var()
-    assert attitude_variances(elevation, attitude) == pytest.approx(measured, rel=0.03)
+    turned = Rotation.from_rotvec(np.column_stack((*tilt, heading))).apply(u) @ f['mat']
+    measured = (math.cos(0.0 if tilted else elevation) * np.arctan2(turned[:, 0], turned[:, 1])).var(), np.arcsin(
+        turned[:, 2]).var()
+    at = (0.0, 0.0) if tilted else (azimuth, elevation)
+    assert attitude_variances(estimate_frame.verticals(f, *at), 2e-4**2, 5e-4**2) == pytest.approx(measured, rel=0.03)

@@ -26,3 +26,8 @@ def test_the_default_rules_out_the_noisy_models_on_a_target_that_stands_still():
     pointing = {name: study.batch((f'geo/{name}', 0, 2)) for name in ('default', 'tuned', 'manoeuvre')}
     assert np.all(pointing['default'] < 1.5 * pointing['tuned'])
     assert np.all(pointing['default'] < 0.5 * pointing['manoeuvre'])
+
+
+def test_on_a_ship_what_the_ins_wanders_by_is_no_manoeuvre():
+    default, tuned = (study.batch((f'geo-ship/{name}', 0, 2)) for name in ('default', 'tuned'))
+    assert np.all(default < study.HONEST * tuned)

@@ -25,13 +25,15 @@ alpha: 0 but for constant gains; colour: bandwidth of the noise of the angle [ra
 FILTER = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
                    ('x', 'f8', (BANK, 3)), ('p', 'f8', (BANK, 6)), ('mu', 'f8', (BANK,)),
                    ('x_prior', 'f8', (BANK, 3)), ('p_prior', 'f8', (BANK, 6)), ('mu_prior', 'f8', (BANK,)),
-                   ('y', 'f8'), ('follows', 'i8'), ('past', 'f8', (BANK, 5)), ('weights', 'f8', (BANK,))], align=True)
+                   ('y', 'f8'), ('follows', 'i8'), ('past', 'f8', (BANK, 5)), ('weights', 'f8', (BANK,)),
+                   ('walk', 'f8')], align=True)
 """bank, count, states: of the constants that x, p, mu belong to: estimate, covariance (as in kalman.Symmetric) and
 probability of each model, after the last measurement.
 
 x_prior, p_prior, mu_prior: predicted by T [s] from there. `predict` sets them, `expected`, `innovation`, `correct` use
 them. y: the last measured angle [rad]; follows: 1 where the noise of the next one is correlated with its; past: the
-kalman.Past of each model, of the same prediction. weights: scratch.
+kalman.Past of each model, of the same prediction. weights: scratch. walk: variance per second
+[rad2/s] that the angle gains beside what every model says.
 """
 
 ESTIMATE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
@@ -124,6 +126,7 @@ def predict(f, c, T):
         model = motion_models.discretised(c.models[j], g.x.acceleration, T)
         _put(f.x_prior, f.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
                                                kalman.predicted_covariance(g.P, model.F, model.Q, T)))
+        f.p_prior[j, 0] += f.walk * T
         o, past = f.past[j], kalman.past(g, model.F, T)
         o[0], o[1], o[2], o[3], o[4] = past
 

@@ -40,15 +40,12 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
 
 
 @compiled
-def attitude_variances(elevation, attitude):
-    """Variances [rad2] (cross-elevation, elevation) of a direction at an elevation [rad] from the noise of the
-    attitude it was measured with: tilted by it across the line of sight, and turned about the vertical.
-
-    attitude: record of AttitudeModelParameters.
-    """
-    s, c = math.sin(elevation), math.cos(elevation)
-    tilt, heading = attitude.tilt_noise * attitude.tilt_noise, attitude.heading_noise * attitude.heading_noise
-    return s * s * tilt + c * c * heading, tilt
+def attitude_variances(verticals, tilt, heading):
+    """Variances (across, along) of a direction from those of the attitude it was measured with, in their unit: `tilt`
+    about every horizontal axis, `heading` about the vertical. A turn about either axis of the direction moves it along
+    the other; verticals: as of estimate_frame."""
+    across, along = verticals
+    return tilt + along * along * (heading - tilt), tilt + across * across * (heading - tilt)
 
 
 @compiled

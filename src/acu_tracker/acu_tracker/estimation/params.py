@@ -118,11 +118,15 @@ class ReceiverModelParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class AttitudeModelParameters(Parameters):
-    """The control unit's model of the INS, on a ship: the part of its error that changes from sample to sample. What
-    changes slowly cancels, because the target is measured and pointed at with the same attitude."""
+    """The control unit's model of the INS, on a ship. The part of its error that changes from sample to sample is in
+    every measurement. What changes slowly cancels, because the target is measured and pointed at with the same
+    attitude; but as it changes the target seems to walk."""
 
     tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')
     heading_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of heading, per sample')
+    tilt_wander: float = parameter(1.7e-4, 0.0, 0.1, 'rad', 'rms of the slow error of roll and pitch')
+    heading_wander: float = parameter(5e-4, 0.0, 0.1, 'rad', 'rms of the slow error of heading')
+    wander_time: float = parameter(300.0, 0.1, 1e5, 's', 'correlation time of the slow errors')
 
 
 @dataclasses.dataclass(frozen=True)

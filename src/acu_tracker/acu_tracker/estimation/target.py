@@ -8,7 +8,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from acu_tracker.estimation import tracker
+from acu_tracker.estimation import target_filter, tracker
 from acu_tracker.estimation.measurement import (
     NO_INNOVATION,
     AxisMeasurement,
@@ -91,11 +91,17 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
         azimuth_rate, elevation_rate = _measured_rates(g, deck, u, at)
     R_cross = R_elevation = error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e)
-    if deck.stabilised:
-        cross, along = attitude_variances(elevation, p.tracker.attitude)
-        R_cross, R_elevation = R_cross + cross, R_elevation + along
-    R_rate = u.error_rate_sigma * u.error_rate_sigma
     cos_el = max(math.cos(elevation), 0.01)
+    walk_cross = walk_elevation = 0.0
+    if deck.stabilised:
+        a, verticals = p.tracker.attitude, estimate_frame.verticals(g.frame, azimuth, elevation)
+        cross, along = attitude_variances(verticals, a.tilt_noise * a.tilt_noise, a.heading_noise * a.heading_noise)
+        R_cross, R_elevation = R_cross + cross, R_elevation + along
+        k = 2.0 / a.wander_time
+        walk_cross, walk_elevation = attitude_variances(verticals, k * a.tilt_wander * a.tilt_wander,
+                                                        k * a.heading_wander * a.heading_wander)
+    target_filter.walk(g.tracker.filter, walk_cross / (cos_el * cos_el), walk_elevation)
+    R_rate = u.error_rate_sigma * u.error_rate_sigma
     axis = (AxisMeasurement(azimuth, R_cross / (cos_el * cos_el), azimuth_rate, R_rate / (cos_el * cos_el)),
             AxisMeasurement(elevation, R_elevation, elevation_rate, R_rate))
     outcome, innovation = tracker.observe(g.tracker, p.tracker, c, Measurement(t, axis, u.range, u.range_variance),

@@ -44,6 +44,13 @@ def start(f, c, m, rate_sigma):
 
 
 @compiled
+def walk(f, azimuth, elevation):
+    """From now on the measured angles walk, as of an INS whose error changes slowly, by these variances per second
+    [rad2/s]. The Cartesian filter takes them to stay."""
+    f.axis[0].walk, f.axis[1].walk = azimuth, elevation
+
+
+@compiled
 def predict(f, c, T):
     """Predict by T [s] >= 0 from the last measurement into the prior fields; a repeated call costs nothing."""
     if f.predicted == T:

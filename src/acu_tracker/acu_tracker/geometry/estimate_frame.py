@@ -73,6 +73,14 @@ def direction_to_frame(f, azimuth, elevation):
 
 
 @compiled
+def verticals(f, azimuth, elevation):
+    """(across, along): components on the earth's vertical of the unit vectors along which azimuth and elevation of a
+    direction in the frame grow; both angles [rad]. Of a level frame 0 and the cosine of the elevation."""
+    s, c, z = math.sin(azimuth), math.cos(azimuth), f.mat[2]
+    return z[0] * c - z[1] * s, z[2] * math.cos(elevation) - (z[0] * s + z[1] * c) * math.sin(elevation)
+
+
+@compiled
 def of_deck(f, attitude):
     """The Attitude, deck -> frame, of an Attitude deck -> earth. It stands until the next call."""
     mat = attitude.mat

@@ -38,9 +38,6 @@ from pedestal_common.parameters import as_dict
 RUNS = 50
 """Runs of each case, with independent noise."""
 
-DRIVE_RUNS = 50
-"""Runs at most of each case through the product, one of which takes as long as a hundred of the others."""
-
 DRIVE_SECONDS, DRIVE_START, DRIVE_ELEVATION = 36.0, 6.0, 0.5
 """Of the runs through the product: duration, what of it is left to the hand-over to autotrack [s], where [rad]."""
 
@@ -293,13 +290,11 @@ def drive_figure():
 
 
 def run(progress, runs=RUNS, pool=None) -> Result:
-    """Run CASES `runs` times, DRIVE_CASES as often but DRIVE_RUNS times at most; pool: monte_carlo.Pool, None for this
-    process."""
+    """Run CASES and DRIVE_CASES `runs` times; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     misses = statistics(CASES, runs, pool, lambda share, text: progress(0.5 * share, text))
-    driven_runs = min(runs, DRIVE_RUNS)
-    items = [(name, SEED + i) for name in DRIVE_CASES for i in range(driven_runs)]
+    items = [(name, SEED + i) for name in DRIVE_CASES for i in range(runs)]
     done = np.array(list(pool.map(driven_measures, items, lambda share, text: progress(
         0.5 + 0.5 * share, f'the whole chain, {text}'))))
-    of_drive = dict(zip(DRIVE_CASES, done.reshape(len(DRIVE_CASES), driven_runs, 2)))
+    of_drive = dict(zip(DRIVE_CASES, done.reshape(len(DRIVE_CASES), runs, 2)))
     return Result(rows(misses) + drive_rows(of_drive), figures(misses), remarks(misses))
