@@ -28,7 +28,8 @@ TIMEOUT = 40
 @pytest.fixture(scope='module')
 def run(start_run, connect):
     """A realtime run whose ACU is stopped for a while on the way to the target: run.stopped, run.resumed [s]."""
-    run = start_run('leo_pass', '--pacing', 'realtime', '--duration', '6', '--param', 'acu.azimuth.shaper.rate=0.3')
+    run = start_run('leo_pass', '--pacing', 'realtime', '--duration', '6', '--param', 'acu.azimuth.shaper.rate=0.3',
+                    '--param', 'scenario.priority=10')
     client = connect(run.domain_id)
     client.read('joint_states')
     heard = client.heard['joint_states']

@@ -21,7 +21,7 @@ class GraphParameters(parameters.Parameters):
                                          'node is refused')
     silence: float = parameters.parameter(0.2, 0.02, 60.0, 's', 'realtime: a node without its first input for this '
                                           'long says so')
-    priority: int = parameters.parameter(10, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes that have a step '
+    priority: int = parameters.parameter(0, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes that have a step '
                                          'to make, where the system allows it, one more of the drive; 0: that of any '
                                          'process')
 

@@ -54,7 +54,7 @@ class ScenarioParameters(parameters.Parameters):
     beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
                                       'in a namespace beam_1 ...')
     deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
-    priority: int = parameters.parameter(10, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes that have a step '
+    priority: int = parameters.parameter(0, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes that have a step '
                                          'to make, where the system allows it, one more of the drive; 0: that of any '
                                          'process')
     program: ProgramParameters = parameters.group(ProgramParameters)
