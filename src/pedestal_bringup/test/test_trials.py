@@ -153,17 +153,17 @@ def test_the_same_numbers_whoever_works_and_a_plan_that_goes_on(tmp_path):
                                                                          for name, (value, _) in values.items()}
 
 
-def start_forty(folder):
-    """The command that makes forty trials in a folder."""
-    return subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.cli', 'trials', 'leo_pass', '--runs', '40',
+def start_many(folder):
+    """The command that makes 120 trials in a folder: enough to be stopped before it ends."""
+    return subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.cli', 'trials', 'leo_pass', '--runs', '120',
                              '--duration', '8', '--workers', '1', '--vary', VARY[0], '--output', folder.name],
                             cwd=folder.parent, start_new_session=True, text=True, stdout=subprocess.PIPE,
                             stderr=subprocess.PIPE)
 
 
-def finish_forty(folder):
+def finish_many(folder):
     """Their rows, once the command has come to its end."""
-    process = start_forty(folder)
+    process = start_many(folder)
     _, errors = process.communicate(timeout=300.0)
     assert (process.returncode, errors) == (0, '')
     return (folder / 'trials.csv').read_bytes()
@@ -171,7 +171,7 @@ def finish_forty(folder):
 
 @pytest.fixture(scope='module')
 def never_stopped(tmp_path_factory):
-    return finish_forty(tmp_path_factory.mktemp('forty') / 'whole')
+    return finish_many(tmp_path_factory.mktemp('many') / 'whole')
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
@@ -181,7 +181,7 @@ def test_a_command_that_was_stopped_goes_on(never_stopped, tmp_path, number):
         file = tmp_path / 'cut' / 'trials.csv'
         return file.read_bytes().count(b'\n') - 1 if file.exists() else 0
 
-    process = start_forty(tmp_path / 'cut')
+    process = start_many(tmp_path / 'cut')
     try:
         while rows() < 4:
             assert process.poll() is None, process.communicate()
@@ -192,11 +192,11 @@ def test_a_command_that_was_stopped_goes_on(never_stopped, tmp_path, number):
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
     done = rows()
-    assert 4 <= done < 40
+    assert 4 <= done < 120
     if number == signal.SIGINT:
         assert process.returncode == 130
-        assert errors == f'pedestal: {done} of 40 trials are in cut; the same command goes on\npedestal: stopped\n'
-    assert finish_forty(tmp_path / 'cut') == never_stopped
+        assert errors == f'pedestal: {done} of 120 trials are in cut; the same command goes on\npedestal: stopped\n'
+    assert finish_many(tmp_path / 'cut') == never_stopped
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():

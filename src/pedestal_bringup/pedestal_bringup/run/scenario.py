@@ -16,6 +16,7 @@ import yaml
 
 from pedestal_bringup.run import parameter_file
 from pedestal_common import files, nodes, parameters, plain_yaml, topics
+from pedestal_common.graph_parameters import GraphParameters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,6 +43,12 @@ class RestartParameters(parameters.Parameters):
                                           'is killed and started again; 0: never')
 
 
+def _of_graph(name):
+    """The parameter graph.NAME, which a scenario tells every node."""
+    field = GraphParameters.__dataclass_fields__[name]
+    return dataclasses.field(default=field.default, metadata=field.metadata)
+
+
 @dataclasses.dataclass(frozen=True)
 class ScenarioParameters(parameters.Parameters):
     """The header of a scenario."""
@@ -53,10 +60,8 @@ class ScenarioParameters(parameters.Parameters):
     beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
     beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
                                       'in a namespace beam_1 ...')
-    deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
-    priority: int = parameters.parameter(0, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes that have a step '
-                                         'to make, where the system allows it, one more of the drive; 0: that of any '
-                                         'process')
+    deadline: float = _of_graph('deadline')
+    priority: int = _of_graph('priority')
     program: ProgramParameters = parameters.group(ProgramParameters)
     restart: RestartParameters = parameters.group(RestartParameters)
 

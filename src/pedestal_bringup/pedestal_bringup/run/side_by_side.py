@@ -45,10 +45,18 @@ def _track(rows, ends, i):
     return ProgramTrack(rows.times[ends[i]:ends[i + 1]], rows.angles[ends[i]:ends[i + 1]])
 
 
+class ControlUnits(typing.NamedTuple):
+    """Control units one after the other. tables: those of all as one, which end at ends (tables, n + 1), as
+    `_one_after_another` gives them."""
+    record: np.ndarray
+    tables: Tables
+    ends: np.ndarray
+
+
 @compiled
-def _acu_law(acus, ends, i, stamp, step):
+def _acu_law(acus, i, stamp, step):
     """The step of control unit i."""
-    of_all = acus.tables
+    of_all, ends = acus.tables, acus.ends
     tables = Tables(_track(of_all.program, ends[0], i), _track(of_all.tle, ends[1], i), _track(of_all.sun, ends[2], i))
     acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
 
@@ -62,12 +70,12 @@ class Kept(typing.NamedTuple):
 
 
 @compiled
-def _loop(drives, receivers, acus, ends, first, last, period_ns, steps, kept):
+def _loop(drives, receivers, acus, first, last, period_ns, steps, kept):
     """Steps first ... last - 1 of every trial, of which a Kept keeps what it says.
 
-    drives: as of lanes.beside; receivers: a memory whose arrays have the trials as a further first dimension; acus,
-    ends: a memory whose tables are those of all trials, as `_one_after_another` gives them. steps (2, trials) of STEP:
-    those of even and of odd numbers, the present ones and the ones before by turns.
+    drives: as of lanes.beside; receivers: a memory whose arrays have the trials as a further first dimension; acus:
+    ControlUnits. steps (2, trials) of STEP: those of even and of odd numbers, the present ones and the ones before by
+    turns.
     """
     moving = drive_unit.LANES(drives)
     for k in range(first, last):
@@ -75,7 +83,7 @@ def _loop(drives, receivers, acus, ends, first, last, period_ns, steps, kept):
         drive_unit.law_of_lanes(moving, stamp, steps[1 - now], steps[now])
         for i in range(len(kept.rows)):
             _receiver_law(receivers, i, stamp, steps[now, i])
-            _acu_law(acus, ends, i, stamp, steps[now, i])
+            _acu_law(acus, i, stamp, steps[now, i])
             for j in range(len(kept.words)):
                 kept.rows[i, k, j] = kept.said[now, i, kept.words[j]]
 
@@ -147,7 +155,7 @@ def runs(loops, names, kept=None):
         tables, ends = zip(*map(_one_after_another, zip(*(unit.memory.tables for unit in acus))))
         _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
                                            np.stack([block.normals for block in blocks])),
-              acu_unit.Memory(acu_record, Tables(*tables)), np.array(ends), first, last, period_ns, steps, keeps)
+              ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
         first = last
     lanes.take_back(moving, drive_record)
     return [Run(steps, np.zeros(0, TRUTH), np.arange(count) * period_ns, loop.units, told)
