@@ -104,7 +104,7 @@ ANNOUNCED = {'acu/keyhole', 'acu/blockage', 'ins/state', *(
 """Topics of words that neither run gives a reason to say, and nobody asks for anything."""
 
 
-@pytest.mark.parametrize('name, topics', [('first', 20), ('ship', 26)])
+@pytest.mark.parametrize('name, topics', [('first', 20), ('ship', 27)])
 def test_recording_is_complete(runs, name, topics, monkeypatch, capsys):
     monkeypatch.setattr(signal, 'signal', lambda *_: None)
     assert cli.main(['verify', str(runs[name].bag)]) == 0

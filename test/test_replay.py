@@ -18,8 +18,8 @@ from pedestal_common import messages, middleware, topics
 
 CLI = [sys.executable, '-m', 'pedestal_bringup.cli']
 ANSWERS = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode')
-INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'ins/state', 'tracking_receiver/angle_error',
-          'acu/program_track')
+INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'ins/state', 'ins/error',
+          'tracking_receiver/angle_error', 'acu/program_track')
 STEPS = 601
 ENOUGH = {'--lockstep': range(STEPS, STEPS + 1), '--rate 1': range(STEPS // 2, STEPS + 1),
           '--rate 4': range(1, STEPS + 1)}

@@ -74,6 +74,17 @@ def test_a_signal_of_any_strength_is_tracked_by_a_filter_that_knows_its_errors(n
     assert (nis > 0.8).all() and (nis < 1.2).all()
 
 
+def test_the_control_unit_believes_what_the_ins_says_of_its_error():
+    """An INS three times as noisy as the control unit's parameters have it."""
+    nis = {}
+    for told in ('true', 'false'):
+        _, run, on = track('ship_pass', 'ins.tilt_noise=1e-4', 'ins.heading_noise=1e-4', f'ins.error_told={told}',
+                           'scenario.duration=30')
+        nis[told] = np.nanmean(layouts.of_filter(run.steps, 'nis')[on], axis=0)
+    assert (nis['true'] > 0.8).all() and (nis['true'] < 1.2).all()
+    assert (nis['false'] > 1.5).all()
+
+
 @pytest.mark.parametrize('name', ['ship_pass', 'ship_pass_ss6'])
 def test_the_ship_is_isolated_by_60_db(name):
     found = isolated(name)
@@ -211,6 +222,9 @@ def test_the_chain_from_power_up_to_autotrack(told):
     heading = told.rows['heading_at_alignment_deg']['value']
     assert told.rows['heading_sigma_at_alignment_deg']['value'] <= math.degrees(SIGMA)
     assert abs(heading) < 3.0 * told.rows['heading_sigma_at_alignment_deg']['value']
+    error = told.bag.table('ins/error')
+    assert not error['heading.position'].any()
+    assert np.unique([error[f'{angle}.velocity'] for angle in ('roll', 'pitch', 'heading')]) == [1.45e-6]
     assert told.rows['pointing_rms_deg']['value'] < 0.01 and told.rows['loss_s']['value'] == 0.0
 
 

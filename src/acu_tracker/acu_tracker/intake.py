@@ -6,7 +6,7 @@ import math
 
 from acu_tracker import by_level, outage, signals, supervision
 from acu_tracker.estimation import divergence, measurement, repetition, target
-from acu_tracker.geometry import attitude, encoders
+from acu_tracker.geometry import attitude, attitude_error, encoders
 from acu_tracker.lookahead import levelled_deck, planner
 from pedestal_common import line_of_sight
 from pedestal_common.compiled import compiled
@@ -23,16 +23,19 @@ def take_encoders(s, u):
 
 @compiled
 def take_attitude(s, c, u):
-    """Take the attitude of this step, also into the mean of the look-ahead; signals.ATTITUDE where it is not valid,
-    else 0."""
+    """Take the attitude of this step, also into the mean of the look-ahead, and what its INS says of its error; flags
+    signals.ATTITUDE, ATTITUDE_ERROR of what is not valid."""
     s.aligning = u.aligning
     if u.stabilised != s.attitude.stabilised:
         s.attitude.stabilised, s.target.tracker.running = u.stabilised, 0
         planner.forget(s.lookahead)
     if not u.stabilised:
         return 0
+    flags = 0
+    if u.attitude_error_came and not attitude_error.take(s.attitude.error, u.attitude_noise, u.attitude_walk):
+        flags = signals.ATTITUDE_ERROR
     if not u.attitude_valid:
-        return signals.ATTITUDE
+        return flags | signals.ATTITUDE
     outcome = attitude.take(s.attitude, c.p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate, u.aligning)
     if outcome == attitude.NEW:
         deck = s.lookahead.deck
@@ -41,7 +44,7 @@ def take_attitude(s, c, u):
             levelled_deck.restart(deck)
         h = s.attitude.history
         levelled_deck.take(deck, u.attitude_stamp, h.sample[h.newest], c.p.keyhole.mean_time)
-    return signals.ATTITUDE if outcome == attitude.INVALID else 0
+    return flags | (signals.ATTITUDE if outcome == attitude.INVALID else 0)
 
 
 @compiled

@@ -82,6 +82,7 @@ class SharedParameters(Parameters):
     attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: latency of the attitude')
     receiver_rate: bool = flag(False, 'the receiver measures the rate of its errors: tracking_receiver/angle_rate')
     receiver_range: bool = flag(False, 'the receiver measures the range: tracking_receiver/range')
+    ins_error: bool = flag(False, 'the INS tells how its error changes: ins/error, instead of tracker.attitude')
     initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
     stow_pins: bool = flag(False, 'the drive has stow pins: adu/stow_pins')
     stow_window: float = parameter(1.75e-3, 1e-5, 0.1, 'rad', 'largest distance of an axis from its stow angle at '

@@ -8,10 +8,10 @@ from pedestal_common import topics
 from pedestal_common.compiled import compiled
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
-                  'step_gap', 'error_noisy')
+                  'step_gap', 'error_noisy', 'attitude_error')
 """Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
 (STAMP, ENCODER, ERROR, ERROR_STAMP, ERROR_GATED, ATTITUDE, PROGRAM, PRESET,
- STEP_GAP, ERROR_NOISY) = (1 << i for i in range(len(INVALID_INPUTS)))
+ STEP_GAP, ERROR_NOISY, ATTITUDE_ERROR) = (1 << i for i in range(len(INVALID_INPUTS)))
 
 DRIVE_STATES = topics.BY_NAME['adu/state'].texts
 READY = len(topics.ENABLED) - 1
@@ -30,6 +30,8 @@ INPUTS = np.dtype([
     ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
     ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
     ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
+    ('attitude_error_came', 'i8'),                      # what the INS says of its error, of roll, pitch, heading:
+    ('attitude_noise', 'f8', (3,)), ('attitude_walk', 'f8', (3,)),              # 1-sigma [rad], [rad/sqrt(s)]
     ('aligning', 'i8'),                                                         # 1: the INS is still aligning
     ('drive_ready', 'i8'), ('drive', 'i8'),             # 1: the drive follows the commands; code of DRIVE_STATES
     ('pins', 'i8'),                                                             # code of adu/stow_pins

@@ -22,7 +22,7 @@ JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'shi
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 COMMAND, ESTIMATE, REFERENCE, FILTER = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/filter'
 MODE, KEYHOLE, BLOCKAGE, ALARMS = 'acu/mode', 'acu/keyhole', 'acu/blockage', 'acu/alarms'
-PROGRAM, DRIVE, INS = 'acu/program_track', 'adu/state', 'ins/state'
+PROGRAM, DRIVE, INS, INS_ERROR = 'acu/program_track', 'adu/state', 'ins/state', 'ins/error'
 PINS_ASKED, PINS = 'acu/stow_pins', 'adu/stow_pins'
 
 FILTER_SIZE, MODELS = len(topics.FILTER), len(topics.MOTION_MODELS)
@@ -76,6 +76,10 @@ def decode(u, stamp, inputs):
             u.quaternion[i] = attitude.orientation[i]
         for i in range(3):
             u.deck_rate[i] = attitude.angular_velocity[i]
+    u.attitude_error_came = inputs[INS_ERROR].stamp != NEVER
+    if u.attitude_error_came:
+        for i in range(3):
+            u.attitude_noise[i], u.attitude_walk[i] = inputs[INS_ERROR].position[i], inputs[INS_ERROR].velocity[i]
     u.drive, u.aligning = inputs[DRIVE], inputs[INS] == ALIGNING
     u.drive_ready, u.pins = u.drive <= signals.READY, inputs[PINS]
 
@@ -176,7 +180,7 @@ class Acu(Unit):
 
     def latency(self, topic):
         """Age [s] of a topic's stamp at a step: attitude_latency or receiver_latency."""
-        return self.parameters.attitude_latency if topic == ATTITUDE else self.parameters.receiver_latency
+        return self.parameters.attitude_latency if topic in (ATTITUDE, INS_ERROR) else self.parameters.receiver_latency
 
     def configure(self, parameters):
         """Take other values of LIVE parameters into the constants; the state stays."""

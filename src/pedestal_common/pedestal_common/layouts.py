@@ -61,7 +61,7 @@ LAYOUTS = {
 }
 """The diagonal of an Imu's orientation_covariance says how well an INS knows its attitude."""
 
-ONLY = {'acu/filter': ('position',), 'adu/truth': ('position', 'velocity')}
+ONLY = {'acu/filter': ('position',), 'adu/truth': ('position', 'velocity'), 'ins/error': ('position', 'velocity')}
 """Fields of a topic that does not use all of its type's."""
 
 _JOINTS = {'sensor_msgs/msg/JointState': 'name', 'trajectory_msgs/msg/JointTrajectory': 'joint_names'}

@@ -114,6 +114,12 @@ TOPICS = (
           '`aligning`, or `aligned` once the 1-sigma of its heading is below `alignment.aligned_sigma`, and again '
           '`aligning` after 0.1 s without its IMU; method `model` never says it, which counts as aligned',
           texts=('aligning', 'aligned')),
+    Topic('ins/error', 'sensor_msgs/msg/JointState', 'step',
+          '`roll`, `pitch`, `heading`: 1-sigma of what changes in the error of `ship/imu/data`, whose stamp it has: '
+          'position, the noise of each sample [rad]; velocity, what it wanders by [rad/sqrt(s)]',
+          names=('roll', 'pitch', 'heading'), frame='base_link',
+          units={f'{angle}.velocity': 'rad/sqrt(s)' for angle in ('roll', 'pitch', 'heading')},
+          measured='error_told', flag='ins_error'),
     Topic('tracking_receiver/angle_error', 'geometry_msgs/msg/Vector3Stamped', 'step',
           'x cross-elevation error [rad], y elevation error [rad], z C/N0 [dB-Hz]; x, y are NaN while unlocked; '
           '`latency` late', frame='beam',

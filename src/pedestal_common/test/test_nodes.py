@@ -5,8 +5,8 @@ import pytest
 
 from pedestal_common import nodes, topics, unit
 
-SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'diagnostics',
-          *(f'{node}/{name}' for node in ('ship_motion', 'ins') for name in ('inject', 'injected'))}
+SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'ins/error',
+          'diagnostics', *(f'{node}/{name}' for node in ('ship_motion', 'ins') for name in ('inject', 'injected'))}
 
 
 def test_every_topic_is_written_by_one_node_and_every_name_is_in_the_table_of_topics():
@@ -62,6 +62,7 @@ def test_a_node_hears_what_may_be_real_equipment_and_no_ship_where_none_is_named
     assert nodes.reads(acu, ()) == ashore == nodes.reads(acu, ('acu', 'adu', 'recorder'))
     aboard = nodes.reads(acu, ('beam_1/acu', 'ins'), ('receiver_range',))
     assert set(aboard) - set(ashore) == {'ship/imu/data', 'ins/state', 'tracking_receiver/range'}
+    assert 'ins/error' in nodes.reads(acu, ('acu', 'ins'), ('ins_error',))
     assert nodes.reads(nodes.row('ins'), ('ins', 'acu')) == ('ship/imu/data_raw',)
 
 

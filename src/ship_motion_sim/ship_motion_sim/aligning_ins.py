@@ -146,4 +146,6 @@ def step(s, c, i, out, normals):
         out.stage = navigator.ALIGNING
     for n in range(3):
         out.velocity[n] = s.navigator.strapdown.velocity[n]
+        # Integrated, the noise of a gyro is a walk and nothing else.
+        out.noise[n], out.walk[n] = 0.0, c.navigator.conditions.gyro_noise
     ins.release(c, s, i.stamp_ns, out)

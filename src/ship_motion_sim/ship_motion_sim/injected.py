@@ -21,7 +21,7 @@ INS = np.dtype([('latency_ns', 'i8'), ('drop', 'i8'), ('clock_ns', 'i8'), ('rate
 """latency_ns: of the INS when nothing is broken; drop: 1 while it is silent; clock_ns: added to its stamps; rate:
 added to the deck rate, FLU [rad/s]; turn: roll, pitch and yaw added to its attitude [rad]; said: what spoils it."""
 
-RAW, DATA = 'ship/imu/data_raw', 'ship/imu/data'
+RAW, DATA, CHANGES = 'ship/imu/data_raw', 'ship/imu/data', 'ins/error'
 
 
 def initial(latency_ns) -> np.ndarray:
@@ -148,3 +148,5 @@ def spoil_ins(e, stamp, outputs):
     spoil.numbers(e.said, data.angular_velocity, 4)
     if data.stamp != NEVER:
         data.stamp = NEVER if e.drop != 0 else data.stamp + e.clock_ns
+    if outputs[CHANGES].stamp != NEVER:
+        outputs[CHANGES].stamp = data.stamp

@@ -34,6 +34,7 @@ CONSTANTS = np.dtype([
     ('imu_tolerance', 'f8'),                # [rad/s]
     ('latency_ns', 'i8'),
     ('variance', 'f8', (3,)),               # of roll, pitch, heading that the model declares [rad2]
+    ('walk', 'f8', (3,)),                   # what they wander by [rad/sqrt(s)]
 ], align=True)
 
 UNDER_WAY = [
@@ -69,6 +70,7 @@ OUTPUTS = np.dtype([
     ('linear_acceleration', 'f8', (3,)),    # of the IMU message with this stamp [m/s2]
     ('variance', 'f8', (3,)),               # of roll, pitch, heading as declared [rad2]
     ('stage', 'i8'),                        # of this result, navigator.STAGES; NO_STAGE: the model, which has none
+    ('noise', 'f8', (3,)), ('walk', 'f8', (3,)),    # of roll, pitch, heading as declared [rad], [rad/sqrt(s)]
     ('velocity', 'f8', (3,)),               # ENU, now, of an INS that navigates [m/s]
 ], align=True)
 
@@ -88,6 +90,7 @@ def constants(params: InsParameters) -> np.ndarray:
     record['imu_tolerance'] = params.imu_tolerance
     record['latency_ns'] = round(params.latency * 1e9)
     record['variance'] = model_variance(params)
+    record['walk'] = math.sqrt(2.0 / params.wander_time) * record['wander']
     return record
 
 
@@ -184,4 +187,6 @@ def step(s, c, i, out, normals):
             s.released += 1
             out.status = BUFFER_FULL
         measure(c, s, i.stamp_ns, i.linear_acceleration, normals)
+    for n in range(3):
+        out.noise[n], out.walk[n] = c.noise[n], c.walk[n]
     release(c, s, i.stamp_ns, out)

@@ -15,15 +15,15 @@ from pedestal_common.records import NEVER
 from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, joined
 from ship_motion_sim import aligning_ins, injected, ins, navigator
 
-RAW, DATA, STATE = 'ship/imu/data_raw', 'ship/imu/data', 'ins/state'
+RAW, DATA, STATE, CHANGES = 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'ins/error'
 
 
 def _record_of(state, constants):
-    """The record of an INS. row: of the noise that the next step takes; worst: the highest status since the last
-    diagnosis."""
+    """The record of an INS. error_told: whether it says how its error changes; row: of the noise that the next step
+    takes; worst: the highest status since the last diagnosis."""
     return np.dtype([('state', state), ('constants', constants), ('inputs', ins.INPUTS), ('outputs', ins.OUTPUTS),
-                     ('row', 'i8'), ('worst', 'i8'), ('schedule', schedule.SCHEDULE), ('injected', injected.INS)],
-                    align=True)
+                     ('error_told', 'i8'), ('row', 'i8'), ('worst', 'i8'), ('schedule', schedule.SCHEDULE),
+                     ('injected', injected.INS)], align=True)
 
 
 MODEL_RECORD = _record_of(ins.STATE, ins.CONSTANTS)
@@ -51,15 +51,17 @@ def decode(u, raw):
 
 
 @compiled
-def encode(o, outputs):
-    """Outputs of the INS -> records of its messages."""
-    data = outputs[DATA]
+def encode(o, error_told, outputs):
+    """Outputs of the INS -> records of its messages; error_told: whether it says how its error changes."""
+    data, changes = outputs[DATA], outputs[CHANGES]
     data.stamp = o.stamp_ns if o.due == 1 else NEVER
     for i in range(4):
         data.orientation[i] = o.quaternion[i]
     for i in range(3):
         data.angular_velocity[i], data.linear_acceleration[i] = o.angular_velocity[i], o.linear_acceleration[i]
         data.orientation_variance[i] = o.variance[i]
+        changes.position[i], changes.velocity[i] = o.noise[i], o.walk[i]
+    changes.stamp = data.stamp if error_told else NEVER
     outputs[STATE] = o.stage
 
 
@@ -73,7 +75,7 @@ def model_law(memory, stamp, inputs, outputs):
     ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
     m.row += 1
     m.worst = max(m.worst, m.outputs.status)
-    encode(m.outputs, outputs)
+    encode(m.outputs, m.error_told, outputs)
     if m.schedule.pending != 0:
         injected.spoil_ins(m.injected, stamp, outputs)
 
@@ -88,7 +90,7 @@ def aligning_law(memory, stamp, inputs, outputs):
     aligning_ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
     m.row += 1
     m.worst = max(m.worst, m.outputs.status)
-    encode(m.outputs, outputs)
+    encode(m.outputs, m.error_told, outputs)
     if m.schedule.pending != 0:
         injected.spoil_ins(m.injected, stamp, outputs)
 
@@ -127,6 +129,7 @@ class Ins(Simulated):
         else:
             self.memory = AligningMemory(joined(ALIGNING_RECORD, state=aligning_ins.initial_state(constants),
                                                 constants=constants, **faults), normals)
+        self.parts['error_told'] = parameters.error_told
         rate_noise = parameters.rate_noise if model else 0.0     # zeros: unknown
         self.messages[DATA].angular_velocity_covariance = (np.eye(3) * rate_noise**2).ravel()
 

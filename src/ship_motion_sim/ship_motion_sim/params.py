@@ -3,7 +3,7 @@ both hold the group `ship`, which must be the same in both (ins.step says when i
 import dataclasses
 
 from pedestal_common.injection import table
-from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
+from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 SEED_MAX = 2 ** 31 - 1
 IMU_OUTPUTS = ('sample', 'increment')
@@ -196,6 +196,7 @@ class InsParameters(Parameters):
     latency: float = parameter(0.005, 0.0, 0.25, 's', 'from measurement to release')
     imu_tolerance: float = parameter(0.005, 1e-6, 1.0, 'rad/s',
                                      'largest difference between the IMU and the ship as the INS knows it')
+    error_told: bool = flag(True, 'it tells how its error changes: ins/error')
     seed: int = parameter(3, 0, SEED_MAX, '-', 'seed of the errors')
     imu_output: str = choice('sample', IMU_OUTPUTS, "the IMU's `output`")
     alignment: AlignmentParameters = group(AlignmentParameters)

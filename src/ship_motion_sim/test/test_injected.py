@@ -60,8 +60,9 @@ def test_a_delay_is_the_latency_with_right_stamps():
 
 
 def test_dropped_attitudes_do_not_come_and_a_stepped_clock_moves_the_stamps():
-    plain, dropped, stepped = (run('', inject)[1][DATA] for inject in (
-        '', '1 drop duration=0.5', '1 clock_step time=0.1'))
+    said = [run('', inject)[1] for inject in ('', '1 drop duration=0.5', '1 clock_step time=0.1')]
+    assert all((one['ins/error']['stamp'] == one[DATA]['stamp']).all() for one in said)
+    plain, dropped, stepped = (one[DATA] for one in said)
     assert np.flatnonzero((dropped['stamp'] == records.NEVER) & (plain['stamp'] != records.NEVER)).tolist() == list(
         range(200, 300))
     assert (stepped['stamp'][200:] - plain['stamp'][200:] == 100_000_000).all()

@@ -103,6 +103,22 @@ def test_wander_has_its_size_from_the_first_sample():
     assert np.std(first) == pytest.approx(1e-3, rel=0.15)       # 400 samples: 3.5 %, four of them
 
 
+def test_it_says_how_its_error_changes():
+    """Over a time short of its memory the error of an angle changes by 2 noise^2 + walk^2 T (200 s: 4 % of it)."""
+    bench = Bench(dataclasses.replace(PERFECT, tilt_noise=1e-4, heading_noise=2e-4, tilt_wander=2e-3,
+                                      heading_wander=1e-3, wander_time=20.0, ship=STILL))
+    out = bench.step(0)
+    angles = [euler(out['quaternion'])]
+    for k in range(1, 40_000):
+        bench.inputs['stamp_ns'] = k * STEP
+        out = bench.run()
+        angles.append(euler(out['quaternion']))
+    for n in (1, 20):
+        change = np.var(np.subtract(angles[n:], angles[:-n]), axis=0)
+        assert change == pytest.approx(2.0 * out['noise']**2 + out['walk']**2 * n * 0.005, rel=0.15)
+    assert out['noise'] == pytest.approx([1e-4, 1e-4, 2e-4])
+
+
 @pytest.mark.parametrize('latency', [0.0, 0.004999999, 0.005, 0.005000001, 0.012, 0.25])
 @pytest.mark.parametrize('regular', [True, False])
 def test_latency_releases_the_newest_result_old_enough(latency, regular):

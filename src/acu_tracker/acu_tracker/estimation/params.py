@@ -118,9 +118,9 @@ class ReceiverModelParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class AttitudeModelParameters(Parameters):
-    """The control unit's model of the INS, on a ship. The part of its error that changes from sample to sample is in
-    every measurement. What changes slowly cancels, because the target is measured and pointed at with the same
-    attitude; but as it changes the target seems to walk."""
+    """The control unit's model of an INS, on a ship, that does not tell how its error changes. The part that changes
+    from sample to sample is in every measurement. What changes slowly cancels, because the target is measured and
+    pointed at with the same attitude; but as it changes the target seems to walk."""
 
     tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')
     heading_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of heading, per sample')

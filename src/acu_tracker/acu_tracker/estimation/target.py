@@ -18,7 +18,7 @@ from acu_tracker.estimation.measurement import (
     attitude_variances,
     error_variance,
 )
-from acu_tracker.geometry import attitude, deck_reference, estimate_frame, lever_arm
+from acu_tracker.geometry import attitude, attitude_error, deck_reference, estimate_frame, lever_arm
 from acu_tracker.geometry.deck_reference import STILL, Attitude
 from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Vector, rotated
@@ -94,12 +94,11 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     cos_el = max(math.cos(elevation), 0.01)
     walk_cross = walk_elevation = 0.0
     if deck.stabilised:
-        a, verticals = p.tracker.attitude, estimate_frame.verticals(g.frame, azimuth, elevation)
-        cross, along = attitude_variances(verticals, a.tilt_noise * a.tilt_noise, a.heading_noise * a.heading_noise)
+        verticals = estimate_frame.verticals(g.frame, azimuth, elevation)
+        noise, walk = attitude_error.expected(deck.error, p.tracker.attitude)
+        cross, along = attitude_variances(verticals, *noise)
         R_cross, R_elevation = R_cross + cross, R_elevation + along
-        k = 2.0 / a.wander_time
-        walk_cross, walk_elevation = attitude_variances(verticals, k * a.tilt_wander * a.tilt_wander,
-                                                        k * a.heading_wander * a.heading_wander)
+        walk_cross, walk_elevation = attitude_variances(verticals, *walk)
     target_filter.walk(g.tracker.filter, walk_cross / (cos_el * cos_el), walk_elevation)
     R_rate = u.error_rate_sigma * u.error_rate_sigma
     axis = (AxisMeasurement(azimuth, R_cross / (cos_el * cos_el), azimuth_rate, R_rate / (cos_el * cos_el)),

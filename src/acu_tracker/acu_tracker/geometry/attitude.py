@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 
-from acu_tracker.geometry import attitude_jump
+from acu_tracker.geometry import attitude_error, attitude_jump
 from acu_tracker.geometry.deck_reference import Attitude
 from acu_tracker.geometry.vector import vector
 from acu_tracker.history import bracket, history_type, push
@@ -12,10 +12,12 @@ from pedestal_common.line_of_sight import ASHORE, rotation
 
 ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('told', 'f8', (7,)),
                      ('aligned', 'i8'), ('jump', attitude_jump.JUMP),
+                     ('error', attitude_error.ERROR),
                      ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,))], align=True)
 """stabilised: 1 on a ship, 0 ashore, where the attitude never changes; history: quaternion (x, y, z, w) deck -> earth,
 w [rad/s], dw [rad/s2] of the last steps, as they are believed; told: the last q and w as they came; aligned: whether
-the INS was. mat_ed (deck -> earth), w, dw: at the instant that `at` was last called for.
+the INS was; error: how its error changes. mat_ed (deck -> earth), w, dw: at the instant that `at` was last called
+for.
 """
 
 TURNS = 1e-6

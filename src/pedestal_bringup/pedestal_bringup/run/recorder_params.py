@@ -14,6 +14,7 @@ class RecorderParameters(Parameters):
     seed: int = parameter(1, 0, 2**31 - 1, '', 'seed of the run')
     receiver_rate: bool = flag(False, 'tracking_receiver/angle_rate is there')
     receiver_range: bool = flag(False, 'tracking_receiver/range is there')
+    ins_error: bool = flag(False, 'ins/error is there')
     stow_pins: bool = flag(False, 'adu/stow_pins and acu/stow_pins are there')
     scenario_yaml: str = text('', 'the scenario of the run as a ROS 2 parameter file')
     parameters_yaml: str = text('', 'every parameter of every node of the run as YAML, {node: {name: value}}')

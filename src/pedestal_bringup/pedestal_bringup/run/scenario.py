@@ -92,11 +92,6 @@ SHARED = (
     ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
     ('tracking_receiver', 'receiver.cn0_time_constant', 'acu', 'acquisition.time_constant'),
     ('ins', 'latency', 'acu', 'attitude_latency'),
-    ('ins', 'tilt_noise', 'acu', 'tracker.attitude.tilt_noise'),
-    ('ins', 'heading_noise', 'acu', 'tracker.attitude.heading_noise'),
-    ('ins', 'tilt_wander', 'acu', 'tracker.attitude.tilt_wander'),
-    ('ins', 'heading_wander', 'acu', 'tracker.attitude.heading_wander'),
-    ('ins', 'wander_time', 'acu', 'tracker.attitude.wander_time'),
     ('ship_motion', 'imu.output', 'ins', 'imu_output'),
     *(('tracking_receiver', f'lever_arm.{axis}', 'acu', f'lever_arm.{axis}') for axis in 'xyz'),
     ('tracking_receiver', 'blockage', 'acu', 'blockage'),
@@ -340,11 +335,14 @@ def _spread(name, sections, header, seed):
     for key, value in sections['ship_motion'].items():
         if key.startswith('ship.'):
             share('ins', key, value)
+    def said(node, key, otherwise=None):
+        default = parameters.defaults(nodes.row(node, header.beam).parameters_type()).get(key, otherwise)
+        return sections[node].get(key, default)
+
     for node in ('acu', 'tracking_receiver'):
-        share(node, 'period', sections['adu'].get(
-            'period', parameters.defaults(nodes.row(nodes.DRIVE, header.beam).parameters_type())['period']))
+        share(node, 'period', said('adu', 'period'))
     for owner, key, flag in MEASURED:
-        measured = sections[owner].get(key, False)
+        measured = (header.ship or not nodes.row(owner).optional) and said(owner, key, False)
         for node in ('acu', 'recorder'):
             if measured or any(flag in values for section, values in sections.items()
                                if nodes.plain(section) == node):

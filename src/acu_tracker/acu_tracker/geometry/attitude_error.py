@@ -1,0 +1,35 @@
+"""How the error of the attitude changes, as its INS says or, from one that does not say it, as the parameters do."""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+
+ERROR = np.dtype([('told', 'i8'), ('noise', 'f8', (2,)), ('walk', 'f8', (2,))], align=True)
+"""Variances of tilt (roll and pitch) and of heading, once told: noise of each sample [rad2], what they grow by as the
+error wanders [rad2/s]."""
+
+LARGEST = 0.5
+"""Noise [rad] and wander [rad/sqrt(s)] above which nobody is believed."""
+
+
+@compiled
+def take(e, noise, walk):
+    """Believe the 1-sigma (3,) of roll, pitch and heading that an INS says; False, and nothing changed, where one is
+    none."""
+    for i in range(3):
+        if not (0.0 <= noise[i] <= LARGEST and 0.0 <= walk[i] <= LARGEST):
+            return False
+    e.noise[0], e.noise[1] = 0.5 * (noise[0] * noise[0] + noise[1] * noise[1]), noise[2] * noise[2]
+    e.walk[0], e.walk[1] = 0.5 * (walk[0] * walk[0] + walk[1] * walk[1]), walk[2] * walk[2]
+    e.told = 1
+    return True
+
+
+@compiled
+def expected(e, a):
+    """((noise of tilt, of heading) [rad2], (walk of tilt, of heading) [rad2/s]); a: record of AttitudeModelParameters,
+    whose slow errors, Gauss-Markov, walk by 2 sigma^2 / tau."""
+    if e.told:
+        return (e.noise[0], e.noise[1]), (e.walk[0], e.walk[1])
+    k = 2.0 / a.wander_time
+    return ((a.tilt_noise * a.tilt_noise, a.heading_noise * a.heading_noise),
+            (k * a.tilt_wander * a.tilt_wander, k * a.heading_wander * a.heading_wander))
