@@ -79,7 +79,7 @@ def test_the_control_unit_believes_what_the_ins_says_of_its_error():
     nis = {}
     for told in ('true', 'false'):
         _, run, on = track('ship_pass', 'ins.tilt_noise=1e-4', 'ins.heading_noise=1e-4', f'ins.error_told={told}',
-                           'scenario.duration=30')
+                           'tracking_receiver.receiver.cn0_dbhz=60', 'scenario.duration=20')
         nis[told] = np.nanmean(layouts.of_filter(run.steps, 'nis')[on], axis=0)
     assert (nis['true'] > 0.8).all() and (nis['true'] < 1.2).all()
     assert (nis['false'] > 1.5).all()
