@@ -12,7 +12,7 @@ import pytest
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags.verify import verify
-from pedestal_common import messages
+from pedestal_common import commands, messages
 
 PAUSE = 1.6
 """Drive time [s] for which the ACU of the run stands still: longer than a second, so a diagnostic falls in it."""
@@ -243,3 +243,30 @@ def test_disable_and_enable(drive):
     assert drive.client.trigger('adu/enable') == (True, 'drive is releasing brakes')
     drive.moves_at(0.1, 0.0)
     assert drive.state == 'enabled'
+
+
+def test_a_live_fault_breaks_the_drive_and_is_told_and_recorded(start_run, connect):
+    run = start_run('uav_flyby', '--duration', '8', '--pacing', 'realtime')
+    somebody = connect(run.domain_id)
+    somebody.write('adu/inject')
+    for topic in ('adu/injected', 'adu/state', 'acu/mode'):
+        somebody.read(topic)
+    somebody.until(lambda: somebody.heard['acu/mode'] and somebody.heard['acu/mode'][-1].data == 'autotrack')
+    for command in (commands.Command('encoder_jump', 'anna', '1', {'size': '0.02', 'duration': '0.5'}),
+                    commands.Command('encoder_jump', 'anna', '2', {'size': '9'})):
+        somebody.publish('adu/inject', commands.message(command))
+        somebody.until(lambda command=command: any(status.message == command.number
+                                                   for status in somebody.heard['adu/injected']))
+    somebody.until(lambda: any(said.data == 'fault: azimuth encoder disagreement'
+                               for said in somebody.heard['adu/state']))
+    somebody.until(lambda: somebody.heard['acu/mode'][-1].data == 'standby')
+    result = run.finish()
+    assert result.returncode in (0, 3), result.stderr        # 3: a busy machine lost steps
+    bag = bags.read(run.bag)
+    replies = [commands.of_reply(message) for *_, message in bag.messages('adu/injected')]
+    told = [(command.verb, command.who, command.number, reply.granted, reply.text)
+            for command, reply in replies if command.who == 'anna']
+    assert [row[:4] for row in told] == [('encoder_jump', 'anna', '1', True), ('encoder_jump', 'anna', '2', False)]
+    assert told[0][4].startswith('encoder_jump from the step after ') and told[0][4].endswith(' s on, for 0.5 s')
+    assert 'size = 9 rad: must be -3.2 to 3.2' in told[1][4]
+    assert len(list(bag.raw('adu/inject'))) == 2
