@@ -27,6 +27,10 @@ DRAIN = 4.0
 when others were heard but a topic of every step was not: Fast DDS repeats what a reader missed while it was being
 discovered with the next heartbeat of the writer, by default every 3 s."""
 
+LAST = 'diagnostics'
+"""The topic that every node writes, and in lockstep waits for its reader before its first step: the recorder opens it
+when the executor hears of all others. What is there before is taken in another order than that in which it came."""
+
 FAR = 3600 * SECOND
 """Time [ns] from the drive's beyond which no stamp is believed."""
 
@@ -62,7 +66,11 @@ class RecorderNode(shell.Shell):
         self._quiet = None
         self.diagnose_with(self._diagnosis)
         for index, topic in enumerate(recorded):
-            self._record(index, topic)
+            if topic.name == LAST:
+                self._last = index, topic
+            else:
+                self._record(index, topic)
+        self._opening = self.every(0.0, self._record_last)
         if not self.graph.lockstep:
             self.every(1.0, self._flush)
 
@@ -77,6 +85,10 @@ class RecorderNode(shell.Shell):
                                      raw=True)
         else:
             listening.subscribe(self, topic, topic.name, take, 'recorded')
+
+    def _record_last(self):
+        self._opening.cancel()
+        self._record(*self._last)
 
     def _taker(self, index, topic):
         put = self._in_step(index, topic) if self.graph.lockstep else self._as_it_comes(index, topic)
