@@ -4,7 +4,7 @@ s, c, u, o: records of control_unit.STATE and CONSTANTS, of signals.INPUTS and O
 """
 import math
 
-from acu_tracker import by_level, outage, signals, supervision
+from acu_tracker import by_level, modes, outage, signals, supervision
 from acu_tracker.estimation import divergence, measurement, repetition, target
 from acu_tracker.geometry import attitude, encoders
 from acu_tracker.lookahead import levelled_deck, planner
@@ -45,6 +45,18 @@ def take_attitude(s, c, u):
 
 
 @compiled
+def _wrong_level(s, u):
+    """The flag of a message, of a locked receiver or not, that a mode goes by the level of and must not believe,
+    else 0."""
+    if not u.error_came or not modes.BY_LEVEL[s.mode]:
+        return 0
+    if not math.isfinite(u.cn0_dbhz):
+        return signals.ERROR
+    known, _ = encoders.at(s.encoders, u.error_stamp)
+    return 0 if known else signals.ERROR_STAMP
+
+
+@compiled
 def take_error(s, c, u, o, program):
     """Filter y = encoder at the instant of the error, displaced by the error; a flag where it is not accepted, else 0.
 
@@ -54,8 +66,9 @@ def take_error(s, c, u, o, program):
     """
     s.error[0] = s.error[1] = math.nan
     receiver = c.p.tracker.receiver
-    if not u.error_valid:
-        return 0
+    wrong = _wrong_level(s, u)
+    if wrong or not u.error_valid:
+        return wrong
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
         return signals.ERROR
     if s.pointing_offset > ON_TARGET * receiver.beamwidth:

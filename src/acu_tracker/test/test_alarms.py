@@ -232,6 +232,18 @@ def test_receiver_and_ins_are_missed(Rig):
     assert 'INS lost' in told(rig) and rig.mode == 'standby'
 
 
+def test_an_unlocked_receiver_that_repeats_its_level_is_told_and_an_empty_sky_is_not(Rig):
+    rig = Rig(initial_mode='program')
+    rig.program()
+    rig.receiver_on = False
+    rig.run(3.0, error_came=1, cn0_dbhz=10.0)
+    assert rig.mode == 'program' and not told(rig)
+    rig.run(0.9, cn0_dbhz=20.6)
+    assert not told(rig)
+    rig.run(0.1, cn0_dbhz=20.6)
+    assert told(rig) == {'receiver silent'}
+
+
 def test_a_gap_between_steps_is_a_time_jump(moving):
     moving.k += 20
     moving.step()
