@@ -128,7 +128,8 @@ ALARMS = (
           ('INS lost', *_both('encoder jump', 'encoder stuck', 'encoder disagreement', 'immobile',
                               'following error')),
           'in autotrack, innovations squared over their variance: 7 in the mean of 100 errors, or 2 when the signal '
-          'goes; leads to `program`, or `standby` without a program, and autotrack is refused',
+          'goes; or the error of an axis moves with the beam as it would if its slope were reversed; leads to '
+          '`program`, or `standby` without a program, and autotrack is refused',
           "check slope, phase and sign of the receiver's errors; then reset"),
     Alarm('signal lost', 'medium', 0.5, 1.0, False,
           ('emergency stop', 'drive silent', 'time jump', 'receiver silent', 'INS lost', 'INS jump', 'receiver noisy',
