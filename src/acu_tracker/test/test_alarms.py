@@ -179,6 +179,16 @@ def test_an_axis_that_does_not_move_and_one_that_pushes(moving):
     assert told(moving) >= {'azimuth immobile', 'azimuth brake not released'}
 
 
+def test_an_axis_whose_brakes_drag_pushes_on_where_it_turns_back():
+    d = detector()
+    for k in range(400):
+        torque = 5800.0 * min(max(30.0 * np.sin(2.0 * np.pi * k * T / 0.8), -1.0), 1.0)
+        assert detectors.pushes(d, torque, 60.0, T) or k < 20
+    for _ in range(60):
+        pushes = detectors.pushes(d, 0.0, 60.0, T)
+    assert not pushes and not detectors.pushes(d, np.nan, 60.0, T)
+
+
 def test_brakes_that_do_not_hold(Rig):
     rig = Rig()
     rig.run(1.0)

@@ -52,7 +52,7 @@ def _of_motors(d, i, u, envelope, p, facts):
         bits |= table.ENCODER_STUCK
     if detectors.disagreement(d, x, facts.dt):
         bits |= table.DISAGREEMENT
-    if detectors.pushes(d, u.torque[i], p.feedforward.friction):
+    if detectors.pushes(d, u.torque[i], p.feedforward.friction, facts.dt):
         bits |= table.BRAKE_NOT_RELEASED
     if detectors.immobile(d, dy, high, low):
         bits |= table.IMMOBILE
