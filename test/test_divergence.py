@@ -4,6 +4,7 @@ import pytest
 
 from acu_tracker import modes
 from pedestal_bringup.run import closed_loop, scenario
+from pedestal_bringup.studies import imm_feedforward
 from pedestal_common.unit import ERROR
 
 SECONDS = 8.0
@@ -39,6 +40,42 @@ def test_errors_that_lead_away_are_recognised_and_left(name, wrong):
     assert acu.request('acu/autotrack') == (False, 'refused: diverged; mode is program')
     acu.request('acu/reset_faults')
     assert acu.faults == () and acu.request('acu/autotrack').granted
+
+
+@pytest.mark.parametrize('fault', ['wrong_slope', 'wrong_slope axis=cross_elevation', 'wrong_slope axis=elevation',
+                                   'phase_180'])
+@pytest.mark.parametrize('name', ['leo_pass', 'ship_pass', 'uav_flyby'])
+def test_a_slope_that_turns_over_in_autotrack_is_seen_before_the_target_leaves_the_beam(name, fault):
+    for seed in range(1, 4):
+        done = run(f'tracking_receiver.inject=4 {fault}', name=name, seed=seed)
+        mode, t = done['acu/mode'], done.t
+        automatic = np.flatnonzero(mode == modes.AUTOTRACK)
+        assert 4.0 < t[automatic[-1]] < SECONDS - 0.5 and (mode[automatic[-1] + 1:] == modes.PROGRAM).all()
+        assert off(done)[t > 4.0].max() < 0.5
+        assert done.units['acu'].faults == ('diverged',)
+
+
+def test_a_reset_while_the_slope_is_still_wrong_is_followed_by_the_same_verdict():
+    loop = closed_loop.Loop(scenario.load('ship_pass', ['tracking_receiver.inject=4 wrong_slope'], seed=1,
+                                          duration=20.0))
+
+    def reset(made):
+        if made in (2000, 3000):
+            loop.units['acu'].request('acu/reset_faults')
+        return 1000
+    done = loop.run(watch=reset)
+    ends = np.flatnonzero(np.diff((done['acu/mode'] == modes.AUTOTRACK).astype(int)) < 0)
+    assert len(ends) == 3 and done['acu/mode'][-1] == modes.PROGRAM
+    assert off(done)[-1] < 0.25 and done.units['acu'].faults == ('diverged',)
+
+
+@pytest.mark.parametrize('name', list(imm_feedforward.DRIVE_CASES))
+def test_a_target_that_reverses_is_no_reversed_slope(name):
+    """Paper 003 through the product: 3.5 deg/s to and fro."""
+    for seed in (1, 2):
+        done = imm_feedforward.DRIVE_CASES[name].with_seed(seed).run()
+        state = done.units['acu'].parts['state']
+        assert done['acu/mode'][-1] == modes.AUTOTRACK and not state['divergence']['diverged']
 
 
 @pytest.mark.parametrize('wrong', ['slope_factor=2', 'cross_coupling=0.6', 'slope_factor=0.5', 'phase_error=0.8'])

@@ -21,7 +21,7 @@ from acu_tracker import (
     supervision,
 )
 from acu_tracker.alarms import conditions
-from acu_tracker.estimation import divergence, repetition, target, target_filter, tracker
+from acu_tracker.estimation import divergence, repetition, slope_sign, target, target_filter, tracker
 from acu_tracker.geometry import attitude, deck_reference, encoders
 from acu_tracker.geometry.vector import vector
 from acu_tracker.lookahead import planner
@@ -39,6 +39,7 @@ STATE = np.dtype([
     ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('aligning', 'i8'),
     ('target', target.TARGET), ('error', 'f8', (2,)),                           # of this step, azimuth, elevation
     ('repetition', repetition.REPETITION), ('divergence', divergence.DIVERGENCE),
+    ('slope_sign', slope_sign.SLOPE_SIGN),
     ('preset', direction.DIRECTION), ('slave', direction.DIRECTION), ('manual', manual.MANUAL), ('fallback', 'i8'),
     ('table', 'i8'), ('stow', stow.STOW),                       # mode whose table was followed last
     ('azimuth', 'f8'), ('target_angles', 'f8', (2,)),  # raw azimuth of the last reference; deck angles of its target

@@ -4,8 +4,8 @@ s, c, u, o: records of control_unit.STATE and CONSTANTS, of signals.INPUTS and O
 """
 import math
 
-from acu_tracker import by_level, outage, signals, supervision
-from acu_tracker.estimation import divergence, measurement, repetition, target
+from acu_tracker import by_level, modes, outage, signals, supervision
+from acu_tracker.estimation import divergence, measurement, repetition, slope_sign, target
 from acu_tracker.geometry import attitude, attitude_error, encoders
 from acu_tracker.lookahead import levelled_deck, planner
 from pedestal_common import line_of_sight
@@ -48,6 +48,18 @@ def take_attitude(s, c, u):
 
 
 @compiled
+def _wrong_level(s, u):
+    """The flag of a message, of a locked receiver or not, that a mode goes by the level of and must not believe,
+    else 0."""
+    if not u.error_came or not modes.BY_LEVEL[s.mode]:
+        return 0
+    if not math.isfinite(u.cn0_dbhz):
+        return signals.ERROR
+    known, _ = encoders.at(s.encoders, u.error_stamp)
+    return 0 if known else signals.ERROR_STAMP
+
+
+@compiled
 def take_error(s, c, u, o, program):
     """Filter y = encoder at the instant of the error, displaced by the error; a flag where it is not accepted, else 0.
 
@@ -57,8 +69,9 @@ def take_error(s, c, u, o, program):
     """
     s.error[0] = s.error[1] = math.nan
     receiver = c.p.tracker.receiver
-    if not u.error_valid:
-        return 0
+    wrong = _wrong_level(s, u)
+    if wrong or not u.error_valid:
+        return wrong
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
         return signals.ERROR
     if s.pointing_offset > ON_TARGET * receiver.beamwidth:
@@ -75,6 +88,8 @@ def take_error(s, c, u, o, program):
     outcome, innovation = target.take(s.target, c.p, c.tracker, s.attitude, u, at, measured, restart_gap)
     if outcome != target.NOISY and supervision.obeys(s):
         divergence.take(s.divergence, innovation)
+    if s.mode == modes.AUTOTRACK and outcome != target.NO_ATTITUDE and slope_sign.near(u, receiver.beamwidth):
+        _watch_slope(s, c, u, at)
     for i in range(2):
         one = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
@@ -86,6 +101,18 @@ def take_error(s, c, u, o, program):
     if outcome == target.NOISY:
         return signals.ERROR_NOISY
     return signals.ERROR_GATED if outcome == target.GATED else 0
+
+
+@compiled
+def _watch_slope(s, c, u, at):
+    """Note an error that shows that the slope of autotrack is reversed; at: Pointing of the beam it belongs to."""
+    p = c.p.tracker
+    t = u.error_stamp - p.receiver.age
+    attitude.at(s.attitude, c.p, t)
+    error, beam = (u.cross_elevation, u.elevation), slope_sign.beam(s.attitude.mat_ed, at.A, at.E)
+    variance = measurement.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, p.receiver)
+    if slope_sign.take(s.slope_sign, t, beam, error, variance, p.coast_after):
+        s.divergence.diverged = 1
 
 
 @compiled

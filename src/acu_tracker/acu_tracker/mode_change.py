@@ -3,7 +3,7 @@
 s, c, u, o: records of control_unit.STATE and CONSTANTS, of signals.INPUTS and OUTPUTS; of_all: the Tables.
 """
 from acu_tracker import by_level, direction, modes, outage, reach, resumption, stow, supervision
-from acu_tracker.estimation import divergence, tracker
+from acu_tracker.estimation import divergence, slope_sign, tracker
 from acu_tracker.geometry import attitude, encoders
 from acu_tracker.program import tables
 from acu_tracker.search import coast
@@ -80,6 +80,7 @@ def change(s, c, u, o, of_all, request):
     if mode != s.mode:
         s.mode, s.entered = mode, 1
         divergence.restart(s.divergence)
+        slope_sign.restart(s.slope_sign)
     return result, flags
 
 

@@ -179,6 +179,16 @@ def test_an_axis_that_does_not_move_and_one_that_pushes(moving):
     assert told(moving) >= {'azimuth immobile', 'azimuth brake not released'}
 
 
+def test_an_axis_whose_brakes_drag_pushes_on_where_it_turns_back():
+    d = detector()
+    for k in range(400):
+        torque = 5800.0 * min(max(30.0 * np.sin(2.0 * np.pi * k * T / 0.8), -1.0), 1.0)
+        assert detectors.pushes(d, torque, 60.0, T) or k < 20
+    for _ in range(60):
+        pushes = detectors.pushes(d, 0.0, 60.0, T)
+    assert not pushes and not detectors.pushes(d, np.nan, 60.0, T)
+
+
 def test_brakes_that_do_not_hold(Rig):
     rig = Rig()
     rig.run(1.0)
@@ -230,6 +240,18 @@ def test_receiver_and_ins_are_missed(Rig):
     assert told(rig) == {'receiver silent', 'signal lost'} and annunciated(rig) == ['receiver silent']
     rig.run(0.5, attitude_valid=0)
     assert 'INS lost' in told(rig) and rig.mode == 'standby'
+
+
+def test_an_unlocked_receiver_that_repeats_its_level_is_told_and_an_empty_sky_is_not(Rig):
+    rig = Rig(initial_mode='program')
+    rig.program()
+    rig.receiver_on = False
+    rig.run(3.0, error_came=1, cn0_dbhz=10.0)
+    assert rig.mode == 'program' and not told(rig)
+    rig.run(0.9, cn0_dbhz=20.6)
+    assert not told(rig)
+    rig.run(0.1, cn0_dbhz=20.6)
+    assert told(rig) == {'receiver silent'}
 
 
 def test_a_gap_between_steps_is_a_time_jump(moving):

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.modes import AUTOTRACK
+from acu_tracker.modes import AUTOTRACK, STEPTRACK
 
 NAN_FIELDS = [
     ('position', (math.nan, 0.5), 'encoder'), ('velocity', (0.0, math.inf), 'encoder'),
@@ -55,6 +55,27 @@ def test_error_stamps_that_stand_still_go_back_or_lie_ahead(Rig):
             after = rig.state['target']['tracker']['filter']['axis']
             assert after[name].tobytes() == before['filter']['axis'][name].tobytes()
         assert np.isnan(rig.outputs['innovation']).all()
+
+
+@pytest.mark.parametrize('locked', [True, False])
+@pytest.mark.parametrize('field, value, flag', [
+    ('cn0_dbhz', math.nan, 'error'), ('cn0_dbhz', -math.inf, 'error'), ('error_stamp', 1.2, 'error_stamp'),
+    ('error_stamp', -3.0, 'error_stamp'), ('error_stamp', math.nan, 'error_stamp')])
+def test_a_message_that_a_mode_goes_by_the_level_of_is_judged_locked_or_not(Rig, field, value, flag, locked):
+    rig = Rig(initial_mode='stop', at=(0.5, 0.6))
+    rig.run(1.0, error_came=1)
+    said = {'error_came': 1, 'error_valid': locked}
+    rig.step(**said, **{field: value})
+    assert rig.invalid == ({flag} if locked else set())
+    assert rig.ask(STEPTRACK)
+    rig.step(**said)
+    assert not rig.invalid and rig.mode == 'steptrack'
+    rig.step(**said, **{field: value})
+    assert rig.invalid == {flag}
+    rig.step(**said)
+    assert not rig.invalid
+    rig.step(error_came=0, error_valid=0, **{field: value})
+    assert not rig.invalid and rig.mode == 'steptrack'
 
 
 def test_outlier_is_gated(Rig):

@@ -9,10 +9,10 @@ from acu_tracker.alarms import annunciator, detectors, table
 from acu_tracker.servo import position_loop
 from pedestal_common.compiled import compiled
 
-SUPERVISION = np.dtype([('axis', detectors.AXIS, (2,)), ('said', 'f8', (3,)), ('ready', 'f8'), ('lost', 'i8'),
-                        ('alarms', annunciator.ALARMS)], align=True)
-"""said: errors [rad] and C/N0 [dB-Hz] of the receiver in the step before; ready: stamp at which the drive was ready
-last [s]; lost: bits of the axes that had one motor when it was."""
+SUPERVISION = np.dtype([('axis', detectors.AXIS, (2,)), ('said', 'f8', (3,)), ('least', 'f8'), ('ready', 'f8'),
+                        ('lost', 'i8'), ('alarms', annunciator.ALARMS)], align=True)
+"""said: errors [rad] and C/N0 [dB-Hz] of the receiver in the step before; least: lowest C/N0 that it has told; ready:
+stamp at which the drive was ready last [s]; lost: bits of the axes that had one motor when it was."""
 
 INVALID = signals.ENCODER | signals.ERROR | signals.ERROR_STAMP | signals.PROGRAM | signals.PRESET
 """Flags of inputs that were not believed, but of the attitude, which is lost when that goes on."""
@@ -34,7 +34,7 @@ SILENCE = 0.3
 
 def initialise(s):
     """Nothing is wrong; s: view of SUPERVISION."""
-    s['ready'] = -np.inf
+    s['least'], s['ready'] = np.inf, -np.inf
     s['axis']['y'] = np.nan
     annunciator.initialise(s['alarms'])
 
@@ -52,7 +52,7 @@ def _of_motors(d, i, u, envelope, p, facts):
         bits |= table.ENCODER_STUCK
     if detectors.disagreement(d, x, facts.dt):
         bits |= table.DISAGREEMENT
-    if detectors.pushes(d, u.torque[i], p.feedforward.friction):
+    if detectors.pushes(d, u.torque[i], p.feedforward.friction, facts.dt):
         bits |= table.BRAKE_NOT_RELEASED
     if detectors.immobile(d, dy, high, low):
         bits |= table.IMMOBILE
@@ -110,10 +110,14 @@ def _of_drive(s, u):
 
 @compiled
 def _repeated(s, u):
-    """Whether the receiver tells the numbers of the step before once more: it has noise."""
-    said = s.said
-    again = (u.error_valid and u.cross_elevation == said[0] and u.elevation == said[1] and u.cn0_dbhz == said[2])
-    said[0], said[1], said[2] = u.cross_elevation, u.elevation, u.cn0_dbhz
+    """Whether the receiver tells the numbers of the step before once more: it has noise. Unlocked it tells the level
+    alone, of which it may tell an empty sky's as the lowest that it has."""
+    said, z = s.said, u.cn0_dbhz
+    again = z == said[2] and (u.cross_elevation == said[0] and u.elevation == said[1] if u.error_valid else
+                              z > s.least)
+    said[0], said[1], said[2] = u.cross_elevation, u.elevation, z
+    if z < s.least:
+        s.least = z
     return again
 
 

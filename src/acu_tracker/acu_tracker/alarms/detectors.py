@@ -12,7 +12,7 @@ AXIS = np.dtype([
     ('y', 'f8'), ('dy', 'f8'),                              # of the step before [rad], [rad/s]; NaN: it was none
     ('apart', 'f8'), ('disagrees', 'i8'),                           # of `disagreement` [rad]
     ('turned', 'f8'), ('moved', 'f8'), ('stuck', 'i8'),             # of motors and encoder in this look [rad]
-    ('immobile', 'i8'), ('pushes', 'i8'), ('late', 'i8'), ('moves', 'i8'),
+    ('immobile', 'i8'), ('push', 'f8'), ('pushes', 'i8'), ('late', 'i8'), ('moves', 'i8'),
     ('e', 'f8'), ('area', 'f8'), ('loads', 'f8'), ('oscillates', 'i8'),         # of `oscillation` [rad], [rad s], [-]
 ], align=True)
 
@@ -33,6 +33,9 @@ IDLE = 0.1
 
 PUSHES = 50.0
 """Torque over the Coulomb friction that no free axis needs for long: half of what brakes hold, twice a strong wind."""
+
+TO_AND_FRO = 0.1
+"""Time constant of the mean of the torque's amount [s]: an axis whose brakes drag and that turns back pushes on."""
 
 SURGE = 2.0
 """Acceleration that an axis may reach, in those that are commanded at the most."""
@@ -124,9 +127,12 @@ def immobile(d, dy, high, low):
 
 
 @compiled
-def pushes(d, T, friction):
-    """Whether a torque on the load is far more than the Coulomb friction, both [Nm]."""
-    d.pushes = beyond(d.pushes, abs(T), PUSHES * friction, 0.5 * PUSHES * friction)
+def pushes(d, T, friction, dt):
+    """Whether a torque on the load is far more than the Coulomb friction, both [Nm], either way in the mean of
+    TO_AND_FRO."""
+    if math.isfinite(T):
+        d.push += (abs(T) - d.push) * min(dt / TO_AND_FRO, 1.0)
+    d.pushes = beyond(d.pushes, d.push, PUSHES * friction, 0.5 * PUSHES * friction)
     return d.pushes != 0
 
 

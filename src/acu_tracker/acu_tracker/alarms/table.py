@@ -52,7 +52,7 @@ ALARMS = (
     Alarm('time jump', 'medium', 0.0, 10.0, False, ('drive silent',),
           'the stamps of two steps in a row are more than `step_gap` apart; the axes went on from where they were',
           "look at the drive's clock and at the load of the computers"),
-    Alarm('receiver silent', 'medium', 1.0, 1.0, False, ('drive silent', 'time jump'),
+    Alarm('receiver silent', 'medium', 0.95, 1.0, False, ('drive silent', 'time jump'),
           'no message of the receiver, neither locked nor unlocked, or the same numbers again and again',
           'look at the receiver and its network; choose a mode that does without it', 'following'),
     Alarm('INS lost', 'high', 0.0, 1.0, False, ('drive silent', 'time jump'),
@@ -128,7 +128,8 @@ ALARMS = (
           ('INS lost', *_both('encoder jump', 'encoder stuck', 'encoder disagreement', 'immobile',
                               'following error')),
           'in autotrack, innovations squared over their variance: 7 in the mean of 100 errors, or 2 when the signal '
-          'goes; leads to `program`, or `standby` without a program, and autotrack is refused',
+          'goes; or the error of an axis moves with the beam as it would if its slope were reversed; leads to '
+          '`program`, or `standby` without a program, and autotrack is refused',
           "check slope, phase and sign of the receiver's errors; then reset"),
     Alarm('signal lost', 'medium', 0.5, 1.0, False,
           ('emergency stop', 'drive silent', 'time jump', 'receiver silent', 'INS lost', 'INS jump', 'receiver noisy',

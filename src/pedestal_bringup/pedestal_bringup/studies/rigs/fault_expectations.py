@@ -86,24 +86,27 @@ def _off_heading():
 
 REACH = {'search': 10.0, 'acquire': 2.0, 'steptrack': HALF}
 """Largest way from the target to the beam of a mode that goes by the level [deg]: across the area of five beamwidths
-about the expected place; a look-around of 1.2 beamwidths about a peak within 0.7; in the beam."""
+about the expected place; a look-around of 1.2 beamwidths about a peak within 0.7; in the beam. A fade takes the level
+itself: step track has to search for it then and to look around, so that the reach of acquire is its own."""
 
 TO_AUTOTRACK = ('search', 'acquire', 'autotrack')
 
-SILENT, WRONG = ('drop', 'freeze', 'nan', 'fade', 'clock_step'), ('wrong_slope', 'phase_180')
+SILENT, WRONG = ('drop', 'freeze', 'nan', 'clock_step'), ('wrong_slope', 'phase_180')
 """Faults of the receiver without which, and with which no target is found."""
 
 
 def _by_level(node, fault, of_modes):
     """{mode: Expected} of the modes that go by the level, by those of the others."""
-    program = of_modes['program']
+    program, reaches = of_modes['program'], REACH
     told, error, end = program.told, program.error, program.end
-    if node == 'tracking_receiver' and fault in SILENT:
-        told, end = (None if fault == 'fade' else 200), ('program',)
+    if node == 'tracking_receiver' and fault == 'fade':
+        told, end, reaches = None, ('program',), {**REACH, 'steptrack': REACH['acquire']}
+    elif node == 'tracking_receiver' and fault in SILENT:
+        told, end = 200, ('program',)
     elif node == 'tracking_receiver' and fault in WRONG:
         end = ('program', 'standby')
     return {mode: Expected(told, end if end == STANDBY else tuple(dict.fromkeys((mode, *TO_AUTOTRACK, *end))),
-                           None if error is None else max(error, reach)) for mode, reach in REACH.items()}
+                           None if error is None else max(error, reach)) for mode, reach in reaches.items()}
 
 
 _EXPECTED = {
