@@ -130,7 +130,16 @@ def test_a_filter_changed_while_it_tracks_makes_no_bump(runs):
 
 @pytest.mark.parametrize('override, text', [
     ('acu.receiver_rate=true', 'acu: receiver_rate = True: must be False'),
-    ('recorder.receiver_range=true', 'recorder: receiver_range = True: must be False')])
+    ('recorder.receiver_range=true', 'recorder: receiver_range = True: must be False'),
+    ('acu.ins_error=true', 'acu: ins_error = True: must be False')])
 def test_a_topic_nobody_measures_is_not_waited_for(override, text):
     with pytest.raises(scenario.ScenarioError, match=text):
         scenario.load('leo_pass', [override])
+
+
+def test_a_model_of_an_ins_that_tells_its_error_is_refused():
+    chosen = ['acu.tracker.attitude.tilt_noise=1e-4']
+    with pytest.raises(scenario.ScenarioError, match='acu: tracker.attitude.tilt_noise: the INS tells it; it is of '
+                                                     'use with ins.error_told = false'):
+        scenario.load('ship_pass', chosen)
+    assert scenario.load('ship_pass', [*chosen, 'ins.error_told=false']).node_parameters('acu').ins_error is False

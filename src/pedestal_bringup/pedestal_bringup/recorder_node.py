@@ -66,10 +66,9 @@ class RecorderNode(shell.Shell):
         self._quiet = None
         self.diagnose_with(self._diagnosis)
         for index, topic in enumerate(recorded):
-            if topic.name == LAST:
-                self._last = index, topic
-            else:
+            if topic.name != LAST:
                 self._record(index, topic)
+        self._last = [(index, topic) for index, topic in enumerate(recorded) if topic.name == LAST]
         self._opening = self.every(0.0, self._record_last)
         if not self.graph.lockstep:
             self.every(1.0, self._flush)
@@ -88,7 +87,8 @@ class RecorderNode(shell.Shell):
 
     def _record_last(self):
         self._opening.cancel()
-        self._record(*self._last)
+        for index, topic in self._last:
+            self._record(index, topic)
 
     def _taker(self, index, topic):
         put = self._in_step(index, topic) if self.graph.lockstep else self._as_it_comes(index, topic)

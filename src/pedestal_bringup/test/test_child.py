@@ -1,4 +1,6 @@
-"""Children of a process that has one thread, and of one that has more: what they are and how they end."""
+"""Children of a process that has one thread, of one that has more, and where a copy can have no name of its own: what
+they are and how they end."""
+import contextlib
 import json
 import os
 import pathlib
@@ -10,12 +12,16 @@ import pytest
 
 PARENT = """
 import os, pathlib, signal, sys, threading, time
+from pedestal_bringup.run import child as children
 from pedestal_bringup.run.child import Child
 
 def start(rehearse=lambda: None):
     with open('log', 'ab') as log:
         return Child([sys.executable, '-m', 'one_node', 'a word', '--x'], log.fileno(), rehearse)
 
+if {nameless}:
+    prctl = children._libc.prctl
+    children._libc.prctl = lambda option, *rest: -1 if option == children.PR_SET_MM else prctl(option, *rest)
 if {threads}:
     threading.Thread(target=time.sleep, args=(60.0,), daemon=True).start()
 """
@@ -40,16 +46,16 @@ if __name__ == '__main__':
 """
 
 
-@pytest.fixture(params=[False, True], ids=['alone', 'with threads'])
+@pytest.fixture(params=['alone', 'with threads', 'nameless'])
 def parent(request, tmp_path):
     """run(code, node=NODE) -> (CompletedProcess of a parent that starts children of a node, their log)."""
-    def run(code, node=NODE):
+    def run(code, node=NODE, before=None):
         (tmp_path / 'one_node.py').write_text(node)
-        done = subprocess.run([sys.executable, '-c', PARENT.format(threads=request.param) + code], cwd=tmp_path,
-                              env={**os.environ, 'PYTHONPATH': str(tmp_path)}, capture_output=True, text=True,
-                              timeout=60.0)
+        made = PARENT.format(threads=request.param == 'with threads', nameless=request.param == 'nameless')
+        done = subprocess.run([sys.executable, '-c', made + code], cwd=tmp_path, preexec_fn=before, text=True,
+                              env={**os.environ, 'PYTHONPATH': str(tmp_path)}, capture_output=True, timeout=60.0)
         return done, (tmp_path / 'log').read_text()
-    run.copies = not request.param
+    run.copies = request.param == 'alone'
     return run
 
 
@@ -100,10 +106,11 @@ os.kill(os.getpid(), signal.SIGKILL)
 """, NODE.replace('return 7', 'time.sleep(60.0)'))
     assert done.returncode == -9
     deadline = time.monotonic() + 30.0
-    while any(pathlib.Path(f'/proc/{pid}/cmdline').exists() and pathlib.Path(f'/proc/{pid}/cmdline').read_text()
-              for pid in done.stdout.split()):  # a zombie has none
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    for pid in done.stdout.split():
+        with contextlib.suppress(FileNotFoundError):
+            while pathlib.Path(f'/proc/{pid}/cmdline').read_text():  # a zombie has none
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
 
 
 @pytest.mark.parametrize('node, expected', [
@@ -117,6 +124,30 @@ print(child.wait())
 """, node)
     assert (done.stdout, done.stderr) == ('1\n', '')
     assert 'Traceback' in log and f'{expected}\n' in log
+
+
+@pytest.mark.parametrize('end, code', [('return None', 0), ('sys.exit(3)', 3), ("sys.exit('no')", 1)])
+def test_its_exit_code_is_that_of_an_interpreter(parent, end, code):
+    done, _ = parent('child = start()\nchild.begin()\nprint(child.wait())', NODE.replace('return 7', end))
+    assert done.stdout == f'{code}\n'
+
+
+def test_a_child_whose_log_is_full_does_not_come_back_as_its_parent(parent):
+    done, _ = parent("""
+with open('log', 'w') as log, open('/dev/full', 'w') as full:
+    child = Child([sys.executable, '-m', 'one_node'], full.fileno(), lambda: None)
+try:
+    child.begin()
+    print(child.wait() != 0)
+finally:
+    print('once')
+""")
+    assert done.stdout == 'True\nonce\n'
+
+
+def test_a_child_of_a_process_without_standard_input_has_its_log(parent):
+    done, log = parent('child = start()\nchild.begin()\nprint(child.wait())', before=lambda: os.close(0))
+    assert done.stdout == '7\n' and 'it said\n' in log
 
 
 def test_what_fails_in_the_rehearsal_is_not_told(parent):

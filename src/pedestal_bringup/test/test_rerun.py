@@ -128,6 +128,15 @@ def test_a_default_that_has_changed_since_is_set_as_it_was(recorded):
     assert again == dataclasses.replace(chosen, values=values)
 
 
+def test_a_topic_that_the_recording_could_not_have_is_not_there(recorded):
+    def older(values):
+        for node, name in (('ins', 'error_told'), ('acu', 'ins_error'), ('recorder', 'ins_error')):
+            del values[node][name]
+    chosen = scenario.load('ship_pass', ['ins.error_told=false'])
+    again = rerun.configured(recorded(scenario.load('ship_pass'), older, scenario='ship_pass'))
+    assert all(again.node_parameters(node) == chosen.node_parameters(node) for node in ('ins', 'acu', 'recorder'))
+
+
 def test_what_cannot_be_made_again_is_refused(tmp_path, recorded):
     with pytest.raises(bag.BagError, match='a_0.mcap: holds no configuration, so that it cannot be made again'):
         rerun.configured(write(tmp_path / 'a', rows()))

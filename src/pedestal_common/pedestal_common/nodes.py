@@ -203,6 +203,11 @@ def recorded(names, flags=(), beams=0) -> list:
             and (not link.flag or link.flag in flags)]
 
 
+def held(names) -> frozenset:
+    """Those of these topics of a graph that hold (see Topic)."""
+    return frozenset(name for name in names if BY_NAME[plain(name)].holds)
+
+
 def readers(link, names):
     """The nodes of a graph that must read a topic before it may start; the recorder reads every one."""
     return [name for name in names if name in link.readers or name == 'recorder']

@@ -22,13 +22,15 @@ class Steps:
     followers: {topic: latency in ns}; due is the newest trigger stamp <= t_k - latency (none at the start).
     Lockstep waits for exactly that message; triggers that come meanwhile wait their turn, for who makes them may be
     ahead by as much as others look back. Realtime answers t_k at the latest when the trigger of the next step arrives,
-    with whatever newest message is there and None for a follower that sent nothing new; prompt: at once.
+    with whatever newest message is there and None for a follower that sent nothing new; prompt: at once. It waits for
+    none of the followers that are `held`.
     `answer(stamp_ns, trigger_message, {topic: message or None})` is called once per step, in order.
     """
 
-    def __init__(self, trigger, followers, lockstep, answer, prompt=False):
+    def __init__(self, trigger, followers, lockstep, answer, prompt=False, held=frozenset()):
         self.trigger, self._lockstep, self._answer = trigger, lockstep, answer
         self._prompt = prompt and not lockstep
+        self._passed_over = frozenset() if lockstep else held
         self._latency = dict(followers)
         self._awaited = {topic: collections.deque() for topic in followers}
         self._due = dict.fromkeys(followers)
@@ -93,7 +95,7 @@ class Steps:
 
     def _ready(self, topic):
         due, arrived = self._due[topic], self._arrived[topic]
-        if due is None:
+        if due is None or topic in self._passed_over:
             return True
         while arrived and arrived[0][0] < due and len(arrived) > 1:
             arrived.popleft()

@@ -69,6 +69,7 @@ class Topic(typing.NamedTuple):
     units    {column: unit} where the type alone does not tell (see layouts)
     texts    of a text: those that a reader tells apart, in the order of their codes
     measured  the parameter of its writer that says whether it is there; flag: that of its readers; '': it always is
+    holds    whether what it says holds until it says otherwise: in realtime no step waits for it
     """
     name: str
     type: str
@@ -81,6 +82,7 @@ class Topic(typing.NamedTuple):
     texts: tuple = ()
     measured: str = ''
     flag: str = ''
+    holds: bool = False
 
 
 TOPICS = (
@@ -116,10 +118,11 @@ TOPICS = (
           texts=('aligning', 'aligned')),
     Topic('ins/error', 'sensor_msgs/msg/JointState', 'step',
           '`roll`, `pitch`, `heading`: 1-sigma of what changes in the error of `ship/imu/data`, whose stamp it has: '
-          'position, the noise of each sample [rad]; velocity, what it wanders by [rad/sqrt(s)]',
+          'position, the noise of each sample [rad]; velocity, what it wanders by [rad/sqrt(s)]; all six are numbers, '
+          'and hold until the next',
           names=('roll', 'pitch', 'heading'), frame='base_link',
           units={f'{angle}.velocity': 'rad/sqrt(s)' for angle in ('roll', 'pitch', 'heading')},
-          measured='error_told', flag='ins_error'),
+          measured='error_told', flag='ins_error', holds=True),
     Topic('tracking_receiver/angle_error', 'geometry_msgs/msg/Vector3Stamped', 'step',
           'x cross-elevation error [rad], y elevation error [rad], z C/N0 [dB-Hz]; x, y are NaN while unlocked; '
           '`latency` late', frame='beam',

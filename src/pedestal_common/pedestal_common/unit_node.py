@@ -201,7 +201,7 @@ class UnitNode(shell.Shell):
         In lockstep a step whose inputs stay away for the deadline ends the node with the names of the silent writers.
         """
         self.steps = Steps(trigger, {name: round(latency * SECOND) for name, latency in latencies.items()},
-                           self.graph.lockstep, self._answer)
+                           self.graph.lockstep, self._answer, held=nodes.held(latencies))
         decoders = {name: decoder for port in self.ports for name, decoder in port.decoders.items()}
         for name in (trigger, *latencies):
             if nodes.plain(name) not in self.row.writes:

@@ -6,10 +6,10 @@ from pedestal_common.steps import GraphError, Steps
 MS = 1_000_000
 
 
-def collect(followers, lockstep=True):
+def collect(followers, lockstep=True, **options):
     answers = []
     steps = Steps('trigger', followers, lockstep,
-                  lambda stamp, message, inputs: answers.append((stamp // MS, message, dict(inputs))))
+                  lambda stamp, message, inputs: answers.append((stamp // MS, message, dict(inputs))), **options)
     return steps, answers
 
 
@@ -21,6 +21,19 @@ def test_lockstep_answers_once_when_all_have_come(order):
             assert len(answers) == k
             steps.take(topic, 5 * k * MS, f'{topic}{k}')
         assert answers[-1] == (5 * k, f'trigger{k}', {'a': f'a{k}', 'b': f'b{k}'})
+
+
+def test_realtime_waits_for_nothing_that_holds():
+    steps, answers = collect({'a': 0, 'h': 0}, lockstep=False, held=frozenset('h'))
+    for k, topics in enumerate((('trigger', 'a'), ('h', 'trigger', 'a'), ('trigger', 'a', 'h'), ('trigger', 'a'))):
+        for topic in topics:
+            steps.take(topic, 5 * k * MS, f'{topic}{k}')
+        assert len(answers) == k + 1
+    assert [inputs['h'] for _, _, inputs in answers] == [None, 'h1', None, 'h2']
+    steps, answers = collect({'a': 0, 'h': 0}, held=frozenset('h'))
+    steps.take('trigger', 0, 't')
+    steps.take('a', 0, 'a')
+    assert not answers and steps.waiting_for == ['h']
 
 
 def test_triggers_that_are_ahead_wait_their_turn():

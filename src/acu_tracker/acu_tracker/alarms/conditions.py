@@ -14,7 +14,8 @@ SUPERVISION = np.dtype([('axis', detectors.AXIS, (2,)), ('said', 'f8', (3,)), ('
 """said: errors [rad] and C/N0 [dB-Hz] of the receiver in the step before; least: lowest C/N0 that it has told; ready:
 stamp at which the drive was ready last [s]; lost: bits of the axes that had one motor when it was."""
 
-INVALID = signals.ENCODER | signals.ERROR | signals.ERROR_STAMP | signals.PROGRAM | signals.PRESET
+INVALID = (signals.ENCODER | signals.ERROR | signals.ERROR_STAMP | signals.PROGRAM | signals.PRESET
+           | signals.ATTITUDE_ERROR)
 """Flags of inputs that were not believed, but of the attitude, which is lost when that goes on."""
 
 OFF_TIME = 2.5

@@ -171,7 +171,7 @@ def feed(recording, unit) -> Feed:
 
     steps, taken = [], []
     matched = Steps(trigger, {name: round(latency * SECOND) for name, latency in latencies.items()},
-                    recording.lockstep, lambda *step: steps.append(step), prompt=paces)
+                    recording.lockstep, lambda *step: steps.append(step), prompt=paces, held=nodes.held(latencies))
     problem = ''
     try:
         take = matched.take

@@ -87,6 +87,9 @@ def configured(bag):
             raise bags.BagError(f'{bag.file}: holds parameters of {node}, which is no node of its scenario')
         now = parameters.as_dict(chosen.node_parameters(node))
         values[node].update({key: value for key, value in then.items() if key not in now or now[key] != value})
+        # A topic that the version of the recording did not have is not there.
+        values[node].update({key: False for owner, told, flag in scenario.MEASURED for key in (told, flag)
+                             if key in now and key not in then})
     changed = dataclasses.replace(chosen, values=values)
     for node in recorded:
         try:

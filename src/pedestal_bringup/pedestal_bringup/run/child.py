@@ -1,20 +1,22 @@
 """A node as a child of this process, with its log for an output: a copy of this process where that can be, else a new
 interpreter.
 
-A copy has imported already what every node does, half a second of a core. It can be as long as this process has one
-thread, so until rclpy, whose libraries start some, is imported.
+A copy has imported already what every node does, half a second of a core. It can be as long as nothing of this process
+has threads that a fork would cut off, so until rclpy, whose libraries start some, is imported; OpenBLAS ends its own.
 """
 import contextlib
 import ctypes
+import fcntl
 import gc
 import importlib.util
+import math
 import os
-import select
 import signal
 import struct
 import subprocess
 import sys
 import threading
+import time
 import traceback
 
 PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_MM, PR_SET_MM_MAP = 1, 15, 35, 14
@@ -39,19 +41,20 @@ class Child:
         if copy:
             gc.freeze()
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
-        self.pid = os.fork()
-        if not self.pid:
-            code = 1
-            try:
-                _settle(parent, output, gate, mask)
-                code = (_as_copy if copy and _take_name(command) else _as_interpreter)(command, gate, rehearse)
-            except BaseException:
-                traceback.print_exc()
-            finally:
-                sys.stdout.flush()
-                os._exit(code)
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        os.close(gate)
+        try:
+            self.pid = os.fork()
+            if not self.pid:
+                def life():
+                    held = _settle(parent, output, gate, mask)
+                    become = _as_copy if copy and _take_name(command) else _as_interpreter
+                    return become(command, held, rehearse)
+                _live(life)
+        except OSError:
+            os.close(self._begin)
+            raise
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+            os.close(gate)
 
     def begin(self):
         """Let it go on."""
@@ -69,14 +72,12 @@ class Child:
 
     def wait(self, timeout=None):
         """Its exit code when it has ended. timeout [s]; raises subprocess.TimeoutExpired."""
-        if self.poll() is None:
-            ending = os.pidfd_open(self.pid)
-            try:
-                if not select.select((ending,), (), (), timeout)[0]:
-                    raise subprocess.TimeoutExpired(str(self.pid), timeout)
-            finally:
-                os.close(ending)
-        return self.poll()
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        while self.poll() is None:
+            if time.monotonic() > end:
+                raise subprocess.TimeoutExpired(str(self.pid), timeout)
+            time.sleep(0.005)
+        return self.returncode
 
     def send_signal(self, number):
         """Send a signal, not to one that has ended."""
@@ -88,8 +89,26 @@ class Child:
         self.send_signal(signal.SIGKILL)
 
 
+def _live(life):
+    """Call life(), and end with its exit code: nothing that goes wrong brings a child back to where its parent is."""
+    code = 1
+    try:
+        code = life() or 0
+    except SystemExit as end:
+        code = end.code or 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        try:
+            sys.stdout.flush()
+        finally:
+            os._exit(code if isinstance(code, int) else 1)
+
+
 def _settle(parent, output, gate, mask):
-    """Keep nothing of what belongs to the parent."""
+    """Keep nothing of what belongs to the parent; the gate, which is elsewhere now."""
+    # Where the parent has no standard input one of them may be in its place.
+    output, gate = (fcntl.fcntl(descriptor, fcntl.F_DUPFD, 3) for descriptor in (output, gate))
     os.setsid()
     _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:
@@ -105,6 +124,7 @@ def _settle(parent, output, gate, mask):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    return gate
 
 
 def _wait(gate):
@@ -120,7 +140,8 @@ def _as_interpreter(command, gate, _):
 
 
 def _as_copy(command, gate, rehearse):
-    sys.stdout, sys.stderr = open(1, 'w', closefd=False), open(2, 'w', buffering=1, closefd=False)
+    sys.stdout, sys.stderr = (open(descriptor, 'w', buffering, errors='backslashreplace', closefd=False)
+                              for descriptor, buffering in ((1, -1), (2, 1)))
     module = command[2]
     sys.argv = [importlib.util.find_spec(module).origin, *command[3:]]
     main = importlib.import_module(module).main
@@ -132,6 +153,12 @@ def _as_copy(command, gate, rehearse):
 
 def _take_name(command):
     """Whether this process now has a command line of its own, as ps, pgrep and killall see it."""
+    with contextlib.suppress(OSError, ValueError, struct.error):
+        return _named(command)
+    return False
+
+
+def _named(command):
     _libc.prctl(PR_SET_NAME, os.path.basename(command[0]).encode())
     line = b''.join(os.fsencode(argument) + b'\0' for argument in command)
     begin = _libc.malloc(len(line))

@@ -1,7 +1,4 @@
-"""A run of a scenario: its nodes as processes, watched to the end and ended in order.
-
-In lockstep a node that dies or falls silent ends the run with its name; in realtime it is started again (supervisor).
-"""
+"""A run of a scenario: what its nodes are told, and what came of it. They begin and are watched in `watch`."""
 import dataclasses
 import pathlib
 import time

@@ -2,7 +2,8 @@
 
 A node is told by the kernel when `pedestal run` dies (processes.Graph) and ends in order, the drive with a ramp. This
 process reads the numbers of the nodes from its standard input, one a line, holds on to each by a pidfd, so that nobody
-else with the same number is ever met, and comes into play when the input ends.
+else with the same number is ever met, and comes into play when the input ends. Without pidfds (Linux before 5.3) it
+does nothing.
 """
 import contextlib
 import os
@@ -21,7 +22,7 @@ def main():
         signal.signal(number, signal.SIG_IGN)
     nodes = []
     for line in sys.stdin:
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, AttributeError):
             nodes.append(os.pidfd_open(int(line)))
     deadline = time.monotonic() + PATIENCE
     _signal(nodes, signal.SIGCONT)

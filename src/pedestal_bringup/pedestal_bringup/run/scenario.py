@@ -335,6 +335,7 @@ def _spread(name, sections, header, seed):
     for key, value in sections['ship_motion'].items():
         if key.startswith('ship.'):
             share('ins', key, value)
+
     def said(node, key, otherwise=None):
         default = parameters.defaults(nodes.row(node, header.beam).parameters_type()).get(key, otherwise)
         return sections[node].get(key, default)
@@ -347,6 +348,11 @@ def _spread(name, sections, header, seed):
             if measured or any(flag in values for section, values in sections.items()
                                if nodes.plain(section) == node):
                 share(node, flag, measured)
+    for section, values in sections.items():
+        for key in values:
+            if key.startswith('tracker.attitude.') and sections['acu'].get('ins_error'):
+                raise ScenarioError(f'scenario {name}, {section}: {key}: the INS tells it; it is of use with '
+                                    'ins.error_told = false')
     for owner, key, node, known_as in SHARED:
         if key in sections[owner]:
             sections[node].setdefault(known_as, sections[owner][key])

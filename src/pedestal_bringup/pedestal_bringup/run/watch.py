@@ -1,4 +1,7 @@
-"""The middle of a run, in which this process is a node of the graph itself: the operator, who watches the others."""
+"""What this process does as a node of the graph itself, the operator: watch the others, send the program track.
+
+In lockstep a node that dies or falls silent ends the run with its name; in realtime it is started again (supervisor).
+"""
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
