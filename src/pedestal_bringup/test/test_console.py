@@ -61,6 +61,7 @@ def test_a_verb_that_computes_nothing_imports_no_compiler(command):
 
 @pytest.mark.parametrize('code, without', [
     ('import pedestal_bringup.recorder_node', {'numba', 'scipy'}),
+    ('from pedestal_bringup.run import graph, scenario; graph.read_tracks(scenario.load("ship_pass"))', {'rclpy'}),
     ('from pedestal_bringup.run import program, scenario; program.program_messages(scenario.load("leo_pass")); '
      'scenario.load("leo_pass").unit("tracking_receiver").prepare()', {'scipy.linalg'})])
 def test_a_run_imports_before_its_first_step_what_it_needs(code, without):

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 
 from pedestal_bringup.again import difference, recompute
 from pedestal_bringup.run import parameter_file
-from pedestal_bringup.run.graph import Operator, sole_run
+from pedestal_bringup.run.operator_node import Operator, sole_run
 from pedestal_bringup.run.processes import RunError, command_line
 from pedestal_common import commands, messages, middleware, nodes, parameters, records
 from pedestal_common.steps import SECOND

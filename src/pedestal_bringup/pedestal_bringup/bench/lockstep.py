@@ -1,4 +1,5 @@
 """The lockstep ring against its floor, the bare ring, interleaved on this machine; latency of the ring in realtime."""
+import contextlib
 import json
 import os
 import pathlib
@@ -42,7 +43,8 @@ def bare_lap():
 def graph_run(folder, number, pacing, seconds):
     """(graph.Outcome, bag folder) of a run of the demo scenario."""
     path = pathlib.Path(folder) / f'run-{number}'
-    return graph.run(scenario.load('leo_pass', pacing=pacing, duration=seconds), path, lambda seconds: None), path
+    chosen = scenario.load('leo_pass', pacing=pacing, duration=seconds)
+    return graph.run(chosen, path, contextlib.nullcontext(lambda seconds: None)), path
 
 
 def latencies(path):

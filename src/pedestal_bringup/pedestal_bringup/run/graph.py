@@ -2,21 +2,15 @@
 
 In lockstep a node that dies or falls silent ends the run with its name; in realtime it is started again (supervisor).
 """
-import contextlib
 import dataclasses
 import pathlib
-import socket
 import time
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-
 from pedestal_bringup.bags import configuration
-from pedestal_bringup.run import lockstep, parameter_file, supervisor
-from pedestal_bringup.run.operator_node import Operator, another_graph
+from pedestal_bringup.run import parameter_file
 from pedestal_bringup.run.processes import Graph, log_folder
 from pedestal_bringup.run.program import program_messages
-from pedestal_common import messages, middleware, nodes
+from pedestal_common import nodes
 from pedestal_common.steps import SECOND
 from ship_motion_sim import motion
 
@@ -72,20 +66,6 @@ def parameters_of_all(scenario, bag, start):
     return parameter_file.text(sections)
 
 
-@contextlib.contextmanager
-def sole_run(domain_id):
-    """Hold a ROS domain for one run on this machine: an abstract socket, gone with its process however that ends.
-
-    Raises RunError when another run holds it; discovery alone is too slow to tell on a busy machine.
-    """
-    with socket.socket(socket.AF_UNIX) as holder:
-        try:
-            holder.bind(f'\0pedestal-domain-{domain_id}')
-        except OSError:
-            raise another_graph(domain_id) from None
-        yield
-
-
 def read_tracks(scenario):
     """The program tracks {topic: message} of a scenario, its files of target and ship read before anything is started.
     Raises ValueError, OSError for a file that is not what it should be."""
@@ -97,78 +77,11 @@ def read_tracks(scenario):
 def run(scenario, bag, progress):
     """Run a scenario to its end, or until Ctrl-C, and return its Outcome.
 
-    progress(time of the run [s]) is called as it goes on. Raises RunError when it cannot go on. The recording up to
-    then stays readable.
+    progress: a context with a function of the time of the run [s], which is called as it goes on. Raises RunError when
+    it cannot go on. The recording up to then stays readable.
     """
-    realtime = scenario.header.pacing == 'realtime'
     tracks = read_tracks(scenario)
-    graph = Graph(scenario, bag)
-    middleware.initialise([])
-    try:
-        operator = Operator(scenario.header.graph_beams, scenario.nodes)
-        try:
-            with sole_run(operator.context.get_domain_id()):
-                operator.refuse_company()
-                return (_in_realtime if realtime else _in_lockstep)(graph, operator, tracks, progress)
-        finally:
-            operator.destroy_node()
-    finally:
-        rclpy.try_shutdown()
-
-
-def _in_lockstep(graph, operator, tracks, progress):
-    graph.write(parameters_of_all(graph.scenario, graph.bag, 0))
-    with graph:
-        try:
-            lockstep.watch(graph, operator, tracks, progress)
-        except KeyboardInterrupt:
-            graph.stop()
-            return Outcome(graph.result(nodes.DRIVE), graph.result('recorder'), stopped=True)
-        return Outcome(graph.outcome(nodes.DRIVE), graph.outcome('recorder'))
-
-
-def _in_realtime(graph, operator, tracks, progress):
-    supervisor.prepare(graph.scenario)
-    start = begins(graph.scenario)
-    graph.write(parameters_of_all(graph.scenario, graph.bag, start))
-    for track in tracks.values():
-        messages.put_stamp(track.header.stamp, start)
-    with graph:
-        supervised = supervisor.Supervisor(graph, operator, start)
-        try:
-            supervised.watch(tracks, progress)
-            stopped = False
-        except KeyboardInterrupt:
-            stopped = True
-        graph.stop()
-        recorder = graph.result('recorder') if stopped else graph.outcome('recorder')
-        return Outcome(graph.result(nodes.DRIVE), recorder, supervised.restarts.count, supervised.losses.count,
-                       stopped)
-
-
-def send_program(scenario, start=None, ros_arguments=()) -> int:
-    """Send a scenario's program track to a running ACU and keep it latched until Ctrl-C.
-
-    start: when its time is 0 [ns UTC]; None: when the graph's is, which the ACU is asked for. ros_arguments: for the
-    node that sends it, in the namespace of the graph.
-    """
-    middleware.initialise(ros_arguments)
-    try:
-        operator = Operator(scenario.header.graph_beams)
-        executor = SingleThreadedExecutor()
-        executor.add_node(operator)
-        tracks = program_messages(scenario)
-        if start is None:
-            acu = nodes.members(('acu',), scenario.header.graph_beams)[0]
-            print(f'asks {acu} on ROS_DOMAIN_ID {operator.context.get_domain_id()} when its time began', flush=True)
-            start = operator.graph_start(acu, executor)
-        for track in tracks.values():
-            messages.put_stamp(track.header.stamp, start)
-        operator.send(tracks)
-        print(f'{", ".join(tracks) or "nothing to be"} sent; kept for who comes later until Ctrl-C', flush=True)
-        while True:
-            executor.spin_once(timeout_sec=0.2)
-    except KeyboardInterrupt:
-        return 0
-    finally:
-        rclpy.try_shutdown()
+    with Graph(scenario, bag) as graph, progress as advance:
+        # With rclpy, after which no node can be a copy of this process (child).
+        from pedestal_bringup.run import watch
+        return watch.run(graph, tracks, advance)

@@ -1,4 +1,6 @@
 """The operator inside `pedestal run` and `pedestal program`: sends the program tracks, hears who lives."""
+import contextlib
+import socket
 import time
 
 from rcl_interfaces.srv import GetParameters
@@ -102,3 +104,17 @@ class Operator(Shell):
 def another_graph(domain_id):
     """The RunError where somebody else runs a graph on this ROS domain."""
     return RunError(f'another graph runs on ROS_DOMAIN_ID {domain_id}; set a free one')
+
+
+@contextlib.contextmanager
+def sole_run(domain_id):
+    """Hold a ROS domain for one run on this machine: an abstract socket, gone with its process however that ends.
+
+    Raises RunError when another run holds it; discovery alone is too slow to tell on a busy machine.
+    """
+    with socket.socket(socket.AF_UNIX) as holder:
+        try:
+            holder.bind(f'\0pedestal-domain-{domain_id}')
+        except OSError:
+            raise another_graph(domain_id) from None
+        yield

@@ -1,6 +1,7 @@
 """The nodes of a run as processes: direct children with their logs, told to end in order, never left behind."""
 import contextlib
 import ctypes
+import functools
 import json
 import os
 import pathlib
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import time
 
+from pedestal_bringup.run.child import Child
 from pedestal_common import nodes
 
 LOG_LINES = 8
@@ -18,7 +20,6 @@ LOG_SPACE = 64 * 1024
 """Bytes of the disk that a log holds in advance, so that the cause of an end is kept also when it is full by then."""
 
 FALLOC_FL_KEEP_SIZE = 1
-PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None)
 
 
@@ -45,8 +46,18 @@ def uninterrupted():
             signal.signal(number, handler)
 
 
+def _load_laws(scenario, node):
+    """Load the laws of a node, unless they are still to be compiled."""
+    from pedestal_common.compiled import is_compiled  # with numba, which only a run needs
+    if scenario.row(node).unit:
+        unit = scenario.unit(node)
+        if is_compiled(unit):
+            unit.prepare()
+
+
 class Graph:
-    """The processes of one run and their logs, beside the bag. Use as a context: leaving it stops whatever still runs.
+    """The processes of one run and their logs, beside the bag. Use as a context, in which they are held until `begin`:
+    leaving it stops whatever still runs.
 
     They do not outlive `pedestal run`, however that ends: the kernel sends them SIGTERM then, and who does not listen
     to it is ended by a process of its own (reaper).
@@ -72,19 +83,12 @@ class Graph:
         except OSError as error:
             raise RunError(f'cannot record to {self.bag}: {error.filename}: {error.strerror}') from None
 
-    def write(self, parameters):
-        """The text of the ROS 2 parameter file with which every node starts."""
-        with self._beside_the_bag():
-            self.file.write_text(parameters)
-
-    def _own(self):
-        return [node for node in self.scenario.nodes if node != 'operator']
-
     def __enter__(self):
         self._reaper = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.run.reaper'], stdin=subprocess.PIPE,
                                         start_new_session=True)
-        for node in self._own():
-            self.start(node)
+        for node in self.scenario.nodes:
+            if node != 'operator':
+                self._hold(node)
         return self
 
     def __exit__(self, *_):
@@ -92,22 +96,28 @@ class Graph:
         self._reaper.stdin.close()
         self._reaper.wait()
 
+    def write(self, parameters):
+        """The text of the ROS 2 parameter file with which every node starts."""
+        with self._beside_the_bag():
+            self.file.write_text(parameters)
+
+    def begin(self, parameters):
+        """Start the nodes with the text of their parameter file."""
+        self.write(parameters)
+        for process in self.processes.values():
+            process.begin()
+
     def start(self, node):
-        """Start a node, which goes on in the log of its last start."""
-        supervisor = os.getpid()
+        """Start a node again, which goes on in its log."""
+        self._hold(node)
+        self.processes[node].begin()
 
-        def end_with_supervisor():
-            _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-            if os.getppid() != supervisor:
-                os._exit(1)
-
+    def _hold(self, node):
         with open(self._log_of(node), 'ab') as output:
             self._log_starts[node] = size = output.seek(0, os.SEEK_END)
             _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size), ctypes.c_long(LOG_SPACE))
-            self.processes[node] = subprocess.Popen(
-                command_line(node, self.scenario.row(node).module, self.file),
-                stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True,
-                preexec_fn=end_with_supervisor)
+            self.processes[node] = Child(command_line(node, self.scenario.row(node).module, self.file),
+                                         output.fileno(), functools.partial(_load_laws, self.scenario, node))
         with contextlib.suppress(OSError):
             self._reaper.stdin.write(b'%d\n' % self.processes[node].pid)
             self._reaper.stdin.flush()

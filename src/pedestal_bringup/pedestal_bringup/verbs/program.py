@@ -32,8 +32,8 @@ def _utc(text):
 
 
 def main(options):
-    """Send the program track; exit code of graph.send_program."""
-    from pedestal_bringup.run import graph, program, scenario
+    """Send the program track; exit code of watch.send_program."""
+    from pedestal_bringup.run import program, scenario, watch
     chosen = scenario.load(options.scenario, options.param, duration=options.duration)
     start = program.begins(chosen) if options.start == FILE else options.start
-    return graph.send_program(chosen, start, arguments.ros_arguments(options))
+    return watch.send_program(chosen, start, arguments.ros_arguments(options))

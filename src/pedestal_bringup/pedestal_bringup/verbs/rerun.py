@@ -19,9 +19,8 @@ def main(options):
     recording = bag.read(options.recording)
     chosen = rerun.configured(recording)
     path = graph.new_bag(options.bag, chosen.name)
-    with console.progress_of_run(chosen.header.duration) as progress:
-        if graph.run(chosen, path, progress).stopped:
-            raise KeyboardInterrupt
+    if graph.run(chosen, path, console.progress_of_run(chosen.header.duration)).stopped:
+        raise KeyboardInterrupt
     result = rerun.result(recording, bag.read(path))
     print('\n'.join(result.lines()))
     return 0 if result.equal else 1

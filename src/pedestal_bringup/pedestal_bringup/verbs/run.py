@@ -51,9 +51,8 @@ def main(options):
     console.check_json(options.json)
     for line in program.announced(chosen):
         print(line)
-    with (beside.servers(options, chosen.header, bag),
-          console.progress_of_run(chosen.header.duration) as progress):
-        outcome = graph.run(chosen, bag, progress)
+    with beside.servers(options, chosen.header, bag):
+        outcome = graph.run(chosen, bag, console.progress_of_run(chosen.header.duration))
     # With scipy, which takes half a second: nobody waits for it before the first step.
     from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read

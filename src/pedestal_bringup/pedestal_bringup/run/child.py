@@ -1,0 +1,147 @@
+"""A node as a child of this process, with its log for an output: a copy of this process where that can be, else a new
+interpreter.
+
+A copy has imported already what every node does, half a second of a core. It can be as long as this process has one
+thread, so until rclpy, whose libraries start some, is imported.
+"""
+import contextlib
+import ctypes
+import gc
+import importlib.util
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import traceback
+
+PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_MM, PR_SET_MM_MAP = 1, 15, 35, 14
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_libc = ctypes.CDLL(None)
+_libc.sbrk.restype = _libc.malloc.restype = ctypes.c_void_p
+
+
+class Child:
+    """A process that is held until `begin` and then does what `python -m` would; otherwise like a subprocess.Popen.
+
+    command: [interpreter, '-m', module, arguments ...]; output: descriptor of its log; rehearse: what a copy does
+    while it is held, and where nothing is said that fails. It heads a session of its own, and the kernel sends it
+    SIGTERM when this process ends.
+    """
+
+    def __init__(self, command, output, rehearse):
+        copy = 'rclpy' not in sys.modules and threading.active_count() == 1
+        gate, self._begin = os.pipe()
+        self.returncode = None
+        parent = os.getpid()
+        if copy:
+            gc.freeze()
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
+        self.pid = os.fork()
+        if not self.pid:
+            code = 1
+            try:
+                try:
+                    _settle(parent, output, gate, mask)
+                    code = (_as_copy if copy and _take_name(command) else _as_interpreter)(command, gate, rehearse)
+                except BaseException:
+                    traceback.print_exc()
+                sys.stdout.flush()
+            finally:
+                # Whatever failed, a full disk too: what called this goes on in the parent only.
+                os._exit(code)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        os.close(gate)
+
+    def begin(self):
+        """Let it go on."""
+        with contextlib.suppress(BrokenPipeError):
+            os.write(self._begin, b'.')
+        os.close(self._begin)
+
+    def poll(self):
+        """Its exit code, -N where signal N ended it; None while it runs."""
+        if self.returncode is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            if pid:
+                self.returncode = os.waitstatus_to_exitcode(status)
+        return self.returncode
+
+    def wait(self, timeout=None):
+        """Its exit code when it has ended. timeout [s]; raises subprocess.TimeoutExpired."""
+        if self.poll() is None:
+            ending = os.pidfd_open(self.pid)
+            try:
+                if not select.select((ending,), (), (), timeout)[0]:
+                    raise subprocess.TimeoutExpired(str(self.pid), timeout)
+            finally:
+                os.close(ending)
+        return self.poll()
+
+    def send_signal(self, number):
+        """Send a signal, not to one that has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self):
+        """SIGKILL."""
+        self.send_signal(signal.SIGKILL)
+
+
+def _settle(parent, output, gate, mask):
+    """Keep nothing of what belongs to the parent."""
+    os.setsid()
+    _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:
+        os._exit(1)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    for descriptor in map(int, os.listdir('/proc/self/fd')):
+        if descriptor > 2 and descriptor != gate:
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
+    for number in STOPPING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def _wait(gate):
+    """Until the parent says so; end where it has gone."""
+    if not os.read(gate, 1):
+        os._exit(0)
+    os.close(gate)
+
+
+def _as_interpreter(command, gate, _):
+    _wait(gate)
+    os.execv(command[0], command)
+
+
+def _as_copy(command, gate, rehearse):
+    sys.stdout, sys.stderr = open(1, 'w', closefd=False), open(2, 'w', buffering=1, closefd=False)
+    module = command[2]
+    sys.argv = [importlib.util.find_spec(module).origin, *command[3:]]
+    main = importlib.import_module(module).main
+    with contextlib.suppress(Exception):
+        rehearse()
+    _wait(gate)
+    return main()
+
+
+def _take_name(command):
+    """Whether this process now has a command line of its own, as ps, pgrep and killall see it."""
+    _libc.prctl(PR_SET_NAME, os.path.basename(command[0]).encode())
+    line = b''.join(os.fsencode(argument) + b'\0' for argument in command)
+    begin = _libc.malloc(len(line))
+    ctypes.memmove(begin, line, len(line))
+    with open('/proc/self/stat') as stream:
+        # proc(5) counts its fields from 1; the second, a name in brackets, may hold anything.
+        fields = [0, 0, 0, *stream.read().rpartition(')')[2].split()]
+    code, data, stack, environment = (map(int, fields[a:b]) for a, b in ((26, 28), (45, 48), (28, 29), (50, 52)))
+    memory = struct.pack('=12QIi', *code, *data, _libc.sbrk(0), *stack, begin, begin + len(line), *environment,
+                         0, 0, -1)
+    return _libc.prctl(PR_SET_MM, PR_SET_MM_MAP, memory, len(memory), 0) == 0
