@@ -3,6 +3,9 @@
 A verb is a module of the room `verbs`: its help is the module's docstring, `add_arguments(parser)` adds its arguments,
 and `main(options)` does the work and returns the exit code.
 """
+from pedestal_bringup import stop
+
+# isort: split
 import argparse
 import contextlib
 import importlib
@@ -11,7 +14,7 @@ import shlex
 import signal
 import sys
 
-from pedestal_bringup.console import EXIT_STOPPED, STDOUT
+from pedestal_bringup.console import STDOUT
 from pedestal_common.parameters import ParameterError
 
 VERBS = ('run', 'scenarios', 'samples', 'new', 'parameters', 'status', 'mode', 'ask', 'operate', 'live', 'program',
@@ -23,9 +26,7 @@ def main(args=None) -> int:
     """Run a verb: exit code 0; 1 with one line on stderr for an error; 2 for a wrong command line; 130 if stopped."""
     options = _parser().parse_args(args)
     options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, signal.default_int_handler)
+    stop.on_stop(signal.default_int_handler)
     alone = getattr(options, 'json', None) == STDOUT
     try:
         with contextlib.redirect_stdout(sys.stderr) if alone else contextlib.nullcontext():
@@ -40,8 +41,8 @@ def main(args=None) -> int:
         print(f'pedestal: error: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print('pedestal: stopped', file=sys.stderr)
-        return EXIT_STOPPED
+        print(stop.SAID, file=sys.stderr)
+        return stop.EXIT_CODE
 
 
 def _parser():

@@ -7,7 +7,6 @@ import shutil
 import sys
 import textwrap
 
-EXIT_STOPPED = 130
 EXIT_WRONG_COMMAND = 2
 EXIT_DISTURBED = 3
 

@@ -1,5 +1,6 @@
 """Lists on terminals of all widths, and in a pipe."""
 import os
+import signal
 import subprocess
 import sys
 
@@ -68,3 +69,11 @@ def test_a_run_imports_before_its_first_step_what_it_needs(code, without):
     done = subprocess.run([sys.executable, '-c', f'{code}; import sys; print({without} & sys.modules.keys())'],
                           capture_output=True, text=True, timeout=300)
     assert (done.stdout, done.stderr) == ('set()\n', '')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_stopped_while_it_imports_it_says_so_and_nothing_else(tmp_path, number):
+    (tmp_path / 'argparse.py').write_text(f'import os, time\nos.kill(os.getpid(), {number})\ntime.sleep(60.0)\n')
+    done = subprocess.run([sys.executable, '-m', 'pedestal_bringup.cli', 'scenarios'], capture_output=True, text=True,
+                          env={**os.environ, 'PYTHONPATH': str(tmp_path)}, timeout=60.0)
+    assert (done.returncode, done.stdout, done.stderr) == (130, '', 'pedestal: stopped\n')

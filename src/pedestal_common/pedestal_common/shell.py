@@ -33,6 +33,9 @@ START_DEADLINE = 300.0
 PARTING = 1.0
 """Seconds a node that ends waits for readers to take what it published."""
 
+FAREWELL = 0.1
+"""Seconds it stays when its endpoints have left."""
+
 DAY = 86_400 * SECOND
 
 DIAGNOSTICS = 1.0
@@ -397,10 +400,12 @@ def _leave(node, code):
     """End the process with an exit code as soon as the endpoints of its node have left the graph.
 
     The participant is not destroyed: where others leave at that moment Fast DDS 2.14 may hang in it, in 1 of 100 ends
-    of a graph (DomainParticipant::set_listener waits for a callback with the mutex that the callback wants)."""
+    of a graph (DomainParticipant::set_listener waits for a callback with the mutex that the callback wants). So it
+    stays for FAREWELL: others who do not hear that a reader has left wait for it, for the 20 s of its lease."""
     with node.handle, contextlib.suppress(OSError):
         node.destroy_node()
         sys.stdout.flush()
+    time.sleep(FAREWELL)
     os._exit(code)
 
 

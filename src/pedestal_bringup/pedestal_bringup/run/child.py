@@ -144,6 +144,8 @@ def _as_copy(command, gate, rehearse):
                               for descriptor, buffering in ((1, -1), (2, 1)))
     module = command[2]
     sys.argv = [importlib.util.find_spec(module).origin, *command[3:]]
+    # Who is told to end while the rest is imported: the module does this first, by the name that is its own now.
+    sys.modules.pop('pedestal_common.entry', None)
     main = importlib.import_module(module).main
     with contextlib.suppress(Exception):
         rehearse()

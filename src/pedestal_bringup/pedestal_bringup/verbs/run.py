@@ -5,7 +5,7 @@ end, or its drive lost more than 1 % of its steps outside announced restarts; 13
 import pathlib
 import sys
 
-from pedestal_bringup import console
+from pedestal_bringup import console, stop
 from pedestal_bringup.verbs import arguments
 
 
@@ -60,7 +60,7 @@ def main(options):
     if outcome.stopped:
         print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
         if not outcome.recorder.get('messages'):
-            return console.EXIT_STOPPED
+            return stop.EXIT_CODE
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     parts = [results.of_bag(recording.view(beam)) for beam in beams]
@@ -79,7 +79,7 @@ def main(options):
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                       'mcap_sha256': outcome.recorder['sha256']})
     if outcome.stopped:
-        return console.EXIT_STOPPED
+        return stop.EXIT_CODE
     check = verify(bag)
     if not realtime and check.aborted or not (check.complete or outcome.restarts):
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
