@@ -1,11 +1,11 @@
 """Strangers beside a station ashore: one that stops reading, a slow one, two that flood: steps that the drive loses.
 
-    python docs/reliability/strangers.py [SECONDS]
+    python docs/reliability/strangers.py [SECONDS [PRIORITY]]
 
-Each case lasts SECONDS (default 60). Drive, control unit, receiver and recorder run in standby; prints a row per case
-from the diagnostics of the drive. A step is missed when the drive does not make it, lost when it is missed or when the
-command for it has not come. ms is what a step costs the drive of a core, which says on a busy machine, too, whether a
-stranger burdens it.
+Each case lasts SECONDS (default 60); the nodes have graph.priority PRIORITY (default 0). Drive, control unit, receiver
+and recorder run in standby; prints a row per case from the diagnostics of the drive. A step is missed when the drive
+does not make it, lost when it is missed or when the command for it has not come. ms is what a step costs the drive of
+a core, which says on a busy machine, too, whether a stranger burdens it.
 """
 import multiprocessing
 import os
@@ -90,11 +90,12 @@ def measured(watcher, drive, case, seconds, stranger=None, stop=False, count=Non
           + f' {1e3 * used / (after["step"] - before["step"]):6.2f} {moved:10.1e}  {said[:60]}', flush=True)
 
 
-def main(seconds=60.0):
+def main(seconds=60.0, priority=0.0):
     process, number = multiprocessing.get_context('spawn').Process, multiprocessing.get_context('spawn').Value
     with tempfile.TemporaryDirectory() as folder:
         domain_id = int(os.environ.get('ROS_DOMAIN_ID', '77'))
-        station = Station(folder, domain_id, changes=('acu.initial_mode=standby', 'scenario.duration=36000'))
+        station = Station(folder, domain_id, changes=(
+            'acu.initial_mode=standby', 'scenario.duration=36000', f'scenario.priority={priority:.0f}'))
         watcher = Stranger(domain_id)
         try:
             station.start(*station.nodes, 'recorder')
