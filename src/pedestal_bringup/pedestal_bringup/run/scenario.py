@@ -348,11 +348,12 @@ def _spread(name, sections, header, seed):
             if measured or any(flag in values for section, values in sections.items()
                                if nodes.plain(section) == node):
                 share(node, flag, measured)
-    for section, values in sections.items():
-        for key in values:
-            if key.startswith('tracker.attitude.') and sections['acu'].get('ins_error'):
-                raise ScenarioError(f'scenario {name}, {section}: {key}: the INS tells it; it is of use with '
-                                    'ins.error_told = false')
+    modelled = [(section, key) for section in sections for key in sections[section]
+                if key.startswith('tracker.attitude.')]
+    if modelled and sections['acu'].get('ins_error'):
+        section, key = modelled[0]
+        raise ScenarioError(f'scenario {name}, {section}: {key}: the INS tells it; it is of use with '
+                            'ins.error_told = false')
     for owner, key, node, known_as in SHARED:
         if key in sections[owner]:
             sections[node].setdefault(known_as, sections[owner][key])
