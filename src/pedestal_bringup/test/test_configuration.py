@@ -1,3 +1,4 @@
+import os
 import subprocess
 
 import pytest
@@ -23,6 +24,7 @@ def tree(tmp_path, monkeypatch):
 def test_git_revision_and_its_dirt(tree):
     assert configuration.git_revision() == ''  # installed into somebody's repository
     git(tree.parent, 'add', '.')
+    assert configuration.git_revision() == ''  # without a commit
     git(tree.parent, 'commit', '--quiet', '--message', 'x')
     git(tree.parent, 'tag', 'release')
     revision = git(tree.parent, 'rev-parse', 'HEAD')
@@ -31,6 +33,15 @@ def test_git_revision_and_its_dirt(tree):
     assert configuration.git_revision() == revision
     tree.write_text('2\n')
     assert configuration.git_revision() == revision + '-dirty'
+
+
+def test_git_revision_leaves_the_index_alone(tree):
+    git(tree.parent, 'add', '.')
+    git(tree.parent, 'commit', '--quiet', '--message', 'x')
+    os.utime(tree, (1, 1))  # which git would note in the index
+    index = (tree.parent / '.git/index').read_bytes()
+    assert configuration.git_revision() == git(tree.parent, 'rev-parse', 'HEAD')
+    assert (tree.parent / '.git/index').read_bytes() == index
 
 
 def test_no_git_or_no_repository_is_an_empty_revision(tree, tmp_path, monkeypatch):

@@ -34,7 +34,9 @@ def git_revision():
     (installed, also into an environment that lies in somebody's repository)."""
     if not _git('ls-files', '--error-unmatch', pathlib.Path(__file__).name):
         return ''
-    return _git('describe', '--always', '--dirty', '--abbrev=40', '--exclude=*')
+    # Not `git describe --dirty`, which takes the lock of the index and writes it, whatever it is told.
+    revision = _git('rev-parse', '--verify', 'HEAD')
+    return revision + ('-dirty' if revision and _git('status', '--porcelain', '--untracked-files=no') else '')
 
 
 def versions():

@@ -38,10 +38,13 @@ def watch(graph, operator, tracks, progress):
 def failure(graph, stuck, unheard=None):
     """The error of a run in which a node has ended before its time, or `unheard` says nothing any more.
 
-    stuck(names) -> those that do not answer. A node may accuse one that itself waits for the node that is stuck.
+    stuck(names) -> those that do not answer. A node may accuse one that itself waits for the node that is stuck. When
+    the drive has come to its end all others were told to end, and only who could not do it well did so early.
     """
     time.sleep(0.5)
-    early = {node: code for node, code in graph.ended().items() if code != 0 or node not in ENDING}
+    ended = graph.ended()
+    ending = graph.processes if ended.get(nodes.DRIVE) == 0 else ENDING
+    early = {node: code for node, code in ended.items() if code != 0 or node not in ending}
     lines = {node: graph.last_lines(node) for node in graph.processes}
     accused = {name for node in early for name in graph.result(node).get('silent', ())}
     killed = [node for node, code in early.items() if code < 0]
