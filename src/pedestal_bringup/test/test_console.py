@@ -15,7 +15,7 @@ ROWS = [('leo', '1', 'a satellite pass around its culmination, ashore, as seen b
 @pytest.mark.parametrize('columns', [40, 80, 200])
 def test_a_list_stays_within_the_terminal(capsys, monkeypatch, columns):
     monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
-    monkeypatch.setattr(console.shutil, 'get_terminal_size', lambda: os.terminal_size((columns, 24)))
+    monkeypatch.setenv('COLUMNS', str(columns))
     console.show_list(ROWS[:2])
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= columns
@@ -25,7 +25,7 @@ def test_a_list_stays_within_the_terminal(capsys, monkeypatch, columns):
 
 def test_on_a_narrow_terminal_each_cell_goes_below_the_name(capsys, monkeypatch):
     monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
-    monkeypatch.setattr(console.shutil, 'get_terminal_size', lambda: os.terminal_size((40, 24)))
+    monkeypatch.setenv('COLUMNS', '40')
     console.show_list([('azimuth.speed_loop.schedule', 'hold_fade', 'off | constant | fade | hold_fade', 'how'),
                        ('short', '1', '', '')])
     assert capsys.readouterr().out.splitlines() == [
