@@ -68,7 +68,7 @@ def run():
         latency = latencies(path)
     lap, floor = statistics.median(laps), statistics.median(bare)
     rows = [row('graph', 'lap_us', lap, 'us'), row('graph', 'bare_ring_us', floor, 'us'),
-            row('graph', 'ratio', lap / floor, '', '<= 1.6'),
+            row('graph', 'ratio', lap / floor, '', '<= 1.25'),
             row('graph', 'realtime_factor', statistics.median(factors), '', '>= 4'),
             row('realtime', 'latency_p50_us', float(np.percentile(latency, 50)) * 1e6, 'us'),
             row('realtime', 'latency_p99_us', float(np.percentile(latency, 99)) * 1e6, 'us'),
