@@ -145,6 +145,20 @@ def test_before_the_graph_begins_the_drive_is_not_silent(start_node, connect):
     assert not any('no joint_states' in status.message for status in told(False))
 
 
+def test_the_last_step_before_a_silence_is_answered_in_it(start_node, connect):
+    """Its error never comes: who was killed had no time to say where the beam is."""
+    client = connect(start_node('acu').domain_id)
+    client.write('joint_states')
+    client.read('acu/rate_command')
+    answers = client.heard['acu/rate_command']
+    angles = messages.template('joint_states')
+    while len(answers) < 10:
+        messages.put_stamp(angles.header.stamp, last := time.time_ns())
+        client.publish('joint_states', angles)
+        client.spin(0.01)
+    client.until(lambda: messages.nanoseconds(answers[-1].header.stamp) == last, SOON)
+
+
 @pytest.fixture(scope='module')
 def drive(start_node, connect):
     """A drive alone, with brakes so weak that a stop takes a second, under a commander."""

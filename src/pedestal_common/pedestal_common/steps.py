@@ -106,6 +106,11 @@ class Steps:
                              f'is its latency what this node was told ({self._latency[topic] / SECOND:.6f} s)?')
         return arrived[0][0] >= due
 
+    def give_up(self):
+        """Realtime: answer the step that waits, if one does, without what has not come."""
+        if self._pending is not None:
+            self._close()
+
     def _close(self):
         stamp, message = self._pending
         self._pending = None

@@ -267,6 +267,12 @@ class UnitNode(shell.Shell):
             self._answered = self._begun = now
         held_up, self._watched = now - self._watched > limit, now
         silent = now - self._answered > limit and not held_up
+        if silent and self.steps.pending_stamp is not None:
+            # Its trigger was the last one. Left until the others are back it would be a step of before the silence
+            # that meets what they say after it.
+            answered = self._answered
+            self.steps.give_up()
+            self._answered = answered
         if silent != self.unit.silent:
             for port in self.ports:
                 port.unit.silent = silent

@@ -94,6 +94,20 @@ def test_realtime_goes_on_without_a_silent_follower():
     assert answers[-1] == (10, 2, {'a': 'late'})
 
 
+def test_realtime_gives_up_the_step_that_waits():
+    steps, answers = collect({'a': 0}, lockstep=False)
+    steps.give_up()
+    assert answers == []
+    steps.take('a', 0, 'a0')
+    steps.take('trigger', 5 * MS, 1)
+    assert answers == []
+    steps.give_up()
+    assert answers == [(5, 1, {'a': 'a0'})] and steps.pending_stamp is None
+    steps.take('a', 1000 * MS, 'a1')
+    steps.take('trigger', 1000 * MS, 2)
+    assert answers[1:] == [(1000, 2, {'a': 'a1'})]
+
+
 def test_realtime_hands_over_the_newest_and_never_twice():
     steps, answers = collect({'a': 0}, lockstep=False)
     steps.take('trigger', 0, 0)
