@@ -27,12 +27,11 @@ IN_TURN := --dist loadfile --no-loadscope-reorder
 # Containers often set it: every process would compile the sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-install: .venv/tests laws
-
-laws: .venv/installed
+install: .venv/tests
 	@.venv/bin/python -m pedestal_bringup.run.prepare
 
-demo: laws
+demo: .venv/installed
+	@.venv/bin/python -m pedestal_bringup.run.prepare leo_pass
 	rm -rf $(DEMO) $(DEMO).log
 	.venv/bin/pedestal run leo_pass --bag $(DEMO)
 	.venv/bin/pedestal verify $(DEMO)
@@ -42,7 +41,7 @@ demo: laws
 test: install
 	.venv/bin/ruff check .
 	.venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(addprefix --ignore=,$(REALTIME))
-	.venv/bin/python -m pytest $(REALTIME)
+	.venv/bin/python -m pytest --numprocesses 2 $(IN_TURN) $(REALTIME)
 
 update-references: install
 	.venv/bin/python bags/reference/update.py
@@ -116,4 +115,4 @@ APT := apt-get -qq -o APT::Sandbox::User=root
 	    rm -r usr python3-pip-whl_*.deb ); fi || \
 	    { rm -rf $*; echo 'This Python cannot make an environment with pip: sudo apt-get install python3-venv'; exit 1; }
 
-.PHONY: install laws demo test update-references docs book numbers bench colcon clean
+.PHONY: install demo test update-references docs book numbers bench colcon clean

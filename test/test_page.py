@@ -278,10 +278,10 @@ def test_a_recording_on_the_page(browser, start_process):
 
 
 @pytest.fixture(scope='module')
-def station(start_run, connect):
+def station(start_run, connect, patient):
     """(Run, Client of its graph, Site of its page) of an antenna in standby."""
     run = start_run('uav_flyby', '--duration', '900', '--pacing', 'realtime', '--page', str(free_port()),
-                    '--param', 'acu.initial_mode=standby', '--param', 'acu.tracker.handover=false')
+                    '--param', 'acu.initial_mode=standby', '--param', 'acu.tracker.handover=false', *patient)
     site = Site(begins_with(run.process, 3))
     client = connect(run.domain_id)
     for name in ('acu/mode', 'joint_states', 'acu/command_result'):
@@ -378,7 +378,7 @@ def test_ten_pages_that_never_read_cost_the_control_unit_no_step(station):
     def share_lost():
         client.heard['diagnostics'].clear()
         first, lost = client.until(drive)
-        last, more = client.until(lambda: (now := drive())[0] > first + 800 and now)
+        last, more = client.until(lambda: (now := drive())[0] > first + 400 and now)
         return (more - lost) / (last - first)
     differences = []
     for _ in range(6):

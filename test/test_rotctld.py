@@ -31,13 +31,13 @@ def free_port():
 
 
 @pytest.fixture(scope='module')
-def station(start_run, connect):
+def station(start_run, connect, patient):
     """(Run, Client of its graph, port of its rotctld) of an antenna in standby, which moves softly: where a busy
     machine loses steps, a hard start looks like an encoder that jumps."""
     port = free_port()
     soft = (f'acu.{axis}.shaper.{name}' for axis in topics.AXES for name in ('rate=0.6', 'acceleration=2', 'jerk=100'))
     changes = ('acu.initial_mode=standby', 'acu.tracker.handover=false', *soft)
-    run = start_run('uav_flyby', '--duration', '600', '--pacing', 'realtime', '--rotctld', str(port),
+    run = start_run('uav_flyby', '--duration', '600', '--pacing', 'realtime', '--rotctld', str(port), *patient,
                     *(word for change in changes for word in ('--param', change)))
     client = connect(run.domain_id)
     for name in ('acu/mode', 'joint_states'):

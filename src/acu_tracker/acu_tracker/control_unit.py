@@ -174,28 +174,12 @@ def _start_from_actual(s, c, u, begins, gap):
 
 
 @compiled
-def step(s, c, u, o, of_all):
-    """Run one drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and the Tables `of_all`.
-
-    A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
-    """
-    dt = u.stamp - s.stamp
-    if not (dt > 0.0 and math.isfinite(u.stamp)):
-        o.invalid_input = signals.STAMP
-        o.reason = modes.BAD_STAMP
-        return
-    signals.clear(o)
-    jumped = dt > c.p.step_gap
-    flags = 0
-    if jumped and math.isfinite(s.stamp):
-        flags = signals.STEP_GAP
-        mode_change.bridge_silence(s, c, u.stamp)
-    now = Instants(u.stamp, u.stamp + c.lead, c.p.period if jumped else dt)
-    s.stamp = u.stamp
+def observe(s, c, u, o, of_all):
+    """Take in what has come for the step: encoders, attitude, receiver, preset, and what watches over them. Gives the
+    bits of signals.INVALID_INPUTS."""
     program = tables.of_mode(of_all, s.table)
-
     tracker.transfer(s.target.tracker, c.p.tracker, c.tracker)
-    flags |= intake.take_encoders(s, u) | intake.take_attitude(s, c, u)
+    flags = intake.take_encoders(s, u) | intake.take_attitude(s, c, u)
     flags |= intake.take_error(s, c, u, o, program) | intake.take_preset(s, u)
 
     if not u.drive_ready or not math.isfinite(s.unasked.since):
@@ -204,6 +188,13 @@ def step(s, c, u, o, of_all):
     if c.axis[0].p.controller != position_loop.BEAM:
         frozen.watch(s.frozen, u, c.p.step_gap + c.p.command_delay)
     by_level.advance(s, c, u, program)
+    return flags
+
+
+@compiled
+def act(s, c, u, o, of_all, now, dt, jumped, flags):
+    """Decide on the mode, move the axes and tell, after `observe`, which gave the flags. now: Instants; dt: time since
+    the last step [s]; jumped: whether it is longer than step_gap."""
     rested = stow.rests(s.stow, c.p.stow_pins, u.pins, s.mode)
     waiting = s.pending if s.mode == modes.STANDBY else modes.NO_REQUEST
     _, program_flags = mode_change.change(s, c, u, o, of_all, waiting)
@@ -247,3 +238,26 @@ def step(s, c, u, o, of_all):
     guidance.look_ahead(s, c, program)
     o.pins, o.pins_wrong = s.stow.asked, stow.wrong(s.stow, c, u) if c.p.stow_pins else 0
     supervision.step(s, c, u, o, dt, s.reason == modes.SIGNAL_LOST or (o.coasting and not outage.permitted(s, c)))
+
+
+@compiled
+def step(s, c, u, o, of_all):
+    """Run one drive step; records STATE, CONSTANTS, INPUTS, OUTPUTS and the Tables `of_all`.
+
+    A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
+    """
+    dt = u.stamp - s.stamp
+    if not (dt > 0.0 and math.isfinite(u.stamp)):
+        o.invalid_input = signals.STAMP
+        o.reason = modes.BAD_STAMP
+        return
+    signals.clear(o)
+    jumped = dt > c.p.step_gap
+    flags = 0
+    if jumped and math.isfinite(s.stamp):
+        flags = signals.STEP_GAP
+        mode_change.bridge_silence(s, c, u.stamp)
+    now = Instants(u.stamp, u.stamp + c.lead, c.p.period if jumped else dt)
+    s.stamp = u.stamp
+    flags |= observe(s, c, u, o, of_all)
+    act(s, c, u, o, of_all, now, dt, jumped, flags)

@@ -186,7 +186,7 @@ class RecorderNode(shell.Shell):
                 else:
                     order.take(sender_slot, stamp, data)
 
-        if topic.rate == 'change':
+        if topic.rate in topics.BETWEEN_STEPS:
             return put_change
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 

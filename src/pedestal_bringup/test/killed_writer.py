@@ -19,7 +19,7 @@ import time
 import numpy as np
 
 from pedestal_bringup.bags.writer import Writer
-from pedestal_common import messages
+from pedestal_common import messages, topics
 
 _spec = importlib.util.spec_from_file_location('bag_test_messages', pathlib.Path(__file__).with_name('test_bag.py'))
 _bag_test = importlib.util.module_from_spec(_spec)
@@ -33,7 +33,7 @@ def rows():
     """Endless (index of the topic, stamp, bytes) of a lockstep run; the messages repeat, their stamps go on."""
     made = [(_bag_test.NAMES.index(name), stamp, bytearray(messages.serialize(message)))
             for name, stamp, message in _bag_test.run(STEPS, latency=0)]
-    once = [index for index, topic in enumerate(_bag_test.RECORDED) if topic.rate in ('once', 'change')]
+    once = [index for index, topic in enumerate(_bag_test.RECORDED) if topic.rate in ('once', *topics.BETWEEN_STEPS)]
     for turn in itertools.count():
         shift = turn * STEPS * _bag_test.T
         for index, stamp, data in made:

@@ -81,7 +81,7 @@ def run(steps=450, latency=4):
             if topic.rate == 'second' and k % 200 == 0:
                 rows += [(name, k * T, diagnostics(node, k)) for node in topic.writers]
             elif topic.rate == 'step' and not (name == 'tracking_receiver/angle_error' and k >= steps - latency) \
-                    or topic.rate == 'once' and k == 0 or topic.rate == 'change' and k in (0, 100):
+                    or topic.rate == 'once' and k == 0 or topic.rate in topics.BETWEEN_STEPS and k in (0, 100):
                 rows.append((name, k * T, made(name, k, rng)))
     return rows
 

@@ -144,7 +144,7 @@ def rows():
 
 ANSWERS = {topic.name: next(answer.name for answer in RECORDED
                             if answer.rate == 'step' and answer.writers == topic.writers)
-           for topic in RECORDED if topic.rate == 'change'}
+           for topic in RECORDED if topic.rate in topics.BETWEEN_STEPS}
 """{topic that changes now and then: what its writer says in every step}."""
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from pedestal_bringup.bags import step_order
 from pedestal_bringup.bags.step_order import OrderError, StepOrder
-from pedestal_common import nodes
+from pedestal_common import nodes, topics
 
 T = 5_000_000
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
@@ -12,8 +12,8 @@ RECORDED = nodes.recorded(NODES)
 NAMES = [topic.name for topic in RECORDED]
 ANSWERS = {topic.name: next(other.name for other in RECORDED
                             if other.rate == 'step' and other.writers == topic.writers)
-           for topic in RECORDED if topic.rate == 'change'}
-"""The first step topic of whoever writes a `change` topic."""
+           for topic in RECORDED if topic.rate in topics.BETWEEN_STEPS}
+"""The first step topic of whoever writes a topic between two steps."""
 SPEAKERS = [node for node in nodes.links()['diagnostics'].writers if node in NODES]
 
 
@@ -38,7 +38,7 @@ def canonical(steps, latency=3):
             if topic.rate == 'second' and k % 200 == 0:
                 rows += [(topic.name, k, f'{topic.name} {node} {k}', node) for node in SPEAKERS]
             elif topic.rate == 'step' and (topic.name != 'tracking_receiver/angle_error' or k < steps - latency) \
-                    or topic.rate == 'once' and k == 0 or topic.rate == 'change' and k in (0, 7):
+                    or topic.rate == 'once' and k == 0 or topic.rate in topics.BETWEEN_STEPS and k in (0, 7):
                 rows.append((topic.name, k, f'{topic.name} {k}', None))
     return rows
 

@@ -63,18 +63,21 @@ def _cache_folder(thing):
     return _folder_of(thing.__module__.partition('.')[0])
 
 
+def done(kind, form='') -> pathlib.Path | None:
+    """The file that says that the laws of a class, in a form of them, are in the cache; None where there is none."""
+    folder = _cache_folder(kind)
+    return pathlib.Path(folder, f'{kind.__module__}.{kind.__name__}{form}.done') if folder else None
+
+
 def _done(unit):
-    """The file that says that the laws of a unit, which its memory tells apart, are in the cache; None where there is
-    no cache."""
-    memory_type = type(unit.memory)
-    folder = _cache_folder(memory_type)
-    return pathlib.Path(folder, f'{memory_type.__module__}.{memory_type.__name__}.done') if folder else None
+    """That of a unit, which its memory tells apart."""
+    return done(type(unit.memory))
 
 
 def is_compiled(unit) -> bool:
     """Whether the laws of a unit are in the cache."""
-    done = _done(unit)
-    return done is not None and done.exists()
+    mark = _done(unit)
+    return mark is not None and mark.exists()
 
 
 @contextlib.contextmanager
@@ -89,13 +92,13 @@ def _alone(path):
 def compiled_once(unit):
     """Around the first call of the laws of a unit: of the processes that start with a cold cache one compiles them,
     the others wait for it and find them there. Four beams start as fast as one."""
-    done = _done(unit)
-    if done is None or done.exists():
+    mark = _done(unit)
+    if mark is None or mark.exists():
         yield
         return
-    with _alone(done.with_suffix('.lock')):
+    with _alone(mark.with_suffix('.lock')):
         yield
-        done.touch()
+        mark.touch()
 
 
 class _Place(UserProvidedCacheLocator):

@@ -57,7 +57,11 @@ QOS = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reliable=Fal
        'once': Qos(latched=True, lockstep=1, written=1, read=1, reliable=True, recorded=100, unlatched=True),
        'change': Qos(latched=True, lockstep=1, written=1, read=8, reliable=True, recorded=1000),
        'command': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
+       'reply': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
        'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000)}
+
+BETWEEN_STEPS = 'change', 'reply'
+"""Rates of what is said between two steps, when there is something to say."""
 
 
 class Topic(typing.NamedTuple):
@@ -167,13 +171,13 @@ TOPICS = (
           'two or more points: time-tagged azimuth and elevation (earth); one point: a preset (deck)', frame='earth'),
     Topic('acu/command', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
           'name = verb, hardware_id = who, message = number of the request, values = arguments; see commands'),
-    Topic('acu/command_result', 'diagnostic_msgs/msg/DiagnosticStatus', 'change',
+    Topic('acu/command_result', 'diagnostic_msgs/msg/DiagnosticStatus', 'reply',
           'every command that was obeyed or refused, by topic, service or schedule, with `granted` and `reply`; it '
           'took effect in the step that is answered next'),
     *(topic for node in ('ship_motion', 'ins', 'tracking_receiver', 'adu') for topic in (
         Topic(f'{node}/inject', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
               'a fault to inject: name = fault, values = its arguments; see the faults that can be injected'),
-        Topic(f'{node}/injected', 'diagnostic_msgs/msg/DiagnosticStatus', 'change',
+        Topic(f'{node}/injected', 'diagnostic_msgs/msg/DiagnosticStatus', 'reply',
               'every fault that was injected or refused, as on `acu/command_result`'
               + ('; services too' if node == 'adu' else '')))),
     Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'second', 'state of each node'),

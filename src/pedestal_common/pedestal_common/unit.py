@@ -231,6 +231,10 @@ class Unit(typing.Protocol):
         for array, values in zip(arrays, before):
             array[...] = values
 
+    def prepare_ahead(self):
+        """Compile what `prepare` comes to last, in a process beside the one that does, which then finds it; the unit
+        is of no use afterwards. Overridden where it is worth a process."""
+
 
 def announced(unit, topic, stamps, outputs):
     """(stamps [ns] (m,), texts) of a text topic of a unit whenever it changed in outputs (n,), steps of stamps (n,).

@@ -44,7 +44,7 @@ class Feeder(Operator):
         if row.obeys:
             self.asks = self._publisher(self.links[row.obeys])
             self.create_subscription(middleware.message_class(self.links[row.replies].type), row.replies,
-                                     self.replies.append, middleware.qos('change'), raw=True)
+                                     self.replies.append, middleware.qos(self.links[row.replies].rate), raw=True)
 
     def stand_in(self, names):
         """Make nodes of these names, those the process is told of, which read what it writes."""

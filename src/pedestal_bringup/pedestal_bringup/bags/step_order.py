@@ -4,6 +4,8 @@ Arrival depends on the machine's load, the steps do not; so equal runs give equa
 """
 import heapq
 
+from pedestal_common.topics import BETWEEN_STEPS
+
 MAX_WAITING = 10_000
 SECOND = 1_000_000_000
 
@@ -38,7 +40,7 @@ class StepOrder:
         self._steps = len(self._needed['step'])
         self._last_answer, self._answer_slot = {}, {}
         for index, topic in enumerate(topics):
-            if topic.rate == 'change':
+            if topic.rate in BETWEEN_STEPS:
                 answers = [slot for slot in self._needed['step'] if self._slots[slot - 1][1].writers == topic.writers]
                 self._answer_slot[index] = answers[0] if answers else None
                 self._last_answer[self._answer_slot[index]] = -1
@@ -124,7 +126,7 @@ class StepOrder:
         for (index, topic, _), data in zip(self._slots, bucket[1:]):
             if data is not None:
                 write(index, stamp, stamp, data)
-            elif topic.rate == 'change':
+            elif topic.rate in BETWEEN_STEPS:
                 changes = self._changes[index]
                 while changes and changes[0][0] < stamp:
                     write(index, stamp, stamp, changes.pop(0)[1])

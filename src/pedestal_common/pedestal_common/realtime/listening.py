@@ -75,7 +75,7 @@ class Listener:
         self.link, self._node, self._ros_name, self._take = link, node, ros_name, take
         everybodys = len(link.writers) > 1 or link.rate in ('once', 'command')
         self._expected = any(writer in node.graph.members for writer in link.writers)
-        text = link.rate == 'change' and self._expected
+        text = link.rate in topics.BETWEEN_STEPS and self._expected
         self.intake = intake.Intake(decode, round(node.graph.future * 1e9), None if everybodys else self._count,
                                     paced=not text, oldest=LATEST if link.rate == 'command' else None)
         self._held, self._missed = collections.deque(maxlen=HELD), 0
