@@ -127,7 +127,8 @@ def moving(tmp_path_factory, reserve_domain, connect):
 
 
 def stranger_writes(field, connect, name, stamp, seconds=1.0, until=lambda: True, **numbers):
-    """A node `stranger` publishes on a topic for a while and until() is true; stamp() gives each its stamp [ns]."""
+    """A node `stranger` publishes on a topic for a while; stamp() gives each its stamp [ns]. Then now and then, so
+    that its numbers do not come near to those of others, until until() is true."""
     client = connect(field.station.domain_id, 'stranger')
     topic = topics.BY_NAME[name]
     publisher = client.node.create_publisher(middleware.message_class(topic.type), name,
@@ -141,7 +142,7 @@ def stranger_writes(field, connect, name, stamp, seconds=1.0, until=lambda: True
         assert passed < SOON, field.told()
         messages.put_stamp(message.header.stamp, stamp())
         publisher.publish(messages.serialize(message))
-        field.operator.spin(0.003)
+        field.operator.spin(0.003 if passed < seconds else 0.3)
     client.close()
 
 
