@@ -167,7 +167,7 @@ def graphs(start_run):
         return (sys.executable, '-c', 'import os, resource, sys; '
                 f'resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size})); os.execv(sys.argv[1], sys.argv[1:])')
 
-    first = start_run('leo_pass', '--pacing', 'realtime', '--duration', '20', '--param', 'adu.period=0.02', '--param',
+    first = start_run('leo_pass', '--pacing', 'realtime', '--duration', '30', '--param', 'adu.period=0.02', '--param',
                       'acu.period=0.02')
     full = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '30', prefix=limit(2_500_000))
     at_its_end = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '0.5', prefix=limit(70_000))

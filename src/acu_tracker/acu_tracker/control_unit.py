@@ -192,9 +192,11 @@ def observe(s, c, u, o, of_all):
 
 
 @compiled
-def act(s, c, u, o, of_all, now, dt, jumped, flags):
-    """Decide on the mode, move the axes and tell, after `observe`, which gave the flags. now: Instants; dt: time since
-    the last step [s]; jumped: whether it is longer than step_gap."""
+def act(s, c, u, o, of_all, dt, flags):
+    """Decide on the mode, move the axes and tell, after `observe`. dt: time since the last step [s], infinite in the
+    first; flags: bits of signals.INVALID_INPUTS so far."""
+    jumped = dt > c.p.step_gap
+    now = Instants(s.stamp, s.stamp + c.lead, c.p.period if jumped else dt)
     rested = stow.rests(s.stow, c.p.stow_pins, u.pins, s.mode)
     waiting = s.pending if s.mode == modes.STANDBY else modes.NO_REQUEST
     _, program_flags = mode_change.change(s, c, u, o, of_all, waiting)
@@ -252,12 +254,10 @@ def step(s, c, u, o, of_all):
         o.reason = modes.BAD_STAMP
         return
     signals.clear(o)
-    jumped = dt > c.p.step_gap
     flags = 0
-    if jumped and math.isfinite(s.stamp):
+    if c.p.step_gap < dt < math.inf:
         flags = signals.STEP_GAP
         mode_change.bridge_silence(s, c, u.stamp)
-    now = Instants(u.stamp, u.stamp + c.lead, c.p.period if jumped else dt)
     s.stamp = u.stamp
     flags |= observe(s, c, u, o, of_all)
-    act(s, c, u, o, of_all, now, dt, jumped, flags)
+    act(s, c, u, o, of_all, dt, flags)

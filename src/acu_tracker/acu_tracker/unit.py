@@ -11,7 +11,6 @@ from acu_tracker.alarms.desk import Desk
 from acu_tracker.authority import Authority
 from acu_tracker.prediction import Predictor
 from acu_tracker.program import segments, tables
-from acu_tracker.servo.position_loop import Instants
 from acu_tracker.verbs import ALARM_VERBS, VERBS, points
 from pedestal_common import messages, nodes, topics
 from pedestal_common.commands import Reply, schedule
@@ -182,8 +181,7 @@ class Acu(Unit):
     def prepare_ahead(self):
         """The second half of a step: two fifths of the time to compile it."""
         m = self.parts
-        control_unit.act(m['state'], m['constants'], m['inputs'], m['outputs'], self.memory.tables,
-                         Instants(0.0, 0.0, 0.0), 0.0, False, 0)
+        control_unit.act(m['state'], m['constants'], m['inputs'], m['outputs'], self.memory.tables, 0.0, 0)
 
     def latency(self, topic):
         """Age [s] of a topic's stamp at a step: attitude_latency or receiver_latency."""

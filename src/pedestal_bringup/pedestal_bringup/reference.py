@@ -36,7 +36,7 @@ FIRST = (
 """The parameters in the table of docs/parameters.md."""
 
 RATES = {'step': 'step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
-         'reply': 'when somebody asked', 'command': 'when somebody asks'}
+         'reply': 'after each request', 'command': 'when somebody asks'}
 
 
 def _table(head, rows):

@@ -69,14 +69,9 @@ def done(kind, form='') -> pathlib.Path | None:
     return pathlib.Path(folder, f'{kind.__module__}.{kind.__name__}{form}.done') if folder else None
 
 
-def _done(unit):
-    """That of a unit, which its memory tells apart."""
-    return done(type(unit.memory))
-
-
 def is_compiled(unit) -> bool:
-    """Whether the laws of a unit are in the cache."""
-    mark = _done(unit)
+    """Whether the laws of a unit, which its memory tells apart, are in the cache."""
+    mark = done(type(unit.memory))
     return mark is not None and mark.exists()
 
 
@@ -92,7 +87,7 @@ def _alone(path):
 def compiled_once(unit):
     """Around the first call of the laws of a unit: of the processes that start with a cold cache one compiles them,
     the others wait for it and find them there. Four beams start as fast as one."""
-    mark = _done(unit)
+    mark = done(type(unit.memory))
     if mark is None or mark.exists():
         yield
         return

@@ -1,5 +1,6 @@
 """A realtime run: the antenna goes on, so a node that dies is started again; one that falls silent is killed first."""
 import contextlib
+import os
 import signal
 import subprocess
 import sys
@@ -44,7 +45,8 @@ def prepare(scenario):
                                + (f'; {lines[-1]}' if lines else ''))
     finally:
         for process in processes.values():
-            process.kill()
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)      # with the process that it compiles beside
             process.wait()
             process.stderr.close()
 
