@@ -54,6 +54,7 @@ class Intake:
         self.dropped_at = None
         self.anew = False
         self.offset = None
+        self._obeyed = None     # when the writer in charge was heard last [ns]
         self._stamp = None
         self._back_since = self._back = None
 
@@ -79,26 +80,29 @@ class Intake:
 
     def _of_charge(self, stream, now):
         """Whether the writer of a message, which may be unclear, is in charge."""
-        charge = self.in_charge
+        if stream is not None and stream is self.in_charge and self._may_be_another(stream, now):
+            self.in_charge = None
         if stream is None:
             self._drop(UNCLEAR_WRITER, '', now)
-        elif stream is charge:
-            others = [other for other in self.writers.streams if other is not charge]
-            for other in others:
-                other.known = other.known or now - other.arrival < SILENCE
-            if not stream.mixed:
-                return True
-            stream.mixed = any(other.mixed and now - other.arrival < SILENCE for other in others)
-            if not stream.mixed:
-                return True
-            self._drop(UNCLEAR_WRITER, '', now)
+        elif stream is self.in_charge:
+            for other in self.writers.streams:
+                other.known = other.known or (other is not stream and now - other.arrival < SILENCE)
+            self._obeyed = now
+            return True
         elif self._may_take_over(stream, now):
-            self.in_charge, self.anew = stream, charge is not None
+            self.in_charge, self.anew = stream, self._obeyed is not None
             self._stamp = self._back_since = self.offset = None
+            self._obeyed = now
             return True
         else:
             self._drop(ANOTHER_WRITER, '', now)
         return False
+
+    def _may_be_another(self, stream, now):
+        """Whether the writer in charge, silent until now, left out numbers and the graph shows a stranger that was not
+        heard yet: this node was held up perhaps, and what comes first is the stranger's."""
+        return (now - self._obeyed >= SILENCE and stream.skipped[1] == stream.last
+                and (self._strangers() or 0) > self._known(stream, now))
 
     def _may_take_over(self, stream, now):
         """Whether a writer that is not in charge is from now on."""
@@ -106,19 +110,24 @@ class Intake:
         silent = SILENCE if charge is None else now - charge.arrival
         # What a stranger that has gone said before may come late: then the graph no longer shows it.
         stream.known = stream.known or (charge is not None and stream.last > charge.growth(silent))
-        if silent < (ABANDONED if stream.known else SILENCE) or stream.mixed:
+        if silent < (ABANDONED if stream.known else SILENCE):
             return False
         if stream.looked is not None and now - stream.looked < LOOK:
             return False
         stream.looked = now
         strangers = self._strangers()
-        speaking = [other for other in self.writers.streams if other is not stream and now - other.arrival < SILENCE]
         if stream.known:
-            free = not strangers and not speaking and silent >= (ABANDONED_UNSEEN if strangers is None else ABANDONED)
+            alone = not any(other is not stream and now - other.arrival < SILENCE for other in self.writers.streams)
+            free = not strangers and alone and silent >= (ABANDONED_UNSEEN if strangers is None else ABANDONED)
         else:
-            free = not strangers or strangers <= sum(other.known for other in speaking)
+            free = not strangers or strangers <= self._known(stream, now)
         stream.known = stream.known and not free
         return free
+
+    def _known(self, stream, now):
+        """How many writers beside this one speak that are known to be others."""
+        return sum(other.known for other in self.writers.streams
+                   if other is not stream and now - other.arrival < SILENCE)
 
     def _in_order(self, stamp, now, utc):
         """Whether a stamp is later than the last one and not ahead of the time. One that goes back is believed once

@@ -1,8 +1,11 @@
 """Who wrote a message: those of each writer of a topic carry numbers of its own, one more from each to the next.
 
-rclpy names no writer, so a message belongs to the stream that it continues: the next number, at the time at which the
-next message of that stream is due. Where two streams are continued equally well it belongs to neither.
+rclpy names no writer, so a message belongs to the stream that it continues: a higher number, by no more than there was
+time for. Two writers whose messages could continue one stream are not told apart. When their numbers have parted again
+both are known by their pace, if that is another for each; otherwise neither is, until only one of them speaks.
 """
+import collections
+
 INTERVAL = 5_000_000
 """Time between two messages [ns] taken for that of a stream of which only one has come."""
 
@@ -14,27 +17,25 @@ OWED = 1_000_000_000
 left out."""
 
 PAUSE = 4.0
-"""Time between two messages, in intervals of their stream, that is believed of its pace."""
-
-EARLY, LOST = 3.0, 1.0
-"""What speaks against a stream, in messages of it: each by which this one comes early, each left out. One by which it
-comes late counts 1: writers are held up easily."""
-
-MARGIN = 1.0
-"""By how much a stream must be the better one to be believed."""
+"""Time between two messages, in intervals of their stream, that is believed of its interval."""
 
 NEAR = 20
 """Two streams that both speak and whose numbers are this close are not told apart."""
 
-PARTED = 40
-"""Until their numbers are this far apart: more than NEAR, or two that come close would part at once as they came."""
+WINDOW, STRIDE = 40, 8
+"""Messages of which a stream's pace is the median time per number over STRIDE of them: one that is held up, and a few
+that then come at once, do not change it."""
 
 FASTER = 0.85
-"""Of two streams that were close the faster one is ahead, if its interval is below this part of the other's."""
+"""Of two streams that were close the faster one is told by its pace if that takes less than this part of the time of
+the other's, and if both have kept theirs to the square root of this."""
 
 RESOLVED = 200_000_000
-"""A stream speaks while it was heard within this time [ns]. Two that are close have turned out to be one when for so
-long every number was above the one before."""
+"""A stream speaks while it was heard within this time [ns]. Of two that are close one has gone when for so long the
+numbers were those of one."""
+
+RECENT = 1_000_000_000
+"""A stream that was silent for so long [ns] takes part with the next few of its numbers only."""
 
 FORGOTTEN = 30_000_000_000
 """A stream that was silent for so long [ns] is no longer known."""
@@ -42,32 +43,36 @@ FORGOTTEN = 30_000_000_000
 
 class Stream:
     """The messages of one writer. last: number of the last one; source: when it was sent, arrival: when it came [ns];
-    interval: mean time between two [ns]; owed: messages by which it is behind its pace; lost: numbers left out.
+    begun: when the first one came [ns]; interval: mean time between two [ns]; owed: messages by which it is behind its
+    pace; lost: numbers left out; skipped: (before, after) the last of them; unclear: whether it is one of those that
+    are not told apart.
 
-    An Intake notes on it: known, whether it spoke together with the writer in charge; mixed, whether it may be that
-    writer; looked, when it was last asked who else may write [ns]."""
-    __slots__ = ('arrival', 'interval', 'known', 'last', 'looked', 'lost', 'mixed', 'owed', 'source')
+    An Intake notes on it: known, whether it spoke together with the writer in charge; looked, when it was last asked
+    who else may write [ns]."""
+    __slots__ = ('_heard', 'arrival', 'begun', 'interval', 'known', 'last', 'looked', 'lost', 'owed', 'skipped',
+                 'source', 'unclear')
 
     def __init__(self, number, source, now):
+        self._heard = collections.deque([(number, source)], WINDOW)
+        self.begun = now
         self.last, self.source, self.arrival = number, source, now
         self.interval = self.looked = None
-        self.lost, self.owed = 0, 0.0
-        self.known = self.mixed = False
+        self.lost, self.owed, self.skipped = 0, 0.0, (0, 0)
+        self.known = self.unclear = False
 
     def fits(self, number, source):
         """Whether a message can be of this stream."""
         gap = number - self.last
         return gap == 1 or 0 < gap <= self.growth(source - self.source) + self.owed
 
-    def cost(self, number, source):
-        """What speaks against it being of this stream."""
-        gap, interval = number - self.last, self.interval or INTERVAL
-        late = (source - self.source) / interval - gap
-        return (late if late > 0.0 else EARLY * max(-late - self.owed, 0.0)) + LOST * (gap - 1)
-
     def growth(self, elapsed):
         """By how much its numbers grow at the most in a time [ns]."""
         return SLACK + 2.0 * elapsed / (self.interval or INTERVAL)
+
+    def near(self, other):
+        """Whether what this one says next could be of the other one, or the other way round."""
+        behind, ahead = (self, other) if self.last < other.last else (other, self)
+        return ahead.last - behind.last <= NEAR or behind.fits(ahead.last, ahead.source)
 
     def follow(self, number, source, now):
         """The message is of this stream; how many were left out before it."""
@@ -76,11 +81,29 @@ class Stream:
             interval = self.interval or INTERVAL
             self.owed = min(max(self.owed + elapsed / interval - gap, 0.0), OWED / interval)
             # A silence, as of a cut cable, says little about the pace: it is taken for PAUSE intervals at the most.
-            pace = min(elapsed / gap, RESOLVED if self.interval is None else PAUSE * self.interval)
-            self.interval = pace if self.interval is None else self.interval + 0.05 * (pace - self.interval)
+            step = min(elapsed / gap, RESOLVED if self.interval is None else PAUSE * self.interval)
+            self.interval = step if self.interval is None else self.interval + 0.05 * (step - self.interval)
+        if gap > 1:
+            self.skipped = self.last, number
+        self._heard.append((number, source))
         self.last, self.source, self.arrival = number, source, now
         self.lost += gap - 1
         return gap - 1
+
+    def pace(self):
+        """Time per number [ns], None of a stream that has not said enough."""
+        heard = list(self._heard)
+        if len(heard) < 3 * STRIDE:
+            return None
+        paces = sorted((source - earlier_source) / (number - earlier)
+                       for (earlier, earlier_source), (number, source) in zip(heard, heard[STRIDE:], strict=False))
+        return paces[len(paces) // 2]
+
+    def revive(self, stream):
+        """Go on as a stream that turned out to be this one."""
+        self._heard = stream._heard
+        self.last, self.source, self.arrival = stream.last, stream.source, stream.arrival
+        self.interval, self.owed, self.skipped = stream.interval, stream.owed, stream.skipped
 
 
 class Streams:
@@ -89,69 +112,92 @@ class Streams:
     def __init__(self):
         self.streams = []
         self.lost = 0
-        self._close = ()        # two streams that are not told apart
-        self._high = None       # (number, when it was sent) of the message furthest ahead of theirs
-        self._rising = None     # (since [ns], last number) of messages that were each above the one before
+        self._close = ()                # streams that are not told apart; what is said since is of unclear ones
+        self._parted = 0, -FORGOTTEN    # (lowest number, when [ns]) of those that were close last
+        self._heard = -RESOLVED
 
     def of(self, number, source, now):
         """The Stream of a message, a new one where it continues none; None where it may be of several. number: its
         sequence number; source: when it was sent, now: when it came [ns]."""
-        if self._close and abs(number - self._high[0]) <= 2 * PARTED:
-            return self._told_apart(number, source, now)
-        fitting = [stream for stream in self.streams if stream not in self._close and stream.fits(number, source)]
-        if not fitting:
-            stream = self._begun(number, source, now)
-        else:
-            fitting.sort(key=lambda stream: stream.cost(number, source))
-            if len(fitting) > 1 and fitting[1].cost(number, source) - fitting[0].cost(number, source) < MARGIN:
-                return None
+        heard, self._heard = self._heard, now
+        recent = [stream for stream in self.streams if heard - stream.arrival < RECENT]
+        speaking = [stream for stream in recent if heard - stream.arrival < RESOLVED]
+        fitting = [stream for stream in recent
+                   if stream.fits(number, source) and (stream in speaking or number - stream.last <= NEAR)]
+        if len(fitting) == 1 or not fitting and (fitting := self._silent(number, source)):
             stream = fitting[0]
             self.lost += stream.follow(number, source, now)
-        if len(self.streams) > 1 and not self._close:
-            self._compare(stream, now)
-        return stream
+            close = []
+        else:
+            # A number that was left out by what seemed one stream: two writers have spoken in it.
+            close = fitting or [other for other in recent if other.skipped[0] < number < other.skipped[1]]
+            stream = self._begun(number, source, now)
+        if len(self.streams) > 1:
+            near = [other for other in speaking
+                    if other is not stream and other not in close and other.near(stream)]
+            if close or near:
+                stream = self._confuse(stream, close + near if close else [stream, *near], now)
+        if stream.unclear:
+            self._tell_apart(now)
+        return None if stream.unclear else stream
 
     def several(self, now):
         """Whether more than one of the streams speaks at the time now [ns]."""
         return sum(now - stream.arrival < RESOLVED for stream in self.streams) > 1
 
+    def _silent(self, number, source):
+        """[the stream heard last] of those that do not speak and that the message can be of."""
+        return sorted((stream for stream in self.streams if stream.fits(number, source)),
+                      key=lambda stream: stream.arrival)[-1:]
+
     def _begun(self, number, source, now):
+        """A new stream: of a writer that was close to another one perhaps, which then is known."""
         self.streams = [other for other in self.streams if now - other.arrival < FORGOTTEN]
-        self.streams.append(Stream(number, source, now))
-        return self.streams[-1]
+        stream = Stream(number, source, now)
+        stream.unclear = bool(self._close)
+        lowest, since = self._parted
+        stream.known = number >= lowest and now - since < FORGOTTEN
+        self.streams.append(stream)
+        return stream
 
-    def _compare(self, stream, now):
-        """Note that the stream of the message just heard has come close to another one."""
-        for other in self.streams:
-            if other is not stream and now - other.arrival < RESOLVED and abs(other.last - stream.last) <= NEAR:
-                leading = max(stream, other, key=lambda stream: stream.last)
-                self._close, self._high = (other, stream), (leading.last, leading.source)
-                self._rising = now, stream.last
-                return
+    def _confuse(self, latest, streams, now):
+        """Note that these streams are not told apart. What the latest has said just now begins a new one."""
+        self._close += tuple(stream for stream in streams if not stream.unclear)
+        self._parted = min(stream.last for stream in streams), now
+        self.streams = [stream for stream in self.streams if stream is not latest and stream not in streams]
+        return self._begun(latest.last, latest.source, now)
 
-    def _told_apart(self, number, source, now):
-        """The Stream of a message of the two that are close, once they have parted: the faster one is ahead."""
+    def _tell_apart(self, now):
+        """Streams that were close, once two have parted and are known by their pace, or one of them has gone."""
         for stream in self._close:
             stream.arrival = now
-        since, last = self._rising
-        self._rising = (since if number > last else now), number
-        high, sent = self._high
-        if number > high:
-            self._high = number, source
-        if now - self._rising[0] >= RESOLVED:
-            return self._one(number, source, now)
-        if number >= high - PARTED:
-            return None
-        fast, slow = sorted(self._close, key=lambda stream: stream.interval or INTERVAL)
-        fast.mixed = slow.mixed = (fast.interval or INTERVAL) > FASTER * (slow.interval or INTERVAL)
-        fast.last, fast.source, slow.last, slow.source = high, sent, number, source
-        self._close = ()
-        return None if slow.mixed else slow
+        speaking = [stream for stream in self.streams if stream.unclear and now - stream.arrival < RESOLVED]
+        if len(speaking) == 1 and now - speaking[0].begun >= RESOLVED:
+            speaking[0].known = True    # as whoever spoke beside the one in charge: nobody knows which this is
+            self._cleared(speaking)
+        elif len(speaking) == len(self._close) == 2:
+            before, after = (_by_pace(pair) for pair in (self._close, speaking))
+            if before and after and all(_same(*pair) for pair in zip(before, after, strict=True)):
+                for stream, found in zip(before, after, strict=True):
+                    stream.revive(found)
+                self._cleared(before)
 
-    def _one(self, number, source, now):
-        """Only one of the two goes on, nobody knows which: as a stream of its own, that was known beside them."""
-        self.streams = [stream for stream in self.streams if stream not in self._close]
+    def _cleared(self, streams):
+        """These are told apart; nobody knows what else is."""
+        self.streams = [stream for stream in self.streams if not stream.unclear] + streams
         self._close = ()
-        stream = self._begun(number, source, now)
-        stream.known = True
-        return stream
+        for stream in streams:
+            stream.unclear = False
+
+
+def _by_pace(pair):
+    """[faster, slower] of two streams, [] where that is not clear."""
+    if any(stream.pace() is None for stream in pair):
+        return []
+    fast, slow = sorted(pair, key=lambda stream: stream.pace())
+    return [fast, slow] if fast.pace() < FASTER * slow.pace() else []
+
+
+def _same(stream, found):
+    """Whether the pace of one stream is that of the other."""
+    return FASTER < min(stream.pace(), found.pace())**2 / max(stream.pace(), found.pace())**2

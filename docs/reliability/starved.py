@@ -1,0 +1,96 @@
+"""Two writers of one command on a machine that is short of time: how often the wrong one is obeyed.
+
+    python docs/reliability/starved.py [SEEDS]
+
+The control unit writes every 5 ms; for 1.5 or 5 s a stranger that began up to 3 s after it writes every 2 to 6 ms, so
+that their numbers are near each other or meet. Both writers and the reader are held up, each by itself: so many times
+a second, for so long on average, both exponential. A writer that was held up leaves out what was due meanwhile, or
+catches up at once; the reader finds the last 8 messages that came. Prints for each machine, of SEEDS (default 200)
+trials, in how many more than 3 messages of the stranger were obeyed, how many in all and in a row at the most, and
+how much of what the right writer wrote was obeyed.
+"""
+import argparse
+import sys
+
+import numpy as np
+
+from pedestal_common.realtime.intake import Intake
+
+SECOND = 1_000_000_000
+UTC = 1_790_000_000 * SECOND
+FUTURE = 50_000_000
+PERIOD = 0.005
+DURATION = 10.0
+QUEUE = 8
+
+MACHINES = ((0.5, 0.02), (0.5, 0.08), (0.5, 0.25), (2.0, 0.02), (2.0, 0.08), (2.0, 0.25), (5.0, 0.02), (5.0, 0.08),
+            (5.0, 0.25))
+"""How often each process is held up [1/s], and for how long on average [s]."""
+
+
+def held_up(times, rng, rate, mean):
+    """Times (n,) [s] of a process that is held up: those within a stall are at its end."""
+    begins, t = [], rng.exponential(1.0 / rate)
+    ends = []
+    while t < DURATION:
+        begins.append(t)
+        ends.append(t + rng.exponential(mean))
+        t = ends[-1] + rng.exponential(1.0 / rate)
+    if not begins:
+        return times
+    stall = np.searchsorted(begins, times, side='right') - 1
+    return np.where(stall < 0, times, np.maximum(times, np.array(ends)[stall]))
+
+
+def sent(rng, begin, end, period, machine):
+    """When a writer sends its messages [s]."""
+    times = np.sort(held_up(np.arange(begin, end, period), rng, *machine) + rng.exponential(3e-4, 1))
+    if rng.random() < 0.5:
+        return times[np.diff(times, prepend=-1.0) > 0.3 * period]
+    return times + 1e-6 * np.arange(len(times))
+
+
+def trial(machine, seed):
+    """(times [s] at which a message of the stranger was obeyed, part of the right writer's that was)."""
+    rng = np.random.default_rng(seed)
+    begin = rng.uniform(0.1, 3.0)
+    right = sent(rng, 0.0, DURATION, PERIOD, machine)
+    stranger = sent(rng, begin, min(DURATION, begin + rng.choice((1.5, 5.0))), rng.choice((2, 3.3, 3.6, 4, 6)) * 1e-3,
+                    machine)
+    messages = sorted([(time, i + 1, False) for i, time in enumerate(right)]
+                      + [(time, i + 1, True) for i, time in enumerate(stranger)])
+    heard = np.maximum.accumulate(held_up(np.array([time for time, *_ in messages]), rng, *machine))
+    now = 0.0
+
+    def strangers():
+        return int(len(stranger) > 0 and begin <= now < stranger[-1] + 0.1)
+    intake = Intake(lambda data: (data, data), FUTURE, strangers)
+    obeyed, of_right = [], 0
+    for at_once in np.split(np.arange(len(messages)), np.flatnonzero(np.diff(heard) > 0.0) + 1):
+        for place, k in enumerate(at_once[-QUEUE:]):
+            time, number, strange = messages[k]
+            now = heard[k] + 2e-5 * place
+            source, steady = UTC + round(time * SECOND), round(now * SECOND)
+            if intake.take(source, number, source, steady, UTC + steady) is not None:
+                of_right += not strange
+                obeyed += [now] * strange
+    return np.array(obeyed), of_right / len(right)
+
+
+def main(args=None):
+    """Print the table; the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('seeds', nargs='?', type=int, default=200)
+    seeds = parser.parse_args(args).seeds
+    print('| held up | for | stranger obeyed | messages | in a row | right writer obeyed |\n|---|---|---|---|---|---|')
+    for machine in MACHINES:
+        obeyed, right = zip(*(trial(machine, seed) for seed in range(seeds)), strict=True)
+        row = max(max((len(run) for run in np.split(times, np.flatnonzero(np.diff(times) > 0.05) + 1)), default=0)
+                  for times in obeyed)
+        print(f'| {machine[0]:g} /s | {machine[1] * 1e3:g} ms | {sum(len(times) > 3 for times in obeyed)} of {seeds} '
+              f'| {sum(map(len, obeyed))} | {row} | {100.0 * np.mean(right):.0f} % |', flush=True)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
