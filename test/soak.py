@@ -1,6 +1,6 @@
 """Lets a realtime graph run for long and says what became of its memory, its steps and its latency.
 
-    python test/soak.py [--hours 2] [--priority 0]
+    python test/soak.py [--hours 2] [--priority 0] [--bag soak]
 
 A UAV flies ovals beside the antenna, a pass every 87 s, and is to be in its beam throughout. Memory is the resident
 set of each process, looked at every 10 s; latency is from the publication of joint_states(t_k) to that of
@@ -77,9 +77,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--hours', type=float, default=2.0)
     parser.add_argument('--priority', type=int, default=0, help='scenario.priority, 0 to 98')
+    parser.add_argument('--bag', type=pathlib.Path, help='keep the recording in this folder')
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         bag, rows, track = (pathlib.Path(folder) / name for name in ('soak', 'rows.json', 'flight.csv'))
+        bag = options.bag or bag
         seconds = 3600.0 * options.hours
         flight(track, seconds)
         process = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.cli', 'run', 'track_file', '--param',

@@ -30,8 +30,7 @@ MACHINES = ((0.5, 0.02), (0.5, 0.08), (0.5, 0.25), (2.0, 0.02), (2.0, 0.08), (2.
 
 def held_up(times, rng, rate, mean):
     """Times (n,) [s] of a process that is held up: those within a stall are at its end."""
-    begins, t = [], rng.exponential(1.0 / rate)
-    ends = []
+    begins, ends, t = [], [], rng.exponential(1.0 / rate)
     while t < DURATION:
         begins.append(t)
         ends.append(t + rng.exponential(mean))
@@ -44,7 +43,7 @@ def held_up(times, rng, rate, mean):
 
 def sent(rng, begin, end, period, machine):
     """When a writer sends its messages [s]."""
-    times = np.sort(held_up(np.arange(begin, end, period), rng, *machine) + rng.exponential(3e-4, 1))
+    times = held_up(np.arange(begin, end, period), rng, *machine) + rng.exponential(3e-4)
     if rng.random() < 0.5:
         return times[np.diff(times, prepend=-1.0) > 0.3 * period]
     return times + 1e-6 * np.arange(len(times))

@@ -85,8 +85,8 @@ class Intake:
         if stream is None:
             self._drop(UNCLEAR_WRITER, '', now)
         elif stream is self.in_charge:
-            for other in self.writers.streams:
-                other.known = other.known or (other is not stream and now - other.arrival < SILENCE)
+            for other in self._speaking_beside(stream, now):
+                other.known = True
             self._obeyed = now
             return True
         elif self._may_take_over(stream, now):
@@ -102,7 +102,7 @@ class Intake:
         """Whether the writer in charge, silent until now, left out numbers and the graph shows a stranger that was not
         heard yet: this node was held up perhaps, and what comes first is the stranger's."""
         return (now - self._obeyed >= SILENCE and stream.skipped[1] == stream.last
-                and (self._strangers() or 0) > self._known(stream, now))
+                and (self._strangers() or 0) > sum(other.known for other in self._speaking_beside(stream, now)))
 
     def _may_take_over(self, stream, now):
         """Whether a writer that is not in charge is from now on."""
@@ -115,19 +115,17 @@ class Intake:
         if stream.looked is not None and now - stream.looked < LOOK:
             return False
         stream.looked = now
-        strangers = self._strangers()
+        strangers, speaking = self._strangers(), self._speaking_beside(stream, now)
         if stream.known:
-            alone = not any(other is not stream and now - other.arrival < SILENCE for other in self.writers.streams)
-            free = not strangers and alone and silent >= (ABANDONED_UNSEEN if strangers is None else ABANDONED)
+            free = not strangers and not speaking and silent >= (ABANDONED_UNSEEN if strangers is None else ABANDONED)
         else:
-            free = not strangers or strangers <= self._known(stream, now)
+            free = not strangers or strangers <= sum(other.known for other in speaking)
         stream.known = stream.known and not free
         return free
 
-    def _known(self, stream, now):
-        """How many writers beside this one speak that are known to be others."""
-        return sum(other.known for other in self.writers.streams
-                   if other is not stream and now - other.arrival < SILENCE)
+    def _speaking_beside(self, stream, now):
+        """The other streams that speak."""
+        return [other for other in self.writers.streams if other is not stream and now - other.arrival < SILENCE]
 
     def _in_order(self, stamp, now, utc):
         """Whether a stamp is later than the last one and not ahead of the time. One that goes back is believed once

@@ -177,13 +177,13 @@ class Streams:
             self._cleared(speaking)
         elif len(speaking) == len(self._close) == 2:
             before, after = (_by_pace(pair) for pair in (self._close, speaking))
-            if before and after and all(_same(*pair) for pair in zip(before, after, strict=True)):
-                for stream, found in zip(before, after, strict=True):
+            if before and after and all(_same(was, pace) for (was, _), (pace, _) in zip(before, after, strict=True)):
+                for (_, stream), (_, found) in zip(before, after, strict=True):
                     stream.revive(found)
-                self._cleared(before)
+                self._cleared([stream for _, stream in before])
 
     def _cleared(self, streams):
-        """These are told apart; nobody knows what else is."""
+        """These are told apart; what else was unclear is given up."""
         self.streams = [stream for stream in self.streams if not stream.unclear] + streams
         self._close = ()
         for stream in streams:
@@ -191,13 +191,15 @@ class Streams:
 
 
 def _by_pace(pair):
-    """[faster, slower] of two streams, [] where that is not clear."""
-    if any(stream.pace() is None for stream in pair):
+    """[(pace, stream)] of two streams, the faster first; [] where that is not clear."""
+    paced = [(stream.pace(), stream) for stream in pair]
+    if any(pace is None for pace, _ in paced):
         return []
-    fast, slow = sorted(pair, key=lambda stream: stream.pace())
-    return [fast, slow] if fast.pace() < FASTER * slow.pace() else []
+    paced.sort(key=lambda one: one[0])
+    (fast, _), (slow, _) = paced
+    return paced if fast < FASTER * slow else []
 
 
-def _same(stream, found):
-    """Whether the pace of one stream is that of the other."""
-    return FASTER < min(stream.pace(), found.pace())**2 / max(stream.pace(), found.pace())**2
+def _same(was, pace):
+    """Whether a pace [ns] is the one that was."""
+    return FASTER < min(was, pace)**2 / max(was, pace)**2
