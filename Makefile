@@ -18,9 +18,9 @@ PIP := -m pip --disable-pip-version-check install --quiet --use-pep517 --constra
 # Needs setuptools first; otherwise pip makes an environment for each package that it builds.
 BUILT_HERE := --no-build-isolation
 DEMO := bags/runs/demo
-# Graphs in realtime that are killed, frozen and cut: two at a time, not beside other tests.
-REALTIME := test/test_field.py test/test_live.py test/test_network.py test/test_operating.py test/test_page.py \
-	test/test_realtime.py test/test_rotctld.py test/test_supervision.py
+# Graphs in realtime that are killed, frozen and cut, not beside other tests; the files that take longest come first.
+REALTIME := test/test_operating.py test/test_page.py test/test_supervision.py test/test_realtime.py \
+	test/test_field.py test/test_rotctld.py test/test_network.py test/test_live.py
 # The files in the order of pyproject.toml, where those of graphs come first: a file of few tests, each a graph, would
 # else be the last, and one core idle.
 IN_TURN := --dist loadfile --no-loadscope-reorder
@@ -41,7 +41,7 @@ demo: .venv/installed
 test: install
 	.venv/bin/ruff check .
 	.venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(addprefix --ignore=,$(REALTIME))
-	.venv/bin/python -m pytest --numprocesses 2 $(IN_TURN) $(REALTIME)
+	.venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(REALTIME)
 
 update-references: install
 	.venv/bin/python bags/reference/update.py

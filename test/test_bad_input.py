@@ -169,7 +169,7 @@ def graphs(start_run):
 
     first = start_run('leo_pass', '--pacing', 'realtime', '--duration', '30', '--param', 'adu.period=0.02', '--param',
                       'acu.period=0.02')
-    full = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '30', prefix=limit(2_500_000))
+    full = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '30', prefix=limit(650_000))
     at_its_end = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '0.5', prefix=limit(70_000))
     deadline = time.monotonic() + 180.0
     while not first.recorded(10):

@@ -378,7 +378,7 @@ def test_ten_pages_that_never_read_cost_the_control_unit_no_step(station):
     def share_lost():
         client.heard['diagnostics'].clear()
         first, lost = client.until(drive)
-        last, more = client.until(lambda: (now := drive())[0] > first + 800 and now)
+        last, more = client.until(lambda: (now := drive())[0] > first + 300 and now)
         return (more - lost) / (last - first)
     differences = []
     for _ in range(6):

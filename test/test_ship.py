@@ -187,7 +187,7 @@ def told(start_run):
         listener = threading.Thread(target=listen)
         listener.start()
         parameters = (f'ship_motion.nmea.port={ear.getsockname()[1]}', f'ship_motion.nmea.rate={DATAGRAMS}',
-                      f'ins.alignment.aligned_sigma={SIGMA}')
+                      f'ins.alignment.aligned_sigma={SIGMA}', 'adu.period=0.01')
         run = start_run('ship_align_and_track', '--pacing', 'lockstep', '--duration', str(SECONDS),
                         *(part for parameter in parameters for part in ('--param', parameter)))
         try:

@@ -11,17 +11,18 @@ from pedestal_bringup.trials import ensemble, monte_carlo
 from pedestal_bringup.trials.plan import plan
 
 CASES = {
-    'leo_pass': (5.0, ['adu.azimuth.load.inertia=normal(1, 0.1)x', 'acu.azimuth.filter.kind=choice(ca, imm)']),
-    'ship_pass': (4.0, ['ship_motion.ship.sea_state=choice(3, 5)', 'ins.tilt_noise=uniform(0.0, 1e-4)']),
-    'ship_overhead': (29.0, ['ins.tilt_noise=uniform(0.0, 1e-4)']),
-    'phased_array_four': (3.0, ['acu.tracker.lock_count=uniform(20, 40)']),
+    'leo_pass': (5.0, 0.005, ['adu.azimuth.load.inertia=normal(1, 0.1)x', 'acu.azimuth.filter.kind=choice(ca, imm)']),
+    'ship_pass': (4.0, 0.005, ['ship_motion.ship.sea_state=choice(3, 5)', 'ins.tilt_noise=uniform(0.0, 1e-4)']),
+    'ship_overhead': (29.0, 0.02, ['ins.tilt_noise=uniform(0.0, 1e-4)']),
+    'phased_array_four': (3.0, 0.01, ['acu.tracker.lock_count=uniform(20, 40)']),
 }
+"""{scenario: (length [s], period [s], what is varied)}"""
 
 
 @pytest.mark.parametrize('name', CASES)
 def test_the_graph_gives_the_numbers_of_the_trial(start_run, tmp_path, name):
-    duration, vary = CASES[name]
-    made = plan(name, 2, vary, seed=11, duration=duration)
+    duration, period, vary = CASES[name]
+    made = plan(name, 2, vary, [f'adu.period={period}'], seed=11, duration=duration)
     with ensemble.table(made, tmp_path) as table:
         ensemble.make([made], [table], monte_carlo.Pool(1))
     _, _, *arguments = shlex.split(made.command(1))

@@ -115,7 +115,7 @@ def test_an_outcome_is_that_of_all_its_runs():
 
 @pytest.fixture(scope='module')
 def result():
-    return study.run(lambda share, text: None, runs=30)
+    return study.run(lambda share, text: None, runs=12)
 
 
 def test_no_row_misses_its_target_but_those_that_are_said_to(result):

@@ -22,8 +22,6 @@ import dataclasses
 import math
 
 import numpy as np
-from scipy import ndimage
-from scipy.spatial.transform import Rotation
 
 from pedestal_bringup.analysis import tracking
 
@@ -71,6 +69,9 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     error (n, 2) [rad] cross-elevation, elevation; target (n, 3) ENU from the ship, of any length; attitude (n, 4)
     true quaternions x, y, z, w deck -> earth; deck_rate (n, 3) [rad/s] FLU.
     """
+    # Slow to import, and most runs are ashore.
+    from scipy import ndimage
+    from scipy.spatial.transform import Rotation
     turns = Rotation.from_quat(attitude)
     mean = turns.mean()
     axes = _beam_axes(mean.inv().apply(target))

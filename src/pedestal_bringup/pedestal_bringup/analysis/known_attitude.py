@@ -3,7 +3,6 @@ import dataclasses
 import math
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pedestal_bringup.analysis import tracking
 
@@ -57,6 +56,7 @@ def read(bag):
     both = np.isfinite(true).all(axis=1)
     if not both.any():
         return None
+    from scipy.spatial.transform import Rotation  # slow to import, and most runs are ashore
     t, true = t[both], Rotation.from_quat(true[both])
     known = Rotation.from_quat(np.column_stack([table[name] for name in quaternion])[both])
     error = (known * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
