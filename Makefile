@@ -41,7 +41,7 @@ demo: .venv/installed
 test: install
 	.venv/bin/ruff check .
 	.venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(addprefix --ignore=,$(REALTIME))
-	.venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(REALTIME)
+	.venv/bin/python -m pytest --numprocesses 2 $(IN_TURN) $(REALTIME)
 
 update-references: install
 	.venv/bin/python bags/reference/update.py

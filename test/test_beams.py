@@ -125,8 +125,7 @@ def test_ctrl_c_ends_an_array_in_order(start_run):
     while not run.recorded():
         assert time.monotonic() < deadline
         time.sleep(0.02)
-    run.process.send_signal(signal.SIGINT)
-    done = run.finish()
+    done = run.interrupt()
     assert (done.returncode, done.stderr) == (130, f'pedestal: stopped; what was recorded is in {run.bag}\n')
     assert run.pids() == {}
     recorded = bags.read(run.bag)

@@ -102,13 +102,7 @@ def graph(start_run, connect):
         client.read(name)
     client.until(lambda: client.heard['joint_states'] and client.heard['acu/mode'])
     yield run, client, port
-    end(run)
-
-
-def end(run):
-    if run.process.poll() is None:
-        run.process.send_signal(signal.SIGINT)
-        run.process.communicate(timeout=120)
+    run.interrupt()
 
 
 @pytest.fixture
@@ -237,7 +231,7 @@ def test_a_viewer_of_its_own_ends_when_told_to(graph, start_process):
 def test_the_recording_has_every_track_once(graph, complaints):
     """That of the scenario, and two that were refused."""
     run, _, _ = graph
-    end(run)
+    run.interrupt()
     tracks = [messages.deserialize(data, 'trajectory_msgs/msg/JointTrajectory')
               for _, _, _, data in bags.read(run.bag).raw(TRACK)]
     assert [len(one.points) for one in tracks][1:] == [2, 2]

@@ -288,9 +288,7 @@ def station(start_run, connect, patient):
         client.read(name)
     client.until(lambda: client.heard['joint_states'] and client.heard['acu/mode'])
     yield run, client, site
-    if run.process.poll() is None:
-        run.process.send_signal(signal.SIGINT)
-        run.process.communicate(timeout=PATIENCE)
+    run.interrupt()
 
 
 def mode(client):
@@ -378,7 +376,7 @@ def test_ten_pages_that_never_read_cost_the_control_unit_no_step(station):
     def share_lost():
         client.heard['diagnostics'].clear()
         first, lost = client.until(drive)
-        last, more = client.until(lambda: (now := drive())[0] > first + 300 and now)
+        last, more = client.until(lambda: (now := drive())[0] > first + 150 and now)
         return (more - lost) / (last - first)
     differences = []
     for _ in range(6):
@@ -472,8 +470,7 @@ def _arguments(process):
 
 def test_the_recording_says_who_asked_at_which_page(station):
     run, _, _ = station
-    run.process.send_signal(signal.SIGINT)
-    run.process.communicate(timeout=PATIENCE)
+    run.interrupt()
     told = {command.who: command.verb for command in (
         commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus'))[0]
         for *_, data in bags.read(run.bag).raw('acu/command_result'))}

@@ -46,8 +46,7 @@ def station(start_run, connect, patient):
     with connected(port) as probe:
         client.until(lambda: b'no control unit' not in ask(probe, '_') and b'-' not in ask(probe, 'p'), 60.0)
     yield run, client, port
-    run.process.send_signal(signal.SIGINT)
-    run.process.communicate(timeout=120)
+    run.interrupt()
 
 
 def connected(port):
@@ -215,8 +214,7 @@ def _serial(end, line):
 
 def test_the_recording_says_who_moved_the_antenna(station):
     run, _, _ = station
-    run.process.send_signal(signal.SIGINT)
-    run.process.communicate(timeout=120)
+    run.interrupt()
     told = [commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus'))[0]
             for *_, data in bags.read(run.bag).raw('acu/command_result')]
     assert told and {command.who.split()[0] for command in told} <= {'rotctld', 'easycomm'}

@@ -136,10 +136,12 @@ class Gpredict:
                               text=True).stdout
 
     def close(self):
-        """End it and its screen."""
-        for process in reversed(self._processes):
-            process.terminate()
-            process.wait()
+        """End it and its screen. gpredict is killed: told to end, it may wait for a lock of its own for ever."""
+        screen, gpredict = self._processes
+        gpredict.kill()
+        gpredict.wait()
+        screen.terminate()
+        screen.wait()
 
 
 def main(port='4533', seconds='60'):
