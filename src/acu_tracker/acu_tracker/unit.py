@@ -179,9 +179,10 @@ class Acu(Unit):
         self.memory.record[...] = before
 
     def prepare_ahead(self):
-        """The second half of a step: two fifths of the time to compile it."""
-        m = self.parts
-        control_unit.act(m['state'], m['constants'], m['inputs'], m['outputs'], self.memory.tables, 0.0, 0)
+        """What the commands and the diagnosis call."""
+        self.request(self.REQUESTS[0])
+        self.desk.prepare()
+        self.diagnose()
 
     def latency(self, topic):
         """Age [s] of a topic's stamp at a step: attitude_latency or receiver_latency."""

@@ -11,8 +11,11 @@ ACKNOWLEDGED_STEPS = 1000
 """Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so
 a slow recorder slows the run and loses nothing."""
 
-LONGEST_WAIT = SECOND // 10
-"""Time [ns] after which the clock is looked at again, however far away the next step is: it may be stepped."""
+LONGEST_WAIT = 0.1
+"""Seconds after which the clock is looked at again, however far away the next step is: it may be stepped."""
+
+SHARE = 0.25
+"""Realtime: the part of a period for which what arrives is heard, also by a drive that is late for its next step."""
 
 
 class Timekeeper(unit_node.UnitNode):
@@ -45,11 +48,11 @@ class Timekeeper(unit_node.UnitNode):
             self.follow(self.unit.trigger, latencies)
             self.timer = self.every(0.001, self.start)
         else:
+            self.wait, self.guarded_tick = 0.0, self._guarded(self.tick)
             for port in self.ports:
                 for name, decoder in port.decoders.items():
                     if name != self.unit.trigger:
                         self.reader(name, unit_node.decoding(decoder), self._newest_taker(name))
-            self.timer = self.every(0.001, self.tick)
 
     @property
     def awaits(self):
@@ -87,17 +90,33 @@ class Timekeeper(unit_node.UnitNode):
             port.publish()
         self.look_after()
 
+    def spin(self, executor):
+        """Realtime: hear what arrives until the next step, then make it.
+
+        Not by a timer of rclpy: at each reset EventsExecutor (rclpy 7.1.6) looks once more which timers are due, and
+        queues those that it has queued already. The queue of a drive too slow for its steps grows without end, and
+        what is said to it waits for minutes.
+        """
+        if self.graph.lockstep:
+            super().spin(executor)
+            return
+        end = time.monotonic() + self.wait
+        while self.failure is None and (left := end - time.monotonic()) > 0.0:
+            executor.spin_once(timeout_sec=left)
+        if self.failure is None:
+            self.guarded_tick()
+
     def tick(self):
-        """Realtime: make the step whose time it is, if it was not made, and wait for the next."""
+        """Realtime: make the step whose time it is, if it was not made, and see how long it is to the next [s]."""
         now, utc = self.clock()
         start = self.epoch(utc)
-        k = (utc - start) // self.period_ns
+        k, least = (utc - start) // self.period_ns, 0.0
         if k >= 0 and k > self.k:
             self._tick(k, start + k * self.period_ns, now)
+            least = SHARE * self.parameters.period
         _, utc = self.clock()
-        wait = start + (max(k, self.k) + 1) * self.period_ns - utc
-        self.timer.timer_period_ns = min(max(wait, 1), LONGEST_WAIT)
-        self.timer.reset()
+        wait = (start + (max(k, self.k) + 1) * self.period_ns - utc) / SECOND
+        self.wait = min(max(wait, least), LONGEST_WAIT)
 
     def _tick(self, k, stamp, now):
         """Make step k of a stamp [ns] at the time now of the steady clock [ns]. Of steps whose time has passed nothing

@@ -70,10 +70,28 @@ _compiling = []
 """Not empty while it compiles, which can be cut short."""
 
 
-def _on_signal(*_):
+STOPS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
+"""What a node is stopped by; the last only by itself, see _on_signal."""
+
+AGAIN = 0.02
+"""Seconds after which a node that could not be stopped at once stops itself."""
+
+_HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
+"""Functions of llvmlite that LLVM calls around making machine code, in which it hears of no exception."""
+
+
+def _on_signal(_number, frame):
     _stop.append(True)
-    if _compiling:
-        raise Stopped
+    if not _compiling:
+        return
+    while frame is not None:
+        if frame.f_code.co_name in _HOOKS:
+            # A signal that comes while machine code is made is always told here: it would be a message on stderr, and
+            # the code would be lost.
+            signal.setitimer(signal.ITIMER_REAL, AGAIN)
+            return
+        frame = frame.f_back
+    raise Stopped
 
 
 def readings():
@@ -372,6 +390,10 @@ class Shell(Node):
         missing = [name for name in wanted if name not in names and nodes.STAND_IN not in names]
         return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
+    def spin(self, executor):
+        """Take one turn of the executor; overridden by who has steps of his own to make."""
+        executor.spin_once(timeout_sec=0.1)
+
     @property
     def awaits(self):
         """What a node that is ready waits for, as a person calls it; overridden by who begins otherwise."""
@@ -415,7 +437,7 @@ def main(make_node, args=None):
     Exit code 0; 1 with one line on stderr. On stdout its `result`, if it has one, as a JSON object, to which an error
     adds {'error': the line, 'silent': the nodes that it waited for}.
     """
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOPS:
         signal.signal(number, _on_signal)
     node, code = None, 0
     name = os.path.basename(sys.argv[0])
@@ -428,7 +450,7 @@ def main(make_node, args=None):
         gc.freeze()
         node.get_logger().info(f'ready, waits for {node.awaits}')
         while not (_stop or node.finished) or node.draining():
-            executor.spin_once(timeout_sec=0.1)
+            node.spin(executor)
         node.close()
         if node.failure is not None:
             raise node.failure
@@ -442,7 +464,7 @@ def main(make_node, args=None):
         _say(sys.stdout, json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}))
         _say(sys.stderr, f'{name}: error: {error}')
     # It ends anyway; Python's own end would give a late signal its deadly default back.
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOPS:
         signal.signal(number, signal.SIG_IGN)
     if node is not None:
         _leave(node, code)

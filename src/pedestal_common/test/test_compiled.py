@@ -5,6 +5,10 @@ import subprocess
 import sys
 
 import pytest
+from numba.core import types
+
+from pedestal_common.compiled import compiled, inlined
+from pedestal_common.law import by_type
 
 LAW = """
 import sys
@@ -102,3 +106,137 @@ def test_laws_saved_at_once_are_all_kept(folder):
 def test_without_a_cache_everyone_compiles(folder):
     (folder / 'cache').touch()
     assert compilations(folder, folder / 'cache', [()] * 2) == [1, 1]
+
+
+@compiled
+def square(x):
+    return x * x
+
+
+@inlined
+def cube(x):
+    return x * square(x)
+
+
+@compiled
+def sum_of_powers(x):
+    return cube(x) + square(x)
+
+
+def test_only_what_python_calls_becomes_machine_code():
+    assert sum_of_powers(3.0) == 36.0
+    assert len(sum_of_powers.overloads) == 1 and not square.overloads and not cube.overloads
+    assert (square(3.0), cube(2), sum_of_powers(1)) == (9.0, 8, 2)
+    assert len(square.overloads) == 1
+
+
+def test_a_law_that_a_function_makes_is_that_one():
+    """Two of the same name and types, with other numbers in them."""
+    def times(factor):
+        @compiled
+        def law(x):
+            return factor * square(x)
+
+        @compiled
+        def called(x):
+            return law(x)
+        return called
+
+    assert [times(factor)(2.0) for factor in (1.0, 3.0)] == [4.0, 12.0]
+
+
+CALLER = """
+import sys
+from pedestal_common.compiled import compiled
+from pedestal_common.law import Law
+from two_laws.called import called
+
+@compiled
+def law(x):
+    return called(x) + 1.0
+
+if __name__ == '__main__':
+    from two_laws import law as module
+    translated, translate = [], Law._translate
+    Law._translate = lambda law, args: (translated.append(law.py_func.__name__), translate(law, args))[1]
+    print(module.law(2.0), *translated)
+"""
+
+
+def test_a_law_finds_what_another_process_translated_of_it(tmp_path):
+    package = tmp_path / 'two_laws'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    (package / 'called.py').write_text('from pedestal_common.compiled import compiled, inlined\n\n\n'
+                                       '@inlined\ndef inner(x):\n    return 2.0 * x\n\n\n'
+                                       '@compiled\ndef called(x):\n    return inner(x) * x\n')
+    (package / 'law.py').write_text(CALLER)
+
+    def said(code):
+        done = subprocess.run([sys.executable, *code], capture_output=True, text=True, timeout=120.0,
+                              env=environment(tmp_path, tmp_path / 'cache'))
+        assert not done.stderr
+        return done.stdout.strip()
+
+    assert said(['-c', 'from two_laws.called import called; print(called(2.0))']) == '8.0'
+    assert said(['-m', 'two_laws.law']) == '9.0 law'
+    assert said(['-m', 'two_laws.law']) == '9.0'
+
+
+def by_kind(x):
+    raise NotImplementedError
+
+
+@compiled
+def of_kinds(x, y):
+    return by_kind(x) + by_kind(y)
+
+
+by_type(by_kind, lambda kind: square if kind == types.float64 else cube)
+
+
+def test_a_function_is_the_law_for_its_type():
+    assert of_kinds(3.0, 2) == 17.0
+
+
+STOPPED = """
+import os, signal
+from numba.core.codegen import JITCodeLibrary
+from pedestal_common import shell
+
+made = JITCodeLibrary._object_compiled_hook
+
+def told(cls, module, code):
+    # As if it had come while LLVM was at work.
+    if not shell._stop:
+        os.kill(os.getpid(), signal.SIGINT)
+    made(module, code)
+
+JITCodeLibrary._object_compiled_hook = classmethod(told)
+from pedestal_common.compiled import compiled
+
+@compiled
+def law(x):
+    return x + 1.0
+
+class Unit:
+    memory = 1.0
+
+    def prepare(self):
+        while True:
+            law(2.0)
+
+for number in shell.STOPS:
+    signal.signal(number, shell._on_signal)
+try:
+    shell.Shell.prepare(None, Unit())
+except shell.Stopped:
+    print('stopped', law(2.0))
+"""
+
+
+def test_a_signal_while_machine_code_is_made_stops_the_node_and_loses_nothing(tmp_path):
+    (tmp_path / 'stopped.py').write_text(STOPPED)
+    done = subprocess.run([sys.executable, '-m', 'stopped'], capture_output=True, text=True, timeout=120.0,
+                          env=environment(tmp_path, tmp_path / 'cache'))
+    assert (done.stdout, done.stderr, done.returncode) == ('stopped 3.0\n', '', 0)

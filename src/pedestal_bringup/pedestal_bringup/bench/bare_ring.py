@@ -35,6 +35,7 @@ def _filled(topic):
 class Ring(Node):
     """A node of the ring: it passes on what comes on its trigger and drops everything else."""
     awaits = 'its trigger'
+    spin = shell.Shell.spin
 
     def __init__(self, role, steps):
         super().__init__(role)

@@ -17,6 +17,7 @@ from adu_drive import unit as drive_unit
 from pedestal_bringup.run.program import program_messages
 from pedestal_common import layouts, nodes, records, topics
 from pedestal_common.compiled import compiled
+from pedestal_common.law import by_type
 from pedestal_common.steps import SECOND
 from pedestal_common.unit import BLOCK, Unit, announced
 
@@ -36,12 +37,7 @@ def step(memory, stamp, inputs, outputs):
     raise NotImplementedError
 
 
-@overload(step)
-def _step(memory, stamp, inputs, outputs):
-    if isinstance(memory, types.NoneType):
-        return lambda memory, stamp, inputs, outputs: None
-    law = _LAWS[memory.instance_class]
-    return lambda memory, stamp, inputs, outputs: law(memory, stamp, inputs, outputs)
+by_type(step, lambda memory: None if isinstance(memory, types.NoneType) else _LAWS[memory.instance_class])
 
 
 def true_bias(drive, truth):

@@ -16,7 +16,7 @@ import joblib
 import numpy as np
 from joblib.externals import loky
 
-from pedestal_common.compiled import COLUMNS, digest
+from pedestal_common.law_cache import COLUMNS, digest
 
 TIMEOUT = 10.0
 """Longest time to wait for a scheduler, or for its first worker [s]."""

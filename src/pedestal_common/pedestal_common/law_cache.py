@@ -1,0 +1,104 @@
+"""Where compiled laws are kept: a folder named after all sources of the product, which any checkout of them shares.
+
+Numba's cache does not see that a callee in another file changed (numba documentation, "Notes on Caching").
+"""
+import contextlib
+import fcntl
+import functools
+import hashlib
+import importlib.util
+import os
+import pathlib
+import shutil
+import tempfile
+import time
+
+import numba
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.runtime import rtsys
+from numba.misc.appdirs import user_cache_dir
+
+COLUMNS = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
+KEPT_DAYS = 7.0
+_ROOT = pathlib.Path(numba.config.CACHE_DIR or user_cache_dir()) / 'pedestal'
+if not _ROOT.is_absolute():
+    # A user without a home, as in a container: '~' stays as it is.
+    _ROOT = pathlib.Path(tempfile.gettempdir()) / f'pedestal-{os.getuid()}'
+
+
+def digest(packages) -> str:
+    """Of the sources of packages and the version of the compiler."""
+    sha = hashlib.sha256(numba.__version__.encode())
+    for package in packages:
+        spec = importlib.util.find_spec(package) if package != '__main__' else None
+        if spec is not None and spec.origin is not None:
+            for path in sorted(pathlib.Path(spec.origin).parent.rglob('*.py')):
+                sha.update(path.read_bytes())
+    return sha.hexdigest()[:16]
+
+
+@functools.cache
+def _folder_of(package) -> str | None:
+    """The cache of one package's laws: named after its own sources and all it may call."""
+    columns = () if package == 'pedestal_common' else (package,) if package in COLUMNS else COLUMNS
+    folder = _ROOT / f'{package}-{digest(("pedestal_common", *columns, package))}'
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        for other in _ROOT.iterdir():
+            if time.time() - other.stat().st_mtime > KEPT_DAYS * 86400:
+                shutil.rmtree(other, ignore_errors=True)
+    except OSError:
+        return None
+    return str(folder) if os.access(folder, os.W_OK) else None
+
+
+def folder(thing) -> str | None:
+    """The cache of the package that a law or a type is of; None where there is none."""
+    return _folder_of(thing.__module__.partition('.')[0])
+
+
+@contextlib.contextmanager
+def alone(path):
+    """Hold the lock of a file, which other processes wait for."""
+    with path.open('w') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+class _Place(UserProvidedCacheLocator):
+    """The folder of a law is named after its module, not after the path of its file: a checkout finds what another of
+    the same sources has compiled."""
+
+    def __init__(self, law, file):
+        super().__init__(law, file)
+        self._cache_path = os.path.join(folder(law), law.__module__)
+
+    @classmethod
+    def from_function(cls, law, file):
+        """The place of a law; numba asks for it."""
+        return cls(law, file)
+
+
+class Contents(CompileResultCacheImpl):
+    """What is kept of a law; overridden where that is no executable."""
+    _locator_classes = (_Place,)
+
+
+class Cache(FunctionCache):
+    """Of two processes that save a law for two signatures at once one may lose its entry, or find the other's code
+    under it: numba reads the index, chooses a name, writes the index and then the code. Here one waits.
+
+    To load a law numba makes ready to compile, for a third of a second and with all of scipy.linalg. What is loaded
+    asks for its runtime only; who compiles makes ready by himself."""
+    _impl_class = Contents
+
+    def load_overload(self, sig, target_context):
+        """A law for these types; None where it is not kept."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
+
+    def _save_overload(self, sig, data):
+        with alone(pathlib.Path(self.cache_path).with_name('index.lock')):
+            super()._save_overload(sig, data)
