@@ -16,6 +16,7 @@ from pedestal_common import orbit, topics
 from pedestal_common.geodesy import StationParameters, station_frame
 from pedestal_common.orbit import TargetError
 from pedestal_common.parameters import ParameterError, Parameters, group, parameter, text
+from pedestal_common.reproducible import arctan2, turned
 from pedestal_common.steps import SECOND
 
 ROWS = 2400
@@ -149,13 +150,13 @@ class Predictor:
         origin, to_enu = station_frame(self.parameters.station)
         fixed = np.einsum('nij,nj->ni', orbit.earth_fixed(julian, fractions),
                           sun.position(julian - sun.J2000 + fractions))
-        return _angles((fixed - origin) @ to_enu.T)
+        return _angles(turned(to_enu, fixed - origin))
 
 
 def _angles(enu):
     """Azimuth and elevation (n, 2) [rad] of ENU positions (n, 3)."""
     east, north, up = enu.T
-    return np.stack((np.arctan2(east, north), np.arctan2(up, np.hypot(east, north))), axis=-1)
+    return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)
 
 
 def _table(angles_at, stamp, interval):

@@ -11,6 +11,8 @@ Sun".
 """
 import numpy as np
 
+from pedestal_common.reproducible import cos, sin
+
 AU = 149_597_870_700.0
 """Astronomical unit [m]."""
 
@@ -21,8 +23,8 @@ J2000 = 2451545.0
 def position(n):
     """Geocentric position (m, 3) [m], equator and equinox of date, at days n (m,) since J2000."""
     L, g = np.radians(280.460 + 0.9856474 * n), np.radians(357.528 + 0.9856003 * n)
-    longitude = L + np.radians(1.915 * np.sin(g) + 0.020 * np.sin(2.0 * g))
+    longitude = L + np.radians(1.915 * sin(g) + 0.020 * sin(2.0 * g))
     obliquity = np.radians(23.439 - 4e-7 * n)
-    R = 1.00014 - 0.01671 * np.cos(g) - 0.00014 * np.cos(2.0 * g)
+    R = 1.00014 - 0.01671 * cos(g) - 0.00014 * cos(2.0 * g)
     return AU * R[:, np.newaxis] * np.column_stack((
-        np.cos(longitude), np.cos(obliquity) * np.sin(longitude), np.sin(obliquity) * np.sin(longitude)))
+        cos(longitude), cos(obliquity) * sin(longitude), sin(obliquity) * sin(longitude)))

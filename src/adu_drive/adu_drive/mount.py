@@ -27,7 +27,7 @@ def _tilt(forward, starboard):
     if tau == 0.0:
         return np.eye(3)
     K = np.array([[0.0, 0.0, forward], [0.0, 0.0, -starboard], [-forward, starboard, 0.0]]) / tau
-    return np.eye(3) + math.sin(tau) * K + (1.0 - math.cos(tau)) * K @ K
+    return np.eye(3) + math.sin(tau) * K + (1.0 - math.cos(tau)) * np.einsum('ij,jk', K, K)
 
 
 def constants(p):

@@ -10,6 +10,7 @@ import types
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.reproducible import geomspace, power
 
 LINES = 128
 LOWEST, HIGHEST = 1e-4, 20.0
@@ -25,19 +26,19 @@ def davenport(f, V):
     Davenport, Quarterly Journal of the Royal Meteorological Society 87 (1961) 194, scaled to a variance of 1.
     """
     x = 1200.0 * f / V
-    return 2.0 / 3.0 * x * x / (f * (1.0 + x * x) ** (4.0 / 3.0))
+    return 2.0 / 3.0 * x * x / (f * power(1.0 + x * x, 4.0 / 3.0))
 
 
 def von_karman(f, V, L):
     """The same of the longitudinal von Karman spectrum, L [m] its length."""
-    return 4.0 * (L / V) / (1.0 + 70.8 * (f * L / V) ** 2) ** (5.0 / 6.0)
+    return 4.0 * (L / V) / power(1.0 + 70.8 * (f * L / V) ** 2, 5.0 / 6.0)
 
 
 def _lines(gust):
     """Amplitude of v / V, angular frequency [rad/s] and phase of every cosine."""
     if _KINDS[gust.kind] != SPECTRUM:
         return np.zeros((3, LINES))
-    edges = np.geomspace(LOWEST, HIGHEST, LINES + 1)
+    edges = geomspace(LOWEST, HIGHEST, LINES + 1)
     f = np.sqrt(edges[:-1] * edges[1:])
     density = davenport(f, gust.speed) if gust.kind == 'davenport' else von_karman(f, gust.speed, gust.length)
     phase = np.random.default_rng(gust.seed).uniform(0.0, 2.0 * math.pi, LINES)

@@ -17,6 +17,7 @@ import numpy as np
 from adu_drive.wind import HIGHEST, LINES, LOWEST, turbulence, von_karman
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import cross, direction
+from pedestal_common.reproducible import geomspace, power
 
 SHARES = (1.0, 0.78, 0.55)
 """sigma of u, v, w over that of u."""
@@ -24,13 +25,13 @@ SHARES = (1.0, 0.78, 0.55)
 
 def constants(p):
     """Constants of WindFieldParameters: nested dictionary."""
-    edges, random = np.geomspace(LOWEST, HIGHEST, LINES + 1), np.random.default_rng(p.seed)
+    edges, random = geomspace(LOWEST, HIGHEST, LINES + 1), np.random.default_rng(p.seed)
     phase = random.uniform(0.0, 2.0 * math.pi, (3, LINES))
     # Each component has its own frequencies, anywhere in the same bands: at equal ones they would stay correlated.
-    f = edges[:-1] * (edges[1] / edges[0]) ** random.uniform(0.0, 1.0, (3, LINES))
+    f = edges[:-1] * power(edges[1] / edges[0], random.uniform(0.0, 1.0, (3, LINES)))
     area, amplitude = 0.25 * math.pi * p.diameter ** 2, np.zeros((3, LINES))
     if p.speed > 0.0:
-        admittance = 1.0 / (1.0 + (2.0 * f * math.sqrt(area) / p.speed) ** (4.0 / 3.0))
+        admittance = 1.0 / (1.0 + power(2.0 * f * math.sqrt(area) / p.speed, 4.0 / 3.0))
         amplitude = p.intensity * admittance * np.sqrt(2.0 * von_karman(f, p.speed, p.length) * np.diff(edges))
     to_x, to_y, _ = direction(p.from_azimuth + math.pi, 0.0)
     return {'blows': int(p.speed > 0.0), 'omega': 2.0 * math.pi * f,

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from pedestal_common.parameters import Parameters, parameter
+from pedestal_common.reproducible import cos, sin
 
 EARTH_RADIUS, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
 """WGS84 [m], [-]."""
@@ -21,10 +22,10 @@ class StationParameters(Parameters):
 def geocentric(latitude, longitude, height):
     """Earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or numbers."""
     e2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
-    N = EARTH_RADIUS / np.sqrt(1.0 - e2 * np.sin(latitude)**2)
-    return np.stack([(N + height) * np.cos(latitude) * np.cos(longitude),
-                     (N + height) * np.cos(latitude) * np.sin(longitude),
-                     (N * (1.0 - e2) + height) * np.sin(latitude)], axis=-1)
+    N = EARTH_RADIUS / np.sqrt(1.0 - e2 * sin(latitude)**2)
+    return np.stack([(N + height) * cos(latitude) * cos(longitude),
+                     (N + height) * cos(latitude) * sin(longitude),
+                     (N * (1.0 - e2) + height) * sin(latitude)], axis=-1)
 
 
 def station_frame(station):

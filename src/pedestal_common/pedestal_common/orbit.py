@@ -10,6 +10,7 @@ from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
 from pedestal_common.geodesy import station_frame
+from pedestal_common.reproducible import arctan2, cos, sin, turned
 
 EARTH_RATE = 7.29211514670698e-5
 """Of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
@@ -53,7 +54,7 @@ def earth_fixed(julian, fractions, ut1_offset=0.0):
     """Rotations (n, 3, 3) from TEME, the true equator and mean equinox of date, to the earth at julian + fractions
     (n,), UTC."""
     theta = gstime(julian) + EARTH_RATE * 86400.0 * fractions + EARTH_RATE * ut1_offset
-    c, s = np.cos(theta), np.sin(theta)
+    c, s = cos(theta), sin(theta)
     to_fixed = np.zeros((len(fractions), 3, 3))
     to_fixed[:, 0, 0], to_fixed[:, 0, 1], to_fixed[:, 1, 0], to_fixed[:, 1, 1], to_fixed[:, 2, 2] = c, s, -s, c, 1.0
     return to_fixed
@@ -74,13 +75,13 @@ def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
     r = np.einsum('nij,nj->ni', to_fixed, 1e3 * position)
     v = np.einsum('nij,nj->ni', to_fixed, 1e3 * velocity) - np.cross([0.0, 0.0, EARTH_RATE], r)
     origin, to_enu = station_frame(station)
-    return (r - origin) @ to_enu.T, v @ to_enu.T
+    return turned(to_enu, r - origin), turned(to_enu, v)
 
 
 def elevations(satrec, station, julian, fraction, times):
     """Elevation [deg] (n,) at times [s] past julian + fraction."""
     east, north, up = enu(satrec, station, julian, fraction, times)[0].T
-    return np.degrees(np.arctan2(up, np.hypot(east, north)))
+    return np.degrees(arctan2(up, np.hypot(east, north)))
 
 
 def calendar(julian, fraction):

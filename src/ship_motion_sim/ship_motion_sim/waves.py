@@ -9,6 +9,7 @@ import typing
 import numpy as np
 
 from pedestal_common import csv_table
+from pedestal_common.reproducible import cos, exp, power, sin
 from ship_motion_sim import earth
 from ship_motion_sim.params import HullParameters, ShipParameters
 
@@ -35,7 +36,7 @@ def shape(w, tp, gamma):
     """JONSWAP without its level (Hasselmann et al. 1973): any positive w [rad/s] -> relative density."""
     wp = 2.0 * math.pi / tp
     width = np.where(w <= wp, 0.07, 0.09)
-    return w ** -5.0 * np.exp(-1.25 * (wp / w) ** 4) * gamma ** np.exp(-0.5 * ((w - wp) / (width * wp)) ** 2)
+    return power(w, -5.0) * exp(-1.25 * power(wp / w, 4.0)) * power(gamma, exp(-0.5 * ((w - wp) / (width * wp)) ** 2))
 
 
 def band(tp):
@@ -68,14 +69,15 @@ def _second_order(w, period, damping):
 
 def _mean_over(u):
     """sin u / u: a sine averaged over a length, u half its phase along it."""
-    return np.sinc(u / math.pi)
+    v = np.where(u == 0.0, 1.0, u)
+    return np.where(u == 0.0, 1.0, sin(v) / v)
 
 
 def _slope_over(u):
     """3 (sin u - u cos u) / u^3: the best straight line through a sine along a length, against its slope."""
     small = np.abs(u) < 1e-2
     v = np.where(small, 1.0, u)
-    return np.where(small, 1.0 - u ** 2 / 10.0, 3.0 * (np.sin(v) - v * np.cos(v)) / v ** 3)
+    return np.where(small, 1.0 - u ** 2 / 10.0, 3.0 * (sin(v) - v * cos(v)) / (v * v * v))
 
 
 def transfer(hull: HullParameters, w, mu, speed, gravity):
@@ -86,10 +88,10 @@ def transfer(hull: HullParameters, w, mu, speed, gravity):
     wave travels, so it is -j times the elevation; yaw follows the change of that sway along the hull.
     """
     k = w ** 2 / gravity
-    d_x, d_y = np.cos(mu), -np.sin(mu)
+    d_x, d_y = cos(mu), -sin(mu)
     w_e = w - k * speed * d_x
     u_length, u_beam = 0.5 * k * hull.length * d_x, 0.5 * k * hull.beam * d_y
-    level = np.exp(-0.5 * k * hull.draught) * _mean_over(u_beam)
+    level = exp(-0.5 * k * hull.draught) * _mean_over(u_beam)
     force = level * _mean_over(u_length)
     moment = level * _slope_over(u_length)
     roll = _second_order(w_e, hull.roll_period, hull.roll_damping)

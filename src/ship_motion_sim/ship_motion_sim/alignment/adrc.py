@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.reproducible import solution
 from ship_motion_sim.alignment import extended_observer, levelling, slope, steady_state
 from ship_motion_sim.alignment.conditions import SIGMA_UNKNOWN
 
@@ -52,10 +53,10 @@ def constants(k, p, h) -> np.ndarray:
     Q[1, 1] += (g * float(k['gyro_noise']))**2 * h
     P = steady_state.covariance(A, Q)
     record['velocity_variance'] = P[0, 0]
-    record['innovation_variance'] = innovation @ P @ innovation + r
+    record['innovation_variance'] = np.sum(np.outer(innovation, innovation) * P) + r
     z = cmath.exp(1j * extended_observer.SWELL * h)
-    state = np.linalg.solve(z * np.eye(5) - A, noise)
-    record['swell'] = abs(state[0] / (innovation @ state + 1.0))**2
+    state = solution(z * np.eye(5) - A, noise)
+    record['swell'] = abs(state[0] / (state[0] - state[2] + 1.0))**2
     record['level'] = math.sqrt(P[1, 1] + float(k['accelerometer_bias'])**2) / g
     return record
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from pedestal_common import csv_table, parameters
+from pedestal_common.reproducible import arctan2, cos, sin
 from tracking_receiver_sim.ephemeris import horizon
 from tracking_receiver_sim.track import instant
 from tracking_receiver_sim.track.flight import Flight
@@ -34,7 +35,7 @@ def of_orbit(ephemeris, target, duration, margin) -> Flight:
     _check_acceleration(ephemeris, spline, zero, target.track_file.max_acceleration)
     t = np.linspace(0.0, duration, 2 + int(duration / KNOTS))
     east, north, up = spline(t).T
-    distance, elevation = np.hypot(np.hypot(east, north), up), np.arctan2(up, np.hypot(east, north))
+    distance, elevation = np.hypot(np.hypot(east, north), up), arctan2(up, np.hypot(east, north))
     top = int(np.argmax(elevation))
     start_time = instant.iso(ephemeris.midnight + zero)
     return Flight(spline.x, spline.c, start_time, (
@@ -80,7 +81,7 @@ def of_directions(directions, target, _duration, _margin) -> Flight:
         raise csv_table.TableError(f'{directions.path}: start = {target.track_file.start:g} s: must be before the end '
                                    f'of the table at {directions.t[-1] - directions.t[0]:g} s')
     a, e = directions.azimuth, directions.elevation
-    unit = np.column_stack((np.cos(e) * np.sin(a), np.cos(e) * np.cos(a), np.sin(e)))
+    unit = np.column_stack((cos(e) * sin(a), cos(e) * cos(a), sin(e)))
     spline = CubicSpline(t, target.angle.range * unit)
     dated = directions.midnight is not None
     start_time = instant.iso(directions.midnight + zero) if dated else ''

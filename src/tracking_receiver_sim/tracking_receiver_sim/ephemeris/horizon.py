@@ -4,6 +4,7 @@ from scipy.optimize import brentq
 
 from pedestal_common import csv_table
 from pedestal_common.geodesy import station_frame
+from pedestal_common.reproducible import arctan2, turned
 from tracking_receiver_sim.ephemeris import frames, interpolation, states
 from tracking_receiver_sim.track import instant
 
@@ -27,13 +28,13 @@ def enu(ephemeris, station, t):
             r[mine], v[mine] = frames.earth_fixed(segment.frame, ephemeris.midnight + inside,
                                                   *interpolation.at(segment, inside))
     origin, to_enu = station_frame(station)
-    return (r - origin) @ to_enu.T, v @ to_enu.T
+    return turned(to_enu, r - origin), turned(to_enu, v)
 
 
 def elevation(ephemeris, station, t):
     """[rad] (n,) at t (n,); NaN where no segment holds t."""
     east, north, up = enu(ephemeris, station, np.atleast_1d(t))[0].T
-    return np.arctan2(up, np.hypot(east, north))
+    return arctan2(up, np.hypot(east, north))
 
 
 def require(ephemeris, begin, end):

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
 from pedestal_common import csv_table, geodesy
+from pedestal_common.reproducible import turned
 from tracking_receiver_sim.track import instant
 
 SAMPLES = 4
@@ -46,7 +47,7 @@ def lay_out(fixes, track, station) -> Flight:
     kept, dropped = without_held(fixes, track.max_gap)
     origin, to_enu = geodesy.station_frame(station)
     earth_fixed = geodesy.geocentric(np.radians(kept.latitude), np.radians(kept.longitude), kept.altitude)
-    enu = (earth_fixed - origin) @ to_enu.T
+    enu = turned(to_enu, earth_fixed - origin)
     time = kept.time - fixes.time[0] - track.start
     if time[-1] <= 0.0:
         raise csv_table.TableError(f'{fixes.path}: start = {track.start:g} s: must be before the end of the track at '

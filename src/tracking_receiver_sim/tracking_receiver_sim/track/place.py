@@ -39,8 +39,8 @@ def beside(fixes, track) -> StationParameters:
     clearance = max(LEAST_RANGE, laid.speed / AZIMUTH_RATE)
     along = ground[-1] - ground[0]
     bearing = math.atan2(along[0], along[1]) + 0.5 * math.pi
-    right = np.array([math.sin(bearing), math.cos(bearing)])
-    distance = _clear_of(ground @ np.array([right[1], -right[0]]), ground @ right, clearance)
+    (east, north), to_east, to_north = ground.T, math.sin(bearing), math.cos(bearing)
+    distance = _clear_of(east * to_north - north * to_east, east * to_east + north * to_north, clearance)
     latitude, longitude = geodesy.destination(below.latitude_deg, below.longitude_deg, bearing, distance)
     height = float(np.clip(fixes.altitude.min() - BELOW * clearance, LOWEST, HIGHEST))
     return StationParameters(latitude_deg=round(latitude, 5), longitude_deg=round(longitude, 5),

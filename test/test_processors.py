@@ -1,0 +1,43 @@
+"""A run has the same bytes on every processor: what units compute before their first step is the same with the
+instructions and the BLAS of another one."""
+import hashlib
+import os
+import subprocess
+import sys
+
+import numpy as np
+
+from pedestal_bringup.run import closed_loop, scenario
+
+NEEDS_FILE = {'track_file'}
+OTHER = {'NPY_DISABLE_CPU_FEATURES': 'X86_V3 X86_V4', 'OPENBLAS_CORETYPE': 'Prescott'}
+"""An old processor, whose instructions every one has."""
+
+
+def numbers(memory):
+    """The arrays of a memory, however deep in its tuples."""
+    if isinstance(memory, tuple):
+        return b''.join(map(numbers, memory))
+    return np.ascontiguousarray(memory).tobytes()
+
+
+def print_digests():
+    for name in sorted(set(scenario.available()) - NEEDS_FILE):
+        for node, unit in closed_loop.Loop(scenario.load(name, duration=2.0)).units.items():
+            print(name, node, hashlib.sha256(numbers(unit.memory)).hexdigest())
+
+
+def digests(**environment):
+    done = subprocess.run([sys.executable, __file__], env={**os.environ, **environment}, capture_output=True,
+                          text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def test_units_begin_alike_on_another_processor():
+    here = digests()
+    assert len(here) > 50 and digests(**OTHER) == here
+
+
+if __name__ == '__main__':
+    print_digests()
