@@ -92,8 +92,16 @@ def test_a_checkout_finds_what_another_of_the_same_sources_compiled(folder):
     assert compilations(folder, folder / 'cache', [()]) == [1]
     shutil.copytree(folder / 'one_law', folder / 'elsewhere' / 'one_law')
     assert compilations(folder / 'elsewhere', folder / 'cache', [()]) == [0]
-    law.write_text(law.read_text() + '# changed')
+    law.write_text(law.read_text().replace('x.mean()', 'x.min()'))
     assert compilations(folder, folder / 'cache', [()]) == [1]
+
+
+def test_docstrings_and_comments_compile_nothing(folder):
+    law = folder / 'one_law' / 'law.py'
+    assert compilations(folder, folder / 'cache', [()]) == [1]
+    law.write_text('"""A module."""\n# It holds one law.\n' + law.read_text().replace(
+        'def law(x):', 'def law(x):\n    """Return the sum and the mean."""'))
+    assert compilations(folder, folder / 'cache', [()]) == [0]
 
 
 def test_laws_saved_at_once_are_all_kept(folder):
