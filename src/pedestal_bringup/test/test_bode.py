@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from adu_drive.params import AduParameters
+from pedestal_bringup.analysis import tracking
 from pedestal_bringup.studies import bode
-from pedestal_bringup.studies.rigs import metrics
 
 PLANT_PERIOD, CURRENT_PERIOD, SPEED_PERIOD = 5e-5, 1e-4, 5e-4
 
@@ -266,7 +266,7 @@ def test_response_of_a_known_filter_and_its_deviation():
     y += 1e-3 * np.random.default_rng(1).standard_normal(len(x))
     measured = bode.response(sweep, x, y)
     error = np.abs(measured.open_loop / (0.25 / (1.0 - 0.5 * np.exp(-2j * np.pi * measured.frequency * 1e-3))) - 1.0)
-    assert error.max() < 0.02 and 0.5 < metrics.rms(error) / metrics.rms(measured.deviation) < 2.0
+    assert error.max() < 0.02 and 0.5 < tracking.rms(error) / tracking.rms(measured.deviation) < 2.0
 
 
 def test_study_through_the_command_line(tmp_path):

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import missed
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.run.program import program_table
 from pedestal_bringup.studies import budget as study
-from pedestal_bringup.studies.rigs.rows import missed
 from pedestal_bringup.studies.scenarios import Recorded
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.parameters import as_dict, build

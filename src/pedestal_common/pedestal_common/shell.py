@@ -24,7 +24,7 @@ from pedestal_common import messages, middleware, nodes, parameters
 from pedestal_common.graph_parameters import GraphParameters
 from pedestal_common.realtime import utc
 from pedestal_common.realtime.listening import Listener, subscribe
-from pedestal_common.steps import SECOND, GraphError
+from pedestal_common.steps import DAY, SECOND, GraphError
 from pedestal_common.unit import OK, WARN, Diagnosis
 
 START_DEADLINE = 300.0
@@ -35,8 +35,6 @@ PARTING = 1.0
 
 FAREWELL = 0.1
 """Seconds it stays when its endpoints have left."""
-
-DAY = 86_400 * SECOND
 
 DIAGNOSTICS = 1.0
 """Seconds between two diagnostics in realtime."""
@@ -217,7 +215,7 @@ class Shell(Node):
         """The stamp [ns] at which the time of the units is 0: 0 in lockstep, `graph.start`, or the day's beginning
         of the first stamp that is asked for."""
         if self._epoch is None:
-            self._epoch = stamp // DAY * DAY
+            self._epoch = stamp // (DAY * SECOND) * DAY * SECOND
         return self._epoch
 
     def writer(self, name):

@@ -4,6 +4,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import schedule, spoil, table
 from pedestal_common.line_of_sight import quaternion
+from pedestal_common.quaternion import product
 from pedestal_common.records import NEVER
 from pedestal_common.steps import SECOND
 
@@ -35,16 +36,7 @@ def initial(latency_ns) -> np.ndarray:
 def turned(q, roll, pitch, yaw):
     """Quaternion (x, y, z, w) of a deck of attitude q (4,) that is turned by roll and pitch about its own axes and by
     yaw about the vertical [rad]."""
-    return product(quaternion(0.0, 0.0, yaw), product((q[0], q[1], q[2], q[3]), quaternion(roll, pitch, 0.0)))
-
-
-@compiled
-def product(p, q):
-    """Hamilton product of two quaternions (x, y, z, w)."""
-    px, py, pz, pw = p
-    qx, qy, qz, qw = q
-    return (pw * qx + px * qw + py * qz - pz * qy, pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw, pw * qw - px * qx - py * qy - pz * qz)
+    return product(quaternion(0.0, 0.0, yaw), product(q, quaternion(roll, pitch, 0.0)))
 
 
 @compiled

@@ -13,6 +13,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import to_earth
+from pedestal_common.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import adrc, adrc_scheduled, classical, extended_observer, oba, riccati_eso
 from ship_motion_sim.alignment.conditions import CONDITIONS, SIGMA_UNKNOWN, conditions
@@ -168,7 +169,7 @@ def attitude(s, c):
         if s.oba.count < 2.0:
             return q[0], q[1], q[2], q[3]
         return oba.attitude(s.oba, c.conditions, q[0], q[1], q[2], q[3])
-    return strapdown.product(0.0, 0.0, math.sin(0.5 * s.azimuth), math.cos(0.5 * s.azimuth), q[0], q[1], q[2], q[3])
+    return product((0.0, 0.0, math.sin(0.5 * s.azimuth), math.cos(0.5 * s.azimuth)), q)
 
 
 @compiled

@@ -12,11 +12,11 @@ import yaml
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import configuration
 from pedestal_common import messages, nodes, plain_yaml
+from pedestal_common.steps import SECOND
 
 MAX_LATENCY = 1_000_000_000
 """A topic may end this much [ns] before the last step: the next messages were still on their way (latency)."""
 
-SECOND = 1_000_000_000
 SHOWN = 10
 
 

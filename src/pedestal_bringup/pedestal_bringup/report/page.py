@@ -63,13 +63,13 @@ def _pointing(bag, data, values):
             row('noise reduction by the filter', 'noise_reduction_cross_elevation', 'noise_reduction_elevation',
                 'noise_reduction', unit=''),
             _of_axes('load torque, rms of the run',
-                     [(tracking.rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm') for axis in AXES]),
+                     [(tracking.known_rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm') for axis in AXES]),
             *_torques(data)]
 
 
 def _torques(data):
     return [_of_axes(f'torque of motor {i}, rms of the run',
-                     [(tracking.rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
+                     [(tracking.known_rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
             for i in (1, 2)] if data.motors else []
 
 
@@ -94,7 +94,7 @@ def _loop(bag, check):
             rate = (t.size - 1) / max(wall[-1] - wall[0], 1) * 1e9
             rows += [['loop rate achieved (wall time)', elements.number(rate, 'Hz')],
                      ['jitter of the step, wall time',
-                      f'{tracking.rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
+                      f'{tracking.known_rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
                       f'largest {np.abs(jitter).max():.3g} ms']]
     missing = max([check.steps - topic.count for topic in check.topics
                    if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],

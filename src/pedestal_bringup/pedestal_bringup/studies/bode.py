@@ -20,12 +20,13 @@ import numpy as np
 from acu_tracker.params import AcuParameters
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.run import closed_loop
 from pedestal_bringup.studies import servo
 from pedestal_bringup.studies.rigs import drawing
 from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_common.compiled import compiled
 from pedestal_common.topics import AXES
 

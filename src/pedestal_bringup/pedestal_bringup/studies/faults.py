@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.alarms import report
 from acu_tracker.alarms.table import NAMES
 from acu_tracker.modes import MODES
+from pedestal_bringup.analysis.intervals import missed, row
 from pedestal_bringup.report.figures import FILTERED, INK, RAW
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.studies.rigs import drawing
 from pedestal_bringup.studies.rigs.fault_expectations import EXPECTED
-from pedestal_bringup.studies.rigs.rows import Result, missed, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_common.injection import table
 
 SCENARIO, ONSET, LASTS, SECONDS = 'ship_pass', 10.0, 5.0, 20.0

@@ -10,11 +10,13 @@ import math
 
 import numpy as np
 
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, TRUTH
 from pedestal_bringup.studies import bode
 from pedestal_bringup.studies.rigs import drawing, metrics
 from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import loops
 from pedestal_common.topics import AXES
 
@@ -143,7 +145,7 @@ def _metrics(flown, i, torque):
             ('step_settling_2percent_s', metrics.settling_time(step.t, _angle(step, i), STEP, BAND), 's'),
             ('gust_torque_nm', torque, 'Nm'), ('gust_peak_rad', metrics.peak(after - after[0]), 'rad'),
             ('sine_max_error_rad', metrics.peak(_sine_error(sine, i)[settled]), 'rad'),
-            ('sine_rms_error_rad', metrics.rms(_sine_error(sine, i)[settled]), 'rad')]
+            ('sine_rms_error_rad', tracking.rms(_sine_error(sine, i)[settled]), 'rad')]
 
 
 def _figure(kind, run):
