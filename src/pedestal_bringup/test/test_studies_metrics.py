@@ -8,7 +8,8 @@ from scipy import stats
 
 from pedestal_bringup.analysis import intervals, tracking
 from pedestal_bringup.studies import alignment
-from pedestal_bringup.studies.rigs import cases, metrics
+from pedestal_bringup.studies.rigs import metrics
+from pedestal_bringup.trials import cases
 
 T = np.arange(0.0, 3.0, 1e-4)
 

@@ -5,7 +5,7 @@ motors      tracking.Tracking of a drive with motors    tracking    tracking.Tra
 encoders    the same where the true direction of its dish is known too
 filter      consistency.Consistency                     isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
-run         graph.Outcome                               supervised  graph.Outcome in realtime
+run         start.Outcome                               supervised  start.Outcome in realtime
 Errors are per axis and sample: both axes together are all samples of both, not the angle off the beam.
 """
 import math

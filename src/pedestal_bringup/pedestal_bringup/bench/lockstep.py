@@ -41,7 +41,7 @@ def bare_lap():
 
 
 def graph_run(folder, number, pacing, seconds):
-    """(graph.Outcome, bag folder) of a run of the demo scenario."""
+    """(start.Outcome, bag folder) of a run of the demo scenario."""
     path = pathlib.Path(folder) / f'run-{number}'
     chosen = scenario.load('leo_pass', pacing=pacing, duration=seconds)
     return graph.run(chosen, path, contextlib.nullcontext(lambda seconds: None)), path

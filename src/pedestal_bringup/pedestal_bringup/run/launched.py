@@ -3,6 +3,7 @@ import typing
 
 from pedestal_bringup.run import beside, graph, scenario, supervisor
 from pedestal_bringup.run.processes import Graph
+from pedestal_bringup.run.start import begins, parameters_of_all
 from pedestal_common import parameters
 
 
@@ -78,7 +79,7 @@ def prepare(given, chosen):
     if chosen.header.pacing == 'realtime':
         supervisor.prepare(chosen)
     made = Graph(chosen, bag)
-    made.write(graph.parameters_of_all(chosen, bag, graph.begins(chosen)))
+    made.write(parameters_of_all(chosen, bag, begins(chosen)))
     whole = made.log / f'{chosen.name}.yaml'
     whole.write_text(chosen.as_yaml())
     return made.file, whole

@@ -6,9 +6,9 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from pedestal_bringup.run import lockstep, supervisor
-from pedestal_bringup.run.graph import Outcome, begins, parameters_of_all
 from pedestal_bringup.run.operator_node import Operator, sole_run
 from pedestal_bringup.run.program import program_messages
+from pedestal_bringup.run.start import Outcome, begins, parameters_of_all
 from pedestal_common import messages, middleware, nodes
 
 

@@ -246,7 +246,7 @@ def recorded(batch, run):
     inputs, truth = np.zeros(1, imu.INPUTS), np.zeros(1, motion.OUTPUTS)
     inputs['dt'] = PERIOD
     motion.truth(ship[0], 0.0, truth[0])
-    start = misaligned(truth[0]['quaternion'].tolist(), angles)
+    start = misaligned(truth[0]['quaternion'], angles)
     increments = Increments(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)))
     simulate(Sensors(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS)),
              random.standard_normal((n, imu.NORMALS)), disturbance(batch, random, n), increments)

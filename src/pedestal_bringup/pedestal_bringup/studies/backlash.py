@@ -12,9 +12,10 @@ from pedestal_bringup.analysis import tracking
 from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, RAW, TRUTH
 from pedestal_bringup.studies import servo
-from pedestal_bringup.studies.rigs import cases, drawing, metrics
-from pedestal_bringup.studies.rigs.cases import Case
+from pedestal_bringup.studies.rigs import drawing, metrics
 from pedestal_bringup.studies.rigs.rows import Result
+from pedestal_bringup.trials import cases
+from pedestal_bringup.trials.cases import Case
 
 SETTLED = 2.0
 """Standstill is evaluated from this time on after a step [s]."""

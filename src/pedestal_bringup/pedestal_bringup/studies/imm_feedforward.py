@@ -19,7 +19,7 @@ from acu_tracker.modes import AUTOTRACK
 from pedestal_bringup.analysis import tracking
 from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies.rigs import cases, drawing, feedforward_loop, metrics, profiles
+from pedestal_bringup.studies.rigs import drawing, feedforward_loop, metrics, profiles
 from pedestal_bringup.studies.rigs.feedforward_loop import (
     METRICS,
     REVERSALS,
@@ -34,7 +34,7 @@ from pedestal_bringup.studies.rigs.feedforward_loop import (
     statistics,
 )
 from pedestal_bringup.studies.rigs.rows import Result
-from pedestal_bringup.trials import monte_carlo
+from pedestal_bringup.trials import cases, monte_carlo
 from pedestal_common.parameters import as_dict
 
 RUNS = 50

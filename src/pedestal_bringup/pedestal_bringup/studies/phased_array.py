@@ -23,10 +23,10 @@ from pedestal_bringup.studies.rigs.angle_loop import (
     delay_limit,
     spectral_radius,
 )
-from pedestal_bringup.studies.rigs.cases import Case
 from pedestal_bringup.studies.rigs.metrics import overshoot_percent, peak
 from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
+from pedestal_bringup.trials.cases import Case
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 

@@ -13,9 +13,10 @@ import numpy as np
 from pedestal_bringup.analysis import tracking
 from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies.rigs import cases, drawing, metrics
-from pedestal_bringup.studies.rigs.cases import Case
+from pedestal_bringup.studies.rigs import drawing, metrics
 from pedestal_bringup.studies.rigs.rows import Result
+from pedestal_bringup.trials import cases
+from pedestal_bringup.trials.cases import Case
 
 STEP = 0.174
 """Of figure 5 [rad]."""

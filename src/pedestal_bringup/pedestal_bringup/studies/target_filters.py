@@ -14,9 +14,9 @@ from pedestal_bringup.report.figures import FILTERED
 from pedestal_bringup.run import recorded
 from pedestal_bringup.studies.filters import MANOEUVRE
 from pedestal_bringup.studies.rigs import drawing
-from pedestal_bringup.studies.rigs.cases import Case
 from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
+from pedestal_bringup.trials.cases import Case
 
 RUNS, SEED = 30, 1
 """Runs of each case; seed of the first."""

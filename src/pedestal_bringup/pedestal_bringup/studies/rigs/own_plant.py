@@ -1,6 +1,6 @@
 """Studies of your own plant, `pedestal study servo|backlash|bode --scenario FILE`: both axes of a scenario, ashore.
 
-bode      the loops as studies/bode measures them, each axis for itself
+bode      the loops by trials/frequency_response, each axis for itself
 servo     a step of STEP and a sine of AMPLITUDE at FREQUENCY in still air, a step of wind torque of GUST of what the
           motors have for a short time; of the true angle of the dish
 backlash  the standstill after that step, and what the sine leaves of its reversals, with the bias of the scenario and
@@ -15,9 +15,9 @@ from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, TRUTH
 from pedestal_bringup.studies import bode
 from pedestal_bringup.studies.rigs import drawing, metrics
-from pedestal_bringup.studies.rigs.cases import Case
 from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import loops
+from pedestal_bringup.trials.cases import Case
 from pedestal_common.topics import AXES
 
 STEP, AMPLITUDE, FREQUENCY, GUST = 0.02, 0.02, 0.1, 0.2
