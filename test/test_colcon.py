@@ -59,7 +59,7 @@ def test_ros2_launch_runs_a_scenario_in_a_namespace(start_process, tmp_path):
     assert refused.returncode == 1 and 'duration:=long: must be a number of seconds' in said
     ran = start_process([*command, 'duration:=1', 'namespace:=ship_1', 'bag:=mine'])
     said = ''.join(ran.communicate(timeout=600.0))
-    assert verify(tmp_path / 'mine').complete, said
+    assert verify(load(tmp_path / 'mine')).complete, said
 
 
 def test_a_node_starts_and_stops(start_process, node_names, complaints):

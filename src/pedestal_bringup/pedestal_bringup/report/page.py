@@ -24,10 +24,11 @@ def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathl
     figures.VECTOR, as that too. The same bag gives the same bytes.
     Raises bag.BagError when the bag cannot be read to its end, OSError when the report cannot be written.
     """
-    bag = bags.read(bag_path, beam)
+    whole = bags.read(bag_path)
+    bag = whole.view(beam)
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'report.html'
     data = run_data.read(bag)
-    page = _page(bag, data)
+    page = _page(bag, data, verify(whole))
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text(page, encoding='utf-8')
     if png_folder is not None:
@@ -223,8 +224,7 @@ def _made(bag, data):
     return elements.table(None, rows, 'meta')
 
 
-def _page(bag, data):
-    check = verify(bag.path)
+def _page(bag, data, check):
     name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',

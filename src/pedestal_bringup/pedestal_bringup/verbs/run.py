@@ -80,7 +80,7 @@ def main(options):
                                       'mcap_sha256': outcome.recorder['sha256']})
     if outcome.stopped:
         return stop.EXIT_CODE
-    check = verify(bag)
+    check = verify(recording)
     if not realtime and check.aborted or not (check.complete or outcome.restarts):
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     if not check.complete:
