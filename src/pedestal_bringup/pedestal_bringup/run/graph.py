@@ -2,7 +2,6 @@
 import pathlib
 
 from pedestal_bringup.run.processes import Graph
-from pedestal_bringup.run.program import program_messages
 from ship_motion_sim import motion
 
 
@@ -24,22 +23,23 @@ def new_bag(given, scenario):
     return bag
 
 
-def read_tracks(scenario):
-    """The program tracks {topic: message} of a scenario, its files of target and ship read before anything is started.
-    Raises ValueError, OSError for a file that is not what it should be."""
+def read_files(plan):
+    """Read the files of target and ship of a program.Plan before anything is started. Raises ValueError, OSError for a
+    file that is not what it should be."""
+    scenario = plan.scenario
     if 'ship_motion' in scenario.nodes:
         motion.constants(scenario.node_parameters('ship_motion').ship)
-    return program_messages(scenario)
+    return plan.tracks
 
 
-def run(scenario, bag, progress):
-    """Run a scenario to its end, or until Ctrl-C, and return its Outcome.
+def run(plan, bag, progress):
+    """Run the scenario of a program.Plan to its end, or until Ctrl-C, and return its Outcome.
 
     progress: a context with a function of the time of the run [s], which is called as it goes on. Raises RunError when
     it cannot go on. The recording up to then stays readable.
     """
-    tracks = read_tracks(scenario)
-    with Graph(scenario, bag) as graph, progress as advance:
+    tracks = read_files(plan)
+    with Graph(plan.scenario, bag) as graph, progress as advance:
         # With rclpy, after which no node can be a copy of this process (child).
         from pedestal_bringup.run import watch
         return watch.run(graph, tracks, advance)

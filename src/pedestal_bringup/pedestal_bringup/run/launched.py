@@ -3,6 +3,7 @@ import typing
 
 from pedestal_bringup.run import beside, graph, scenario, supervisor
 from pedestal_bringup.run.processes import Graph
+from pedestal_bringup.run.program import Plan
 from pedestal_bringup.run.start import begins, parameters_of_all
 from pedestal_common import parameters
 
@@ -74,7 +75,7 @@ def servers(given, chosen):
 def prepare(given, chosen):
     """Make what a Scenario starts with, its laws and the folder of its logs: (ROS 2 parameter file of all nodes, the
     scenario as a file). Raises ValueError, RunError."""
-    graph.read_tracks(chosen)
+    graph.read_files(Plan(chosen))
     bag = graph.new_bag(given['bag'], chosen.name)
     if chosen.header.pacing == 'realtime':
         supervisor.prepare(chosen)

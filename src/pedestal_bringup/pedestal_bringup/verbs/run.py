@@ -37,7 +37,8 @@ LARGEST_LOSS = 0.01
 
 def main(options):
     """Run, record and print the results; the exit code. Raises RuntimeError where the recording is not complete."""
-    from pedestal_bringup.run import beside, graph, program, scenario
+    from pedestal_bringup.run import beside, graph, scenario
+    from pedestal_bringup.run.program import Plan
     from pedestal_common import nodes
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
     if options.tle or options.station or options.which:
@@ -49,10 +50,11 @@ def main(options):
     chosen = scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
     bag = graph.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
-    for line in program.announced(chosen):
+    plan = Plan(chosen)
+    for line in plan.announced():
         print(line)
     with beside.servers(options, chosen.header, bag):
-        outcome = graph.run(chosen, bag, console.progress_of_run(chosen.header.duration))
+        outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration))
     # With scipy, which takes half a second: nobody waits for it before the first step.
     from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read
