@@ -20,8 +20,8 @@ SHOWN = 200
 def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathlib.Path:
     """Write the report of a bag and return where: output, default report.html in the bag (beside a bare .mcap).
 
-    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there; vector: one of
-    figures.VECTOR, as that too. The same bag gives the same bytes.
+    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there; vector: 'pdf'
+    or 'svg', as that too. The same bag gives the same bytes.
     Raises bag.BagError when the bag cannot be read to its end, OSError when the report cannot be written.
     """
     whole = bags.read(bag_path)

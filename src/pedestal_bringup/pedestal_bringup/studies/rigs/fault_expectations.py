@@ -57,11 +57,6 @@ def _moving(expected, still=GOES_ON):
     return {**_always(still), **dict.fromkeys((*MOVING, *FOLLOWING), expected)}
 
 
-def _following(expected):
-    """Where it matters only when the axes follow a target in the sky."""
-    return {**_always(GOES_ON), **dict.fromkeys(FOLLOWING, expected)}
-
-
 def _autotrack(told, error, *end):
     """Where it matters only when the receiver closes the loop."""
     return {**_always(GOES_ON), 'autotrack': Expected(told, end, error)}
