@@ -21,7 +21,8 @@ from ship_motion_sim.params import AIDS, METHODS
 
 STAGES = ('aligning', 'aligned')
 ALIGNING, NAVIGATING = range(len(STAGES))
-MODEL, CLASSICAL, ADRC, ADRC_SCHEDULED, RICCATI_ESO, OBA = range(len(METHODS))
+CLASSICAL, ADRC, ADRC_SCHEDULED, RICCATI_ESO, OBA = map(
+    METHODS.index, ('classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba'))
 NO_AID, LOG, GNSS = range(len(AIDS))
 
 CONSTANTS = np.dtype([

@@ -16,22 +16,13 @@ from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW
 from pedestal_bringup.studies import servo
 from pedestal_bringup.studies.rigs import drawing
 from pedestal_bringup.studies.rigs.rows import Result
-from pedestal_bringup.trials.frequency_response import (
-    CURRENT,
-    POSITION,
-    SPEED,
-    case,
-    current,
-    margins,
-    position,
-    speed,
-)
+from pedestal_bringup.trials import frequency_response as frequency
 from pedestal_common.topics import AXES
 
 
 def controller(name):
     """The Case of the default position loop with a position controller of this name on both axes."""
-    return case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
+    return frequency.case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
 FAST = {'acu.azimuth.feedforward.bandwidth': 40.0}
@@ -43,11 +34,11 @@ NOTCH = {**STRUCTURE, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.wid
 CASES = {
     'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
     'adrc': (controller('adrc'), AXES),
-    'paper-r1': (case('paper-r1', 'servo_sine', servo.R1), AXES[:1]),
-    'best': (case('best', 'servo_sine', servo.BEST), AXES[:1]),
-    'rigid': (case('rigid', 'leo_pass', FAST), AXES[:1]),
-    'structure': (case('structure', 'leo_pass', STRUCTURE), AXES[:1]),
-    'structure-notch': (case('structure-notch', 'leo_pass', NOTCH), AXES[:1])}
+    'paper-r1': (frequency.case('paper-r1', 'servo_sine', servo.R1), AXES[:1]),
+    'best': (frequency.case('best', 'servo_sine', servo.BEST), AXES[:1]),
+    'rigid': (frequency.case('rigid', 'leo_pass', FAST), AXES[:1]),
+    'structure': (frequency.case('structure', 'leo_pass', STRUCTURE), AXES[:1]),
+    'structure-notch': (frequency.case('structure-notch', 'leo_pass', NOTCH), AXES[:1])}
 """Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's; a
 faster one with a rigid load, with a flexible one, and with a notch against that."""
 
@@ -64,15 +55,15 @@ def nonlinearity(measured, smaller):
 def rows(responses):
     """The rows of {name: Response}."""
     return [row(name, metric, value, unit) for name, measured in responses.items()
-            for metric, (value, unit) in margins(measured).items()]
+            for metric, (value, unit) in frequency.margins(measured).items()]
 
 
 def run(progress) -> Result:
     """Measure all loops, each also with half the excitation."""
     drive = AduParameters()
-    parts = {'current loops': (functools.partial(current, drive), CURRENT),
-             'speed loops': (functools.partial(speed, drive), SPEED)}
-    parts |= {f'position loop {name}': (functools.partial(position, case, axes), POSITION)
+    parts = {'current loops': (functools.partial(frequency.current, drive), frequency.CURRENT),
+             'speed loops': (functools.partial(frequency.speed, drive), frequency.SPEED)}
+    parts |= {f'position loop {name}': (functools.partial(frequency.position, case, axes), frequency.POSITION)
               for name, (case, axes) in CASES.items()}
     responses, change = {}, {}
     for i, (text, (measure, sweep)) in enumerate(parts.items()):
@@ -148,7 +139,7 @@ def bode_figure(title, curves, design):
             gain.semilogx(f, decibel(x), color=colour, lw=width, alpha=0.6 if width > 2.0 else 1.0,
                           label=f'{label}: {margin_text(measured)}')
             phase.semilogx(f, degrees(x), color=colour, lw=width, alpha=0.6 if width > 2.0 else 1.0)
-            at = margins(measured)['crossover_hz'][0]
+            at = frequency.margins(measured)['crossover_hz'][0]
             if not column and math.isfinite(at):
                 phase_there = float(np.interp(math.log(at), np.log(f), degrees(x)))
                 gain.plot(at, 0.0, 'x', color=INK, ms=6.0)
@@ -169,6 +160,6 @@ def bode_figure(title, curves, design):
 
 def margin_text(measured):
     """Gain and phase margin of a Response in words, for a legend."""
-    gain, phase = (margins(measured)[name][0] for name in ('gain_margin_db', 'phase_margin_deg'))
+    gain, phase = (frequency.margins(measured)[name][0] for name in ('gain_margin_db', 'phase_margin_deg'))
     parts = [f'{value:.0f} {unit}' for value, unit in ((gain, 'dB'), (phase, 'deg')) if math.isfinite(value)]
     return f'margins {", ".join(parts)}' if parts else 'no margin in the band'
