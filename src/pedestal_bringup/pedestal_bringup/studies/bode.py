@@ -1,7 +1,8 @@
-"""Frequency response of the current, speed and position loops by trials/frequency_response.
+"""Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
 
-The grey line of a figure is the design of the gains: w_c / s for the current, (K_p + K_i / s) / (J s) for the
-speed of a rigid drive, K_p / s + K_i / s^2 for the position. The difference is sampling, delay, elasticity.
+The loops are measured by trials/frequency_response. The grey line of a figure is the design of the gains: w_c / s for
+the current, (K_p + K_i / s) / (J s) for the speed of a rigid drive, K_p / s + K_i / s^2 for the position. The
+difference is sampling, delay, elasticity.
 """
 import dataclasses
 import functools

@@ -1,4 +1,4 @@
-"""Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
+"""Open-loop and closed-loop response of the current, speed and position loops to a multisine, on the simulated plant.
 
 A signal is added inside a loop at its break point while the axis moves at a constant rate, where friction is a
 constant and the bias keeps the teeth closed. The signal sent on from there is E, the returned one -Y; at the excited
