@@ -15,6 +15,7 @@ from acu_tracker.verbs import ALARM_VERBS, VERBS, points
 from pedestal_common import messages, nodes, topics
 from pedestal_common.commands import Reply, schedule
 from pedestal_common.compiled import compiled
+from pedestal_common.inputs import taking
 from pedestal_common.records import NEVER
 from pedestal_common.unit import NEVER_DUE, Unit, joined
 
@@ -22,8 +23,7 @@ JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'shi
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 COMMAND, ESTIMATE, REFERENCE, FILTER = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/filter'
 MODE, KEYHOLE, BLOCKAGE, ALARMS = 'acu/mode', 'acu/keyhole', 'acu/blockage', 'acu/alarms'
-PROGRAM, DRIVE, INS, INS_ERROR = 'acu/program_track', 'adu/state', 'ins/state', 'ins/error'
-PINS_ASKED, PINS = 'acu/stow_pins', 'adu/stow_pins'
+DRIVE, INS, PINS_ASKED = 'adu/state', 'ins/state', 'acu/stow_pins'
 
 FILTER_SIZE, MODELS = len(topics.FILTER), len(topics.MOTION_MODELS)
 """Numbers of an axis on acu/filter; the last of them are the probabilities of the motion models."""
@@ -48,40 +48,24 @@ class Memory(typing.NamedTuple):
     tables: tables.Tables
 
 
+_take = taking(signals.TOPICS)
+
+
 @compiled
 def decode(u, stamp, inputs):
     """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next. A rate or a
     range is used only with the error of its own stamp."""
-    joints, error, attitude = inputs[JOINTS], inputs[ERRORS], inputs[ATTITUDE]
-    rate, distance = inputs[RATE], inputs[RANGE]
-    u.stamp = stamp * 1e-9
-    for i in range(2):
-        u.position[i], u.velocity[i], u.torque[i] = joints.position[i], joints.velocity[i], joints.effort[i]
-    u.encoder_valid = 1
-    u.error_came, u.error_valid = error.stamp != NEVER, 0
-    if error.stamp != NEVER:
-        x, y, cn0_dbhz = error.vector[0], error.vector[1], error.vector[2]
-        u.error_valid = 1 if x == x else 0
-        u.error_stamp = error.stamp * 1e-9
-        u.cross_elevation, u.elevation, u.cn0_dbhz = x, y, cn0_dbhz
-    u.error_rate[0] = u.error_rate[1] = u.range = math.nan
-    if rate.stamp != NEVER and rate.stamp == error.stamp:
-        u.error_rate[0], u.error_rate[1], u.error_rate_sigma = rate.vector[0], rate.vector[1], rate.vector[2]
-    if distance.stamp != NEVER and distance.stamp == error.stamp:
-        u.range, u.range_variance = distance.range[0], distance.variance[0]
-    if attitude.stamp != NEVER:
-        u.attitude_stamp = attitude.stamp * 1e-9
+    _take(u, inputs)
+    error, rate, distance = inputs[ERRORS], inputs[RATE], inputs[RANGE]
+    u.stamp, u.encoder_valid = stamp * 1e-9, 1
+    u.error_valid = 1 if u.error_came and u.cross_elevation == u.cross_elevation else 0
+    if rate.stamp == NEVER or rate.stamp != error.stamp:
+        u.error_rate[0] = u.error_rate[1] = math.nan
+    if distance.stamp == NEVER or distance.stamp != error.stamp:
+        u.range = math.nan
+    if inputs[ATTITUDE].stamp != NEVER:
         u.attitude_valid = 1
-        for i in range(4):
-            u.quaternion[i] = attitude.orientation[i]
-        for i in range(3):
-            u.deck_rate[i] = attitude.angular_velocity[i]
-    u.attitude_error_came = inputs[INS_ERROR].stamp != NEVER
-    if u.attitude_error_came:
-        for i in range(3):
-            u.attitude_noise[i], u.attitude_walk[i] = inputs[INS_ERROR].position[i], inputs[INS_ERROR].velocity[i]
-    u.drive, u.aligning = inputs[DRIVE], inputs[INS] == ALIGNING
-    u.drive_ready, u.pins = u.drive <= signals.READY, inputs[PINS]
+    u.aligning, u.drive_ready = inputs[INS] == ALIGNING, u.drive <= signals.READY
 
 
 @compiled
@@ -183,10 +167,6 @@ class Acu(Unit):
         self.request(self.REQUESTS[0])
         self.desk.prepare()
         self.diagnose()
-
-    def latency(self, topic):
-        """Age [s] of a topic's stamp at a step: attitude_latency or receiver_latency."""
-        return self.parameters.attitude_latency if topic in (ATTITUDE, INS_ERROR) else self.parameters.receiver_latency
 
     def configure(self, parameters):
         """Take other values of LIVE parameters into the constants; the state stays."""
