@@ -4,6 +4,7 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.modes import TABLE
 from pedestal_common import inputs, nodes, topics
 from pedestal_common.compiled import compiled
 
@@ -27,7 +28,8 @@ INPUTS = np.dtype([
     ('error_valid', 'i8'),                                                      # 0: none came, or unlocked
     ('stabilised', 'i8'), ('attitude_valid', 'i8'),                             # 1: the pedestal stands on a ship
     ('aligning', 'i8'), ('drive_ready', 'i8'),          # 1: the INS is still aligning; the drive follows the commands
-    ('unpredicted', 'i8', (2,)),                         # of the modes tle, sun: NONE or why there is no table
+    ('unpredicted', 'i8', (sum(row.table for row in TABLE),)),    # of the modes that follow a table: NONE or why
+                                                        # there is none
     ('gap', 'i8'), ('turnaround', 'i8'),                # 1: rows of the program are missing here; the last segment
                                                         # was refused because it asked for too fast a turnaround
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles

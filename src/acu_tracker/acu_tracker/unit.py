@@ -5,13 +5,13 @@ import typing
 
 import numpy as np
 
-from acu_tracker import announcement, control_unit, diagnosis, manual, mode_change, modes, signals, supervision
+from acu_tracker import announcement, control_unit, diagnosis, mode_change, modes, signals, supervision
 from acu_tracker.alarms import annunciator, report, table
 from acu_tracker.alarms.desk import Desk
 from acu_tracker.authority import Authority
 from acu_tracker.prediction import Predictor
 from acu_tracker.program import segments, tables
-from acu_tracker.verbs import ALARM_VERBS, VERBS, points
+from acu_tracker.verbs import ALARM_VERBS, TAKEN, VERBS
 from pedestal_common import messages, nodes, topics
 from pedestal_common.commands import Reply, schedule
 from pedestal_common.compiled import compiled
@@ -225,17 +225,17 @@ class Acu(Unit):
         predicted, all of them shifted by the offset."""
         stamp = self.now if stamp is None else int(stamp)
         inputs, t = self.parts['inputs'], stamp * 1e-9
-        for mode, predict in ((modes.TLE, self.predictor.satellite), (modes.SUN, self.predictor.sun)):
-            known = self.predicted.get(mode)
-            if known is None or not known.since <= t < known.until:
-                known = self.predicted[mode] = predict(t)
-            inputs['unpredicted'][mode - modes.TLE] = known.reason
+        for place, row in enumerate(tables.FOLLOWED):
+            known = self.predicted.get(row.name)
+            if row.predicted and (known is None or not known.since <= t < known.until):
+                known = self.predicted[row.name] = getattr(self.predictor, row.predicted)(t)
+            inputs['unpredicted'][place] = known.reason if known else modes.NONE
         piece, inputs['gap'], ends = self.segments.at(t - self.offset[0])
         until = min(ends + self.offset[0], *(known.until for known in self.predicted.values()))
         self._laid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE
         self.memory = self.memory._replace(tables=tables.Tables(*(
-            tables.shifted(track, self.offset) for track in (piece, *(known.track for known in (
-                self.predicted[modes.TLE], self.predicted[modes.SUN]))))))
+            tables.shifted(self.predicted[row.name].track if row.predicted else piece, self.offset)
+            for row in tables.FOLLOWED)))
 
     def take_text(self, topic, text):
         """Take a text topic; the drive's state is kept for the diagnosis."""
@@ -276,10 +276,11 @@ class Acu(Unit):
             self.lay_tables()
             return Reply(True, 'program track shifted by {:g} s, {:g} and {:g} rad'.format(*self.offset))
         if verb == 'elements':
-            self._take_elements(*arguments.values())
+            self.take_elements(*arguments.values())
             return Reply(True, f'elements of satellite {self.predictor.number}')
         before, predictor = {name: state[name].copy() for name in ('preset', 'manual', 'slave')}, self.predictor
-        self._take_arguments(verb, arguments)
+        if verb in TAKEN:
+            TAKEN[verb](self, arguments)
         reply = self.request(f'acu/{verb}')
         if not reply.granted:
             for name, value in before.items():
@@ -289,32 +290,10 @@ class Acu(Unit):
                 self.lay_tables()
         return reply
 
-    def _take_elements(self, line_1, line_2):
+    def take_elements(self, line_1, line_2):
         """Predict by other elements, in whose lines _ stands for a blank. Raises ValueError."""
         self._predict_by(self.predictor.by(line_1.replace('_', ' '), line_2.replace('_', ' ')))
         self.lay_tables()
-
-    def _take_arguments(self, mode, arguments):
-        """What a mode is asked for with. Raises ValueError."""
-        state = self.parts['state']
-        if mode == 'preset':
-            angles = [arguments[axis] for axis in topics.AXES]
-            if arguments['point']:
-                named = points(self.parameters.points)
-                if arguments['point'] not in named:
-                    raise ValueError(f'point = {arguments["point"]}: must be one of {", ".join(named) or "none"}')
-                angles = named[arguments['point']]
-            preset = state['preset']
-            preset['angle'] = np.where(np.isfinite(angles), angles, preset['angle'])
-            preset['stamp'], preset['moves'], preset['rate'] = state['stamp'], arguments['moves'], _rates(arguments)
-        elif mode == 'rate':
-            state['manual']['asked'] = [arguments[axis] for axis in topics.AXES]
-            state['manual']['until'] = state['stamp'] + manual.DEAD_MAN
-        elif mode == 'tle' and any(arguments.values()):
-            self._take_elements(*arguments.values())
-        elif mode == 'slave':
-            state['slave'] = (state['stamp'], [arguments[axis] for axis in topics.AXES], _rates(arguments),
-                              arguments['moves'], arguments['holds'])
 
     def admit(self, command):
         """Raise ValueError where somebody else is in control."""
@@ -394,11 +373,6 @@ class Acu(Unit):
         if not np.isfinite(numbers[ERRORS][:, 0]).any():
             return 'the receiver never locked'
         return '' if 'autotrack' in numbers[MODE] else 'the ACU was never in autotrack'
-
-
-def _rates(arguments):
-    """The rates (2,) [rad/s] among the arguments of a command."""
-    return [arguments[f'{axis}_rate'] for axis in topics.AXES]
 
 
 def rows(message):
