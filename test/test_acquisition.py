@@ -4,7 +4,7 @@ import pytest
 
 from acu_tracker import modes
 from pedestal_bringup.studies import acquisition as study
-from pedestal_bringup.studies.rigs.cases import Case
+from pedestal_bringup.trials.cases import Case
 
 
 def run(name, seed, duration=None, **parameters):

@@ -6,6 +6,7 @@ import pytest
 from acu_tracker import modes
 from acu_tracker.alarms import report, table
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.run import closed_loop, scenario
 
@@ -24,7 +25,7 @@ def tripped(start_run):
 
 
 def test_the_recording_is_complete_and_says_why(tripped):
-    assert verify(tripped.path).complete
+    assert verify(load(tripped.path)).complete
     states, told = tripped.table('adu/state'), tripped.table('acu/mode')
     assert list(states['data']) == ['enabled', 'fault: azimuth overspeed']
     assert list(told['data']) == ['program', 'standby']

@@ -14,6 +14,7 @@ from pedestal_bringup.again import difference, recompute
 from pedestal_bringup.analysis import tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import export
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.report.page import write as write_report
 from pedestal_bringup.run import closed_loop, scenario
@@ -62,7 +63,7 @@ def test_each_beam_tracks_its_own_target(views):
 
 
 def test_one_bag_holds_all_beams_and_is_complete(runs):
-    check = verify(runs['four'].bag)
+    check = verify(load(runs['four'].bag))
     assert check.complete, check.lines()
     assert check.steps == 301
     counts = {topic.name: topic.count for topic in check.topics}

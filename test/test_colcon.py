@@ -49,7 +49,9 @@ def test_ros2_launch_finds_the_launch_and_scenario_files():
 @pytest.mark.skipif(not shutil.which('ros2'), reason='no ros2: the wheels have none')
 def test_ros2_launch_runs_a_scenario_in_a_namespace(start_process, tmp_path):
     """Started here, its arguments known; a wrong one is refused by name."""
-    from pedestal_bringup.bags.verify import verify  # wants mcap, which the environment of colcon has none of
+    # They want mcap, which the environment of colcon has none of.
+    from pedestal_bringup.bags.bag import load
+    from pedestal_bringup.bags.verify import verify
     from pedestal_bringup.run import launched
     command = ['ros2', 'launch', 'pedestal_bringup', 'pedestal.launch.py']
     shown = start_process([*command, '--show-args']).communicate(timeout=180.0)[0]
@@ -59,7 +61,7 @@ def test_ros2_launch_runs_a_scenario_in_a_namespace(start_process, tmp_path):
     assert refused.returncode == 1 and 'duration:=long: must be a number of seconds' in said
     ran = start_process([*command, 'duration:=1', 'namespace:=ship_1', 'bag:=mine'])
     said = ''.join(ran.communicate(timeout=600.0))
-    assert verify(tmp_path / 'mine').complete, said
+    assert verify(load(tmp_path / 'mine')).complete, said
 
 
 def test_a_node_starts_and_stops(start_process, node_names, complaints):

@@ -8,6 +8,7 @@ import pytest
 
 from pedestal_bringup import cli
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.verify import verify
 
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
@@ -92,7 +93,7 @@ def test_what_a_kill_left_is_recovered(killed, target, monkeypatch, capsys):
     said, errors = capsys.readouterr()
     assert errors == '' and 'the recording breaks off after' in said
     recovered = run.bag.with_name('bag-recovered')
-    report = verify(recovered)
+    report = verify(load(recovered))
     assert report.complete and report.steps >= 200, report.lines()
     assert list(bags.read(recovered).raw()) == list(bags.load(run.bag).raw())
     assert bags.read(recovered).configuration == bags.load(run.bag).configuration
@@ -104,4 +105,4 @@ def test_ctrl_c_ends_in_order(killed):
     assert result.stderr == f'pedestal: stopped; what was recorded is in {run.bag}\n'
     assert run.pids() == {}
     assert_readable(run)
-    assert verify(run.bag).problems == []
+    assert verify(load(run.bag)).problems == []

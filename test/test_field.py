@@ -11,7 +11,7 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup.run.program import program_messages
+from pedestal_bringup.run.program import Plan
 from pedestal_common import messages, middleware, topics
 from pedestal_common.steps import SECOND
 
@@ -119,7 +119,7 @@ def moving(tmp_path_factory, reserve_domain, connect):
     """A station that follows a program, swinging to and fro, and then its receiver."""
     with contextlib.closing(Field(tmp_path_factory.mktemp('moving'), reserve_domain(), connect)) as field:
         field.begin()
-        tracks = program_messages(field.station.scenario)
+        tracks = Plan(field.station.scenario).tracks
         field.operator.write('acu/program_track')
         field.operator.publish('acu/program_track', tracks['acu/program_track'])
         field.until(lambda: field.mode == 'autotrack')

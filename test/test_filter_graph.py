@@ -11,6 +11,7 @@ from pedestal_bringup import cli
 from pedestal_bringup.analysis import consistency, tracking
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import export
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_common import layouts, topics
@@ -56,12 +57,12 @@ def told(runs):
 
 
 def test_every_topic_is_recorded(runs):
-    report = verify(runs['measured'].bag)
+    report = verify(load(runs['measured'].bag))
     assert report.complete, report.lines()
     assert {'tracking_receiver/angle_rate', 'tracking_receiver/range', 'acu/filter'} <= {
         topic.name for topic in report.topics}
     assert not {'tracking_receiver/angle_rate', 'tracking_receiver/range'} & {
-        topic.name for topic in verify(runs['switched'].bag).topics}
+        topic.name for topic in verify(load(runs['switched'].bag)).topics}
 
 
 def test_recomputed_to_the_last_bit(runs, capsys, monkeypatch):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup.run import closed_loop, program, scenario
+from pedestal_bringup.run import closed_loop, scenario
+from pedestal_bringup.run.program import Plan
 from tracking_receiver_sim.track import files
 
 PATH = 'tracking_receiver.target.track_file.path'
@@ -39,11 +40,11 @@ def test_two_options_are_enough(adsb):
 
 
 def test_the_flight_is_told_where_the_run_begins(adsb):
-    log, path = program.announced(scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH]))
+    log, path = Plan(scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH])).announced()
     assert log.startswith('flight.csv: ADS-B of 4b1812 RGA3: 57 of 60 fixes, 3 held positions dropped, times in whole')
     assert 'altitudes in steps of 100 ft, smoothed: off the fixes by ' in log
     assert path.startswith('59 s, at most 3') and ' km from the station at latitude 47.' in path
-    assert program.announced(scenario.load('uav_flyby')) == []
+    assert Plan(scenario.load('uav_flyby')).announced() == []
 
 
 def test_the_flight_is_in_the_diagnostics_of_the_receiver(adsb):
@@ -105,9 +106,9 @@ def test_an_orbit_from_a_file_is_tracked(oem):
     error = run.truth['error'][run.t > 10.0]
     half_beam = 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
     assert np.isfinite(error).all() and np.abs(error).max() < 0.5 * half_beam
-    log, path = program.announced(chosen)
+    log, path = Plan(chosen).announced()
     assert log == 'pass.oem: CCSDS OEM of SAT (2026-001A): 17 states in ITRF, HERMITE of degree 7'
     assert path.startswith('20 s from 2026-11-22T05:03:20.000Z, highest ')
-    assert program.begins(chosen) == 1_795_323_800 * 10**9
+    assert Plan(chosen).begins() == 1_795_323_800 * 10**9
     with pytest.raises(ValueError, match='--start file: the target of uav_flyby has no date'):
-        program.begins(scenario.load('uav_flyby'))
+        Plan(scenario.load('uav_flyby')).begins()

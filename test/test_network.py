@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import graph, processes, scenario, supervisor
+from pedestal_bringup.run import processes, scenario, supervisor
+from pedestal_bringup.run.start import begins, parameters_of_all
 from pedestal_common.steps import SECOND
 
 
@@ -124,8 +125,8 @@ def cut(hosts, tmp_path_factory, reserve_domain):
     chosen = scenario.load('leo_pass', pacing='realtime',
                            overrides=['acu.resume_time=15', f'adu.command_timeout={TIMEOUT}'])
     supervisor.prepare(chosen)
-    start, bag, file = graph.begins(chosen), folder / 'bag', folder / 'parameters.yaml'
-    file.write_text(graph.parameters_of_all(chosen, bag, start))
+    begin, bag, file = begins(chosen), folder / 'bag', folder / 'parameters.yaml'
+    file.write_text(parameters_of_all(chosen, bag, begin))
     (folder / 'bag.log').mkdir()
     started = [hosts.start('far' if node == 'acu' else 'near',
                            processes.command_line(node, chosen.row(node).module, file), folder / f'{node}.log',
@@ -147,7 +148,7 @@ def cut(hosts, tmp_path_factory, reserve_domain):
     time.sleep(FOLLOWED)
     times = []
     for seconds in CUTS:
-        times.append([(moment - start) / SECOND for moment in hosts.cut(seconds)])
+        times.append([(moment - begin) / SECOND for moment in hosts.cut(seconds)])
         time.sleep(FOLLOWED)
     for process in started:
         process.terminate()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.verify import verify
 from pedestal_common import commands, messages, nodes
 
@@ -57,7 +58,7 @@ def test_a_run_goes_at_the_pace_of_the_clock(run):
     rows = {row['metric']: row['value'] for row in json.loads(run.json.read_text())['rows']}
     assert 0.0 < rows['realtime_factor'] < 1.02
     assert rows['lost_steps'] > 200
-    assert verify(run.bag).complete
+    assert verify(load(run.bag)).complete
 
 
 def test_who_has_a_step_to_make_goes_first(run):

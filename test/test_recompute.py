@@ -12,6 +12,7 @@ from pedestal_bringup import cli
 from pedestal_bringup.again import difference, recompute, recompute_report
 from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.bags import bag as bags
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.bags.writer import Writer as BagWriter
 from pedestal_common import messages, topics
@@ -226,7 +227,7 @@ def test_a_recording_from_before_the_truth_is_read_by_its_encoders(runs, rewrite
     """Every verb that reads the truth of the dish takes joint_states for it and says so. The receiver then errs by the
     counts of the encoders."""
     path = rewrite(runs['leo'].bag, lambda rows: rows, without=('adu/truth',))
-    assert verify(path).finished
+    assert verify(load(path)).finished
     old, whole = (results.measured(results.of_tracking(tracking.read(bags.read(bag)))) for bag in (
         path, runs['leo'].bag))
     assert not any(name.startswith('encoder_') for name in old)

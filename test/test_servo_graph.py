@@ -6,7 +6,7 @@ import pytest
 
 from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.studies import servo
-from pedestal_bringup.studies.rigs.cases import Case
+from pedestal_bringup.trials.cases import Case
 
 ALLOWED = 1e-6
 """Largest difference between a run of the nodes and the study [rad, rad/s]."""

@@ -32,7 +32,7 @@ def track(name, *overrides):
 def pointing(name, *overrides):
     """Pointing error [deg] rms of a scenario."""
     _, run, on = track(name, *overrides)
-    return math.degrees(tracking.rms(run.truth['error'][on]))
+    return math.degrees(tracking.known_rms(run.truth['error'][on]))
 
 
 def isolated(name, *overrides):
@@ -117,7 +117,7 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     lost = off > 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
     loss = np.sum(lost[first:] & (t[first:] > t[first] + tracking.SETTLING)) * 0.005
     assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 10.0
-    assert math.degrees(tracking.rms(off[t > plan['t2'] + 3.0])) < 0.02
+    assert math.degrees(tracking.known_rms(off[t > plan['t2'] + 3.0])) < 0.02
     rate = run['acu/rate_command']['velocity'][first:, 0]
     assert abs(rate).max() <= chosen.node_parameters('acu').azimuth.limits.rate + 1e-12
 

@@ -13,6 +13,7 @@ class Mode(typing.NamedTuple):
     the expected place of the target; fallback: the mode it falls back on when its target ends, of `program` the mode
     whose table was followed last; handover: the mode it hands over to by itself, once that can be entered. Both are
     names, '' for none. table: it follows a table of directions; pinned: the stow pins may be in.
+    predicted: the method of prediction.Predictor that makes its table; button: the page has one among the modes.
     """
     name: str
     doc: str
@@ -24,29 +25,32 @@ class Mode(typing.NamedTuple):
     handover: str = ''
     table: bool = False
     pinned: bool = False
+    predicted: str = ''
+    button: bool = True
 
 
 TABLE = (
     Mode('standby', 'rate command 0', 'always; after a fault'),
-    Mode('stop', 'the axes stand where they come to rest', 'encoders valid'),
+    Mode('stop', 'the axes stand where they come to rest', 'encoders valid', button=False),
     Mode('stow', 'the stow angles; with `stow_pins` the pins go in once the axes stand there',
          'encoders valid, angles inside the limits', pinned=True),
     Mode('unstow', 'rate command 0; the stow pins go out', 'encoders valid, a stow pin is not out',
          'to `standby` when both are out', pinned=True),
     Mode('preset', 'the preset angles', 'encoders valid, angles inside the limits'),
-    Mode('rate', 'the rates of the last ask `rate`, for 0.5 s; nobody asks again: the axes stand', 'encoders valid'),
+    Mode('rate', 'the rates of the last ask `rate`, for 0.5 s; nobody asks again: the axes stand', 'encoders valid',
+         button=False),
     Mode('slave', 'the direction of the last ask `slave`, in earth angles, moved on by its rates',
          'a direction was given and holds, 1 s by default', 'to `stop` when it holds no longer',
-         follows=True, fallback='stop'),
+         follows=True, fallback='stop', button=False),
     Mode('program', 'the time-tagged table', 'the table is there, valid now and inside the limits',
          'to `autotrack` after `lock_count` accepted errors; to `standby` past its end, or where rows are missing',
          follows=True, handover='autotrack', table=True),
     Mode('tle', 'a satellite by its elements', 'there are elements, not older than `prediction.oldest`; the satellite '
          'is above the horizon and inside the limits',
          'to `autotrack` after `lock_count` accepted errors; to `standby` when it has set',
-         follows=True, handover='autotrack', table=True),
+         follows=True, handover='autotrack', table=True, predicted='satellite'),
     Mode('sun', 'the sun, to calibrate the pointing', 'the sun is above the horizon and inside the limits',
-         'to `standby` when it has set', follows=True, table=True),
+         'to `standby` when it has set', follows=True, table=True, predicted='sun'),
     Mode('autotrack', 'the filtered target, through short losses the prediction of the filter',
          'receiver locked, filter converged',
          'after `coast_time` without an error, or once the estimate is uncertain by half a beamwidth, to the fallback '

@@ -20,11 +20,13 @@ from acu_tracker.servo.params import (
 )
 from acu_tracker.servo.position_loop import CONTROLLERS
 from acu_tracker.verbs import POINTS_DOC, VERBS, points
+from pedestal_common import nodes
 from pedestal_common.blockage import DOC as SECTORS_DOC
 from pedestal_common.blockage import sectors
 from pedestal_common.commands import SCHEDULE_DOC, schedule
+from pedestal_common.graph_parameters import topic_flags
 from pedestal_common.lever_arm import LeverArm
-from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
+from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,7 +70,7 @@ class ElevationParameters(AxisParameters):
 
 
 @dataclasses.dataclass(frozen=True)
-class SharedParameters(Parameters):
+class SharedParameters(topic_flags(nodes.row('acu').reads)):
     """What belongs to no axis alone."""
 
     period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')
@@ -80,11 +82,7 @@ class SharedParameters(Parameters):
     command_delay: float = parameter(0.0, 0.0, 1.0, 's', 'known delay from t_k until the command is in force')
     receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', "known latency of the receiver's errors")
     attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: latency of the attitude')
-    receiver_rate: bool = flag(False, 'the receiver measures the rate of its errors: tracking_receiver/angle_rate')
-    receiver_range: bool = flag(False, 'the receiver measures the range: tracking_receiver/range')
-    ins_error: bool = flag(False, 'the INS tells how its error changes: ins/error, instead of tracker.attitude')
     initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
-    stow_pins: bool = flag(False, 'the drive has stow pins: adu/stow_pins')
     stow_window: float = parameter(1.75e-3, 1e-5, 0.1, 'rad', 'largest distance of an axis from its stow angle at '
                                    'which the pins are asked to go in')
     stow_timeout: float = parameter(20.0, 0.1, 3600.0, 's', 'time within which the pins must be where they were '

@@ -17,7 +17,7 @@ from pedestal_common.geodesy import StationParameters, station_frame
 from pedestal_common.orbit import TargetError
 from pedestal_common.parameters import ParameterError, Parameters, group, parameter, text
 from pedestal_common.reproducible import arctan2, turned
-from pedestal_common.steps import SECOND
+from pedestal_common.steps import DAY, SECOND
 
 ROWS = 2400
 """Of a table."""
@@ -31,13 +31,11 @@ PER_ORBIT = 5400
 SUN_INTERVAL = 30.0
 """Time [s] between two rows of the sun, which moves by 0.13 deg in it."""
 
-SEARCHED = 2.0 * 86400.0
+SEARCHED = 2.0 * DAY
 """Time ahead [s] in which the next rise is looked for."""
 
 LOOK = 20.0
 """Time [s] between two looks for it."""
-
-DAY = 86400.0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -42,7 +42,7 @@ def table(s, c, u, mode, of_all):
     """(NONE or why the table of a mode cannot be followed, signals.PROGRAM if it is bad, else 0)."""
     track = tables.of_mode(of_all, mode)
     if mode != modes.PROGRAM:
-        unpredicted = u.unpredicted[mode - modes.TLE]
+        unpredicted = u.unpredicted[tables.PLACE[mode]]
         if unpredicted != modes.NONE:
             return unpredicted, 0
         if (program_track.status(track, s.stamp) == modes.NONE

@@ -4,7 +4,8 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.motion_models import MODELS
-from pedestal_common import topics
+from acu_tracker.modes import TABLE
+from pedestal_common import inputs, nodes, topics
 from pedestal_common.compiled import compiled
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
@@ -19,23 +20,16 @@ EMERGENCY_STOP, DRIVE_FAULT = DRIVE_STATES.index('emergency stop'), len(DRIVE_ST
 """Codes of adu/state: up to READY the drive follows commands, from DRIVE_FAULT on it tells a fault. A drive that has
 sent none, topics.SILENT, counts as ready."""
 
+TOPICS = nodes.row('acu').reads
+
 INPUTS = np.dtype([
-    ('stamp', 'f8'),                                                            # t_k [s]
-    ('position', 'f8', (2,)), ('velocity', 'f8', (2,)), ('encoder_valid', 'i8'),  # deck azimuth, elevation
-    ('torque', 'f8', (2,)),                                                     # of the motors on the load [Nm]
-    ('error_came', 'i8'), ('error_stamp', 'f8'), ('error_valid', 'i8'),          # valid 0: none came, or unlocked
-    ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
-    ('error_rate', 'f8', (2,)), ('error_rate_sigma', 'f8'),                     # of that error [rad/s]; NaN: none
-    ('range', 'f8'), ('range_variance', 'f8'),                                  # to that target [m], [m2]; NaN: none
-    ('stabilised', 'i8'),                                                       # 1: the pedestal stands on a ship
-    ('attitude_stamp', 'f8'), ('attitude_valid', 'i8'),
-    ('quaternion', 'f8', (4,)), ('deck_rate', 'f8', (3,)),                      # deck -> earth (xyzw); FLU [rad/s]
-    ('attitude_error_came', 'i8'),                      # what the INS says of its error, of roll, pitch, heading:
-    ('attitude_noise', 'f8', (3,)), ('attitude_walk', 'f8', (3,)),              # 1-sigma [rad], [rad/sqrt(s)]
-    ('aligning', 'i8'),                                                         # 1: the INS is still aligning
-    ('drive_ready', 'i8'), ('drive', 'i8'),             # 1: the drive follows the commands; code of DRIVE_STATES
-    ('pins', 'i8'),                                                             # code of adu/stow_pins
-    ('unpredicted', 'i8', (2,)),                         # of the modes tle, sun: NONE or why there is no table
+    *inputs.fields(TOPICS),                             # see the rows of topics.TOPICS
+    ('stamp', 'f8'), ('encoder_valid', 'i8'),                                   # t_k [s]
+    ('error_valid', 'i8'),                                                      # 0: none came, or unlocked
+    ('stabilised', 'i8'), ('attitude_valid', 'i8'),                             # 1: the pedestal stands on a ship
+    ('aligning', 'i8'), ('drive_ready', 'i8'),          # 1: the INS is still aligning; the drive follows the commands
+    ('unpredicted', 'i8', (sum(row.table for row in TABLE),)),    # of the modes that follow a table: NONE or why
+                                                        # there is none
     ('gap', 'i8'), ('turnaround', 'i8'),                # 1: rows of the program are missing here; the last segment
                                                         # was refused because it asked for too fast a turnaround
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles

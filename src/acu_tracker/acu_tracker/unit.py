@@ -5,16 +5,17 @@ import typing
 
 import numpy as np
 
-from acu_tracker import announcement, control_unit, diagnosis, manual, mode_change, modes, signals, supervision
+from acu_tracker import announcement, control_unit, diagnosis, mode_change, modes, signals, supervision
 from acu_tracker.alarms import annunciator, report, table
 from acu_tracker.alarms.desk import Desk
 from acu_tracker.authority import Authority
 from acu_tracker.prediction import Predictor
 from acu_tracker.program import segments, tables
-from acu_tracker.verbs import ALARM_VERBS, VERBS, points
+from acu_tracker.verbs import ALARM_VERBS, TAKEN, VERBS
 from pedestal_common import messages, nodes, topics
 from pedestal_common.commands import Reply, schedule
 from pedestal_common.compiled import compiled
+from pedestal_common.inputs import taking
 from pedestal_common.records import NEVER
 from pedestal_common.unit import NEVER_DUE, Unit, joined
 
@@ -22,8 +23,7 @@ JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'shi
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 COMMAND, ESTIMATE, REFERENCE, FILTER = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/filter'
 MODE, KEYHOLE, BLOCKAGE, ALARMS = 'acu/mode', 'acu/keyhole', 'acu/blockage', 'acu/alarms'
-PROGRAM, DRIVE, INS, INS_ERROR = 'acu/program_track', 'adu/state', 'ins/state', 'ins/error'
-PINS_ASKED, PINS = 'acu/stow_pins', 'adu/stow_pins'
+DRIVE, INS, PINS_ASKED = 'adu/state', 'ins/state', 'acu/stow_pins'
 
 FILTER_SIZE, MODELS = len(topics.FILTER), len(topics.MOTION_MODELS)
 """Numbers of an axis on acu/filter; the last of them are the probabilities of the motion models."""
@@ -48,40 +48,24 @@ class Memory(typing.NamedTuple):
     tables: tables.Tables
 
 
+_take = taking(signals.TOPICS)
+
+
 @compiled
 def decode(u, stamp, inputs):
     """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next. A rate or a
     range is used only with the error of its own stamp."""
-    joints, error, attitude = inputs[JOINTS], inputs[ERRORS], inputs[ATTITUDE]
-    rate, distance = inputs[RATE], inputs[RANGE]
-    u.stamp = stamp * 1e-9
-    for i in range(2):
-        u.position[i], u.velocity[i], u.torque[i] = joints.position[i], joints.velocity[i], joints.effort[i]
-    u.encoder_valid = 1
-    u.error_came, u.error_valid = error.stamp != NEVER, 0
-    if error.stamp != NEVER:
-        x, y, cn0_dbhz = error.vector[0], error.vector[1], error.vector[2]
-        u.error_valid = 1 if x == x else 0
-        u.error_stamp = error.stamp * 1e-9
-        u.cross_elevation, u.elevation, u.cn0_dbhz = x, y, cn0_dbhz
-    u.error_rate[0] = u.error_rate[1] = u.range = math.nan
-    if rate.stamp != NEVER and rate.stamp == error.stamp:
-        u.error_rate[0], u.error_rate[1], u.error_rate_sigma = rate.vector[0], rate.vector[1], rate.vector[2]
-    if distance.stamp != NEVER and distance.stamp == error.stamp:
-        u.range, u.range_variance = distance.range[0], distance.variance[0]
-    if attitude.stamp != NEVER:
-        u.attitude_stamp = attitude.stamp * 1e-9
+    _take(u, inputs)
+    error, rate, distance = inputs[ERRORS], inputs[RATE], inputs[RANGE]
+    u.stamp, u.encoder_valid = stamp * 1e-9, 1
+    u.error_valid = 1 if u.error_came and u.cross_elevation == u.cross_elevation else 0
+    if rate.stamp == NEVER or rate.stamp != error.stamp:
+        u.error_rate[0] = u.error_rate[1] = math.nan
+    if distance.stamp == NEVER or distance.stamp != error.stamp:
+        u.range = math.nan
+    if inputs[ATTITUDE].stamp != NEVER:
         u.attitude_valid = 1
-        for i in range(4):
-            u.quaternion[i] = attitude.orientation[i]
-        for i in range(3):
-            u.deck_rate[i] = attitude.angular_velocity[i]
-    u.attitude_error_came = inputs[INS_ERROR].stamp != NEVER
-    if u.attitude_error_came:
-        for i in range(3):
-            u.attitude_noise[i], u.attitude_walk[i] = inputs[INS_ERROR].position[i], inputs[INS_ERROR].velocity[i]
-    u.drive, u.aligning = inputs[DRIVE], inputs[INS] == ALIGNING
-    u.drive_ready, u.pins = u.drive <= signals.READY, inputs[PINS]
+    u.aligning, u.drive_ready = inputs[INS] == ALIGNING, u.drive <= signals.READY
 
 
 @compiled
@@ -184,10 +168,6 @@ class Acu(Unit):
         self.desk.prepare()
         self.diagnose()
 
-    def latency(self, topic):
-        """Age [s] of a topic's stamp at a step: attitude_latency or receiver_latency."""
-        return self.parameters.attitude_latency if topic in (ATTITUDE, INS_ERROR) else self.parameters.receiver_latency
-
     def configure(self, parameters):
         """Take other values of LIVE parameters into the constants; the state stays."""
         super().configure(parameters)
@@ -245,17 +225,17 @@ class Acu(Unit):
         predicted, all of them shifted by the offset."""
         stamp = self.now if stamp is None else int(stamp)
         inputs, t = self.parts['inputs'], stamp * 1e-9
-        for mode, predict in ((modes.TLE, self.predictor.satellite), (modes.SUN, self.predictor.sun)):
-            known = self.predicted.get(mode)
-            if known is None or not known.since <= t < known.until:
-                known = self.predicted[mode] = predict(t)
-            inputs['unpredicted'][mode - modes.TLE] = known.reason
+        for place, row in enumerate(tables.FOLLOWED):
+            known = self.predicted.get(row.name)
+            if row.predicted and (known is None or not known.since <= t < known.until):
+                known = self.predicted[row.name] = getattr(self.predictor, row.predicted)(t)
+            inputs['unpredicted'][place] = known.reason if known else modes.NONE
         piece, inputs['gap'], ends = self.segments.at(t - self.offset[0])
         until = min(ends + self.offset[0], *(known.until for known in self.predicted.values()))
         self._laid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE
         self.memory = self.memory._replace(tables=tables.Tables(*(
-            tables.shifted(track, self.offset) for track in (piece, *(known.track for known in (
-                self.predicted[modes.TLE], self.predicted[modes.SUN]))))))
+            tables.shifted(self.predicted[row.name].track if row.predicted else piece, self.offset)
+            for row in tables.FOLLOWED)))
 
     def take_text(self, topic, text):
         """Take a text topic; the drive's state is kept for the diagnosis."""
@@ -296,10 +276,11 @@ class Acu(Unit):
             self.lay_tables()
             return Reply(True, 'program track shifted by {:g} s, {:g} and {:g} rad'.format(*self.offset))
         if verb == 'elements':
-            self._take_elements(*arguments.values())
+            self.take_elements(*arguments.values())
             return Reply(True, f'elements of satellite {self.predictor.number}')
         before, predictor = {name: state[name].copy() for name in ('preset', 'manual', 'slave')}, self.predictor
-        self._take_arguments(verb, arguments)
+        if verb in TAKEN:
+            TAKEN[verb](self, arguments)
         reply = self.request(f'acu/{verb}')
         if not reply.granted:
             for name, value in before.items():
@@ -309,32 +290,10 @@ class Acu(Unit):
                 self.lay_tables()
         return reply
 
-    def _take_elements(self, line_1, line_2):
+    def take_elements(self, line_1, line_2):
         """Predict by other elements, in whose lines _ stands for a blank. Raises ValueError."""
         self._predict_by(self.predictor.by(line_1.replace('_', ' '), line_2.replace('_', ' ')))
         self.lay_tables()
-
-    def _take_arguments(self, mode, arguments):
-        """What a mode is asked for with. Raises ValueError."""
-        state = self.parts['state']
-        if mode == 'preset':
-            angles = [arguments[axis] for axis in topics.AXES]
-            if arguments['point']:
-                named = points(self.parameters.points)
-                if arguments['point'] not in named:
-                    raise ValueError(f'point = {arguments["point"]}: must be one of {", ".join(named) or "none"}')
-                angles = named[arguments['point']]
-            preset = state['preset']
-            preset['angle'] = np.where(np.isfinite(angles), angles, preset['angle'])
-            preset['stamp'], preset['moves'], preset['rate'] = state['stamp'], arguments['moves'], _rates(arguments)
-        elif mode == 'rate':
-            state['manual']['asked'] = [arguments[axis] for axis in topics.AXES]
-            state['manual']['until'] = state['stamp'] + manual.DEAD_MAN
-        elif mode == 'tle' and any(arguments.values()):
-            self._take_elements(*arguments.values())
-        elif mode == 'slave':
-            state['slave'] = (state['stamp'], [arguments[axis] for axis in topics.AXES], _rates(arguments),
-                              arguments['moves'], arguments['holds'])
 
     def admit(self, command):
         """Raise ValueError where somebody else is in control."""
@@ -414,11 +373,6 @@ class Acu(Unit):
         if not np.isfinite(numbers[ERRORS][:, 0]).any():
             return 'the receiver never locked'
         return '' if 'autotrack' in numbers[MODE] else 'the ACU was never in autotrack'
-
-
-def _rates(arguments):
-    """The rates (2,) [rad/s] among the arguments of a command."""
-    return [arguments[f'{axis}_rate'] for axis in topics.AXES]
 
 
 def rows(message):

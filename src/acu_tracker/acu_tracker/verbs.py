@@ -1,6 +1,8 @@
 """What can be asked of the control unit on acu/command: the modes with their arguments, and what is beside them."""
 import math
 
+import numpy as np
+
 from acu_tracker.alarms.annunciator import LONGEST_SHELVED
 from acu_tracker.authority import ROLES
 from acu_tracker.manual import DEAD_MAN
@@ -70,3 +72,42 @@ def points(text) -> dict:
             raise ParameterError(f'points = {part!r}: each name once, angles -20 to 20 rad')
         named[name] = azimuth, elevation
     return named
+
+
+def _rates(arguments):
+    """Return the rates (2,) [rad/s] among the arguments of a command."""
+    return [arguments[f'{axis}_rate'] for axis in AXES]
+
+
+def _take_preset(unit, arguments):
+    angles = [arguments[axis] for axis in AXES]
+    if arguments['point']:
+        named = points(unit.parameters.points)
+        if arguments['point'] not in named:
+            raise ValueError(f'point = {arguments["point"]}: must be one of {", ".join(named) or "none"}')
+        angles = named[arguments['point']]
+    state = unit.parts['state']
+    preset = state['preset']
+    preset['angle'] = np.where(np.isfinite(angles), angles, preset['angle'])
+    preset['stamp'], preset['moves'], preset['rate'] = state['stamp'], arguments['moves'], _rates(arguments)
+
+
+def _take_rate(unit, arguments):
+    state = unit.parts['state']
+    state['manual']['asked'] = [arguments[axis] for axis in AXES]
+    state['manual']['until'] = state['stamp'] + DEAD_MAN
+
+
+def _take_slave(unit, arguments):
+    state = unit.parts['state']
+    state['slave'] = (state['stamp'], [arguments[axis] for axis in AXES], _rates(arguments), arguments['moves'],
+                      arguments['holds'])
+
+
+def _take_tle(unit, arguments):
+    if any(arguments.values()):
+        unit.take_elements(*arguments.values())
+
+
+TAKEN = {'preset': _take_preset, 'rate': _take_rate, 'slave': _take_slave, 'tle': _take_tle}
+"""{mode: function (unit.Acu, its arguments) that takes what it is asked for with}; each raises ValueError."""

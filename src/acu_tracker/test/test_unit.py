@@ -5,7 +5,7 @@ import pytest
 from acu_tracker.modes import MODES
 from acu_tracker.params import AcuParameters
 from acu_tracker.prediction import PredictionParameters
-from acu_tracker.unit import COMMAND, DRIVE, JOINTS, MODE, PROGRAM, Acu
+from acu_tracker.unit import COMMAND, DRIVE, JOINTS, MODE, Acu
 from pedestal_common import messages, records, topics
 from pedestal_common.commands import Command
 
@@ -77,8 +77,8 @@ def test_what_an_operator_waits_for_is_urgent():
 
 
 def test_a_program_track_without_the_axes_is_refused():
-    message = messages.template(PROGRAM)
+    message = messages.template('acu/program_track')
     message.joint_names = ['azimuth', 'polarisation']
     with pytest.raises(ValueError, match='must hold azimuth and elevation'):
-        Acu(AcuParameters(), ()).decode(PROGRAM, message)
+        Acu(AcuParameters(), ()).decode('acu/program_track', message)
     assert records.is_text(MODE)

@@ -5,17 +5,17 @@ from adu_drive import axis
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import schedule, spoil, table
 
-(MOTOR_LOSS, ENCODER_JUMP, ENCODER_STUCK, BRAKE_STUCK, LOST_TOOTH, GUST, PIN_STUCK, DROP, DELAY, FREEZE, BIAS, NAN,
- NOISE) = (table.code('adu', name) for name in (
-     'motor_loss', 'encoder_jump', 'encoder_stuck', 'brake_stuck', 'lost_tooth', 'gust', 'pin_stuck', 'drop', 'delay',
-     'freeze', 'bias', 'nan', 'noise'))
+MESSAGES = spoil.codes('adu')
+MOTOR_LOSS, ENCODER_JUMP, ENCODER_STUCK, BRAKE_STUCK, LOST_TOOTH, GUST, PIN_STUCK, DELAY, BIAS = (
+    table.code('adu', name) for name in ('motor_loss', 'encoder_jump', 'encoder_stuck', 'brake_stuck', 'lost_tooth',
+                                         'gust', 'pin_stuck', 'delay', 'bias'))
 
 STUCK = axis.STUCK_ON, axis.STUCK_OFF
 """By the option of brake_stuck."""
 
-INJECTED = np.dtype([('drop', 'i8'), ('bias', 'f8', (2,)), ('said', spoil.SPOILT)], align=True)
-"""drop: 1 while no command is heard; bias: of the rates on joint_states [rad/s]; said: what spoils joint_states and,
-frozen, adu/motor_states."""
+INJECTED = np.dtype([('bias', 'f8', (2,)), ('said', spoil.SPOILT)], align=True)
+"""bias: of the rates on joint_states [rad/s]; said: what spoils joint_states and, frozen, adu/motor_states; said.drop
+is 1 while no command is heard."""
 
 JOINTS, MOTORS = 'joint_states', 'adu/motor_states'
 
@@ -33,7 +33,7 @@ def _break(m, fault, values):
     """What a fault does to the records of the drive (unit.RECORD)."""
     i = int(values[0])
     s, c = (m.state.azimuth, m.constants.azimuth) if i == 0 else (m.state.elevation, m.constants.elevation)
-    e = m.injected
+    spoil.apply(m.injected.said, MESSAGES, fault, values)
     if fault == MOTOR_LOSS:
         s.motor_lost[int(values[1])] = 1
     elif fault == ENCODER_JUMP:
@@ -48,18 +48,10 @@ def _break(m, fault, values):
         s.gust += values[1]
     elif fault == PIN_STUCK:
         m.state.pins.stuck[i] = 1
-    elif fault == DROP:
-        e.drop = 1
     elif fault == DELAY:
         m.state.late_ticks = round(values[0] / m.constants.period * m.constants.speed_ticks)
-    elif fault == FREEZE:
-        e.said.freeze = 1
     elif fault == BIAS:
-        e.bias[i] += values[1]
-    elif fault == NAN:
-        e.said.nan = 1
-    elif fault == NOISE:
-        e.said.sigma, e.said.seed = values[0], int(values[1])
+        m.injected.bias[i] += values[1]
 
 
 @compiled
@@ -69,7 +61,7 @@ def take(m, stamp):
     _mend(m.state.azimuth)
     _mend(m.state.elevation)
     spoil.restore(e.said)
-    m.state.late_ticks = e.drop = m.state.pins.stuck[0] = m.state.pins.stuck[1] = 0
+    m.state.late_ticks = m.state.pins.stuck[0] = m.state.pins.stuck[1] = 0
     e.bias[0] = e.bias[1] = 0.0
     schedule.begin(m.schedule)
     for i in range(schedule.SLOTS):

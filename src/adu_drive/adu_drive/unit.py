@@ -103,7 +103,7 @@ def listen(m, stamp, inputs):
     if m.link.stamp == NEVER:
         m.state.k = stamp // m.link.period
         return False
-    decode(m.inputs, m.link, m.injected.drop, inputs[COMMAND], inputs[SHIP])
+    decode(m.inputs, m.link, m.injected.said.drop, inputs[COMMAND], inputs[SHIP])
     m.inputs.pins = inputs[PINS_ASKED]
     return True
 

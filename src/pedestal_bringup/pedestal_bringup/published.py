@@ -10,6 +10,7 @@ import pathlib
 import sys
 
 from pedestal_bringup import claims, console, studies
+from pedestal_bringup.analysis.intervals import missed
 from pedestal_bringup.studies import (
     acquisition,
     alignment,
@@ -24,7 +25,6 @@ from pedestal_bringup.studies import (
 )
 from pedestal_bringup.studies.rigs.feedforward_loop import REVERSALS
 from pedestal_bringup.studies.rigs.profiles import PROFILES
-from pedestal_bringup.studies.rigs.rows import missed
 from pedestal_bringup.trials import monte_carlo
 
 FILE = 'docs/rows.json'

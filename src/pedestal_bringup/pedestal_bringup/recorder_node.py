@@ -227,7 +227,7 @@ class RecorderNode(shell.Shell):
         if stamp is None:
             return
         if self.graph.lockstep and stamp // SECOND > self._stamp // SECOND:
-            self._publish_diagnostics()
+            self.diagnostics.publish(self._stamp)
         self._stamp = stamp
         if self._end is not None and stamp - self.epoch(stamp) >= self._end:
             self.finished = True

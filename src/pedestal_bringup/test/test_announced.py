@@ -3,11 +3,12 @@ import re
 
 import pytest
 
-from pedestal_bringup.run import program, scenario
+from pedestal_bringup.run import scenario
+from pedestal_bringup.run.program import Plan
 
 
 def lines(name, duration):
-    return program.announced(scenario.load(name, duration=duration))
+    return Plan(scenario.load(name, duration=duration)).announced()
 
 
 def test_a_run_as_long_as_its_scenario_says_when_the_satellite_is_highest():

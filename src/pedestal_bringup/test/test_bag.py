@@ -10,6 +10,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from pedestal_bringup.bags import bag, columns
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.bags.writer import Writer
 from pedestal_common import commands, messages, nodes, topics
@@ -175,7 +176,7 @@ def test_configuration_comes_back_and_is_indexed(tmp_path):
 def test_a_bag_that_does_not_say_how_it_was_made_is_no_gap(recording):
     content = bag.read(recording)
     assert content.configuration == {'scenario': '', 'parameters': {}}
-    report = verify(recording)
+    report = verify(load(recording))
     assert report.complete and report.made == 'made by: not said in the bag, it holds no configuration'
     assert report.made in report.lines()
 
@@ -361,7 +362,7 @@ def test_a_bag_that_is_being_written_is_refused(tmp_path):
 
 
 def test_verify_accepts_a_whole_run_with_a_delayed_topic(recording, rows):
-    report = verify(recording)
+    report = verify(load(recording))
     assert report.complete, report.lines()
     assert report.steps == 450 and report.period == 0.005
     assert {check.name: check.count for check in report.topics} == counts(rows)
@@ -389,7 +390,7 @@ FAULTS = {
 
 @pytest.mark.parametrize('line', FAULTS)
 def test_verify_names_the_gap(tmp_path, rows, line):
-    report = verify(write(tmp_path / 'b', FAULTS[line](rows)))
+    report = verify(load(write(tmp_path / 'b', FAULTS[line](rows))))
     assert not report.complete
     problems = [problem for check in report.topics for problem in check.problems]
     assert len(problems) == 1 and problems[0].startswith(line)
@@ -401,7 +402,7 @@ def test_verify_finds_swapped_messages(tmp_path, rows):
     swapped = list(rows)
     a, b = places[20], places[21]
     swapped[a], swapped[b] = rows[b], rows[a]
-    report = verify(write(tmp_path / 'b', swapped))
+    report = verify(load(write(tmp_path / 'b', swapped)))
     problems = [problem for check in report.topics for problem in check.problems]
     assert problems == ['1 stamps go back, the first from 0.105000 to 0.100000 s']
 
@@ -413,30 +414,30 @@ def test_verify_finds_what_the_recorder_lost(tmp_path, rows):
             writer.skip(NAMES.index('clock'), 3)
         writer.write(NAMES.index(name), stamp, stamp, data)
     writer.close()
-    assert any('sequence numbers say that 3 were lost' in line for line in verify(tmp_path / 'b').lines())
+    assert any('sequence numbers say that 3 were lost' in line for line in verify(load(tmp_path / 'b')).lines())
 
 
 def test_verify_finds_damage_and_wrong_counts(tmp_path, rows, recording):
     path = write(tmp_path / 'b', rows)
     text = (path / 'metadata.yaml').read_text()
     (path / 'metadata.yaml').write_text(text.replace('message_count: 450', 'message_count: 449', 1))
-    assert verify(path).problems == ['metadata.yaml counts 449 of clock where 450 are']
+    assert verify(load(path)).problems == ['metadata.yaml counts 449 of clock where 450 are']
     (path / 'metadata.yaml').write_text(': [')
-    assert verify(path).problems[0].startswith('metadata.yaml cannot be read')
+    assert verify(load(path)).problems[0].startswith('metadata.yaml cannot be read')
     (path / 'metadata.yaml').unlink()
-    assert verify(path).problems == ['metadata.yaml is missing']
+    assert verify(load(path)).problems == ['metadata.yaml is missing']
     file = path / 'b_0.mcap'
     file.write_bytes(file.read_bytes()[:file.stat().st_size // 2])
-    report = verify(path)
+    report = verify(load(path))
     assert not report.complete and 'inside a record' in report.problems[0]
     assert 0 < sum(check.count for check in report.topics) < len(rows)
 
 
 def test_verify_of_nothing(tmp_path):
-    report = verify(write(tmp_path / 'b', []))
+    report = verify(load(write(tmp_path / 'b', [])))
     assert not report.complete and report.steps == 0
     with pytest.raises(bag.BagError):
-        verify(pathlib.Path(tmp_path / 'none'))
+        verify(load(pathlib.Path(tmp_path / 'none')))
 
 
 def test_a_disk_that_takes_a_chunk_partly_leaves_a_whole_bag_without_a_hole(tmp_path, rows):
@@ -467,7 +468,7 @@ def test_a_disk_that_takes_a_chunk_partly_leaves_a_whole_bag_without_a_hole(tmp_
     assert errors == [f'{tmp_path}/b/b_0.mcap: No space left on device']
     assert [row[:2] + row[3:] for row in bag.read(tmp_path / 'b').raw()] == [
         row for row in rows if row[1] < 1_000_000_000]
-    assert not verify(tmp_path / 'b').problems
+    assert not verify(load(tmp_path / 'b')).problems
     with open(writer.file, 'rb') as stream:
         reader = make_reader(stream, validate_crcs=True)
         assert len(list(reader.iter_messages())) == reader.get_summary().statistics.message_count == writer.messages

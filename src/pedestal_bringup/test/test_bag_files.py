@@ -9,6 +9,7 @@ import pytest
 
 from pedestal_bringup import cli
 from pedestal_bringup.bags import bag
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.recover import recover
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.bags.writer import Writer
@@ -68,7 +69,7 @@ def test_the_files_are_read_in_their_order(restarted, rows):
     assert [file.name for file in content.files] == [f'run_{k}.mcap' for k in range(4)]
     assert list(content.raw()) == expected
     assert list(content.raw('clock')) == [row for row in expected if row[0] == 'clock']
-    report = verify(restarted)
+    report = verify(load(restarted))
     assert not any('sequence' in problem for check in report.topics for problem in check.problems)
     *killed, away = report.problems
     assert [line.partition(':')[0] for line in killed] == ['run_0.mcap', 'run_2.mcap']
@@ -89,7 +90,7 @@ def test_recover_makes_one_file_of_them(restarted):
     found = recover(restarted)
     whole = bag.read(found.path)
     assert list(whole.raw()) == list(bag.read(restarted).raw()) and len(whole.files) == 1
-    assert not any('sequence' in problem for check in verify(found.path).topics for problem in check.problems)
+    assert not any('sequence' in problem for check in verify(load(found.path)).topics for problem in check.problems)
     assert found.lines()[0] == 'nothing is missing'
 
 
@@ -99,7 +100,7 @@ def test_a_broken_file_in_the_middle_is_said_and_recovered(restarted):
     (restarted / 'run_1.mcap').write_bytes(data)
     with pytest.raises(bag.BagError, match='run_1.mcap: broken record.*`pedestal recover`'):
         bag.read(restarted)
-    assert verify(restarted).problems[-1].startswith('metadata.yaml counts')
+    assert verify(load(restarted)).problems[-1].startswith('metadata.yaml counts')
     found = recover(restarted)
     assert found.gaps[0].line().startswith('bytes ') and ' of run_1.mcap unused (a corrupted chunk)' in \
         found.gaps[0].line()
@@ -132,7 +133,7 @@ def test_an_empty_file_of_a_recorder_that_died_at_once_is_replaced(rows, tmp_pat
 @pytest.mark.parametrize('pacing', ['realtime', 'lockstep'])
 def test_an_aborted_run_is_no_finished_one(rows, tmp_path, capsys, pacing):
     record(tmp_path / 'run', rows, 0, 2, metadata={**METADATA, 'pacing': pacing})
-    report = verify(tmp_path / 'run')
+    report = verify(load(tmp_path / 'run'))
     assert report.complete and report.aborted and not report.finished
     assert cli.main(['verify', str(tmp_path / 'run')]) == 1
     *_, ending, last = capsys.readouterr().out.splitlines()
@@ -143,7 +144,7 @@ def test_an_aborted_run_is_no_finished_one(rows, tmp_path, capsys, pacing):
 
 def test_a_run_that_came_to_its_end_is_finished(rows, tmp_path, capsys):
     record(tmp_path / 'run', rows, 0, 9)
-    assert verify(tmp_path / 'run').finished
+    assert verify(load(tmp_path / 'run')).finished
     assert cli.main(['verify', str(tmp_path / 'run')]) == 0
     assert 'abort' not in capsys.readouterr().out
 
@@ -162,7 +163,8 @@ def test_steps_that_the_drive_lost_are_said(tmp_path):
         writer.write(NAMES.index('diagnostics'), 500_000_000, 0, diagnostics('adu', **values))
     writer.write(NAMES.index('diagnostics'), 500_000_000, 0, diagnostics('acu', lost_steps='9', step='9'))
     writer.close()
-    assert 'lost steps: 53 of 101, made by the drive without the command for them' in verify(tmp_path / 'run').lines()
+    report = verify(load(tmp_path / 'run'))
+    assert 'lost steps: 53 of 101, made by the drive without the command for them' in report.lines()
 
 
 def test_times_are_those_of_the_scenario(rows, tmp_path):
@@ -174,7 +176,7 @@ def test_times_are_those_of_the_scenario(rows, tmp_path):
             data = data[:4] + struct.pack('<iI', *divmod(start + stamp, SECOND)) + data[12:]
             writer.write(index, start + stamp, start + stamp, data)
     writer.close()
-    content, report = bag.read(tmp_path / 'run'), verify(tmp_path / 'run')
+    content, report = bag.read(tmp_path / 'run'), verify(load(tmp_path / 'run'))
     assert (content.start, content.planned_end) == (start, start + 4 * SECOND)
     assert content.table('joint_states')['t'][-1] == 1.995
     assert report.ending == 'aborted: ends at 1.995000 s, planned end 4.000000 s'
@@ -184,5 +186,5 @@ def test_times_are_those_of_the_scenario(rows, tmp_path):
 
 @pytest.mark.parametrize('name', ['leo_pass', 'servo_sine', 'servo_step', 'ship_pass', 'uav_flyby'])
 def test_a_recording_of_an_earlier_version_is_finished(name):
-    report = verify(pathlib.Path(__file__).parents[3] / 'bags' / 'reference' / name)
+    report = verify(load(pathlib.Path(__file__).parents[3] / 'bags' / 'reference' / name))
     assert report.finished and report.planned_end == report.end, report.lines()

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from adu_drive.params import AduParameters
+from pedestal_bringup.analysis import tracking
 from pedestal_bringup.studies import bode
-from pedestal_bringup.studies.rigs import metrics
+from pedestal_bringup.trials import frequency_response as frequency
 
 PLANT_PERIOD, CURRENT_PERIOD, SPEED_PERIOD = 5e-5, 1e-4, 5e-4
 
@@ -161,7 +162,7 @@ def margins_agree(measured, loop, lowest):
     f = np.geomspace(lowest, 0.45 / loop.dt, 20000)
     gm, pm, _, _, w_pm, _ = control.stability_margins(
         control.frd(model_at(loop, f), 2.0 * math.pi * f, smooth=True), returnall=True)
-    ours = {metric: value for metric, (value, _) in bode.margins(measured).items()}
+    ours = {metric: value for metric, (value, _) in frequency.margins(measured).items()}
     return (ours['crossover_hz'] == pytest.approx(np.min(w_pm) / (2.0 * math.pi), rel=0.01)
             and ours['gain_margin_db'] == pytest.approx(20.0 * math.log10(np.min(gm[gm > 1.0])), abs=1.0)
             and ours['phase_margin_deg'] == pytest.approx(np.min(np.abs(pm)), abs=3.0))
@@ -170,31 +171,31 @@ def margins_agree(measured, loop, lowest):
 def test_current_loops():
     """Around 70 Hz, where rotors swing in the meshes, their voltage is met late: up to 8 % and 3 deg, in the model."""
     p = AduParameters()
-    for name, measured in bode.current(p, dataclasses.replace(bode.CURRENT, kept=3)).items():
+    for name, measured in frequency.current(p, dataclasses.replace(frequency.CURRENT, kept=3)).items():
         m = getattr(p.azimuth, name.partition('/')[2])
         loop = open_current_loop(m, p.azimuth.current_loop.bandwidth)
         assert agrees(measured, loop, 20.0, 4000.0, 0.015, 0.7, lambda f: turning(p.azimuth, f))
-        ours = bode.margins(measured)
+        ours = frequency.margins(measured)
         assert ours['crossover_hz'][0] == pytest.approx(p.azimuth.current_loop.bandwidth, rel=0.01)
         assert ours['phase_margin_deg'][0] == pytest.approx(control.margin(loop)[1], abs=3.0)
 
 
 def test_speed_loops():
     p = AduParameters()
-    for name, measured in bode.speed(p, dataclasses.replace(bode.SPEED, points=60, kept=3)).items():
+    for name, measured in frequency.speed(p, dataclasses.replace(frequency.SPEED, points=60, kept=3)).items():
         loop = open_speed_loop(getattr(p, name.partition('/')[2]))
         assert agrees(measured, loop, 2.0, 300.0, 0.015, 0.7)
         assert margins_agree(measured, loop, 1.0)
 
 
-QUICK = dataclasses.replace(bode.POSITION, points=80)
+QUICK = dataclasses.replace(frequency.POSITION, points=80)
 
 
 def test_position_loops():
     case, axes = bode.CASES['feedforward']
     loaded = case.loaded()
     drive, acu, T = loaded.node_parameters('adu'), loaded.node_parameters('acu'), 5e-3
-    measured = bode.position(case, axes, QUICK)
+    measured = frequency.position(case, axes, QUICK)
     assert set(measured) == {'position/azimuth/feedforward', 'position/elevation/feedforward'}
     for name in axes:
         loop = open_position_loop(getattr(drive, name), pi_controller(getattr(acu, name).feedforward, T), T)
@@ -209,7 +210,7 @@ def test_position_loop_of_the_paper():
     assert c.integral == 0.0
     loop = open_position_loop(loaded.node_parameters('adu').azimuth,
                               pd_controller(c.bandwidth, c.derivative, c.derivative_time, T), T)
-    measured = bode.position(case, axes, QUICK)['position/azimuth/paper-r1']
+    measured = frequency.position(case, axes, QUICK)['position/azimuth/paper-r1']
     assert agrees(measured, loop, 0.5, 40.0, 0.02, 0.7)
     assert margins_agree(measured, loop, 0.25)
 
@@ -224,10 +225,10 @@ def test_flexible_structure_and_the_notch_against_it():
         loop = open_position_loop(loaded.node_parameters('adu').azimuth, pi_controller(acu.feedforward, T), T)
         if acu.notch.frequency > 0.0:
             loop = loop * notch_filter(acu.notch, T)
-        measured = bode.position(case, axes)[f'position/azimuth/{name}']
+        measured = frequency.position(case, axes)[f'position/azimuth/{name}']
         assert agrees(measured, loop, 0.25, 40.0, 0.04, 2.0)
         assert margins_agree(measured, loop, 0.25)
-        ours[name] = {metric: value for metric, (value, _) in bode.margins(measured).items()}
+        ours[name] = {metric: value for metric, (value, _) in frequency.margins(measured).items()}
     assert ours['structure']['phase_margin_deg'] < 20.0 and ours['structure']['gain_margin_db'] < 5.0
     assert ours['structure-notch']['phase_margin_deg'] > 40.0 and ours['structure-notch']['gain_margin_db'] > 10.0
 
@@ -235,14 +236,14 @@ def test_flexible_structure_and_the_notch_against_it():
 def known(loop):
     """A Response that is exact."""
     f = np.geomspace(0.1, 40.0, 200)
-    return bode.Response(f, loop(2j * math.pi * f), np.zeros(len(f)))
+    return frequency.Response(f, loop(2j * math.pi * f), np.zeros(len(f)))
 
 
 def test_margins_of_a_known_loop():
     """4 / (s (s / 5 + 1) (s / 20 + 1)) against python-control; a slower one has neither crossover nor margins."""
     loop = control.tf([4.0], np.polymul([1.0, 0.0], np.polymul([0.2, 1.0], [0.05, 1.0])))
     gm, pm, _, w_pm = control.margin(loop)
-    ours = {metric: value for metric, (value, _) in bode.margins(known(loop)).items()}
+    ours = {metric: value for metric, (value, _) in frequency.margins(known(loop)).items()}
     closed = control.feedback(loop)
     assert ours['gain_margin_db'] == pytest.approx(20.0 * math.log10(gm), abs=0.01)
     assert ours['phase_margin_deg'] == pytest.approx(pm, abs=0.05)
@@ -250,23 +251,23 @@ def test_margins_of_a_known_loop():
     assert ours['bandwidth_hz'] == pytest.approx(control.bandwidth(closed) / (2.0 * math.pi), rel=1e-3)
     assert ours['peak_db'] == pytest.approx(
         20.0 * math.log10(control.system_norm(closed, p='inf')), abs=0.01)
-    slow = bode.margins(known(control.tf([0.1], [1.0, 0.1])))
+    slow = frequency.margins(known(control.tf([0.1], [1.0, 0.1])))
     assert math.isnan(slow['crossover_hz'][0]) and math.isnan(slow['gain_margin_db'][0])
     assert math.isnan(slow['phase_margin_deg'][0])
 
 
 def test_response_of_a_known_filter_and_its_deviation():
     """0.5 y' + 0.25 in front of white noise: the deviation tells how far the measured points lie off."""
-    sweep = bode.Sweep(1.0, 1.0, 400.0, 60, 1, 8, 1.0)
+    sweep = frequency.Sweep(1.0, 1.0, 400.0, 60, 1, 8, 1.0)
     x = sweep.signal(1e-3)
     assert np.abs(x).max() == pytest.approx(1.0)
     y = np.zeros(len(x))
     for k in range(1, len(x)):
         y[k] = 0.5 * y[k - 1] + 0.25 * x[k]
     y += 1e-3 * np.random.default_rng(1).standard_normal(len(x))
-    measured = bode.response(sweep, x, y)
+    measured = frequency.response(sweep, x, y)
     error = np.abs(measured.open_loop / (0.25 / (1.0 - 0.5 * np.exp(-2j * np.pi * measured.frequency * 1e-3))) - 1.0)
-    assert error.max() < 0.02 and 0.5 < metrics.rms(error) / metrics.rms(measured.deviation) < 2.0
+    assert error.max() < 0.02 and 0.5 < tracking.rms(error) / tracking.rms(measured.deviation) < 2.0
 
 
 def test_study_through_the_command_line(tmp_path):

@@ -62,8 +62,9 @@ def test_a_verb_that_computes_nothing_imports_no_compiler(command):
 
 @pytest.mark.parametrize('code, without', [
     ('import pedestal_bringup.recorder_node', {'numba', 'scipy'}),
-    ('from pedestal_bringup.run import graph, scenario; graph.read_tracks(scenario.load("ship_pass"))', {'rclpy'}),
-    ('from pedestal_bringup.run import program, scenario; program.program_messages(scenario.load("leo_pass")); '
+    ('from pedestal_bringup.run import graph, program, scenario; '
+     'graph.read_files(program.Plan(scenario.load("ship_pass")))', {'rclpy'}),
+    ('from pedestal_bringup.run import program, scenario; program.Plan(scenario.load("leo_pass")).tracks; '
      'scenario.load("leo_pass").unit("tracking_receiver").prepare()', {'scipy.linalg'})])
 def test_a_run_imports_before_its_first_step_what_it_needs(code, without):
     done = subprocess.run([sys.executable, '-c', f'{code}; import sys; print({without} & sys.modules.keys())'],

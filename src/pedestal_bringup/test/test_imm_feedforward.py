@@ -10,8 +10,9 @@ from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
 from acu_tracker.estimation import axis_filter
 from acu_tracker.estimation.params import FilterParameters
+from pedestal_bringup.analysis import intervals, tracking
 from pedestal_bringup.studies import imm_feedforward as study
-from pedestal_bringup.studies.rigs import drawing, metrics, rows
+from pedestal_bringup.studies.rigs import drawing
 from pedestal_bringup.studies.rigs import feedforward_loop as loop
 from pedestal_bringup.trials import monte_carlo
 
@@ -95,7 +96,7 @@ def test_noise_of_the_rate_is_the_steady_states():
     K = P @ H.T / (P[0, 0] + R)
     expected = math.degrees(math.sqrt(solve_discrete_lyapunov((np.eye(2) - K @ H) @ F, K @ K.T * R)[1, 1]))
     result = loop.statistics({'cv': ('azimuth', loop.cv(0.5))}, 50, monte_carlo.Pool(1))['cv']
-    assert metrics.rms(result.of('rate_noise_deg_s')) == pytest.approx(expected, rel=0.03)
+    assert tracking.rms(result.of('rate_noise_deg_s')) == pytest.approx(expected, rel=0.03)
 
 
 def test_an_outcome_is_that_of_all_its_runs():
@@ -107,7 +108,7 @@ def test_an_outcome_is_that_of_all_its_runs():
     t, _, period = loop.motion('azimuth')
     assert result.miss_mean == pytest.approx(miss.mean(axis=0), abs=1e-12)
     counts = t >= 0.5 * period
-    assert metrics.rms(result.of('miss_rms_deg')) == pytest.approx(math.degrees(metrics.rms(miss[:, counts])))
+    assert tracking.rms(result.of('miss_rms_deg')) == pytest.approx(math.degrees(tracking.rms(miss[:, counts])))
     assert result.of('miss_peak_deg') == pytest.approx(np.degrees(np.abs(miss[:, counts]).max(axis=1)))
     assert (result.of('miss_rms_deg') < result.of('miss_worst_second_deg')).all()
     assert (result.of('miss_worst_second_deg') < result.of('miss_peak_deg')).all()
@@ -126,7 +127,7 @@ def test_no_row_misses_its_target_but_those_that_are_said_to(result):
         for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state'):
             assert {(f'{axis}/{name}', 'miss_rms_deg'), (f'{axis}/{name}', 'rate_noise_deg_s')} <= named.keys()
     assert sum(row['target'] is not None for row in result.rows) == 15
-    assert [(row['case'], row['metric']) for row in result.rows if rows.missed(row)] == [
+    assert [(row['case'], row['metric']) for row in result.rows if intervals.missed(row)] == [
         (case, 'miss_ratio_to_kalman_cv')
         for case in ('azimuth/drive-imm-default', 'elevation/drive-imm', 'elevation/drive-imm-default')]
 

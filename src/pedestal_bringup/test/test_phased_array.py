@@ -7,9 +7,10 @@ import pytest
 from scipy import linalg
 
 from acu_tracker.estimation.constant_gain import benedict_bordner
+from pedestal_bringup.analysis import intervals, tracking
 from pedestal_bringup.studies import phased_array
 from pedestal_bringup.studies.phased_array import instants, settled
-from pedestal_bringup.studies.rigs import drawing, metrics, rows
+from pedestal_bringup.studies.rigs import drawing, metrics
 from pedestal_bringup.studies.rigs.angle_loop import GRID, LENGTH, Better, Paper, Receiver, received
 from tracking_receiver_sim import monopulse
 
@@ -27,7 +28,7 @@ def values_of(result):
 def test_every_target_is_met(result):
     targets = {(row['case'], row['metric']): row['target'] for row in result.rows if row['target'] is not None}
     assert targets == phased_array.TARGETS
-    assert [row for row in result.rows if rows.missed(row)] == []
+    assert [row for row in result.rows if intervals.missed(row)] == []
 
 
 def test_limits_found_by_bisection_are_those_of_the_eigenvalues(values):
@@ -111,7 +112,7 @@ def test_jitter_is_that_of_the_steady_filter():
     expected = math.sqrt(np.mean([g @ covariance @ g for g in (np.array([1.0, a, a * a / 2]) for a in ahead)]))
     noise = sigma * np.random.default_rng(2).standard_normal(200_000)
     beam, _ = Better(q, sigma).run(np.zeros(200_000), noise)
-    assert metrics.rms(beam[20_000:]) == pytest.approx(expected, rel=0.06)
+    assert tracking.rms(beam[20_000:]) == pytest.approx(expected, rel=0.06)
 
 
 def test_with_the_ins_only_what_the_attitude_is_late_is_left():

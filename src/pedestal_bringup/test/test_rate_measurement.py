@@ -6,8 +6,9 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from acu_tracker.estimation import axis_filter
+from pedestal_bringup.analysis import intervals
 from pedestal_bringup.studies import rate_measurement as study
-from pedestal_bringup.studies.rigs import drawing, metrics, rows
+from pedestal_bringup.studies.rigs import drawing, metrics
 
 T, ALPHA, SIGMA = study.T, study.ALPHA, study.SIGMA
 CASES = [(sigma_a, rate_sigma) for sigma_a in study.SIGMA_A for rate_sigma in study.RATE_SIGMA.values()]
@@ -76,7 +77,7 @@ def result():
 def test_rows(result):
     values = {(row['case'], row['metric']): row['value'] for row in result.rows}
     assert len(values) == len(result.rows)
-    assert [row for row in result.rows if rows.missed(row)] == []
+    assert [row for row in result.rows if intervals.missed(row)] == []
     for name in ('position', 'position-rate'):
         assert values[name, 'rate_bandwidth_hz'] > 1.0 and values[name, 'dynamic_error_0p2hz'] < 0.02
     assert values['position-rate', 'rate_bandwidth_ratio'] == pytest.approx(

@@ -11,6 +11,7 @@ from mcap.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
 
 from pedestal_bringup.bags import bag
+from pedestal_bringup.bags.bag import load
 from pedestal_bringup.bags.recover import recover
 from pedestal_bringup.bags.verify import verify
 from pedestal_bringup.bags.writer import Writer
@@ -57,7 +58,7 @@ def test_twenty_deaths_lose_at_most_the_last_second(tmp_path, made):
         assert file.read_bytes() == before and {entry.name for entry in path.iterdir()} <= {file.name, 'metadata.yaml'}
         lengths.append(len(got))
         if number % 10 < 2:
-            report = verify(found.path)
+            report = verify(load(found.path))
             assert report.complete, report.lines()
             assert 'recovered (0 messages lost in the middle)' in report.made
     assert len(lengths) > 10 and len(set(lengths)) > 5, lengths
@@ -112,7 +113,7 @@ def test_a_chunk_that_is_broken_in_the_middle_is_left_out_and_said(whole, tmp_pa
     assert lines[1].startswith(f'lost in the middle: 200 steps, {total} messages: 200 of clock, ')
     assert lines[2] == 'the recording ends after 6.995000 s, the run was to go on to 20.000000 s'
     assert last.endswith(f'0.000000 to 6.995000 s; {stop - start} bytes unused')
-    problems = [problem for check in verify(found.path).topics for problem in check.problems]
+    problems = [problem for check in verify(load(found.path)).topics for problem in check.problems]
     assert 'missing 200 steps from 3.000000 to 3.995000 s' in problems
 
 

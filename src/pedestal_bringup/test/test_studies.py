@@ -81,7 +81,7 @@ def test_two_loops_fight_at_rest_where_one_does_not(studied):
 
 
 def test_what_misses_its_target_is_marked(done):
-    from pedestal_bringup.studies.rigs.rows import missed
+    from pedestal_bringup.analysis.intervals import missed
     _, folder, result = done
     rows = json.loads((folder / 'rows.json').read_text())['rows']
     assert result.stdout.count('MISSED') == sum(map(missed, rows))

@@ -6,8 +6,10 @@ import pytest
 import yaml
 from scipy import stats
 
+from pedestal_bringup.analysis import intervals, tracking
 from pedestal_bringup.studies import alignment
-from pedestal_bringup.studies.rigs import cases, metrics, rows
+from pedestal_bringup.studies.rigs import metrics
+from pedestal_bringup.trials import cases
 
 T = np.arange(0.0, 3.0, 1e-4)
 
@@ -72,48 +74,48 @@ def test_residual_keeps_all_but_offset_and_fundamental():
     (1.0, '>= 1', True), (1.0, '< 1', False), (13.4, '12 +- 1.5', True), (13.6, '12 +- 1.5', False),
     (0.8683, '0.868 to 0.8695', True), (0.87, '0.868 to 0.8695', False), (None, '<= 1', False)])
 def test_targets(value, target, expected):
-    assert rows.meets(value, target) is expected
+    assert intervals.meets(value, target) is expected
 
 
 def test_a_row_without_a_number_is_null_and_misses():
-    row = rows.row('case', 'metric', math.nan, 's', target='<= 1')
-    assert row['value'] is None and rows.missed(row)
-    assert not rows.missed(rows.row('case', 'metric', 1.0, 's'))
+    row = intervals.row('case', 'metric', math.nan, 's', target='<= 1')
+    assert row['value'] is None and intervals.missed(row)
+    assert not intervals.missed(intervals.row('case', 'metric', 1.0, 's'))
 
 
 def test_the_interval_of_a_mean_is_scipys():
     values = np.random.default_rng(1).normal(3.0, 0.5, 12)
-    mean, low, high = rows.interval(values)
+    mean, low, high = intervals.interval(values)
     expected = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
     assert (mean, low, high) == pytest.approx((values.mean(), *expected), rel=1e-12)
 
 
 def test_nineteen_of_twenty_intervals_hold_the_mean():
     samples = np.random.default_rng(2).normal(1.0, 2.0, (4000, 5))
-    held = [low <= 1.0 <= high for _, low, high in map(rows.interval, samples)]
+    held = [low <= 1.0 <= high for _, low, high in map(intervals.interval, samples)]
     assert np.mean(held) == pytest.approx(0.95, abs=0.012)
 
 
 def test_pseudo_values_of_a_mean_are_the_values_and_of_an_rms_its_jackknife():
     values = [1.0, 4.0, 2.0, 8.0]
-    assert rows.pseudo_values(values, np.mean) == pytest.approx(values)
-    _, low, high = rows.interval(rows.pseudo_values(values, lambda some: metrics.rms(np.array(some))))
-    without = [metrics.rms(np.delete(values, i)) for i in range(4)]
+    assert intervals.pseudo_values(values, np.mean) == pytest.approx(values)
+    _, low, high = intervals.interval(intervals.pseudo_values(values, lambda some: tracking.rms(np.array(some))))
+    without = [tracking.rms(np.delete(values, i)) for i in range(4)]
     error = math.sqrt(3.0 / 4.0 * np.sum(np.square(without - np.mean(without))))
     assert high - low == pytest.approx(2.0 * stats.t.ppf(0.975, 3) * error, rel=1e-12)
 
 
 def test_a_random_row_meets_its_target_with_its_whole_interval():
-    row = rows.row('case', 'metric', np.array([1.0, 2.0, 3.0]), 'deg', target='<= 4')
+    row = intervals.row('case', 'metric', np.array([1.0, 2.0, 3.0]), 'deg', target='<= 4')
     assert (row['value'], row['runs']) == (2.0, 3) and row['ci_low'] < 0.0 < 4.0 < row['ci_high']
-    assert rows.missed(row) and not rows.missed({**row, 'target': '<= 5'})
-    alone = rows.row('case', 'metric', np.array([1.0]), 'deg', target='<= 4')
-    assert (alone['value'], alone['ci_low'], alone['runs']) == (1.0, None, 1) and rows.missed(alone)
+    assert intervals.missed(row) and not intervals.missed({**row, 'target': '<= 5'})
+    alone = intervals.row('case', 'metric', np.array([1.0]), 'deg', target='<= 4')
+    assert (alone['value'], alone['ci_low'], alone['runs']) == (1.0, None, 1) and intervals.missed(alone)
 
 
 def test_a_run_without_a_number_leaves_the_row_without_one():
-    row = rows.row('case', 'metric', np.array([1.0, math.nan]), 's', target='<= 4')
-    assert row['value'] is None and rows.missed(row)
+    row = intervals.row('case', 'metric', np.array([1.0, math.nan]), 's', target='<= 4')
+    assert row['value'] is None and intervals.missed(row)
 
 
 def test_a_case_says_how_to_run_it_through_the_nodes():

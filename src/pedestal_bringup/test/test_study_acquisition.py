@@ -8,8 +8,8 @@ from scipy.stats import binomtest
 
 from acu_tracker import modes
 from acu_tracker.search.pattern import PATTERNS, SPIRAL, SQUARE
+from pedestal_bringup.analysis.intervals import missed
 from pedestal_bringup.studies import acquisition as study
-from pedestal_bringup.studies.rigs.rows import missed
 
 
 @dataclasses.dataclass

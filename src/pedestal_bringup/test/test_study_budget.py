@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import missed
 from pedestal_bringup.run import closed_loop, scenario
-from pedestal_bringup.run.program import program_table
+from pedestal_bringup.run.program import Plan
 from pedestal_bringup.studies import budget as study
-from pedestal_bringup.studies.rigs.rows import missed
 from pedestal_bringup.studies.scenarios import Recorded
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.parameters import as_dict, build
@@ -103,13 +103,13 @@ def test_a_recording_is_measured_against_where_the_target_is_seen():
 
 def test_the_operator_knows_no_ut1_and_of_the_air_what_is_measured():
     plain = scenario.load('leo_pass', duration=4.0)
-    times, angles = program_table(plain)
+    times, angles = Plan(plain).tables['']
     of_true_earth = scenario.load('leo_pass', ['tracking_receiver.target.leo_pass.ut1_offset=0.5'], duration=4.0)
-    assert np.array_equal(program_table(of_true_earth)[1], angles)
+    assert np.array_equal(Plan(of_true_earth).tables[''][1], angles)
     true = target.build(of_true_earth.node_parameters('tracking_receiver').target, 4.0)
     at_times = target.look_angles(true, times - plain.header.program.time_offset)[0]
     assert np.abs(np.unwrap(at_times) - angles[:, 0]).min() > 1e-5
-    refracted = program_table(scenario.load('leo_pass', ['scenario.program.refractivity=311'], duration=4.0))[1]
+    refracted = Plan(scenario.load('leo_pass', ['scenario.program.refractivity=311'], duration=4.0)).tables[''][1]
     assert refracted[:, 0] == pytest.approx(angles[:, 0], abs=0.0)
     assert refracted[:, 1] - angles[:, 1] == pytest.approx([arrival.refraction(311.0, E)[0] for E in angles[:, 1]])
 

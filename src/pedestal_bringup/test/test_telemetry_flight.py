@@ -6,8 +6,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
+from pedestal_bringup.analysis import intervals
 from pedestal_bringup.studies import telemetry_flight as study
-from pedestal_bringup.studies.rigs import drawing, rows
+from pedestal_bringup.studies.rigs import drawing
 
 
 @pytest.fixture(scope='module')
@@ -39,7 +40,7 @@ def test_the_matrices_are_those_of_the_continuous_model():
 
 def test_the_filter_is_better_than_what_is_measured_and_both_pairs_have_full_rank(result):
     assert len({(row['case'], row['metric']) for row in result.rows}) == len(result.rows)
-    assert [row for row in result.rows if rows.missed(row)] == []
+    assert [row for row in result.rows if intervals.missed(row)] == []
     values = {(row['case'], row['metric']): row['value'] for row in result.rows}
     assert values['azimuth/measured', 'angle_rms'] == pytest.approx(math.degrees(study.SIGMA), rel=0.02)
     assert values['elevation/measured', 'rate_rms'] == pytest.approx(math.degrees(study.RATE_SIGMA), rel=0.02)

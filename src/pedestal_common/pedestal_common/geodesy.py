@@ -10,6 +10,9 @@ from pedestal_common.reproducible import cos, sin
 EARTH_RADIUS, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
 """WGS84 [m], [-]."""
 
+EARTH_RATE = 7.29211514670698e-5
+"""Of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
+
 
 @dataclasses.dataclass(frozen=True)
 class StationParameters(Parameters):

@@ -1,9 +1,20 @@
 """What every node is told about its graph (ROS parameters `graph.*`). No ROS here."""
 import dataclasses
 
-from pedestal_common import nodes, parameters
+from pedestal_common import nodes, parameters, topics
 from pedestal_common.nodes import MAX_BEAMS
 from pedestal_common.steps import SECOND
+
+
+def topic_flags(names):
+    """Return the base of a parameter dataclass that has the flag of each of these topics that has one."""
+    flagged = {}
+    for topic in map(topics.BY_NAME.get, names):
+        if topic.flag:
+            flagged.setdefault(topic.flag, []).append(topic.name)
+    return dataclasses.make_dataclass('TopicFlags', [
+        (name, bool, parameters.flag(False, f'the graph has {" and ".join(of_flag)}'))
+        for name, of_flag in flagged.items()], bases=(parameters.Parameters,), frozen=True)
 
 
 @dataclasses.dataclass(frozen=True)

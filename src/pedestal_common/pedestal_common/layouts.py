@@ -61,9 +61,6 @@ LAYOUTS = {
 }
 """The diagonal of an Imu's orientation_covariance says how well an INS knows its attitude."""
 
-ONLY = {'acu/filter': ('position',), 'adu/truth': ('position', 'velocity'), 'ins/error': ('position', 'velocity')}
-"""Fields of a topic that does not use all of its type's."""
-
 _JOINTS = {'sensor_msgs/msg/JointState': 'name', 'trajectory_msgs/msg/JointTrajectory': 'joint_names'}
 """Where a message tells whose numbers its fields are."""
 
@@ -80,7 +77,7 @@ def fields(topic) -> tuple:
     """The Fields of a topic of the table, whose numbers make its record; () of a text."""
     row = topics.BY_NAME[topic]
     return tuple(field for field in LAYOUTS.get(row.type, ())
-                 if field.recorded and field.name in ONLY.get(topic, (field.name,)))
+                 if field.recorded and field.name in (row.only or (field.name,)))
 
 
 def _names(field, row):

@@ -9,11 +9,10 @@ from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
 from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
-from pedestal_common.geodesy import station_frame
+from pedestal_common.geodesy import EARTH_RATE, station_frame
 from pedestal_common.reproducible import arctan2, cos, sin, turned
+from pedestal_common.steps import DAY
 
-EARTH_RATE = 7.29211514670698e-5
-"""Of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
 TLE_NUMBERS = (
     {'epoch year': (18, 20), 'epoch day': (20, 32)},
     {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
@@ -53,7 +52,7 @@ def satellite(leo_pass) -> Satrec:
 def earth_fixed(julian, fractions, ut1_offset=0.0):
     """Rotations (n, 3, 3) from TEME, the true equator and mean equinox of date, to the earth at julian + fractions
     (n,), UTC."""
-    theta = gstime(julian) + EARTH_RATE * 86400.0 * fractions + EARTH_RATE * ut1_offset
+    theta = gstime(julian) + EARTH_RATE * DAY * fractions + EARTH_RATE * ut1_offset
     c, s = cos(theta), sin(theta)
     to_fixed = np.zeros((len(fractions), 3, 3))
     to_fixed[:, 0, 0], to_fixed[:, 0, 1], to_fixed[:, 1, 0], to_fixed[:, 1, 1], to_fixed[:, 2, 2] = c, s, -s, c, 1.0
@@ -65,7 +64,7 @@ def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
 
     ut1_offset: UT1 - UTC [s].
     """
-    fractions = fraction + times / 86400.0
+    fractions = fraction + times / DAY
     error, position, velocity = satrec.sgp4_array(np.full(len(times), julian), fractions)
     if error.any():
         i = int(np.argmax(error != 0))

@@ -13,6 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from pedestal_common import orbit
 from pedestal_common.orbit import TargetError
+from pedestal_common.steps import DAY
 
 LOOK = 20.0
 """Time between two looks [s]."""
@@ -22,7 +23,6 @@ AHEAD = 5.0
 """Time that is searched [days]."""
 LONGEST = 1.0
 """Of a pass that is searched for [days]: no run is longer."""
-DAY = 86400.0
 
 
 class Pass(typing.NamedTuple):

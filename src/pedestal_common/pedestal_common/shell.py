@@ -1,4 +1,4 @@
-"""What every node is: parameters, clock, topics of the table, diagnostics, waiting for its graph, `main`."""
+"""What every node is: parameters, clock, topics of the table, waiting for its graph, `main`."""
 import contextlib
 import gc
 import inspect
@@ -21,11 +21,11 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 
 from pedestal_common import messages, middleware, nodes, parameters
+from pedestal_common.diagnostics import Diagnostics
 from pedestal_common.graph_parameters import GraphParameters
 from pedestal_common.realtime import utc
 from pedestal_common.realtime.listening import Listener, subscribe
-from pedestal_common.steps import SECOND, GraphError
-from pedestal_common.unit import OK, WARN, Diagnosis
+from pedestal_common.steps import DAY, SECOND, GraphError
 
 START_DEADLINE = 300.0
 """Seconds a node waits for its graph: the others may be compiling their laws for the first time."""
@@ -35,24 +35,6 @@ PARTING = 1.0
 
 FAREWELL = 0.1
 """Seconds it stays when its endpoints have left."""
-
-DAY = 86_400 * SECOND
-
-DIAGNOSTICS = 1.0
-"""Seconds between two diagnostics in realtime."""
-
-SILENT = 2.5
-"""Seconds without its diagnostics after which a node counts as silent: they tell it as `deadline_s`."""
-
-AWAY = 1_500_000_000
-"""Time [ns] between two diagnostics beyond which a node was held up, and says so."""
-
-URGENT_PAUSE = 100_000_000
-"""Time [ns] between two diagnostics that do not wait for their second."""
-
-STEPPED = 60 * SECOND
-"""Time [ns] for which the diagnostics speak of a step of the system's clock."""
-
 
 class Stopped(BaseException):  # noqa: N818  no error: the node was told to stop
     """SIGINT or SIGTERM came while a node was waiting or compiling. Like KeyboardInterrupt it is no Exception, which
@@ -144,13 +126,10 @@ class Shell(Node):
         self._next_second = 0
         self._stamp = 0
         self._started = False
-        self._publish_diagnosis = None
-        self._utc = utc.Utc(*readings())
+        self.diagnostics = None
+        self.utc = utc.Utc(*readings())
         self._epoch = 0 if self.graph.lockstep else self.graph.start or None
-        self._listeners = []
-        self._diagnosed = None
-        self._away = 0
-        self._steps_told = 0, None
+        self.listeners = []
 
     def _place(self, name):
         """(namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their end."""
@@ -211,13 +190,13 @@ class Shell(Node):
     def clock(self):
         """(steady clock, UTC) of now [ns]."""
         steady, system = readings()
-        return steady, self._utc.at(steady, system)
+        return steady, self.utc.at(steady, system)
 
     def epoch(self, stamp):
         """The stamp [ns] at which the time of the units is 0: 0 in lockstep, `graph.start`, or the day's beginning
         of the first stamp that is asked for."""
         if self._epoch is None:
-            self._epoch = stamp // DAY * DAY
+            self._epoch = stamp // (DAY * SECOND) * DAY * SECOND
         return self._epoch
 
     def writer(self, name):
@@ -240,7 +219,7 @@ class Shell(Node):
                                      middleware.qos(link.rate), raw=True)
         else:
             listener = Listener(self, link, ros_name, decode, take)
-            self._listeners.append(listener)
+            self.listeners.append(listener)
             listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
 
     def writers_of(self, ros_name):
@@ -271,53 +250,12 @@ class Shell(Node):
     def diagnose_with(self, diagnose):
         """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time,
         in realtime at every second of the wall and when what is urgent changes."""
-        self._diagnose = diagnose
-        self._publish_diagnosis = self.writer('diagnostics')
-        if not self.graph.lockstep:
-            self._diagnosed = time.monotonic_ns()
-            self.every(DIAGNOSTICS, self._publish_diagnostics)
+        self.diagnostics = Diagnostics(self, diagnose)
 
     def diagnose_now(self):
         """Realtime: something has changed, which its diagnostics tell before their second; False where that would be
         too soon after the last ones."""
-        due = bool(self._publish_diagnosis) and not self.graph.lockstep and (
-            time.monotonic_ns() - self._diagnosed > URGENT_PAUSE)
-        if due:
-            self._publish_diagnostics()
-        return due
-
-    def _publish_diagnostics(self):
-        diagnosis, stamp = self._diagnose(), self._stamp
-        if not self.graph.lockstep:
-            now, stamp = self.clock()
-            self._away, self._diagnosed = now - self._diagnosed, now
-            diagnosis = self._with_findings(Diagnosis(*diagnosis), now)
-        level, message, values = diagnosis
-        array = messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
-            level=level, name=self.name, message=message, hardware_id='pedestal',
-            values=[messages.KeyValue(key=key, value=value) for key, value in values])])
-        messages.put_stamp(array.header.stamp, stamp)
-        self._publish_diagnosis(messages.serialize(array))
-
-    def _with_findings(self, diagnosis, now):
-        """A Diagnosis with what the shell of a realtime node has found, the worst first."""
-        findings = [*filter(None, (listener.finding(now) for listener in self._listeners))]
-        if self._away > AWAY:
-            findings.append((WARN, f'was held up for {self._away * 1e-9:.1f} s'))
-        steps, since = self._steps_told
-        if self._utc.steps != steps:
-            steps, since = self._steps_told = self._utc.steps, now
-        if since is not None and now - since < STEPPED:
-            findings.append((WARN, f'the clock of this host was stepped by {self._utc.last_step * 1e-9:+.3f} s'))
-        if self._utc.ahead > self.graph.future * SECOND:
-            findings.append((WARN, f'goes on {self._utc.ahead * 1e-9:.3f} s ahead of UTC, whose clock was '
-                             'set back: nodes that start now refuse its stamps until it is started again'))
-        if diagnosis.level != OK or not findings:
-            findings.insert(0, diagnosis[:2])
-        findings.sort(key=lambda finding: -finding[0])
-        values = [*diagnosis.values, ('deadline_s', f'{SILENT:g}'), ('clock_steps', str(self._utc.steps)),
-                  *(value for listener in self._listeners for value in listener.values())]
-        return Diagnosis(findings[0][0], '; '.join(text for _, text in findings), values)
+        return self.diagnostics is not None and not self.graph.lockstep and self.diagnostics.publish_urgent()
 
     def begin_step(self, stamp):
         """To be called with t_k [ns] before anything of step k is published. In lockstep the first call waits for the
@@ -331,7 +269,7 @@ class Shell(Node):
             self.get_logger().info('runs')
         if self.graph.lockstep and stamp >= self._next_second:
             self._next_second = (stamp // SECOND + 1) * SECOND
-            self._publish_diagnostics()
+            self.diagnostics.publish(stamp)
 
     def prepare(self, unit):
         """Compile the laws of a unit, cold half a minute and more, unless told to stop."""

@@ -2,6 +2,9 @@
 import collections
 
 SECOND = 1_000_000_000
+"""[ns]"""
+DAY = 86_400
+"""[s]"""
 
 
 class GraphError(RuntimeError):

@@ -74,6 +74,9 @@ class Topic(typing.NamedTuple):
     texts    of a text: those that a reader tells apart, in the order of their codes
     measured  the parameter of its writer that says whether it is there; flag: that of its readers; '': it always is
     holds    whether what it says holds until it says otherwise: in realtime no step waits for it
+    only     fields of its layout that it uses; (): all
+    inputs   {field of its record: name of the control unit's input, or a name for each number}; see inputs
+    latency  the parameter of the control unit that tells how old it is at a step
     """
     name: str
     type: str
@@ -87,15 +90,19 @@ class Topic(typing.NamedTuple):
     measured: str = ''
     flag: str = ''
     holds: bool = False
+    only: tuple = ()
+    inputs: typing.Mapping = {}
+    latency: str = ''
 
 
 TOPICS = (
     Topic('clock', 'rosgraph_msgs/msg/Clock', 'step', "the drive's time t_k"),
     Topic('joint_states', 'sensor_msgs/msg/JointState', 'step',
-          '`azimuth`, `elevation`: encoder angle [rad], rate [rad/s], torque on the load [Nm]', frame='base_link'),
+          '`azimuth`, `elevation`: encoder angle [rad], rate [rad/s], torque on the load [Nm]', frame='base_link',
+          inputs={'position': 'position', 'velocity': 'velocity', 'effort': 'torque'}),
     Topic('adu/truth', 'sensor_msgs/msg/JointState', 'step',
           '`azimuth`, `elevation`: true deck angle [rad] and rate [rad/s] of the dish, or of the beam of an array: '
-          'what simulated equipment reads, and the ACU never', frame='base_link'),
+          'what simulated equipment reads, and the ACU never', frame='base_link', only=('position', 'velocity')),
     Topic('adu/motor_states', 'sensor_msgs/msg/JointState', 'step',
           '`azimuth_motor_1` ... `elevation_motor_2`: shaft angle [rad], rate [rad/s], torque [Nm]', names=MOTORS,
           frame='base_link'),
@@ -103,11 +110,12 @@ TOPICS = (
           '`enabled` when the drive follows commands, `enabled: azimuth motor lost` when with one motor of a pair; '
           'otherwise why not: `stopping`, `engaging brakes`, `disabled`, `releasing brakes`, `emergency stop`, '
           '`fault: azimuth overspeed, ...`',
-          texts=(*ENABLED, 'stopping', 'engaging brakes', 'disabled', 'releasing brakes', 'emergency stop')),
+          texts=(*ENABLED, 'stopping', 'engaging brakes', 'disabled', 'releasing brakes', 'emergency stop'),
+          inputs={'code': 'drive'}),
     Topic('adu/stow_pins', 'std_msgs/msg/String', 'change',
           'where the stow pin of each axis is: `azimuth out, elevation out`, ...; `out`, `moving`, `in`, `failed`',
           texts=tuple(f'azimuth {azimuth}, elevation {elevation}' for azimuth in PINS for elevation in PINS),
-          measured='stow_pins', flag='stow_pins'),
+          measured='stow_pins', flag='stow_pins', inputs={'code': 'pins'}),
     Topic('ship/truth', 'nav_msgs/msg/Odometry', 'step',
           'pose of `base_link` (FLU) in `earth` (ENU), twist in `base_link`', frame='earth', child='base_link'),
     Topic('ship/imu/data_raw', 'sensor_msgs/msg/Imu', 'step',
@@ -115,7 +123,8 @@ TOPICS = (
           frame='base_link'),
     Topic('ship/imu/data', 'sensor_msgs/msg/Imu', 'step',
           'attitude deck -> earth with its 1-sigma, deck rate against the earth [rad/s]; `latency` late',
-          frame='base_link'),
+          frame='base_link', latency='attitude_latency',
+          inputs={'stamp': 'attitude_stamp', 'orientation': 'quaternion', 'angular_velocity': 'deck_rate'}),
     Topic('ins/state', 'std_msgs/msg/String', 'change',
           '`aligning`, or `aligned` once the 1-sigma of its heading is below `alignment.aligned_sigma`, and again '
           '`aligning` after 0.1 s without its IMU; method `model` never says it, which counts as aligned',
@@ -126,20 +135,26 @@ TOPICS = (
           'and hold until the next',
           names=('roll', 'pitch', 'heading'), frame='base_link',
           units={f'{angle}.velocity': 'rad/sqrt(s)' for angle in ('roll', 'pitch', 'heading')},
-          measured='error_told', flag='ins_error', holds=True),
+          measured='error_told', flag='ins_error', holds=True, only=('position', 'velocity'),
+          latency='attitude_latency',
+          inputs={'came': 'attitude_error_came', 'position': 'attitude_noise', 'velocity': 'attitude_walk'}),
     Topic('tracking_receiver/angle_error', 'geometry_msgs/msg/Vector3Stamped', 'step',
           'x cross-elevation error [rad], y elevation error [rad], z C/N0 [dB-Hz]; x, y are NaN while unlocked; '
           '`latency` late', frame='beam',
-          units={'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'}),
+          units={'x': 'rad', 'y': 'rad', 'z': 'dB-Hz'}, latency='receiver_latency',
+          inputs={'came': 'error_came', 'stamp': 'error_stamp',
+                  'vector': ('cross_elevation', 'elevation', 'cn0_dbhz')}),
     Topic('tracking_receiver/angle_rate', 'geometry_msgs/msg/Vector3Stamped', 'step',
           'x cross-elevation, y elevation: rate of the error [rad/s], NaN while unlocked; z their 1-sigma [rad/s], '
           'tachometer and receiver together; `latency` late', frame='beam',
           units={'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'}, measured='receiver.rate.measured',
-          flag='receiver_rate'),
+          flag='receiver_rate', latency='receiver_latency',
+          inputs={'vector': ('error_rate', 'error_rate', 'error_rate_sigma')}),
     Topic('tracking_receiver/range', 'sensor_msgs/msg/Range', 'step',
           'range of the target [m], NaN while unlocked, and its variance [m2]; `latency` late', frame='beam',
           units={'field_of_view': 'rad', 'min_range': 'm', 'max_range': 'm'}, measured='receiver.ranging.measured',
-          flag='receiver_range'),
+          flag='receiver_range', latency='receiver_latency',
+          inputs={'range': 'range', 'variance': 'range_variance'}),
     Topic('target/truth', 'nav_msgs/msg/Odometry', 'step',
           'target position [m] and velocity [m/s], ENU of the station', frame='earth', child='target'),
     Topic('acu/rate_command', 'sensor_msgs/msg/JointState', 'step',
@@ -152,7 +167,7 @@ TOPICS = (
     Topic('acu/filter', 'sensor_msgs/msg/JointState', 'step',
           'named numbers of each axis, all in `position`, NaN where there is none in this step: '
           + ', '.join(f'`azimuth_{name}`' + (f' [{unit}]' if unit else '') for name, unit in FILTER.items()),
-          names=tuple(f'{axis}_{name}' for axis in AXES for name in FILTER), frame='earth',
+          names=tuple(f'{axis}_{name}' for axis in AXES for name in FILTER), frame='earth', only=('position',),
           units={f'{axis}_{name}.position': unit for axis in AXES for name, unit in FILTER.items()}),
     Topic('acu/mode', 'std_msgs/msg/String', 'change', 'the mode'),
     Topic('acu/stow_pins', 'std_msgs/msg/String', 'change',

@@ -113,8 +113,8 @@ class Unit(typing.Protocol):
                 if name != self.trigger and topics.BY_NAME[name].rate == 'step'}
 
     def latency(self, topic) -> float:
-        """How much older than the step [s] a topic is; overridden where one is."""
-        return 0.0
+        """How much older than the step [s] a topic is."""
+        return getattr(self.parameters, topics.BY_NAME[topic].latency, 0.0)
 
     @property
     def parts(self):

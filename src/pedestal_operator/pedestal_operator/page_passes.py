@@ -8,6 +8,7 @@ from concurrent import futures
 
 from pedestal_common import orbit, passes
 from pedestal_common.geodesy import StationParameters
+from pedestal_common.steps import DAY
 from pedestal_operator import page_state
 
 MOST = 4
@@ -16,7 +17,6 @@ MOST = 4
 SEARCHED, GOOD = 2.0, 1.0
 """Time ahead that is searched, and for which what was found is good [days]."""
 
-DAY = 86400.0
 CALENDAR = 1e8
 """Time [s UTC] before which a clock counts from the beginning of a run."""
 

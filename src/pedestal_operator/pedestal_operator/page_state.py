@@ -8,6 +8,7 @@ None).
 import json
 import math
 
+from acu_tracker.modes import TABLE
 from pedestal_common import topics
 from pedestal_operator import page_sky
 
@@ -29,7 +30,7 @@ WANTED = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floo
                                 *(f'target.leo_pass.{name}' for name in ELEMENTS))}
 """{node: its parameters that are shown}."""
 
-MODES = ('standby', 'stow', 'unstow', 'preset', 'program', 'tle', 'sun', 'autotrack', 'search', 'acquire', 'steptrack')
+MODES = tuple(row.name for row in TABLE if row.button)
 """Modes with a button; `stop` has one of its own, `rate` is the jog, `slave` is for programs."""
 
 SPAN, PERIOD = 600.0, 0.5

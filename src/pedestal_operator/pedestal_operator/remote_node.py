@@ -11,6 +11,7 @@ from pedestal_common import commands, messages, middleware, nodes, parameters, r
 from pedestal_common.commands import Reply
 from pedestal_common.shell import Shell
 from pedestal_common.steps import GraphError
+from pedestal_operator.antenna import Antenna
 from pedestal_operator.requests import Requests
 
 NUMBERS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
@@ -35,7 +36,7 @@ def user():
     return f'{name}@{socket.gethostname()}'
 
 
-class Remote(Shell):
+class Remote(Shell, Antenna):
     """Hears the graph and asks it. who: by which name it asks from now on; node: whose commands it can ask for.
 
     numbers: {topic: numbers of its last message, as `records` orders them}; texts: {topic: its last text};
@@ -98,25 +99,6 @@ class Remote(Shell):
     def present(self, name):
         """Whether a topic or node was heard lately."""
         return name in self.heard and time.monotonic() - self.heard[name] < FRESH
-
-    def told(self, node) -> dict:
-        """{key: text} of a node's last diagnostics; {} where it is silent."""
-        name = self.beam + node if nodes.row(node).of_beam else node
-        return {pair.key: pair.value for pair in self.status[name].values} if self.present(name) else {}
-
-    def angles(self, topic):
-        """(azimuth, elevation) [deg] of joint_states or acu/reference; NaN where it is silent."""
-        if not self.present(topic):
-            return math.nan, math.nan
-        numbers = self.numbers[topic]
-        return math.degrees(numbers[0]), math.degrees(numbers[1])
-
-    def rates(self):
-        """(azimuth, elevation) rates [deg/s] of the axes; NaN where they are silent."""
-        if not self.present('joint_states'):
-            return math.nan, math.nan
-        numbers = self.numbers['joint_states']
-        return math.degrees(numbers[2]), math.degrees(numbers[3])
 
     def query(self, names):
         """The Query for parameters of the node that is asked."""

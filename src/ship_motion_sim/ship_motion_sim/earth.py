@@ -2,13 +2,13 @@
 import math
 
 from pedestal_common.compiled import compiled
+from pedestal_common.geodesy import EARTH_FLATTENING, EARTH_RATE
 
-FLATTENING = 1.0 / 298.257223563
-RATE = 7.292115e-5              # [rad/s]
+RATE = round(EARTH_RATE, 11)    # [rad/s], to the digits that WGS-84 prints
 GRAVITY_EQUATOR = 9.7803253359  # [m/s2]
 GRAVITY_POLE = 9.8321849378     # [m/s2]
-ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
-_SOMIGLIANA = (1.0 - FLATTENING) * GRAVITY_POLE / GRAVITY_EQUATOR - 1.0
+ECCENTRICITY2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
+_SOMIGLIANA = (1.0 - EARTH_FLATTENING) * GRAVITY_POLE / GRAVITY_EQUATOR - 1.0
 
 
 @compiled

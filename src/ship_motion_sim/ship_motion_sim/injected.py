@@ -4,21 +4,20 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import schedule, spoil, table
 from pedestal_common.line_of_sight import quaternion
+from pedestal_common.quaternion import product
 from pedestal_common.records import NEVER
 from pedestal_common.steps import SECOND
 
-IMU_DROP, IMU_FREEZE, IMU_BIAS, IMU_NAN, IMU_NOISE = (
-    table.code('ship_motion', name) for name in ('drop', 'freeze', 'bias', 'nan', 'noise'))
-DROP, DELAY, FREEZE, BIAS, NAN, NOISE, JUMP, CLOCK_STEP = (
-    table.code('ins', name) for name in ('drop', 'delay', 'freeze', 'bias', 'nan', 'noise', 'ins_jump',
-                                             'clock_step'))
+IMU_MESSAGES, INS_MESSAGES = spoil.codes('ship_motion'), spoil.codes('ins')
+IMU_BIAS = table.code('ship_motion', 'bias')
+DELAY, BIAS, JUMP, CLOCK_STEP = (table.code('ins', name) for name in ('delay', 'bias', 'ins_jump', 'clock_step'))
 
-IMU = np.dtype([('drop', 'i8'), ('rate', 'f8', (3,)), ('force', 'f8', (3,)), ('said', spoil.SPOILT)], align=True)
-"""drop: 1 while it is silent; rate [rad/s], force [m/s2]: added to what it feels, FLU; said: what spoils it."""
+IMU = np.dtype([('rate', 'f8', (3,)), ('force', 'f8', (3,)), ('said', spoil.SPOILT)], align=True)
+"""rate [rad/s], force [m/s2]: added to what it feels, FLU; said: what spoils it."""
 
-INS = np.dtype([('latency_ns', 'i8'), ('drop', 'i8'), ('clock_ns', 'i8'), ('rate', 'f8', (3,)), ('turn', 'f8', (3,)),
+INS = np.dtype([('latency_ns', 'i8'), ('clock_ns', 'i8'), ('rate', 'f8', (3,)), ('turn', 'f8', (3,)),
                 ('said', spoil.SPOILT)], align=True)
-"""latency_ns: of the INS when nothing is broken; drop: 1 while it is silent; clock_ns: added to its stamps; rate:
+"""latency_ns: of the INS when nothing is broken; clock_ns: added to its stamps; rate:
 added to the deck rate, FLU [rad/s]; turn: roll, pitch and yaw added to its attitude [rad]; said: what spoils it."""
 
 RAW, DATA, CHANGES = 'ship/imu/data_raw', 'ship/imu/data', 'ins/error'
@@ -35,23 +34,13 @@ def initial(latency_ns) -> np.ndarray:
 def turned(q, roll, pitch, yaw):
     """Quaternion (x, y, z, w) of a deck of attitude q (4,) that is turned by roll and pitch about its own axes and by
     yaw about the vertical [rad]."""
-    return product(quaternion(0.0, 0.0, yaw), product((q[0], q[1], q[2], q[3]), quaternion(roll, pitch, 0.0)))
-
-
-@compiled
-def product(p, q):
-    """Hamilton product of two quaternions (x, y, z, w)."""
-    px, py, pz, pw = p
-    qx, qy, qz, qw = q
-    return (pw * qx + px * qw + py * qz - pz * qy, pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw, pw * qw - px * qx - py * qy - pz * qz)
+    return product(quaternion(0.0, 0.0, yaw), product(q, quaternion(roll, pitch, 0.0)))
 
 
 @compiled
 def take_imu(m, stamp):
     """Mend the IMU, then break what is broken in the step of a stamp [ns]; m: ship_unit.RECORD."""
     e = m.injected
-    e.drop = 0
     for i in range(3):
         e.rate[i] = e.force[i] = 0.0
     spoil.restore(e.said)
@@ -64,17 +53,10 @@ def take_imu(m, stamp):
 
 @compiled
 def _break_imu(e, fault, values):
-    if fault == IMU_DROP:
-        e.drop = 1
-    elif fault == IMU_FREEZE:
-        e.said.freeze = 1
-    elif fault == IMU_BIAS:
+    spoil.apply(e.said, IMU_MESSAGES, fault, values)
+    if fault == IMU_BIAS:
         e.rate[int(values[0])] += values[1]
         e.force[int(values[0])] += values[2]
-    elif fault == IMU_NAN:
-        e.said.nan = 1
-    elif fault == IMU_NOISE:
-        e.said.sigma, e.said.seed = values[0], int(values[1])
 
 
 @compiled
@@ -88,7 +70,7 @@ def spoil_imu(e, stamp, outputs):
             raw.angular_velocity[i] += spoil.noise(e.said, stamp, i)
     spoil.numbers(e.said, raw.angular_velocity, 0)
     spoil.numbers(e.said, raw.linear_acceleration, 3)
-    if e.drop != 0:
+    if e.said.drop != 0:
         raw.stamp = NEVER
 
 
@@ -97,7 +79,7 @@ def take_ins(m, stamp):
     """Mend the INS, then break what is broken in the step of a stamp [ns]; m: record of ins_unit."""
     e = m.injected
     m.constants.latency_ns = e.latency_ns
-    e.drop = e.clock_ns = 0
+    e.clock_ns = 0
     for i in range(3):
         e.rate[i] = e.turn[i] = 0.0
     spoil.restore(e.said)
@@ -110,18 +92,11 @@ def take_ins(m, stamp):
 
 @compiled
 def _break_ins(c, e, fault, values):
-    if fault == DROP:
-        e.drop = 1
-    elif fault == DELAY:
+    spoil.apply(e.said, INS_MESSAGES, fault, values)
+    if fault == DELAY:
         c.latency_ns += round(values[0] * SECOND)
-    elif fault == FREEZE:
-        e.said.freeze = 1
     elif fault == BIAS:
         e.rate[int(values[0])] += values[1]
-    elif fault == NAN:
-        e.said.nan = 1
-    elif fault == NOISE:
-        e.said.sigma, e.said.seed = values[0], int(values[1])
     elif fault == JUMP:
         e.turn[0] += values[0]
         e.turn[1] += values[1]
@@ -147,6 +122,6 @@ def spoil_ins(e, stamp, outputs):
     spoil.numbers(e.said, data.orientation, 0)
     spoil.numbers(e.said, data.angular_velocity, 4)
     if data.stamp != NEVER:
-        data.stamp = NEVER if e.drop != 0 else data.stamp + e.clock_ns
+        data.stamp = NEVER if e.said.drop != 0 else data.stamp + e.clock_ns
     if outputs[CHANGES].stamp != NEVER:
         outputs[CHANGES].stamp = data.stamp

@@ -66,13 +66,16 @@ def encode(o, error_told, outputs):
 
 
 @compiled
-def model_law(memory, stamp, inputs, outputs):
-    """Step k of method `model`."""
-    m = memory.record[0]
+def begin(m, stamp, raw):
+    """Before a step: break what is broken in it, and read its inputs; m: record of either INS."""
     if schedule.pending(m.schedule, stamp):
         injected.take_ins(m, stamp)
-    decode(m.inputs, inputs[RAW])
-    ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
+    decode(m.inputs, raw)
+
+
+@compiled
+def end(m, stamp, outputs):
+    """After a step: publish its outputs."""
     m.row += 1
     m.worst = max(m.worst, m.outputs.status)
     encode(m.outputs, m.error_told, outputs)
@@ -81,18 +84,21 @@ def model_law(memory, stamp, inputs, outputs):
 
 
 @compiled
+def model_law(memory, stamp, inputs, outputs):
+    """Step k of method `model`."""
+    m = memory.record[0]
+    begin(m, stamp, inputs[RAW])
+    ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
+    end(m, stamp, outputs)
+
+
+@compiled
 def aligning_law(memory, stamp, inputs, outputs):
     """Step k of an INS that aligns."""
     m = memory.record[0]
-    if schedule.pending(m.schedule, stamp):
-        injected.take_ins(m, stamp)
-    decode(m.inputs, inputs[RAW])
+    begin(m, stamp, inputs[RAW])
     aligning_ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
-    m.row += 1
-    m.worst = max(m.worst, m.outputs.status)
-    encode(m.outputs, m.error_told, outputs)
-    if m.schedule.pending != 0:
-        injected.spoil_ins(m.injected, stamp, outputs)
+    end(m, stamp, outputs)
 
 
 @compiled

@@ -13,6 +13,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import to_earth
+from pedestal_common.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import adrc, adrc_scheduled, classical, extended_observer, oba, riccati_eso
 from ship_motion_sim.alignment.conditions import CONDITIONS, SIGMA_UNKNOWN, conditions
@@ -20,7 +21,8 @@ from ship_motion_sim.params import AIDS, METHODS
 
 STAGES = ('aligning', 'aligned')
 ALIGNING, NAVIGATING = range(len(STAGES))
-MODEL, CLASSICAL, ADRC, ADRC_SCHEDULED, RICCATI_ESO, OBA = range(len(METHODS))
+CLASSICAL, ADRC, ADRC_SCHEDULED, RICCATI_ESO, OBA = map(
+    METHODS.index, ('classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba'))
 NO_AID, LOG, GNSS = range(len(AIDS))
 
 CONSTANTS = np.dtype([
@@ -168,7 +170,7 @@ def attitude(s, c):
         if s.oba.count < 2.0:
             return q[0], q[1], q[2], q[3]
         return oba.attitude(s.oba, c.conditions, q[0], q[1], q[2], q[3])
-    return strapdown.product(0.0, 0.0, math.sin(0.5 * s.azimuth), math.cos(0.5 * s.azimuth), q[0], q[1], q[2], q[3])
+    return product((0.0, 0.0, math.sin(0.5 * s.azimuth), math.cos(0.5 * s.azimuth)), q)
 
 
 @compiled

@@ -13,6 +13,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import cross, rotation, to_earth
+from pedestal_common.quaternion import product
 
 STATE = np.dtype([
     ('quaternion', 'f8', (4,)),         # x, y, z, w, deck -> n'
@@ -21,13 +22,6 @@ STATE = np.dtype([
     ('last_angle', 'f8', (3,)),         # the increments before, for coning and sculling
     ('last_force', 'f8', (3,)),
 ], align=True)
-
-
-@compiled
-def product(ax, ay, az, aw, bx, by, bz, bw):
-    """Quaternion product a b of (x, y, z, w): the rotation b, then the rotation a."""
-    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
 
 
 @compiled
@@ -88,10 +82,7 @@ def step(s, angle, force, dt, earth_rate, command, gravity):
     v[1] += gy + hy - dt * cy
     v[2] += gz + hz - dt * cz - dt * gravity
     ux, uy, uz = coning(angle, s.last_angle)
-    px, py, pz, pw = from_rotvec(ux, uy, uz)
-    px, py, pz, pw = product(q[0], q[1], q[2], q[3], px, py, pz, pw)
-    nx, ny, nz, nw = from_rotvec(tx, ty, tz)
-    px, py, pz, pw = product(nx, ny, nz, nw, px, py, pz, pw)
-    set_attitude(s, px, py, pz, pw)
+    x, y, z, w = product(from_rotvec(tx, ty, tz), product(q, from_rotvec(ux, uy, uz)))
+    set_attitude(s, x, y, z, w)
     for i in range(3):
         s.last_angle[i], s.last_force[i] = angle[i], force[i]

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_common import orbit
+from pedestal_common import geodesy, orbit
 from pedestal_common.line_of_sight import earth_direction
 from pedestal_common.parameters import build
 from tracking_receiver_sim import monopulse, target
@@ -85,7 +85,7 @@ def test_ut1_turns_the_earth_under_the_orbit():
         satrec = orbit.satellite(p.leo_pass)
         return orbit.enu(satrec, p.station, *target._start(p, satrec, 0.0), np.arange(0.0, 600.0, 60.0),
                                      p.leo_pass.ut1_offset)[0]
-    moved = 8.5 + math.degrees(0.5 * orbit.EARTH_RATE)
+    moved = 8.5 + math.degrees(0.5 * geodesy.EARTH_RATE)
     ahead = look({'leo_pass.ut1_offset': 0.5})
     assert ahead == pytest.approx(look({'station.longitude_deg': moved}), abs=1e-3)
     assert np.linalg.norm(ahead - look({}), axis=1).min() > 50.0

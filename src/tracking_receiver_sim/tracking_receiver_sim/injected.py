@@ -6,17 +6,18 @@ from pedestal_common.injection import schedule, spoil, table
 from pedestal_common.records import NEVER
 from pedestal_common.steps import SECOND
 
-DROP, DELAY, FREEZE, BIAS, NAN, NOISE, FADE, WRONG_SLOPE, PHASE_180, CLOCK_STEP = (
-    table.code('tracking_receiver', name) for name in (
-        'drop', 'delay', 'freeze', 'bias', 'nan', 'noise', 'fade', 'wrong_slope', 'phase_180', 'clock_step'))
+MESSAGES = spoil.codes('tracking_receiver')
+DELAY, BIAS, FADE, WRONG_SLOPE, PHASE_180, CLOCK_STEP = (
+    table.code('tracking_receiver', name) for name in ('delay', 'bias', 'fade', 'wrong_slope', 'phase_180',
+                                                       'clock_step'))
 
 BOTH, CROSS_ELEVATION, ELEVATION = range(3)
 """Options of wrong_slope."""
 
-INJECTED = np.dtype([('power', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('latency_ns', 'i8'), ('drop', 'i8'),
+INJECTED = np.dtype([('power', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('latency_ns', 'i8'),
                      ('clock_ns', 'i8'), ('bias', 'f8', (2,)), ('said', spoil.SPOILT)], align=True)
-"""power ... latency_ns: constants of the receiver (receiver.CONSTANTS) when nothing is broken; drop: 1 while no result
-comes; clock_ns: added to the stamps; bias: added to the errors [rad]; said: what spoils the results."""
+"""power ... latency_ns: constants of the receiver (receiver.CONSTANTS) when nothing is broken; clock_ns: added to the
+stamps; bias: added to the errors [rad]; said: what spoils the results."""
 
 ERRORS, RATE, RANGE = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 
@@ -34,7 +35,7 @@ def _mend(c, e):
     """Nothing is broken."""
     c.power, c.cos_phi, c.sin_phi, c.latency_ns = e.power, e.cos_phi, e.sin_phi, e.latency_ns
     c.sign[0] = c.sign[1] = 1.0
-    e.drop = e.clock_ns = 0
+    e.clock_ns = 0
     e.bias[0] = e.bias[1] = 0.0
     spoil.restore(e.said)
 
@@ -42,19 +43,12 @@ def _mend(c, e):
 @compiled
 def _break(c, e, fault, values):
     """What a fault does to constants and results of the receiver."""
-    if fault == DROP:
-        e.drop = 1
-    elif fault == DELAY:
+    spoil.apply(e.said, MESSAGES, fault, values)
+    if fault == DELAY:
         c.latency_ns += round(values[0] * SECOND)
-    elif fault == FREEZE:
-        e.said.freeze = 1
     elif fault == BIAS:
         e.bias[0] += values[0]
         e.bias[1] += values[1]
-    elif fault == NAN:
-        e.said.nan = 1
-    elif fault == NOISE:
-        e.said.sigma, e.said.seed = values[0], int(values[1])
     elif fault == FADE:
         c.power *= 10.0**(-0.1 * values[0])
     elif fault == WRONG_SLOPE:
@@ -91,6 +85,6 @@ def spoil_messages(e, stamp, outputs):
     spoil.numbers(e.said, distance.range, 6)
     for message in (error, rate):
         if message.stamp != NEVER:
-            message.stamp = NEVER if e.drop != 0 else message.stamp + e.clock_ns
+            message.stamp = NEVER if e.said.drop != 0 else message.stamp + e.clock_ns
     if distance.stamp != NEVER:
-        distance.stamp = NEVER if e.drop != 0 else distance.stamp + e.clock_ns
+        distance.stamp = NEVER if e.said.drop != 0 else distance.stamp + e.clock_ns

@@ -15,8 +15,6 @@ from pedestal_common.compiled import compiled
 
 SCALE = 2.0 * 1.8676215105779688
 """u = pi D/lambda sin(theta) per half-power beamwidth of the cosine taper."""
-LOSSLESS_SLOPE = 0.5 * SCALE
-"""k_m when both illuminations carry the same power: the most a lossless comparator gives."""
 
 
 @compiled

@@ -12,7 +12,7 @@ from tracking_receiver_sim.path.params import PathParameters, PolarisationParame
 from tracking_receiver_sim.smoothing import SMOOTHINGS, WINDOW
 
 KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp')
-LEO_PASS, TRACK_FILE, FLYBY, SINE, STEP, RAMP = range(6)
+SINE, STEP, RAMP = map(KINDS.index, ('sine', 'step', 'ramp'))
 
 BEAMS = ('moving', 'held')
 MOVING, HELD = range(len(BEAMS))

@@ -9,6 +9,7 @@ from acu_tracker.geometry.vector import vector
 from acu_tracker.history import bracket, history_type, push
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import ASHORE, rotation
+from pedestal_common.quaternion import product
 
 ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('told', 'f8', (7,)),
                      ('aligned', 'i8'), ('jump', attitude_jump.JUMP),
@@ -43,13 +44,10 @@ def rotation_angle(w, dw, T):
 @compiled
 def rotated(q, r):
     """Quaternion (x, y, z, w) of a deck of attitude q (4,) after the rotation vector r [rad] (FLU): q (x) exp(r/2)."""
-    qx, qy, qz, qw = q[0], q[1], q[2], q[3]
     rx, ry, rz = r
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
-    ex, ey, ez, ew = k * rx, k * ry, k * rz, math.cos(0.5 * angle)
-    return (qw * ex + qx * ew + qy * ez - qz * ey, qw * ey - qx * ez + qy * ew + qz * ex,
-            qw * ez + qx * ey - qy * ex + qz * ew, qw * ew - qx * ex - qy * ey - qz * ez)
+    return product(q, (k * rx, k * ry, k * rz, math.cos(0.5 * angle)))
 
 
 @compiled

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quaternion import product
 
 JUMP = np.dtype([('c', 'f8', (4,)), ('apart', 'i8')], align=True)
 """c: quaternion (x, y, z, w) earth -> earth; apart: 1 while it is not that of no rotation."""
@@ -23,15 +24,6 @@ INS."""
 
 RATE = 1e-3
 """With which a jump is let in [rad/s]."""
-
-
-@compiled
-def product(a, b):
-    """Quaternion a (x) b."""
-    ax, ay, az, aw = a[0], a[1], a[2], a[3]
-    bx, by, bz, bw = b[0], b[1], b[2], b[3]
-    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
 
 
 @compiled

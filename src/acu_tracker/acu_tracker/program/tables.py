@@ -1,6 +1,6 @@
 """The tables of directions that a mode may follow: the program, a satellite by its elements, the sun."""
+import collections
 import math
-import typing
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from acu_tracker import modes
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from pedestal_common.compiled import compiled
 
+FOLLOWED = tuple(row for row in modes.TABLE if row.table)
 
-class Tables(typing.NamedTuple):
-    """One ProgramTrack for each mode that follows a table."""
-    program: ProgramTrack
-    tle: ProgramTrack
-    sun: ProgramTrack
+Tables = collections.namedtuple('Tables', [row.name for row in FOLLOWED])
+"""One ProgramTrack for each mode that follows a table, that of the program first."""
 
+NO_TABLES = Tables(*(NO_TRACK for _ in FOLLOWED))
 
-NO_TABLES = Tables(NO_TRACK, NO_TRACK, NO_TRACK)
+PLACE = tuple(FOLLOWED.index(row) if row.table else 0 for row in modes.TABLE)
+"""For each mode the place of its table among them, that of the program where it follows none."""
 
 
 def shifted(track, offset):
@@ -32,8 +32,4 @@ def shifted(track, offset):
 @compiled
 def of_mode(tables, mode):
     """The table that a mode follows; of one that follows none the program."""
-    if mode == modes.TLE:
-        return tables.tle
-    if mode == modes.SUN:
-        return tables.sun
-    return tables.program
+    return tables[PLACE[mode]]

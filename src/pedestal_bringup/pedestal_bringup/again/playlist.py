@@ -11,8 +11,7 @@ import numpy as np
 from pedestal_bringup.bags import bag as bags
 from pedestal_common import nodes, topics
 from pedestal_common.parameters import did_you_mean
-
-SECOND = 1_000_000_000
+from pedestal_common.steps import SECOND
 
 
 def reads(graph, node, name):

@@ -11,6 +11,7 @@ from pedestal_bringup.bags import bag as bags
 from pedestal_common import commands, messages, records
 from pedestal_common.steps import SECOND
 from pedestal_operator import page_log, page_sky, page_state, remote_node
+from pedestal_operator.antenna import Antenna
 from pedestal_operator.page_log import Log
 from pedestal_operator.page_passes import Coming
 from pedestal_operator.page_security import ROLES
@@ -33,7 +34,7 @@ TEXTS = (*remote_node.TEXTS, 'ins/state', 'acu/blockage')
 LISTS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_result')
 
 
-class Recording:
+class Recording(Antenna):
     """A bag.Bag of one beam as page_state wants an antenna: what had been told last when it was `position` [s] old.
 
     length: of the recording [s]. Raises BagError where there are no joint_states in it.
@@ -66,10 +67,6 @@ class Recording:
     def present(self, name):
         """Whether a topic or node had been heard lately."""
         return name in self._heard and self.now - self._heard[name] < remote_node.FRESH
-
-    told = remote_node.Remote.told
-    angles = remote_node.Remote.angles
-    rates = remote_node.Remote.rates
 
     def lines(self):
         """What had happened so far, for the event log."""

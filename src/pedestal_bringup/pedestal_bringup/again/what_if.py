@@ -12,7 +12,7 @@ import numpy as np
 
 from pedestal_bringup.analysis import results, tracking
 from pedestal_bringup.analysis.results import Result
-from pedestal_bringup.analysis.tracking import DEGREES, largest, rms
+from pedestal_bringup.analysis.tracking import DEGREES, known_rms, largest
 from pedestal_common.topics import AXES
 
 RIPPLE = 0.25
@@ -48,7 +48,8 @@ class Answers:
 
     def ripple(self, table):
         """Rms [rad/s] of what is faster than RIPPLE in the velocities of a table."""
-        return rms(np.concatenate([_ripple(table['t'], table[f'{axis}.velocity'], self.common) for axis in AXES]))
+        return known_rms(np.concatenate([_ripple(table['t'], table[f'{axis}.velocity'], self.common)
+                                         for axis in AXES]))
 
 
 def _ripple(t, values, common):
@@ -84,7 +85,7 @@ class AgainstTruth:
     @property
     def noise(self):
         """Rms [rad] of the receiver's error less the true one."""
-        return rms(self.run.measured[self.judged] - self.true)
+        return known_rms(self.run.measured[self.judged] - self.true)
 
     @functools.cached_property
     def motion(self):
@@ -107,7 +108,7 @@ class AgainstTruth:
         e, w = error[known], true_rate[known]
         moving = np.sum(w * w)
         return (-float(np.sum(e * w) / moving) if moving > 0.0 else math.nan,
-                rms((rate * scale - true_rate)[known]))
+                known_rms((rate * scale - true_rate)[known]))
 
 
 NUMBERS = (
@@ -115,19 +116,19 @@ NUMBERS = (
            'When the ACU came to autotrack.'),
     Result('tracked_percent', '%', 'answers', lambda acu: 100.0 * acu.autotrack.size / max(acu.estimate['t'].size, 1),
            'Share of the steps in autotrack.'),
-    Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: rms(acu.true) * DEGREES,
+    Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.true) * DEGREES,
            'Rms of the true pointing error of the recorded antenna, both axes together.'),
-    Result('estimate_error_rms_deg', 'deg', 'truth', lambda acu: rms(acu.error) * DEGREES,
+    Result('estimate_error_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error) * DEGREES,
            'Rms of estimate less truth, both axes together.'),
-    Result('estimate_error_cross_elevation_rms_deg', 'deg', 'truth', lambda acu: rms(acu.error[:, 0]) * DEGREES,
+    Result('estimate_error_cross_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 0]) * DEGREES,
            'Rms of estimate less truth in cross-elevation.'),
-    Result('estimate_error_elevation_rms_deg', 'deg', 'truth', lambda acu: rms(acu.error[:, 1]) * DEGREES,
+    Result('estimate_error_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 1]) * DEGREES,
            'Rms of estimate less truth in elevation.'),
     Result('estimate_error_max_deg', 'deg', 'truth', lambda acu: largest(acu.error) * DEGREES,
            'Largest of estimate less truth on either axis.'),
     Result('single_sample_noise_deg', 'deg', 'truth', lambda acu: acu.noise * DEGREES,
            "Rms of the receiver's error less the true one."),
-    Result('noise_reduction', '-', 'truth', lambda acu: acu.noise / rms(acu.error),
+    Result('noise_reduction', '-', 'truth', lambda acu: acu.noise / known_rms(acu.error),
            "The receiver's noise over the error of the estimate."),
     Result('estimate_lag_s', 's', 'truth', lambda acu: acu.motion[0], 'How late the estimate is.'),
     Result('estimate_rate_error_rms_deg_s', 'deg/s', 'truth', lambda acu: acu.motion[1] * DEGREES,

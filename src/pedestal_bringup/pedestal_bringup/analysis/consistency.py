@@ -145,7 +145,8 @@ class Axis:
             np.isfinite(nees)]
         self.nis, self.nis_expected, self.nees = _mean(self._nis), _mean(self._freedoms), _mean(self._nees)
         self.error, self.rate_error, self.sigma, self.rate_sigma = (
-            tracking.rms(values[on, i]) for values in (known.error, known.rate_error, known.sigma, known.rate_sigma))
+            tracking.known_rms(values[on, i])
+            for values in (known.error, known.rate_error, known.sigma, known.rate_sigma))
 
     @functools.cached_property
     def nis_inside(self):

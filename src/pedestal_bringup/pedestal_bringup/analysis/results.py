@@ -5,7 +5,7 @@ motors      tracking.Tracking of a drive with motors    tracking    tracking.Tra
 encoders    the same where the true direction of its dish is known too
 filter      consistency.Consistency                     isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
-run         graph.Outcome                               supervised  graph.Outcome in realtime
+run         start.Outcome                               supervised  start.Outcome in realtime
 Errors are per axis and sample: both axes together are all samples of both, not the angle off the beam.
 """
 import math
@@ -14,7 +14,7 @@ import typing
 import numpy as np
 
 from pedestal_bringup.analysis import consistency, isolation, known_attitude, tracking
-from pedestal_bringup.analysis.tracking import DEGREES, largest, rms
+from pedestal_bringup.analysis.tracking import DEGREES, known_rms, largest
 
 
 class Result(typing.NamedTuple):
@@ -46,50 +46,50 @@ def _nees_mark(i):
 
 
 RESULTS = (
-    Result('azimuth_following_rms_deg', 'deg', 'motors', lambda run: rms(run.following[:, 0]),
+    Result('azimuth_following_rms_deg', 'deg', 'motors', lambda run: known_rms(run.following[:, 0]),
            'Rms of reference less encoder in azimuth, over every step outside standby.'),
     Result('azimuth_following_max_deg', 'deg', 'motors', lambda run: largest(run.following[:, 0]),
            'Largest of reference less encoder in azimuth, over every step outside standby.'),
-    Result('elevation_following_rms_deg', 'deg', 'motors', lambda run: rms(run.following[:, 1]),
+    Result('elevation_following_rms_deg', 'deg', 'motors', lambda run: known_rms(run.following[:, 1]),
            'Rms of reference less encoder in elevation, over every step outside standby.'),
     Result('elevation_following_max_deg', 'deg', 'motors', lambda run: largest(run.following[:, 1]),
            'Largest of reference less encoder in elevation, over every step outside standby.'),
-    Result('pointing_rms_deg', 'deg', 'tracking', lambda run: run.pointing(rms),
+    Result('pointing_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms),
            'Rms of the true pointing error, the target off where the dish points, both axes together, in settled '
            'autotrack.'),
     Result('pointing_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest),
            'Largest true pointing error of either axis in settled autotrack.'),
-    Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(rms, 0),
+    Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation.'),
-    Result('elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(rms, 1),
+    Result('elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 1),
            'Rms of the true pointing error in elevation.'),
     Result('cross_elevation_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest, 0),
            'Largest true pointing error in cross-elevation.'),
     Result('elevation_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest, 1),
            'Largest true pointing error in elevation.'),
-    Result('encoder_pointing_rms_deg', 'deg', 'encoders', lambda run: rms(run.by_encoders),
+    Result('encoder_pointing_rms_deg', 'deg', 'encoders', lambda run: known_rms(run.by_encoders),
            'Rms of the pointing error that the encoders show, both axes together.'),
     Result('encoder_pointing_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders),
            'Largest pointing error that the encoders show on either axis.'),
-    Result('encoder_cross_elevation_rms_deg', 'deg', 'encoders', lambda run: rms(run.by_encoders[:, 0]),
+    Result('encoder_cross_elevation_rms_deg', 'deg', 'encoders', lambda run: known_rms(run.by_encoders[:, 0]),
            'Rms of the pointing error that the encoders show in cross-elevation.'),
-    Result('encoder_elevation_rms_deg', 'deg', 'encoders', lambda run: rms(run.by_encoders[:, 1]),
+    Result('encoder_elevation_rms_deg', 'deg', 'encoders', lambda run: known_rms(run.by_encoders[:, 1]),
            'Rms of the pointing error that the encoders show in elevation.'),
     Result('encoder_cross_elevation_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders[:, 0]),
            'Largest pointing error that the encoders show in cross-elevation.'),
     Result('encoder_elevation_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders[:, 1]),
            'Largest pointing error that the encoders show in elevation.'),
-    Result('single_sample_noise_deg', 'deg', 'tracking', lambda run: rms(run.noise),
+    Result('single_sample_noise_deg', 'deg', 'tracking', lambda run: known_rms(run.noise),
            "Rms of the receiver's error less the true one.", "receiver's single-sample noise"),
-    Result('pointing_to_noise', '-', 'tracking', lambda run: run.pointing(rms) / rms(run.noise),
+    Result('pointing_to_noise', '-', 'tracking', lambda run: run.pointing(known_rms) / known_rms(run.noise),
            'pointing_rms_deg over single_sample_noise_deg.', target='<= 0.4'),
     Result('noise_reduction_cross_elevation', '-', 'tracking',
-           lambda run: rms(run.noise[:, 0]) / rms(run.filter_error[:, 0]),
+           lambda run: known_rms(run.noise[:, 0]) / known_rms(run.filter_error[:, 0]),
            "The receiver's noise over the error of the filtered line of sight, in cross-elevation."),
     Result('noise_reduction_elevation', '-', 'tracking',
-           lambda run: rms(run.noise[:, 1]) / rms(run.filter_error[:, 1]),
+           lambda run: known_rms(run.noise[:, 1]) / known_rms(run.filter_error[:, 1]),
            "The receiver's noise over the error of the filtered line of sight, in elevation."),
-    Result('noise_reduction', '-', 'tracking', lambda run: rms(run.noise) / rms(run.filter_error),
+    Result('noise_reduction', '-', 'tracking', lambda run: known_rms(run.noise) / known_rms(run.filter_error),
            "The receiver's noise over the error of the filtered line of sight, both axes together."),
     Result('lock_time_s', 's', 'tracking', lambda run: run.lock_time,
            'When the receiver locked for the first time.', 'first lock'),
@@ -133,9 +133,9 @@ RESULTS = (
     Result('heading_sigma_at_alignment_deg', 'deg', 'attitude', lambda ins: ins.at_alignment[1] * DEGREES,
            'Standard deviation that the INS stated for its heading when it was aligned.',
            '1 sigma of heading then, as the INS says'),
-    Result('heading_error_rms_deg', 'deg', 'attitude', lambda ins: rms(ins.heading[ins.after]) * DEGREES,
+    Result('heading_error_rms_deg', 'deg', 'attitude', lambda ins: known_rms(ins.heading[ins.after]) * DEGREES,
            'Rms of the heading error of the INS since it was aligned.', 'heading error from then on, rms'),
-    Result('level_error_rms_deg', 'deg', 'attitude', lambda ins: rms(ins.error[ins.after, :2]) * DEGREES,
+    Result('level_error_rms_deg', 'deg', 'attitude', lambda ins: known_rms(ins.error[ins.after, :2]) * DEGREES,
            'Rms of the level error of the INS since it was aligned, per axis.',
            'level error from then on, rms per axis'),
     Result('lost_steps', 'steps', 'run', lambda run: float(run.drive.get('lost_steps', math.nan)),

@@ -277,10 +277,15 @@ def keyholes(bag):
     return list(slews.values())
 
 
-def rms(values):
-    """Root mean square of the finite values; NaN when there are none."""
+def rms(values, axis=None):
+    """Return the root mean square of values, of all or along an axis; NaN where one of them is NaN."""
+    return np.sqrt(np.mean(np.square(values), axis=axis))
+
+
+def known_rms(values):
+    """Return the root mean square of the finite values; NaN when there are none."""
     values = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(values**2))) if values.size else math.nan
+    return float(rms(values)) if values.size else math.nan
 
 
 def largest(values):

@@ -14,16 +14,15 @@ import numpy as np
 from pedestal_bringup.bags import bag as bags
 from pedestal_common import layouts, messages, nodes
 
-FORMATS = ('csv', 'parquet')
 STAMP, NANOSECONDS = 't [s]', 'stamp [ns]'
 
 
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
     """Write the topics of a bag as tables; iterator of (file, rows, columns), or (None, why, topic) of one left out.
 
-    file_format: of FORMATS. names: topics to write, all when empty; of those named each must be readable, of all the
-    unreadable ones are left out. output: folder, default `export` in the bag (beside a bare .mcap). overwrite: replace
-    files. A file is `acu.rate_command.csv` and so on.
+    file_format: 'csv' or 'parquet'. names: topics to write, all when empty; of those named each must be readable, of
+    all the unreadable ones are left out. output: folder, default `export` in the bag (beside a bare .mcap). overwrite:
+    replace files. A file is `acu.rate_command.csv` and so on.
     Raises bag.BagError, ValueError where Parquet cannot be written, or, before anything is written, FileExistsError.
     """
     write = _parquet_writer() if file_format == 'parquet' else _write_csv

@@ -4,10 +4,10 @@ Arrival depends on the machine's load, the steps do not; so equal runs give equa
 """
 import heapq
 
+from pedestal_common.steps import SECOND
 from pedestal_common.topics import BETWEEN_STEPS
 
 MAX_WAITING = 10_000
-SECOND = 1_000_000_000
 
 
 class OrderError(ValueError):

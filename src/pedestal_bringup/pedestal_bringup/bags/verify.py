@@ -9,14 +9,13 @@ import typing
 import numpy as np
 import yaml
 
-from pedestal_bringup.bags import bag as bags
 from pedestal_bringup.bags import configuration
 from pedestal_common import messages, nodes, plain_yaml
+from pedestal_common.steps import SECOND
 
 MAX_LATENCY = 1_000_000_000
 """A topic may end this much [ns] before the last step: the next messages were still on their way (latency)."""
 
-SECOND = 1_000_000_000
 SHOWN = 10
 
 
@@ -115,12 +114,9 @@ class _Grid(typing.NamedTuple):
         return self.first - (self.first - stamp) // self.period * self.period
 
 
-def verify(path) -> Report:
-    """Judge a bag. The steps are the stamps of joint_states (else of the first step topic that has any).
-
-    Raises bag.BagError when there is nothing to judge: missing, empty or foreign file.
+def verify(bag) -> Report:
+    """Judge a bag.Bag. The steps are the stamps of joint_states (else of the first step topic that has any).
     """
-    bag = bags.load(path)
     rows = {name: bag.rows(name) for name in bag.topics}
     stamps = {name: row.stamp - bag.start for name, row in rows.items()}
     graph, planned = bag.graph, bag.planned_end
@@ -142,8 +138,8 @@ def verify(path) -> Report:
     drive = bag.last_values(nodes.DRIVE)
     lost = count(drive.get('lost_steps', '')), count(drive.get('step', ''))
     planned = planned - bag.start if of_steps and planned is not None else None
-    return Report(str(path), checks, bag.breaks + problems, grid.steps, grid.period / 1e9 if grid.period else np.nan,
-                  configuration.line(bag), grid.last, planned,
+    return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
+                  grid.period / 1e9 if grid.period else np.nan, configuration.line(bag), grid.last, planned,
                   None if None in lost else lost)
 
 

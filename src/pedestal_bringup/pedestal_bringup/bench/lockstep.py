@@ -15,6 +15,7 @@ from pedestal_bringup.bags import bag
 from pedestal_bringup.bench import bare_ring
 from pedestal_bringup.bench.table import show
 from pedestal_bringup.run import graph, scenario
+from pedestal_bringup.run.program import Plan
 
 ROUNDS = 3
 RING_STEPS = 3000
@@ -41,10 +42,10 @@ def bare_lap():
 
 
 def graph_run(folder, number, pacing, seconds):
-    """(graph.Outcome, bag folder) of a run of the demo scenario."""
+    """(start.Outcome, bag folder) of a run of the demo scenario."""
     path = pathlib.Path(folder) / f'run-{number}'
     chosen = scenario.load('leo_pass', pacing=pacing, duration=seconds)
-    return graph.run(chosen, path, contextlib.nullcontext(lambda seconds: None)), path
+    return graph.run(Plan(chosen), path, contextlib.nullcontext(lambda seconds: None)), path
 
 
 def latencies(path):

@@ -77,7 +77,7 @@ def run():
         content = bag.read(path)
         raw = [(content.topics[name], data) for name, _, _, data in content.raw()]
         count, size = len(raw), content.file.stat().st_size
-        checked = count / best_of(lambda: verify(path), 3)
+        checked = count / best_of(lambda: verify(bag.load(path)), 3)
         scanned = count / best_of(lambda: bag.read(path), 3)
         read = count / best_of(lambda: [messages.deserialize(data, kind) for kind, data in raw], 3)
         disk = disk_rate(folder)

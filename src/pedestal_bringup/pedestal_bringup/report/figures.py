@@ -84,8 +84,6 @@ def outside_legend(figure, axes, **options):
 METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},
             'svg': {'Date': None, 'Creator': None, 'Format': None, 'Type': None}}
 """What a file of each format does not say, so that equal data give equal bytes."""
-VECTOR = ('pdf', 'svg')
-"""Formats beside PNG."""
 
 DASHES = {TRUTH: (0, (6.0, 1.5)), MOTOR_1: (0, (3.0, 1.0, 1.0, 1.0)), MOTOR_2: (0, (2.0, 1.2))}
 """{colour: dashes} by which lines are told apart where colours are not; every other colour is solid."""

@@ -20,14 +20,15 @@ SHOWN = 200
 def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathlib.Path:
     """Write the report of a bag and return where: output, default report.html in the bag (beside a bare .mcap).
 
-    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there; vector: one of
-    figures.VECTOR, as that too. The same bag gives the same bytes.
+    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there; vector: 'pdf'
+    or 'svg', as that too. The same bag gives the same bytes.
     Raises bag.BagError when the bag cannot be read to its end, OSError when the report cannot be written.
     """
-    bag = bags.read(bag_path, beam)
+    whole = bags.read(bag_path)
+    bag = whole.view(beam)
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'report.html'
     data = run_data.read(bag)
-    page = _page(bag, data)
+    page = _page(bag, data, verify(whole))
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text(page, encoding='utf-8')
     if png_folder is not None:
@@ -63,13 +64,13 @@ def _pointing(bag, data, values):
             row('noise reduction by the filter', 'noise_reduction_cross_elevation', 'noise_reduction_elevation',
                 'noise_reduction', unit=''),
             _of_axes('load torque, rms of the run',
-                     [(tracking.rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm') for axis in AXES]),
+                     [(tracking.known_rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm') for axis in AXES]),
             *_torques(data)]
 
 
 def _torques(data):
     return [_of_axes(f'torque of motor {i}, rms of the run',
-                     [(tracking.rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
+                     [(tracking.known_rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
             for i in (1, 2)] if data.motors else []
 
 
@@ -94,7 +95,7 @@ def _loop(bag, check):
             rate = (t.size - 1) / max(wall[-1] - wall[0], 1) * 1e9
             rows += [['loop rate achieved (wall time)', elements.number(rate, 'Hz')],
                      ['jitter of the step, wall time',
-                      f'{tracking.rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
+                      f'{tracking.known_rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
                       f'largest {np.abs(jitter).max():.3g} ms']]
     missing = max([check.steps - topic.count for topic in check.topics
                    if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],
@@ -223,8 +224,7 @@ def _made(bag, data):
     return elements.table(None, rows, 'meta')
 
 
-def _page(bag, data):
-    check = verify(bag.path)
+def _page(bag, data, check):
     name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',

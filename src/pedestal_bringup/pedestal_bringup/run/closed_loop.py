@@ -14,7 +14,7 @@ from numba.extending import overload
 from acu_tracker import announcement
 from adu_drive import beam_unit
 from adu_drive import unit as drive_unit
-from pedestal_bringup.run.program import program_messages
+from pedestal_bringup.run.program import Plan
 from pedestal_common import layouts, nodes, records, topics
 from pedestal_common.compiled import compiled
 from pedestal_common.law import by_type
@@ -146,7 +146,7 @@ class Loop:
             full = prefix + name if nodes.row(name).of_beam else name
             if full in scenario.nodes:
                 self.units[name] = scenario.unit(full, dict(changed).get(name))
-        for topic, message in program_messages(scenario).items():
+        for topic, message in Plan(scenario).tracks.items():
             if topic.startswith(prefix):
                 self.units['acu'].decode(nodes.plain(topic), message)
         period = self.units[nodes.DRIVE].parameters.period

@@ -13,7 +13,7 @@ import math
 
 from adu_drive.params import AduParameters
 from pedestal_bringup.run import parameter_file, scenario
-from pedestal_bringup.run.program import program_table
+from pedestal_bringup.run.program import Plan
 from pedestal_common import plain_yaml
 from pedestal_common.parameters import ParameterError, as_dict, build, flatten
 from pedestal_common.topics import AXES
@@ -87,7 +87,7 @@ def sections(sheet, title):
 
 def _at_the_target(sheet, found):
     """Initial angles three beamwidths beside where the target is predicted, so that a slow antenna is there soon."""
-    _, angles = program_table(scenario.parse(sheet.like, parameter_file.text(found)))
+    _, angles = Plan(scenario.parse(sheet.like, parameter_file.text(found))).tables['']
     return {f'initial_{name}': float(f'{angle + 3.0 * sheet.theta:.4g}') for name, angle in zip(AXES, angles[0])}
 
 

@@ -1,30 +1,8 @@
-"""A run of a scenario: what its nodes are told, and what came of it. They begin and are watched in `watch`."""
-import dataclasses
+"""A run of a scenario from its files to its end. `watch` begins and watches its nodes."""
 import pathlib
-import time
 
-from pedestal_bringup.bags import configuration
-from pedestal_bringup.run import parameter_file
-from pedestal_bringup.run.processes import Graph, log_folder
-from pedestal_bringup.run.program import program_messages
-from pedestal_common import nodes
-from pedestal_common.steps import SECOND
+from pedestal_bringup.run.processes import Graph
 from ship_motion_sim import motion
-
-START_TIME = 5.0
-"""Seconds from the start of the nodes of a realtime run to the beginning of its time: a warm start takes two of them.
-Who comes later has lost steps, no more."""
-
-
-@dataclasses.dataclass
-class Outcome:
-    """What a run says of itself: the last JSON line of the drive and of the recorder, {} of one that left none; how
-    often a node was started again; the steps that the drive lost beside; whether the user stopped it."""
-    drive: dict
-    recorder: dict
-    restarts: int = 0
-    losses: int = 0
-    stopped: bool = False
 
 
 def _free_bag(scenario):
@@ -45,40 +23,23 @@ def new_bag(given, scenario):
     return bag
 
 
-def begins(scenario):
-    """graph.start of a run whose nodes start now [ns UTC]; 0 in lockstep, where time is that of the steps."""
-    return time.time_ns() + round(START_TIME * SECOND) if scenario.header.pacing == 'realtime' else 0
-
-
-def parameters_of_all(scenario, bag, start):
-    """The scenario as a ROS 2 parameter file, every node told of the graph it is in. start: graph.start [ns UTC]."""
-    names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
-    shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
-              'graph.deadline': scenario.header.deadline, 'graph.start': start,
-              'graph.priority': scenario.header.priority}
-    sections = {node: {**scenario.given(node), **shared} for node in scenario.nodes if node != 'operator'}
-    sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
-    if start and not scenario.header.beam:
-        sections[nodes.DRIVE].setdefault('state_file', str(log_folder(bag) / f'{nodes.DRIVE}.state'))
-    return parameter_file.text(sections)
-
-
-def read_tracks(scenario):
-    """The program tracks {topic: message} of a scenario, its files of target and ship read before anything is started.
-    Raises ValueError, OSError for a file that is not what it should be."""
+def read_files(plan):
+    """Read the files of target and ship of a program.Plan before anything is started. Raises ValueError, OSError for a
+    file that is not what it should be."""
+    scenario = plan.scenario
     if 'ship_motion' in scenario.nodes:
         motion.constants(scenario.node_parameters('ship_motion').ship)
-    return program_messages(scenario)
+    return plan.tracks
 
 
-def run(scenario, bag, progress):
-    """Run a scenario to its end, or until Ctrl-C, and return its Outcome.
+def run(plan, bag, progress):
+    """Run the scenario of a program.Plan to its end, or until Ctrl-C, and return its Outcome.
 
     progress: a context with a function of the time of the run [s], which is called as it goes on. Raises RunError when
     it cannot go on. The recording up to then stays readable.
     """
-    tracks = read_tracks(scenario)
-    with Graph(scenario, bag) as graph, progress as advance:
+    tracks = read_files(plan)
+    with Graph(plan.scenario, bag) as graph, progress as advance:
         # With rclpy, after which no node can be a copy of this process (child).
         from pedestal_bringup.run import watch
         return watch.run(graph, tracks, advance)

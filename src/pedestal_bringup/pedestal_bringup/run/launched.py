@@ -3,6 +3,8 @@ import typing
 
 from pedestal_bringup.run import beside, graph, scenario, supervisor
 from pedestal_bringup.run.processes import Graph
+from pedestal_bringup.run.program import Plan
+from pedestal_bringup.run.start import begins, parameters_of_all
 from pedestal_common import parameters
 
 
@@ -73,12 +75,12 @@ def servers(given, chosen):
 def prepare(given, chosen):
     """Make what a Scenario starts with, its laws and the folder of its logs: (ROS 2 parameter file of all nodes, the
     scenario as a file). Raises ValueError, RunError."""
-    graph.read_tracks(chosen)
+    graph.read_files(Plan(chosen))
     bag = graph.new_bag(given['bag'], chosen.name)
     if chosen.header.pacing == 'realtime':
         supervisor.prepare(chosen)
     made = Graph(chosen, bag)
-    made.write(graph.parameters_of_all(chosen, bag, graph.begins(chosen)))
+    made.write(parameters_of_all(chosen, bag, begins(chosen)))
     whole = made.log / f'{chosen.name}.yaml'
     whole.write_text(chosen.as_yaml())
     return made.file, whole

@@ -1,52 +1,82 @@
 """The program track an operator sends before a pass: the predicted target as time-tagged azimuth and elevation."""
 import dataclasses
 import datetime
+import functools
 
 import numpy as np
 
+from pedestal_bringup.run.scenario import Scenario
 from pedestal_common import messages, orbit
 from tracking_receiver_sim import target
 from tracking_receiver_sim.path import arrival
 
 
-def program_table(scenario, prefix=''):
-    """(times (n,) s, angles (n, 2) earth azimuth (unwrapped), elevation [rad]) of a scenario's prediction; prefix: of
-    the beam. The operator knows neither UT1 nor how late the target is seen, and of the air what `refractivity` says.
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """A scenario.Scenario with its targets and its program tracks; each is built once, when it is first needed."""
+    scenario: Scenario
 
-    From stamp 0 until two intervals past the end, so that the end of the run lies inside; where the target is not
-    known, it stands at its first or last known place. Times to the last bit as the ACU reads them from the message.
-    """
-    program, duration = scenario.header.program, scenario.header.duration
-    true = scenario.node_parameters(prefix + 'tracking_receiver').target
-    believed = dataclasses.replace(true, leo_pass=dataclasses.replace(true.leo_pass, ut1_offset=0.0))
-    built = target.build(believed, duration)
-    nanoseconds = np.round(np.arange(0.0, duration + 2.0 * program.interval, program.interval) * 1e9)
-    times = nanoseconds // 1e9 + nanoseconds % 1e9 * 1e-9
-    known = np.clip(times - program.time_offset, built.breaks[0], built.breaks[-1])
-    azimuth, elevation, _ = target.look_angles(built, known)
-    if program.refractivity > 0.0:
-        elevation = elevation + [arrival.refraction(program.refractivity, E)[0] for E in elevation]
-    return times, np.column_stack((np.unwrap(azimuth) + program.azimuth_offset, elevation + program.elevation_offset))
+    @functools.cached_property
+    def targets(self):
+        """{prefix of the beam: true target.Target}."""
+        return {prefix: target.build(self._parameters(prefix), self.scenario.header.duration)
+                for prefix in self.scenario.prefixes}
 
+    def _parameters(self, prefix):
+        return self.scenario.node_parameters(prefix + 'tracking_receiver').target
 
-def announced(scenario):
-    """Lines on the targets of a scenario's beams, each once: what a flight is, when a satellite is highest, rises and
-    sets."""
-    lines = []
-    for prefix in scenario.prefixes:
-        built = target.build(scenario.node_parameters(prefix + 'tracking_receiver').target, scenario.header.duration)
-        lines += built.summary or _sky(built, scenario.header.duration)
-    return list(dict.fromkeys(lines))
+    def _believed(self, prefix):
+        """The target of a beam as the operator knows it, who does not know UT1."""
+        true = self._parameters(prefix)
+        believed = dataclasses.replace(true, leo_pass=dataclasses.replace(true.leo_pass, ut1_offset=0.0))
+        return self.targets[prefix] if believed == true else target.build(believed, self.scenario.header.duration)
 
+    @functools.cached_property
+    def tables(self):
+        """{prefix of the beam: (times (n,) s, angles (n, 2) earth azimuth (unwrapped), elevation [rad])} of the
+        prediction. The operator knows neither UT1 nor how late the target is seen, and of the air what `refractivity`
+        says.
 
-def begins(scenario):
-    """UTC [ns] of the time 0 of a scenario by its target. Raises ValueError where the target has no date."""
-    built = target.build(scenario.node_parameters(f'{scenario.prefixes[0]}tracking_receiver').target,
-                         scenario.header.duration)
-    if not built.start_time:
-        raise ValueError(f'--start file: the target of {scenario.name} has no date; say a UTC instead')
-    begin = orbit.instant('start', built.start_time).replace(tzinfo=datetime.timezone.utc)
-    return round(begin.timestamp() * 1e3) * 1_000_000
+        From stamp 0 until two intervals past the end, so that the end of the run lies inside; where the target is not
+        known, it stands at its first or last known place. Times to the last bit as the ACU reads them from the
+        message.
+        """
+        program, duration = self.scenario.header.program, self.scenario.header.duration
+        nanoseconds = np.round(np.arange(0.0, duration + 2.0 * program.interval, program.interval) * 1e9)
+        times = nanoseconds // 1e9 + nanoseconds % 1e9 * 1e-9
+        tables = {}
+        for prefix in self.scenario.prefixes:
+            built = self._believed(prefix)
+            known = np.clip(times - program.time_offset, built.breaks[0], built.breaks[-1])
+            azimuth, elevation, _ = target.look_angles(built, known)
+            if program.refractivity > 0.0:
+                elevation = elevation + [arrival.refraction(program.refractivity, E)[0] for E in elevation]
+            tables[prefix] = times, np.column_stack((np.unwrap(azimuth) + program.azimuth_offset,
+                                                     elevation + program.elevation_offset))
+        return tables
+
+    @functools.cached_property
+    def tracks(self):
+        """{topic: JointTrajectory} of the program track for every beam; {} where there is none."""
+        if self.scenario.header.program.source == 'none':
+            return {}
+        return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in self.tables.items()}
+
+    def announced(self):
+        """Lines on the targets of the beams, each once: what a flight is, when a satellite is highest, rises and
+        sets."""
+        lines = []
+        for built in self.targets.values():
+            lines += built.summary or _sky(built, self.scenario.header.duration)
+        return list(dict.fromkeys(lines))
+
+    def begins(self):
+        """UTC [ns] of the time 0 by the target. Raises ValueError where the target has no date."""
+        start_time = self.targets[self.scenario.prefixes[0]].start_time
+        if not start_time:
+            raise ValueError(f'--start file: the target of {self.scenario.name} has no date; say a UTC instead')
+        begin = orbit.instant('start', start_time).replace(tzinfo=datetime.timezone.utc)
+        return round(begin.timestamp() * 1e3) * 1_000_000
 
 
 def _sky(built, duration):
@@ -68,14 +98,6 @@ def _sky(built, duration):
     sets = (f'the satellite sets {when(up[-1])}: nothing can be tracked after',) if up.size and (
         up[-1] < times.size - 1) else ()
     return (highest, *rises, *sets)
-
-
-def program_messages(scenario):
-    """{topic: JointTrajectory} of a scenario's program track for every beam; {} where it has none."""
-    if scenario.header.program.source == 'none':
-        return {}
-    return {f'{prefix}acu/program_track': program_message(*program_table(scenario, prefix))
-            for prefix in scenario.prefixes}
 
 
 def program_message(times, angles):

@@ -32,15 +32,15 @@ def station_changes(text):
 
 
 class Sky:
-    """The satellite and the station of a scenario.Scenario, seen at `now` (datetime, UTC). Raises ValueError where its
+    """The satellite and the station of a scenario.Draft, seen at `now` (datetime, UTC). Raises ValueError where its
     target is no satellite."""
 
-    def __init__(self, scenario, now):
-        if scenario.header.graph_beams > 1:
-            raise ValueError(f'--pass: {scenario.name} has {scenario.header.beams} beams; it takes a scenario of one')
-        target = scenario.node_parameters(f'{scenario.prefixes[0]}tracking_receiver').target
+    def __init__(self, draft, now):
+        if draft.header.graph_beams > 1:
+            raise ValueError(f'--pass: {draft.name} has {draft.header.beams} beams; it takes a scenario of one')
+        target = draft.target
         if target.kind != 'leo_pass':
-            raise ValueError(f'--tle, --pass: the target of {scenario.name} is a {target.kind}, which is no satellite')
+            raise ValueError(f'--tle, --pass: the target of {draft.name} is a {target.kind}, which is no satellite')
         self.satellite, self.station, self.now = orbit.satellite(target.leo_pass), target.station, now
 
     def list(self):

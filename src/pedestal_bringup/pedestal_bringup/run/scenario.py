@@ -254,21 +254,57 @@ def file_overrides(path):
             for node, values in parameter_file.read(path).items() for key, value in values.items()]
 
 
+@dataclasses.dataclass(frozen=True)
+class Draft:
+    """A scenario before it is checked as a whole: sections {node or `scenario`: {dotted name: value}}."""
+    name: str
+    sections: dict
+
+    def changed(self, overrides):
+        """The Draft with texts 'node.key=value' on top. Raises ScenarioError."""
+        sections = {node: dict(values) for node, values in self.sections.items()}
+        for override in overrides:
+            node, key, value = parse_override(override)
+            sections.setdefault(node, {})[key] = value
+        return Draft(self.name, sections)
+
+    @property
+    def header(self):
+        """The ScenarioParameters."""
+        return _checked(self.name, 'scenario', ScenarioParameters, self.sections['scenario'])
+
+    @property
+    def target(self):
+        """The target of a single receiver."""
+        return _checked(self.name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
+                        self.sections.get('tracking_receiver', {})).target
+
+
+def draft(name_or_path):
+    """A Draft from a name or a YAML path. Raises ScenarioError."""
+    name, content = text(name_or_path)
+    return Draft(name, _sections(name, content))
+
+
 def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
-    """A Scenario from a name or a YAML path; see parse."""
-    return parse(*text(name_or_path), overrides, seed, duration, pacing)
+    """A Scenario from a name or a YAML path; see checked."""
+    return checked(draft(name_or_path).changed(overrides), seed, duration, pacing)
 
 
 def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     """A Scenario from its YAML text; parse(name, Scenario.as_yaml()) gives the same again.
 
-    overrides: texts 'node.key=value'. seed, duration and pacing replace the header's where given.
+    overrides: texts 'node.key=value'; see checked.
+    """
+    return checked(Draft(name, _sections(name, content)).changed(overrides), seed, duration, pacing)
+
+
+def checked(changed, seed=None, duration=None, pacing=None):
+    """The Scenario of a Draft that `changed` made. seed, duration and pacing replace the header's where given.
+
     Raises ScenarioError for anything unknown or out of range.
     """
-    sections = _sections(name, content)
-    for override in overrides:
-        node, key, value = parse_override(override)
-        sections.setdefault(node, {})[key] = value
+    name, sections = changed.name, dict(changed.sections)
     header_values = sections.pop('scenario')
     for key, value in (('seed', seed), ('duration', duration), ('pacing', pacing)):
         if value is not None:

@@ -6,9 +6,8 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from pedestal_bringup.run import lockstep, supervisor
-from pedestal_bringup.run.graph import Outcome, begins, parameters_of_all
 from pedestal_bringup.run.operator_node import Operator, sole_run
-from pedestal_bringup.run.program import program_messages
+from pedestal_bringup.run.start import Outcome, begins, parameters_of_all
 from pedestal_common import messages, middleware, nodes
 
 
@@ -56,20 +55,21 @@ def _in_realtime(graph, operator, tracks, progress):
     return Outcome(graph.result(nodes.DRIVE), recorder, supervised.restarts.count, supervised.losses.count, stopped)
 
 
-def send_program(scenario, start=None, ros_arguments=()) -> int:
-    """Send a scenario's program track to a running ACU and keep it latched until Ctrl-C.
+def send_program(plan, start=None, ros_arguments=()) -> int:
+    """Send the program track of a program.Plan to a running ACU and keep it latched until Ctrl-C.
 
     start: when its time is 0 [ns UTC]; None: when the graph's is, which the ACU is asked for. ros_arguments: for the
     node that sends it, in the namespace of the graph.
     """
+    beams = plan.scenario.header.graph_beams
     middleware.initialise(ros_arguments)
     try:
-        operator = Operator(scenario.header.graph_beams)
+        operator = Operator(beams)
         executor = SingleThreadedExecutor()
         executor.add_node(operator)
-        tracks = program_messages(scenario)
+        tracks = plan.tracks
         if start is None:
-            acu = nodes.members(('acu',), scenario.header.graph_beams)[0]
+            acu = nodes.members(('acu',), beams)[0]
             print(f'asks {acu} on ROS_DOMAIN_ID {operator.context.get_domain_id()} when its time began', flush=True)
             start = operator.graph_start(acu, executor)
         for track in tracks.values():

@@ -14,11 +14,12 @@ from scipy.stats import beta
 from acu_tracker import modes
 from acu_tracker.search.params import SearchParameters
 from acu_tracker.search.pattern import PATTERNS, SPIRAL, SQUARE
+from pedestal_bringup.analysis.intervals import CONFIDENCE, row
 from pedestal_bringup.report.figures import FILTERED
 from pedestal_bringup.studies.rigs import drawing
-from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.rows import CONFIDENCE, Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
+from pedestal_bringup.trials.cases import Case
 
 RUNS, SEED = 100, 1
 

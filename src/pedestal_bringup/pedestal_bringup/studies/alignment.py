@@ -15,13 +15,16 @@ from collections import namedtuple
 
 import numpy as np
 
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import pseudo_values, row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies.rigs import drawing
-from pedestal_bringup.studies.rigs.rows import Result, pseudo_values, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 from pedestal_common.line_of_sight import to_deck
-from ship_motion_sim import imu, motion, navigator, strapdown
+from pedestal_common.quaternion import product
+from ship_motion_sim import imu, motion, navigator
 from ship_motion_sim.params import (
     METHODS,
     AlignmentParameters,
@@ -131,7 +134,7 @@ class Accuracy:
     @property
     def level(self):
         """Rms of the level errors over the runs and the time from SHORT on [arcmin]."""
-        return math.sqrt(np.mean(self.rms[round(SHORT / EVERY):, :2]**2))
+        return tracking.rms(self.rms[round(SHORT / EVERY):, :2])
 
     @property
     def ratio(self):
@@ -144,7 +147,7 @@ class Accuracy:
         return 1e6 * self.whole.wall_time / self.whole.steps
 
     def over_parts(self, statistic):
-        """rows.pseudo_values of statistic(Accuracy)."""
+        """intervals.pseudo_values of statistic(Accuracy)."""
         return pseudo_values(self.parts, lambda parts: statistic(Accuracy(parts)))
 
 
@@ -205,7 +208,7 @@ def misaligned(attitude, angles):
     """Attitude deck -> n' of an attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T; angles a_x, a_y, a_z
     [rad]."""
     for axis in (2, 0, 1):
-        attitude = strapdown.product(*quaternion(axis, -angles[axis]), *attitude)
+        attitude = product(quaternion(axis, -angles[axis]), attitude)
     return attitude
 
 
@@ -243,7 +246,7 @@ def recorded(batch, run):
     inputs, truth = np.zeros(1, imu.INPUTS), np.zeros(1, motion.OUTPUTS)
     inputs['dt'] = PERIOD
     motion.truth(ship[0], 0.0, truth[0])
-    start = misaligned(truth[0]['quaternion'].tolist(), angles)
+    start = misaligned(truth[0]['quaternion'], angles)
     increments = Increments(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)))
     simulate(Sensors(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS)),
              random.standard_normal((n, imu.NORMALS)), disturbance(batch, random, n), increments)
@@ -252,7 +255,7 @@ def recorded(batch, run):
 
 def errors(estimated, attitude):
     """Errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one (n, 4)."""
-    x, y, z, w = strapdown.product(*estimated.T, *(attitude * (-1.0, -1.0, -1.0, 1.0)).T)
+    x, y, z, w = product(estimated.T, (attitude * (-1.0, -1.0, -1.0, 1.0)).T)
     size = np.sqrt(x * x + y * y + z * z)
     angle = 2.0 * np.arctan2(size, np.abs(w)) * np.sign(np.where(w == 0.0, 1.0, w))
     return np.stack((x, y, z), axis=1) * (angle / np.where(size > 0.0, size, 1.0))[:, None]
@@ -336,7 +339,7 @@ def rows(accuracy, bound):
     azimuth, level = (sigma / ARCMIN for sigma in bound)
     table += [row('limit', 'time_to_12arcmin_rms_s', settling_time(azimuth), 's'),
               *(row('limit', f'azimuth_rms_arcmin_{t}s', at(azimuth, t), 'arcmin') for t in TIMES),
-              row('limit', 'level_rms_arcmin', math.sqrt(np.mean(level[round(SHORT / EVERY):]**2)), 'arcmin')]
+              row('limit', 'level_rms_arcmin', tracking.rms(level[round(SHORT / EVERY):]), 'arcmin')]
     return table + [row(case, 'step_us', a.step_us, 'us') for case, a in accuracy[''].items()]
 
 
@@ -409,7 +412,7 @@ def level_figure(accuracy, bound):
     t = EVERY * np.arange(1, len(bound[1]) + 1)
     for case, a in accuracy.items():
         axes[0, 0].plot(t, a.whole.first[:, 0] / ARCMIN, color=COLOURS[case], linewidth=0.8, label=case)
-        axes[1, 0].plot(t, np.sqrt(np.mean(a.rms[:, :2]**2, axis=1)), color=COLOURS[case], label=case)
+        axes[1, 0].plot(t, tracking.rms(a.rms[:, :2], axis=1), color=COLOURS[case], label=case)
     axes[0, 0].set_title('level error about east of one run (figure 4 of the paper)')
     axes[0, 0].set_xlim(100.0, DURATION)
     axes[0, 0].set_ylim(-4.0, 4.0)

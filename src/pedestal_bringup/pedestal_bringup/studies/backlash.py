@@ -8,11 +8,14 @@ import math
 
 import numpy as np
 
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, RAW, TRUTH
 from pedestal_bringup.studies import servo
-from pedestal_bringup.studies.rigs import cases, drawing, metrics
-from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs import drawing, metrics
+from pedestal_bringup.studies.rigs.rows import Result
+from pedestal_bringup.trials import cases
+from pedestal_bringup.trials.cases import Case
 
 SETTLED = 2.0
 """Standstill is evaluated from this time on after a step [s]."""
@@ -124,10 +127,10 @@ def measured(kind, name, record):
         overshoot = metrics.overshoot_percent(record['adu/truth']['position'][:, 0], servo.STEP)
         return {'step_overshoot_percent': (overshoot, '%')}
     moving = record.t < MOVED
-    return {'fight_torque_rms_nm': (metrics.rms(fight(record)[~moving]), 'Nm'),
-            'synchronism_error_rms_rad_s': (metrics.rms(synchronism_error(record)[~moving]), 'rad/s'),
-            'move_fight_torque_rms_nm': (metrics.rms(fight(record)[moving]), 'Nm'),
-            'move_synchronism_error_rms_rad_s': (metrics.rms(synchronism_error(record)[moving]), 'rad/s')}
+    return {'fight_torque_rms_nm': (tracking.rms(fight(record)[~moving]), 'Nm'),
+            'synchronism_error_rms_rad_s': (tracking.rms(synchronism_error(record)[~moving]), 'rad/s'),
+            'move_fight_torque_rms_nm': (tracking.rms(fight(record)[moving]), 'Nm'),
+            'move_synchronism_error_rms_rad_s': (tracking.rms(synchronism_error(record)[moving]), 'rad/s')}
 
 
 def rows(done):

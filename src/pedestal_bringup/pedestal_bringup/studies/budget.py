@@ -16,9 +16,11 @@ import typing
 
 import numpy as np
 
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import pseudo_values, row
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.studies.rigs import drawing
-from pedestal_bringup.studies.rigs.rows import Result, pseudo_values, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common import topics
 from pedestal_common.parameters import defaults
@@ -209,7 +211,7 @@ def budget(mode, runs, duration, pool, progress):
 def _sizes(case, e):
     """Rows of an error (n, 2), or of one of several runs (runs, n, 2)."""
     return [row(case, 'rms_deg', rms(e), 'deg'),
-            *(row(case, f'{axis}_rms_deg', np.sqrt(np.mean(e[..., i] ** 2, axis=-1)), 'deg')
+            *(row(case, f'{axis}_rms_deg', tracking.rms(e[..., i], axis=-1), 'deg')
               for i, axis in enumerate(ACROSS))]
 
 

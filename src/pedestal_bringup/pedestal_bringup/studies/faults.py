@@ -13,12 +13,15 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.alarms import report
 from acu_tracker.alarms.table import NAMES
 from acu_tracker.modes import MODES
+from acu_tracker.prediction import Predictor
+from pedestal_bringup.analysis.intervals import missed, row
 from pedestal_bringup.report.figures import FILTERED, INK, RAW
 from pedestal_bringup.run import closed_loop, scenario
 from pedestal_bringup.studies.rigs import drawing
 from pedestal_bringup.studies.rigs.fault_expectations import EXPECTED
-from pedestal_bringup.studies.rigs.rows import Result, missed, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_common.injection import table
+from tracking_receiver_sim.params import LeoPassParameters
 
 SCENARIO, ONSET, LASTS, SECONDS = 'ship_pass', 10.0, 5.0, 20.0
 SETTLED = 5.0
@@ -33,20 +36,31 @@ JOGGED = '; '.join(f'{t:g} rate azimuth={RATE}' for t in np.arange(SETTLED, SECO
 ASIDE = 0.05
 """By which the program is off in mode search [rad], so that the target is found late."""
 
-OUTSET = {'standby': ['acu.initial_mode=standby'], 'stop': ['acu.commands=1 stop'],
-          'stow': ['acu.initial_mode=stow'], 'preset': ['acu.initial_mode=preset'], 'rate': [f'acu.commands={JOGGED}'],
-          'slave': ['acu.commands=1 slave azimuth={} elevation={} holds=60'.format(*DIRECTION)],
-          'program': ['acu.initial_mode=program', 'acu.tracker.handover=false'],
-          'autotrack': ['acu.initial_mode=program'],
-          'search': ['acu.initial_mode=program', 'acu.commands=6 search',
-                     f'scenario.program.elevation_offset={ASIDE}'],
-          'acquire': ['acu.initial_mode=program', 'acu.commands=9 acquire'],
-          'steptrack': ['acu.initial_mode=program', 'acu.commands=5 steptrack']}
+START = 'tracking_receiver.target.leo_pass.start_time'
+
+_OUTSETS = {
+    'stop': ['acu.commands=1 stop'],
+    'unstow': ['acu.initial_mode=unstow', 'acu.elevation.stow=0.35', 'acu.stow_timeout=60', 'adu.stow_pins=true',
+               *(f'adu.pins.{given}' for given in ('initially_in=true', 'elevation=0.35', 'travel_time=30',
+                                                   'timeout=60'))],
+    'rate': [f'acu.commands={JOGGED}'],
+    'slave': ['acu.commands=1 slave azimuth={} elevation={} holds=60'.format(*DIRECTION)],
+    'program': ['acu.initial_mode=program', 'acu.tracker.handover=false'],
+    'tle': ['acu.initial_mode=tle', 'acu.tracker.handover=false', f'{START}=2019-12-09T16:40:53',
+            *(f'acu.prediction.{line}={getattr(LeoPassParameters, line)}' for line in ('line_1', 'line_2'))],
+    'sun': ['acu.initial_mode=sun', f'{START}=2019-12-10T14:15:25'],
+    'autotrack': ['acu.initial_mode=program'],
+    'search': ['acu.initial_mode=program', 'acu.commands=6 search', f'scenario.program.elevation_offset={ASIDE}'],
+    'acquire': ['acu.initial_mode=program', 'acu.commands=9 acquire'],
+    'steptrack': ['acu.initial_mode=program', 'acu.commands=5 steptrack']}
+"""Where it takes more than the initial mode; tle has the pass of the other modes, sun a time at which it is up."""
+
+OUTSET = {mode: _OUTSETS.get(mode, [f'acu.initial_mode={mode}']) for mode in MODES}
 """Parameters with which a run is in a mode at the onset."""
 
 ALARM = 'alarm'
 
-ON_TARGET = ('program', 'autotrack')
+ON_TARGET = ('program', 'tle', 'autotrack')
 """Modes that follow the target; which of them does counts as one."""
 
 TOWARDS_TARGET = ('search', 'acquire', 'steptrack', *ON_TARGET)
@@ -93,9 +107,10 @@ def errors(run, mode):
     at = run['adu/truth']['position']
     if mode in TOWARDS_TARGET:
         off = np.hypot(*run.truth['error'].T)
-    elif mode == 'slave':
+    elif mode in ('slave', 'sun'):
         beam = Rotation.from_quat(run['ship/truth']['orientation']).apply(pointing(*at.T))
-        off = np.arccos(np.clip(beam @ enu(*DIRECTION), -1.0, 1.0))
+        cosine = beam @ enu(*DIRECTION)[0] if mode == 'slave' else (beam * enu(*of_sun(run.t))).sum(axis=1)
+        off = np.arccos(np.clip(cosine, -1.0, 1.0))
     else:
         turned = RATE * (run.t - run.t[first - 1]) if mode == 'rate' else 0.0
         off = np.hypot((at[:, 0] - at[first - 1, 0] - turned) * np.cos(at[:, 1]), at[:, 1] - at[first - 1, 1])
@@ -112,9 +127,15 @@ def pointing(azimuth, elevation):
 
 
 def enu(azimuth, elevation):
-    """ENU unit vector of earth angles [rad], azimuth clockwise from north."""
-    [[north, west, up]] = pointing(np.array([azimuth]), np.array([elevation]))
-    return np.array([-west, north, up])
+    """Return ENU unit vectors of earth angles [rad], azimuth clockwise from north."""
+    north, west, up = pointing(*np.atleast_1d(azimuth, elevation)).T
+    return np.column_stack((-west, north, up))
+
+
+def of_sun(t):
+    """Return azimuth and elevation (2, n) [rad] of the sun in the runs of mode sun, at stamps (n,) [s]."""
+    track = Predictor(scenario.load(SCENARIO, OUTSET['sun']).node_parameters('acu').prediction).sun(0.0).track
+    return [np.interp(t, track.times, angles) for angles in track.angles.T]
 
 
 def usual(mode):

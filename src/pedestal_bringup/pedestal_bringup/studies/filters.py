@@ -14,10 +14,11 @@ import numpy as np
 from acu_tracker.estimation.kinds import KINDS
 from acu_tracker.estimation.motion_models import MODELS
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies.rigs import drawing, ensemble, profiles
 from pedestal_bringup.studies.rigs.ensemble import Noise
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo, tuning
 from pedestal_common.parameters import build
 

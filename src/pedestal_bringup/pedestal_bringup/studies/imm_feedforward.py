@@ -16,8 +16,10 @@ import numpy as np
 from acu_tracker.estimation.motion_models import MODELS
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.modes import AUTOTRACK
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies.rigs import cases, drawing, feedforward_loop, metrics, profiles
+from pedestal_bringup.studies.rigs import drawing, feedforward_loop, metrics, profiles
 from pedestal_bringup.studies.rigs.feedforward_loop import (
     METRICS,
     REVERSALS,
@@ -31,8 +33,8 @@ from pedestal_bringup.studies.rigs.feedforward_loop import (
     imm,
     statistics,
 )
-from pedestal_bringup.studies.rigs.rows import Result, row
-from pedestal_bringup.trials import monte_carlo
+from pedestal_bringup.studies.rigs.rows import Result
+from pedestal_bringup.trials import cases, monte_carlo
 from pedestal_common.parameters import as_dict
 
 RUNS = 50
@@ -95,7 +97,7 @@ def driven(item):
 def driven_measures(item):
     """(rms, largest) miss [deg] of an item as of `driven`."""
     _, error = driven(item)
-    return math.degrees(metrics.rms(error)), math.degrees(metrics.peak(error))
+    return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
 
 
 TARGETS = {

@@ -8,9 +8,10 @@ import math
 
 import numpy as np
 
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH
 from pedestal_bringup.studies.rigs import drawing, ensemble, feedforward_loop, profiles
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
 
 RUNS = 200

@@ -9,10 +9,11 @@ import math
 
 import numpy as np
 
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_bringup.studies.rigs import drawing, feedforward_loop
 from pedestal_bringup.studies.rigs.feedforward_loop import Source
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
 
 RUNS = 50

@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from pedestal_bringup.analysis.tracking import began
+from pedestal_bringup.analysis.intervals import row
+from pedestal_bringup.analysis.tracking import began, rms
 from pedestal_bringup.studies.rigs import phased_array_figures as figures
 from pedestal_bringup.studies.rigs.angle_loop import (
     GRID,
@@ -22,10 +23,10 @@ from pedestal_bringup.studies.rigs.angle_loop import (
     delay_limit,
     spectral_radius,
 )
-from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.metrics import overshoot_percent, peak, rms
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.metrics import overshoot_percent, peak
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
+from pedestal_bringup.trials.cases import Case
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 

@@ -17,10 +17,12 @@ import numpy as np
 from acu_tracker.estimation import axis_filter
 from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies.rigs import drawing, ensemble, metrics, profiles
+from pedestal_bringup.studies.rigs import drawing, ensemble, profiles
 from pedestal_bringup.studies.rigs.ensemble import PERIOD as T
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.compiled import compiled
 
@@ -178,7 +180,7 @@ def batch(item):
     t, target = flyby()
     counts = t >= SKIPPED
     estimates = [flown(name, run)[2] for run in range(first, first + count)]
-    return np.degrees([[metrics.rms((out[field] - target[:, i])[counts]) for i, field in enumerate(('angle', 'rate'))]
+    return np.degrees([[tracking.rms((out[field] - target[:, i])[counts]) for i, field in enumerate(('angle', 'rate'))]
                        for out in estimates])
 
 

@@ -9,12 +9,13 @@ import math
 import numpy as np
 
 from pedestal_bringup.analysis import results, tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, RAW
 from pedestal_bringup.run.recorded import Recorded
 from pedestal_bringup.studies.rigs import drawing
-from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
+from pedestal_bringup.trials.cases import Case
 
 RUNS, SEED = 40, 1
 """Runs of each case; seed of the first."""

@@ -10,10 +10,13 @@ import math
 
 import numpy as np
 
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
-from pedestal_bringup.studies.rigs import cases, drawing, metrics
-from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs import drawing, metrics
+from pedestal_bringup.studies.rigs.rows import Result
+from pedestal_bringup.trials import cases
+from pedestal_bringup.trials.cases import Case
 
 STEP = 0.174
 """Of figure 5 [rad]."""
@@ -138,7 +141,7 @@ def sine_metrics(record, reading):
     return {f'sine_{reading}_max_error_rad': largest,
             f'sine_{reading}_max_error_percent': 100.0 * largest / AMPLITUDE,
             f'sine_{reading}_peak_error_percent': 100.0 * abs(1.0 - amplitude / AMPLITUDE),
-            f'sine_{reading}_rms_error_rad': metrics.rms(error[steady]),
+            f'sine_{reading}_rms_error_rad': tracking.rms(error[steady]),
             f'sine_{reading}_amplitude_rad': amplitude, f'sine_{reading}_period_s': fitted,
             f'sine_{reading}_start_error_rad': metrics.peak(error[t < period])}
 

@@ -9,13 +9,14 @@ import math
 import numpy as np
 
 from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED
 from pedestal_bringup.run import recorded
 from pedestal_bringup.studies.filters import MANOEUVRE
 from pedestal_bringup.studies.rigs import drawing
-from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
+from pedestal_bringup.trials.cases import Case
 
 RUNS, SEED = 30, 1
 """Runs of each case; seed of the first."""
@@ -69,7 +70,7 @@ def pointing(case):
     begun = np.flatnonzero(flown.mode == 'autotrack')
     if not begun.size or np.any(flown.mode[begun[0]:] != 'autotrack'):
         return math.nan
-    return flown.pointing(tracking.rms)
+    return flown.pointing(tracking.known_rms)
 
 
 def batch(item):

@@ -18,11 +18,13 @@ import math
 import numpy as np
 
 from acu_tracker.estimation import axis_filter, motion_models
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, RAW
 from pedestal_bringup.studies.rate_measurement import ALPHA, filter_of
-from pedestal_bringup.studies.rigs import drawing, ensemble, metrics
+from pedestal_bringup.studies.rigs import drawing, ensemble
 from pedestal_bringup.studies.rigs.ensemble import PERIOD as T
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import monte_carlo
 from pedestal_common.topics import AXES
 
@@ -97,7 +99,7 @@ def batch(item):
     axis, first, count = item
     t, target = flight()
     counts = t >= START + SETTLED
-    return np.degrees([[[metrics.rms(error) for error in (values - target[axis])[counts].T]
+    return np.degrees([[[tracking.rms(error) for error in (values - target[axis])[counts].T]
                         for values in flown(axis, run)] for run in range(first, first + count)])
 
 

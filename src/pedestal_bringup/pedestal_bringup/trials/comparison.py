@@ -11,7 +11,7 @@ import typing
 
 import numpy as np
 
-from pedestal_bringup.studies.rigs.rows import interval
+from pedestal_bringup.analysis.intervals import estimated, interval
 from pedestal_bringup.trials import statistics
 
 
@@ -74,10 +74,10 @@ def rows(sides):
             continue
         case, metric = statistics.case_of(sides.case, name)
         larger = statistics.larger_is_better(name)
-        found.append(statistics.row(case, f'{metric}/difference', statistics.unit(name), interval(a - b), len(a)))
+        found.append(estimated(case, f'{metric}/difference', interval(a - b), statistics.unit(name), len(a)))
         if has_gain(name, a, b):
-            found.append(statistics.row(case, f'{metric}/gain', '%', gain(a, b, larger), len(a)))
-        found.append(statistics.row(case, f'{metric}/wins', '%', wins(a, b, larger), len(a)))
+            found.append(estimated(case, f'{metric}/gain', gain(a, b, larger), '%', len(a)))
+        found.append(estimated(case, f'{metric}/wins', wins(a, b, larger), '%', len(a)))
     return found
 
 

@@ -1,8 +1,8 @@
 """`pedestal tune --loops`: gains of the drive's and the control unit's loops for the plant of a scenario.
 
 Each axis is designed as a rigid one; the margins are then measured on the simulated plant, with its gears, lash,
-friction, structure, delays and sampling (studies/bode), and a loop that falls short of them becomes slower until it
-holds them. Per motor on its shaft, with the motors' inertia J_m, the load's J_L and the ratio N:
+friction, structure, delays and sampling (frequency_response), and a loop that falls short of them becomes slower
+until it holds them. Per motor on its shaft, with the motors' inertia J_m, the load's J_L and the ratio N:
 
     J = J_m + J_L / (2 N^2)                          what one motor turns
     K_p = w_s J,  K_i = K_p w_s / 5                  speed loop of crossover w_s
@@ -22,7 +22,7 @@ import numpy as np
 from adu_drive.params import SPEED_PERIOD
 from pedestal_bringup.bags import configuration
 from pedestal_bringup.run import parameter_file, scenario
-from pedestal_bringup.studies import bode
+from pedestal_bringup.trials import frequency_response as frequency
 from pedestal_common.topics import AXES
 
 SPEED, RATIO = 28.0, 8.0
@@ -121,8 +121,8 @@ def _rounded(gains):
 
 
 def holds(margins, asked):
-    """Whether margins, as bode.margins gives them, are those that are asked. A gain margin beyond the band counts as
-    held; a loop that is never above 1 has none."""
+    """Whether margins, as frequency.margins gives them, are those that are asked. A gain margin beyond the band
+    counts as held; a loop that is never above 1 has none."""
     phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
     return phase >= asked.phase_margin and not gain < asked.gain_margin
 
@@ -148,7 +148,7 @@ class Loops:
 
     def _case(self):
         said = dict(text.split('=', 1) for text in self.overrides)
-        return bode.case(self.name, self.source, {**said, **self.gains, **STILL})
+        return frequency.case(self.name, self.source, {**said, **self.gains, **STILL})
 
     def _sweep(self, axis, sweep, period):
         """A sweep whose torque stays below half of the bias, so that the teeth stay closed, and whose highest
@@ -158,26 +158,26 @@ class Loops:
                                    highest=min(sweep.highest, 0.475 / period))
 
     def response(self, loop, name):
-        """bode.Response of a loop of an axis with the gains as they are, None where the drive trips; loop: 'current'
-        (of the motor with less phase margin), 'speed', 'position'."""
+        """frequency.Response of a loop of an axis with the gains as they are, None where the drive trips; loop:
+        'current' (of the motor with less phase margin), 'speed', 'position'."""
         drive = self._case().loaded().node_parameters('adu')
         axis = getattr(drive, name)
         if loop == 'current':
             travel = drive.azimuth.limits
             limits = dataclasses.replace(axis.limits, lower=travel.lower, upper=travel.upper)
-            found = bode.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
-            return min(found.values(), key=lambda response: bode.margins(response)['phase_margin_deg'][0])
+            found = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
+            return min(found.values(), key=lambda response: frequency.margins(response)['phase_margin_deg'][0])
         if loop == 'speed':
-            return bode.speed(drive, self._sweep(axis, bode.SPEED, SPEED_PERIOD))[f'speed/{name}']
-        sweep = self._sweep(axis, bode.POSITION, drive.period)
-        found = bode.position(self._case(), (name,), sweep)[f'position/{name}/{self.name}']
+            return frequency.speed(drive, self._sweep(axis, frequency.SPEED, SPEED_PERIOD))[f'speed/{name}']
+        sweep = self._sweep(axis, frequency.POSITION, drive.period)
+        found = frequency.position(self._case(), (name,), sweep)[f'position/{name}/{self.name}']
         # A drive that has tripped sends nothing.
         return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
 
     def measured(self, loop, name):
-        """bode.margins of `response`, None where the drive trips."""
+        """frequency.margins of `response`, None where the drive trips."""
         found = self.response(loop, name)
-        return bode.margins(found) if found else None
+        return frequency.margins(found) if found else None
 
     def close(self, loop, name, asked, set_to, fastest):
         """(w, margins) of the first loop, from crossover `fastest` [rad/s] down, that holds what is asked; set_to(w)

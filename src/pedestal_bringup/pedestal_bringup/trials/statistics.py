@@ -14,13 +14,12 @@ import typing
 import numpy as np
 from scipy import stats
 
-from pedestal_bringup.analysis import results
-from pedestal_bringup.studies.rigs import rows as study_rows
+from pedestal_bringup.analysis import intervals, results
 from pedestal_common import nodes
 from pedestal_common.parameters import did_you_mean
 
 PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
-Z = float(stats.norm.ppf(0.5 + 0.5 * study_rows.CONFIDENCE))
+Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE))
 
 
 class Question(typing.NamedTuple):
@@ -38,28 +37,21 @@ QUESTIONS = (
              'The target was never further than half a beamwidth off, once tracked.'),
     Question('aligned', 'aligned_s', np.isfinite, 'The INS reported that it was aligned.'),
     *(Question(f'{result.name}_met', result.name,
-               lambda values, target=result.target: np.array([study_rows.meets(value, target) for value in values]),
+               lambda values, target=result.target: np.array([intervals.meets(value, target) for value in values]),
                f'{result.name} is {result.target}.')
       for result in results.RESULTS if result.target and result.part not in ('run', 'supervised')),
 )
 
 
-def row(case, metric, unit, estimate, runs):
-    """A row of a --json file. estimate: (value, low, high); runs: how many trials it is of."""
-    value, low, high = (float(number) if math.isfinite(number) else None for number in estimate)
-    return {'case': case, 'metric': metric, 'value': value, 'unit': unit, 'paper': None, 'target': None,
-            'ci_low': low, 'ci_high': high, 'runs': runs}
-
-
 def percentile(values, share):
     """(value, low, high) of a percentile, 0 to 100, of values (n,); NaN where n is too small for a bound."""
-    interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(study_rows.CONFIDENCE)
+    interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE)
     return np.percentile(values, share), interval.low, interval.high
 
 
 def rate(count, n):
     """(share, low, high) [%] of `count` times yes out of n."""
-    interval = stats.binomtest(count, n).proportion_ci(study_rows.CONFIDENCE, method='exact')
+    interval = stats.binomtest(count, n).proportion_ci(intervals.CONFIDENCE, method='exact')
     return 100.0 * count / n, 100.0 * interval.low, 100.0 * interval.high
 
 
@@ -96,10 +88,10 @@ def of_results(case, table):
         own, metric = case_of(case, name)
         if not values.size:
             continue
-        estimates = {'mean': study_rows.interval(values), 'min': (values.min(), math.nan, math.nan),
+        estimates = {'mean': intervals.interval(values), 'min': (values.min(), math.nan, math.nan),
                      **{f'p{share:02d}': percentile(values, share) for share in PERCENTILES},
                      'max': (values.max(), math.nan, math.nan)}
-        found += [row(own, f'{metric}/{key}', unit(name), estimate, values.size)
+        found += [intervals.estimated(own, f'{metric}/{key}', estimate, unit(name), values.size)
                   for key, estimate in estimates.items()]
     return found
 
@@ -112,7 +104,8 @@ def of_questions(case, table):
         for question in QUESTIONS:
             if question.result == metric:
                 yes = question.holds(table.column(name))
-                found.append(row(own, f'{question.name}/rate', '%', rate(int(np.sum(yes)), len(yes)), len(yes)))
+                found.append(intervals.estimated(own, f'{question.name}/rate', rate(int(np.sum(yes)), len(yes)), '%',
+                                                 len(yes)))
     return found
 
 
@@ -128,7 +121,8 @@ def of_sensitivity(case, table):
         for parameter, given in varied.items():
             estimate = rank_correlation(given[known], values[known])
             if math.isfinite(estimate[0]):
-                found.append(row(own, f'{metric}/rank_correlation({parameter})', '', estimate, int(known.sum())))
+                found.append(intervals.estimated(own, f'{metric}/rank_correlation({parameter})', estimate, '',
+                                                 int(known.sum())))
     return found
 
 

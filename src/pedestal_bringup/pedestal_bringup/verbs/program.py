@@ -33,7 +33,8 @@ def _utc(text):
 
 def main(options):
     """Send the program track; exit code of watch.send_program."""
-    from pedestal_bringup.run import program, scenario, watch
-    chosen = scenario.load(options.scenario, options.param, duration=options.duration)
-    start = program.begins(chosen) if options.start == FILE else options.start
-    return watch.send_program(chosen, start, arguments.ros_arguments(options))
+    from pedestal_bringup.run import scenario, watch
+    from pedestal_bringup.run.program import Plan
+    plan = Plan(scenario.load(options.scenario, options.param, duration=options.duration))
+    start = plan.begins() if options.start == FILE else options.start
+    return watch.send_program(plan, start, arguments.ros_arguments(options))

@@ -16,10 +16,11 @@ def main(options):
     from pedestal_bringup.again import rerun
     from pedestal_bringup.bags import bag
     from pedestal_bringup.run import graph
+    from pedestal_bringup.run.program import Plan
     recording = bag.read(options.recording)
     chosen = rerun.configured(recording)
     path = graph.new_bag(options.bag, chosen.name)
-    if graph.run(chosen, path, console.progress_of_run(chosen.header.duration)).stopped:
+    if graph.run(Plan(chosen), path, console.progress_of_run(chosen.header.duration)).stopped:
         raise KeyboardInterrupt
     result = rerun.result(recording, bag.read(path))
     print('\n'.join(result.lines()))

@@ -37,22 +37,19 @@ LARGEST_LOSS = 0.01
 
 def main(options):
     """Run, record and print the results; the exit code. Raises RuntimeError where the recording is not complete."""
-    from pedestal_bringup.run import beside, graph, program, scenario
+    from pedestal_bringup.run import beside, graph
+    from pedestal_bringup.run.program import Plan
     from pedestal_common import nodes
-    changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
-    if options.tle or options.station or options.which:
-        changes, duration = _own_sky(options, changes)
-        if changes is None:
-            return 0
-    else:
-        duration = options.duration
-    chosen = scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
+    chosen = _chosen(options)
+    if chosen is None:
+        return 0
     bag = graph.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
-    for line in program.announced(chosen):
+    plan = Plan(chosen)
+    for line in plan.announced():
         print(line)
     with beside.servers(options, chosen.header, bag):
-        outcome = graph.run(chosen, bag, console.progress_of_run(chosen.header.duration))
+        outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration))
     # With scipy, which takes half a second: nobody waits for it before the first step.
     from pedestal_bringup.analysis import results
     from pedestal_bringup.bags.bag import read
@@ -80,7 +77,7 @@ def main(options):
                                       'mcap_sha256': outcome.recorder['sha256']})
     if outcome.stopped:
         return stop.EXIT_CODE
-    check = verify(bag)
+    check = verify(recording)
     if not realtime and check.aborted or not (check.complete or outcome.restarts):
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     if not check.complete:
@@ -96,23 +93,29 @@ def main(options):
     return console.EXIT_DISTURBED if disturbed else 0
 
 
-def _own_sky(options, changes):
-    """(changes, duration) with the satellite, the station and the pass that the options name; (None, None) where the
-    passes were listed instead."""
+def _chosen(options):
+    """The Scenario that the options name, with their satellite, station and pass; None where the passes were listed
+    instead."""
+    from pedestal_bringup.run import scenario
+    changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
+    duration = options.duration
+    if not (options.tle or options.station or options.which):
+        return scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
     import datetime
 
-    from pedestal_bringup.run import satellite, scenario
+    from pedestal_bringup.run import satellite
     if options.station:
         changes = satellite.station_changes(options.station) + changes
     if options.tle:
         changes = satellite.tle_changes(options.tle, options.satellite) + changes
-    if not (options.tle or options.which):
-        return changes, options.duration
-    now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
-    sky = satellite.Sky(scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing), now)
-    if options.which == 'list':
-        sky.list()
-        return None, None
-    start, duration, line = sky.choose(options.which or 'next')
-    print(line)
-    return start + changes, options.duration or duration
+    draft = scenario.draft(options.scenario)
+    if options.tle or options.which:
+        now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
+        sky = satellite.Sky(draft.changed(changes), now)
+        if options.which == 'list':
+            sky.list()
+            return None
+        start, length, line = sky.choose(options.which or 'next')
+        print(line)
+        changes, duration = start + changes, duration or length
+    return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)

@@ -33,7 +33,8 @@ def main(options):
         print(f'pedestal: error: unknown study {options.name!r};{did_you_mean(options.name, studies.NAMES)} '
               f'there are {", ".join(studies.NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
-    from pedestal_bringup.studies.rigs import drawing, rows
+    from pedestal_bringup.analysis import intervals
+    from pedestal_bringup.studies.rigs import drawing
     kinds = ['png', options.vector] if options.vector else ['png']
     output = options.output or pathlib.Path('studies', options.name)
     console.check_json(options.json)
@@ -48,7 +49,7 @@ def main(options):
             progress(None, f'drawing {name}')
             drawing.save(draw, *(output / f'{name}.{kind}' for kind in kinds))
     console.show_study(f'study {options.name}', result.rows if result.shown is None else result.shown,
-                       rows.missed)
+                       intervals.missed)
     for remark in result.remarks:
         print(remark)
     print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')

@@ -9,7 +9,8 @@ def add_arguments(parser):
 
 def main(options):
     """Print the check; exit code 1 where the bag is not complete."""
+    from pedestal_bringup.bags.bag import load
     from pedestal_bringup.bags.verify import verify
-    check = verify(options.bag)
+    check = verify(load(options.bag))
     print('\n'.join(check.lines()))
     return 0 if check.finished else 1

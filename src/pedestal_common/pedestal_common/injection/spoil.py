@@ -4,13 +4,14 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.injection import table
 
 MOST = 32
 """Numbers that a node holds at most."""
 
-SPOILT = np.dtype([('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'), ('held', 'f8', (MOST,)), ('sigma', 'f8'),
-                   ('seed', 'i8')], align=True)
-"""freeze, nan: 1 while it is so; held: the numbers of the first frozen step, holds: 1 once they are there; sigma
+SPOILT = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'), ('held', 'f8', (MOST,)),
+                   ('sigma', 'f8'), ('seed', 'i8')], align=True)
+"""drop, freeze, nan: 1 while it is so; held: the numbers of the first frozen step, holds: 1 once they are there; sigma
 and seed of white noise, sigma 0: none."""
 
 
@@ -18,7 +19,26 @@ and seed of white noise, sigma 0: none."""
 def restore(e):
     """Nothing is spoilt from now on; what is held stays, for a freeze that goes on."""
     e.holds = e.freeze
-    e.freeze, e.nan, e.sigma = 0, 0, 0.0
+    e.drop, e.freeze, e.nan, e.sigma = 0, 0, 0, 0.0
+
+
+def codes(node):
+    """Return the codes of the faults of every message of a node: drop, freeze, nan, noise."""
+    return tuple(table.code(node, name) for name in ('drop', 'freeze', 'nan', 'noise'))
+
+
+@compiled
+def apply(e, codes, fault, values):
+    """Apply a fault of every message; other faults change nothing."""
+    drop, freeze, nan, noise = codes
+    if fault == drop:
+        e.drop = 1
+    elif fault == freeze:
+        e.freeze = 1
+    elif fault == nan:
+        e.nan = 1
+    elif fault == noise:
+        e.sigma, e.seed = values[0], int(values[1])
 
 
 @compiled

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import extended_observer, riccati_eso
 
@@ -127,7 +128,5 @@ def solve(s):
 @compiled
 def attitude(s, k, qx, qy, qz, qw):
     """Quaternion (x, y, z, w) deck -> n now, from the deck -> b0 that the gyros give (qx, qy, qz, qw)."""
-    bx, by, bz, bw = solve(s)
-    qx, qy, qz, qw = strapdown.product(bx, by, bz, bw, qx, qy, qz, qw)
-    nx, ny, nz, nw = strapdown.from_rotvec(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
-    return strapdown.product(nx, ny, nz, nw, qx, qy, qz, qw)
+    turned = strapdown.from_rotvec(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
+    return product(turned, product(solve(s), (qx, qy, qz, qw)))

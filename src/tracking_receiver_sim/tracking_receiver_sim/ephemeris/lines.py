@@ -9,7 +9,6 @@ from pedestal_common import csv_table
 LONGEST = 1024
 """Characters of a line; the CCSDS books allow 254."""
 
-DAY = 86400.0
 WORD = re.compile(r'\S+')
 NUMBER = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?', re.ASCII)
 TIME = re.compile(r'(\d{4}-(?:\d\d-\d\d|\d{3}))[T ](\d\d):(\d\d):(\d\d)(?:\.(\d{1,18}))?Z?', re.ASCII)

@@ -9,8 +9,8 @@ import re
 import pynmea2
 
 from pedestal_common import csv_table
+from pedestal_common.steps import DAY
 
-DAY = 86400.0
 SENTENCE = re.compile(r'\$..(?:GGA|RMC),.*', re.ASCII)
 LONGEST = 1024
 """Characters of a line; the standard allows 82."""

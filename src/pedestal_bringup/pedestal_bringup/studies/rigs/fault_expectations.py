@@ -11,6 +11,8 @@ for that holds for them; only the receiver matters to them as it does to autotra
 """
 import typing
 
+from acu_tracker.modes import TABLE
+
 TENTH, HALF = 0.1, 0.5
 """Of the beamwidth of the antenna of the study [deg]."""
 
@@ -40,8 +42,9 @@ GOES_ON = Expected(None, SAME, TENTH)
 IN_BEAM = Expected(None, SAME, HALF)
 TRIPS = Expected(4, STANDBY, HALF)
 
-STILL, MOVING = ('standby', 'stop', 'stow', 'preset'), ('rate',)
-FOLLOWING = ('slave', 'program', 'autotrack')
+MOVING = ('rate',)
+FOLLOWING = tuple(row.name for row in TABLE if row.follows and not row.by_level)
+STILL = tuple(row.name for row in TABLE if not row.follows and row.name not in MOVING)
 MODES = (*STILL, *MOVING, *FOLLOWING)
 """Still and moving on the deck; following what lies in earth angles, which takes the attitude."""
 
@@ -55,11 +58,6 @@ def _always(expected):
 def _moving(expected, still=GOES_ON):
     """Where it matters only when the axes move."""
     return {**_always(still), **dict.fromkeys((*MOVING, *FOLLOWING), expected)}
-
-
-def _following(expected):
-    """Where it matters only when the axes follow a target in the sky."""
-    return {**_always(GOES_ON), **dict.fromkeys(FOLLOWING, expected)}
 
 
 def _autotrack(told, error, *end):
@@ -79,8 +77,7 @@ def _attitude(told, error, still=None):
 
 def _off_heading():
     """Where the attitude is off by more than half a beamwidth: only autotrack can point better than it is known."""
-    return {**_always(GOES_ON), 'slave': Expected(200, ('slave', 'standby'), None),
-            'program': Expected(200, ('program', 'standby'), None),
+    return {**_always(GOES_ON), **{mode: Expected(200, (mode, 'standby'), None) for mode in FOLLOWING},
             'autotrack': Expected(200, ('autotrack', 'program'), HALF)}
 
 
@@ -107,6 +104,14 @@ def _by_level(node, fault, of_modes):
         end = ('program', 'standby')
     return {mode: Expected(told, end if end == STANDBY else tuple(dict.fromkeys((mode, *TO_AUTOTRACK, *end))),
                            None if error is None else max(error, reach)) for mode, reach in reaches.items()}
+
+
+def _unstowing(fault, of_modes):
+    """Return what holds in unstow: the antenna stands as in standby, on its brakes, where a trip may not end it."""
+    expected = of_modes['standby']
+    expected = expected._replace(end=expected.end and _STOPS_OR_NOT['unstow'])
+    # An inverter that is off is missed when torque is asked for.
+    return expected._replace(told=None) if fault == 'adu.motor_loss' else expected
 
 
 _EXPECTED = {
@@ -148,6 +153,7 @@ _EXPECTED = {
     'ins.ins_jump': _off_heading(),
     'ins.clock_step': _attitude(60, HALF),
 }
-EXPECTED = {name: {**of_modes, **_by_level(*name.split('.'), of_modes)} for name, of_modes in _EXPECTED.items()}
+EXPECTED = {name: {**of_modes, **_by_level(*name.split('.'), of_modes), 'unstow': _unstowing(name, of_modes)}
+            for name, of_modes in _EXPECTED.items()}
 """{'NODE.FAULT': {mode: Expected}}, of every fault with its defaults that lasts 5 s."""
 

@@ -18,6 +18,7 @@ from acu_tracker.estimation import axis_filter
 from acu_tracker.estimation.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.servo import feedforward
+from pedestal_bringup.analysis import tracking
 from pedestal_bringup.studies.rigs import ensemble, metrics, profiles
 from pedestal_bringup.studies.rigs.ensemble import PERIOD as T
 from pedestal_bringup.studies.rigs.profiles import RATE, STROKE
@@ -174,8 +175,8 @@ def measures(axis, steps):
     second = round(1.0 / T)
     reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * RATE, np.ones(round(CALM / T)))[:len(t)] > 0.5
     miss, noise = steps['miss'][:, counts], (steps['rate'] - target[:, 1])[:, counts & ~reversing]
-    values = [(metrics.rms(one), math.sqrt(np.convolve(one * one, np.full(second, 1.0 / second), 'valid').max()),
-               metrics.peak(one), metrics.rms(other)) for one, other in zip(miss, noise)]
+    values = [(tracking.rms(one), math.sqrt(np.convolve(one * one, np.full(second, 1.0 / second), 'valid').max()),
+               metrics.peak(one), tracking.rms(other)) for one, other in zip(miss, noise)]
     return np.degrees(values)
 
 

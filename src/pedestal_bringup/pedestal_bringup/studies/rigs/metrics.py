@@ -71,11 +71,6 @@ def residual(t, y, period):
     return y - offset - a * np.sin(w * t) - b * np.cos(w * t)
 
 
-def rms(y):
-    """Root mean square of y (any shape), a float in its unit."""
-    return float(np.sqrt(np.mean(np.square(y))))
-
-
 def peak(y):
     """Largest absolute value of y (any shape), a float in its unit."""
     return float(np.max(np.abs(y)))

@@ -1,6 +1,6 @@
 """Studies of your own plant, `pedestal study servo|backlash|bode --scenario FILE`: both axes of a scenario, ashore.
 
-bode      the loops as studies/bode measures them, each axis for itself
+bode      the loops by trials/frequency_response, each axis for itself
 servo     a step of STEP and a sine of AMPLITUDE at FREQUENCY in still air, a step of wind torque of GUST of what the
           motors have for a short time; of the true angle of the dish
 backlash  the standstill after that step, and what the sine leaves of its reversals, with the bias of the scenario and
@@ -10,12 +10,14 @@ import math
 
 import numpy as np
 
+from pedestal_bringup.analysis import tracking
+from pedestal_bringup.analysis.intervals import row
 from pedestal_bringup.report.figures import FILTERED, INK, TRUTH
 from pedestal_bringup.studies import bode
 from pedestal_bringup.studies.rigs import drawing, metrics
-from pedestal_bringup.studies.rigs.cases import Case
-from pedestal_bringup.studies.rigs.rows import Result, row
+from pedestal_bringup.studies.rigs.rows import Result
 from pedestal_bringup.trials import loops
+from pedestal_bringup.trials.cases import Case
 from pedestal_common.topics import AXES
 
 STEP, AMPLITUDE, FREQUENCY, GUST = 0.02, 0.02, 0.1, 0.2
@@ -143,7 +145,7 @@ def _metrics(flown, i, torque):
             ('step_settling_2percent_s', metrics.settling_time(step.t, _angle(step, i), STEP, BAND), 's'),
             ('gust_torque_nm', torque, 'Nm'), ('gust_peak_rad', metrics.peak(after - after[0]), 'rad'),
             ('sine_max_error_rad', metrics.peak(_sine_error(sine, i)[settled]), 'rad'),
-            ('sine_rms_error_rad', metrics.rms(_sine_error(sine, i)[settled]), 'rad')]
+            ('sine_rms_error_rad', tracking.rms(_sine_error(sine, i)[settled]), 'rad')]
 
 
 def _figure(kind, run):

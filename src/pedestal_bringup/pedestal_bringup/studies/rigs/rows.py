@@ -1,14 +1,11 @@
-"""The result of a study: rows, their intervals over the runs, and the targets they meet or miss."""
+"""The result of a study."""
 import dataclasses
-import math
-
-import numpy as np
-from scipy.special import stdtrit
 
 
 @dataclasses.dataclass
 class Result:
-    """The result of a study: rows as of `row`, figures {name: function that draws a Figure}, remarks in sentences.
+    """The result of a study: rows as of intervals.row, figures {name: function that draws a Figure}, remarks in
+    sentences.
 
     shown: the rows that are printed, where they are too many for a terminal; None: all.
     """
@@ -16,65 +13,3 @@ class Result:
     figures: dict
     remarks: list = dataclasses.field(default_factory=list)
     shown: list | None = None
-
-
-CONFIDENCE = 0.95
-"""Of the interval of a mean."""
-
-
-def interval(values):
-    """(mean, low, high) of the values (n,) of n independent runs: mean and its CONFIDENCE interval by Student's t,
-
-        mean -+ t_(n-1) s / sqrt(n),        s: standard deviation of the values.
-
-    NaN where a value is not finite; of one run low and high are NaN.
-    """
-    values = np.asarray(values, float)
-    n, mean = len(values), float(np.mean(values))
-    if n < 2:
-        return mean, math.nan, math.nan
-    half = float(stdtrit(n - 1, 0.5 * (1.0 + CONFIDENCE)) * np.std(values, ddof=1) / math.sqrt(n))
-    return mean, mean - half, mean + half
-
-
-def pseudo_values(parts, statistic):
-    """Values (n,) whose mean and `interval` are those of a statistic of all runs together, such as an rms over them.
-
-    parts: n about equal parts of the runs; statistic(parts) -> number. Tukey's jackknife (Efron and Stein, Annals of
-    Statistics 9 (1981) 586): theta_i = n theta - (n - 1) theta_-i, the latter of all parts but i.
-    """
-    n, whole = len(parts), statistic(parts)
-    return np.array([n * whole - (n - 1) * statistic(parts[:i] + parts[i + 1:]) if n > 1 else whole
-                     for i in range(n)])
-
-
-def row(case, metric, value, unit, paper=None, target=None, runs=None):
-    """One row of a study. value: a number, or the values (n,) of the runs of what is random: the row then has their
-    mean, its interval and their number, or `runs` where the values are those of parts of the runs. paper: the printed
-    number or None; target: a text that `meets` reads, or None."""
-    mean, low, high = (value, None, None) if np.ndim(value) == 0 else interval(value)
-    number = {'case': case, 'metric': metric, 'value': _finite(mean), 'unit': unit, 'paper': paper, 'target': target}
-    if low is None:
-        return number
-    return {**number, 'ci_low': _finite(low), 'ci_high': _finite(high), 'runs': runs or len(value)}
-
-
-def _finite(value):
-    return float(value) if math.isfinite(value) else None
-
-
-def meets(value, target):
-    """Whether a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'; None meets no target."""
-    if value is None:
-        return False
-    first, word, last = ('', *target.split()) if len(target.split()) == 2 else target.split()
-    last = float(last)
-    return {'<=': lambda: value <= last, '>=': lambda: value >= last, '<': lambda: value < last,
-            '>': lambda: value > last, '+-': lambda: abs(value - float(first)) <= last,
-            'to': lambda: float(first) <= value <= last}[word]()
-
-
-def missed(row):
-    """Whether a row has a target and does not meet it; a random one meets it when its whole interval does."""
-    judged = ('ci_low', 'ci_high') if 'runs' in row else ('value',)
-    return row['target'] is not None and not all(meets(row[key], row['target']) for key in judged)

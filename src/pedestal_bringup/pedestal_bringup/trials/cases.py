@@ -1,4 +1,4 @@
-"""Cases of a study: scenarios with parameters changed, run through the composed units."""
+"""Cases: scenarios with parameters changed, run through the composed units."""
 import dataclasses
 import math
 import shlex

@@ -1,0 +1,11 @@
+"""Quaternions (x, y, z, w)."""
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def product(a, b):
+    """Return the Hamilton product a (x) b: the rotation b, then the rotation a."""
+    ax, ay, az, aw = a[0], a[1], a[2], a[3]
+    bx, by, bz, bw = b[0], b[1], b[2], b[3]
+    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)

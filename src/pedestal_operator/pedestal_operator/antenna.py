@@ -1,0 +1,33 @@
+"""The last messages of an antenna, of a running graph or of a recording."""
+import abc
+import math
+
+from pedestal_common import nodes
+
+
+class Antenna(abc.ABC):
+    """Read the last messages. beam: prefix of the beam's nodes; numbers: {topic: numbers of its last message}; status:
+    {node: its last DiagnosticStatus}."""
+
+    @abc.abstractmethod
+    def present(self, name):
+        """Return True if a topic or node published lately."""
+
+    def told(self, node) -> dict:
+        """{key: text} of a node's last diagnostics; {} where it is silent."""
+        name = self.beam + node if nodes.row(node).of_beam else node
+        return {pair.key: pair.value for pair in self.status[name].values} if self.present(name) else {}
+
+    def angles(self, topic):
+        """(azimuth, elevation) [deg] of joint_states or acu/reference; NaN where it is silent."""
+        if not self.present(topic):
+            return math.nan, math.nan
+        numbers = self.numbers[topic]
+        return math.degrees(numbers[0]), math.degrees(numbers[1])
+
+    def rates(self):
+        """(azimuth, elevation) rates [deg/s] of the axes; NaN where they are silent."""
+        if not self.present('joint_states'):
+            return math.nan, math.nan
+        numbers = self.numbers['joint_states']
+        return math.degrees(numbers[2]), math.degrees(numbers[3])
