@@ -10,7 +10,7 @@
 
 PYTHON ?= python3
 PACKAGES := pedestal_common ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_operator \
-	pedestal_bringup pedestal
+	pedestal_recording pedestal_bringup pedestal_analysis pedestal_studies pedestal
 ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
 # pip would write the bytecode of all that it installs on one core, tests of others included; here that of the product is
 # written on all cores, and the rest when it is imported.
@@ -28,10 +28,10 @@ IN_TURN := --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE
 
 install: .venv/tests
-	@.venv/bin/python -m pedestal_bringup.run.prepare
+	@.venv/bin/python -m pedestal_bringup.loop.prepare
 
 demo: .venv/installed
-	@.venv/bin/python -m pedestal_bringup.run.prepare leo_pass
+	@.venv/bin/python -m pedestal_bringup.loop.prepare leo_pass
 	rm -rf $(DEMO) $(DEMO).log
 	.venv/bin/pedestal run leo_pass --bag $(DEMO)
 	.venv/bin/pedestal verify $(DEMO)
@@ -47,19 +47,19 @@ update-references: install
 	.venv/bin/python bags/reference/update.py
 
 docs: install
-	.venv/bin/python -m pedestal_bringup.reference
+	.venv/bin/python -m tools.reference
 
 # What is made of the code is written beside a copy of docs/; no page may fetch anything from elsewhere.
 book: install .venv/mkdocs
-	.venv/bin/python -m pedestal_bringup.book build/book/pages
+	.venv/bin/python -m tools.book build/book/pages
 	NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict
 	! grep --recursive --include='*.html' --extended-regexp --files-with-matches \
 	    '<(script|img|iframe|link)[^>]*(src|href)="?(https?:)?//' build/book/site
 	@echo 'Book: $(CURDIR)/build/book/site/index.html'
 
 numbers: install
-	.venv/bin/python -m pedestal_bringup.published
-	.venv/bin/python -m pedestal_bringup.reference
+	.venv/bin/python -m pedestal_studies.numbers.published
+	.venv/bin/python -m tools.reference
 
 bench: install
 	.venv/bin/pedestal bench graph

@@ -32,7 +32,7 @@ PICTURES = {'ashore': (('leo_pass', '--pacing', 'realtime', '--page', str(PORT))
 
 def pedestal(*arguments):
     """A `pedestal` command as a process."""
-    command = [sys.executable, '-m', 'pedestal_bringup.cli', *map(str, arguments)]
+    command = [sys.executable, '-m', 'pedestal.cli', *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 

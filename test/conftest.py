@@ -195,7 +195,7 @@ def start_run(reserve_domain, tmp_path_factory):
 
 def _run(scenario, arguments, domain, folder, bag=None, prefix=()):
     run = Run(None, bag or folder / 'bag', domain)
-    command = [*prefix, sys.executable, '-m', 'pedestal_bringup.cli', 'run', scenario, '--bag', run.bag, '--json',
+    command = [*prefix, sys.executable, '-m', 'pedestal.cli', 'run', scenario, '--bag', run.bag, '--json',
                run.json, *arguments]
     run.process = _popen(command, folder, _environment(domain, folder))
     return run
@@ -246,7 +246,7 @@ def recorded(reserve_domain, tmp_path_factory):
 MODULES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'ins': 'ship_motion_sim.ins_node',
            'tracking_receiver': 'tracking_receiver_sim.tracking_receiver_node', 'acu': 'acu_tracker.acu_node',
            'adu': 'adu_drive.adu_node', 'beam_steering': 'adu_drive.beam_steering_node',
-           'recorder': 'pedestal_bringup.recorder_node'}
+           'recorder': 'pedestal_recording.recorder_node'}
 
 
 @dataclasses.dataclass
@@ -283,7 +283,7 @@ class Client:
     def __init__(self, domain_id, name):
         import rclpy
 
-        from pedestal_common import middleware
+        from pedestal_common.node import middleware
         self.context = rclpy.Context()
         rclpy.init(args=[], context=self.context, domain_id=domain_id)
         self.node = rclpy.create_node(name, context=self.context)
@@ -295,7 +295,8 @@ class Client:
 
     def write(self, *names):
         """Make publishers of these topics and wait until someone reads each."""
-        from pedestal_common import middleware, topics
+        from pedestal_common.graph import topics
+        from pedestal_common.node import middleware
         for name in names:
             topic = topics.BY_NAME[name]
             self.publishers[name] = self.node.create_publisher(middleware.message_class(topic.type), name,
@@ -305,7 +306,9 @@ class Client:
 
     def read(self, name, take=None):
         """Hear a topic: messages go to self.heard[name] and to take; waits until someone writes it."""
-        from pedestal_common import messages, middleware, topics
+        from pedestal_common.graph import topics
+        from pedestal_common.node import middleware
+        from pedestal_common.wire import messages
         topic = topics.BY_NAME[name]
         heard = self.heard[name] = []
 
@@ -320,7 +323,7 @@ class Client:
             time.sleep(0.3)  # the writer's side of the discovery
 
     def publish(self, name, message):
-        from pedestal_common import messages
+        from pedestal_common.wire import messages
         self.publishers[name].publish(messages.serialize(message))
 
     def spin(self, seconds):
@@ -382,7 +385,7 @@ def connect():
     """connect(domain_id, name='client') -> Client; by its name it can stand for a node of the graph."""
     clients = []
     before = dict(os.environ)
-    from pedestal_common import middleware
+    from pedestal_common.node import middleware
     middleware.set_defaults()
 
     def open_client(domain_id, name='client'):

@@ -23,8 +23,8 @@ import time
 import zstandard
 from mcap.writer import Writer as McapWriter
 
-from pedestal_bringup import cli
-from pedestal_bringup.run import scenario
+from pedestal import cli
+from pedestal_bringup.scenario import scenario
 
 TIME, WAITING = 60, 600.0
 """Seconds of a core, and of the clock beside a busy machine, after which a verb hangs."""

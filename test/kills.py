@@ -19,8 +19,10 @@ import time
 
 import rclpy
 
-from pedestal_bringup.bags import bag as bags
-from pedestal_common import messages, middleware, nodes, topics
+from pedestal_common.graph import nodes, topics
+from pedestal_common.node import middleware
+from pedestal_common.wire import messages
+from pedestal_recording import bag as bags
 
 ANSWERS = {'adu': 'joint_states', 'tracking_receiver': 'tracking_receiver/angle_error', 'acu': 'acu/rate_command'}
 """{node: a topic that it writes in every step}."""
@@ -125,7 +127,7 @@ def orphans(log):
 
 def started(folder, pacing, *arguments):
     bag = pathlib.Path(folder) / f'run-{time.time_ns()}'
-    command = [sys.executable, '-m', 'pedestal_bringup.cli', 'run', 'leo_pass', '--pacing', pacing, '--bag', str(bag),
+    command = [sys.executable, '-m', 'pedestal.cli', 'run', 'leo_pass', '--pacing', pacing, '--bag', str(bag),
                *arguments]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                                start_new_session=True)

@@ -19,7 +19,7 @@ import time
 import numpy as np
 from kills import children
 
-from pedestal_bringup.bags import bag as bags
+from pedestal_recording import bag as bags
 
 EDGES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 50.0, np.inf)
 """Of the histogram of latencies [ms]."""
@@ -84,7 +84,7 @@ def main():
         bag = options.bag or bag
         seconds = 3600.0 * options.hours
         flight(track, seconds)
-        process = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.cli', 'run', 'track_file', '--param',
+        process = subprocess.Popen([sys.executable, '-m', 'pedestal.cli', 'run', 'track_file', '--param',
                                     f'tracking_receiver.target.track_file.path={track}', '--pacing', 'realtime',
                                     '--duration', str(seconds), '--bag', str(bag), '--json', str(rows),
                                     '--param', f'scenario.priority={options.priority}'],

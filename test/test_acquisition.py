@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup.studies import acquisition as study
-from pedestal_bringup.trials.cases import Case
+from pedestal_analysis.trials.cases import Case
+from pedestal_studies.system import acquisition as study
 
 
 def run(name, seed, duration=None, **parameters):

@@ -5,10 +5,11 @@ import pytest
 
 from acu_tracker import modes
 from acu_tracker.alarms import report, table
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags.bag import load
-from pedestal_bringup.bags.verify import verify
-from pedestal_bringup.run import closed_loop, scenario
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_recording import bag as bags
+from pedestal_recording.bag import load
+from pedestal_recording.verify import verify
 
 TRIP = ['adu.azimuth.faults.overspeed=1.5',
         'acu.commands=1.0 acknowledge alarm=drive_fault; 1.2 shelve alarm=drive_fault seconds=60 reason=tests; '

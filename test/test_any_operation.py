@@ -6,10 +6,12 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from acu_tracker import modes
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import records, topics
-from pedestal_common.commands import Command
-from pedestal_common.topics import AXES
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph import topics
+from pedestal_common.graph.topics import AXES
+from pedestal_common.wire import records
+from pedestal_common.wire.commands import Command
 
 RAMP = 1.5
 """Time [s] in which axes that were let go, or told to stop, stand."""

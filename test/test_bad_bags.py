@@ -6,9 +6,10 @@ import sqlite3
 import pytest
 from mcap.writer import Writer as McapWriter
 
-from pedestal_bringup import cli
-from pedestal_bringup.bags.writer import Writer
-from pedestal_common import messages, nodes, topics
+from pedestal import cli
+from pedestal_common.graph import nodes, topics
+from pedestal_common.wire import messages
+from pedestal_recording.writer import Writer
 
 RECORDED = nodes.recorded(('tracking_receiver', 'acu', 'adu', 'recorder'))
 

@@ -6,11 +6,11 @@ import time
 
 import pytest
 
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags.bag import load
-from pedestal_bringup.bags.verify import verify
-from pedestal_common import messages
+from pedestal import cli
+from pedestal_common.wire import messages
+from pedestal_recording import bag as bags
+from pedestal_recording.bag import load
+from pedestal_recording.verify import verify
 
 TRACK_PATH = 'tracking_receiver.target.track_file.path'
 TRACK = 'time_s,latitude_deg,longitude_deg,altitude_m\n'

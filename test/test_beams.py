@@ -10,15 +10,16 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup.again import difference, recompute
-from pedestal_bringup.analysis import tracking
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags import export
-from pedestal_bringup.bags.bag import load
-from pedestal_bringup.bags.verify import verify
-from pedestal_bringup.report.page import write as write_report
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import messages
+from pedestal_analysis.report.page import write as write_report
+from pedestal_analysis.reprocess import difference, recompute
+from pedestal_analysis.results import tracking
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.wire import messages
+from pedestal_recording import bag as bags
+from pedestal_recording import export
+from pedestal_recording.bag import load
+from pedestal_recording.verify import verify
 
 FOUR, SWAY = 'phased_array_four', 'phased_array_sway'
 BEAMS = [f'beam_{i}' for i in range(1, 5)]
@@ -81,7 +82,7 @@ def test_the_results_are_told_by_beam(runs):
 
 
 def test_the_same_run_gives_the_same_file(runs, run_process, tmp_path):
-    rerun = [sys.executable, '-m', 'pedestal_bringup.cli', 'rerun', runs['four'].bag, '--bag', tmp_path / 'again']
+    rerun = [sys.executable, '-m', 'pedestal.cli', 'rerun', runs['four'].bag, '--bag', tmp_path / 'again']
     done = run_process(rerun, 90.0)
     assert (done.returncode, done.stderr) == (0, '')
     assert ': equal to the last byte, ' in done.stdout

@@ -2,11 +2,11 @@
 import json
 import sys
 
-SHORT = ('import json; from pedestal_bringup.bench import recording; '
+SHORT = ('import json; from pedestal_studies.bench import recording; '
          'recording.BAG_SECONDS = 2.0; recording.DISK_BYTES = 10_000_000; '
          'rows = recording.run(); print(json.dumps(rows))')
 
-RING = ('from pedestal_bringup.bench import lockstep; '
+RING = ('from pedestal_studies.bench import lockstep; '
         'lockstep.RING_STEPS = 200; print(lockstep.bare_lap())')
 
 

@@ -50,9 +50,9 @@ def test_ros2_launch_finds_the_launch_and_scenario_files():
 def test_ros2_launch_runs_a_scenario_in_a_namespace(start_process, tmp_path):
     """Started here, its arguments known; a wrong one is refused by name."""
     # They want mcap, which the environment of colcon has none of.
-    from pedestal_bringup.bags.bag import load
-    from pedestal_bringup.bags.verify import verify
-    from pedestal_bringup.run import launched
+    from pedestal_bringup.graph import launched
+    from pedestal_recording.bag import load
+    from pedestal_recording.verify import verify
     command = ['ros2', 'launch', 'pedestal_bringup', 'pedestal.launch.py']
     shown = start_process([*command, '--show-args']).communicate(timeout=180.0)[0]
     assert all(f"'{argument.name}':" in shown for argument in launched.ARGUMENTS)

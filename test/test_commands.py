@@ -4,10 +4,11 @@ import sys
 
 import pytest
 
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import commands, messages
+from pedestal import cli
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.wire import commands, messages
+from pedestal_recording import bag as bags
 
 SCHEDULE = 'acu.commands=2 preset azimuth=0.4 elevation=0.6; 2.5 preset azimuth=9; 4 program'
 SECONDS = 6.0
@@ -59,7 +60,7 @@ def test_it_is_recomputed_and_made_again(scheduled, tmp_path, capsys, monkeypatc
 
 
 def test_a_run_with_an_operator_is_made_again_to_the_byte(scheduled, start_process, tmp_path):
-    process = start_process([sys.executable, '-m', 'pedestal_bringup.cli', 'rerun', scheduled,
+    process = start_process([sys.executable, '-m', 'pedestal.cli', 'rerun', scheduled,
                              '--bag', tmp_path / 'again'])
     said, _ = process.communicate(timeout=180)
     assert process.returncode == 0 and 'equal to the last byte' in said

@@ -3,9 +3,10 @@ import numpy as np
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_bringup.studies import imm_feedforward
-from pedestal_common.unit import ERROR
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.node.unit import ERROR
+from pedestal_studies.papers import imm_feedforward
 
 SECONDS = 8.0
 

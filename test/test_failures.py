@@ -6,10 +6,10 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags.bag import load
-from pedestal_bringup.bags.verify import verify
+from pedestal import cli
+from pedestal_recording import bag as bags
+from pedestal_recording.bag import load
+from pedestal_recording.verify import verify
 
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 DEADLINE = 3

@@ -11,9 +11,11 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup.run.program import Plan
-from pedestal_common import messages, middleware, topics
-from pedestal_common.steps import SECOND
+from pedestal_bringup.scenario.program import Plan
+from pedestal_common.graph import topics
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.node import middleware
+from pedestal_common.wire import messages
 
 TOOLS = pathlib.Path(__file__).parents[1] / 'docs' / 'reliability'
 PERIOD = 5_000_000

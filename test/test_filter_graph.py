@@ -7,14 +7,15 @@ import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
-from pedestal_bringup import cli
-from pedestal_bringup.analysis import consistency, tracking
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags import export
-from pedestal_bringup.bags.bag import load
-from pedestal_bringup.bags.verify import verify
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import layouts, topics
+from pedestal import cli
+from pedestal_analysis.results import consistency, tracking
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph import layouts, topics
+from pedestal_recording import bag as bags
+from pedestal_recording import export
+from pedestal_recording.bag import load
+from pedestal_recording.verify import verify
 
 SECONDS = 5.0
 PARAMS = ['acu.tracker.lock_count=20', 'tracking_receiver.receiver.rate.measured=true',

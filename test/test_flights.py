@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_bringup.run.program import Plan
-from tracking_receiver_sim.track import files
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.program import Plan
+from tracking_receiver_sim import track_files
 
 PATH = 'tracking_receiver.target.track_file.path'
 SMOOTH = 'tracking_receiver.target.track_file.smooth=true'
@@ -70,7 +71,7 @@ def test_what_the_scenario_says_stands(adsb):
 
 def test_a_scenario_says_all_that_followed_from_its_file(adsb):
     chosen = scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH])
-    assert {*files.OPEN} - {'duration'} <= {*chosen.given('tracking_receiver')}
+    assert {*track_files.OPEN} - {'duration'} <= {*chosen.given('tracking_receiver')}
     text = chosen.as_yaml()
     content = adsb.read_text()
     adsb.write_text('moved away')

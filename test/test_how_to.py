@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from pedestal_common import messages
+from pedestal_common.wire import messages
 
 FILE = pathlib.Path(__file__).parents[1] / 'docs' / 'how-to' / 'receiver.py'
 

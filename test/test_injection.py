@@ -4,10 +4,11 @@ import signal
 import numpy as np
 import pytest
 
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import commands, messages
+from pedestal import cli
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.wire import commands, messages
+from pedestal_recording import bag as bags
 
 SECONDS = 4.0
 FAULTS = ['adu.inject=2.2 gust torque=-3000 duration=0.3; 3 encoder_jump axis=elevation size=0.02',

@@ -18,11 +18,14 @@ from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 from websockets.sync.client import connect as open_socket
 
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run.program import program_message
-from pedestal_common import line_of_sight, messages, middleware, nodes
-from pedestal_operator import frames
+from pedestal import cli
+from pedestal_bringup.scenario.program import program_message
+from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph import nodes
+from pedestal_common.node import middleware
+from pedestal_common.wire import messages
+from pedestal_operator.viewers import frames
+from pedestal_recording import bag as bags
 
 SOON = 60.0
 TRACK = 'acu/program_track'
@@ -215,7 +218,7 @@ def test_a_program_track_is_taken_once_whether_its_writer_latches_or_not(graph):
 
 def test_a_viewer_of_its_own_ends_when_told_to(graph, start_process):
     run, _, port = graph
-    live = [sys.executable, '-m', 'pedestal_bringup.cli', 'live', '--port']
+    live = [sys.executable, '-m', 'pedestal.cli', 'live', '--port']
     taken = start_process([*live, port], ROS_DOMAIN_ID=str(run.domain_id))
     assert taken.wait(60.0) == 1 and f'127.0.0.1:{port}' in taken.stderr.read()
     own = free_port()

@@ -11,12 +11,14 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags.bag import load
-from pedestal_bringup.bags.verify import verify
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import nodes, parameters
+from pedestal import cli
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common import parameters
+from pedestal_common.graph import nodes
+from pedestal_recording import bag as bags
+from pedestal_recording.bag import load
+from pedestal_recording.verify import verify
 
 PARAM = 'acu.tracker.lock_count=20'
 LENGTH = {'leo_pass': 5.0, 'ship_pass': 3.0}
@@ -78,7 +80,7 @@ def test_another_seed_gives_another_file(runs):
 
 
 def test_rerun_makes_the_same_file_again(runs, run_process, tmp_path):
-    pedestal = [sys.executable, '-m', 'pedestal_bringup.cli']
+    pedestal = [sys.executable, '-m', 'pedestal.cli']
     done = run_process([*pedestal, 'rerun', runs['first'].bag, '--bag', tmp_path / 'again'], 90.0)
     assert (done.returncode, done.stderr) == (0, '')
     assert done.stdout == f'{tmp_path}/again: equal to the last byte, sha256 {digest(runs["first"])}\n'

@@ -9,10 +9,11 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import processes, scenario, supervisor
-from pedestal_bringup.run.start import begins, parameters_of_all
-from pedestal_common.steps import SECOND
+from pedestal_bringup.graph import processes, supervisor
+from pedestal_bringup.graph.start import begins, parameters_of_all
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph.steps import SECOND
+from pedestal_recording import bag as bags
 
 
 def sockets(pid):
@@ -142,7 +143,7 @@ def cut(hosts, tmp_path_factory, reserve_domain):
             assert time.monotonic() < deadline and not any(process.poll() for process in started), said()
             time.sleep(0.1)
     wait_until(lambda: 'runs' in (folder / 'acu.log').read_text())
-    hosts.start('far', [sys.executable, '-m', 'pedestal_bringup.cli', 'program', 'leo_pass'], folder / 'program.log',
+    hosts.start('far', [sys.executable, '-m', 'pedestal.cli', 'program', 'leo_pass'], folder / 'program.log',
                 **domain)
     wait_until(lambda: 'sent' in (folder / 'program.log').read_text())
     time.sleep(FOLLOWED)

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from pedestal_bringup.run import parameter_file
+from pedestal_bringup.scenario import parameter_file
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder')

@@ -9,11 +9,11 @@ import time
 
 import pytest
 
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_common import commands, messages
+from pedestal import cli
+from pedestal_common.wire import commands, messages
+from pedestal_recording import bag as bags
 
-PEDESTAL = (sys.executable, '-m', 'pedestal_bringup.cli')
+PEDESTAL = (sys.executable, '-m', 'pedestal.cli')
 ARROW_RIGHT = b'\x1b[C'
 BURST = tuple(str(number) for number in range(40))
 

@@ -6,9 +6,10 @@ import numpy as np
 import yaml
 
 from acu_tracker import modes
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import closed_loop, satellite, scenario
+from pedestal import cli, satellite
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_recording import bag as bags
 from tracking_receiver_sim.params import LeoPassParameters
 
 UTC = '2019-12-10T12:35'

@@ -20,8 +20,8 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect as connect_web_socket
 
-from pedestal_bringup.bags import bag as bags
-from pedestal_common import commands, messages
+from pedestal_common.wire import commands, messages
+from pedestal_recording import bag as bags
 
 CHROMIUM = shutil.which('chromium')
 REFERENCE = pathlib.Path(__file__).parents[1] / 'bags' / 'reference' / 'uav_flyby'
@@ -259,7 +259,7 @@ def holds(page, condition, argument=None):
 @needs_chromium
 def test_a_recording_on_the_page(browser, start_process):
     port = free_port()
-    player = start_process([sys.executable, '-m', 'pedestal_bringup.cli', 'replay', REFERENCE, '--page', port,
+    player = start_process([sys.executable, '-m', 'pedestal.cli', 'replay', REFERENCE, '--page', port,
                             '--paused'])
     page = opened(browser[1], re.search(r'http\S+', begins_with(player, 1))[0])
     joints = bags.read(REFERENCE).table('joint_states')

@@ -7,7 +7,8 @@ import sys
 
 import numpy as np
 
-from pedestal_bringup.run import closed_loop, scenario
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
 
 NEEDS_FILE = {'track_file'}
 OTHER = {'NPY_DISABLE_CPU_FEATURES': 'X86_V3 X86_V4', 'OPENBLAS_CORETYPE': 'Prescott'}

@@ -9,8 +9,8 @@ import sys
 
 import pytest
 
-from pedestal_bringup import cli, samples
-from pedestal_bringup.console import EXIT_DISTURBED
+from pedestal import cli, samples
+from pedestal_analysis.console import EXIT_DISTURBED
 
 ROOT = pathlib.Path(__file__).parents[1]
 

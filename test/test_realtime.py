@@ -10,10 +10,11 @@ import time
 import numpy as np
 import pytest
 
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags.bag import load
-from pedestal_bringup.bags.verify import verify
-from pedestal_common import commands, messages, nodes
+from pedestal_common.graph import nodes
+from pedestal_common.wire import commands, messages
+from pedestal_recording import bag as bags
+from pedestal_recording.bag import load
+from pedestal_recording.verify import verify
 
 PAUSE = 1.6
 """Drive time [s] for which the ACU of the run stands still: longer than a second, so a diagnostic falls in it."""

@@ -8,16 +8,17 @@ import sys
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from pedestal_bringup import cli
-from pedestal_bringup.again import difference, recompute, recompute_report
-from pedestal_bringup.analysis import results, tracking
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags.bag import load
-from pedestal_bringup.bags.verify import verify
-from pedestal_bringup.bags.writer import Writer as BagWriter
-from pedestal_common import messages, topics
-from pedestal_common import nodes as graph
-from pedestal_common.commands import SERVICE, Command
+from pedestal import cli
+from pedestal_analysis.reprocess import difference, recompute, recompute_report
+from pedestal_analysis.results import results, tracking
+from pedestal_common.graph import nodes as graph
+from pedestal_common.graph import topics
+from pedestal_common.wire import messages
+from pedestal_common.wire.commands import SERVICE, Command
+from pedestal_recording import bag as bags
+from pedestal_recording.bag import load
+from pedestal_recording.verify import verify
+from pedestal_recording.writer import Writer as BagWriter
 
 REFERENCES = pathlib.Path(__file__).parent.parent / 'bags' / 'reference'
 EXACT = ('--absolute', '0', '--relative', '0')
@@ -210,7 +211,7 @@ def test_a_changed_parameter_is_reported_old_against_new(runs, pedestal, tmp_pat
 
 def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     """Those of the recording are what its run said; the recorded estimate, delayed by 20 ms, lags 20 ms more."""
-    from pedestal_bringup.again import what_if
+    from pedestal_analysis.reprocess import what_if
     recording = recompute.Recording(runs['leo'].bag)
     old = {name: recording.output(name) for name in OUTPUTS}
     late = difference.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
@@ -265,7 +266,7 @@ def test_a_bag_with_inputs_only_gets_its_outputs(inputs_only, runs, pedestal, tm
 
 def test_a_changed_parameter_on_a_ship_and_rows_alone_on_the_standard_output(run_process):
     ship = pathlib.Path(__file__).parents[1] / 'bags' / 'reference' / 'ship_pass'
-    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recompute', ship, '--param',
+    done = run_process([sys.executable, '-m', 'pedestal.cli', 'recompute', ship, '--param',
                         'acu.azimuth.filter.kind=ca', '--json', '-'], 120.0)
     assert done.returncode == 0, done.stderr
     metrics = {row['metric'] for row in json.loads(done.stdout)['rows']}
@@ -360,7 +361,7 @@ def test_what_was_asked_for_is_found_and_asked_for_again(requested, pedestal):
 def test_the_process_of_the_node_says_the_same(requested, run_process, reserve_domain):
     """Inputs, program track and services, over DDS."""
     node, path = requested
-    done = run_process([sys.executable, '-m', 'pedestal_bringup.cli', 'recompute', path, '--node', node, '--live',
+    done = run_process([sys.executable, '-m', 'pedestal.cli', 'recompute', path, '--node', node, '--live',
                         *EXACT], 120.0, ROS_DOMAIN_ID=str(reserve_domain()))
     assert done.returncode == 0, done.stdout + done.stderr
     assert f'compared is what the process of {node} published' in done.stdout

@@ -2,8 +2,10 @@
 import pathlib
 
 import pytest
+from tools import reference
 
-from pedestal_bringup import claims, published, reference, studies
+import pedestal_studies
+from pedestal_studies.numbers import claims, published
 
 ROOT = pathlib.Path(__file__).parent.parent
 
@@ -24,7 +26,7 @@ def test_the_rows_of_the_tables_are_all_that_is_kept_and_say_what_studies_say():
     for table in published.TABLES.values():
         table(rows)
     assert rows.used.keys() == rows.keys()
-    assert {study for study, *_ in rows} <= {*studies.NAMES}
+    assert {study for study, *_ in rows} <= {*pedestal_studies.NAMES}
 
 
 def test_what_is_random_is_never_of_one_seed():

@@ -13,10 +13,12 @@ import time
 
 import pytest
 
-from pedestal_bringup.bags import bag as bags
-from pedestal_common import messages, middleware, topics
+from pedestal_common.graph import topics
+from pedestal_common.node import middleware
+from pedestal_common.wire import messages
+from pedestal_recording import bag as bags
 
-CLI = [sys.executable, '-m', 'pedestal_bringup.cli']
+CLI = [sys.executable, '-m', 'pedestal.cli']
 ANSWERS = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode')
 INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'ins/state', 'ins/error',
           'tracking_receiver/angle_error', 'acu/program_track')
@@ -58,7 +60,7 @@ def acu_and_recorder(run, start_process, domain, tmp_path):
         node = [sys.executable, '-m', 'acu_tracker.acu_node', '--ros-args', '--params-file',
                 run.log / 'parameters.yaml', '-p', 'acu:graph.nodes:=acu,ins,adu,operator,recorder', '-p',
                 f'acu:graph.pacing:={pacing}']
-        recorder = [sys.executable, '-m', 'pedestal_bringup.recorder_node', '--ros-args', '-p',
+        recorder = [sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args', '-p',
                     f'bag:={tmp_path / "again"}', '-p', 'graph.nodes:=acu,recorder', '-p', f'graph.pacing:={pacing}']
         return [start_process(command, ROS_DOMAIN_ID=str(domain)) for command in (node, recorder)]
     return start
@@ -92,7 +94,7 @@ def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, 
 
 def test_all_of_it_into_a_recorder_gives_the_same_file(run, start_process, run_process, domain, tmp_path,
                                                        complaints):
-    recorder = start_process([sys.executable, '-m', 'pedestal_bringup.recorder_node', '--ros-args', '--params-file',
+    recorder = start_process([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args', '--params-file',
                               run.log / 'parameters.yaml', '-p', f'recorder:bag:={tmp_path / "bag"}'],
                              ROS_DOMAIN_ID=str(domain))
     done = run_process([*CLI, 'replay', run.bag, '--rate', '5'], 60.0, ROS_DOMAIN_ID=str(domain))

@@ -14,8 +14,9 @@ import time
 
 import pytest
 
-from pedestal_bringup.bags import bag as bags
-from pedestal_common import commands, messages, topics
+from pedestal_common.graph import topics
+from pedestal_common.wire import commands, messages
+from pedestal_recording import bag as bags
 
 ROTCTL = shutil.which('rotctl')
 _SPEC = importlib.util.spec_from_file_location('rotator_gpredict',

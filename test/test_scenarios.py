@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup.run import closed_loop, scenario
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
 
 DURATION = 6.0
 

@@ -8,8 +8,9 @@ import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
-from pedestal_bringup.run.program import program_message
-from pedestal_common import messages, middleware
+from pedestal_bringup.scenario.program import program_message
+from pedestal_common.node import middleware
+from pedestal_common.wire import messages
 
 PERIOD = 5_000_000
 JOINTS, ERROR = 'joint_states', 'tracking_receiver/angle_error'

@@ -4,9 +4,9 @@ import json
 import numpy as np
 import pytest
 
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.studies import servo
-from pedestal_bringup.trials.cases import Case
+from pedestal_analysis.trials.cases import Case
+from pedestal_recording import bag as bags
+from pedestal_studies.papers import servo
 
 ALLOWED = 1e-6
 """Largest difference between a run of the nodes and the study [rad, rad/s]."""

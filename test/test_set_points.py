@@ -6,7 +6,8 @@ import pathlib
 import numpy as np
 import pytest
 
-from pedestal_bringup.run import closed_loop, scenario
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
 
 _SPEC = importlib.util.spec_from_file_location('rotator_passes',
                                                pathlib.Path(__file__).parents[1] / 'docs' / 'rotator' / 'passes.py')

@@ -12,12 +12,14 @@ import pynmea2
 import pytest
 
 from acu_tracker import modes
-from pedestal_bringup.again import difference, recompute
-from pedestal_bringup.analysis import isolation, known_attitude, results, tracking
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import layouts, messages
-from ship_motion_sim import motion
+from pedestal_analysis.reprocess import difference, recompute
+from pedestal_analysis.results import isolation, known_attitude, results, tracking
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph import layouts
+from pedestal_common.wire import messages
+from pedestal_recording import bag as bags
+from ship_motion_sim.sea import motion
 from tracking_receiver_sim import target
 
 

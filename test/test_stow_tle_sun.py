@@ -8,11 +8,12 @@ import pytest
 
 from acu_tracker import modes
 from acu_tracker.alarms.table import NAMES
-from pedestal_bringup import cli
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import commands, messages
-from pedestal_common.commands import Command
+from pedestal import cli
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.wire import commands, messages
+from pedestal_common.wire.commands import Command
+from pedestal_recording import bag as bags
 
 START = '2019-12-10T14:15:25'
 """At the culmination of a pass of 38 deg, with the sun above the horizon."""

@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import reaper
-from pedestal_common import messages
+from pedestal_bringup.graph import reaper
+from pedestal_common.wire import messages
+from pedestal_recording import bag as bags
 
 _spec = importlib.util.spec_from_file_location('kills', pathlib.Path(__file__).with_name('kills.py'))
 kills = importlib.util.module_from_spec(_spec)

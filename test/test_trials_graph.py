@@ -6,9 +6,9 @@ import shlex
 import numpy as np
 import pytest
 
-from pedestal_bringup.run import scenario
-from pedestal_bringup.trials import ensemble, monte_carlo
-from pedestal_bringup.trials.plan import plan
+from pedestal_analysis.trials import ensemble, monte_carlo
+from pedestal_analysis.trials.plan import plan
+from pedestal_bringup.scenario import scenario
 
 CASES = {
     'leo_pass': (5.0, 0.005, ['adu.azimuth.load.inertia=normal(1, 0.1)x', 'acu.azimuth.filter.kind=choice(ca, imm)']),

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import structure
-from pedestal_bringup.analysis import tracking
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.run import closed_loop, scenario
+from adu_drive.plant import structure
+from pedestal_analysis.results import tracking
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_recording import bag as bags
 
 SHARE, FREQUENCY = 0.5, 8.0
 SWINGS = (f'adu.azimuth.structure.inertia_share={SHARE}', f'adu.azimuth.structure.frequency={FREQUENCY}')

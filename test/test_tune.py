@@ -9,13 +9,14 @@ import pytest
 import yaml
 from rcl_interfaces.srv import GetParameters
 
-from pedestal_bringup import cli
-from pedestal_bringup.again import recompute
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.bags.writer import Writer
-from pedestal_bringup.run import scenario
-from pedestal_bringup.trials import tune
-from pedestal_common import parameters, topics
+from pedestal import cli
+from pedestal_analysis.reprocess import recompute
+from pedestal_analysis.tuning import tune
+from pedestal_bringup.scenario import scenario
+from pedestal_common import parameters
+from pedestal_common.graph import topics
+from pedestal_recording import bag as bags
+from pedestal_recording.writer import Writer
 
 BAG = pathlib.Path(__file__).parent.parent / 'bags' / 'reference' / 'uav_flyby'
 

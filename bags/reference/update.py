@@ -24,7 +24,7 @@ REFERENCES = {'leo_pass': SHORT, 'uav_flyby': SHORT, 'ship_pass': SHORT, 'servo_
 
 def pedestal(*arguments):
     """Exit code of a `pedestal` command, its output on ours."""
-    return subprocess.run([sys.executable, '-m', 'pedestal_bringup.cli', *map(str, arguments)]).returncode
+    return subprocess.run([sys.executable, '-m', 'pedestal.cli', *map(str, arguments)]).returncode
 
 
 def recompute(name, bag):

@@ -13,7 +13,7 @@ from geometry_msgs.msg import Vector3Stamped
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from pedestal_common import middleware
+from pedestal_common.node import middleware
 
 
 class Receiver(Node):

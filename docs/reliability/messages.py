@@ -24,9 +24,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from station import NODES, Station, reads
 
-from pedestal_bringup.run import scenario
-from pedestal_common import messages, middleware, nodes, topics
-from pedestal_common.realtime import listening
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph import nodes, topics
+from pedestal_common.node import listening, middleware
+from pedestal_common.wire import messages
 
 NUMBERS = (float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 0.0, -0.0, 0.5, -2.0, 1e6)
 STAMPS = (0, 1, -1, 2**31 - 1, -2**31, 1_000_000_000)

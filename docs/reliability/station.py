@@ -7,9 +7,10 @@ import time
 
 import yaml
 
-from pedestal_bringup.run import processes, scenario
-from pedestal_common import nodes, topics
-from pedestal_common.steps import SECOND
+from pedestal_bringup.graph import processes
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.steps import SECOND
 
 NODES = ('tracking_receiver', 'acu', 'adu')
 """Of a station ashore with one antenna."""

@@ -19,7 +19,9 @@ import rclpy
 from messages import Stranger
 from station import Station
 
-from pedestal_common import messages, middleware, topics
+from pedestal_common.graph import topics
+from pedestal_common.node import middleware
+from pedestal_common.wire import messages
 
 COUNTERS = 'step', 'lost_steps', 'missed_steps', 'late_ticks'
 

@@ -14,8 +14,9 @@ import sys
 import numpy as np
 
 from acu_tracker.servo import unasked
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import records
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.wire import records
 
 WINDS = (0.0, 0.0), (500.0, 0.2), (1000.0, 0.2), (1500.0, 0.2), (2000.0, 0.3), (2500.0, 0.35), (3000.0, 0.4)
 """Mean torque [Nm], intensity of the gusts."""

@@ -15,11 +15,12 @@ import sys
 import numpy as np
 
 from acu_tracker import modes
-from pedestal_bringup.run import closed_loop, scenario
-from pedestal_common import topics
-from pedestal_operator import rotctld
-from pedestal_operator.controller import Controller
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph import topics
 from pedestal_operator.requests import Requests
+from pedestal_operator.rotator import rotctld
+from pedestal_operator.rotator.controller import Controller
 
 EARTH, HEIGHT, GRAVITY = 6371e3, 500e3, 3.986e14
 """Radius [m], height of the orbit [m], gravitational parameter [m3/s2]."""

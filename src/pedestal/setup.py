@@ -11,13 +11,13 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
     ],
-    install_requires=['numpy', 'matplotlib'],
+    install_requires=['numpy', 'matplotlib', 'rich'],
     extras_require={'test': ['pytest', 'nbclient', 'ipykernel']},
     python_requires='>=3.10',
     zip_safe=False,
     maintainer='pedestal maintainers',
     maintainer_email='pedestal@example.org',
-    description='The tracking-antenna pedestal as a Python library: scenarios, runs, trials and recordings as numpy '
-                'arrays, without ROS.',
+    description='The command and the Python library of the tracking antenna: run, record, judge and tune it.',
     license='Apache-2.0',
+    entry_points={'console_scripts': ['pedestal = pedestal.cli:main']},
 )

@@ -11,7 +11,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
     ],
-    install_requires=['numpy', 'numba', 'rosbags', 'scipy', 'sgp4'],
+    install_requires=['numpy', 'numba', 'rosbags', 'scipy', 'sgp4', 'PyYAML'],
     extras_require={'test': ['pytest']},
     python_requires='>=3.10',
     zip_safe=False,

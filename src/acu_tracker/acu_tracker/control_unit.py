@@ -6,25 +6,15 @@ import math
 
 import numpy as np
 
-from acu_tracker import (
-    by_level,
-    direction,
-    guidance,
-    intake,
-    manual,
-    mode_change,
-    modes,
-    outage,
-    resumption,
-    signals,
-    stow,
-    supervision,
-)
+from acu_tracker import intake, modes, signals
 from acu_tracker.alarms import conditions
-from acu_tracker.estimation import divergence, repetition, slope_sign, target, target_filter, tracker
-from acu_tracker.geometry import attitude, deck_reference, encoders
+from acu_tracker.estimation import divergence, repetition, slope_sign, target, tracker
+from acu_tracker.estimation.filters import target_filter
+from acu_tracker.geometry import attitude, deck_reference, direction, encoders
 from acu_tracker.geometry.vector import vector
+from acu_tracker.guidance import guidance, manual
 from acu_tracker.lookahead import planner
+from acu_tracker.mode import by_level, mode_change, outage, resumption, stow, supervision
 from acu_tracker.params import AxisParameters, SharedParameters
 from acu_tracker.program import bridge, tables
 from acu_tracker.search import acquisition

@@ -4,12 +4,14 @@ s, c, u, o: records of control_unit.STATE and CONSTANTS, of signals.INPUTS and O
 """
 import math
 
-from acu_tracker import by_level, modes, outage, signals, supervision
-from acu_tracker.estimation import divergence, measurement, repetition, slope_sign, target
+from acu_tracker import modes, signals
+from acu_tracker.estimation import divergence, repetition, slope_sign, target
+from acu_tracker.estimation.filters import measurement
 from acu_tracker.geometry import attitude, attitude_error, encoders
 from acu_tracker.lookahead import levelled_deck, planner
-from pedestal_common import line_of_sight
+from acu_tracker.mode import by_level, outage, supervision
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight
 
 ON_TARGET = 0.5
 """Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""

@@ -3,10 +3,11 @@ import dataclasses
 import math
 
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
-from acu_tracker.history import LENGTH
+from acu_tracker.geometry.history import LENGTH
 from acu_tracker.lookahead.params import KeyholeParameters
 from acu_tracker.modes import FALLBACKS, MODES
-from acu_tracker.prediction import PredictionParameters
+from acu_tracker.operating.verbs import POINTS_DOC, VERBS, points
+from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.search.params import AcquisitionParameters, SearchParameters, StepTrackParameters
 from acu_tracker.servo import ends, floor
 from acu_tracker.servo.params import (
@@ -19,14 +20,13 @@ from acu_tracker.servo.params import (
     ShaperParameters,
 )
 from acu_tracker.servo.position_loop import CONTROLLERS
-from acu_tracker.verbs import POINTS_DOC, VERBS, points
-from pedestal_common import nodes
-from pedestal_common.blockage import DOC as SECTORS_DOC
-from pedestal_common.blockage import sectors
-from pedestal_common.commands import SCHEDULE_DOC, schedule
-from pedestal_common.graph_parameters import topic_flags
-from pedestal_common.lever_arm import LeverArm
+from pedestal_common.geometry.blockage import DOC as SECTORS_DOC
+from pedestal_common.geometry.blockage import sectors
+from pedestal_common.geometry.lever_arm import LeverArm
+from pedestal_common.graph import nodes
+from pedestal_common.graph.graph_parameters import topic_flags
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
+from pedestal_common.wire.commands import SCHEDULE_DOC, schedule
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,10 +3,11 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation.motion_models import MODELS
+from acu_tracker.estimation.filters.motion_models import MODELS
 from acu_tracker.modes import TABLE
-from pedestal_common import inputs, nodes, topics
 from pedestal_common.compiled import compiled
+from pedestal_common.graph import nodes, topics
+from pedestal_common.wire import inputs
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
                   'step_gap', 'error_noisy', 'attitude_error')

@@ -5,19 +5,22 @@ import typing
 
 import numpy as np
 
-from acu_tracker import announcement, control_unit, diagnosis, mode_change, modes, signals, supervision
+from acu_tracker import control_unit, modes, signals
 from acu_tracker.alarms import annunciator, report, table
-from acu_tracker.alarms.desk import Desk
-from acu_tracker.authority import Authority
-from acu_tracker.prediction import Predictor
+from acu_tracker.mode import mode_change, supervision
+from acu_tracker.operating import announcement, diagnosis
+from acu_tracker.operating.authority import Authority
+from acu_tracker.operating.desk import Desk
+from acu_tracker.operating.verbs import ALARM_VERBS, TAKEN, VERBS
 from acu_tracker.program import segments, tables
-from acu_tracker.verbs import ALARM_VERBS, TAKEN, VERBS
-from pedestal_common import messages, nodes, topics
-from pedestal_common.commands import Reply, schedule
+from acu_tracker.program.prediction import Predictor
 from pedestal_common.compiled import compiled
-from pedestal_common.inputs import taking
-from pedestal_common.records import NEVER
-from pedestal_common.unit import NEVER_DUE, Unit, joined
+from pedestal_common.graph import nodes, topics
+from pedestal_common.node.unit import NEVER_DUE, Unit, joined
+from pedestal_common.wire import messages
+from pedestal_common.wire.commands import Reply, schedule
+from pedestal_common.wire.inputs import taking
+from pedestal_common.wire.records import NEVER
 
 JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'

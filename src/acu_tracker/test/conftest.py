@@ -11,7 +11,7 @@ from acu_tracker.params import AcuParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from acu_tracker.program.tables import Tables
 from acu_tracker.signals import INVALID_INPUTS
-from pedestal_common import line_of_sight
+from pedestal_common.geometry import line_of_sight
 from pedestal_common.parameters import as_dict, build
 
 ASHORE = Rotation.from_quat(line_of_sight.ASHORE)

@@ -4,13 +4,14 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker import signals, supervision
+from acu_tracker import signals
 from acu_tracker.alarms import annunciator, conditions, detectors, machine, report, table
+from acu_tracker.mode import supervision
 from acu_tracker.modes import MODES, PRESET, STANDBY
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import ALARMS, DRIVE, JOINTS, Acu
-from pedestal_common.commands import Command
 from pedestal_common.parameters import build
+from pedestal_common.wire.commands import Command
 
 T = 0.005
 

@@ -8,8 +8,8 @@ from acu_tracker.estimation.params import AttitudeModelParameters
 from acu_tracker.geometry import attitude_error
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import Acu
-from pedestal_common import records
 from pedestal_common.parameters import build, record
+from pedestal_common.wire import records
 
 PARAMETERS = record(AttitudeModelParameters(tilt_noise=1e-3, heading_noise=2e-3, tilt_wander=3e-3, heading_wander=4e-3,
                                             wander_time=50.0))[0]

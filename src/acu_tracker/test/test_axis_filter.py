@@ -5,9 +5,9 @@ import pytest
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 from scipy.signal import lfilter
 
-from acu_tracker.estimation import axis_filter, constant_gain
-from acu_tracker.estimation.kinds import KINDS
-from acu_tracker.estimation.measurement import AxisMeasurement
+from acu_tracker.estimation.filters import axis_filter, constant_gain
+from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import ParameterError, build
 

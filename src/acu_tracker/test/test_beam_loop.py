@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker.estimation import constant_gain
+from acu_tracker.estimation.filters import constant_gain
 from acu_tracker.geometry import attitude, deck_reference
 from acu_tracker.geometry.vector import Vector
 from acu_tracker.servo import beam_loop
-from pedestal_common import line_of_sight
+from pedestal_common.geometry import line_of_sight
 
 T = 0.01
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.optimize import minimize
 
-from acu_tracker.estimation import constant_gain
+from acu_tracker.estimation.filters import constant_gain
 
 T, R = 0.02, 2.5e-7
 H = np.array([[1.0, 0.0, 0.0]])

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker import announcement
 from acu_tracker.lookahead import levelled_deck, planner
 from acu_tracker.modes import AUTOTRACK, MODES, PRESET, PROGRAM, STANDBY, STOW
+from acu_tracker.operating import announcement
 from acu_tracker.program.program_track import NO_TRACK
-from pedestal_common import line_of_sight
+from pedestal_common.geometry import line_of_sight
 
 BEAMWIDTH = 0.0175
 SLOW = {'azimuth.shaper.rate': 0.1745, 'azimuth.limits.rate': 0.2, 'azimuth.shaper.acceleration': 0.35}

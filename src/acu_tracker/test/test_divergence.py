@@ -6,7 +6,7 @@ import pytest
 from scipy.signal import lfilter
 
 from acu_tracker.estimation import divergence
-from acu_tracker.estimation.measurement import NO_INNOVATION, AxisInnovation, Innovation
+from acu_tracker.estimation.filters.measurement import NO_INNOVATION, AxisInnovation, Innovation
 
 
 def innovation(chi_square):

@@ -5,8 +5,8 @@ import pytest
 from filterpy.kalman import IMMEstimator, KalmanFilter
 from scipy.linalg import expm
 
-from acu_tracker.estimation import axis_filter, imm
-from acu_tracker.estimation.measurement import AxisMeasurement
+from acu_tracker.estimation.filters import axis_filter, imm
+from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import build
 

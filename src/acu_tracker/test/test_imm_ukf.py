@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from acu_tracker.estimation import tracker
-from acu_tracker.estimation.measurement import AxisMeasurement, Measurement
+from acu_tracker.estimation.filters.measurement import AxisMeasurement, Measurement
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters, UkfParameters
 from pedestal_common.parameters import build, record
 

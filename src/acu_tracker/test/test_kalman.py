@@ -1,8 +1,8 @@
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
-from acu_tracker.estimation import kalman, motion_models
-from acu_tracker.estimation.kalman import Gaussian, Symmetric
+from acu_tracker.estimation.filters import kalman, motion_models
+from acu_tracker.estimation.filters.kalman import Gaussian, Symmetric
 from acu_tracker.geometry.motion import AxisMotion
 
 T, ALPHA, R, R_RATE = 0.01, 0.5, 2.5e-7, 4e-6

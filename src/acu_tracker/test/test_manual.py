@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from acu_tracker import manual, modes
+from acu_tracker import modes
 from acu_tracker.alarms.table import NAMES
-from acu_tracker.authority import Authority
+from acu_tracker.guidance import manual
+from acu_tracker.operating.authority import Authority
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import Acu
-from pedestal_common import messages, nodes
-from pedestal_common.commands import Command
+from pedestal_common.graph import nodes
 from pedestal_common.parameters import ParameterError, build
+from pedestal_common.wire import messages
+from pedestal_common.wire.commands import Command
 
 T = 0.005
 STEP_NS = 5_000_000

@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import expm
 
-from acu_tracker.estimation import kalman, motion_models
+from acu_tracker.estimation.filters import kalman, motion_models
 from acu_tracker.geometry.motion import AxisMotion
-from pedestal_common import topics
+from pedestal_common.graph import topics
 
 CASES = [(0.1, 0.01), (0.5, 0.005), (0.5, 0.0999), (0.7, 0.3), (2.0, 0.24999), (2.0, 0.25001), (5.0, 0.4), (1.0, 3.0)]
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from skyfield.api import EarthSatellite, load, wgs84
 
-from acu_tracker import modes, prediction, sun
-from acu_tracker.prediction import PredictionParameters, Predictor
-from acu_tracker.program import program_track
-from pedestal_common import orbit
-from pedestal_common.geodesy import StationParameters
+from acu_tracker import modes
+from acu_tracker.program import prediction, program_track, sun
+from acu_tracker.program.prediction import PredictionParameters, Predictor
+from pedestal_common.geometry import orbit
+from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.parameters import ParameterError
 
 LINES = ('1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',

@@ -6,7 +6,7 @@ import pytest
 from scipy.signal import lfilter
 
 from acu_tracker.estimation import roughness
-from acu_tracker.estimation.measurement import AxisInnovation, AxisMeasurement, Innovation, Measurement
+from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, Innovation, Measurement
 
 GATE, SIGMA = 25.0, 1e-4
 

@@ -8,7 +8,7 @@ from acu_tracker.geometry.motion import AxisMotion, Motion
 from acu_tracker.geometry.vector import Vector
 from acu_tracker.search import place
 from acu_tracker.search.pattern import Point
-from pedestal_common import line_of_sight
+from pedestal_common.geometry import line_of_sight
 
 
 @pytest.fixture

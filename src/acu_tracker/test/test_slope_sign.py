@@ -7,7 +7,7 @@ import pytest
 from acu_tracker import signals
 from acu_tracker.estimation import slope_sign
 from acu_tracker.geometry.vector import Vector
-from pedestal_common.line_of_sight import ashore_matrix
+from pedestal_common.geometry.line_of_sight import ashore_matrix
 
 T, SIGMA, GAP = 0.005, 5e-4, 0.1
 ASHORE = ashore_matrix()

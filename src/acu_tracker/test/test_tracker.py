@@ -5,9 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from acu_tracker.estimation import target_filter, tracker
-from acu_tracker.estimation.kinds import KINDS
-from acu_tracker.estimation.measurement import (
+from acu_tracker.estimation import tracker
+from acu_tracker.estimation.filters import target_filter
+from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.measurement import (
     AxisMeasurement,
     Measurement,
     attitude_variances,
@@ -17,7 +18,7 @@ from acu_tracker.estimation.measurement import (
 from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters, TrackerParameters
 from acu_tracker.geometry import estimate_frame
 from acu_tracker.geometry.vector import Vector
-from pedestal_common import line_of_sight
+from pedestal_common.geometry import line_of_sight
 from pedestal_common.parameters import build, record
 
 DEG = math.pi / 180

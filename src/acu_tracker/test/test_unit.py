@@ -4,10 +4,11 @@ import pytest
 
 from acu_tracker.modes import MODES
 from acu_tracker.params import AcuParameters
-from acu_tracker.prediction import PredictionParameters
+from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.unit import COMMAND, DRIVE, JOINTS, MODE, Acu
-from pedestal_common import messages, records, topics
-from pedestal_common.commands import Command
+from pedestal_common.graph import topics
+from pedestal_common.wire import messages, records
+from pedestal_common.wire.commands import Command
 
 LINES = ('1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
          '2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482')

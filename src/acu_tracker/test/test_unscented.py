@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from filterpy.kalman import IMMEstimator, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from acu_tracker.estimation import unscented
-from acu_tracker.estimation.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
+from acu_tracker.estimation.filters import unscented
+from acu_tracker.estimation.filters.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import UkfParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
 

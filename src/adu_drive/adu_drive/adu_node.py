@@ -6,8 +6,8 @@ import sys
 
 from adu_drive import resting
 from adu_drive.timekeeper_node import Timekeeper
-from pedestal_common import shell
-from pedestal_common.unit import WARN
+from pedestal_common.node import shell
+from pedestal_common.node.unit import WARN
 
 
 class AduNode(Timekeeper):

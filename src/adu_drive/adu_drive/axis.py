@@ -7,23 +7,9 @@ import math
 
 import numpy as np
 
-from adu_drive import (
-    bias,
-    brake,
-    current_loop,
-    disturbance_observer,
-    encoder,
-    faults,
-    friction,
-    gear_train,
-    motor,
-    pi,
-    speed_loop,
-    structure,
-    thermal,
-    travel,
-)
+from adu_drive.controller import bias, current_loop, disturbance_observer, encoder, faults, pi, speed_loop, travel
 from adu_drive.params import SPEED_PERIOD
+from adu_drive.plant import brake, friction, gear_train, motor, structure, thermal
 from pedestal_common.compiled import compiled, inlined
 
 CURRENT_TICKS = 5

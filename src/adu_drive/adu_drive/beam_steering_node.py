@@ -5,8 +5,8 @@ import pedestal_common.entry  # noqa: F401
 import sys
 
 from adu_drive.timekeeper_node import Timekeeper
-from pedestal_common import shell
-from pedestal_common.unit import Diagnosis
+from pedestal_common.node import shell
+from pedestal_common.node.unit import Diagnosis
 
 
 class BeamSteeringNode(Timekeeper):

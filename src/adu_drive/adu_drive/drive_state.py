@@ -9,9 +9,10 @@ fall in.
 """
 import math
 
-from adu_drive import faults, stow_pins
-from pedestal_common import topics
+from adu_drive import stow_pins
+from adu_drive.controller import faults
 from pedestal_common.compiled import compiled
+from pedestal_common.graph import topics
 
 PHASES = ('enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brakes')
 ENABLED, STOPPING, ENGAGING, DISABLED, RELEASING = range(len(PHASES))

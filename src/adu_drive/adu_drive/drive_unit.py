@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from adu_drive import axis, drive_state, gimbal, mount, stow_pins, wind, wind_field
+from adu_drive import axis, drive_state, stow_pins
 from adu_drive.lanes import at, count
 from adu_drive.params import AduParameters, whole_speed_periods
+from adu_drive.plant import gimbal, mount, wind, wind_field
 from pedestal_common.compiled import compiled, inlined
 
 RING = 256

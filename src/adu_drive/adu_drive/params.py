@@ -452,5 +452,5 @@ class BeamParameters(RunParameters):
         if abs(periods - round(periods)) > 1e-6:
             raise ParameterError(f'transport_delay = {self.transport_delay:g} s: must be a multiple of the period '
                                  f'{self.period:g} s: a beam changes at the steps')
-        from adu_drive import electronic_beam  # with numba, which only the array needs
+        from adu_drive.array import electronic_beam  # with numba, which only the array needs
         electronic_beam.check_delay(self.period, self.transport_delay)

@@ -9,9 +9,9 @@ which is a fault of its axis; it is tried again once the faults are reset.
 """
 import math
 
-from adu_drive import faults
-from pedestal_common import topics
+from adu_drive.controller import faults
 from pedestal_common.compiled import compiled
+from pedestal_common.graph import topics
 
 STATES = topics.PINS
 OUT, MOVING, IN, FAILED = range(len(STATES))

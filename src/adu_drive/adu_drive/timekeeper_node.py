@@ -4,8 +4,8 @@ What moves is its unit: one drive, or one for each beam of an array.
 """
 import time
 
-from pedestal_common import unit_node
-from pedestal_common.steps import SECOND
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.node import unit_node
 
 ACKNOWLEDGED_STEPS = 1000
 """Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so

@@ -6,14 +6,16 @@ import typing
 
 import numpy as np
 
-from adu_drive import drive_state, drive_unit, faults, injected, lanes, resting, stow_pins, thermal
-from pedestal_common import nodes, topics
-from pedestal_common.commands import Reply
+from adu_drive import drive_state, drive_unit, injected, lanes, resting, stow_pins
+from adu_drive.controller import faults
+from adu_drive.plant import thermal
 from pedestal_common.compiled import compiled
+from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
-from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, joined
+from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis, joined
+from pedestal_common.wire.commands import Reply
+from pedestal_common.wire.records import NEVER
 
 CLOCK, COMMAND, SHIP, JOINTS, MOTORS = 'clock', 'acu/rate_command', 'ship/truth', 'joint_states', 'adu/motor_states'
 TRUTH, STATE, PINS, PINS_ASKED = 'adu/truth', 'adu/state', 'adu/stow_pins', 'acu/stow_pins'

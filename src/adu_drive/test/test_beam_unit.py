@@ -4,9 +4,9 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive.beam_unit import CLOCK, COMMAND, JOINTS, STATE, Beam
+from adu_drive.array.beam_unit import CLOCK, COMMAND, JOINTS, STATE, Beam
 from adu_drive.params import BeamParameters
-from pedestal_common import records
+from pedestal_common.wire import records
 
 T = 10_000_000
 P = BeamParameters(period=0.01, transport_delay=0.03, initial_azimuth=0.3, initial_elevation=0.6)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from adu_drive import disturbance_observer
+from adu_drive.controller import disturbance_observer
 from adu_drive.params import AduParameters
 from pedestal_common.parameters import build
 

@@ -6,7 +6,8 @@ import numba
 import numpy as np
 import pytest
 
-from adu_drive import drive_unit, faults
+from adu_drive import drive_unit
+from adu_drive.controller import faults
 from adu_drive.params import (
     AduParameters,
     AxisParameters,
@@ -15,7 +16,7 @@ from adu_drive.params import (
     LimitParameters,
     WindParameters,
 )
-from pedestal_common.line_of_sight import direction
+from pedestal_common.geometry.line_of_sight import direction
 from pedestal_common.parameters import ParameterError, build
 
 LOAD_STEP = 2.0 * math.pi / 2 ** 22

@@ -4,8 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import electronic_beam
-from adu_drive.electronic_beam import RING
+from adu_drive.array import electronic_beam
+from adu_drive.array.electronic_beam import RING
 from pedestal_common.parameters import ParameterError
 
 MS = 1_000_000

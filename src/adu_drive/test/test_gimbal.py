@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 import sympy
 
-from adu_drive import drive_unit, gimbal
+from adu_drive import drive_unit
 from adu_drive.params import AduParameters
+from adu_drive.plant import gimbal
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError, build
 

@@ -4,11 +4,12 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import gear_train, unit
+from adu_drive import unit
 from adu_drive.params import AduNodeParameters
-from pedestal_common import records
-from pedestal_common.commands import Command
+from adu_drive.plant import gear_train
 from pedestal_common.parameters import ParameterError, build
+from pedestal_common.wire import records
+from pedestal_common.wire.commands import Command
 
 PERIOD_NS = 5_000_000
 RATIO, TORQUE = 64.0, 5000.0

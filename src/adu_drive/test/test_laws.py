@@ -4,8 +4,9 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import bias, encoder, friction, gear_train, pi, speed_loop, travel
+from adu_drive.controller import bias, encoder, pi, speed_loop, travel
 from adu_drive.params import BiasParameters
+from adu_drive.plant import friction, gear_train
 
 
 def test_own_exp_and_tanh_keep_their_stated_errors():

@@ -5,7 +5,7 @@ import pytest
 from adu_drive import unit
 from adu_drive.params import AduNodeParameters
 from pedestal_common.parameters import build
-from pedestal_common.records import NEVER
+from pedestal_common.wire.records import NEVER
 
 PERIOD_NS = 5_000_000
 RATE = (1.0, -0.2)

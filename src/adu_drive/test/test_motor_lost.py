@@ -2,10 +2,11 @@
 import numpy as np
 import pytest
 
-from adu_drive import drive_state, faults
+from adu_drive import drive_state
+from adu_drive.controller import faults
 from adu_drive.params import AduNodeParameters, AduParameters
 from adu_drive.unit import STATE, Adu
-from pedestal_common import topics
+from pedestal_common.graph import topics
 from pedestal_common.parameters import build
 
 LOST = {0: faults.MOTOR_1_LOST, 1: faults.MOTOR_2_LOST}

@@ -6,10 +6,11 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from adu_drive import drive_unit, mount
+from adu_drive import drive_unit
 from adu_drive.params import AduParameters, MountParameters
+from adu_drive.plant import mount
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import direction
+from pedestal_common.geometry.line_of_sight import direction
 from pedestal_common.parameters import build
 
 TERMS = {'non_perpendicularity': .02, 'collimation': .03, 'tilt_forward': .015, 'tilt_starboard': -.01, 'sag': -.04}

@@ -4,10 +4,11 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import drive_state, faults, resting, stow_pins
+from adu_drive import drive_state, resting, stow_pins
+from adu_drive.controller import faults
 from adu_drive.params import AduNodeParameters, AduParameters
 from adu_drive.unit import Adu
-from pedestal_common import topics
+from pedestal_common.graph import topics
 from pedestal_common.parameters import ParameterError, build
 
 STOWED = {'stow_pins': True, 'pins.elevation': 0.7, 'initial_elevation': 0.7, 'pins.travel_time': 0.3,

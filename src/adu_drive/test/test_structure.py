@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from adu_drive import axis, drive_unit, structure
+from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
+from adu_drive.plant import structure
 from pedestal_common.parameters import build
 
 H, J = 50e-6, 210.0

@@ -5,8 +5,8 @@ import types
 import numpy as np
 import pytest
 
-from adu_drive import gear_train, motor
 from adu_drive.params import AduParameters
+from adu_drive.plant import gear_train, motor
 from pedestal_common.parameters import build
 
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from pedestal.scenario import Scenario
-from pedestal_bringup.trials import comparison, ensemble, monte_carlo, statistics
-from pedestal_bringup.trials import plan as plans
-from pedestal_bringup.trials import table as tables
+from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
+from pedestal_analysis.trials import plan as plans
+from pedestal_analysis.trials import table as tables
 
 
 def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None = None, *, sobol: bool = False,

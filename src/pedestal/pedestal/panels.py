@@ -5,7 +5,7 @@ import functools
 import typing
 from collections.abc import Callable
 
-from pedestal_bringup.report import run_data, run_figures
+from pedestal_analysis.report import run_data, run_figures
 from pedestal_common.parameters import did_you_mean
 
 if typing.TYPE_CHECKING:

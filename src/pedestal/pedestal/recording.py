@@ -10,11 +10,11 @@ import numpy as np
 
 from pedestal.panels import draw
 from pedestal.scenario import Scenario
-from pedestal_bringup.analysis import results, tracking
-from pedestal_bringup.bags import bag as bags
-from pedestal_bringup.report import run_data
-from pedestal_bringup.run import recorded
-from pedestal_common import layouts
+from pedestal_analysis.report import run_data
+from pedestal_analysis.results import results, tracking
+from pedestal_bringup.loop import recorded
+from pedestal_common.graph import layouts
+from pedestal_recording import bag as bags
 
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes

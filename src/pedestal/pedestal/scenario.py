@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pedestal_bringup.run import scenario as bringup
+from pedestal_bringup.scenario import scenario as bringup
 from pedestal_common import parameters
 
 Value = float | int | bool | str
@@ -35,7 +35,7 @@ def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None,
     >>> pedestal.load('leo_pas')
     Traceback (most recent call last):
         ...
-    pedestal_bringup.run.scenario.ScenarioError: unknown scenario 'leo_pas'; did you mean 'leo_pass'? there are ...
+    pedestal_bringup.scenario.scenario.ScenarioError: unknown scenario 'leo_pas'; did you mean 'leo_pass'? ...
     """
     return Scenario(str(source), dict(changes or {}), duration, seed)
 

@@ -15,9 +15,9 @@ import pytest
 
 import pedestal
 from pedestal import panels
-from pedestal_bringup.analysis import results
-from pedestal_bringup.bags import bag
-from pedestal_common import topics
+from pedestal_analysis.results import results
+from pedestal_common.graph import topics
+from pedestal_recording import bag
 
 ROOT = pathlib.Path(__file__).parents[3]
 REFERENCES = ROOT / 'bags' / 'reference'

@@ -19,15 +19,16 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, PushRosNamespace
 
 from launch import LaunchDescription
-from pedestal_bringup.run import launched
-from pedestal_common import nodes
+from pedestal_bringup.graph import launched
+from pedestal_common.graph import nodes
 
 
 def operator(context, scenario):
     """What sends the program track, in the namespace of the nodes."""
     namespace = context.launch_configurations.get('ros_namespace', '')
-    return [ExecuteProcess(cmd=[sys.executable, '-m', 'pedestal_bringup.cli', 'program', str(scenario),
-                                *(['--namespace', namespace] if namespace else [])], output='screen')]
+    remapped = ['--ros-args', '-r', f'__ns:=/{namespace.strip("/")}'] if namespace else []
+    return [ExecuteProcess(cmd=[sys.executable, '-m', 'pedestal_bringup.graph.send_program', str(scenario), *remapped],
+                           output='screen')]
 
 
 def start(context):

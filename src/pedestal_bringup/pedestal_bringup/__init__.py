@@ -1,1 +1,1 @@
-"""Command line, graph, recorder, bags, studies and report of the tracking-antenna pedestal."""
+"""Starts a scenario of the tracking antenna: as a graph of nodes, by ros2 launch, or as a closed loop without ROS."""

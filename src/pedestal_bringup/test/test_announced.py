@@ -3,8 +3,8 @@ import re
 
 import pytest
 
-from pedestal_bringup.run import scenario
-from pedestal_bringup.run.program import Plan
+from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.program import Plan
 
 
 def lines(name, duration):

@@ -12,8 +12,8 @@ import pytest
 
 PARENT = """
 import os, pathlib, signal, sys, threading, time
-from pedestal_bringup.run import child as children
-from pedestal_bringup.run.child import Child
+from pedestal_bringup.graph import child as children
+from pedestal_bringup.graph.child import Child
 
 def start(rehearse=lambda: None):
     with open('log', 'ab') as log:

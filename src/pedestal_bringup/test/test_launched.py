@@ -1,8 +1,8 @@
 """The arguments of pedestal.launch.py as its texts; test/test_colcon.py starts it where there is a `ros2`."""
 import pytest
 
-from pedestal_bringup.run import beside, launched
-from pedestal_common import plain_yaml
+from pedestal_bringup.graph import beside, launched
+from pedestal_common.text_files import plain_yaml
 
 
 def given(**texts):

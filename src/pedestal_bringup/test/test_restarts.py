@@ -1,5 +1,5 @@
 """Which node is started again and when, and who counts as silent: decisions without processes and without a clock."""
-from pedestal_bringup.run.restarts import Losses, Restarts, Silence
+from pedestal_bringup.graph.restarts import Losses, Restarts, Silence
 
 
 def test_a_node_starts_again_at_once_and_then_later_and_later():

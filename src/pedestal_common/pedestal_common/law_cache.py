@@ -21,6 +21,9 @@ from numba.core.runtime import rtsys
 from numba.misc.appdirs import user_cache_dir
 
 COLUMNS = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
+ROOF = ('pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
+"""Packages with laws above the columns; a law may call those of the packages before its own."""
+
 KEPT_DAYS = 7.0
 _ROOT = pathlib.Path(numba.config.CACHE_DIR or user_cache_dir()) / 'pedestal'
 if not _ROOT.is_absolute():
@@ -81,8 +84,9 @@ def _is_text(statement):
 @functools.cache
 def _folder_of(package) -> str | None:
     """The cache of one package's laws: named after its own sources and all it may call."""
-    columns = () if package == 'pedestal_common' else (package,) if package in COLUMNS else COLUMNS
-    folder = _ROOT / f'{package}-{digest(("pedestal_common", *columns, package))}'
+    below = () if package == 'pedestal_common' or package in COLUMNS else (
+        *COLUMNS, *(ROOF[:ROOF.index(package)] if package in ROOF else ROOF))
+    folder = _ROOT / f'{package}-{digest(("pedestal_common", *below, package))}'
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_common import blockage
+from pedestal_common.geometry import blockage
 from pedestal_common.parameters import ParameterError
 
 

@@ -1,9 +1,9 @@
 """Commands and replies on a topic and in a schedule."""
 import pytest
 
-from pedestal_common import commands, messages
-from pedestal_common.commands import Argument, Command, Reply, Verb
 from pedestal_common.parameters import ParameterError
+from pedestal_common.wire import commands, messages
+from pedestal_common.wire.commands import Argument, Command, Reply, Verb
 
 VERBS = (Verb('point', 'go there', (Argument('azimuth', 'where', -3.0, 3.0, 'rad'),
                                     Argument('speed', 'how', 0.0, 1.0, 'rad/s', default=0.5))),

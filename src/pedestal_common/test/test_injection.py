@@ -2,10 +2,10 @@
 import numpy as np
 import pytest
 
-from pedestal_common import nodes, topics
-from pedestal_common.commands import Command, values
+from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, spoil, table
 from pedestal_common.parameters import ParameterError
+from pedestal_common.wire.commands import Command, values
 
 MILLISECOND = 1_000_000
 ALL = [(node, fault) for node, faults in table.FAULTS.items() for fault in faults]

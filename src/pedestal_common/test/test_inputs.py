@@ -3,7 +3,8 @@ import types
 
 import pytest
 
-from pedestal_common import inputs, layouts, nodes, records, topics
+from pedestal_common.graph import layouts, nodes, topics
+from pedestal_common.wire import inputs, records
 
 NAMES = ('tracking_receiver/angle_error', 'tracking_receiver/angle_rate', 'adu/state', 'ins/state')
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pedestal_common.interval import interval
+from pedestal_common.geometry.interval import interval
 
 
 @pytest.mark.parametrize('rows', [2, 3, 4, 17, 100])

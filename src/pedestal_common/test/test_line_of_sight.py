@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pedestal_common import line_of_sight as los
+from pedestal_common.geometry import line_of_sight as los
 
 RNG = np.random.default_rng(7)
 BEAMS = [(0.0, 0.0), (0.4, 0.7), (-2.9, 1.4), (3.1, -0.1)]

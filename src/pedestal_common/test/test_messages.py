@@ -1,7 +1,7 @@
 """Messages: zero padding, round trip, clear errors."""
 import pytest
 
-from pedestal_common import messages
+from pedestal_common.wire import messages
 
 
 def test_padding_is_zero_whatever_came_before():

@@ -10,7 +10,8 @@ from rclpy.qos import (  # noqa: E402
     qos_check_compatible,
 )
 
-from pedestal_common import middleware, topics  # noqa: E402
+from pedestal_common.graph import topics
+from pedestal_common.node import middleware  # noqa: E402
 
 ROLES = ('written', 'read', 'recorded')
 

@@ -3,7 +3,8 @@ import importlib
 
 import pytest
 
-from pedestal_common import nodes, topics, unit
+from pedestal_common.graph import nodes, topics
+from pedestal_common.node import unit
 
 SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'ins/error',
           'diagnostics', *(f'{node}/{name}' for node in ('ship_motion', 'ins') for name in ('inject', 'injected'))}

@@ -5,7 +5,7 @@ import pathlib
 import pytest
 import yaml
 
-from pedestal_common import files, plain_yaml
+from pedestal_common.text_files import files, plain_yaml
 
 
 @pytest.mark.parametrize('text, value', [

@@ -5,7 +5,8 @@ import operator
 import numpy as np
 import pytest
 
-from pedestal_common import layouts, messages, records, topics
+from pedestal_common.graph import layouts, topics
+from pedestal_common.wire import messages, records
 
 STAMPED = [topic.name for topic in topics.TOPICS if topic.rate == 'step']
 STAMP = 3_000_000_007

@@ -1,7 +1,7 @@
 """Step matching: what a node waits for, in which order it answers, what it refuses."""
 import pytest
 
-from pedestal_common.steps import GraphError, Steps
+from pedestal_common.graph.steps import GraphError, Steps
 
 MS = 1_000_000
 

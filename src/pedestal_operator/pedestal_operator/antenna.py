@@ -2,7 +2,7 @@
 import abc
 import math
 
-from pedestal_common import nodes
+from pedestal_common.graph import nodes
 
 
 class Antenna(abc.ABC):

@@ -15,9 +15,9 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from pedestal_common import topics
+from pedestal_common.graph import topics
 from pedestal_operator import state
-from pedestal_operator.controller import JOG_AGAIN
+from pedestal_operator.rotator.controller import JOG_AGAIN
 
 HELD = 0.35
 """Time [s] after the last press of a key for which it counts as held; keyboards repeat about 30 times a second after a

@@ -6,9 +6,11 @@ import sys
 
 from rclpy.qos import QoSProfile
 
-from pedestal_common import messages, middleware, parameters, shell
-from pedestal_operator import frames
-from pedestal_operator.frame_source import FrameSource
+from pedestal_common import parameters
+from pedestal_common.node import middleware, shell
+from pedestal_common.wire import messages
+from pedestal_operator.viewers import frames
+from pedestal_operator.viewers.frame_source import FrameSource
 
 PERIOD = 1.0 / 30.0
 """Time [s] between two messages on tf."""

@@ -6,10 +6,13 @@ import dataclasses
 import queue
 import sys
 
-from pedestal_common import messages, parameters, shell, topics
-from pedestal_operator import frames
-from pedestal_operator.frame_source import FrameSource
-from pedestal_operator.on_demand import OnDemand
+from pedestal_common import parameters
+from pedestal_common.graph import topics
+from pedestal_common.node import shell
+from pedestal_common.wire import messages
+from pedestal_operator.viewers import frames
+from pedestal_operator.viewers.frame_source import FrameSource
+from pedestal_operator.viewers.on_demand import OnDemand
 
 LOOK = 0.05
 """Time [s] between two looks at who watches what."""

@@ -11,12 +11,14 @@ import time
 
 from rcl_interfaces.srv import GetParameters
 
-from pedestal_common import commands, parameters, shell
-from pedestal_operator import page_security, page_sky, page_state
-from pedestal_operator.page_asks import Asks
-from pedestal_operator.page_log import Log
-from pedestal_operator.page_passes import Coming
-from pedestal_operator.page_server import PageServer
+from pedestal_common import parameters
+from pedestal_common.node import shell
+from pedestal_common.wire import commands
+from pedestal_operator.page import page_security, page_sky, page_state
+from pedestal_operator.page.page_asks import Asks
+from pedestal_operator.page.page_log import Log
+from pedestal_operator.page.page_passes import Coming
+from pedestal_operator.page.page_server import PageServer
 from pedestal_operator.remote_node import Remote
 
 FRAME, LOOK, SLOW = 0.05, 0.01, 1.0

@@ -7,10 +7,13 @@ import time
 
 from rcl_interfaces.srv import GetParameters
 
-from pedestal_common import commands, messages, middleware, nodes, parameters, records
-from pedestal_common.commands import Reply
-from pedestal_common.shell import Shell
-from pedestal_common.steps import GraphError
+from pedestal_common import parameters
+from pedestal_common.graph import nodes
+from pedestal_common.graph.steps import GraphError
+from pedestal_common.node import middleware
+from pedestal_common.node.shell import Shell
+from pedestal_common.wire import commands, messages, records
+from pedestal_common.wire.commands import Reply
 from pedestal_operator.antenna import Antenna
 from pedestal_operator.requests import Requests
 

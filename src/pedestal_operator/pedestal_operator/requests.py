@@ -1,7 +1,7 @@
 """What was asked of a node, and the replies. No ROS here."""
 import itertools
 
-from pedestal_common.commands import Command
+from pedestal_common.wire.commands import Command
 
 MOST = 1000
 """Requests that are remembered, the latest: not everybody waits for a reply."""

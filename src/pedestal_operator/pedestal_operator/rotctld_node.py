@@ -5,11 +5,12 @@ import pedestal_common.entry  # noqa: F401
 import dataclasses
 import sys
 
-from pedestal_common import parameters, shell
-from pedestal_operator import controller, rotctld
-from pedestal_operator.line_server import Client
-from pedestal_operator.rotctld import BUSY, INVALID, OK, REJECTED, TIMEOUT
-from pedestal_operator.server_node import ServerNode, ServerParameters, tcp_port
+from pedestal_common import parameters
+from pedestal_common.node import shell
+from pedestal_operator.rotator import controller, rotctld
+from pedestal_operator.rotator.line_server import Client
+from pedestal_operator.rotator.rotctld import BUSY, INVALID, OK, REJECTED, TIMEOUT
+from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
 RESULTS = {controller.DONE: OK, controller.REFUSED: REJECTED, controller.OUT_OF_REACH: INVALID,
            controller.BUSY: BUSY, controller.SILENT: TIMEOUT}

@@ -2,8 +2,8 @@
 import math
 import typing
 
-from pedestal_common import topics
-from pedestal_common.unit import OK
+from pedestal_common.graph import topics
+from pedestal_common.node.unit import OK
 
 
 class Row(typing.NamedTuple):

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from pedestal_operator.course import HOLD, NEXT, Course
+from pedestal_operator.rotator.course import HOLD, NEXT, Course
 
 
 def commanded(times, set_points, t):

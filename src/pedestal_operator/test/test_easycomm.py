@@ -1,8 +1,8 @@
 """EasyComm: what the lines of Hamlib's clients ask for, how they are answered."""
 import pytest
 
-from pedestal_operator import easycomm
-from pedestal_operator.easycomm import Asked, read, told
+from pedestal_operator.rotator import easycomm
+from pedestal_operator.rotator.easycomm import Asked, read, told
 
 
 @pytest.mark.parametrize(('line', 'asked'), (

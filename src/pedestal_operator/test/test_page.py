@@ -5,11 +5,12 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 
-from pedestal_common import line_of_sight, messages
-from pedestal_common.commands import Command, Reply
-from pedestal_operator import page_log, page_passes, page_security, page_sky, page_state
-from pedestal_operator.page_asks import BEHIND, PATIENCE, SILENT, Asks
-from pedestal_operator.page_security import Access, Refused, Request
+from pedestal_common.geometry import line_of_sight
+from pedestal_common.wire import messages
+from pedestal_common.wire.commands import Command, Reply
+from pedestal_operator.page import page_log, page_passes, page_security, page_sky, page_state
+from pedestal_operator.page.page_asks import BEHIND, PATIENCE, SILENT, Asks
+from pedestal_operator.page.page_security import Access, Refused, Request
 from pedestal_operator.requests import Requests
 
 GOOD = Request('127.0.0.1:8080', '', '', '', '/', False)

@@ -1,5 +1,5 @@
 """Which reply belongs to which request."""
-from pedestal_common.commands import Command, Reply
+from pedestal_common.wire.commands import Command, Reply
 from pedestal_operator.requests import MOST, Requests
 
 GRANTED = Reply(True, 'mode is stop')

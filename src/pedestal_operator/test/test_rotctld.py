@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from pedestal_operator import rotctld
-from pedestal_operator.line_server import Lines
-from pedestal_operator.rotctld import INVALID, NOT_AVAILABLE, NOT_IMPLEMENTED, OK, Limits, answer, read
+from pedestal_operator.rotator import rotctld
+from pedestal_operator.rotator.line_server import Lines
+from pedestal_operator.rotator.rotctld import INVALID, NOT_AVAILABLE, NOT_IMPLEMENTED, OK, Limits, answer, read
 
 
 @pytest.mark.parametrize(('line', 'name', 'values', 'separator'), (

@@ -10,8 +10,11 @@ import yaml
 from ikpy.chain import Chain
 from scipy.spatial.transform import Rotation
 
-from pedestal_common import cdr, line_of_sight, messages, topics
-from pedestal_operator import frames, live_node
+from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph import topics
+from pedestal_common.wire import cdr, messages
+from pedestal_operator import live_node
+from pedestal_operator.viewers import frames
 
 LAYOUTS = ('commissioning.json', 'tracking.json')
 FRAMES = {'earth', 'base_link', *(joint.child for joint in frames.JOINTS)}

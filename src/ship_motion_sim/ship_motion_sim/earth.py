@@ -2,7 +2,7 @@
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geodesy import EARTH_FLATTENING, EARTH_RATE
+from pedestal_common.geometry.geodesy import EARTH_FLATTENING, EARTH_RATE
 
 RATE = round(EARTH_RATE, 11)    # [rad/s], to the digits that WGS-84 prints
 GRAVITY_EQUATOR = 9.7803253359  # [m/s2]

@@ -11,9 +11,10 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import to_deck
-from ship_motion_sim import earth, motion
+from pedestal_common.geometry.line_of_sight import to_deck
+from ship_motion_sim import earth
 from ship_motion_sim.params import ShipMotionParameters
+from ship_motion_sim.sea import motion
 
 NORMALS = 6     # standard normals a step takes: three gyros, three accelerometers
 STATUS = ('ok', 'step is not positive', 'truth is not valid')

@@ -2,11 +2,11 @@
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import quaternion
+from pedestal_common.geometry.quaternion import product
+from pedestal_common.graph.steps import SECOND
 from pedestal_common.injection import schedule, spoil, table
-from pedestal_common.line_of_sight import quaternion
-from pedestal_common.quaternion import product
-from pedestal_common.records import NEVER
-from pedestal_common.steps import SECOND
+from pedestal_common.wire.records import NEVER
 
 IMU_MESSAGES, INS_MESSAGES = spoil.codes('ship_motion'), spoil.codes('ins')
 IMU_BIAS = table.code('ship_motion', 'bias')

@@ -7,13 +7,14 @@ import typing
 
 import numpy as np
 
-from pedestal_common import nodes, noise
 from pedestal_common.compiled import compiled
+from pedestal_common.graph import nodes, noise
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
-from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, joined
-from ship_motion_sim import aligning_ins, injected, ins, navigator
+from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis, joined
+from pedestal_common.wire.records import NEVER
+from ship_motion_sim import injected
+from ship_motion_sim.navigation import aligning_ins, ins, navigator
 
 RAW, DATA, STATE, CHANGES = 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'ins/error'
 

@@ -5,7 +5,7 @@ positive pitch has the bow down, so it changes its sign.
 """
 import math
 
-from pedestal_common.steps import DAY
+from pedestal_common.graph.steps import DAY
 
 
 def sentence(body):

@@ -5,9 +5,9 @@ import pedestal_common.entry  # noqa: F401
 import socket
 import sys
 
-from pedestal_common import shell, unit_node
+from pedestal_common.node import shell, unit_node
+from pedestal_common.node.unit import OK, WARN
 from pedestal_common.parameters import ParameterError
-from pedestal_common.unit import OK, WARN
 from ship_motion_sim import nmea
 
 

@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import cross, rotation, to_earth
-from pedestal_common.quaternion import product
+from pedestal_common.geometry.line_of_sight import cross, rotation, to_earth
+from pedestal_common.geometry.quaternion import product
 
 STATE = np.dtype([
     ('quaternion', 'f8', (4,)),         # x, y, z, w, deck -> n'

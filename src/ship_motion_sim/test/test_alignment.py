@@ -6,8 +6,8 @@ import pytest
 from scipy import integrate, linalg
 from scipy.spatial.transform import Rotation
 
-from pedestal_common.quaternion import product
-from ship_motion_sim import navigator, strapdown
+from pedestal_common.geometry.quaternion import product
+from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import (
     adrc_scheduled,
     classical,
@@ -19,6 +19,7 @@ from ship_motion_sim.alignment import (
     steady_state,
 )
 from ship_motion_sim.alignment.conditions import conditions
+from ship_motion_sim.navigation import navigator
 from ship_motion_sim.params import AlignmentParameters
 
 H, LATITUDE = 0.02, math.radians(34.0)

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pedestal_common import records
 from pedestal_common.parameters import build
+from pedestal_common.wire import records
 from ship_motion_sim import ins_unit, ship_unit
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pedestal_common import parameters, records
-from ship_motion_sim import ins, navigator
+from pedestal_common import parameters
+from pedestal_common.wire import records
 from ship_motion_sim.ins_unit import DATA, RAW, STATE, Ins
+from ship_motion_sim.navigation import ins, navigator
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
 from ship_motion_sim.ship_unit import TRUTH, ShipMotion
 

@@ -3,8 +3,8 @@ import itertools
 import pytest
 
 from pedestal_common import parameters
-from ship_motion_sim import navigator
 from ship_motion_sim.ins_unit import Ins
+from ship_motion_sim.navigation import navigator
 from ship_motion_sim.params import METHODS, AdrcParameters, AlignmentParameters, InsParameters, ShipMotionParameters
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import integrate, signal
 
-from pedestal_common import csv_table
 from pedestal_common.parameters import ParameterError
-from ship_motion_sim import waves
+from pedestal_common.text_files import csv_table
 from ship_motion_sim.params import HullParameters, ShipParameters
+from ship_motion_sim.sea import waves
 
 G = 9.81
 HULL = HullParameters()

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from pedestal_common.line_of_sight import ashore_matrix
+from pedestal_common.geometry.line_of_sight import ashore_matrix
 from pedestal_common.parameters import build
 from tracking_receiver_sim import receiver, target
 from tracking_receiver_sim.params import TrackingReceiverParameters

@@ -9,7 +9,7 @@ from sgp4 import omm
 from sgp4.api import WGS72, Satrec
 from sgp4.exporter import export_omm
 
-from pedestal_common import orbit
+from pedestal_common.geometry import orbit
 from tracking_receiver_sim import elements
 from tracking_receiver_sim.params import LeoPassParameters
 

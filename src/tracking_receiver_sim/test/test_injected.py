@@ -4,9 +4,9 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_common import records
-from pedestal_common.commands import Command
 from pedestal_common.parameters import build
+from pedestal_common.wire import records
+from pedestal_common.wire.commands import Command
 from tracking_receiver_sim import unit
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from skyfield.api import EarthSatellite, load, wgs84
 
-from pedestal_common import orbit, passes
-from pedestal_common.geodesy import StationParameters
+from pedestal_common.geometry import orbit, passes
+from pedestal_common.geometry.geodesy import StationParameters
 from tracking_receiver_sim import elements
 from tracking_receiver_sim.params import LeoPassParameters
 

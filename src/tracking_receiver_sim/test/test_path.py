@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_common import geodesy, orbit
-from pedestal_common.line_of_sight import earth_direction
+from pedestal_common.geometry import geodesy, orbit
+from pedestal_common.geometry.line_of_sight import earth_direction
 from pedestal_common.parameters import build
 from tracking_receiver_sim import monopulse, target
 from tracking_receiver_sim.params import TargetParameters

@@ -8,8 +8,9 @@ from scipy.interpolate import CubicHermiteSpline
 from sgp4.io import compute_checksum
 from skyfield.api import EarthSatellite, load, wgs84
 
-from pedestal_common import csv_table, orbit
+from pedestal_common.geometry import orbit
 from pedestal_common.parameters import build
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim import target
 from tracking_receiver_sim.params import LeoPassParameters, TargetParameters
 

@@ -7,11 +7,13 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from skyfield.api import wgs84
 
-from pedestal_common import csv_table, geodesy
-from pedestal_common.geodesy import StationParameters
+from pedestal_common.geometry import geodesy
+from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.text_files import csv_table
+from tracking_receiver_sim import track_files
 from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
-from tracking_receiver_sim.track import files, flight, place
 from tracking_receiver_sim.track import fixes as logs
+from tracking_receiver_sim.track import flight, place
 
 STATION = StationParameters()
 DEGREE = math.radians(1.0) * geodesy.EARTH_RADIUS
@@ -215,13 +217,13 @@ def test_what_is_open_follows_from_the_file(tmp_path):
         fixes.time, fixes.latitude, fixes.longitude, fixes.altitude))
     path.write_text('time_s,latitude_deg,longitude_deg,altitude_m\n' + '\n'.join(rows))
     target = TargetParameters(kind='track_file', track_file=TrackFileParameters(path=str(path), start=9.5))
-    found = files.left_open(target, set())
-    assert tuple(found) == files.OPEN and found['duration'] == 109.4
+    found = track_files.left_open(target, set())
+    assert tuple(found) == track_files.OPEN and found['duration'] == 109.4
     station = StationParameters(*(found[name] for name in place.STATION))
-    assert station == place.beside(files.read(target.track_file)[1], target.track_file)
+    assert station == place.beside(track_files.read(target.track_file)[1], target.track_file)
     there = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height).itrs_xyz.m
     flown = wgs84.latlon(fixes.latitude, fixes.longitude, fixes.altitude).itrs_xyz.m.T - there
     assert 0.0 <= found['receiver.reference_range'] - np.linalg.norm(flown, axis=1).max() < 10.0
-    given = files.left_open(target, {'target.station.latitude_deg', 'target.station.longitude_deg'})
+    given = track_files.left_open(target, {'target.station.latitude_deg', 'target.station.longitude_deg'})
     assert given['target.station.latitude_deg'] == 47.4 and given['target.station.longitude_deg'] == 8.5
     assert given['target.station.height'] == station.height

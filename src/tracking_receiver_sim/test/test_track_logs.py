@@ -3,9 +3,10 @@ import numpy as np
 import pynmea2
 import pytest
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
+from tracking_receiver_sim import track_files
 from tracking_receiver_sim.params import TrackFileParameters
-from tracking_receiver_sim.track import files, fixes, instant
+from tracking_receiver_sim.track import fixes, instant
 
 N = 8
 BEGIN = 1532340000
@@ -75,7 +76,7 @@ LOGS = {'own': own, 'traffic': traffic, 'opensky': opensky, 'gpx': gpx, 'nmea': 
 def read(tmp_path, content, **values):
     path = tmp_path / 'flight.log'
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return files.read(TrackFileParameters(path=str(path), **values))[1]
+    return track_files.read(TrackFileParameters(path=str(path), **values))[1]
 
 
 def refused(tmp_path, content, **values):

@@ -12,9 +12,9 @@ from sgp4 import omm
 from sgp4.api import Satrec
 from sgp4.exporter import export_tle
 
-from pedestal_common import csv_table
-from pedestal_common.orbit import TargetError
+from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.parameters import did_you_mean
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines
 
 BEGINNING = 4096

@@ -1,6 +1,6 @@
 """How fast the error of a beam on a moving deck changes: the true value of the receiver's rate channels."""
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import offset_rates, to_deck
+from pedestal_common.geometry.line_of_sight import offset_rates, to_deck
 
 
 @compiled

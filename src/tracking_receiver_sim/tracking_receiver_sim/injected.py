@@ -2,9 +2,9 @@
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.graph.steps import SECOND
 from pedestal_common.injection import schedule, spoil, table
-from pedestal_common.records import NEVER
-from pedestal_common.steps import SECOND
+from pedestal_common.wire.records import NEVER
 
 MESSAGES = spoil.codes('tracking_receiver')
 DELAY, BIAS, FADE, WRONG_SLOPE, PHASE_180, CLOCK_STEP = (

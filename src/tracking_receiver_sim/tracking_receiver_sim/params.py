@@ -2,11 +2,11 @@
 import dataclasses
 import math
 
-from pedestal_common.blockage import DOC as SECTORS_DOC
-from pedestal_common.blockage import sectors
-from pedestal_common.geodesy import StationParameters
+from pedestal_common.geometry.blockage import DOC as SECTORS_DOC
+from pedestal_common.geometry.blockage import sectors
+from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.geometry.lever_arm import LeverArm
 from pedestal_common.injection import table
-from pedestal_common.lever_arm import LeverArm
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 from tracking_receiver_sim.path.params import PathParameters, PolarisationParameters
 from tracking_receiver_sim.smoothing import SMOOTHINGS, WINDOW

@@ -16,9 +16,9 @@ from collections import namedtuple
 
 import numpy as np
 
-from pedestal_common import blockage
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
+from pedestal_common.geometry import blockage
+from pedestal_common.geometry.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
 from tracking_receiver_sim import smoothing, target
 from tracking_receiver_sim.error_rate import error_rate

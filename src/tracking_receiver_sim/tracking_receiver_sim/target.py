@@ -22,11 +22,11 @@ from collections import namedtuple
 
 import numpy as np
 
-from pedestal_common import orbit
 from pedestal_common.compiled import compiled
-from pedestal_common.interval import interval
-from pedestal_common.line_of_sight import earth_angles, earth_direction
-from pedestal_common.orbit import TargetError
+from pedestal_common.geometry import orbit
+from pedestal_common.geometry.interval import interval
+from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction
+from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.parameters import record, record_type
 from tracking_receiver_sim.params import KINDS, RAMP, SINE, STEP, AngleParameters
 
@@ -230,6 +230,6 @@ def _hermite(x, y, y_dot):
 # track_file
 
 def _track_file(params, duration):
-    from tracking_receiver_sim.track import files  # with scipy, which only a flight needs
-    laid = files.lay_out(params, duration, MARGIN)
+    from tracking_receiver_sim import track_files  # with scipy, which only a flight needs
+    laid = track_files.lay_out(params, duration, MARGIN)
     return laid.breaks, laid.coefficients, laid.start_time, laid.summary

@@ -4,7 +4,7 @@ import pedestal_common.entry  # noqa: F401
 # isort: split
 import sys
 
-from pedestal_common import unit_node
+from pedestal_common.node import unit_node
 
 
 def main(args=None):

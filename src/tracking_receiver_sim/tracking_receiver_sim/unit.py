@@ -5,12 +5,13 @@ import typing
 
 import numpy as np
 
-from pedestal_common import line_of_sight, nodes, noise
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph import nodes, noise
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
-from pedestal_common.records import NEVER
-from pedestal_common.unit import ERROR, OK, WARN, Diagnosis, joined
+from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis, joined
+from pedestal_common.wire.records import NEVER
 from tracking_receiver_sim import injected, receiver, target
 
 BEAM, SHIP, ERRORS, TARGET = 'adu/truth', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'

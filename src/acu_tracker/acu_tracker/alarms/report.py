@@ -1,7 +1,7 @@
 """The list of alarms as a message: diagnostic_msgs/DiagnosticArray on acu/alarms."""
 from acu_tracker.alarms import annunciator, machine, table
-from pedestal_common import messages
-from pedestal_common.unit import ERROR, OK, WARN
+from pedestal_common.node.unit import ERROR, OK, WARN
+from pedestal_common.wire import messages
 
 MOST = 10
 """Alarms that are annunciated at once at the most: those of the highest priority, the first of them first."""

@@ -1,7 +1,7 @@
 """The alarms of the control unit: one row each, every cause before its consequences."""
 import typing
 
-from pedestal_common.topics import AXES
+from pedestal_common.graph.topics import AXES
 
 PRIORITIES = ('critical', 'high', 'medium', 'low')
 

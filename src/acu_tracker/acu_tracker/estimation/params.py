@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from acu_tracker.estimation.kinds import KINDS, named_models
+from acu_tracker.estimation.filters.kinds import KINDS, named_models
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 _DEG = math.pi / 180.0

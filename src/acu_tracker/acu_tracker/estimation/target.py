@@ -8,8 +8,9 @@ from collections import namedtuple
 
 import numpy as np
 
-from acu_tracker.estimation import target_filter, tracker
-from acu_tracker.estimation.measurement import (
+from acu_tracker.estimation import tracker
+from acu_tracker.estimation.filters import target_filter
+from acu_tracker.estimation.filters.measurement import (
     NO_INNOVATION,
     AxisMeasurement,
     AxisVariances,
@@ -22,8 +23,8 @@ from acu_tracker.geometry import attitude, attitude_error, deck_reference, estim
 from acu_tracker.geometry.deck_reference import STILL, Attitude
 from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Vector, rotated
-from pedestal_common import line_of_sight as pointing
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight as pointing
 
 TARGET = np.dtype([('tracker', tracker.TRACKER), ('frame', estimate_frame.FRAME),
                    ('lever_arm', lever_arm.LEVER_ARM)], align=True)

@@ -6,13 +6,9 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation import roughness, target_filter
-from acu_tracker.estimation.measurement import (
-    NO_INNOVATION,
-    Measurement,
-    with_azimuth_near,
-    with_rate,
-)
+from acu_tracker.estimation import roughness
+from acu_tracker.estimation.filters import target_filter
+from acu_tracker.estimation.filters.measurement import NO_INNOVATION, Measurement, with_azimuth_near, with_rate
 from pedestal_common.compiled import compiled
 
 CONSTANTS = np.dtype([('filter', target_filter.CONSTANTS), ('gates', 'f8', (2,))], align=True)

@@ -5,11 +5,11 @@ import numpy as np
 
 from acu_tracker.geometry import attitude_error, attitude_jump
 from acu_tracker.geometry.deck_reference import Attitude
+from acu_tracker.geometry.history import bracket, history_type, push
 from acu_tracker.geometry.vector import vector
-from acu_tracker.history import bracket, history_type, push
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import ASHORE, rotation
-from pedestal_common.quaternion import product
+from pedestal_common.geometry.line_of_sight import ASHORE, rotation
+from pedestal_common.geometry.quaternion import product
 
 ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('told', 'f8', (7,)),
                      ('aligned', 'i8'), ('jump', attitude_jump.JUMP),

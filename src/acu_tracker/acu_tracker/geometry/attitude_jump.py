@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quaternion import product
+from pedestal_common.geometry.quaternion import product
 
 JUMP = np.dtype([('c', 'f8', (4,)), ('apart', 'i8')], align=True)
 """c: quaternion (x, y, z, w) earth -> earth; apart: 1 while it is not that of no rotation."""

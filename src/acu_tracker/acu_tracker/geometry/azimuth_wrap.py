@@ -4,7 +4,7 @@ import math
 from collections import namedtuple
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import wrap
+from pedestal_common.geometry.line_of_sight import wrap
 
 Travel = namedtuple('Travel', 'below above')
 """Future travel of a target's azimuth below (<= 0) and above (>= 0) its present value [rad]."""

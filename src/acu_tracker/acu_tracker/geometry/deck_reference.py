@@ -7,8 +7,8 @@ from collections import namedtuple
 
 from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles
 from acu_tracker.geometry.vector import Vector, cross, minus, rotated, rotated_back, times
-from pedestal_common import line_of_sight
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight
 
 STILL = Vector(0.0, 0.0, 0.0)
 

@@ -2,7 +2,7 @@
 import math
 from collections import namedtuple
 
-from acu_tracker.history import bracket, history_type, interpolated, push
+from acu_tracker.geometry.history import bracket, history_type, interpolated, push
 from pedestal_common.compiled import compiled
 
 ENCODERS = history_type(4)

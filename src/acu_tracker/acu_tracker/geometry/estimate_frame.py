@@ -11,7 +11,7 @@ from acu_tracker.geometry.deck_reference import Attitude
 from acu_tracker.geometry.motion import LineOfSight, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Vector, cross, dot, rotated, rotated_back
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import earth_direction
+from pedestal_common.geometry.line_of_sight import earth_direction
 
 RAISE, LOWER = math.radians(75.0), math.radians(70.0)
 """Elevation in the earth's frame [rad] above which the frame is tilted, below which it is not any more."""

@@ -9,7 +9,7 @@ import numpy as np
 from acu_tracker.geometry.motion import AxisMotion, Motion, normalised
 from acu_tracker.geometry.vector import Vector, minus, rotated, vector
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import earth_angles, earth_direction, wrap
+from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction, wrap
 
 LEVER_ARM = np.dtype([('arm', 'f8', (3,)), ('range', 'f8')], align=True)
 """arm: r over the range of the INS, FLU [-]; range: that range [m], 0 where none was measured."""

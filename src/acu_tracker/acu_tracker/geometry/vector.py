@@ -1,8 +1,8 @@
 """Vectors of three components, and their products."""
 from collections import namedtuple
 
-from pedestal_common import line_of_sight
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight
 
 Vector = namedtuple('Vector', 'x y z')
 """Components along the axes of a frame, which the docstring of the caller names."""

@@ -11,7 +11,7 @@ import numpy as np
 from acu_tracker.lookahead import path as paths
 from acu_tracker.lookahead import slew as slews
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import wrap
+from pedestal_common.geometry.line_of_sight import wrap
 
 LIMITS = np.dtype([('rate', 'f8'), ('acceleration', 'f8'), ('low', 'f8'), ('high', 'f8'), ('highest', 'f8'),
                    ('half_beam', 'f8')], align=True)

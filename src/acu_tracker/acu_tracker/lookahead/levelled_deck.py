@@ -4,7 +4,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import ASHORE
+from pedestal_common.geometry.line_of_sight import ASHORE
 
 LEVELLED_DECK = np.dtype([('mean', 'f8', (4,)), ('spread', 'f8'), ('since', 'f8'), ('latest', 'f8')], align=True)
 """mean: quaternion (x, y, z, w) levelled deck -> earth; spread: mean square of the deck's tilt from it [rad2];

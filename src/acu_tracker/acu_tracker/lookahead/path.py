@@ -7,7 +7,7 @@ from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back
 from acu_tracker.program import bridge as program_bridge
 from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import wrap
+from pedestal_common.geometry.line_of_sight import wrap
 
 ROWS, COLUMNS = 1025, 6
 

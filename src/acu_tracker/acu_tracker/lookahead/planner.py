@@ -13,9 +13,9 @@ from acu_tracker.lookahead import keyhole, levelled_deck
 from acu_tracker.lookahead import path as paths
 from acu_tracker.lookahead import slew as slews
 from acu_tracker.program import program_track
-from pedestal_common import blockage
 from pedestal_common.compiled import assign, compiled
-from pedestal_common.line_of_sight import angles, rotation
+from pedestal_common.geometry import blockage
+from pedestal_common.geometry.line_of_sight import angles, rotation
 
 INTERVAL = 1.0
 """Time between two look-aheads [s]."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, line_of_sight, north_west_up
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import wrap
+from pedestal_common.geometry.line_of_sight import wrap
 
 SLEW = np.dtype([('t1', 'f8'), ('t2', 'f8'), ('azimuth1', 'f8'), ('azimuth2', 'f8'), ('rate1', 'f8'),
                  ('rate2', 'f8'), ('peak', 'f8'), ('acceleration', 'f8'),

@@ -9,8 +9,8 @@ from acu_tracker.geometry.motion import AxisMotion, Motion, angles, normalised, 
 from acu_tracker.geometry.vector import Vector
 from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
 from pedestal_common.compiled import compiled
-from pedestal_common.interval import interval
-from pedestal_common.line_of_sight import earth_direction, wrap
+from pedestal_common.geometry.interval import interval
+from pedestal_common.geometry.line_of_sight import earth_direction, wrap
 
 MAX_ROWS = 100_000
 STEEP = math.radians(80.0)

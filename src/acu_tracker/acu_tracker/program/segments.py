@@ -4,7 +4,7 @@ import math
 import numpy as np
 
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, ProgramTrackError, checked
-from pedestal_common.topics import AXES
+from pedestal_common.graph.topics import AXES
 
 GAP = 3.0
 """A segment goes on with the one before where its first row is at most so many of their intervals, the shorter one,

@@ -12,8 +12,8 @@ import numpy as np
 from acu_tracker.geometry.great_circle import turned
 from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, earth_angles
 from acu_tracker.geometry.vector import Vector, dot, times, vector
-from pedestal_common import line_of_sight
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight
 
 PLACE = np.dtype([('u', 'f8', (3,)), ('du', 'f8', (3,)), ('stamp', 'f8')], align=True)
 """ENU unit vector u [-] of the target at a stamp [s], and its rate du [1/s]."""

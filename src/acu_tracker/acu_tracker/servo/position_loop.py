@@ -10,7 +10,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from acu_tracker.estimation import constant_gain
+from acu_tracker.estimation.filters import constant_gain
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import adrc, beam_loop, ends, feedforward, notch, pid, reference
 from pedestal_common.compiled import compiled

@@ -6,8 +6,8 @@ controller begins there.
 """
 import numpy as np
 
+from acu_tracker.geometry.history import LENGTH, bracket, history_type, interpolated, push
 from acu_tracker.geometry.motion import AxisMotion
-from acu_tracker.history import LENGTH, bracket, history_type, interpolated, push
 from acu_tracker.servo import shaper
 from pedestal_common.compiled import compiled
 

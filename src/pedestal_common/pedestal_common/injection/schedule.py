@@ -11,9 +11,9 @@ force break it again: no fault has to remember what it found.
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.graph.steps import SECOND
 from pedestal_common.injection import table
-from pedestal_common.records import NEVER
-from pedestal_common.steps import SECOND
+from pedestal_common.wire.records import NEVER
 
 SLOTS = 16
 """Faults that can be in force in a node at a time."""

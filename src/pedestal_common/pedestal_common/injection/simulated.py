@@ -1,9 +1,9 @@
 """A unit of simulated equipment: faults can be injected into it."""
-from pedestal_common.commands import Reply
+from pedestal_common.graph.steps import SECOND
 from pedestal_common.injection import schedule, table
-from pedestal_common.records import NEVER
-from pedestal_common.steps import SECOND
-from pedestal_common.unit import Unit
+from pedestal_common.node.unit import Unit
+from pedestal_common.wire.commands import Reply
+from pedestal_common.wire.records import NEVER
 
 
 class Simulated(Unit):

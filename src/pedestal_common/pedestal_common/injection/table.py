@@ -5,8 +5,8 @@ A fault is a verb that a simulated node obeys on its topic `NODE/inject` and in 
 """
 import typing
 
-from pedestal_common.commands import Argument, Verb, schedule
 from pedestal_common.parameters import ParameterError
+from pedestal_common.wire.commands import Argument, Verb, schedule
 
 
 class Fault(typing.NamedTuple):

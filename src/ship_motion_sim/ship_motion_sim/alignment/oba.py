@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quaternion import product
+from pedestal_common.geometry.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import extended_observer, riccati_eso
 

@@ -9,8 +9,9 @@ import math
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from pedestal_common import csv_table, parameters
+from pedestal_common import parameters
 from pedestal_common.reproducible import arctan2, cos, sin
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import horizon
 from tracking_receiver_sim.track import instant
 from tracking_receiver_sim.track.flight import Flight

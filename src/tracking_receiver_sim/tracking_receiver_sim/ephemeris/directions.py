@@ -12,7 +12,7 @@ import typing
 
 import numpy as np
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines, states
 from tracking_receiver_sim.track import instant
 

@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 
-from pedestal_common.geodesy import EARTH_RATE
+from pedestal_common.geometry.geodesy import EARTH_RATE
 
 FIXED = re.compile(r'ITRF(?:-?\d{2}|-?\d{4})?|WGS84')
 INERTIAL = ('EME2000', 'GCRF', 'ICRF', 'TEME', 'TOD')

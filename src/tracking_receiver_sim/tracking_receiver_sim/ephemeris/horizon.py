@@ -2,9 +2,9 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from pedestal_common import csv_table
-from pedestal_common.geodesy import station_frame
+from pedestal_common.geometry.geodesy import station_frame
 from pedestal_common.reproducible import arctan2, turned
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import frames, interpolation, states
 from tracking_receiver_sim.track import instant
 

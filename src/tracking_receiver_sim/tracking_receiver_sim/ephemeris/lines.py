@@ -4,7 +4,7 @@ import datetime
 import functools
 import re
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 
 LONGEST = 1024
 """Characters of a line; the CCSDS books allow 254."""

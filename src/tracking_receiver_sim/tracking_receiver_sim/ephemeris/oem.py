@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import frames, lines, states
 
 ENTRY = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)

@@ -3,7 +3,7 @@ import typing
 
 import numpy as np
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 
 METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
 DEGREES = 1, 19

@@ -10,7 +10,7 @@ import re
 
 import numpy as np
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines, states
 
 BEGINNING = re.compile(rb'stk\.v\.\d+', re.IGNORECASE)

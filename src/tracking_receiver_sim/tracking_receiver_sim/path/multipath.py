@@ -14,7 +14,7 @@ from collections import namedtuple
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.line_of_sight import offsets, to_deck
+from pedestal_common.geometry.line_of_sight import offsets, to_deck
 
 MULTIPATH = np.dtype([('reflection', 'f8'), ('rough', 'f8'), ('phase', 'f8')], align=True)
 """rho; 2 pi sigma_h / lambda; 4 pi h / lambda."""

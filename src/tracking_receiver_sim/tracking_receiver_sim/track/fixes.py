@@ -6,7 +6,7 @@ import typing
 
 import numpy as np
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
 LISTED = 12

@@ -17,8 +17,9 @@ import typing
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
-from pedestal_common import csv_table, geodesy
+from pedestal_common.geometry import geodesy
 from pedestal_common.reproducible import turned
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
 SAMPLES = 4

@@ -6,7 +6,7 @@ ele + geoidheight where the point says so, otherwise ele is taken for it, and th
 """
 from xml.parsers import expat
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
 PIECE = 1 << 20

@@ -2,7 +2,7 @@
 import datetime
 import re
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 
 UNIX = (0.0, 4102444800.0)
 """Seconds since 1970 that an instant may have: until 2100."""

@@ -8,8 +8,8 @@ import re
 
 import pynmea2
 
-from pedestal_common import csv_table
-from pedestal_common.steps import DAY
+from pedestal_common.graph.steps import DAY
+from pedestal_common.text_files import csv_table
 
 SENTENCE = re.compile(r'\$..(?:GGA|RMC),.*', re.ASCII)
 LONGEST = 1024

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from pedestal_common import geodesy
-from pedestal_common.geodesy import StationParameters
+from pedestal_common.geometry import geodesy
+from pedestal_common.geometry.geodesy import StationParameters
 from tracking_receiver_sim.track import flight
 
 AZIMUTH_RATE = 0.05

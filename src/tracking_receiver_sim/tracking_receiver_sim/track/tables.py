@@ -9,7 +9,7 @@ and said. ADS-B logs have rows without a position: these are passed over and cou
 """
 import typing
 
-from pedestal_common import csv_table
+from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
 FOOT = 0.3048

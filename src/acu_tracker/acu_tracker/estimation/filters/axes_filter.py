@@ -1,0 +1,54 @@
+"""The target filter of angles: an `axis_filter` each for azimuth and elevation, f and c their records (2,)."""
+import math
+
+from acu_tracker.estimation.filters import axis_filter
+from acu_tracker.estimation.filters.measurement import Estimate, Innovation
+from acu_tracker.geometry.motion import Motion
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def start(f, c, m, rate_sigma):
+    """Begin at a Measurement, the rates unknown to rate_sigma [rad/s]."""
+    for i in range(2):
+        axis_filter.start(f[i], c[i], m.axis[i].angle, m.axis[i].variance, rate_sigma)
+
+
+@compiled
+def predict(f, c, T):
+    """Predict by T [s] >= 0 from the last measurement into the prior fields."""
+    for i in range(2):
+        axis_filter.predict(f[i], c[i], T)
+
+
+@compiled
+def innovation(f, c, m):
+    """Innovation of a Measurement against the prediction; its range is NaN, as these filters have none."""
+    return Innovation((axis_filter.innovation(f[0], c[0], m.axis[0]), axis_filter.innovation(f[1], c[1], m.axis[1])),
+                      math.nan, math.nan)
+
+
+@compiled
+def correct(f, c, m):
+    """Correct the prediction with a Measurement."""
+    for i in range(2):
+        axis_filter.correct(f[i], c[i], m.axis[i])
+
+
+@compiled
+def expected(f):
+    """Motion at the instant of the last `predict`."""
+    return Motion(axis_filter.expected_motion(f[0]), axis_filter.expected_motion(f[1]))
+
+
+@compiled
+def outlook(f, c, T):
+    """Motion T [s] >= 0 after the last measurement; the prior fields stay."""
+    return Motion(axis_filter.outlook(f[0], c[0], T), axis_filter.outlook(f[1], c[1], T))
+
+
+@compiled
+def read(f):
+    """Estimate at the instant of the last `predict`."""
+    azimuth, elevation = axis_filter.expected(f[0]), axis_filter.expected(f[1])
+    return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(azimuth), axis_filter.variances(elevation)))

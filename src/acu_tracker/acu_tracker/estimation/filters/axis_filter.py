@@ -1,0 +1,258 @@
+"""The target filter of one axis, of any of `kinds`: each is a bank of motion models, a single filter a bank of one.
+
+The state stays at the last measurement that was accepted; `predict` and `outlook` extrapolate from there.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.estimation.filters import constant_gain, imm, kalman, motion_models
+from acu_tracker.estimation.filters.kalman import Gaussian, Past, Symmetric
+from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
+from acu_tracker.estimation.filters.motion_models import MODELS
+from acu_tracker.geometry.motion import AxisMotion
+from pedestal_common.compiled import compiled
+
+BANK = len(MODELS)
+
+CONSTANTS = np.dtype([('count', 'i8'), ('bank', 'i8'), ('models', motion_models.MODEL, (BANK,)), ('states', 'i8'),
+                      ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'), ('rate_measurement', 'i8'),
+                      ('colour', 'f8')], align=True)
+"""count: models in use, the first of `models`; bank: a number that tells which; states: the most of any of them;
+alpha: 0 but for constant gains; colour: bandwidth of the noise of the angle [rad/s], 0 where it is white."""
+
+FILTER = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
+                   ('x', 'f8', (BANK, 3)), ('p', 'f8', (BANK, 6)), ('mu', 'f8', (BANK,)),
+                   ('x_prior', 'f8', (BANK, 3)), ('p_prior', 'f8', (BANK, 6)), ('mu_prior', 'f8', (BANK,)),
+                   ('y', 'f8'), ('follows', 'i8'), ('past', 'f8', (BANK, 5)), ('weights', 'f8', (BANK,)),
+                   ('walk', 'f8')], align=True)
+"""bank, count, states: of the constants that x, p, mu belong to: estimate, covariance (as in kalman.Symmetric) and
+probability of each model, after the last measurement.
+
+x_prior, p_prior, mu_prior: predicted by T [s] from there. `predict` sets them, `expected`, `innovation`, `correct` use
+them. y: the last measured angle [rad]; follows: 1 where the noise of the next one is correlated with its; past: the
+kalman.Past of each model, of the same prediction. weights: scratch. walk: variance per second
+[rad2/s] that the angle gains beside what every model says.
+"""
+
+ESTIMATE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
+                     ('covariance', 'f8'), ('rate_variance', 'f8'), ('innovation', 'f8'), ('rate_innovation', 'f8'),
+                     ('nis', 'f8'), ('mu', 'f8', (BANK,))], align=True)
+"""rad, rad/s, rad/s2; variances of angle and rate and their covariance; the innovation [rad], that of the rate
+[rad/s] and nu' S^-1 nu, NaN where nothing was measured; probability of each of MODELS, NaN if not in the bank."""
+
+
+def constants(params, noise_bandwidth=0.0) -> np.ndarray:
+    """Constants (1,) of FilterParameters; noise_bandwidth [Hz]: of the measured angle's noise, 0 where it is white."""
+    c, bank = np.zeros(1, CONSTANTS), KINDS[params.kind].bank(params)
+    c['count'] = len(bank.models)
+    c['models'][0, :len(bank.models)] = bank.models
+    c['bank'], c['states'] = np.sum(1 << bank.models['kind']), bank.models['states'].max()
+    c['dwell'], (c['alpha'], c['beta'], c['gamma']) = bank.dwell, bank.gains
+    c['rate_measurement'], c['colour'] = params.rate_measurement, 2.0 * math.pi * noise_bandwidth
+    return c
+
+
+@compiled
+def _put(x, p, j, g):
+    """Row j of x (n, 3), p (n, 6) := a Gaussian."""
+    x[j, 0], x[j, 1], x[j, 2] = g.x
+    P = g.P
+    p[j, 0], p[j, 1], p[j, 2], p[j, 3], p[j, 4], p[j, 5] = P.p11, P.p12, P.p13, P.p22, P.p23, P.p33
+
+
+@compiled
+def _fill(f, c, g):
+    """Give every model of the constants the same Gaussian and probability."""
+    f.bank, f.count, f.states = c.bank, c.count, c.states
+    for j in range(c.count):
+        f.mu[j] = 1.0 / c.count
+        _put(f.x, f.p, j, g)
+
+
+@compiled
+def _open_acceleration(f, c, rate_sigma):
+    """Set the variance of the acceleration to that at the start."""
+    for j in range(c.count):
+        f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
+
+
+@compiled
+def start(f, c, y, R, rate_sigma):
+    """Begin at a measured angle y [rad] of variance R, the rate unknown to rate_sigma [rad/s]."""
+    _fill(f, c, Gaussian(AxisMotion(y, 0.0, 0.0), Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
+    _open_acceleration(f, c, rate_sigma)
+    f.y, f.follows = y, 1
+
+
+@compiled
+def transfer(f, c, rate_sigma):
+    """Where the bank has changed, start its models from the combined estimate and covariance of the old bank.
+
+    An acceleration that the old bank did not estimate has the variance of a `start` with rate_sigma [rad/s].
+    """
+    if f.bank != c.bank:
+        unknown = f.states == 2
+        _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
+        if unknown:
+            _open_acceleration(f, c, rate_sigma)
+
+
+@compiled
+def move(f, c, motion):
+    """Shift the models so that together they estimate this AxisMotion, as far as they have an acceleration; their
+    covariances stay."""
+    x = outlook(f, c, 0.0)
+    f.follows = 0
+    for j in range(c.count):
+        f.x[j, 0] += motion.angle - x.angle
+        f.x[j, 1] += motion.rate - x.rate
+        if c.models[j].states > 2:
+            f.x[j, 2] += motion.acceleration - x.acceleration
+
+
+@compiled
+def predict(f, c, T):
+    """The bank T [s] >= 0 after its last measurement, into the prior fields; the state itself stays."""
+    f.T = T
+    stay, switch = imm.switching(T, c.dwell, c.count)
+    for j in range(c.count):
+        if switch == 0.0:
+            f.mu_prior[j], g = f.mu[j], imm.alone(f.x, f.p, j)
+        else:
+            f.mu_prior[j] = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
+            g = imm.combine(f.weights, f.x, f.p, c.count)
+        model = motion_models.discretised(c.models[j], g.x.acceleration, T)
+        _put(f.x_prior, f.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
+                                               kalman.predicted_covariance(g.P, model.F, model.Q, T)))
+        f.p_prior[j, 0] += f.walk * T
+        o, past = f.past[j], kalman.past(g, model.F, T)
+        o[0], o[1], o[2], o[3], o[4] = past
+
+
+@compiled
+def expected(f):
+    """Gaussian of the prediction: mean and covariance of the bank."""
+    return imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
+
+
+@compiled
+def expected_motion(f):
+    """The AxisMotion of `expected`."""
+    return imm.mean(f.mu_prior, f.x_prior, f.count)
+
+
+@compiled
+def variances(g):
+    """The AxisVariances of a Gaussian."""
+    return AxisVariances(g.P.p11, g.P.p12, g.P.p22)
+
+
+@compiled
+def _correlation(f, c):
+    """rho: correlation of the noise of a measurement now with that of the last one, of noise through a first-order
+    lag; 0 where it is white."""
+    return math.exp(-c.colour * f.T) if c.colour > 0.0 and f.follows else 0.0
+
+
+@compiled
+def innovation(f, c, m):
+    """AxisInnovation of an AxisMeasurement against the prediction, y_k - rho y_k-1 in the place of the angle."""
+    rho = _correlation(f, c)
+    x, P = expected(f)
+    u = U = p12 = 0.0
+    for j in range(c.count):
+        u += f.mu_prior[j] * (f.x_prior[j, 0] - rho * f.past[j, 0])
+    for j in range(c.count):
+        w, p, o = f.mu_prior[j], f.p_prior[j], f.past[j]
+        d1, d2 = f.x_prior[j, 0] - rho * o[0] - u, f.x_prior[j, 1] - x.rate
+        U += w * (p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + d1 * d1)
+        p12 += w * (p[1] - rho * o[3] + d1 * d2)
+    nu, nu_rate, S = m.angle - rho * f.y - u, m.rate - x.rate, U + (1.0 - rho * rho) * m.variance
+    # The rate given the angle.
+    more = nu_rate - p12 / S * nu
+    return AxisInnovation(nu, S, nu * nu / S, nu_rate, more * more / (P.p22 + m.rate_variance - p12 * p12 / S))
+
+
+@compiled
+def correct(f, c, m):
+    """Correct the prediction with an AxisMeasurement."""
+    rho = _correlation(f, c)
+    own = (1.0 - rho * rho) * m.variance
+    for j in range(c.count):
+        x, p, o = f.x_prior[j], f.p_prior[j], f.past[j]
+        g = Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
+        nu, S = m.angle - rho * f.y - (x[0] - rho * o[0]), p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + own
+        f.weights[j] = kalman.log_likelihood(nu, S)
+        # Constant gains, but for a start (or after a gap) that deserves more: a growing memory until alpha is reached.
+        if g.P.p11 < c.alpha * S:
+            g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
+        elif rho > 0.0:
+            g = kalman.update_correlated(g, Past(o[0], o[1], o[2], o[3], o[4]), rho, nu, S)
+        else:
+            g = kalman.update(g, nu, m.variance)
+        if not math.isnan(m.rate):
+            nu = m.rate - g.x.rate
+            f.weights[j] += kalman.log_likelihood(nu, g.P.p22 + m.rate_variance)
+            g = kalman.update_rate(g, nu, m.rate_variance)
+        _put(f.x, f.p, j, g)
+    imm.weigh(f.mu_prior, f.weights, c.count, f.mu)
+    f.y, f.follows = m.angle, 1
+
+
+@compiled
+def outlook(f, c, T):
+    """AxisMotion that `predict` expects T [s] >= 0 after the last measurement; the prior fields stay."""
+    angle = rate = acceleration = 0.0
+    stay, switch = imm.switching(T, c.dwell, c.count)
+    for j in range(c.count):
+        mu = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
+        x = kalman.predicted_mean(imm.mean(f.weights, f.x, c.count), motion_models.of_mean(c.models[j], T), T)
+        angle += mu * x.angle
+        rate += mu * x.rate
+        acceleration += mu * x.acceleration
+    return AxisMotion(angle, rate, acceleration)
+
+
+@compiled
+def probabilities(f, c, mu):
+    """mu (BANK,) = probability of each of MODELS, NaN where it is not in the bank."""
+    mu[:] = math.nan
+    for j in range(c.count):
+        mu[c.models[j].kind] = f.mu[j]
+
+
+@compiled
+def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
+    """The filter over arrays (n,): c (1,) of CONSTANTS; stamps [s], angles [rad], variances, rates [rad/s], variances.
+
+    out (n,) of ESTIMATE: row k after measurement k. It starts at the first angle; rows before are NaN. A NaN angle,
+    or one whose stamp does not advance, is not taken: its row is the outlook from the last one taken.
+    """
+    state = np.zeros(1, FILTER)
+    f, model = state[0], c[0]
+    f.mu[:] = last = math.nan
+    f.count = model.count
+    for k in range(len(t)):
+        o = out[k]
+        o.innovation = o.rate_innovation = o.nis = math.nan
+        T = t[k] - last
+        measured = math.isfinite(y[k])
+        if measured and math.isnan(last):
+            start(f, model, y[k], R[k], initial_rate)
+            last = t[k]
+        elif measured and T > 0.0:
+            m = AxisMeasurement(y[k], R[k], y_rate[k] if model.rate_measurement else math.nan, R_rate[k])
+            predict(f, model, T)
+            i = innovation(f, model, m)
+            o.innovation, o.rate_innovation, o.nis = i.nu, i.rate, i.chi_square
+            if not math.isnan(i.rate_chi_square):
+                o.nis += i.rate_chi_square
+            correct(f, model, m)
+            last = t[k]
+        predict(f, model, max(t[k] - last, 0.0))
+        g = expected(f)
+        o.angle, o.rate, o.acceleration = g.x
+        o.variance, o.covariance, o.rate_variance = variances(g)
+        probabilities(f, model, o.mu)

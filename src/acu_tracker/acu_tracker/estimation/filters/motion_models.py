@@ -1,0 +1,196 @@
+"""Motion models of a target: F and Q of one axis, X = (angle, rate, acceleration).
+
+Of cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. Another model is a row of TABLE, a law
+that `discretised` picks, its group in params.py, and its name in topics.MOTION_MODELS, a column of acu/filter.
+
+Corrected against the print of paper 000: q22 has 1/(2 alpha^3); sigma_a^2 goes with the square.
+The closed forms of Q lose all digits for small x = alpha T (q11 is a difference of terms ~1 of size x^5), so
+below SERIES_BELOW the power series is used:
+    q = int_0^T g(s) g(s)' ds,  g = (s^2/2 - alpha s^3/6 + ..., s - alpha s^2/2 + ..., e^(-alpha s)).
+"""
+import math
+import typing
+from collections import namedtuple
+
+import numpy as np
+
+from acu_tracker.estimation.filters.kalman import Symmetric, Transition
+from pedestal_common.compiled import compiled, inlined
+
+
+class MotionModel(typing.NamedTuple):
+    """A row of TABLE. doc: how the target moves; states: 2 for a model without an acceleration, else 3; initial_sigma:
+    its standard deviation of the acceleration [rad/s2] at the start, a function of its parameters; NaN: that of the
+    rate, per second."""
+    name: str
+    doc: str
+    states: int
+    initial_sigma: typing.Callable
+
+
+TABLE = (
+    MotionModel('cv', 'constant rate, disturbed by white acceleration', 2, lambda params: 0.0),
+    MotionModel('ca', 'constant acceleration, disturbed by white jerk', 3, lambda params: math.nan),
+    MotionModel('singer', 'an acceleration of mean 0 that lasts 1 / alpha (Singer 1970)', 3,
+                lambda params: params.sigma),
+    MotionModel('current_statistical', 'an acceleration that lasts 1 / alpha about a mean, the estimate itself '
+                '(paper 000)', 3, lambda params: params.a_max))
+MODELS = tuple(row.name for row in TABLE)
+CV, CA, SINGER, CURRENT_STATISTICAL = range(len(MODELS))
+
+MODEL = np.dtype([('kind', 'i8'), ('states', 'i8'), ('initial_sigma', 'f8'), ('alpha', 'f8'), ('noise', 'f8'),
+                  ('sigma', 'f8'), ('a_max', 'f8'), ('floor', 'f8')], align=True)
+"""kind: of MODELS, states and initial_sigma of its row, then what its group of the parameters gives; a model reads
+only its own.
+
+noise: cv [rad/s2/sqrt(Hz)] of the white acceleration, ca [rad/s3/sqrt(Hz)] of the white jerk: the square root of a
+two-sided density, int of E[w(t) w(s)] ds = noise^2.
+"""
+
+
+def constants(name, params, **changes) -> np.ndarray:
+    """Constants (1,) of the model of a name with its group of the parameters; changes: fields that are otherwise."""
+    m, kind = np.zeros(1, MODEL), MODELS.index(name)
+    m['kind'], m['states'], m['initial_sigma'] = kind, TABLE[kind].states, TABLE[kind].initial_sigma(params)
+    for field, value in {**vars(params), **changes}.items():
+        m[field] = value
+    return m
+
+
+Discrete = namedtuple('Discrete', 'mean F Q')
+"""A model over T: mean: the Transition of the mean of X, F: that of its covariance, Q: its process noise."""
+
+
+SERIES_BELOW = 0.5
+_TERMS = range(14)
+
+
+def _coefficients(first, count):
+    """c_k of the series sum c_k (-x)^k of one q: n! (n + 1) c_k = count(n), a sum of binomials, n = k + first."""
+    return tuple(count(k + first) / (math.factorial(k + first) * (k + first + 1)) for k in _TERMS)
+
+
+_G1 = tuple(1.0 / math.factorial(k + 2) for k in _TERMS)
+_G2 = tuple(1.0 / math.factorial(k + 1) for k in _TERMS)
+_Q11 = _coefficients(4, lambda n: 2**n - 2 * n - 2)
+_Q12 = _coefficients(3, lambda n: 2**n - n - 2)
+_Q13 = _coefficients(2, lambda n: 2**n - n - 1)
+_Q22 = _coefficients(2, lambda n: 2**n - 2)
+_Q23 = _coefficients(1, lambda n: 2**n - 1)
+_Q33 = _coefficients(0, lambda n: 2**n)
+
+
+@compiled
+def _series(c, x):
+    total = 0.0
+    for k in range(len(c) - 1, -1, -1):
+        total = c[k] - x * total
+    return total
+
+
+@inlined
+def fading(alpha, T):
+    """Transition of an acceleration that fades with e^(-alpha T), alpha [1/s], T [s] (paper 000, eq. 2)."""
+    if T == 0.0:
+        return Transition(0.0, 0.0, 1.0)
+    x = alpha * T
+    if x < SERIES_BELOW:
+        return Transition(T * T * _series(_G1, x), T * _series(_G2, x), math.exp(-x))
+    e = math.exp(-x)
+    return Transition((x - 1.0 + e) / alpha**2, (1.0 - e) / alpha, e)
+
+
+@inlined
+def fading_noise(alpha, T):
+    """q in Q = 2 alpha sigma_a^2 q over T [s], alpha [1/s] (paper 000, eq. 4)."""
+    if T == 0.0:
+        return Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    x = alpha * T
+    if x < SERIES_BELOW:
+        return Symmetric(T**5 * _series(_Q11, x), T**4 * _series(_Q12, x), T**3 * _series(_Q13, x),
+                         T**3 * _series(_Q22, x), T**2 * _series(_Q23, x), T * _series(_Q33, x))
+    e = math.exp(-x)
+    q11 = (1.0 - e * e + 2.0 * x + 2.0 / 3.0 * x**3 - 2.0 * x * x - 4.0 * x * e) / (2.0 * alpha**5)
+    q12 = (e * e + 1.0 - 2.0 * e + 2.0 * x * e - 2.0 * x + x * x) / (2.0 * alpha**4)
+    q13 = (1.0 - e * e - 2.0 * x * e) / (2.0 * alpha**3)
+    q22 = (4.0 * e - 3.0 - e * e + 2.0 * x) / (2.0 * alpha**3)
+    q23 = (e * e + 1.0 - 2.0 * e) / (2.0 * alpha**2)
+    q33 = (1.0 - e * e) / (2.0 * alpha)
+    return Symmetric(q11, q12, q13, q22, q23, q33)
+
+
+@compiled
+def acceleration_variance(abar, a_max, floor):
+    """sigma_a^2 of the modified Rayleigh density about the mean acceleration abar (paper 000, eq. 5, with the square).
+
+    At abar = a_max it is zero and the filter would lock, hence sigma_a >= floor a_max. Accelerations in rad/s2.
+    """
+    return max((4.0 - math.pi) / math.pi * max(a_max - abs(abar), 0.0)**2, (floor * a_max)**2)
+
+
+@inlined
+def of_mean(m, T):
+    """Transition of the mean over T [s] of a record of MODEL."""
+    if m.kind == CV:
+        return Transition(0.0, 0.0, 0.0)
+    if m.kind == SINGER:
+        return fading(m.alpha, T)
+    return Transition(0.5 * T * T, T, 1.0)
+
+
+@inlined
+def cv(m, T):
+    """Discrete of constant rate over T [s]."""
+    F, k = of_mean(m, T), m.noise * m.noise
+    return Discrete(F, F, Symmetric(k * T * T * T / 3.0, k * T * T / 2.0, 0.0, k * T, 0.0, 0.0))
+
+
+@inlined
+def ca(m, T):
+    """Discrete of constant acceleration over T [s]."""
+    F, k, T2 = of_mean(m, T), m.noise * m.noise, T * T
+    return Discrete(F, F, Symmetric(k * T2 * T2 * T / 20.0, k * T2 * T2 / 8.0, k * T2 * T / 6.0, k * T2 * T / 3.0,
+                                    k * T2 / 2.0, k * T))
+
+
+@inlined
+def _fading_acceleration(alpha, variance, T):
+    """(F, Q) of an acceleration of this variance [rad2/s4] that lasts 1 / alpha [s]."""
+    k, q = 2.0 * alpha * variance, fading_noise(alpha, T)
+    return fading(alpha, T), Symmetric(k * q.p11, k * q.p12, k * q.p13, k * q.p22, k * q.p23, k * q.p33)
+
+
+@inlined
+def singer(m, T):
+    """Discrete of an acceleration of mean 0 over T [s]."""
+    F, Q = _fading_acceleration(m.alpha, m.sigma * m.sigma, T)
+    return Discrete(F, F, Q)
+
+
+@inlined
+def current_statistical(m, abar, T):
+    """Discrete of an acceleration about its mean abar [rad/s2], the estimate, over T [s].
+
+    The mean moves by Phi X + U abar = Phi1 X, Phi1 that of constant acceleration (paper 000, eq. 6, 11).
+    """
+    F, Q = _fading_acceleration(m.alpha, acceleration_variance(abar, m.a_max, m.floor), T)
+    return Discrete(of_mean(m, T), F, Q)
+
+
+@inlined
+def discretised(m, abar, T):
+    """Discrete over T [s] of a record of MODEL; abar: the estimated acceleration [rad/s2]."""
+    if m.kind == CV:
+        return cv(m, T)
+    if m.kind == CA:
+        return ca(m, T)
+    if m.kind == SINGER:
+        return singer(m, T)
+    return current_statistical(m, abar, T)
+
+
+@compiled
+def initial_variance(m, rate_sigma):
+    """Variance of the acceleration [rad2/s4] at the start, the rate known to rate_sigma [rad/s]."""
+    sigma = rate_sigma if math.isnan(m.initial_sigma) else m.initial_sigma
+    return sigma * sigma

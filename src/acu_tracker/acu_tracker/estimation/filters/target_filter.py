@@ -1,0 +1,215 @@
+"""The target filter in use: that of the axes, or the Cartesian one where the kind has it and a range is measured.
+
+The Cartesian filter starts with the first range from the estimate of the axes' filters, and is used once its standard
+deviation of the rate is half of theirs. The axes' filters keep running beside it, and take over from its estimate when
+it has lost the range. Measured rates go to the axes' filters alone.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.estimation.filters import axes_filter, axis_filter, unscented
+from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
+from acu_tracker.geometry.motion import AxisMotion, Motion
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import wrap
+
+CONSTANTS = np.dtype([('axis', axis_filter.CONSTANTS, (2,)), ('cartesian', unscented.CONSTANTS),
+                      ('range_share_2', 'f8'), ('wanted', 'i8', (2,))], align=True)
+"""range_share_2: square of ukf.range_share; wanted: 1 for an axis of a kind that uses the Cartesian filter."""
+
+FILTER = np.dtype([('axis', axis_filter.FILTER, (2,)), ('cartesian', unscented.STATE), ('running', 'i8'),
+                   ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
+"""running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate; predicted: time [s]
+by which the prior fields are predicted from the present estimate, NaN where they belong to an older one."""
+
+
+def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
+    """Constants (1,) of UkfParameters and the FilterParameters of both axes; noise_bandwidth [Hz]: of the measured
+    angles, 0 where their noise is white, as the Cartesian filter takes it to be."""
+    c = np.zeros(1, CONSTANTS)
+    c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
+    c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
+    c['wanted'] = [KINDS[params.kind].cartesian for params in axes]
+    return c
+
+
+@compiled
+def start(f, c, m, rate_sigma):
+    """Begin at a Measurement, the rates unknown to rate_sigma [rad/s]."""
+    axes_filter.start(f.axis, c.axis, m, rate_sigma)
+    f.running = f.used[0] = f.used[1] = 0
+    f.predicted = math.nan
+
+
+@compiled
+def walk(f, azimuth, elevation):
+    """From now on the measured angles walk, as of an INS whose error changes slowly, by these variances per second
+    [rad2/s]. The Cartesian filter takes them to stay."""
+    f.axis[0].walk, f.axis[1].walk = azimuth, elevation
+
+
+@compiled
+def predict(f, c, T):
+    """Predict by T [s] >= 0 from the last measurement into the prior fields; a repeated call costs nothing."""
+    if f.predicted == T:
+        return
+    f.predicted = T
+    axes_filter.predict(f.axis, c.axis, T)
+    if f.running:
+        unscented.predict(f.cartesian, c.cartesian, T)
+
+
+@compiled
+def axes_azimuth(f):
+    """Azimuth [rad] that the axis's own filter predicted; measured azimuths are unwrapped to it."""
+    return axis_filter.expected_motion(f.axis[0]).angle
+
+
+@compiled
+def innovation(f, c, m):
+    """Innovation of a Measurement against the prediction; rate_chi_square is always that of the axis's filter."""
+    axes = axes_filter.innovation(f.axis, c.axis, m)
+    if not f.running:
+        return axes
+    cartesian = unscented.innovation(f.cartesian, m)
+    azimuth = _chosen_innovation(f.used[0], axes.axis[0], cartesian.axis[0])
+    elevation = _chosen_innovation(f.used[1], axes.axis[1], cartesian.axis[1])
+    return Innovation((azimuth, elevation), cartesian.range_nu, cartesian.range_S)
+
+
+@compiled
+def _chosen_innovation(used, own, cartesian):
+    if not used:
+        return own
+    return AxisInnovation(cartesian.nu, cartesian.S, cartesian.chi_square, math.nan, own.rate_chi_square)
+
+
+@compiled
+def correct(f, c, m):
+    """Correct the prediction with a Measurement that `innovation` was called with."""
+    axes_filter.correct(f.axis, c.axis, m)
+    if f.running:
+        unscented.correct(f.cartesian, m)
+    f.predicted = math.nan
+
+
+@compiled
+def expected(f):
+    """Motion at the instant of the last `predict`; the azimuth on the wrap of the axis's filter."""
+    axes = axes_filter.expected(f.axis)
+    if not (f.used[0] or f.used[1]):
+        return axes
+    cartesian, azimuth = unscented.expected(f.cartesian), axes.azimuth
+    if f.used[0]:
+        _, dA, ddA = cartesian.azimuth
+        azimuth = AxisMotion(azimuth.angle + wrap(cartesian.azimuth.angle - azimuth.angle), dA, ddA)
+    return Motion(azimuth, cartesian.elevation if f.used[1] else axes.elevation)
+
+
+@compiled
+def outlook(f, c, T):
+    """Motion T [s] >= 0 after the last measurement, as `expected` after `predict`, which is spared where it can be."""
+    if f.predicted == T or f.used[0] or f.used[1]:
+        predict(f, c, T)
+        return expected(f)
+    return axes_filter.outlook(f.axis, c.axis, T)
+
+
+@compiled
+def read(f):
+    """Estimate at the instant of the last `predict`."""
+    axes = axes_filter.read(f.axis)
+    if not (f.used[0] or f.used[1]):
+        return axes
+    own, (cartesian, _) = axes.variances, unscented.variances(f.cartesian)
+    return Estimate(expected(f), (cartesian[0] if f.used[0] else own[0], cartesian[1] if f.used[1] else own[1]))
+
+
+@compiled
+def probabilities(f, c, mu):
+    """mu (2, BANK) = probability of each of MODELS on both axes, NaN where it is not in the filter."""
+    for i in range(2):
+        axis_filter.probabilities(f.axis[i], c.axis[i], mu[i])
+        if f.used[i]:
+            unscented.probabilities(f.cartesian, mu[i])
+
+
+@compiled
+def usable(c, m):
+    """The Measurement without the rates that the kinds do not use, and without a range that is not valid."""
+    azimuth = with_rate(m.axis[0], m.axis[0].rate if c.axis[0].rate_measurement else math.nan)
+    elevation = with_rate(m.axis[1], m.axis[1].rate if c.axis[1].rate_measurement else math.nan)
+    ranged = m.range > 0.0 and m.range_variance > 0.0
+    return Measurement(m.stamp, (azimuth, elevation), m.range if ranged else math.nan, m.range_variance)
+
+
+@compiled
+def select(f, c, m):
+    """Start, use or leave the Cartesian filter, after a correction or a start with a Measurement."""
+    if f.running:
+        if unscented.range_known(f.cartesian, c.range_share_2):
+            _use_cartesian(f, c)
+        else:
+            _leave_cartesian(f, c, f.used[0], f.used[1])
+            f.running = 0
+    elif (c.wanted[0] or c.wanted[1]) and m.range_variance <= c.range_share_2 * m.range * m.range:
+        axes_filter.predict(f.axis, c.axis, 0.0)
+        unscented.start(f.cartesian, c.cartesian, axes_filter.read(f.axis), m.range, m.range_variance)
+        f.running, f.predicted = 1, math.nan
+
+
+@compiled
+def _use_cartesian(f, c):
+    """Use the Cartesian estimate for an axis of such a kind once its standard deviation of the rate is half the
+    axis's.
+    """
+    if (f.used[0] or not c.wanted[0]) and (f.used[1] or not c.wanted[1]):
+        return
+    predict(f, c, 0.0)
+    axes, (cartesian, _) = axes_filter.read(f.axis).variances, unscented.variances(f.cartesian)
+    for i in range(2):
+        if c.wanted[i] and cartesian[i].p22 <= 0.25 * axes[i].p22:
+            f.used[i] = 1
+
+
+@compiled
+def _leave_cartesian(f, c, azimuth, elevation):
+    """Move the filters of these axes (azimuth, elevation: 1 for yes) to the Cartesian estimate and stop using it;
+    where that is NaN they stay where they are."""
+    if not (azimuth or elevation):
+        return
+    predict(f, c, 0.0)
+    motion = expected(f)
+    for i, leaves in enumerate((azimuth, elevation)):
+        if leaves:
+            if math.isfinite(motion[i].angle + motion[i].rate + motion[i].acceleration):
+                axis_filter.move(f.axis[i], c.axis[i], motion[i])
+            f.used[i] = 0
+    f.predicted = math.nan
+
+
+@compiled
+def transfer(f, c, rate_sigma, running):
+    """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one.
+
+    running: whether there is an estimate; rate_sigma: as in `start`.
+    """
+    f.predicted = math.nan
+    if running:
+        for i in range(2):
+            axis_filter.transfer(f.axis[i], c.axis[i], rate_sigma)
+    _leave_cartesian(f, c, f.used[0] and not c.wanted[0], f.used[1] and not c.wanted[1])
+    if not (c.wanted[0] or c.wanted[1]):
+        f.running = 0
+
+
+@compiled
+def move(f, c, motion):
+    """Change to a frame in which the target has this Motion now; the covariances stay. The Cartesian filter, which
+    works in the old frame, stops."""
+    f.running = f.used[0] = f.used[1] = 0
+    for i in range(2):
+        axis_filter.move(f.axis[i], c.axis[i], motion[i])
+    f.predicted = math.nan

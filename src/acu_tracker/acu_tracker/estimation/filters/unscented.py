@@ -1,0 +1,341 @@
+"""The Cartesian target filter: an IMM of two unscented filters, CV and CA; azimuth, elevation and range measured.
+
+X = (east north up, velocity, acceleration) [m, m/s, m/s2] of each mode, relative to the antenna; CV keeps its
+acceleration at zero. Without a range the two angles are taken alone, and the range grows uncertain.
+
+The unscented filter in general (Merwe's points; Wan and Van der Merwe 2000), and what is special about this one:
+the motion is linear, so that the transform of the prediction is F P F' + Q exactly; the points of the measurement are
+drawn from the predicted P, after Q. With P = L L' (L lower triangular) they are X +- sqrt(n + lambda) L_k, and only
+k = 1, 2, 3 move the position, which is all that is measured: 7 of the 19 points are evaluated, and the other 12 count
+with the one in the middle. Angles are taken relative to that one, so that the azimuth may wrap.
+With alpha = 1, kappa = 3 - n, beta = 2 no weight of the seven is negative, and S is positive whatever the geometry.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.estimation.filters import imm, motion_models
+from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisVariances, Innovation
+from acu_tracker.geometry.motion import line_of_sight, motion_of_position
+from acu_tracker.geometry.vector import Vector, dot, times
+from pedestal_common.compiled import assign, compiled
+from pedestal_common.geometry.line_of_sight import earth_angles, wrap
+
+N = 9
+MODES = motion_models.CV, motion_models.CA
+ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N
+LAMBDA = ALPHA**2 * (N + KAPPA) - N
+SCALE = math.sqrt(N + LAMBDA)
+WEIGHT = 0.5 / (N + LAMBDA)
+"""Of each of the six moving points."""
+MIDDLE = 1.0 - 6.0 * WEIGHT + 1.0 - ALPHA**2 + BETA
+"""Of the point in the middle and the twelve that measure as it does, in a covariance."""
+
+STATE = np.dtype([
+    ('x', 'f8', (2, N)), ('p', 'f8', (2, N, N)), ('mu', 'f8', (2,)),
+    ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('mu_prior', 'f8', (2,)),
+    ('z', 'f8', (2, 3)), ('s', 'f8', (2, 3, 3)), ('g', 'f8', (2, N, 3)), ('points', 'f8', (2, 3, 3)),
+    ('weights', 'f8', (2,)), ('mean', 'f8', (N,)), ('covariance', 'f8', (N, N))], align=True)
+"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, mu_prior:
+these as `predict` left them; z, s: what `innovation` expects to be measured, and its covariance; g: its covariance
+with X. points, weights, mean, covariance: scratch.
+"""
+
+CONSTANTS = np.dtype([('models', motion_models.MODEL, (2,)), ('dwell', 'f8'), ('initial_speed', 'f8'),
+                      ('initial_acceleration', 'f8')], align=True)
+
+
+def constants(params) -> np.ndarray:
+    """Constants (1,) of UkfParameters."""
+    c = np.zeros(1, CONSTANTS)
+    c['models']['kind'] = MODES
+    c['models']['noise'] = params.cv_noise, params.ca_noise
+    c['dwell'] = params.dwell
+    c['initial_speed'], c['initial_acceleration'] = params.initial_speed, params.initial_acceleration
+    return c
+
+
+@compiled
+def _spread(p, along, onward, variances):
+    """Add the AxisVariances of one coordinate and its rate to the covariance p.
+
+    A unit of it moves the position by along (3,) and the velocity by onward (3,), a unit of its rate the velocity by
+    along.
+    """
+    s11, s12, s22 = variances
+    for i in range(3):
+        for j in range(3):
+            p[i, j] += s11 * along[i] * along[j]
+            p[i, j + 3] += along[i] * (s11 * onward[j] + s12 * along[j])
+            p[i + 3, j] += (s11 * onward[i] + s12 * along[i]) * along[j]
+            p[i + 3, j + 3] += (s11 * onward[i] * onward[j] + s12 * (onward[i] * along[j] + along[i] * onward[j])
+                                + s22 * along[i] * along[j])
+
+
+@compiled
+def start(s, c, estimate, r, R_range):
+    """Begin at an Estimate of the angles and a first range r [m] of variance R_range.
+
+    `expected` continues from that Estimate: CA starts with the acceleration of a target at a constant range, CV
+    without. The radial speed is 0 to within c.initial_speed, the acceleration known to within c.initial_acceleration.
+    """
+    A, dA, _ = estimate.motion.azimuth
+    E, dE, _ = estimate.motion.elevation
+    sight = line_of_sight(estimate.motion)
+    u, du, ddu = sight
+    # The centripetal share that keeps the range constant.
+    k = dot(du, du)
+    x = s.x[1]
+    x[0], x[1], x[2] = times(r, u)
+    x[3], x[4], x[5] = times(r, du)
+    x[6], x[7], x[8] = r * (ddu.x + k * u.x), r * (ddu.y + k * u.y), r * (ddu.z + k * u.z)
+    for i in range(N):
+        s.x[0, i] = x[i] if i < 6 else 0.0
+    p = s.p[0]
+    p[:, :] = 0.0
+    rcA, rsA, sE, cE = r * math.cos(A), r * math.sin(A), math.sin(E), math.cos(E)
+    _spread(p, u, du, AxisVariances(R_range, 0.0, c.initial_speed * c.initial_speed))
+    _spread(p, Vector(cE * rcA, -cE * rsA, 0.0),
+            Vector(-cE * rsA * dA - sE * rcA * dE, -cE * rcA * dA + sE * rsA * dE, 0.0), estimate.variances[0])
+    _spread(p, Vector(-sE * rsA, -sE * rcA, r * cE),
+            Vector(-sE * rcA * dA - cE * rsA * dE, sE * rsA * dA - cE * rcA * dE, -r * sE * dE), estimate.variances[1])
+    assign(s.p[1], p)
+    for i in range(6, N):
+        s.p[1, i, i] = c.initial_acceleration * c.initial_acceleration
+    s.mu[0], s.mu[1] = 0.0, 1.0
+
+
+@compiled
+def _mixed(x, p, w, x_out, p_out):
+    """Mean and covariance of two modes with weights w (2,) into x_out, p_out."""
+    for a in range(N):
+        x_out[a] = w[0] * x[0, a] + w[1] * x[1, a]
+        for b in range(a, N):
+            spread = (x[0, a] - x[1, a]) * (x[0, b] - x[1, b])
+            p_out[a, b] = p_out[b, a] = w[0] * p[0, a, b] + w[1] * p[1, a, b] + w[0] * w[1] * spread
+
+
+@compiled
+def _moved(x, p, m, T):
+    """x = F x and p = F p F' + Q of a model over T [s] in place; the motion is the same in the three directions."""
+    model = motion_models.discretised(m, 0.0, T)
+    (f13, f23, f33), Q = model.F, model.Q
+    for i in range(3):
+        x[i] += T * x[i + 3] + f13 * x[i + 6]
+        x[i + 3] += f23 * x[i + 6]
+        x[i + 6] *= f33
+        for j in range(i, 3):
+            for b in range(0, N, 3):
+                p[i, j + b] += T * p[i + 3, j + b] + f13 * p[i + 6, j + b]
+                p[i + 3, j + b] += f23 * p[i + 6, j + b]
+                p[i + 6, j + b] *= f33
+            for a in range(0, N, 3):
+                p[i + a, j] += T * p[i + a, j + 3] + f13 * p[i + a, j + 6]
+                p[i + a, j + 3] += f23 * p[i + a, j + 6]
+                p[i + a, j + 6] *= f33
+            for a in range(0, N, 3):
+                for b in range(0, N, 3):
+                    p[j + b, i + a] = p[i + a, j + b]
+        p[i, i] += Q.p11
+        p[i + 3, i + 3] += Q.p22
+        p[i + 6, i + 6] += Q.p33
+        p[i, i + 3] += Q.p12
+        p[i, i + 6] += Q.p13
+        p[i + 3, i + 6] += Q.p23
+        p[i + 3, i], p[i + 6, i], p[i + 6, i + 3] = p[i, i + 3], p[i, i + 6], p[i + 3, i + 6]
+
+
+@compiled
+def predict(s, c, T):
+    """Mix the modes and predict them by T [s] into the prior fields; what was estimated stays as it is."""
+    stay, switch = imm.switching(T, c.dwell, 2)
+    for j in range(2):
+        s.mu_prior[j] = imm.mix(s.mu, 2, stay, switch, j, s.weights)
+        _mixed(s.x, s.p, s.weights, s.x_prior[j], s.p_prior[j])
+        _moved(s.x_prior[j], s.p_prior[j], c.models[j], T)
+
+
+@compiled
+def _measured(east, north, up):
+    """(azimuth, elevation, range) of a position."""
+    azimuth, elevation = earth_angles(east, north, up)
+    return azimuth, elevation, math.sqrt(east * east + north * north + up * up)
+
+
+@compiled
+def _transformed(x, p, z, s, g, d):
+    """Unscented transform of the prediction x, p to the measurement: mean z (3,), covariance s (3, 3) without R, and
+    that with X, g (9, 3). d (2, 3, 3): how the points at +L_k and -L_k measure, against the one in the middle."""
+    A, E, r = _measured(x[0], x[1], x[2])
+    z[0] = z[1] = z[2] = 0.0
+    s[:, :] = 0.0
+    for k in range(3):
+        # Column k of L into g, scaled to the offset of the points; the columns before it are in g already.
+        for i in range(k, N):
+            rest = p[i, k]
+            for m in range(k):
+                rest -= g[i, m] * g[k, m] / (SCALE * SCALE)
+            g[i, k] = rest
+        root = SCALE / math.sqrt(g[k, k])
+        for i in range(N):
+            g[i, k] = root * g[i, k] if i >= k else 0.0
+    for k in range(3):
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            a, e, q = _measured(x[0] + sign * g[0, k], x[1] + sign * g[1, k], x[2] + sign * g[2, k])
+            d[side, k, 0], d[side, k, 1], d[side, k, 2] = wrap(a - A), e - E, q - r
+            for m in range(3):
+                z[m] += WEIGHT * d[side, k, m]
+    for a in range(3):
+        for b in range(a, 3):
+            total = MIDDLE * z[a] * z[b]
+            for k in range(3):
+                for side in range(2):
+                    total += WEIGHT * (d[side, k, a] - z[a]) * (d[side, k, b] - z[b])
+            s[a, b] = s[b, a] = total
+    for i in range(N):
+        g0, g1, g2 = WEIGHT * g[i, 0], WEIGHT * g[i, 1], WEIGHT * g[i, 2]
+        for m in range(3):
+            g[i, m] = (g0 * (d[0, 0, m] - d[1, 0, m]) + g1 * (d[0, 1, m] - d[1, 1, m])
+                       + g2 * (d[0, 2, m] - d[1, 2, m]))
+    z[0] += A
+    z[1] += E
+    z[2] += r
+
+
+@compiled
+def innovation(s, m):
+    """Innovation of a Measurement against the prediction of both modes together.
+
+    A range that is NaN was not measured; its variance is then that of a perfect one. Rates are not used.
+    """
+    for j in range(2):
+        _transformed(s.x_prior[j], s.p_prior[j], s.z[j], s.s[j], s.g[j], s.points)
+        s.s[j, 0, 0] += m.axis[0].variance
+        s.s[j, 1, 1] += m.axis[1].variance
+        if m.range == m.range:
+            s.s[j, 2, 2] += m.range_variance
+    range_nu, range_S = _compared(s, 2, m.range)
+    return Innovation((_axis_innovation(s, 0, m), _axis_innovation(s, 1, m)), range_nu, range_S)
+
+
+@compiled
+def _compared(s, i, y):
+    """(nu, S) of what was measured as component i (azimuth, elevation, range), of both modes with their spread."""
+    d = s.z[1, i] - s.z[0, i]
+    if i == 0:
+        d = wrap(d)
+    nu = y - s.z[0, i] - s.mu_prior[1] * d
+    S = s.mu_prior[0] * s.s[0, i, i] + s.mu_prior[1] * s.s[1, i, i] + s.mu_prior[0] * s.mu_prior[1] * d * d
+    return wrap(nu) if i == 0 else nu, S
+
+
+@compiled
+def _axis_innovation(s, i, m):
+    nu, S = _compared(s, i, m.axis[i].angle)
+    return AxisInnovation(nu, S, nu * nu / S, math.nan, math.nan)
+
+
+@compiled
+def _corrected(s, j, azimuth, elevation, range_):
+    """Take the measurement into mode j; its log-likelihood, less what all modes have alike.
+
+    S = G G'; G^-1 nu are the standardised innovations n, the gain times G is w: X += w n, P -= w w'.
+    """
+    S, g = s.s[j], s.g[j]
+    G00 = math.sqrt(S[0, 0])
+    G10 = S[1, 0] / G00
+    G11 = math.sqrt(S[1, 1] - G10 * G10)
+    n0 = wrap(azimuth - s.z[j, 0]) / G00
+    n1 = (elevation - s.z[j, 1] - G10 * n0) / G11
+    G20 = G21 = n2 = per_G22 = 0.0
+    likelihood = -0.5 * (n0 * n0 + n1 * n1) - math.log(G00 * G11)
+    if range_ == range_:
+        G20 = S[2, 0] / G00
+        G21 = (S[2, 1] - G20 * G10) / G11
+        per_G22 = 1.0 / math.sqrt(S[2, 2] - G20 * G20 - G21 * G21)
+        n2 = (range_ - s.z[j, 2] - G20 * n0 - G21 * n1) * per_G22
+        likelihood += math.log(per_G22) - 0.5 * n2 * n2
+    for i in range(N):
+        w0 = g[i, 0] / G00
+        w1 = (g[i, 1] - G10 * w0) / G11
+        w2 = (g[i, 2] - G20 * w0 - G21 * w1) * per_G22
+        g[i, 0], g[i, 1], g[i, 2] = w0, w1, w2
+        s.x[j, i] = s.x_prior[j, i] + w0 * n0 + w1 * n1 + w2 * n2
+    for a in range(N):
+        for b in range(a, N):
+            s.p[j, a, b] = s.p[j, b, a] = s.p_prior[j, a, b] - (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1]
+                                                                + g[a, 2] * g[b, 2])
+    return likelihood
+
+
+@compiled
+def correct(s, m):
+    """Correct with the Measurement that `innovation` was called with; where its range is NaN, with the angles
+    alone."""
+    for j in range(2):
+        s.weights[j] = _corrected(s, j, m.axis[0].angle, m.axis[1].angle, m.range)
+    imm.weigh(s.mu_prior, s.weights, 2, s.mu)
+
+
+@compiled
+def range_known(s, share_2):
+    """Whether the standard deviation of the range is at most a share (its square) of the range in both modes."""
+    for j in range(2):
+        x, p = s.x[j], s.p[j]
+        spread = 0.0
+        for a in range(3):
+            for b in range(3):
+                spread += x[a] * x[b] * p[a, b]
+        r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
+        if not spread <= share_2 * r2 * r2:
+            return False
+    return True
+
+
+@compiled
+def probabilities(s, mu):
+    """mu (BANK,) = probability of each of motion_models.MODELS, NaN where it is not in the filter."""
+    mu[:] = math.nan
+    for j in range(len(MODES)):
+        mu[MODES[j]] = s.mu[j]
+
+
+@compiled
+def expected(s):
+    """Motion in earth angles of the prediction, both modes together; the azimuth in (-pi, pi]."""
+    _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
+    x = s.mean
+    return motion_of_position(Vector(x[0], x[1], x[2]), Vector(x[3], x[4], x[5]), Vector(x[6], x[7], x[8]))
+
+
+@compiled
+def _projected(p, g, h, v):
+    """AxisVariances of two numbers linear in position and velocity: g x and h x + v dx, each (3,) a tuple."""
+    gg = gh = hh = 0.0
+    for a in range(3):
+        for b in range(3):
+            gg += g[a] * g[b] * p[a, b]
+            gh += g[a] * (h[b] * p[a, b] + v[b] * p[a, b + 3])
+            hh += h[a] * h[b] * p[a, b] + 2.0 * h[a] * v[b] * p[a, b + 3] + v[a] * v[b] * p[a + 3, b + 3]
+    return AxisVariances(gg, gh, hh)
+
+
+@compiled
+def variances(s):
+    """(AxisVariances of both axes, variance of the range [m2]) of the prediction, linearised, both modes with their
+    spread."""
+    _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
+    x, p = s.mean, s.covariance
+    e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]
+    rho2 = max(e * e + n * n, 1e-12 * u * u)
+    rho, r2 = math.sqrt(rho2), rho2 + u * u
+    drho = (e * de + n * dn) / rho
+    dA, dE = (n * de - e * dn) / rho2, (rho * du - u * drho) / r2
+    A = (n / rho2, -e / rho2, 0.0)
+    A_rate = ((-dn - 2.0 * e * dA) / rho2, (de - 2.0 * n * dA) / rho2, 0.0)
+    E = (-u * e / (rho * r2), -u * n / (rho * r2), rho / r2)
+    k = (du + u * drho / rho) / rho - 2.0 * dE
+    E_rate = ((k * e - u * de / rho) / r2, (k * n - u * dn / rho) / r2, (-drho - 2.0 * u * dE) / r2)
+    R = (e / math.sqrt(r2), n / math.sqrt(r2), u / math.sqrt(r2))
+    return (_projected(p, A, A_rate, A), _projected(p, E, E_rate, E)), _projected(p, R, R, R).p11

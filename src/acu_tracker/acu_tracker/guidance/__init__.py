@@ -1,0 +1,1 @@
+"""Where the axes are sent in each mode, and what an operator steers by hand."""

@@ -1,0 +1,101 @@
+"""Stow and unstow: the axes stand at the stow angles and the pins are asked to go in; the pins are asked to go out.
+
+A pin holds its axis by force: nothing is commanded while one is not out, or was asked to go in. What was asked stays
+asked, whatever the mode is then, until the other is.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker import modes
+from pedestal_common.compiled import compiled
+from pedestal_common.graph import topics
+
+STOW = np.dtype([('asked', 'i8'), ('since', 'f8'), ('off', 'f8')], align=True)
+"""asked: code of acu/stow_pins, SILENT before the first; since: stamp at which that was asked [s]; off: stamp at which
+the axes were not at rest at the stow angles last [s]."""
+
+_PLACES = topics.BY_NAME['acu/stow_pins'].texts
+OUT, IN = _PLACES.index('out'), _PLACES.index('in')
+
+_STATES = len(topics.PINS)
+_OUT, _IN, _FAILED = (topics.PINS.index(state) for state in ('out', 'in', 'failed'))
+"""Of a pin; a code of adu/stow_pins is that of the azimuth times _STATES and that of the elevation."""
+
+BOTH_OUT, BOTH_IN = _OUT * _STATES + _OUT, _IN * _STATES + _IN
+
+AT_REST = 1e-3
+"""Rate [rad/s] below which an axis stands."""
+
+SETTLED = 0.5
+"""Time for which both axes must stand at the stow angles [s]."""
+
+
+def initialise(s):
+    """Nothing was asked; s: view of STOW."""
+    s['asked'], s['since'], s['off'] = topics.SILENT, -math.inf, -math.inf
+
+
+@compiled
+def failed(code, i):
+    """Whether a code of adu/stow_pins says that the pin of axis i has failed."""
+    return code >= 0 and (code // _STATES if i == 0 else code % _STATES) == _FAILED
+
+
+@compiled
+def obstacle(s, fitted, code):
+    """NONE, or the reason why the axes must not move. fitted: 1 where there are pins; code: of adu/stow_pins."""
+    if not fitted:
+        return modes.NONE
+    if failed(code, 0) or failed(code, 1):
+        return modes.PIN_FAILED
+    return modes.NONE if code == BOTH_OUT and s.asked != IN else modes.PINNED
+
+
+@compiled
+def rests(s, fitted, code, mode):
+    """Whether the mode commands no motion."""
+    return (mode == modes.STANDBY or mode == modes.UNSTOW
+            or (mode == modes.STOW and obstacle(s, fitted, code) != modes.NONE))
+
+
+@compiled
+def _ask(s, place, t):
+    if s.asked != place:
+        s.asked, s.since = place, t
+
+
+@compiled
+def _at_rest(c, u):
+    """Whether both axes stand at the stow angles."""
+    for i in range(2):
+        if not (abs(u.position[i] - c.axis[i].p.stow) <= c.p.stow_window and abs(u.velocity[i]) <= AT_REST):
+            return False
+    return True
+
+
+@compiled
+def step(s, c, u, mode):
+    """Ask of the pins what the mode needs. c, u: records of control_unit.CONSTANTS and of signals.INPUTS."""
+    t = u.stamp
+    if mode == modes.UNSTOW:
+        _ask(s, OUT, t)
+    elif mode == modes.STOW:
+        if u.pins == BOTH_OUT and not _at_rest(c, u):
+            s.off = t
+        elif u.pins != BOTH_OUT or t - s.off >= SETTLED:
+            _ask(s, IN, t)
+    else:
+        s.off = t
+
+
+@compiled
+def wrong(s, c, u):
+    """Bits of the axes whose pin has failed, or is not where it was asked to be in time."""
+    bits = 0
+    for i in range(2):
+        late = s.asked >= 0 and u.stamp - s.since > c.p.stow_timeout and u.pins != (BOTH_IN if s.asked == IN else
+                                                                                   BOTH_OUT)
+        if failed(u.pins, i) or late:
+            bits |= 1 << i
+    return bits

@@ -1,0 +1,1 @@
+"""What an operator may command, who holds control, and what the control unit reports."""

@@ -1,0 +1,71 @@
+"""What the control unit says of itself on /diagnostics."""
+import math
+
+from acu_tracker import modes, signals
+from acu_tracker.operating import announcement
+from pedestal_common.graph import topics
+from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis
+
+FAULTS = {
+    'moves unasked': 'the antenna moves unasked: {unasked}; acu/reset_faults once it is known why',
+    'drive frozen': 'the drive repeats its numbers though it is told to move; acu/reset_faults once it is known why',
+    'diverged': "autotrack diverged: the receiver's errors led away from the target; acu/reset_faults once their "
+                'slope, phase and sign are right'}
+"""What is said of each fault of supervision.LATCHED, the gravest first."""
+
+GATED = {('error_gated',): 'an error of the receiver was too far off to be believed',
+         ('error_noisy',): 'the errors of the receiver are noise, and not used',
+         ('error_gated', 'error_noisy'): 'the errors of the receiver are noise, and not used'}
+"""What is said where nothing but these of signals.INVALID_INPUTS was refused."""
+
+
+def of(unit):
+    """The Diagnosis of an Acu."""
+    state, outputs = unit.parts['state'], unit.parts['outputs']
+    invalid = tuple(name for i, name in enumerate(signals.INVALID_INPUTS) if unit.parts['invalid'] >> i & 1)
+    faults = unit.faults
+    values = _values(unit, faults, invalid)
+    if faults:
+        return Diagnosis(ERROR, FAULTS[faults[0]].format(unasked=_unasked(state['unasked'])), values)
+    if invalid in GATED:
+        return Diagnosis(WARN, GATED[invalid], values)
+    if invalid:
+        return Diagnosis(ERROR, f'invalid input: {" ".join(invalid)}', values)
+    if state['overtravel']:
+        return Diagnosis(WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit', values)
+    mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
+    return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
+
+
+def _values(unit, faults, invalid):
+    """[(key, text)]."""
+    state, outputs = unit.parts['state'], unit.parts['outputs']
+    values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
+              ('fallback', modes.FALLBACK_OF[int(state['fallback'])]), ('control', unit.authority.holder),
+              ('faults', ', '.join(faults)), ('locked', str(int(outputs['locked']))),
+              ('coasting', str(int(outputs['coasting']))), ('drive', unit.drive_told)]
+    if unit.parameters.stow_pins:
+        values.append(('stow_pins', _pins(int(unit.parts['inputs']['pins']))))
+    values += [('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
+               ('rates gated', str(int(outputs['rates_gated']))),
+               ('ranges gated', str(int(outputs['ranges_gated'])))]
+    values += [(f'{axis} limit_s', f'{time:.1f}') for axis, time in zip(topics.AXES, outputs['time_to_limit'])]
+    kinds = ('angle', 'rate', 'acceleration')
+    values += [(f'{axis} limited', ' '.join(kind for kind in kinds if outputs[f'{kind}_limited'][i]))
+               for i, axis in enumerate(topics.AXES)]
+    for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
+        values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
+    return [*values, ('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['lookahead']),
+            *unit.predictor.told(unit.now * 1e-9),
+            *((f'refused {mode}', why) for mode, why in unit.refusals().items())]
+
+
+def _unasked(movement):
+    """How the axes move. movement: view of servo.unasked's record."""
+    return ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded'
+                     for axis, (rate, low, high) in zip(topics.AXES, movement['measured']))
+
+
+def _pins(code):
+    """Where the stow pins are, as the drive says."""
+    return topics.BY_NAME['adu/stow_pins'].texts[code] if code != topics.SILENT else 'unknown'

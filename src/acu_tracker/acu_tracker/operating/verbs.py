@@ -1,0 +1,113 @@
+"""What can be asked of the control unit on acu/command: the modes with their arguments, and what is beside them."""
+import math
+
+import numpy as np
+
+from acu_tracker.alarms.annunciator import LONGEST_SHELVED
+from acu_tracker.guidance.manual import DEAD_MAN
+from acu_tracker.modes import FALLBACKS, MODES, TABLE
+from acu_tracker.operating.authority import ROLES
+from pedestal_common.graph.topics import AXES
+from pedestal_common.parameters import ParameterError
+from pedestal_common.wire.commands import Argument, Verb
+
+
+def _of_axes(doc, low, high, unit, default=None, suffix=''):
+    return tuple(Argument(f'{axis}{suffix}', doc, low, high, unit, default=default) for axis in AXES)
+
+
+_MOVING = (*_of_axes('its rate', -10.0, 10.0, 'rad/s', 0.0, '_rate'),
+           Argument('moves', 'for so long it goes on at these rates', 0.0, 3600.0, 's', default=1.0))
+
+ARGUMENTS = {
+    'preset': (*_of_axes('deck angle; left out: as it was', -20.0, 20.0, 'rad', math.nan), *_MOVING,
+               Argument('point', 'one of those that the parameter `points` names, instead of angles', default='')),
+    'rate': _of_axes(f'holds for {DEAD_MAN:g} s', -10.0, 10.0, 'rad/s', 0.0),
+    'slave': (*_of_axes('earth angle', -20.0, 20.0, 'rad'), *_MOVING,
+              Argument('holds', 'for so long it is good', 0.01, 86400.0, 's', default=1.0)),
+    'tle': tuple(Argument(f'line_{i}', f'line {i} of the elements, _ for blanks; left out: as they are', default='')
+                 for i in (1, 2)),
+}
+"""{mode: its commands.Arguments}."""
+
+_ALARM = Argument('alarm', 'name of an alarm, with _ or blanks')
+
+OF_ALARMS = (
+    Verb('acknowledge', 'an alarm has been seen, with all that stands under it',
+         (_ALARM._replace(doc='name of an alarm; left out: every alarm', default=''),)),
+    Verb('shelve', 'an alarm is put away for a time', (
+        _ALARM, Argument('seconds', 'until it comes back', 1.0, LONGEST_SHELVED, 's'), Argument('reason', 'why'))),
+    Verb('unshelve', 'an alarm is taken back', (_ALARM,)),
+    Verb('reset', 'what is latched ends, unless its cause is still there; nothing moves until a mode is asked for'))
+ALARM_VERBS = tuple(verb.name for verb in OF_ALARMS)
+
+VERBS = (
+    *(Verb(mode, row.doc, ARGUMENTS.get(mode, ())) for mode, row in zip(MODES, TABLE)),
+    Verb('elements', 'predict by these elements in mode `tle`', tuple(
+        Argument(f'line_{i}', f'line {i} of the elements, _ for blanks') for i in (1, 2))),
+    Verb('fallback', 'choose what follows the loss of the track', (
+        Argument('mode', ', '.join(FALLBACKS), options=tuple(FALLBACKS)),)),
+    Verb('offset', 'shift what `program`, `tle` and `sun` follow, as they run', (
+        Argument('time', 'it comes later by this', -3600.0, 3600.0, 's', default=0.0),
+        *_of_axes('added to its angle', -1.0, 1.0, 'rad', 0.0))),
+    Verb('take', 'take control: nobody else is obeyed, but who stops', (
+        Argument('role', 'a supervisor takes it away from others', options=ROLES, default='operator'),)),
+    Verb('release', 'give control back'),
+    *OF_ALARMS,
+)
+
+POINTS_DOC = "named points for `preset`: 'NAME azimuth elevation; ...' [rad], deck angles; empty: none"
+
+
+def points(text) -> dict:
+    """{name: (azimuth, elevation) [rad]} of a text as in POINTS_DOC. Raises ParameterError."""
+    named = {}
+    for part in filter(None, map(str.strip, text.split(';'))):
+        name, *angles = part.split()
+        try:
+            azimuth, elevation = map(float, angles)
+        except ValueError:
+            raise ParameterError(f'points = {part!r}: must be NAME azimuth elevation [rad]') from None
+        if name in named or not (abs(azimuth) <= 20.0 and abs(elevation) <= 20.0):
+            raise ParameterError(f'points = {part!r}: each name once, angles -20 to 20 rad')
+        named[name] = azimuth, elevation
+    return named
+
+
+def _rates(arguments):
+    """Return the rates (2,) [rad/s] among the arguments of a command."""
+    return [arguments[f'{axis}_rate'] for axis in AXES]
+
+
+def _take_preset(unit, arguments):
+    angles = [arguments[axis] for axis in AXES]
+    if arguments['point']:
+        named = points(unit.parameters.points)
+        if arguments['point'] not in named:
+            raise ValueError(f'point = {arguments["point"]}: must be one of {", ".join(named) or "none"}')
+        angles = named[arguments['point']]
+    state = unit.parts['state']
+    preset = state['preset']
+    preset['angle'] = np.where(np.isfinite(angles), angles, preset['angle'])
+    preset['stamp'], preset['moves'], preset['rate'] = state['stamp'], arguments['moves'], _rates(arguments)
+
+
+def _take_rate(unit, arguments):
+    state = unit.parts['state']
+    state['manual']['asked'] = [arguments[axis] for axis in AXES]
+    state['manual']['until'] = state['stamp'] + DEAD_MAN
+
+
+def _take_slave(unit, arguments):
+    state = unit.parts['state']
+    state['slave'] = (state['stamp'], [arguments[axis] for axis in AXES], _rates(arguments), arguments['moves'],
+                      arguments['holds'])
+
+
+def _take_tle(unit, arguments):
+    if any(arguments.values()):
+        unit.take_elements(*arguments.values())
+
+
+TAKEN = {'preset': _take_preset, 'rate': _take_rate, 'slave': _take_slave, 'tle': _take_tle}
+"""{mode: function (unit.Acu, its arguments) that takes what it is asked for with}; each raises ValueError."""

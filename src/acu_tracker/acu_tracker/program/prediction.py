@@ -1,0 +1,186 @@
+"""What the control unit predicts itself, as tables of earth angles: a satellite by its elements, and the sun.
+
+A table begins a little before it is made and is made anew in its second half, while its target is below the horizon
+if it ever is: nothing follows it then. The refraction of the air is left out.
+"""
+import dataclasses
+import datetime
+import math
+import typing
+
+import numpy as np
+
+from acu_tracker import modes
+from acu_tracker.program import sun
+from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
+from pedestal_common.geometry import orbit
+from pedestal_common.geometry.geodesy import StationParameters, station_frame
+from pedestal_common.geometry.orbit import TargetError
+from pedestal_common.graph import topics
+from pedestal_common.graph.steps import DAY, SECOND
+from pedestal_common.parameters import ParameterError, Parameters, group, parameter, text
+from pedestal_common.reproducible import arctan2, turned
+
+ROWS = 2400
+"""Of a table."""
+
+BEFORE = 10.0
+"""Time [s] before now at which a table begins."""
+
+PER_ORBIT = 5400
+"""Rows per revolution of a satellite: 1 s of a low one."""
+
+SUN_INTERVAL = 30.0
+"""Time [s] between two rows of the sun, which moves by 0.13 deg in it."""
+
+SEARCHED = 2.0 * DAY
+"""Time ahead [s] in which the next rise is looked for."""
+
+LOOK = 20.0
+"""Time [s] between two looks for it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PredictionParameters(Parameters):
+    """Of the modes tle and sun."""
+    line_1: str = text('', 'first line of the elements (TLE) of mode tle; empty: none')
+    line_2: str = text('', 'second line of the elements')
+    start_time: str = text('', 'UTC of stamp 0, ISO 8601; empty: in realtime that of the stamps')
+    oldest: float = parameter(14.0, 0.1, 365.0, 'd', 'largest time between the epoch of the elements and now')
+    station: StationParameters = group(StationParameters)
+
+    def check(self):
+        """Raise ParameterError for elements, or a time, that are none."""
+        try:
+            if self.line_1 or self.line_2:
+                orbit.satellite(self)
+            if self.start_time:
+                orbit.instant('start_time', self.start_time)
+        except TargetError as error:
+            raise ParameterError(str(error)) from None
+
+
+class Predicted(typing.NamedTuple):
+    """A table, NONE of modes.REASONS or why there is none, and the stamps [s] from which on it holds and at which it
+    is to be made anew."""
+    track: ProgramTrack
+    reason: int
+    since: float = -math.inf
+    until: float = math.inf
+
+
+class Predictor:
+    """Predicts by PredictionParameters, for stamps counted from `epoch` [ns of UTC]; 0: they count from no time."""
+
+    def __init__(self, parameters, epoch=0):
+        self.parameters, self.epoch = parameters, epoch
+        self._satellite = orbit.satellite(parameters) if parameters.line_1 else None
+
+    def by(self, line_1, line_2):
+        """A Predictor by other elements. Raises ValueError where they are none."""
+        return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2), self.epoch)
+
+    @property
+    def number(self):
+        """Catalogue number of the satellite."""
+        return self._satellite.satnum_str
+
+    @property
+    def _known(self):
+        """Whether UTC is known; in lockstep stamps count from 0."""
+        return self.parameters.start_time != '' or self.epoch > 0
+
+    def satellite(self, stamp) -> Predicted:
+        """The Predicted of the satellite for a stamp [s]."""
+        if self._satellite is None or not self._known:
+            return Predicted(NO_TRACK, modes.NO_ELEMENTS if self._known else modes.NO_UTC)
+        interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / PER_ORBIT, 1), 1.0)
+        if abs(self._age(stamp)) > self.parameters.oldest:
+            return Predicted(NO_TRACK, modes.TOO_OLD, stamp, stamp + ROWS * interval)
+        return _table(self._satellite_angles, stamp, interval)
+
+    def sun(self, stamp) -> Predicted:
+        """The Predicted of the sun for a stamp [s]."""
+        if not self._known:
+            return Predicted(NO_TRACK, modes.NO_UTC)
+        return _table(self._sun_angles, stamp, SUN_INTERVAL)
+
+    def told(self, stamp):
+        """[(key, text)] at a stamp [s]: where the sun is, unless UTC is not known, and the elements, if any."""
+        sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._known else ()
+        lines = ('line_1', 'line_2') if self._satellite is not None else ()
+        return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
+                *((line, getattr(self.parameters, line)) for line in lines)]
+
+    def explained(self, mode, reason, stamp):
+        """What a refusal of a mode for a reason at a stamp [s] should say beside it; '' for nothing."""
+        if reason == modes.NO_UTC:
+            return 'say `prediction.start_time`'
+        if reason == modes.TOO_OLD:
+            return f'they are {abs(self._age(stamp)):.1f} days off, {self.parameters.oldest:g} are allowed'
+        if reason == modes.BELOW_HORIZON:
+            rises = _next_rise(self._satellite_angles if mode == modes.TLE else self._sun_angles, stamp)
+            if math.isnan(rises):
+                return f'it does not rise within {SEARCHED / DAY:g} days'
+            return f'it rises at {orbit.iso(*self._julian(rises))}'
+        return ''
+
+    def _julian(self, stamp):
+        """(Julian day, fraction) of a stamp [s]."""
+        start = self.parameters.start_time
+        begin = (orbit.instant('start_time', start) if start else
+                 datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=self.epoch * 1_000_000 // SECOND))
+        julian, fraction = orbit.julian_date(begin)
+        return julian, fraction + stamp / DAY
+
+    def _age(self, stamp):
+        """Time [days] from the epoch of the elements to a stamp [s]."""
+        julian, fraction = self._julian(stamp)
+        return julian - self._satellite.jdsatepoch + fraction - self._satellite.jdsatepochF
+
+    def _satellite_angles(self, times):
+        """Azimuth and elevation (n, 2) [rad] of the satellite at stamps (n,) [s]. Raises TargetError."""
+        julian, fraction = self._julian(0.0)
+        return _angles(orbit.enu(self._satellite, self.parameters.station, julian, fraction, times)[0])
+
+    def _sun_angles(self, times):
+        """Azimuth and elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
+        julian, fraction = self._julian(0.0)
+        fractions = fraction + times / DAY
+        origin, to_enu = station_frame(self.parameters.station)
+        fixed = np.einsum('nij,nj->ni', orbit.earth_fixed(julian, fractions),
+                          sun.position(julian - sun.J2000 + fractions))
+        return _angles(turned(to_enu, fixed - origin))
+
+
+def _angles(enu):
+    """Azimuth and elevation (n, 2) [rad] of ENU positions (n, 3)."""
+    east, north, up = enu.T
+    return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)
+
+
+def _table(angles_at, stamp, interval):
+    """The Predicted of angles_at(times), with a row every interval [s]."""
+    times = np.floor(stamp) - BEFORE + interval * np.arange(ROWS)
+    try:
+        angles = angles_at(times)
+    except TargetError:
+        return Predicted(NO_TRACK, modes.NO_ELEMENTS)
+    late = np.arange(ROWS // 2, ROWS * 19 // 20)
+    down = late[angles[late, 1] < 0.0]
+    return Predicted(ProgramTrack(times, angles), modes.NONE, float(times[0]),
+                     float(times[down[-1] if down.size else late[-1]]))
+
+
+def _next_rise(angles_at, stamp):
+    """Stamp [s] of the next rise after a stamp, to a second; NaN where there is none."""
+    times = stamp + np.arange(0.0, SEARCHED, LOOK)
+    try:
+        elevation = angles_at(times)[:, 1]
+    except TargetError:
+        return math.nan
+    rises = np.flatnonzero((elevation[:-1] < 0.0) & (elevation[1:] >= 0.0))
+    if not rises.size:
+        return math.nan
+    i = rises[0]
+    return times[i] - LOOK * elevation[i] / (elevation[i + 1] - elevation[i])

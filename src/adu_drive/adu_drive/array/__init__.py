@@ -1,0 +1,1 @@
+"""In the drive's place: the beam of a phased array."""

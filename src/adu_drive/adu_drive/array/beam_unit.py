@@ -1,0 +1,155 @@
+"""The unit of one electronic beam: its command, the beam in force, enable and emergency stop."""
+import math
+import typing
+
+import numpy as np
+
+from adu_drive.array import electronic_beam
+from pedestal_common.compiled import compiled
+from pedestal_common.graph import nodes, topics
+from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
+from pedestal_common.wire.commands import Reply
+from pedestal_common.wire.records import NEVER
+
+COMMAND, JOINTS, TRUTH = 'acu/reference', 'joint_states', 'adu/truth'
+CLOCK, STATE = 'clock', 'adu/state'
+
+CONDITIONS = topics.BY_NAME[STATE].texts
+ENABLED, DISABLED, EMERGENCY_STOP = map(CONDITIONS.index, ('enabled', 'disabled', 'emergency stop'))
+"""Codes of adu/state."""
+
+SWITCHES = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('invalid', 'i8')])
+"""wanted: 0 when it was asked to be disabled; emergency: 1 while a stop is latched; stamp: of the last step [ns];
+invalid: 1 when a command held no angle since the last diagnosis."""
+
+
+RECORD = np.dtype([('state', electronic_beam.STATE), ('constants', electronic_beam.CONSTANTS),
+                   ('inputs', electronic_beam.INPUTS), ('outputs', electronic_beam.OUTPUTS), ('switches', SWITCHES)],
+                  align=True)
+
+
+class Memory(typing.NamedTuple):
+    """All a beam works on."""
+    record: np.ndarray
+
+
+@compiled
+def condition(m):
+    """Code of adu/state of SWITCHES."""
+    return EMERGENCY_STOP if m.emergency else ENABLED if m.wanted else DISABLED
+
+
+@compiled
+def decode(u, m, command):
+    """Record of a command -> inputs of the beam, which is at the stamp of the last step."""
+    u.stamp_ns = m.stamp
+    u.due = 1 if command.stamp != NEVER and condition(m) == ENABLED else 0
+    if u.due == 1:
+        u.command_stamp_ns = command.stamp
+        u.position[0], u.position[1] = command.position[0], command.position[1]
+
+
+@compiled
+def encode(y, m, stamp, outputs):
+    """Outputs of the beam -> records of its messages. A beam has no rate and no torque, and it points where it says.
+    """
+    joints, truth = outputs[JOINTS], outputs[TRUTH]
+    joints.stamp = truth.stamp = outputs[CLOCK].stamp = stamp
+    for i in range(2):
+        joints.position[i] = truth.position[i] = y.position[i]
+    outputs[STATE] = condition(m)
+
+
+@compiled
+def law(memory, stamp, inputs, outputs):
+    """Step k: from t_k-1 to t_k by the command of step k - 1. While it is not enabled it hears nothing, and what is on
+    its way to it is lost."""
+    m = memory.record[0]
+    if m.switches.stamp != NEVER:
+        decode(m.inputs, m.switches, inputs[COMMAND])
+        if condition(m.switches) != ENABLED:
+            m.state.released = m.state.written
+        electronic_beam.step(m.state, m.constants, m.inputs, m.outputs)
+        m.switches.invalid |= m.outputs.invalid_command
+    m.switches.stamp = stamp
+    encode(m.outputs, m.switches, stamp, outputs)
+
+
+@compiled
+def laws(memory, stamps, inputs, outputs):
+    """`law` over arrays."""
+    for k in range(len(stamps)):
+        law(memory, stamps[k], inputs[k], outputs[k])
+
+
+class Beam(Unit):
+    """One beam of a BeamParameters. It does not feel the ship."""
+    NODE, COMMAND, LAWS = nodes.ARRAY, COMMAND, {Memory: (law, laws)}
+    REQUESTS = ('adu/enable', 'adu/disable', 'adu/emergency_stop', 'adu/reset_faults')
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        p = parameters
+        switches = np.zeros(1, SWITCHES)
+        switches['wanted'], switches['stamp'] = 1, NEVER
+        constants = electronic_beam.constants(p.period, p.transport_delay, p.command_timeout * p.period)
+        self.memory = Memory(joined(RECORD, constants=constants, switches=switches,
+                                    state=electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)))
+        electronic_beam.read(self.parts['state'], self.parts['outputs'])
+
+    def latency(self, topic):
+        """How old a command is that a step reads [s]: that of the step before."""
+        return self.parameters.period
+
+    rests = True
+    """An array has nothing that turns."""
+
+    def encode(self, topic, code):
+        """The text of a code of adu/state."""
+        return CONDITIONS[code]
+
+    @property
+    def condition(self):
+        """The text of adu/state as it is now, also between two steps."""
+        return CONDITIONS[condition(self.parts['switches'])]
+
+    def request(self, name):
+        """Enable, disable, stop or reset; the Reply names the state that follows, or why it is refused."""
+        m = self.parts['switches']
+        if name == 'adu/enable' and m['emergency']:
+            return Reply(False, 'refused: an emergency stop is latched (adu/reset_faults); '
+                         f'drive is {self.condition}')
+        if name in ('adu/enable', 'adu/disable'):
+            m['wanted'] = name == 'adu/enable'
+        else:
+            m['emergency'] = name == 'adu/emergency_stop'
+        return Reply(True, f'drive is {self.condition}')
+
+    def requests_for(self, topic, text):
+        """The services that lead to a text of adu/state."""
+        if text == CONDITIONS[EMERGENCY_STOP]:
+            return ['adu/emergency_stop']
+        latched = self.parts['switches']['emergency']
+        return [*(['adu/reset_faults'] if latched else []), 'adu/enable' if text == 'enabled' else 'adu/disable']
+
+    def diagnose(self):
+        """How it is: ERROR in an emergency stop or after a command that it did not obey, WARN while disabled."""
+        outputs, switches = self.parts['outputs'], self.parts['switches']
+        invalid, switches['invalid'] = switches['invalid'], 0
+        values = [*((f'{axis}_deg', f'{math.degrees(angle):.4f}')
+                    for axis, angle in zip(topics.AXES, outputs['position'])), ('state', self.condition)]
+        if self.condition != 'enabled':
+            return Diagnosis(ERROR if switches['emergency'] else WARN, self.condition, values)
+        if invalid:
+            return Diagnosis(ERROR, f'{COMMAND} holds NaN or infinity, goes beyond {electronic_beam.LARGEST:g} rad or '
+                             'is not newer than the one before: the beam stays', values)
+        if outputs['stale']:
+            limit = self.parameters.command_timeout * self.parameters.period
+            return Diagnosis(ERROR, f'no new {COMMAND} for {limit:g} s: the beam stays', values)
+        return Diagnosis(OK, 'following', values)
+
+    @staticmethod
+    def idle(numbers):
+        """Why a recording did not exercise it: its command never changed."""
+        angles = numbers[COMMAND][:, :2]
+        return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'

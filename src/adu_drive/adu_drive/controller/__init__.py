@@ -1,0 +1,1 @@
+"""The laws of the drive's controller, on the motor shaft."""

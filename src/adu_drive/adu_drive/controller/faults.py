@@ -1,0 +1,106 @@
+"""What a drive trips on, from what it measures itself. A fault stays until it is reset (drive_state.request)."""
+import typing
+
+from adu_drive.plant import thermal
+from pedestal_common.compiled import inlined
+
+
+class Fault(typing.NamedTuple):
+    """A fault of an axis: its name, what it is told by, the parameters of an axis that say when; stops: whether the
+    drive stops on it."""
+    name: str
+    doc: str
+    parameters: tuple
+    stops: bool = True
+
+
+FAULTS = (
+    Fault('overcurrent', 'phase current of a motor; torque off at once, the brakes fall in', ('faults.overcurrent',)),
+    Fault('overspeed', 'speed of a motor over the gear ratio', ('faults.overspeed',)),
+    Fault('encoder disagreement', 'load encoder against the mean of the motor encoders',
+          ('faults.encoder_disagreement',)),
+    Fault('following error', 'rate wanted against rate measured, for longer than `faults.following_time`',
+          ('faults.following_error', 'faults.following_time')),
+    Fault('overtemperature', 'I2t of a motor, 1 after rated torque for ever; gone below 0.8',
+          ('faults.overtemperature', 'thermal')),
+    *(Fault(f'motor {i} lost', 'its amplifier reports that it makes no torque; the other motor goes on alone, without '
+            'bias; without either the brakes fall in', (), stops=False) for i in (1, 2)),
+    Fault('final limit', 'switch behind the end of travel, whatever the encoders say, while the axis moves outwards; '
+          'torque off at once, the brakes fall in; once it is reset the drive leads back', ('limits.final',)),
+    Fault('emergency limit', 'switch behind the final one; as that, but it is not reset there: the axis is led back '
+          'by hand', ('limits.emergency',)),
+    Fault('stow pin', 'a stow pin is not where it was sent within `pins.timeout`', ('pins.timeout',)),
+)
+"""Bit i of a fault word stands for FAULTS[i]."""
+(OVERCURRENT, OVERSPEED, DISAGREEMENT, FOLLOWING, OVERTEMPERATURE, MOTOR_1_LOST, MOTOR_2_LOST, FINAL_LIMIT,
+ EMERGENCY_LIMIT, STOW_PIN) = (1 << i for i in range(len(FAULTS)))
+MOTORS_LOST = MOTOR_1_LOST | MOTOR_2_LOST
+ALL = (1 << len(FAULTS)) - 1
+_DROPS = OVERCURRENT | FINAL_LIMIT | EMERGENCY_LIMIT
+_STOPS = sum(1 << i for i, fault in enumerate(FAULTS) if fault.stops)
+
+
+def names(bits):
+    """The names of the faults in a fault word, a tuple."""
+    return tuple(fault.name for i, fault in enumerate(FAULTS) if int(bits) >> i & 1)
+
+
+OUTWARDS = 1e-3
+"""Rate [rad/s] from which an axis moves further behind its end."""
+
+
+@inlined
+def stops(bits):
+    """Whether the drive stops on the faults of an axis."""
+    return bits & _STOPS != 0 or bits & MOTORS_LOST == MOTORS_LOST
+
+
+@inlined
+def drops(bits):
+    """Whether nothing is left to stop an axis under control: the brakes fall in at once."""
+    return bits & _DROPS != 0 or bits & MOTORS_LOST == MOTORS_LOST
+
+
+@inlined
+def late(periods, error, limit):
+    """Periods in a row in which the rate error [rad/s] was beyond its limit."""
+    return periods + 1 if abs(error) > limit else 0
+
+
+@inlined
+def lost(motors):
+    """Fault word of the motors (2,) whose amplifiers are off."""
+    return (MOTOR_1_LOST if motors[0] else 0) | (MOTOR_2_LOST if motors[1] else 0)
+
+
+@inlined
+def at_end(theta, omega, c):
+    """Fault word of the switches behind the ends of travel, with the load at theta [rad] at a rate omega [rad/s]."""
+    bits = 0
+    if theta > c.final_high and omega > OUTWARDS or theta < c.final_low and omega < -OUTWARDS:
+        bits |= FINAL_LIMIT
+    if theta > c.emergency_high or theta < c.emergency_low:
+        bits |= EMERGENCY_LIMIT
+    return bits
+
+
+@inlined
+def detected(current_2, omega, disagreement, late_periods, heat, latched, c):
+    """Fault word of one period of one axis; c its trip levels (see params.FaultParameters).
+
+    current_2: larger square of a motor's current [A2]; omega: larger motor speed [rad/s]; disagreement: load encoder
+    less mean motor encoder over the ratio [rad]; heat: larger thermal load of a motor, which must fall below
+    thermal.WARM to be gone once it is latched.
+    """
+    bits = 0
+    if current_2 > c.current_2:
+        bits |= OVERCURRENT
+    if omega > c.omega:
+        bits |= OVERSPEED
+    if abs(disagreement) > c.disagreement:
+        bits |= DISAGREEMENT
+    if late_periods >= c.late_periods:
+        bits |= FOLLOWING
+    if heat > (min(thermal.WARM, c.heat) if latched & OVERTEMPERATURE else c.heat):
+        bits |= OVERTEMPERATURE
+    return bits

@@ -1,0 +1,70 @@
+"""From the angles of the two axes to where the beam points: a pedestal that is not built as its drawing.
+
+Convention: every term is what must be ADDED to the wanted deck angles to get the angles to command (the VLBI Field
+System's, katpoint's). To first order, A the azimuth and E the elevation, with P of katpoint.PointingModel:
+
+    dA = non_perpendicularity tan E - collimation / cos E + (tilt_forward sin A - tilt_starboard cos A) tan E
+    dE = tilt_forward cos A + tilt_starboard sin A + sag cos E            P3, P4, P5, P6, P8; the zeros are P1, P7
+
+Here they are rotations, exact at any elevation. From the beam outwards: collimation sets it off the normal of the
+elevation axis, elevation turns it, less the sag, non_perpendicularity leans the elevation axis, azimuth turns that,
+and the pedestal's tilt leans the azimuth axis.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import angles, wrap
+
+ZENITH = 1e-9
+"""Closer to the zenith [rad] the azimuth of a beam turns no faster."""
+
+
+def _tilt(forward, starboard):
+    """Rotation (3, 3), FLU, that leans the vertical by `forward` and `starboard` [rad] about one horizontal axis."""
+    tau = math.hypot(forward, starboard)
+    if tau == 0.0:
+        return np.eye(3)
+    K = np.array([[0.0, 0.0, forward], [0.0, 0.0, -starboard], [-forward, starboard, 0.0]]) / tau
+    return np.eye(3) + math.sin(tau) * K + (1.0 - math.cos(tau)) * np.einsum('ij,jk', K, K)
+
+
+def constants(p):
+    """Constants of MountParameters: nested dictionary."""
+    lean, off = p.non_perpendicularity, p.collimation
+    return {'true': int(p.tilt_forward == p.tilt_starboard == lean == off == p.sag == 0.0),
+            'tilt': _tilt(p.tilt_forward, p.tilt_starboard), 'sin_lean': math.sin(lean), 'cos_lean': math.cos(lean),
+            'sin_off': math.sin(off), 'cos_off': math.cos(off), 'sag': p.sag}
+
+
+@compiled
+def _leaning(c, x, y, z):
+    """A vector of the elevating part in the yoke, whose elevation axis leans."""
+    return x, c.cos_lean * y + c.sin_lean * z, c.cos_lean * z - c.sin_lean * y
+
+
+@compiled
+def beam(c, A, E, A_dot, E_dot):
+    """((azimuth, elevation) [rad], their rates [rad/s]) of the beam on the deck, from angles and rates of the axes.
+
+    The azimuth is the one nearest to its axis. Past 90 deg the beam is told as its axes are, over the zenith.
+    """
+    E_beam, E_beam_dot = E - c.sag * math.cos(E), (1.0 + c.sag * math.sin(E)) * E_dot
+    cos_E, sin_E = c.cos_off * math.cos(E_beam), c.cos_off * math.sin(E_beam)
+    x, y, z = _leaning(c, cos_E, -c.sin_off, sin_E)
+    vx, vy, vz = _leaning(c, -E_beam_dot * sin_E, 0.0, E_beam_dot * cos_E)
+    cos_A, sin_A = math.cos(A), math.sin(A)
+    x, y = x * cos_A + y * sin_A, y * cos_A - x * sin_A
+    vx, vy = vx * cos_A + vy * sin_A + A_dot * y, vy * cos_A - vx * sin_A - A_dot * x
+    T = c.tilt
+    x, y, z = (T[0, 0] * x + T[0, 1] * y + T[0, 2] * z, T[1, 0] * x + T[1, 1] * y + T[1, 2] * z,
+               T[2, 0] * x + T[2, 1] * y + T[2, 2] * z)
+    vx, vy, vz = (T[0, 0] * vx + T[0, 1] * vy + T[0, 2] * vz, T[1, 0] * vx + T[1, 1] * vy + T[1, 2] * vz,
+                  T[2, 0] * vx + T[2, 1] * vy + T[2, 2] * vz)
+    azimuth, elevation = angles(x, y, z)
+    level = max(x * x + y * y, ZENITH * ZENITH)
+    azimuth_rate, elevation_rate = (y * vx - x * vy) / level, vz / math.sqrt(level)
+    if E > 0.5 * math.pi:
+        azimuth, elevation, elevation_rate = azimuth + math.pi, math.pi - elevation, -elevation_rate
+    return (A + wrap(azimuth - A), elevation), (azimuth_rate, elevation_rate)

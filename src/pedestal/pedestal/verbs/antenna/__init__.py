@@ -1,0 +1,1 @@
+"""Verbs for an antenna that runs: start it, ask it, command it."""

@@ -1,0 +1,122 @@
+"""run a scenario as separate nodes and record it
+
+Exit code 0; 1 where it cannot run, or the recording is not complete; 3 where a realtime run ended before its planned
+end, or its drive lost more than 1 % of its steps outside announced restarts; 130 where it was stopped."""
+import pathlib
+import sys
+
+from pedestal import stop
+from pedestal.verbs import arguments
+from pedestal_analysis import console
+
+
+def add_arguments(parser):
+    """Scenario, pacing, duration, seed, bag, parameters."""
+    parser.add_argument('scenario', help='name (see `pedestal scenarios`) or path of a .yaml')
+    parser.add_argument('--pacing', choices=('lockstep', 'realtime'), help='default: what the scenario says')
+    parser.add_argument('--duration', type=float, metavar='S', help="length of the run in the drive's time")
+    parser.add_argument('--seed', type=int, metavar='N', help='seed of every noise stream')
+    arguments.add_new_bag(parser)
+    console.add_json(parser)
+    console.add_explain(parser)
+    arguments.add_param(parser)
+    parser.add_argument('--tle', type=pathlib.Path, metavar='FILE', help='track this satellite: TLE, or OMM as KVN, '
+                        'XML, JSON, CSV')
+    parser.add_argument('--satellite', default='', metavar='NAME', help='name or number, where the file has '
+                        'several')
+    parser.add_argument('--station', metavar='LAT,LON,H', help='where the antenna stands: degrees, degrees, metres')
+    parser.add_argument('--pass', dest='which', metavar='WHICH', help='from rise to set: next, the number N or a UTC '
+                        '(2019-12-10T12:35) of a pass; list: print the passes. Default with --tle: next')
+    arguments.add_params_file(parser)
+    from pedestal_bringup.graph import beside
+    beside.add_arguments(parser)
+
+
+LARGEST_LOSS = 0.01
+"""Share of its steps that a drive in realtime may lose, beside those of an announced restart."""
+
+
+def main(options):
+    """Run, record and print the results; the exit code. Raises RuntimeError where the recording is not complete."""
+    from pedestal_bringup.graph import beside, graph
+    from pedestal_bringup.scenario.program import Plan
+    from pedestal_common.graph import nodes
+    chosen = _chosen(options)
+    if chosen is None:
+        return 0
+    bag = graph.new_bag(options.bag, chosen.name)
+    console.check_json(options.json)
+    plan = Plan(chosen)
+    for line in plan.announced():
+        print(line)
+    with beside.servers(options, chosen.header, bag):
+        outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration))
+    # With scipy, which takes half a second: nobody waits for it before the first step.
+    from pedestal_analysis.results import results
+    from pedestal_recording.bag import read
+    from pedestal_recording.verify import verify
+    if outcome.stopped:
+        print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+        if not outcome.recorder.get('messages'):
+            return stop.EXIT_CODE
+    recording = read(bag)
+    beams = [prefix[:-1] for prefix in chosen.prefixes]
+    parts = [results.of_bag(recording.view(beam)) for beam in beams]
+    of_beams = [results.measured(of) for of in parts]
+    realtime = chosen.header.pacing == 'realtime'
+    whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
+    lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
+    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
+                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')},
+                         [results.marks(of) for of in parts])
+    if options.explain:
+        console.explain(results.RESULTS, {*of_beams[0], *whole})
+    print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
+    rows = [row for beam, values in zip(beams, of_beams)
+            for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
+    console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
+                                      'mcap_sha256': outcome.recorder['sha256']})
+    if outcome.stopped:
+        return stop.EXIT_CODE
+    check = verify(recording)
+    if not realtime and check.aborted or not (check.complete or outcome.restarts):
+        raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
+    if not check.complete:
+        print('pedestal: the recording has gaps, a node was started again:\n' + '\n'.join(check.problems),
+              file=sys.stderr)
+    planned = chosen.header.duration / chosen.node_parameters(nodes.DRIVE).period
+    disturbed = [check.ending] if check.aborted else []
+    if outcome.losses > LARGEST_LOSS * planned:
+        disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than {LARGEST_LOSS:.0%}, '
+                         'outside announced restarts')
+    for reason in disturbed:
+        print(f'pedestal: {reason}', file=sys.stderr)
+    return console.EXIT_DISTURBED if disturbed else 0
+
+
+def _chosen(options):
+    """The Scenario that the options name, with their satellite, station and pass; None where the passes were listed
+    instead."""
+    from pedestal_bringup.scenario import scenario
+    changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
+    duration = options.duration
+    if not (options.tle or options.station or options.which):
+        return scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
+    import datetime
+
+    from pedestal import satellite
+    if options.station:
+        changes = satellite.station_changes(options.station) + changes
+    if options.tle:
+        changes = satellite.tle_changes(options.tle, options.satellite) + changes
+    draft = scenario.draft(options.scenario)
+    if options.tle or options.which:
+        now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
+        sky = satellite.Sky(draft.changed(changes), now)
+        if options.which == 'list':
+            sky.list()
+            return None
+        start, length, line = sky.choose(options.which or 'next')
+        print(line)
+        changes, duration = start + changes, duration or length
+    return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)

@@ -1,0 +1,1 @@
+"""Verbs for a choice: scenarios, parameters, studies, trials, tuning, benchmarks."""

@@ -1,0 +1,34 @@
+"""write a scenario of your own antenna from the numbers of its data sheet
+
+What the data sheet does not say is scaled from the antenna that comes with the product; every value is explained in
+the file. `pedestal tune FILE --loops` then finds the loops for it and measures their margins."""
+import pathlib
+
+from pedestal_common import parameters
+
+
+def add_arguments(parser):
+    """The file, and the numbers of the data sheet."""
+    from pedestal_analysis.tuning.sheet import DataSheet
+    parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml')
+    for name, field in parameters.flatten(DataSheet):
+        unit = field.metadata.get('unit')
+        allowed = ', '.join(field.metadata.get('options', ()))
+        described = f'{field.metadata["doc"]}{f": {allowed}" if allowed else ""}; default: {field.default}'
+        parser.add_argument(f'--{name.replace("_", "-")}', type=field.type, default=field.default,
+                            metavar=unit.upper().replace(' ', '') if unit else 'SCENARIO' if allowed else 'RATIO',
+                            help=described.replace('%', '%%'))
+
+
+def main(options):
+    """Write the file. Raises ValueError for what cannot be, FileExistsError where it is there."""
+    from pedestal_analysis.tuning import data_sheet
+    from pedestal_analysis.tuning.sheet import DataSheet
+    if options.file.suffix not in ('.yaml', '.yml'):
+        raise ValueError(f'{options.file}: must end in .yaml, as every scenario')
+    if options.file.exists():
+        raise FileExistsError(f'{options.file} is there already and is not overwritten')
+    sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
+    options.file.write_text(data_sheet.new(sheet, options.file.stem, options.command))
+    print(f'written: {options.file}  (pedestal tune {options.file} --loops)')
+    return 0

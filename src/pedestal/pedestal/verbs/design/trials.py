@@ -1,0 +1,98 @@
+"""run a scenario many times with varied parameters: percentiles, rates, sensitivities, the worst trials
+
+Each trial has a seed of its own and the results of `pedestal run`, from the closed loop without ROS; the commands of
+the worst ones give the same numbers in the graph. --vary NODE.KEY=DISTRIBUTION draws a parameter: uniform(low, high),
+normal(mean, sigma) or choice(a, b, ...), with an x behind it a factor of what the scenario says; or it names a .csv
+whose columns are parameters and whose rows are trials. Rows are written to OUTPUT/trials.csv as they come; after
+Ctrl-C, or worse, the same command goes on. With --against or --against-param the trials of two sides are compared
+pair by pair: the same seeds and draws for both."""
+import contextlib
+import pathlib
+import sys
+
+from pedestal.verbs import arguments
+from pedestal_analysis import console
+
+WORST = 10
+"""Trials whose commands are printed."""
+
+
+def add_arguments(parser):
+    """Scenario, what is varied, how often, who works, what it is compared with."""
+    parser.add_argument('scenario', help='name (see `pedestal scenarios`) or path of a .yaml')
+    parser.add_argument('--runs', type=int, metavar='N', help='trials; default: 100, or the rows of a .csv')
+    parser.add_argument('--vary', action='append', default=[], metavar='NODE.KEY=DISTRIBUTION|FILE.csv',
+                        help="for example 'adu.azimuth.load.inertia=normal(1, 0.1)x'; may be repeated")
+    parser.add_argument('--sobol', action='store_true', help='draw the points of a Sobol sequence, which fill the '
+                        'ranges evenly')
+    parser.add_argument('--duration', type=float, metavar='S', help='of a trial')
+    parser.add_argument('--seed', type=int, metavar='N', help='of the first trial; default: what the scenario says')
+    arguments.add_param(parser)
+    arguments.add_params_file(parser)
+    parser.add_argument('--against', metavar='SCENARIO', help='compare with another scenario')
+    parser.add_argument('--against-param', action='append', default=[], metavar='NODE.KEY=VALUE',
+                        help='compare with this change; may be repeated')
+    parser.add_argument('--by', metavar='RESULT', help='the result that ranks the trials and decides a comparison; '
+                        'default: pointing_rms_deg')
+    arguments.add_workers(parser)
+    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: trials/SCENARIO')
+    console.add_json(parser)
+
+
+def main(options):
+    """Make the trials, print what they say, write table, page and rows."""
+    from pedestal_analysis.report import trials_page
+    from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
+    plans = _plans(options)
+    console.check_json(options.json)
+    folder = options.output or pathlib.Path('trials', plans[0].name)
+    with contextlib.ExitStack() as stack:
+        tables = [stack.enter_context(ensemble.table(plan, folder, name))
+                  for plan, name in zip(plans, ('trials', 'against'))]
+        pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
+        progress = stack.enter_context(console.progress_of_trials())
+        try:
+            ensemble.make(plans, tables, pool, progress)
+        except KeyboardInterrupt:
+            print(f'pedestal: {sum(len(table.rows) for table in tables)} of {sum(plan.runs for plan in plans)} trials '
+                  f'are in {folder}; the same command goes on', file=sys.stderr)
+            raise
+    names = comparison.names(*plans) if len(plans) > 1 else (plans[0].name,)
+    sides = comparison.Sides(*names, *tables) if len(plans) > 1 else None
+    by = statistics.ranked_by(tables[0], options.by)
+    rows = comparison.rows(sides) if sides else []
+    for name, table in zip(names, tables):
+        rows += [*statistics.of_results(name, table), *statistics.of_questions(name, table),
+                 *statistics.of_sensitivity(name, table)]
+    shown = trials_page.read(plans[0], tables[0], by, sides, options.command, WORST)
+    file = folder / 'trials.html'
+    file.write_text(trials_page.page(shown, rows), encoding='utf-8')
+    console.show_trials(f'{plans[0].runs} trials: {" against ".join(names)}', rows)
+    print('\n'.join(_sensitivities(rows, by)))
+    print(f'the worst trials by {by}:')
+    for i in shown.worst:
+        print(f'{console.number(tables[0].column(by)[i]):>10}  {plans[0].command(i)}')
+    if sides:
+        print(comparison.sentence(sides, by))
+    print(f'table {tables[0].file}, page {file}')
+    console.write_json(options.json, {'name': plans[0].name, 'rows': rows})
+    return 0
+
+
+def _plans(options):
+    """The plan.Plan of the trials, and that of what they are compared with."""
+    from pedestal_analysis.trials.plan import plan
+    from pedestal_bringup.scenario import scenario
+    changes = (*(scenario.file_overrides(options.params_file) if options.params_file else ()), *options.param)
+    first = plan(options.scenario, options.runs, options.vary, changes, options.seed, options.duration, options.sobol)
+    if not (options.against or options.against_param):
+        return [first]
+    return [first, plan(options.against or options.scenario, first.runs, options.vary,
+                        (*changes, *options.against_param), first.seed, options.duration, options.sobol)]
+
+
+def _sensitivities(rows, by):
+    """Lines: how the ranking result goes with the varied parameters, the strongest first."""
+    found = [row for row in rows if row['metric'].startswith(f'{by}/rank_correlation(')]
+    return [f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'
+            for row in sorted(found, key=lambda row: -abs(row['value']))]

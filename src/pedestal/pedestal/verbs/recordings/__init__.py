@@ -1,0 +1,1 @@
+"""Verbs for a recording: verify, mend, report, export, and make it again."""

@@ -1,0 +1,1 @@
+"""What recordings and trials show: results, reports, reprocessing, many runs, tuning."""

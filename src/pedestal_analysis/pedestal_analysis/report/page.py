@@ -1,0 +1,247 @@
+"""The page that `pedestal report` writes: a recording as one HTML file that needs nothing else, its figures as PNG."""
+import html
+import itertools
+import pathlib
+
+import numpy as np
+
+from pedestal_analysis.report import (
+    attitude_figures,
+    elements,
+    figures,
+    filter_figures,
+    run_data,
+    run_figures,
+    subject,
+)
+from pedestal_analysis.results import consistency, isolation, results, tracking
+from pedestal_analysis.results.tracking import DEGREES
+from pedestal_common.graph import topics
+from pedestal_common.graph.topics import AXES
+from pedestal_common.text_files.files import sha256
+from pedestal_recording import bag as bags
+from pedestal_recording.verify import verify
+
+SHOWN = 200
+"""Rows of the table of diagnostics at the most."""
+
+def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathlib.Path:
+    """Write the report of a bag and return where: output, default report.html in the bag (beside a bare .mcap).
+
+    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there; vector: 'pdf'
+    or 'svg', as that too. The same bag gives the same bytes.
+    Raises bag.BagError when the bag cannot be read to its end, OSError when the report cannot be written.
+    """
+    whole = bags.read(bag_path)
+    bag = whole.view(beam)
+    output = pathlib.Path(output) if output is not None else bag.file.parent / 'report.html'
+    data = run_data.read(bag)
+    page = _page(bag, data, verify(whole))
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text(page, encoding='utf-8')
+    if png_folder is not None:
+        folder = pathlib.Path(png_folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        for spec in (*run_figures.FIGURES, *filter_figures.FIGURES, *attitude_figures.FIGURES, run_figures.OVERVIEW):
+            if not data.lacks(spec.needs):
+                for kind in ('png', *([vector] if vector else ())):
+                    figures.render(spec, data, folder / f'{spec.key}.{kind}')
+    return output
+
+
+def _of_axes(name, values, last=''):
+    """A row of numbers [(value, unit)] of azimuth and elevation."""
+    return [name, *(elements.number(*value) for value in values), last]
+
+
+def _pointing(bag, data, values):
+    """Rows of the table of pointing and torques, per axis."""
+    noise = values['single_sample_noise_deg'][0]
+
+    def row(name, *keys, scale=1.0, unit='deg'):
+        return [name, *(elements.number(values[key][0] / scale, unit) for key in keys)]
+
+    rms = ('cross_elevation_rms_deg', 'elevation_rms_deg', 'pointing_rms_deg')
+    largest = ('cross_elevation_max_deg', 'elevation_max_deg', 'pointing_max_deg')
+    joints = run_data.table(bag, 'joint_states')
+    by_encoders = [row(f'the same by the encoders, {name}', *(f'encoder_{key}' for key in keys))
+                   for name, keys in (('rms', rms), ('largest', largest))] if data.run.has_encoders else []
+    return [row('pointing error, rms', *rms), row('pointing error, largest', *largest), *by_encoders,
+            row("rms / receiver's single-sample noise", *rms, scale=noise, unit=''),
+            row("largest / receiver's single-sample noise", *largest, scale=noise, unit=''),
+            row('noise reduction by the filter', 'noise_reduction_cross_elevation', 'noise_reduction_elevation',
+                'noise_reduction', unit=''),
+            _of_axes('load torque, rms of the run',
+                     [(tracking.known_rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm') for axis in AXES]),
+            *_torques(data)]
+
+
+def _torques(data):
+    return [_of_axes(f'torque of motor {i}, rms of the run',
+                     [(tracking.known_rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
+            for i in (1, 2)] if data.motors else []
+
+
+def _labelled(parts, *names):
+    """Rows [label, number] of the results of some parts: those named, else all that have a label."""
+    values = results.measured(parts)
+    return [[results.BY_NAME[name].label, elements.number(*values[name])] for name in names or values
+            if results.BY_NAME[name].label]
+
+
+def _loop(bag, check):
+    """Rows on the control loop: its rate in the drive's time, in realtime also in wall time, and what was lost."""
+    rows = []
+    joints = run_data.table(bag, 'joint_states')
+    if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
+        t = joints['t']
+        rows.append(["loop rate achieved (drive's time)", elements.number((t.size - 1) / (t[-1] - t[0]), 'Hz')])
+        if bag.metadata.get('pacing') == 'realtime':
+            wall = bag.rows('joint_states').publish
+            jitter = (np.diff(wall) - check.period * 1e9) / 1e6
+            late = np.percentile(np.abs(jitter), 99.0)
+            rate = (t.size - 1) / max(wall[-1] - wall[0], 1) * 1e9
+            rows += [['loop rate achieved (wall time)', elements.number(rate, 'Hz')],
+                     ['jitter of the step, wall time',
+                      f'{tracking.known_rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
+                      f'largest {np.abs(jitter).max():.3g} ms']]
+    missing = max([check.steps - topic.count for topic in check.topics
+                   if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],
+                  default=0)
+    return [*rows, ['steps', f'{check.steps}'],
+            ['lost steps, made by the drive without the command for them', check.lost_steps or '0'],
+            ['steps missing in the recording', f'{max(missing, 0)}'],
+            ['recording', 'complete, every step once and in order' if check.complete else
+             'NOT complete, see below']]
+
+
+def _results(bag, data, check):
+    """The section of the run against the truth, as far as it goes, and of its loop."""
+    parts, rows = ['<h2 id="results">Results</h2>'], []
+    if data.run is None:
+        parts.append(f'<p class="bad">Not compared with the truth: {html.escape(data.no_truth)}.</p>')
+        if data.motors:
+            parts.append(elements.table(['', 'azimuth', 'elevation', ''], _torques(data), 'n'))
+    else:
+        known = results.of_tracking(data.run)
+        if tracking.by_encoders(bag):
+            parts.append(f'<p class="bad">Pointing errors by the encoders: {html.escape(tracking.BY_ENCODERS)}.</p>')
+        if not data.run.tracking.any():
+            parts.append('<p class="bad">The run was never in autotrack for longer than the settling time, so nothing '
+                         'was evaluated.</p>')
+        parts.append(elements.table(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
+                                    _pointing(bag, data, results.measured(known)), 'n'))
+        parts.append('<p class="soft">Pointing and noise over the evaluated part: autotrack, from '
+                     f'{tracking.SETTLING:g} s after its start. Both axes: all samples of both, per axis.'
+                     '</p>')
+        rows = _labelled(known, 'single_sample_noise_deg', 'lock_time_s', 'autotrack_time_s', 'evaluated_time_s',
+                         'loss_s')
+    return [*parts, elements.table(None, rows + _loop(bag, check), 'n')]
+
+
+def _gaps(bag, check):
+    """What verify found, and the topics without a message."""
+    parts = []
+    if not check.complete:
+        problems = check.problems + [f'{topic.name}: {problem}' for topic in check.topics
+                                     for problem in topic.problems]
+        parts.append('<h2 id="gaps">What the recording lacks</h2><ul>' + ''.join(
+            f'<li>{html.escape(problem)}</li>' for problem in problems) + '</ul>')
+    absent = [topic for topic in bag.graph if topic not in bag.topics or not bag.rows(topic).size]
+    if absent:
+        parts.append(f'<p class="soft">No message in this bag of: {", ".join(absent)}.</p>')
+    return parts
+
+
+def _warnings(check):
+    """What a reader must know before any number: that the run was aborted, and that steps were lost."""
+    return [line for line in (check.ending, check.loss) if line]
+
+
+def _figures(module, data):
+    return [elements.figure(spec, data, data.lacks(spec.needs)) for spec in module.FIGURES]
+
+
+def _honesty(known):
+    """The table of a consistency.Consistency, and a sentence for each axis."""
+    judged = [consistency.axis(known, i) for i in range(2)]
+
+    def row(name, field, marks=(), unit='', scale=1.0):
+        return _of_axes(name, [(scale * getattr(axis, field), unit) for axis in judged], ', '.join(marks))
+
+    marks = [[f'{name}: {consistency.mark(*of)}' for name, of in zip(AXES, means) if consistency.mark(*of)]
+             for means in ([(axis.nis, axis.nis_expected, axis.nis_band) for axis in judged],
+                           [(axis.nees, consistency.FREEDOMS, axis.nees_band) for axis in judged])]
+    rows = [row('mean NIS', 'nis', marks[0]), row('expected of an honest filter', 'nis_expected'),
+            row(f'NIS inside their {100.0 * consistency.PART:g} % band', 'nis_inside', unit='%', scale=100.0),
+            row('mean NEES (angle and rate)', 'nees', marks[1]),
+            [f'{100.0 * consistency.PART:g} % band of the mean, 2 expected',
+             *(' to '.join(map(elements.number, axis.nees_band)) for axis in judged), ''],
+            row('independent errors', 'count'),
+            row('angle error, rms', 'error', unit='deg', scale=DEGREES),
+            row('sigma it states', 'sigma', unit='deg', scale=DEGREES),
+            row('rate error, rms', 'rate_error', unit='deg/s', scale=DEGREES),
+            row('rate sigma it states', 'rate_sigma', unit='deg/s', scale=DEGREES)]
+    verdicts = ''.join(f'<p>{name.capitalize()}: {html.escape(axis.verdict)}.</p>' for name, axis in zip(AXES, judged))
+    return elements.table(['', 'azimuth', 'elevation', ''], rows, 'n') + verdicts + (
+        '<p class="soft">Over the evaluated part. NIS: innovations in units of what the filter expects of them; NEES: '
+        'errors against the truth in units of what it states. On a ship the attitude error of the INS is among them, '
+        'which no filter of the target knows.</p>')
+
+
+def _deck(bag, data):
+    """The section of what the INS knew and of what the ship's rotation left in the pointing error; none ashore."""
+    if data.attitude is None:
+        return []
+    ship = isolation.read(bag, data.run) if data.run is not None else None
+    return ['<h2 id="attitude">The deck</h2>',
+            elements.table(None, _labelled({'attitude': data.attitude}) + _labelled({'isolation': ship}), 'n'),
+            *_figures(attitude_figures, data)]
+
+
+def _diagnostics(statuses):
+    """The section of what was not OK: a status that a node repeats is one row."""
+    title = '<h2 id="diagnostics">Diagnostics that were not OK</h2>'
+    rows = {}
+    for node in dict.fromkeys(node for _, node, _, _ in statuses):
+        own = [(place, status) for place, status in enumerate(statuses) if status[1] == node]
+        for (level, message), group in itertools.groupby(own, lambda row: row[1][2:]):
+            places, stamps = zip(*((place, stamp) for place, (stamp, *_) in group))
+            if level:
+                when = f'{stamps[0]:.1f}' if len(stamps) == 1 else f'{stamps[0]:.1f} to {stamps[-1]:.1f}'
+                rows[places[0]] = [when, node, run_figures.LEVELS[min(level, 3)][0], message]
+    if not rows:
+        return [title, '<p>None.</p>' if statuses else '<p class="soft">No diagnostics in the bag.</p>']
+    more = [f'<p class="soft">and {len(rows) - SHOWN} more.</p>'] if len(rows) > SHOWN else []
+    shown = [rows[place] for place in sorted(rows)][:SHOWN]
+    return [title, elements.table(['time [s]', 'node', 'level', 'message'], shown), *more]
+
+
+def _made(bag, data):
+    """The table of what a bag is of, how it was made and what its file is."""
+    stamps = bag.index.log
+    duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
+    versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in bag.metadata.items()
+                         if key.startswith('version.'))
+    rows = [[key, value] for key, value in bag.metadata.items() if not key.startswith(('version.', 'beamwidth'))]
+    rows = [*subject.rows(bag, data), *rows, ['duration', f'{duration:g} s'],
+            ['versions', versions or 'not in the bag'],
+            ['file', f'{", ".join(file.name for file in bag.files)}, '
+             f'{sum(file.stat().st_size for file in bag.files) / 1e6:.2f} MB, {stamps.size} messages'],
+            ['sha256', ', '.join(map(sha256, bag.files))]]
+    return elements.table(None, rows, 'meta')
+
+
+def _page(bag, data, check):
+    name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
+    parts = [
+        f'<h1>Tracking run: {html.escape(name)}</h1>',
+        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)), _made(bag, data),
+        *_results(bag, data, check), *_gaps(bag, check),
+        '<h2 id="figures">Figures</h2><p class="soft">The paper: antenna tracking with a Kalman filter and a '
+        'dual-motor anti-backlash drive, its UAV experiment. Grey: measured, blue: filtered or achieved, '
+        'orange: truth.</p>',
+        *_figures(run_figures, data),
+        '<h2 id="filter">Is the filter honest?</h2>', *([_honesty(data.filter)] if data.filter is not None else []),
+        *_figures(filter_figures, data), *_deck(bag, data), *_diagnostics(data.statuses)]
+    return elements.page(f'Tracking run: {name}', parts)

@@ -1,0 +1,136 @@
+"""What a report draws: the run against the truth where there is one, and whatever else was recorded."""
+import dataclasses
+import typing
+
+import numpy as np
+
+from pedestal_analysis.results import consistency, known_attitude, measured, tracking
+from pedestal_common.graph import topics
+from pedestal_recording import bag as bags
+
+
+@dataclasses.dataclass
+class RunData:
+    """A recording as the figures draw it.
+
+    run: tracking.Tracking, None without truth; no_truth: why, else ''; raw_angles (n, 2): earth angles of the target
+    as measured [rad]; motors, receiver: tables of adu/motor_states and tracking_receiver/angle_error, None without a
+    message; modes: [(start, stop [s], mode)], one for each change; statuses: [(stamp [s], node, level, message)];
+    beamwidth [rad], NaN when the bag does not say; filter: consistency.Consistency, None without acu/filter; attitude:
+    known_attitude.KnownAttitude, None ashore.
+    """
+    run: typing.Any
+    no_truth: str
+    raw_angles: typing.Any
+    motors: typing.Any
+    receiver: typing.Any
+    modes: list
+    statuses: list
+    beamwidth: float
+    filter: typing.Any = None
+    attitude: typing.Any = None
+
+    def lacks(self, needs):
+        """Why a figure with these needs (keys of _NEEDS) cannot be drawn; '' when it can."""
+        reasons = [_NEEDS[need](self) for need in needs]
+        return '; '.join(dict.fromkeys(filter(None, reasons)))
+
+
+def _no_receiver(data):
+    return '' if data.receiver else 'no message of tracking_receiver/angle_error'
+
+
+_NEEDS = {
+    'truth': lambda data: data.no_truth,
+    'motors': lambda data: '' if data.motors else 'no message of adu/motor_states',
+    'modes': lambda data: '' if data.modes or data.statuses else 'no message of acu/mode or diagnostics',
+    'filter': lambda data: '' if data.filter is not None else 'no message of acu/filter',
+    'attitude': lambda data: '' if data.attitude is not None else 'no INS in the run',
+    'bank': lambda data: '' if data.filter is None or np.isfinite(data.filter.probability).sum(axis=2).max() > 1 else
+    'one model of motion alone',
+    'receiver': _no_receiver,
+    'lock': lambda data: _no_receiver(data) or (
+        '' if np.isfinite(data.receiver['x']).any() else 'the receiver never locked'),
+}
+"""{need of a figure: function of RunData -> why it is not met, ''}."""
+
+
+def read(bag) -> RunData:
+    """The RunData of a bag.Bag. Raises bag.BagError when stamps of the steps go back."""
+    run, no_truth = _tracking(bag)
+    raw = _raw_angles(run, table(bag, 'ship/truth')) if run is not None else None
+    motors = table(bag, 'adu/motor_states')
+    if motors and not {f'{motor}.effort' for motor in topics.MOTORS} <= set(motors):
+        motors = None
+    statuses = [(log / 1e9, status.name, int(status.level), status.message)
+                for _, log, _, array in bag.messages('diagnostics') for status in array.status
+                ] if table(bag, 'diagnostics') else []
+    return RunData(run, no_truth, raw, motors, table(bag, 'tracking_receiver/angle_error'), _modes(bag), statuses,
+                   tracking.beamwidth(bag), _filter(bag, run), _attitude(bag))
+
+
+def table(bag, topic):
+    """The columns of a topic of a bag.Bag; None without a message or when its type is not the graph's.
+
+    Raises bag.BagError when the stamps of a topic of the steps go back: nothing drawn over them would be true.
+    """
+    if bag.topics.get(topic) != topics.BY_NAME[topic].type or not bag.rows(topic).size:
+        return None
+    columns = bag.table(topic)
+    t = columns['t']
+    back = np.flatnonzero(np.diff(t) < 0.0) if topics.BY_NAME[topic].rate == 'step' else np.zeros(0, int)
+    if back.size:
+        raise bags.BagError(f'{bag.file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
+                            f'{t[back[0] + 1]:.6f} s; `pedestal verify` says what else is wrong')
+    return columns
+
+
+def _tracking(bag):
+    """(Tracking, '') or (None, why not)."""
+    absent = [name for name in ('joint_states', 'target/truth') if table(bag, name) is None]
+    if absent:
+        return None, f'no message of {" and ".join(absent)}'
+    if bag.rows('joint_states').size < 2:
+        return None, 'fewer than two steps'
+    try:
+        return tracking.read(bag), ''
+    except KeyError as error:
+        return None, f'no number {error.args[0]} where the graph would have one'
+
+
+def _raw_angles(run, ship):
+    """Earth angles (n, 2) [rad] of the target as measured, before any filter. ship: table of ship/truth or None."""
+    quaternions = None
+    if ship is not None:
+        at = np.searchsorted(ship['t'], run.t - 1e-9).clip(0, ship['t'].size - 1)
+        quaternions = np.column_stack([ship[f'orientation.{axis}'][at] for axis in 'xyzw'])
+    return measured.earth_angles(np.column_stack((run.azimuth, run.elevation)), run.measured, quaternions)
+
+
+def _filter(bag, run):
+    """The consistency.Consistency, None without truth or without its numbers."""
+    try:
+        return consistency.read(bag, run) if run is not None and table(bag, 'acu/filter') is not None else None
+    except KeyError:
+        return None
+
+
+def _attitude(bag):
+    """The known_attitude.KnownAttitude, None ashore or without its numbers."""
+    try:
+        return known_attitude.read(bag) if table(bag, 'ship/imu/data') is not None else None
+    except KeyError:
+        return None
+
+
+def _modes(bag):
+    """[(start, stop [s], mode)], one for each change."""
+    changes = table(bag, 'acu/mode')
+    if changes is None:
+        return []
+    starts, names = [], []
+    for start, name in zip(changes['t'].tolist(), changes['data']):
+        if not names or names[-1] != name:
+            starts.append(start)
+            names.append(name)
+    return list(zip(starts, [*starts[1:], bag.end], names))

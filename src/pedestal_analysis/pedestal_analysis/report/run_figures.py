@@ -1,0 +1,387 @@
+"""The figures of a report about the run: pointing, errors, angles, torques, signal, sky, modes. Angles in degrees."""
+import itertools
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from acu_tracker import modes
+from pedestal_analysis.report.figures import (
+    FILTERED,
+    INK,
+    MOTOR_1,
+    MOTOR_2,
+    RAW,
+    TRUTH,
+    WIDTH,
+    Spec,
+    draw_line,
+    new_panels,
+    outside_legend,
+    spans,
+)
+
+MODES = dict(zip(modes.MODES, itertools.cycle((
+    '#9aa0a6', '#a87b51', '#8364c8', '#b9a3e3', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#e58a95', '#f2b84b',
+    '#5b6abf', '#7a8b2a', '#c46aa8', '#4f4f4f'))))
+"""{mode: colour}."""
+LEVELS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
+LOCKED = '#5f93c4'
+ZOOM = 2.0
+"""Seconds of a zoomed figure."""
+
+
+def _continuous(angle, beside=None):
+    """Degrees without the jump at +-180; beside: a continuous angle [deg] to stay within half a turn of."""
+    angle = np.degrees(angle)
+    if beside is not None:
+        return beside + (angle - beside + 180.0) % 360.0 - 180.0
+    out = angle.copy()
+    finite = np.isfinite(angle)
+    out[finite] = np.unwrap(angle[finite], period=360.0)
+    return out
+
+
+def _middle(run):
+    """The ZOOM seconds in the middle of what was evaluated, else of the run."""
+    t = run.t[run.tracking] if run.tracking.any() else run.t
+    middle = 0.5 * (t[0] + t[-1])
+    return middle - 0.5 * ZOOM, middle + 0.5 * ZOOM
+
+
+def _slowest(run, angles):
+    """The ZOOM seconds of what was evaluated in which the angles (n, 2) changed least."""
+    steps = round(ZOOM / np.median(np.diff(run.t)))
+    if run.tracking.sum() <= steps or not 0 < steps < run.t.size:
+        return _middle(run)
+    change = np.abs(angles[steps:] - angles[:-steps]).sum(axis=1)
+    change[~(run.tracking[steps:] & run.tracking[:-steps]) | ~np.isfinite(change)] = np.inf
+    start = run.t[np.argmin(change)]
+    return start, start + ZOOM
+
+
+def _scale_to(axes, t, values, tracking):
+    """A frame for the evaluated part; a note where the approach before it leaves the frame."""
+    shown = np.abs(values[tracking & np.isfinite(values)])
+    whole = np.abs(values[np.isfinite(values)])
+    if not shown.size or shown.max() == 0.0:
+        return
+    limit = 1.25 * shown.max()
+    axes.set_ylim(-limit, limit)
+    if whole.max() > limit:
+        axes.text(0.995, 0.04, f'off scale outside the evaluated part, up to {whole.max():.2g}°', ha='right',
+                  va='bottom', fontsize=7.5, transform=axes.transAxes)
+
+
+AXES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
+
+
+def draw_errors(axes, data, i, window=None):
+    """Draw what the receiver put out and what the filter made of it [deg], i: 0 cross-elevation, 1 elevation; with the
+    truth in a window (first, last time [s])."""
+    run = data.run
+    raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
+    draw_line(axes, run.t, raw, window, color=RAW, linewidth=0.7, label='receiver, before the filter')
+    if window is not None:
+        truth = np.degrees((run.cross_elevation, run.elevation_error)[i])
+        draw_line(axes, run.t, truth, window, color=TRUTH, label='truth')
+    else:
+        _scale_to(axes, run.t, raw, run.tracking)
+    draw_line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
+    axes.set_ylabel('error [deg]')
+    axes.set_title(AXES[i][0])
+
+
+def _errors(data, window=None):
+    figure, panels = new_panels(2, sharex=True)
+    for i in range(2):
+        draw_errors(panels[i, 0], data, i, window)
+    panels[1, 0].set_xlabel('time [s]')
+    outside_legend(figure, panels[0, 0])
+    return figure
+
+
+def error(data):
+    """What the receiver put out and what the filter made of it, cross-elevation and elevation [deg]."""
+    return _errors(data)
+
+
+def error_zoom(data):
+    """The middle ZOOM seconds of `error`, with the truth."""
+    return _errors(data, _middle(data.run))
+
+
+def _angles(data, zoomed):
+    run = data.run
+    figure, panels = new_panels(2, sharex=True)
+    truth = np.column_stack([_continuous(run.target_earth[:, i]) for i in range(2)])
+    window = _slowest(run, truth) if zoomed else None
+    for i, axes in enumerate(panels[:, 0]):
+        beam = _continuous(run.beam_earth[:, i], truth[:, i])
+        scale = np.cos(run.beam_earth[:, 1] + run.filtered[:, 1]) if i == 0 else 1.0
+        filtered = beam + np.degrees(run.filtered[:, i] / scale)
+        draw_line(axes, run.t, _continuous(data.raw_angles[:, i], truth[:, i]), window, color=RAW,
+              linewidth=0.8 if zoomed else 2.5, label='measured, before the filter')
+        if zoomed:
+            draw_line(axes, run.t, truth[:, i], window, color=TRUTH, label='truth')
+        draw_line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
+        axes.set_ylabel(f'{AXES[i][1]} [deg]')
+    axes.set_xlabel('time [s]')
+    outside_legend(figure, panels[0, 0])
+    return figure
+
+
+def angle(data):
+    """Line of sight in earth angles [deg], as measured and as filtered."""
+    return _angles(data, False)
+
+
+def angle_zoom(data):
+    """The ZOOM seconds of `angle` in which the target moved least, with the truth."""
+    return _angles(data, True)
+
+
+def draw_azimuth(axes, data):
+    """Draw the azimuth of antenna and target in earth angles [deg]."""
+    run = data.run
+    beam = _continuous(run.beam_earth[:, 0])
+    draw_line(axes, run.t, _continuous(run.target_earth[:, 0], beam), color=TRUTH, linewidth=2.5, label='target')
+    draw_line(axes, run.t, beam, color=FILTERED, label='antenna')
+    axes.set_xlabel('time [s]')
+    axes.set_ylabel('azimuth [deg]')
+
+
+def azimuth(data):
+    """Azimuth of antenna and target in earth angles [deg]."""
+    figure, panels = new_panels(1, height=2.4)
+    draw_azimuth(panels[0, 0], data)
+    outside_legend(figure, panels[0, 0])
+    return figure
+
+
+def _shade_modes(axes, data):
+    for start, stop, mode in data.modes:
+        axes.axvspan(start, stop, color=MODES.get(mode, RAW), alpha=0.10, linewidth=0.0)
+    for start, _, _ in data.modes[1:]:
+        axes.axvline(start, color=INK, linewidth=0.6, linestyle=':')
+
+
+def draw_pointing(axes, data, i):
+    """Draw the true pointing error [deg], i: 0 cross-elevation, 1 elevation; dashed: a tenth of the beamwidth."""
+    run = data.run
+    error = np.degrees((run.cross_elevation, run.elevation_error)[i])
+    draw_line(axes, run.t, error, color=TRUTH, linewidth=0.8)
+    _scale_to(axes, run.t, error, run.tracking)
+    if np.isfinite(data.beamwidth):
+        for sign in (-0.1, 0.1):
+            axes.axhline(sign * np.degrees(data.beamwidth), color=INK, linewidth=0.8, linestyle='--')
+    axes.set_title(AXES[i][0])
+    axes.set_ylabel('error [deg]')
+
+
+def pointing(data):
+    """True pointing error on both axes and angle off the beam [deg], over the modes of the ACU."""
+    run = data.run
+    figure, panels = new_panels(3, sharex=True)
+    distance = np.degrees(np.hypot(run.cross_elevation, run.elevation_error))
+    for i in range(2):
+        draw_pointing(panels[i, 0], data, i)
+    axes = panels[2, 0]
+    draw_line(axes, run.t, np.where(distance > 0.0, distance, np.nan), color=TRUTH, linewidth=0.8)
+    axes.set_yscale('log' if np.any(distance > 0.0) else 'linear')
+    axes.set_title('angle between beam and target, whole run')
+    axes.set_ylabel('off axis [deg]')
+    axes.set_xlabel('time [s]')
+    for axes in panels[:, 0]:
+        _shade_modes(axes, data)
+    _mode_legend(figure, data)
+    return figure
+
+
+def _mode_legend(figure, data):
+    names = dict.fromkeys(mode for _, _, mode in data.modes)
+    if names:
+        figure.legend([Patch(color=MODES.get(name, RAW), alpha=0.45, linewidth=0.0) for name in names], list(names),
+                      loc='outside upper right', ncols=len(names))
+
+
+def draw_torques(axes, data, axis, window=None):
+    """Draw the torques of both motors of an axis, 'azimuth' or 'elevation', and their bias [Nm]."""
+    motors = data.motors
+    first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
+    width = 0.7 if window is None else 1.0
+    draw_line(axes, motors['t'], first, window, color=MOTOR_1, linewidth=width, label='motor 1')
+    draw_line(axes, motors['t'], second, window, color=MOTOR_2, linewidth=width, label='motor 2')
+    draw_line(axes, motors['t'], 0.5 * (first - second), window, color=INK, linewidth=0.9, linestyle='--',
+          label='bias, half their difference')
+    axes.set_ylabel('torque [Nm]')
+    axes.set_title(axis)
+
+
+def _start(data):
+    start = data.motors['t'][0]
+    return start, start + ZOOM
+
+
+def torques(data):
+    """Torques of both motors of each axis [Nm], whole and the first ZOOM seconds."""
+    window = _start(data)
+    figure, panels = new_panels(2, 2, height=2.0, sharex='col', sharey='row', width_ratios=(3, 2))
+    for row, axis in zip(panels, ('azimuth', 'elevation')):
+        draw_torques(row[0], data, axis)
+        draw_torques(row[1], data, axis, window)
+        row[1].set_title(f'{axis}, first {ZOOM:g} s')
+        row[1].set_ylabel('')
+    for axes in panels[1]:
+        axes.set_xlabel('time [s]')
+    outside_legend(figure, panels[0, 0])
+    return figure
+
+
+def draw_carrier(axes, data):
+    """Draw C/N0 [dB-Hz]; shaded where the receiver was locked."""
+    table = data.receiver
+    draw_line(axes, table['t'], table['z'], color=RAW, linewidth=0.8, label='C/N0')
+    for first, last in spans(np.isfinite(table['x'])):
+        axes.axvspan(table['t'][first], table['t'][last], color=LOCKED, alpha=0.15, linewidth=0.0)
+    axes.set_xlabel('time [s]')
+    axes.set_ylabel('C/N0 [dB-Hz]')
+
+
+def carrier(data):
+    """C/N0 [dB-Hz] and where the receiver was locked."""
+    figure, panels = new_panels(1, height=2.2)
+    draw_carrier(panels[0, 0], data)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend([*handles, Patch(color=LOCKED, alpha=0.3, linewidth=0.0)], [*labels, 'locked'],
+                  loc='outside upper right', ncols=2)
+    return figure
+
+
+def draw_sky(axes, data):
+    """Draw target and beam over the station, north up, on polar axes."""
+    run = data.run
+    axes.set_theta_zero_location('N')
+    axes.set_theta_direction(-1)
+    for angles, colour, width, label in ((run.target_earth, TRUTH, 3.0, 'target'),
+                                         (run.beam_earth, FILTERED, 1.1, 'beam')):
+        path = angles[::max(1, run.t.size // 1500)]
+        axes.plot(path[:, 0], 90.0 - np.degrees(path[:, 1]), color=colour, linewidth=width, label=label)
+        known = angles[np.isfinite(angles).all(axis=1)]
+        for row, marker in ((0, 'o'), (-1, 's')) if known.size else ():
+            axes.plot(known[row, 0], 90.0 - np.degrees(known[row, 1]), marker, color=colour, markersize=6,
+                      markerfacecolor='white' if row == 0 else colour)
+    axes.plot([], [], 'o', color=INK, markersize=6, markerfacecolor='white', label='start')
+    axes.plot([], [], 's', color=INK, markersize=6, label='end')
+    axes.set_rlim(0.0, 90.0)
+    axes.set_rgrids((30.0, 60.0), ('60°', '30°'), angle=22.5, fontsize=8)
+    axes.set_thetagrids(range(0, 360, 45), ('N', 'NE', 'E', 'SE', 'S', 'SW', 'W', 'NW'))
+
+
+def sky(data):
+    """Target and beam over the station, north up."""
+    figure = Figure(figsize=(WIDTH, 4.2), layout='constrained')
+    axes = figure.subplots(subplot_kw={'projection': 'polar'})
+    draw_sky(axes, data)
+    axes.legend(loc='center left', bbox_to_anchor=(1.2, 0.5))
+    return figure
+
+
+def timeline(data):
+    """Mode of the ACU, lock of the receiver, level that each node reported."""
+    rows = ([('ACU mode', [(start, stop - start, MODES.get(mode, RAW)) for start, stop, mode in data.modes])]
+            if data.modes else [])
+    if data.receiver:
+        t = data.receiver['t']
+        rows.append(('receiver locked', [(t[first], t[last] - t[first], LOCKED)
+                                         for first, last in spans(np.isfinite(data.receiver['x']))]))
+    end = max([stop for _, stop, _ in data.modes] + [stamp for stamp, *_ in data.statuses])
+    for node in dict.fromkeys(node for _, node, *_ in data.statuses):
+        own = [(stamp, level) for stamp, name, level, _ in data.statuses if name == node]
+        own = [own[0], *(after for before, after in zip(own, own[1:]) if after[1] != before[1])]
+        stops = [stamp for stamp, _ in own[1:]] + [end]
+        rows.append((f'{node} diagnostics', [(start, stop - start, LEVELS[min(level, 3)][1])
+                                             for (start, level), stop in zip(own, stops)]))
+    figure, panels = new_panels(1, height=0.35 + 0.3 * len(rows))
+    axes = panels[0, 0]
+    for i, (_, bars) in enumerate(rows):
+        for colour in dict.fromkeys(colour for *_, colour in bars):
+            axes.broken_barh([(start, width) for start, width, own in bars if own == colour], (i - 0.32, 0.64),
+                             color=colour, linewidth=0.0)
+    axes.set_yticks(range(len(rows)), [name for name, _ in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.grid(axis='y', visible=False)
+    axes.set_xlabel('time [s]')
+    keys = [(mode, MODES.get(mode, RAW)) for mode in dict.fromkeys(mode for _, _, mode in data.modes)]
+    keys += [LEVELS[level] for level in sorted({min(level, 3) for _, _, level, _ in data.statuses})]
+    figure.legend([Patch(color=colour, linewidth=0.0) for _, colour in keys], [name for name, _ in keys],
+                  loc='outside upper right', ncols=len(keys))
+    return figure
+
+
+def overview(data):
+    """One wide picture of a run: sky, error before and after the filter, pointing error, motor torques."""
+    figure = Figure(figsize=(13.0, 7.0), layout='constrained')
+    grid = figure.add_gridspec(4, 3, width_ratios=(1.05, 1.0, 1.0))
+    polar = figure.add_subplot(grid[:2, 0], projection='polar')
+    draw_sky(polar, data)
+    polar.set_anchor('W')
+    bottom = []
+    for i, axis in enumerate(('azimuth', 'elevation')):
+        axes = figure.add_subplot(grid[2 + i, 0])
+        draw_torques(axes, data, axis, _start(data))
+        axes.set_title(f'{axis}: motor torques, first {ZOOM:g} s')
+        if i == 0:
+            axes.tick_params(labelbottom=False)
+    bottom.append(axes)
+    handles, labels = axes.get_legend_handles_labels()
+    first = polar.legend(loc='upper left', bbox_to_anchor=(1.05, 1.0))
+    polar.add_artist(first)
+    second = polar.legend(handles, [label.partition(',')[0] for label in labels], loc='lower left',
+                          bbox_to_anchor=(1.05, -0.05))
+    for legend in (first, second):
+        legend.set_in_layout(False)
+    for i in range(2):
+        column = [figure.add_subplot(grid[2 * i:2 * i + 2, 1]), figure.add_subplot(grid[2 * i:2 * i + 2, 2])]
+        draw_errors(column[0], data, i)
+        column[0].set_title(f'{AXES[i][0]}: measured error')
+        draw_pointing(column[1], data, i)
+        column[1].set_title(f'{AXES[i][0]}: pointing error against truth')
+        if i == 0:
+            column[0].legend(loc='upper right')
+        else:
+            bottom += column
+    for axes in bottom:
+        axes.set_xlabel('time [s]')
+    return figure
+
+
+FIGURES = (
+    Spec('pointing', 'Pointing error against truth', 'True angle from the beam axis to the target on both axes, and '
+         'its size over the whole run; background and dotted lines show the mode of the ACU.', ('truth',), pointing),
+    Spec('error', 'Error before and after the filter (figure 7 of the paper)', 'The error the receiver put out (grey) '
+         'jumps from sample to sample; the filtered line of sight seen from the beam (blue) is what the position '
+         "loop gets instead, but for the error of the encoders, and on a ship that of its INS's attitude.",
+         ('truth', 'lock'), error),
+    Spec('error_zoom', 'Error, zoomed (figure 8 of the paper)', f'The middle {ZOOM:g} s of the evaluated part: the '
+         'position loop holds the filtered error (blue) near zero; the true one (orange) is what the filter leaves of '
+         'the noise (grey).', ('truth', 'lock'), error_zoom),
+    Spec('angle', 'Angle before and after the filter (figure 9 of the paper)', 'Line of sight in earth angles as '
+         'measured (grey: encoder plus receiver) and as filtered (blue): one curve at this scale.',
+         ('truth', 'lock'), angle),
+    Spec('angle_zoom', 'Angle, zoomed (figure 10 of the paper)', f'The {ZOOM:g} s in which the target moved least, '
+         'where the noise stands out best: filtered (blue) against measured (grey) and true (orange).',
+         ('truth', 'lock'), angle_zoom),
+    Spec('azimuth', 'Azimuth trajectory (figure 11 of the paper)', "The antenna's azimuth (blue) comes to the "
+         "target's (orange) and stays on it.", ('truth',), azimuth),
+    Spec('torques', 'Motor torques', 'Both motors of an axis share the load and pull against each other by the bias '
+         '(dashed) that closes the backlash and fades where the load is large; right: the start of the run.',
+         ('motors',), torques),
+    Spec('carrier', 'Signal and lock', 'C/N0 at the receiver; shaded where it was locked and put out errors.',
+         ('receiver',), carrier),
+    Spec('sky', 'Sky plot', 'Target and beam over the station: north up, azimuth clockwise, zenith in the middle, '
+         'horizon on the rim.', ('truth',), sky),
+    Spec('timeline', 'Modes and health', 'Mode of the ACU, lock of the receiver and the level each node reported.',
+         ('modes',), timeline),
+)
+OVERVIEW = Spec('overview', '', '', ('truth', 'lock', 'motors'), overview, dpi=100)

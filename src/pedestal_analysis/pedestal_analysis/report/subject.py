@@ -1,0 +1,71 @@
+"""What a recording is of, for people: when it was by the sky's clock, where the antenna stood, what it tracked."""
+import datetime
+import math
+
+import numpy as np
+
+from pedestal_common import parameters
+from pedestal_common.geometry import orbit
+from tracking_receiver_sim.params import TargetParameters
+
+SAID = {
+    'leo_pass': lambda target: f'satellite {target.leo_pass.line_1[2:7]}, by its TLE',
+    'track_file': lambda target: f'the track in {target.track_file.path.rpartition("/")[2]}',
+    'flyby': lambda target: (f'straight flight at {target.flyby.speed:g} m/s, {target.flyby.height:g} m above the '
+                             f'station, {target.flyby.closest_distance:g} m over ground where it is closest'),
+    'sine': lambda target: f'sine of {target.angle.frequency:g} Hz in azimuth and elevation',
+    'step': lambda target: f'step at {target.angle.start:g} s',
+    'ramp': lambda target: f'constant rate from {target.angle.start:g} s on',
+}
+"""{kind of target: TargetParameters -> what it is}."""
+
+ON_EARTH = ('leo_pass', 'track_file')
+"""Kinds that depend on where the station is."""
+
+
+def place(station):
+    """A StationParameters as text."""
+    return f'latitude {station.latitude_deg:g}, longitude {station.longitude_deg:g} deg, height {station.height:g} m'
+
+
+def rows(bag, data):
+    """[name, text] of a bag.Bag as one beam sees it and its run_data.RunData; without what the bag does not say."""
+    beamwidth = [['beamwidth', f'{math.degrees(data.beamwidth):.4g} deg']] if math.isfinite(data.beamwidth) else []
+    values = bag.configuration['parameters'].get('tracking_receiver', {})
+    try:
+        target = parameters.build(TargetParameters, {name.removeprefix('target.'): value for name, value in
+                                                     values.items() if name.startswith('target.')})
+    except parameters.ParameterError:
+        values = {}
+    if not values:
+        return beamwidth
+    station = [['station', place(target.station)]] if target.kind in ON_EARTH else []
+    return [['target', SAID[target.kind](target)], *_sky(bag, data), *station, *beamwidth]
+
+
+def _sky(bag, data):
+    """Rows on the UTC at 0 s, and of the highest place, of a target that has a date."""
+    try:
+        begin = orbit.instant('stamp_0_utc', _begin(bag))
+    except orbit.TargetError:
+        return []
+    highest = []
+    if data.run is not None and np.isfinite(data.run.target_earth[:, 1]).any():
+        elevation = data.run.target_earth[:, 1]
+        top = int(np.nanargmax(elevation))
+        when = begin + datetime.timedelta(seconds=float(data.run.t[top]))
+        highest = [['highest', f'{math.degrees(elevation[top]):.1f} deg at {when:%Y-%m-%d %H:%M:%S} UTC, '
+                    f'{data.run.t[top]:.1f} s']]
+    return [['0 s is', f'{begin:%Y-%m-%d %H:%M:%S} UTC'], *highest]
+
+
+def _begin(bag):
+    """UTC of 0 s as the receiver says it in its diagnostics, '' where it does not."""
+    if 'diagnostics' not in bag.topics or not bag.rows('diagnostics').size:
+        return ''
+    for _, _, _, array in bag.messages('diagnostics'):
+        for status in array.status:
+            for value in status.values:
+                if value.key == 'stamp_0_utc':
+                    return value.value
+    return ''

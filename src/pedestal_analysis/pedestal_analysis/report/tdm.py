@@ -1,0 +1,179 @@
+"""`pedestal export --format tdm`: where the beam saw the target, as a CCSDS Tracking Data Message.
+
+CCSDS 503.0-B-2 in keyword = value notation, for orbit determination. A record holds azimuth and elevation, what the
+encoders said with the error of the receiver put on top; the range where it was measured; and the C/N0. Only steps in
+autotrack with the receiver locked are written. On a ship the angles are turned by the attitude that the INS knew.
+Nothing is corrected for refraction. Times are UTC.
+"""
+import pathlib
+import re
+
+import numpy as np
+
+from pedestal_analysis.results import measured, tracking
+from pedestal_common.geometry import orbit
+from pedestal_common.graph import nodes
+from pedestal_recording import bag as bags
+from pedestal_recording import columns
+from pedestal_recording.export import whole
+
+RATES = 1e-3, 1000.0
+"""Records a second."""
+
+SEGMENT = 10_000
+"""Steps of a segment, which are in memory at once."""
+
+STATION = 'PEDESTAL'
+"""Name of the station where the user says none."""
+
+NAME = re.compile(r'[ -~]{1,80}')
+"""What the name of a participant may be."""
+
+LAUNCH = re.compile(r'(\d\d)(\d{3})([A-Z]{1,3}) *')
+"""The international designator of a TLE."""
+
+NUMBERS = {'joint_states': ('azimuth.position', 'elevation.position'),
+           'tracking_receiver/angle_error': ('x', 'y', 'z'),
+           'ship/imu/data': tuple(f'orientation.{axis}' for axis in 'xyzw'), 'tracking_receiver/range': ('range',)}
+"""{topic: its columns that are read}."""
+
+
+def export(path, created, output=None, rate=10.0, participants=(), overwrite=False):
+    """Write the tracking data of a bag; iterator of (file, records), one for each beam.
+
+    created: datetime of the message, UTC. output: a file that ends in .tdm, or a folder, default `export` in the bag.
+    rate: records a second at the most. participants: names of the station and of the target, where they are not
+    STATION and the international designator of the TLE. overwrite: replace files.
+    Raises bag.BagError and ValueError, or, before anything is written, FileExistsError.
+    """
+    if not RATES[0] <= rate <= RATES[1]:
+        raise ValueError(f'--rate {rate:g}: must be {RATES[0]:g} to {RATES[1]:g} records a second')
+    for name in participants:
+        if not NAME.fullmatch(name):
+            raise ValueError(f'--participants {name!r:.60}: must be at most 80 ASCII characters')
+    bag = bags.read(path)
+    for file, view in _files(bag, output, overwrite).items():
+        tracks = _Tracks(view, rate)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        records = 0
+        with whole(file) as part, open(part, 'w', encoding='ascii', newline='') as stream:
+            stream.write(_header(view, created))
+            for segment in tracks.segments():
+                records += len(segment[0])
+                stream.write(_segment(segment, _participants(view, participants)))
+            if not records:
+                raise bags.BagError(f'{path}: no step in autotrack with the receiver locked in it: nothing to export')
+        yield file, records
+
+
+def _files(bag, output, overwrite):
+    """{file to write: bag.Bag of one beam}. Raises FileExistsError, and ValueError of one file for several beams."""
+    views = [bag.view(prefix[:-1]) for prefix in nodes.prefixes(bag.beams)]
+    output = pathlib.Path(output) if output is not None else bag.file.parent / 'export'
+    if output.suffix == '.tdm':
+        if len(views) > 1:
+            raise ValueError(f'--output {output}: must be a folder: there are {len(views)} beams in {bag.path}')
+        files = {output: views[0]}
+    else:
+        name = bag.path.resolve().stem
+        files = {output / f'{".".join(filter(None, (name, view.beam[:-1])))}.tdm': view for view in views}
+    for file in files:
+        if file.exists() and not overwrite:
+            raise FileExistsError(f'{file} exists already; --overwrite replaces')
+    return files
+
+
+class _Tracks:
+    """The steps of a bag of one beam that are exported, `rate` a second at most."""
+
+    def __init__(self, bag, rate):
+        self.bag, self.begin = bag, _utc_of_zero(bag)
+        rows = {topic: bag.rows(topic) for topic in NUMBERS if topic in bag.topics}
+        self.rows = {topic: of for topic, of in rows.items() if of.size}
+        missing = [name for name in ('joint_states', 'tracking_receiver/angle_error') if name not in self.rows]
+        if missing:
+            raise bags.BagError(f'{bag.path}: no message of {missing[0]} in it')
+        stamps = np.unique(self.rows['joint_states'].stamp)
+        _, first = np.unique((stamps - stamps[:1]) * rate // 1e9, return_index=True)
+        self.stamps = stamps[first]
+
+    def segments(self):
+        """Iterator of (times, angles (n, 2) [deg], range (n,) [km] or NaN, C/N0 (n,) [dB-Hz]), none of them empty."""
+        for at in range(0, len(self.stamps), SEGMENT):
+            stamps = self.stamps[at:at + SEGMENT]
+            beam, error = self._at('joint_states', stamps), self._at('tracking_receiver/angle_error', stamps)
+            attitude = self._at('ship/imu/data', stamps) if 'ship/imu/data' in self.rows else None
+            angles = np.degrees(measured.earth_angles(beam, error[:, :2], attitude))
+            mode = tracking.modes(self.bag, (stamps - self.bag.start) / 1e9)
+            there = np.isfinite(angles).all(axis=1) & ((mode == 'autotrack') | ('acu/mode' not in self.bag.topics))
+            if there.any():
+                times = self.begin + np.round((stamps[there] - self.bag.start) / 1e3).astype('m8[us]')
+                yield (np.datetime_as_string(times), angles[there],
+                       1e-3 * self._at('tracking_receiver/range', stamps)[there, 0], error[there, 2])
+
+    def _at(self, topic, stamps):
+        """NUMBERS of a topic (n, k) at stamps (n,) [ns]; NaN where it has no message of that stamp."""
+        out = np.full((len(stamps), len(NUMBERS[topic])), np.nan)
+        rows = self.rows.get(topic, self.bag.index[:0])
+        _, here, there = np.intersect1d(stamps, rows.stamp, return_indices=True)
+        if here.size:
+            chosen = rows[there]
+            try:
+                table = columns.table([data for *_, data in self.bag.take(chosen)], self.bag.topics[topic], chosen.log)
+            except ValueError as error:
+                raise bags.BagError(f'{self.bag.path}: {topic}: {error}') from None
+            for i, name in enumerate(NUMBERS[topic]):
+                out[here, i] = table.get(name, np.nan)
+        return out
+
+
+def _utc_of_zero(bag):
+    """UTC of the time 0 of a bag of one beam, datetime64[us]: of its target where that has a date, else of the clock
+    it was recorded by. Raises bag.BagError where there is neither."""
+    said = bag.last_values(f'{bag.beam}tracking_receiver').get('stamp_0_utc', '')
+    if said:
+        return np.datetime64(orbit.instant(f'{bag.path}: stamp_0_utc', said), 'us')
+    if bag.start:
+        return np.datetime64(bag.start // 1000, 'us')
+    raise bags.BagError(f'{bag.path}: it does not say when it was, as a tracking data message must: a run in lockstep '
+                        'has a date where its target is a satellite or a flight with a date')
+
+
+def _header(bag, created):
+    run = ', '.join(filter(None, (bag.metadata.get('scenario', ''), f'seed {bag.metadata.get("seed", "unknown")}',
+                                  bag.metadata.get('pacing', ''))))
+    run = ''.join(letter if ' ' <= letter <= '~' else '?' for letter in run[:200])
+    return ('CCSDS_TDM_VERS = 2.0\n'
+            f'COMMENT pedestal: {run}\n'
+            f'CREATION_DATE = {created:%Y-%m-%dT%H:%M:%S}\n'
+            'ORIGINATOR = PEDESTAL\n')
+
+
+def _participants(bag, names):
+    """(name of the station, name of the target)."""
+    receiver = bag.configuration['parameters'].get('tracking_receiver', {})
+    target = str(receiver.get('target.kind', 'TARGET')).upper()[:80]
+    launch = LAUNCH.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[9:17])
+    if target == 'LEO_PASS' and launch:
+        year, number, piece = launch.groups()
+        target = f'{1900 + int(year) + 100 * (int(year) < 57)}-{number}{piece}'
+    return (*names, *(STATION, target if NAME.fullmatch(target) else 'TARGET')[len(names):])
+
+
+def _segment(segment, participants):
+    """The text of a segment; keywords are in the order that table 3-3 of the book demands."""
+    times, angles, distance, cn0 = segment
+    lines = ['META_START', 'COMMENT angles = encoders + error of the receiver, not corrected for refraction',
+             'TIME_SYSTEM = UTC', f'START_TIME = {times[0]}', f'STOP_TIME = {times[-1]}',
+             f'PARTICIPANT_1 = {participants[0]}', f'PARTICIPANT_2 = {participants[1]}',
+             'MODE = SEQUENTIAL', 'PATH = 2,1', 'TIMETAG_REF = RECEIVE',
+             *(('RANGE_UNITS = km',) if np.isfinite(distance).any() else ()),
+             'ANGLE_TYPE = AZEL', 'DATA_QUALITY = RAW', 'META_STOP', 'DATA_START']
+    azimuth = np.round(angles[:, 0], 6) % 360.0
+    for time, a, e, r, c in zip(times, azimuth.tolist(), angles[:, 1].tolist(), distance.tolist(), cn0.tolist()):
+        lines += [f'ANGLE_1 = {time} {a:.6f}', f'ANGLE_2 = {time} {e:.6f}']
+        if np.isfinite(r):
+            lines.append(f'RANGE = {time} {r:.6f}')
+        if np.isfinite(c):
+            lines.append(f'PC_N0 = {time} {c:.2f}')
+    return '\n'.join([*lines, 'DATA_STOP', ''])

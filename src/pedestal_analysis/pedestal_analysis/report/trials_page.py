@@ -1,0 +1,168 @@
+"""The page that `pedestal trials` writes: histograms, scatter plots, the worst trial beside the median one."""
+import dataclasses
+import html
+import math
+
+import numpy as np
+
+from pedestal_analysis.report import elements
+from pedestal_analysis.report.figures import FILTERED, INK, RAW, TRUTH, Spec, draw_line, new_panels
+from pedestal_analysis.results import tracking
+from pedestal_analysis.trials import comparison, statistics
+from pedestal_bringup.loop import recorded
+from pedestal_common.graph import nodes
+
+SHOWN = ('pointing_rms_deg', 'pointing_max_deg', 'azimuth_following_rms_deg', 'elevation_following_rms_deg',
+         'lock_time_s', 'loss_s', 'azimuth_nis_mean', 'azimuth_nees_mean', 'elevation_nis_mean', 'elevation_nees_mean',
+         'isolation_db', 'heading_error_rms_deg')
+"""Results whose histograms are drawn, where they vary."""
+
+
+@dataclasses.dataclass
+class Trials:
+    """Trials as the page shows them: plan.Plan and table.Table, by: the result that ranks them, worst: numbers of the
+    worst, the worst first; flown [(title, tracking.Tracking)] of the worst and of the median one; sides:
+    comparison.Sides or None; command: the command line."""
+    plan: object
+    table: object
+    by: str
+    worst: list
+    flown: list
+    sides: object
+    command: str
+
+
+def read(plan, table, by, sides, command, count=10) -> Trials:
+    """The Trials of a plan and its table; the worst and the median trial are run once more."""
+    places = statistics.ranking(by, table.column(by)).tolist()
+    known = [i for i in places if math.isfinite(table.column(by)[i])] or places
+    chosen = {'worst': places[0], 'median': known[len(known) // 2]}
+    beam = nodes.beam_of(by)
+    flown = [(f'{name}: trial {i}', tracking.read(recorded.record(plan.scenario(i), beam)))
+             for name, i in chosen.items()]
+    return Trials(plan, table, by, places[:count], flown, sides, command)
+
+
+def _label(name):
+    unit = statistics.unit(name)
+    return f'{name} [{unit}]' if unit else name
+
+
+def _varying(table, names):
+    """The columns of those named that vary: [(name, values)]."""
+    found = [(name, table.column(name)) for name in names]
+    return [(name, values) for name, values in found
+            if np.isfinite(values).any() and np.ptp(values[np.isfinite(values)]) > 0.0]
+
+
+def histograms(trials):
+    """How the results are spread over the trials, two a row; the median dashed."""
+    shown = _varying(trials.table, [name for name in trials.table.there if nodes.plain(name) in SHOWN])
+    figure, panels = new_panels(max(1, -(-len(shown) // 2)), 2, height=1.7)
+    for axes, (name, values) in zip(panels.flat, shown):
+        values = values[np.isfinite(values)]
+        axes.hist(values, bins='auto' if len(values) < 5000 else 80, color=FILTERED, alpha=0.7)
+        axes.axvline(np.median(values), color=INK, linestyle='--', linewidth=0.8)
+        axes.set_xlabel(_label(name))
+        axes.locator_params(axis='x', nbins=5)
+    for axes in panels.flat[len(shown):]:
+        axes.set_axis_off()
+    return figure
+
+
+def scatter(trials):
+    """The ranking result over every varied parameter; the worst trials orange."""
+    varied = _varying(trials.table, trials.table.varied)
+    figure, panels = new_panels(max(1, -(-len(varied) // 2)), 2, height=2.0)
+    values = trials.table.column(trials.by)
+    for axes, (name, given) in zip(panels.flat, varied):
+        axes.plot(given, values, '.', color=RAW, markersize=3)
+        axes.plot(given[trials.worst], values[trials.worst], 'o', color=TRUTH, markersize=4)
+        axes.margins(0.03)
+        axes.set_xlabel(name)
+        axes.set_ylabel(_label(trials.by), fontsize=8)
+    for axes in panels.flat[len(varied):]:
+        axes.set_axis_off()
+    return figure
+
+
+def worst_and_median(trials):
+    """Pointing error over time of the worst trial and of the median one, else the following error, on one scale."""
+    pointing = any(run.tracking.any() for _, run in trials.flown)
+    figure, panels = new_panels(2, 2, sharex=True, sharey='row')
+    for column, (title, run) in zip(panels.T, trials.flown):
+        errors = (np.degrees(np.column_stack((run.cross_elevation, run.elevation_error))) if pointing
+                  else run.following)
+        if pointing:
+            errors = np.where(run.since[:, np.newaxis], errors, np.nan)
+        for axes, values, axis in zip(column, errors.T, ('cross-elevation' if pointing else 'azimuth', 'elevation')):
+            draw_line(axes, run.t, values, color=TRUTH, linewidth=0.8)
+            axes.set_title(f'{title}, {axis}')
+        column[1].set_xlabel('time [s]')
+    for row in panels:
+        row[0].set_ylabel('pointing error [deg]' if pointing else 'following error [deg]')
+    return figure
+
+
+def pairs(trials):
+    """The ranking result of both sides pair by pair, and the histogram of the difference."""
+    figure, panels = new_panels(1, 2, height=2.8)
+    a, b = trials.sides.pairs(trials.by)
+    left, right = panels[0]
+    left.plot(b, a, '.', color=FILTERED, markersize=4)
+    ends = [min(a.min(), b.min()), max(a.max(), b.max())]
+    left.plot(ends, ends, color=INK, linewidth=0.8)
+    left.set_xlabel(trials.sides.name_b, fontsize=7)
+    left.set_ylabel(trials.sides.name_a, fontsize=7)
+    left.set_title(_label(trials.by))
+    right.hist(a - b, bins='auto', color=FILTERED, alpha=0.7)
+    right.axvline(0.0, color=INK, linewidth=0.8)
+    right.set_xlabel('difference of a pair')
+    return figure
+
+
+def _figures(trials):
+    """[(Spec, why it cannot be drawn, '')]."""
+    nothing_varied = '' if _varying(trials.table, trials.table.varied) else 'no parameter was varied'
+    found = [(Spec('histograms', 'Histograms', 'Every result over the trials in which it was measured; dashed: the '
+                   'median.', (), histograms), ''),
+             (Spec('scatter', 'Over the varied parameters', f'{trials.by} of each trial; orange: the worst ones.', (),
+                   scatter), nothing_varied),
+             (Spec('worst', 'The worst trial beside the median one', f'By {trials.by}, on one scale.', (),
+                   worst_and_median), '')]
+    if trials.sides is not None:
+        few = '' if len(trials.sides.pairs(trials.by)[0]) else f'{trials.by} was measured in no pair'
+        found.insert(0, (Spec('pairs', 'Pair by pair', 'Each point is a seed; below the line the first side has the '
+                              'smaller value.', (), pairs), few))
+    return found
+
+
+def _estimates(rows, head):
+    """An HTML table of --json rows: value and interval."""
+    lines = [[row['case'], row['metric'], elements.number(row['value'] if row['value'] is not None else math.nan,
+                                                          row['unit']),
+              '' if row['ci_low'] is None and row['ci_high'] is None else
+              f'{_bound(row["ci_low"])} to {_bound(row["ci_high"])}', str(row['runs'])] for row in rows]
+    return elements.table(head, lines)
+
+
+def _bound(value):
+    return '?' if value is None else f'{value:.4g}'
+
+
+def page(trials, rows):
+    """The page of Trials and of their --json rows, as text."""
+    title = f'{trials.plan.runs} trials: {trials.plan.name}'
+    values = trials.table.column(trials.by)
+    worst = [[f'trial {i}', elements.number(values[i], statistics.unit(trials.by)), trials.plan.command(i)]
+             for i in trials.worst]
+    head = ['case', 'metric', 'value', '95 % interval', 'trials']
+    parts = [f'<h1>{html.escape(title)}</h1>', elements.table(None, [['made by', trials.command]], 'meta')]
+    if trials.sides is not None:
+        parts.append(f'<p><b>{html.escape(comparison.sentence(trials.sides, trials.by))}</b></p>')
+    parts += ['<h2 id="figures">Figures</h2>', *(elements.figure(spec, trials, reason)
+                                                for spec, reason in _figures(trials)),
+              f'<h2 id="worst-trials">The worst trials by {html.escape(trials.by)}</h2>',
+              elements.table(['trial', trials.by, 'the run in the graph with the same numbers'], worst),
+              '<h2 id="numbers">Numbers</h2>', _estimates(rows, head)]
+    return elements.page(title, parts)

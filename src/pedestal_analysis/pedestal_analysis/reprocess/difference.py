@@ -1,0 +1,233 @@
+"""Differences between the messages of a topic and those made again: count and order first, then the fields.
+
+`compare` pairs messages by their stamps and lets their numbers differ within a tolerance: a node recomputed.
+`compare_messages` pairs them by their place and lets nothing pass: a run made again.
+"""
+import dataclasses
+import fnmatch
+import itertools
+import math
+
+import numpy as np
+
+from pedestal_common.graph import layouts, topics
+from pedestal_common.wire import messages
+from pedestal_recording import columns
+
+REST = 'names, frames and the rest'
+"""The field that stands for everything in a message that is neither its stamp nor one of its numbers."""
+
+RELATIVE = 1e-9
+"""Relative tolerance; the absolute one is of the column (layouts)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Tolerance:
+    """How far numbers may differ: absolute and relative; None: that of the column and RELATIVE. ignored: patterns of
+    topics or of topic.field that are not compared, for example 'acu/reference*'."""
+    absolute: float | None = None
+    relative: float | None = None
+    ignored: tuple = ()
+
+    def of(self, column):
+        """(absolute, relative) of a layouts.Column."""
+        return (column.tolerance if self.absolute is None else self.absolute,
+                RELATIVE if self.relative is None else self.relative)
+
+    def ignores(self, name):
+        """Whether a topic or topic.field is not compared."""
+        return any(fnmatch.fnmatchcase(name, pattern) for pattern in self.ignored)
+
+
+@dataclasses.dataclass
+class FieldDifference:
+    """One field of a topic: in how many messages it differs, in how many beyond its tolerance, the largest difference
+    (inf: a number against NaN, or no number), the stamp of the first [s]."""
+    name: str
+    different: int
+    beyond: int
+    largest: float
+    first: float
+
+
+@dataclasses.dataclass
+class TopicDifference:
+    """A topic whose messages were paired by their stamps: how many were recorded and are there now, what is wrong with
+    their count and order (texts), the fields that differ, [FieldDifference]."""
+    name: str
+    was: int
+    now: int
+    problems: list
+    fields: list
+
+    @property
+    def equal(self):
+        """Whether nothing differs beyond its tolerance."""
+        return not self.problems and not any(field.beyond for field in self.fields)
+
+    @property
+    def identical(self):
+        """Whether nothing differs at all."""
+        return not self.problems and not self.fields
+
+    def lines(self):
+        """The topic as text, a line for each field that differs."""
+        lines = [f'{self.name:34} {self.now:9} {self.was:9}  {"identical" if self.identical else ""}'.rstrip()]
+        lines += [f'  {problem}' for problem in self.problems]
+        for field in self.fields:
+            largest = f'{field.largest:.3g}' if math.isfinite(field.largest) else 'other'
+            lines.append(f'  {field.name:32} {field.different:9} {field.beyond:9} {largest:>11} {field.first:14.6f}')
+        return lines
+
+
+def lines(differences) -> list:
+    """TopicDifferences as a table of text."""
+    text = [f'{"topic":34} {"computed":>9} {"recorded":>9}']
+    if any(topic.fields for topic in differences):
+        text.append(f'  {"field":32} {"differ":>9} {"beyond":>9} {"largest":>11} {"first s":>14}')
+    return text + [line for topic in differences for line in topic.lines()]
+
+
+@dataclasses.dataclass
+class Output:
+    """Messages of one topic as numbers: stamps (n,) [ns], values (n, columns) in the units of the topic; texts (n,)
+    instead of values where the topic is a text."""
+    stamps: np.ndarray
+    values: np.ndarray
+    texts: list | None = None
+
+    def table(self, topic):
+        """{column: array (n,)} with the names of columns.table."""
+        if self.texts is not None:
+            return {'t': self.stamps / 1e9, 'data': self.texts}
+        return {'t': self.stamps / 1e9,
+                **{column.name: values for column, values in zip(layouts.columns(topic), self.values.T)}}
+
+
+def recorded(data, log, topic) -> Output:
+    """The Output in CDR messages of a topic logged at `log` (n,) [ns]. Raises ValueError when they are none."""
+    type_name = topics.BY_NAME[topic].type
+    log = np.asarray(log, np.int64)
+    if type_name == 'std_msgs/msg/String':
+        return Output(log, np.zeros((len(data), 0)), columns.table(data, type_name, log)['data'])
+    table = columns.table(data, type_name, log)
+    values = np.full((len(data), len(layouts.columns(topic))), math.nan)
+    for number, column in enumerate(layouts.columns(topic)):
+        values[:, number] = table.get(column.name, math.nan)
+    return Output(columns.stamps(data, type_name, log), values)
+
+
+def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, template=None) -> TopicDifference:
+    """Compare the recorded messages of a topic with the recomputed ones.
+
+    data, template: the recorded CDR messages and a message as the node makes it, for what is no number in them.
+    """
+    difference = TopicDifference(topic, len(was.stamps), len(now.stamps), _order(was.stamps, now.stamps), [])
+    _, here, there = np.intersect1d(was.stamps, now.stamps, return_indices=True)
+    stamps = was.stamps[here]
+
+    def add(name, different, beyond, size, stamps=stamps):
+        if different.any() and not tolerance.ignores(f'{topic}.{name}'):
+            difference.fields.append(FieldDifference(name, int(different.sum()), int(beyond.sum()), float(
+                size[different].max()), stamps[np.argmax(different)] / 1e9))
+
+    if was.texts is not None:
+        different = np.array([was.texts[i] != now.texts[j] for i, j in zip(here, there)], bool)
+        add('data', different, different, np.full(different.size, math.inf))
+        return difference
+    for number, column in enumerate(layouts.columns(topic)):
+        a, b = was.values[here, number], now.values[there, number]
+        absolute, relative = tolerance.of(column)
+        different = ~((a == b) | (np.isnan(a) & np.isnan(b)))
+        with np.errstate(invalid='ignore'):
+            size = np.abs(b - a)
+            beyond = different & ~(size <= absolute + relative * np.abs(a))
+        add(column.name, different, beyond, np.where(np.isfinite(size), size, math.inf))
+    if template is not None:
+        type_name = topics.BY_NAME[topic].type
+        names = {column.name for column in layouts.columns(topic)}
+        different = ~columns.alike(data, type_name, messages.serialize(template), names)
+        add(REST, different, different, np.full(different.size, math.inf), was.stamps)
+    return difference
+
+
+def _order(was, now):
+    """What is wrong with the recorded stamps (n,) [ns] against those that are due."""
+    problems = []
+    if len(was) != len(now):
+        problems.append(f'{len(was)} messages recorded, {len(now)} recomputed')
+    unique, count = np.unique(was, return_counts=True)
+    for stamps, problem in ((np.setdiff1d(now, unique), 'not recorded'),
+                            (np.setdiff1d(unique, now), 'not recomputed'),
+                            (unique[count > 1], 'recorded more than once')):
+        if stamps.size:
+            problems.append(f'{stamps.size} {problem}, the first at {stamps[0] / 1e9:.6f} s')
+    back = np.flatnonzero(np.diff(was) < 0)
+    if back.size:
+        problems.append(f'order: {back.size} recorded stamps go back, the first from {was[back[0]] / 1e9:.6f} to '
+                        f'{was[back[0] + 1] / 1e9:.6f} s')
+    return problems
+
+
+@dataclasses.dataclass
+class MessageDifference:
+    """A topic whose messages were paired by their place: how many were recorded and are there now, how many pairs
+    differ, the log time of the first [ns] and what differs in it, texts."""
+    name: str
+    was: int
+    now: int
+    different: int
+    first: int
+    changes: list
+
+
+def compare_messages(name, was, now):
+    """The MessageDifference of a topic in two bags (bag.Bag); None when its messages are equal to the last byte."""
+    kinds = was.topics.get(name, 'none'), now.topics.get(name, 'none')
+    old, new = ([(log, data) for _, log, _, data in bag.raw(name)] if name in bag.topics else []
+                for bag in (was, now))
+    pairs = [(a, b) for a, b in itertools.zip_longest(old, new) if a != b]
+    if pairs:
+        a, b = pairs[0]
+        return MessageDifference(name, len(old), len(new), len(pairs), (a or b)[0], _changes(a, b, kinds))
+    if kinds[0] != kinds[1]:
+        return MessageDifference(name, len(old), len(new), 0, 0, [f'type {kinds[0]} -> {kinds[1]}'])
+    return None
+
+
+def compare_order(was, now):
+    """The MessageDifference at the first place where two bags differ whose topics are equal one by one, or None."""
+    for old, new in zip(was.raw(), now.raw()):
+        if old != new:
+            change = f'its place in the file, now {new[0]} at {new[1] / 1e9:.6f} s comes there'
+            return MessageDifference(old[0], was.rows(old[0]).size, now.rows(old[0]).size, 0, old[1], [change])
+    return None
+
+
+def _changes(was, now, kinds):
+    """What differs between two messages (log time, bytes) of these types, None for one that is not there; texts."""
+    if was is None or now is None:
+        return ['not recorded' if was is None else 'not there any more']
+    if was[0] != now[0]:
+        return [f'log time {was[0] / 1e9:.6f} -> {now[0] / 1e9:.6f}']
+    try:
+        old, new = (dict(_leaves(messages.deserialize(data, kind))) for (_, data), kind in zip((was, now), kinds))
+    except ValueError as error:
+        return [str(error)]
+    return [f'{key} {old.get(key)!r} -> {new.get(key)!r}' for key in dict.fromkeys((*old, *new))
+            if repr(old.get(key)) != repr(new.get(key))] or ['bytes that are in no field']
+
+
+def _leaves(message, prefix=''):
+    """(dotted name, value) of every number and text in a message."""
+    for field in message.__dataclass_fields__:
+        if field.isupper() or field == '__msgtype__':
+            continue
+        value = getattr(message, field)
+        items = enumerate(value) if isinstance(value, (list, np.ndarray)) else ((None, value),)
+        for index, item in items:
+            name = prefix + field + ('' if index is None else f'[{index}]')
+            if hasattr(item, '__dataclass_fields__'):
+                yield from _leaves(item, name + '.')
+            else:
+                yield name, item.item() if isinstance(item, np.generic) else item

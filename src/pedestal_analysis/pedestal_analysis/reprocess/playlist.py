@@ -1,0 +1,97 @@
+"""What a replay publishes, and in which order. No ROS here.
+
+The order is that of the stamps (`header.stamp`; the log time of a type that has none). Of equal stamps latched topics
+go first and have arrived everywhere before anything follows, for so do nodes send them (Shell.announce); then comes
+the order of the table of topics, topics that are not in it last; then the order of the file.
+"""
+import itertools
+
+import numpy as np
+
+from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.parameters import did_you_mean
+from pedestal_recording import bag as bags
+
+
+def reads(graph, node, name):
+    """Whether a node of the graph {name: Link} reads a topic; the recorder reads every one."""
+    return node == 'recorder' or name in graph and node in graph[name].readers
+
+
+def writes(graph, node, name):
+    """Whether a node of the graph {name: Link} writes a topic."""
+    return name in graph and node in graph[name].writers
+
+
+def latched(graph, name):
+    """Whether a topic of the graph {name: Link} holds until its next message."""
+    return name in graph and topics.QOS[graph[name].rate].latched
+
+
+def select(bag, of, names):
+    """The topics of a bag.Bag to publish: those named, else those that the nodes `of` read and none of
+    them writes, else all.
+
+    Raises BagError for a topic that is not in the bag, an unknown node, and a node that reads nothing of the bag.
+    """
+    if names:
+        return bags.chosen_topics(bag, names)
+    if not of:
+        return list(bag.topics)
+    chosen, graph, known = [], bag.graph, nodes.members(nodes.NAMES, bag.beams)
+    for node in of:
+        if node not in known:
+            raise bags.BagError(f'--node {node} is no node;{did_you_mean(node, known)} there are {", ".join(known)}')
+        of_node = [name for name in bag.topics
+                   if reads(graph, node, name) and not any(writes(graph, other, name) for other in of)]
+        if not of_node:
+            wanted = ', '.join(name for name in graph if reads(graph, node, name))
+            raise bags.BagError(f'{bag.path}: nothing in it for node {node}, which reads {wanted}')
+        chosen += of_node
+    return list(dict.fromkeys(chosen))
+
+
+class Playlist:
+    """Messages of a bag.Bag in the order of this module.
+
+    names: topics. start, duration [s]: counted from the first message of a topic that is not latched, duration None to
+    the end; the last message before the start of each latched topic still holds there and goes first. origin, end:
+    stamps [ns] of the first message that counts and of the last one in the bag; first, last: of those published.
+    Raises BagError when there is none.
+    """
+
+    def __init__(self, bag, names, start, duration):
+        self.bag, self.names = bag, names
+        where, stamps, ranks = [], [], []
+        rank = {name: number - len(bag.graph) * latched(bag.graph, name) for number, name in enumerate(bag.graph)}
+        for name in names:
+            rows = bag.where(name)
+            where.append(rows)
+            stamps.append(bag.index.stamp[rows])
+            ranks.append(np.full(rows.size, rank.get(name, len(rank))))
+        where, stamps, ranks = map(np.concatenate, (where, stamps, ranks))
+        if not where.size:
+            raise bags.BagError(f'{bag.path}: no message of {", ".join(names)}')
+        order = np.lexsort((where, ranks, stamps))
+        where, stamps, ranks = where[order], stamps[order], ranks[order]
+        self.origin = int(stamps[ranks >= 0][0] if (ranks >= 0).any() else stamps[0])
+        self.end = int(stamps[-1])
+        begin = self.origin + round(start * SECOND)
+        stop = begin + round(duration * SECOND) if duration is not None else self.end
+        before = np.flatnonzero((ranks < 0) & (stamps < begin))
+        held = np.array([before[ranks[before] == topic][-1] for topic in np.unique(ranks[before])], int)
+        inside = np.flatnonzero((stamps >= begin) & (stamps <= stop))
+        if not inside.size:
+            raise bags.BagError(f'{bag.path}: no message from {start:g} s on; it is '
+                                f'{(self.end - self.origin) / SECOND:g} s long')
+        self.first, self.last = int(stamps[inside[0]]), int(stamps[inside[-1]])
+        stamps[held] = self.first
+        chosen = np.concatenate((held, inside))
+        self._where, self._stamps = where[chosen], stamps[chosen]
+
+    def steps(self):
+        """Iterator of (stamp, iterator of (topic, CDR bytes)), one for each stamp."""
+        rows = zip(self._stamps.tolist(), self.bag.take(self.bag.index[self._where]))
+        for stamp, group in itertools.groupby(rows, lambda row: row[0]):
+            yield stamp, ((name, data) for _, (name, _, _, data) in group)

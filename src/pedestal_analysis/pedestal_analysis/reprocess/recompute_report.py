@@ -1,0 +1,213 @@
+"""The verb `pedestal recompute`: what it prints, writes and answers."""
+import dataclasses
+import math
+
+import numpy as np
+
+from pedestal_analysis import console
+from pedestal_analysis.reprocess import difference, recompute, what_if
+from pedestal_analysis.results import tracking
+from pedestal_analysis.results.results import row
+from pedestal_common.graph import topics
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.wire import messages, records
+from pedestal_recording.writer import Writer
+
+
+@dataclasses.dataclass
+class NodeReport:
+    """One node: lines to print, rows of --json, the outputs {topic: Output} it has now, a message of each as the node
+    makes it {topic: message}, whether they are as they must be."""
+    lines: list
+    rows: list
+    outputs: dict
+    templates: dict
+    well: bool = True
+
+
+def main(options):
+    """(lines to print, rows of --json, whether all is well) of the verb's options.
+
+    Raises ValueError for an option that fits nothing, RunError when a live node does not answer.
+    """
+    recording = recompute.Recording(options.bag, {None: None, 'lockstep': True}.get(options.pacing, False),
+                                    options.beam)
+    given = recompute.file_parameters(options.params_file, recording.bag.beam) if options.params_file else None
+    nodes = recompute.chosen(recording, options.node, given)
+    changes = recompute.overrides(options.param, nodes)
+    if changes:
+        nodes = list(changes)
+    if changes and options.live:
+        raise recompute.RecomputeError('--live compares with what was recorded; --param does not go with it')
+    if options.output and options.output.exists():
+        raise recompute.RecomputeError(f'--output {options.output} exists already; a recording is never overwritten')
+    reports = [_node_report(recording, node, given, changes.get(node), options) for node in nodes]
+    lines = []
+    for report in reports:
+        lines += [*([''] if lines else []), *report.lines]
+    if options.output:
+        outputs = {topic: output for report in reports for topic, output in report.outputs.items()}
+        templates = {topic: message for report in reports for topic, message in report.templates.items()}
+        write(options.output, recording, outputs, templates, changes)
+        lines.append(f'written: {options.output}')
+    return lines, [row for report in reports for row in report.rows], all(report.well for report in reports)
+
+
+def _node_report(recording, node, given, changes, options):
+    """The NodeReport of a node with the parameters given; changes: {key: value} of parameters, None to compare with
+    what was recorded."""
+    params = recompute.parameters_of(recording, node, given)
+    done = recompute.recompute(recording, node, params)
+    tolerance = difference.Tolerance(options.absolute, options.relative, tuple(options.ignore))
+    if changes:
+        new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes),
+                                  {step: [command for command, _ in made] for step, made in done.requests.items()})
+        report = _old_against_new(recording, done, new, tolerance, changes)
+    elif options.live:
+        from pedestal_analysis.reprocess import live
+        report = _against_recorded(recording, live.outputs(recording, done, params), done, tolerance)
+        report.lines.insert(0, f'compared is what the process of {node} published, fed in lockstep')
+    else:
+        report = _against_recorded(recording, done.outputs, done, tolerance)
+    report.lines[:0] = [_title(recording, done, options.params_file), *_stand_ins(recording, done),
+                         *_input_problems(done), *_requests(done)]
+    idle = '' if options.allow_idle else recompute.idle(recording, done)
+    if idle:
+        report.lines.append(f'{node}: NOT exercised: {idle} (--allow-idle lets it pass)')
+        report.well = False
+    return report
+
+
+def _title(recording, done, params_file):
+    stamps = done.feed.stamps / SECOND
+    span = f'{stamps[0]:g} to {stamps[-1]:g} s' if len(stamps) else 'no step'
+    pacing = 'lockstep' if recording.lockstep else 'realtime'
+    if params_file:
+        origin = f'parameters of {params_file}'
+    elif recording.bag.configuration['parameters']:
+        origin = 'parameters as recorded'
+    else:
+        origin = 'DEFAULT parameters, for the recording does not say how it was made (--params-file)'
+    return f'{recording.bag.path}: {recording.bag.beam}{done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
+
+
+def _stand_ins(recording, done):
+    """Lines on the inputs that were not recorded, and what stands for them."""
+    return [f'no {topic} in it: {source} stands for it' for topic in done.feed.rows
+            if (source := recording.source(topic)) != topic]
+
+
+def _input_problems(done):
+    lines = []
+    if done.feed.problem:
+        lines.append(f'NOT recomputed to the end: {done.feed.problem}')
+    if done.feed.refused:
+        lines.append(f'{done.feed.refused} inputs refused: their stamps go back')
+    return lines
+
+
+def _requests(done):
+    """Lines on what was asked for."""
+    lines = [line for step, made in done.requests.items() for line in _requests_of_step(done, step, made)]
+    return lines + ([f'{len(lines)} requests fed'] if lines else [])
+
+
+def _requests_of_step(done, step, made):
+    return [f'{command} asked for at {done.feed.stamps[step] / SECOND:.6f} s{"" if granted else ", and refused"}'
+            for command, granted in made]
+
+
+def _against_recorded(recording, outputs, done, tolerance):
+    """The NodeReport of outputs {topic: Output} against those that were recorded."""
+    compared = recompute.compare(recording, outputs, done.unit, tolerance)
+    if not compared:
+        return _new_numbers(recording, outputs, done)
+    rows = []
+    for topic in compared:
+        rows += [row(done.node, f'{topic.name} recorded', topic.was),
+                 row(done.node, f'{topic.name} recomputed', topic.now),
+                 row(done.node, f'{topic.name} problems', len(topic.problems)),
+                 row(done.node, f'{topic.name} differences', sum(field.different for field in topic.fields))]
+        for field in topic.fields:
+            name = f'{topic.name} {field.name}'
+            rows += [row(done.node, f'{name} different', field.different),
+                     row(done.node, f'{name} beyond tolerance', field.beyond),
+                     row(done.node, f'{name} largest', field.largest),
+                     row(done.node, f'{name} first', field.first, 's')]
+    equal = all(topic.equal for topic in compared)
+    verdict = 'identical' if all(topic.identical for topic in compared) else \
+        'equal within tolerance' if equal else 'DIFFERS'
+    return NodeReport([*difference.lines(compared), f'{done.node}: {verdict}'], rows, outputs, done.unit.messages,
+                      equal and not done.feed.problem)
+
+
+def _new_numbers(recording, outputs, done):
+    """The NodeReport where no output was recorded."""
+    lines = [f'{done.node}: none of its outputs is in the recording: nothing to compare']
+    lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
+    rows = [row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
+    if done.node == 'acu' and len(done.feed.stamps):
+        numbers = what_if.numbers(recording.bag, [done.outputs])
+        lines += _by_encoders(recording)
+        lines += [f'{name:42} {console.measured(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
+        rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
+    return NodeReport(lines, rows, outputs, done.unit.messages, not done.feed.problem)
+
+
+def _by_encoders(recording):
+    """A line on errors that are not those of the dish, in a list; none where its true direction was recorded."""
+    return [f'note: {tracking.BY_ENCODERS}'] if tracking.by_encoders(recording.bag) else []
+
+
+def _old_against_new(recording, old, new, tolerance, changes):
+    """The NodeReport of a node recomputed with changed parameters: numbers of both, and how far its messages moved."""
+    before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
+    whose = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with the parameters unchanged'
+    lines = [f'changed: {", ".join(f"{key} = {value}" for key, value in changes.items())}; old is {whose}']
+    lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
+    rows = []
+    if new.node == 'acu' and len(new.feed.stamps):
+        lines += [f'note: {what_if.NOTE}', *_by_encoders(recording),
+                  f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']
+        for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
+            ratio = f'{b / a:9.4g}' if a and math.isfinite(b / a) else f'{"":9}'
+            lines.append(f'{name:42} {console.measured(a):>12} {console.measured(b):>12} {ratio} {unit}'.rstrip())
+            rows += [row(new.node, f'{name} old', a, unit), row(new.node, f'{name} new', b, unit)]
+    lines += difference.lines([difference.compare(name, before[name], output, tolerance)
+                               for name, output in new.outputs.items() if not tolerance.ignores(name)])
+    return NodeReport(lines, rows, new.outputs, new.unit.messages)
+
+
+def write(path, recording, outputs, templates, changes):
+    """Write a bag: the recording with some topics replaced. A message is logged at its stamp in lockstep; else a new
+    one is logged with the newest recorded message whose stamp is not after its own."""
+    named = [topic for topic in topics.TOPICS if topic.name in outputs or topic.name in recording.bag.topics]
+    rows = []
+    for index, topic in enumerate(named):
+        if topic.name not in outputs:
+            rows += [(log, index, published, data) for _, log, published, data in recording.bag.raw(topic.name)]
+            continue
+        output = outputs[topic.name]
+        logs = output.stamps if recording.lockstep else _logged(recording, output.stamps)
+        rows += [(log, index, log, data) for log, data in zip(logs.tolist(), _bytes(topic.name, output, templates))]
+    rows.sort(key=lambda row: row[:2])
+    changed = ', '.join(f'{node}.{key}={value}' for node, values in changes.items() for key, value in values.items())
+    writer = Writer(path, named, {**recording.bag.metadata, 'recomputed': ' '.join(outputs), 'changed': changed},
+                    {name: content for name, content in recording.bag.metadata_records.items() if name != 'pedestal'})
+    for log, index, published, data in rows:
+        writer.write(index, log, published, data)
+    writer.close()
+
+
+def _logged(recording, stamps):
+    """When messages of these stamps would have been logged: with the recorded joint states."""
+    rows, output = recording.rows('joint_states'), recording.output('joint_states')
+    return rows.log[np.clip(np.searchsorted(output.stamps, stamps, side='right') - 1, 0, None)]
+
+
+def _bytes(topic, output, templates):
+    """The CDR messages of an Output."""
+    if output.texts is not None:
+        return [messages.serialize(messages.String(data=text)) for text in output.texts]
+    encoder = records.Encoder(topic, templates[topic])
+    return [encoder.bytes_of(stamp, values) for stamp, values in zip(output.stamps.tolist(), output.values)]

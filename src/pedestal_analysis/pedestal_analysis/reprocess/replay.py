@@ -1,0 +1,131 @@
+"""`pedestal replay`: a recording published into a live graph in the order of its Playlist, bytes as recorded."""
+import contextlib
+import dataclasses
+import math
+import signal
+import time
+
+import rclpy
+
+from pedestal_analysis.reprocess.player import ANSWERS, Player, answer_of
+from pedestal_analysis.reprocess.playlist import Playlist, select, writes
+from pedestal_analysis.reprocess.terminal import Keyboard
+from pedestal_common.graph import nodes
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.node import middleware, shell
+from pedestal_recording import bag as bags
+
+
+@dataclasses.dataclass(frozen=True)
+class ReplayOptions:
+    """What is published, and when.
+
+    nodes: what these nodes read, or names: these topics, or neither: all. rate: times real time; None: lockstep with
+    the nodes. start, duration [s]: from the first message on, None to the end. paused: begin with a pause. deadline:
+    wall-clock time [s] a reader or an answer is waited for. Raises ValueError for a number out of range.
+    """
+    nodes: list = dataclasses.field(default_factory=list)
+    names: list = dataclasses.field(default_factory=list)
+    rate: float | None = 1.0
+    start: float = 0.0
+    duration: float | None = None
+    paused: bool = False
+    deadline: float = 60.0
+
+    def __post_init__(self):
+        for option in ('rate', 'duration', 'deadline'):
+            value = getattr(self, option)
+            if value is not None and not (0.0 < value < math.inf):
+                raise ValueError(f'--{option} {value:g}: must be above 0')
+        if not 0.0 <= self.start < math.inf:
+            raise ValueError(f'--start {self.start:g} s: must be 0 or more')
+
+
+@dataclasses.dataclass
+class ReplayResult:
+    """What was sent {topic: count}, from the first to the last stamp [s], in which wall time [s]; {node: (its answers,
+    the steps it was asked)}. ended: 'whole', 'quit' (by key) or 'stopped' (by a signal)."""
+    bag: str
+    sent: dict
+    first: float
+    last: float
+    wall: float
+    answers: dict
+    ended: str
+
+    def lines(self):
+        """The result as text."""
+        width = max(map(len, self.sent))
+        lines = [f'{name:{width}} {count:9}' for name, count in self.sent.items()]
+        lines += [f'{node} answered {count} of {steps} steps' for node, (count, steps) in self.answers.items()]
+        span = self.last - self.first
+        factor = f' ({span / self.wall:.3g} x real time)' if self.ended == 'whole' and span > 0.0 else ''
+        return [*lines, f'{self.bag}: {sum(self.sent.values())} messages sent, from {self.first:.6f} to '
+                        f'{self.last:.6f} s in {self.wall:.3f} s{factor}'
+                        + ('' if self.ended == 'whole' else f'; {self.ended} before the end')]
+
+
+@contextlib.contextmanager
+def stop_by_signal():
+    """stopped() -> whether a signal to end has come: rclpy must not be left in the middle of a call."""
+    signals = []
+    before = {number: signal.signal(number, lambda *_: signals.append(True))
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+              if signal.getsignal(number) is not signal.SIG_IGN}
+    try:
+        yield lambda: bool(signals)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def replay(path, options, ready=lambda: None) -> ReplayResult:
+    """Publish a bag into the live graph of this ROS domain, as ReplayOptions say. ready() is called before the first
+    message.
+
+    Raises BagError, ValueError for options that do not fit the bag, GraphError for what the graph is not.
+    """
+    bag = bags.read(path)
+    chosen = select(bag, options.nodes, options.names)
+    if options.rate is None:
+        _check_lockstep(options.nodes, chosen, bag.graph)
+    written = 'clock' in chosen or any(writes(bag.graph, node, 'clock') for node in options.nodes)
+    companion = 'clock' if 'clock' in bag.topics and not written else None
+    playlist = Playlist(bag, [*chosen, *filter(None, [companion])], options.start, options.duration)
+    keyboard = Keyboard()
+    if options.paused and not keyboard.there:
+        raise ValueError('--paused: standard input is no terminal, no key could end the pause')
+    middleware.initialise([])
+    try:
+        with stop_by_signal() as stopped, keyboard:
+            player = Player(playlist, companion, options, keyboard, stopped)
+            try:
+                begun = time.monotonic()
+                if player.connect():
+                    ready()
+                    begun = time.monotonic()
+                    with contextlib.suppress(shell.Stopped):
+                        player.play()
+                wall = time.monotonic() - begun
+                player.finish()
+            finally:
+                player.close()
+            return ReplayResult(
+                str(path), {name: channel.sent for name, channel in player.channels.items()},
+                playlist.first / SECOND, player.position / SECOND, wall,
+                {node.name: (node.answers, node.steps) for node in player.under_test if node.trigger},
+                'stopped' if stopped() else 'quit' if player.pace.quit else 'whole')
+    finally:
+        rclpy.try_shutdown()
+
+
+def _check_lockstep(under_test, chosen, graph):
+    answering = [node for node in under_test if nodes.plain(node) in ANSWERS]
+    if not answering:
+        why = (f'{", ".join(under_test)} answers no step at its stamp' if under_test else
+               'say with --node who answers the steps')
+        raise ValueError(f'--lockstep: {why}; there are {", ".join(ANSWERS)}')
+    for node in answering:
+        trigger, _ = answer_of(node, graph)
+        if trigger not in (None, *chosen):
+            raise ValueError(f'--lockstep: {node} answers {trigger}, which is not published')

@@ -1,0 +1,224 @@
+"""`pedestal replay --page`: a recording on the operator's page, with a slider. There is no graph: it reads the bag."""
+import itertools
+import math
+import queue
+import threading
+import time
+
+import numpy as np
+
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.wire import commands, messages, records
+from pedestal_operator import remote_node
+from pedestal_operator.antenna import Antenna
+from pedestal_operator.page import page_log, page_sky, page_state
+from pedestal_operator.page.page_log import Log
+from pedestal_operator.page.page_passes import Coming
+from pedestal_operator.page.page_security import ROLES
+from pedestal_operator.page.page_server import PageServer
+from pedestal_recording import bag as bags
+
+FRAME, SLOW = 0.1, 1.0
+"""Time [s] between two states that pages are sent, and two of what changes slowly."""
+
+SLOWEST, FASTEST = 0.05, 50.0
+"""Times real time."""
+
+EVENTS = 5000
+"""Messages of a topic that are looked through for the event log, the first ones."""
+
+LATELY = 60
+"""Diagnostics before a moment in which the last one of each node is looked for."""
+
+NUMBERS = (*remote_node.NUMBERS, *page_state.NUMBERS)
+TEXTS = (*remote_node.TEXTS, 'ins/state', 'acu/blockage')
+LISTS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_result')
+
+
+class Recording(Antenna):
+    """A bag.Bag of one beam as page_state wants an antenna: what had been told last when it was `position` [s] old.
+
+    length: of the recording [s]. Raises BagError where there are no joint_states in it.
+    """
+
+    def __init__(self, bag):
+        self._bag, self.beam = bag, bag.beam
+        self._rows = {name: bag.rows(name) for name in (*NUMBERS, *TEXTS, *LISTS)
+                      if name in bag.topics and len(bag.rows(name))}
+        if 'joint_states' not in self._rows:
+            raise bags.BagError(f'{bag.path}: no joint_states in it, which the page shows')
+        self._times = {name: np.maximum.accumulate(rows.stamp if name in NUMBERS else rows.log)
+                       for name, rows in self._rows.items()}
+        joints = self._times['joint_states']
+        self._begin, self.length = int(joints[0]), (int(joints[-1]) - int(joints[0])) / SECOND
+        self._decoders = {name: records.Decoder(name, records.empty(records.of(name), 1)) for name in NUMBERS}
+        self.configuration = {name: value for node in page_state.WANTED
+                              for name, value in bag.configuration['parameters'].get(node, {}).items()}
+        self.configuration['graph.start'] = bag.start
+        self.alarms, self.path, self.log = [], None, Log(most=EVENTS)
+        self.numbers, self.texts, self.status, self._heard = {}, {}, {}, {}
+        self._read_log()
+        self.move(0.0)
+
+    @property
+    def now(self):
+        """The time of the recording [s], UTC in realtime."""
+        return (self._begin + round(self.position * SECOND)) / SECOND
+
+    def present(self, name):
+        """Whether a topic or node had been heard lately."""
+        return name in self._heard and self.now - self._heard[name] < remote_node.FRESH
+
+    def lines(self):
+        """What had happened so far, for the event log."""
+        return [line for line in self.log.lines if line['t'] <= self.now][-page_log.MOST:]
+
+    def move(self, position):
+        """Go to a position [s]."""
+        self.move_numbers(position)
+        for name in TEXTS:
+            for text in self._messages(name, 1):
+                self.texts[name] = text.data
+        self.alarms = [status for array in self._messages('acu/alarms', 1) for status in array.status]
+        for message in self._messages('acu/program_track', 1):
+            self.path = page_sky.path(message, page_state.epoch(self)) or self.path
+        last = self._count('diagnostics')
+        for time_of, array in zip(self._times.get('diagnostics', ())[max(last - LATELY, 0):last],
+                                  self._messages('diagnostics', LATELY)):
+            for status in array.status:
+                self.status[status.name], self._heard[status.name] = status, time_of / SECOND
+
+    def move_numbers(self, position):
+        """The same for the numbers only."""
+        self.position = min(max(position, 0.0), self.length)
+        self.numbers, self.texts, self.status, self._heard = {}, {}, {}, {}
+        for name in NUMBERS:
+            for time_of, data in self._last(name, 1):
+                self.numbers[name], self._heard[name] = self._decoders[name].decoded(data)[1], time_of / SECOND
+
+    def _count(self, name):
+        """How many messages of a topic there had been."""
+        moment = self._begin + round(self.position * SECOND)
+        return int(np.searchsorted(self._times[name], moment, 'right')) if name in self._rows else 0
+
+    def _last(self, name, most):
+        """[(time [ns], CDR bytes)] of the last messages of a topic."""
+        last = self._count(name)
+        first = max(last - most, 0)
+        if last == 0:
+            return []
+        return [(int(at), data) for at, (*_, data) in zip(self._times[name][first:last],
+                                                          self._bag.take(self._rows[name][first:last]))]
+
+    def _messages(self, name, most):
+        return [messages.deserialize(data, self._bag.topics[name]) for _, data in self._last(name, most)]
+
+    def _read_log(self):
+        """All that happened, in its order."""
+        told = []
+        for name in ('acu/mode', 'adu/state', 'acu/command_result', 'acu/alarms'):
+            rows = self._rows.get(name, ())[:EVENTS]
+            told += [(row_log, name, messages.deserialize(data, self._bag.topics[name]))
+                     for row_log, (*_, data) in zip(rows.log.tolist() if len(rows) else (), self._bag.take(rows))]
+        for log, name, message in sorted(told, key=lambda row: row[0]):
+            if name == 'acu/command_result':
+                self.log.replied(log / SECOND, *commands.of_reply(message))
+            elif name == 'acu/alarms':
+                self.position, self.alarms = (log - self._begin) / SECOND, message.status
+                self.log.alarms(log / SECOND, page_state.alarms(self))
+            else:
+                self.log.text(log / SECOND, name, message.data)
+
+
+class Player:
+    """Shows a Recording on a page at a port: plays, pauses, goes where the slider is. options: a replay.ReplayOptions,
+    of which it takes start, rate, paused."""
+
+    def __init__(self, recording, port, options):
+        self._recording, self._lock = recording, threading.Lock()
+        self._playing, self._rate = not options.paused, options.rate
+        self._shown, self._coming = {}, Coming()
+        recording.move(options.start)
+        self._server = PageServer('127.0.0.1', port, (), 32, self._past)
+        self.url = self._server.access.url(ROLES[0])
+
+    def play(self, stopped):
+        """Serve until stopped() is true."""
+        before, slow = time.monotonic(), -math.inf
+        while not stopped():
+            now = time.monotonic()
+            with self._lock:
+                moved = self._hear()
+                if self._playing:
+                    self._go(self._recording.position + self._rate * (now - before))
+                self._show(moved or now - slow >= SLOW)
+            slow = now if moved or now - slow >= SLOW else slow
+            before = now
+            time.sleep(FRAME)
+        self._server.close()
+        self._coming.close()
+
+    def _go(self, position):
+        self._recording.move(position)
+        self._playing = self._playing and position < self._recording.length
+
+    def _hear(self):
+        """Do what the pages ask; whether the recording is elsewhere now."""
+        moved = False
+        while True:
+            try:
+                client, message, _ = self._server.asked.get_nowait()
+            except queue.Empty:
+                return moved
+            wanted = (message or {}).get('replay')
+            if not isinstance(wanted, dict):
+                if message is not None:
+                    self._server.reply(client, {'error': 'this is a recording: nothing can be asked of it'})
+                continue
+            if _number(wanted.get('position')):
+                self._go(float(wanted['position']))
+                moved = True
+            if _number(wanted.get('rate')):
+                self._rate = min(max(float(wanted['rate']), SLOWEST), FASTEST)
+            if isinstance(wanted.get('playing'), bool):
+                again = wanted['playing'] and self._recording.position >= self._recording.length
+                self._go(0.0 if again else self._recording.position)
+                self._playing, moved = wanted['playing'], moved or again
+
+    def _show(self, slowly):
+        recording = self._recording
+        sections = {'now': page_state.now(recording), 'told': page_state.told(recording),
+                    'alarms': page_state.alarms(recording), 'log': recording.lines(),
+                    'replay': {'length': recording.length, 'position': recording.position, 'playing': self._playing,
+                               'rate': self._rate}}
+        if slowly:
+            past = page_sky.Past(page_state.SPAN)
+            for frame in self._frames(SLOW):
+                past.add(frame['t'], frame['beam'])
+            sections |= {'fixed': page_state.fixed(recording), 'past': past.places,
+                         'sky': page_state.sky(recording, self._coming.look(recording))}
+        texts = {name: page_state.encoded(section) for name, section in sections.items()}
+        fresh = {name: text for name, text in texts.items() if self._shown.get(name) != text}
+        self._shown |= fresh
+        self._server.publish(fresh)
+
+    def _past(self):
+        with self._lock:
+            rows = [page_state.history_row(frame) for frame in self._frames(page_state.PERIOD)]
+        return page_state.encoded(rows)
+
+    def _frames(self, period):
+        """[page_state.now] of the time of the strip charts before this moment."""
+        recording, position = self._recording, self._recording.position
+        frames = []
+        for count in itertools.count(-round(page_state.SPAN / period)):
+            if position + count * period >= 0.0 and count <= 0:
+                recording.move_numbers(position + count * period)
+                frames.append(page_state.now(recording))
+            if count >= 0:
+                recording.move(position)
+                return frames
+
+
+def _number(value):
+    return type(value) in (int, float) and math.isfinite(value)

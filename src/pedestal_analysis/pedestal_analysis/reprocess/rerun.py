@@ -1,0 +1,116 @@
+"""Makes a run again from the configuration in its recording, and compares: bytes, then messages, then metadata."""
+import dataclasses
+import pathlib
+
+from pedestal_analysis.reprocess import difference
+from pedestal_bringup.scenario import scenario
+from pedestal_common import parameters
+from pedestal_common.text_files import files
+from pedestal_recording import bag as bags
+
+SHOWN = 4
+"""Fields shown of the first message that differs on a topic."""
+
+
+@dataclasses.dataclass
+class RerunResult:
+    """A recording against the one made again, which is at path. topics: [difference.MessageDifference], the earliest
+    first; metadata: {record: {key: (was, now)}} of what differs; end: last log time of the recording [ns]; sha256: of
+    the new file; same: whether the files are equal to the last byte."""
+    path: pathlib.Path
+    topics: list
+    metadata: dict
+    end: int
+    sha256: str
+    same: bool
+
+    @property
+    def equal(self):
+        """Whether every message is there again, with the same bytes in the same order."""
+        return not self.topics
+
+    @property
+    def cut(self):
+        """Whether the recording ends before the run did and is equal up to there."""
+        return all(topic.was < topic.now == topic.was + topic.different for topic in self.topics)
+
+    @property
+    def other_version(self):
+        """Whether another version of this software made the recording."""
+        return any(key == 'git' or key.startswith('version.') for key in self.metadata.get('pedestal', ()))
+
+    def lines(self):
+        """The comparison as text, the verdict last."""
+        lines = [] if self.cut else list(map(_line, self.topics))
+        lines += [f'{record}.{key}: {_short(was)} -> {_short(now)}'
+                  for record, changes in self.metadata.items() for key, (was, now) in changes.items()]
+        if self.same:
+            verdict = f'equal to the last byte, sha256 {self.sha256}'
+        elif not self.equal:
+            part = f', but equal up to {self.end / 1e9:.6f} s, where the recording ends' if self.cut else ''
+            verdict = f'NOT equal{part}'
+        elif self.other_version:
+            verdict = 'messages equal, made by another version'
+        else:
+            verdict = f'messages equal, {"metadata not" if self.metadata else "packed in another way"}'
+        return [*lines, f'{self.path}: {verdict}']
+
+
+def _line(topic):
+    counts = f'{topic.was} messages' if topic.was == topic.now else f'{topic.was} messages, now {topic.now}'
+    more = f' and {len(topic.changes) - SHOWN} more fields' if len(topic.changes) > SHOWN else ''
+    return (f'{topic.name}: {counts}, {topic.different} differ, the first at {topic.first / 1e9:.6f} s: '
+            f'{", ".join(topic.changes[:SHOWN])}{more}')
+
+
+def _short(text):
+    """A value of the metadata on one line; of a long one (the scenario) only its length."""
+    if not text:
+        return 'none'
+    return text if len(text) < 60 and '\n' not in text else f'a text of {len(text)} characters'
+
+
+def configured(bag):
+    """The Scenario a recording was made from, parameters whose default has changed since set as they were.
+
+    Raises bag.BagError for a recording that cannot be made again.
+    """
+    recorded = bag.configuration['parameters']
+    if not bag.configuration['scenario']:
+        raise bags.BagError(f'{bag.file}: holds no configuration, so that it cannot be made again')
+    if bag.metadata.get('pacing') != 'lockstep':
+        raise bags.BagError(f'{bag.file}: recorded in {bag.metadata.get("pacing")}, which is never the same twice; '
+                            'only a lockstep run can be made again')
+    chosen = scenario.parse(bag.metadata.get('scenario', ''), bag.configuration['scenario'])
+    values = {node: dict(values) for node, values in chosen.values.items()}
+    for node, then in recorded.items():
+        if node not in chosen.nodes:
+            raise bags.BagError(f'{bag.file}: holds parameters of {node}, which is no node of its scenario')
+        now = parameters.as_dict(chosen.node_parameters(node))
+        values[node].update({key: value for key, value in then.items() if key not in now or now[key] != value})
+        # A topic that the version of the recording did not have is not there.
+        values[node].update({key: False for owner, told, flag in scenario.MEASURED for key in (told, flag)
+                             if key in now and key not in then})
+    changed = dataclasses.replace(chosen, values=values)
+    for node in recorded:
+        try:
+            changed.node_parameters(node)
+        except parameters.ParameterError as error:
+            raise bags.BagError(f'{bag.file}: made by a version with other parameters: {node}: {error}') from None
+    return changed
+
+
+def result(was, now) -> RerunResult:
+    """Compare a recording with the one made again; both bag.Bag."""
+    metadata = {}
+    for record in dict.fromkeys((*was.metadata_records, *now.metadata_records)):
+        old, new = (bag.metadata_records.get(record, {}) for bag in (was, now))
+        metadata[record] = {key: (old.get(key), new.get(key)) for key in dict.fromkeys((*old, *new))
+                            if old.get(key) != new.get(key)}
+    topics = [difference.compare_messages(name, was, now) for name in dict.fromkeys((*was.topics, *now.topics))]
+    before, sha256 = (files.sha256(bag.file) for bag in (was, now))
+    if not any(topics) and before != sha256:
+        topics = [difference.compare_order(was, now)]
+    return RerunResult(now.path, sorted(filter(None, topics), key=lambda topic: topic.first),
+                       {record: changes for record, changes in metadata.items() if changes},
+                       int(was.index.log.max(initial=0)), sha256, before == sha256)

@@ -1,0 +1,127 @@
+"""The rate loop of an axis identified on the drive core, and the gains of the feed-forward that follow from it.
+
+Small sines of a few low frequencies are added to a constant rate, where friction is a constant and the bias keeps the
+teeth closed; W(jw) is what the antenna's rate makes of them, without the known delay (transport and half a period of
+the hold, which the ACU's prediction covers). By least squares 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + f_4 (jw)^3, and
+the rate command k_v v + k_a a needs k_v = f_1, k_a = f_2 (paper 003, eq. 14 to 18, as corrected in
+acu_tracker.servo.feedforward).
+"""
+import dataclasses
+import math
+
+import numpy as np
+
+from acu_tracker.servo import feedforward
+from adu_drive import drive_unit
+from adu_drive.params import WindParameters
+from pedestal_common.compiled import compiled
+from pedestal_common.graph import topics
+from pedestal_common.parameters import record
+
+FREQUENCIES = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
+"""Hz; whole periods in PERIOD."""
+PERIOD = 4.0
+DROPPED, KEPT = 1, 2
+"""Periods to settle and to measure."""
+TERMS = 4
+RATE = (0.1, 0.06)
+"""Rates of the axes [rad/s]: above the excitation, and inside the travel for a whole record."""
+PEAK = 0.004
+"""Of each sine [rad/s]."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RateLoop:
+    """One axis: W (n,) complex at w (n,) [rad/s]; f (TERMS,): the series of 1 / W."""
+    w: np.ndarray
+    W: np.ndarray
+    f: np.ndarray
+
+    @property
+    def k_v(self):
+        """Gain of the rate of the reference [-]."""
+        return float(self.f[0])
+
+    @property
+    def k_a(self):
+        """Gain of the acceleration of the reference [s]."""
+        return float(self.f[1])
+
+    def error(self, k_v, k_a):
+        """|1 - (k_v + k_a jw) W| (n,): what a feed-forward leaves of the angle, relative."""
+        return np.abs(1.0 - (k_v + 1j * k_a * self.w) * self.W)
+
+
+def series(w, W, terms=TERMS):
+    """f (terms,) of the least-squares fit 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + ..."""
+    basis = (1j * w[:, np.newaxis]) ** np.arange(terms)
+    wanted = 1.0 / W
+    return np.linalg.lstsq(np.concatenate((basis.real, basis.imag)), np.concatenate((wanted.real, wanted.imag)),
+                           rcond=None)[0]
+
+
+def response(commanded, position, T, delay, w):
+    """W (n,) at w (n,) [rad/s] of a rate loop, less its delay and the hold.
+
+    commanded (m,): rates [rad/s], each held for T [s] from t_k + delay [s] on; position (m,): the angle [rad] at t_k.
+    The record holds whole periods of every w; what is linear in time is left out.
+    """
+    t = T * (np.arange(len(commanded)) - 0.5 * (len(commanded) - 1))
+    waves = np.cos(w * t[:, np.newaxis]), np.sin(w * t[:, np.newaxis])
+    basis = np.column_stack((np.ones_like(t), t, *waves))
+    fit = np.linalg.lstsq(basis, np.column_stack((commanded, position)), rcond=None)[0][2:]
+    U, Y = (fit[:len(w)] - 1j * fit[len(w):]).T
+    return 1j * w * Y / (U * np.sinc(0.5 * w * T / math.pi)) * np.exp(1j * w * (delay + 0.5 * T))
+
+
+@compiled
+def _drive(state, constants, inputs, outputs, rate, torque, position):
+    """Fill position (n, 2) [rad]: the encoders before each step with the commands rate and torque (n, 2)."""
+    u, y = inputs[0], outputs[0]
+    for k in range(len(rate)):
+        position[k, 0], position[k, 1] = y.azimuth.position, y.elevation.position
+        u.azimuth.rate, u.elevation.rate = rate[k, 0], rate[k, 1]
+        u.azimuth.torque, u.elevation.torque = torque[k, 0], torque[k, 1]
+        drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
+
+
+def identify(scenario, torque=True) -> dict:
+    """{axis: RateLoop} of a scenario's drive in still air; torque: with the ACU's torque feed-forward, or without.
+
+    Raises ValueError for a period that does not divide PERIOD, and for travel that is too short.
+    """
+    acu, drive = scenario.node_parameters('acu'), scenario.node_parameters('adu')
+    axes = [getattr(drive, name) for name in topics.AXES]
+    duration = (DROPPED + KEPT) * PERIOD
+    start = {f'initial_{name}': 0.5 * (axis.limits.lower + axis.limits.upper - rate * duration)
+             for name, axis, rate in zip(topics.AXES, axes, RATE)}
+    drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True, **start)
+    w = 2.0 * math.pi * FREQUENCIES
+    steps = round(PERIOD / drive.period)
+    if abs(steps * drive.period - PERIOD) > 1e-9:
+        raise ValueError(f'adu.period = {drive.period:g} s: must divide the {PERIOD:g} s it is identified over')
+    for name, axis, rate in zip(topics.AXES, axes, RATE):
+        if axis.limits.upper - axis.limits.lower < 1.1 * rate * duration:
+            raise ValueError(f'adu.{name}.limits: travel must be at least '
+                             f'{1.1 * rate * duration:g} rad to identify the drive')
+    # Schroeder's phases keep the peak of the sum low.
+    k = np.arange(len(w))
+    angle = w * drive.period * np.arange(steps)[:, np.newaxis] - math.pi * k * (k + 1) / len(k)
+    v, a = PEAK * np.cos(angle).sum(axis=1), -PEAK * (w * np.sin(angle)).sum(axis=1)
+    rate, acceleration = np.tile(v, DROPPED + KEPT)[:, np.newaxis] + RATE, np.tile(a, DROPPED + KEPT)
+    torques = np.zeros_like(rate)
+    for i, name in enumerate(topics.AXES if torque else ()):
+        known = record(getattr(acu, name).feedforward)[0]
+        torques[:, i] = [feedforward.torque(*motion, known) for motion in zip(rate[:, i], acceleration)]
+    state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
+    inputs, outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
+    inputs['enable'] = 1
+    drive_unit.read(state[0], constants[0], outputs[0])
+    position = np.empty_like(rate)
+    _drive(state, constants, inputs, outputs, rate, torques, position)
+    kept = slice(DROPPED * steps, None)
+    loops = {}
+    for i, name in enumerate(topics.AXES):
+        W = response(rate[kept, i], position[kept, i], drive.period, drive.transport_delay, w)
+        loops[name] = RateLoop(w, W, series(w, W))
+    return loops

@@ -1,0 +1,72 @@
+"""What the INS of a recorded run knew of the deck's attitude, against the truth and against the error it stated."""
+import dataclasses
+import math
+
+import numpy as np
+
+from pedestal_analysis.results import tracking
+
+TOPIC, STATE = 'ship/imu/data', 'ins/state'
+
+
+@dataclasses.dataclass
+class KnownAttitude:
+    """The INS at its stamps t (n,) [s].
+
+    error (n, 3) [rad]: the rotation from the true attitude to the known one about east and north (level) and,
+    clockwise, about up (heading); any size up to half a turn. sigma (n, 2) [rad]: standard deviations of level and
+    heading that the INS stated. aligned: stamp [s] at which ins/state became `aligned`; NaN when it never did, the
+    first stamp in a bag without ins/state.
+    """
+    t: np.ndarray
+    error: np.ndarray
+    sigma: np.ndarray
+    aligned: float
+
+    @property
+    def level(self):
+        """Level error (n,) [rad], both axes together."""
+        return np.hypot(self.error[:, 0], self.error[:, 1])
+
+    @property
+    def heading(self):
+        """Heading error (n,) [rad], clockwise."""
+        return self.error[:, 2]
+
+    @property
+    def after(self):
+        """Which rows (n,) bool are from alignment on."""
+        return self.t >= self.aligned
+
+    @property
+    def at_alignment(self):
+        """(heading error, its stated standard deviation) [rad] when it was aligned; NaN when it never was."""
+        first = np.argmax(self.after)
+        return (float(self.heading[first]), float(self.sigma[first, 1])) if self.after.any() else (math.nan, math.nan)
+
+
+def read(bag):
+    """The KnownAttitude of a bag.Bag; None ashore."""
+    if any(topic not in bag.topics or not bag.rows(topic).size for topic in ('ship/truth', TOPIC)):
+        return None
+    table = bag.table(TOPIC)
+    t = table['t']
+    quaternion = [f'orientation.{letter}' for letter in 'xyzw']
+    true = tracking.on_grid(bag, t, 'ship/truth', quaternion)
+    both = np.isfinite(true).all(axis=1)
+    if not both.any():
+        return None
+    from scipy.spatial.transform import Rotation  # slow to import, and most runs are ashore
+    t, true = t[both], Rotation.from_quat(true[both])
+    known = Rotation.from_quat(np.column_stack([table[name] for name in quaternion])[both])
+    error = (known * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
+    sigma = np.sqrt(np.column_stack([table[f'orientation_variance.{axis}'] for axis in 'xz'])[both])
+    return KnownAttitude(t, error, sigma, _aligned(bag, t[0]))
+
+
+def _aligned(bag, first):
+    if STATE not in bag.topics or not bag.rows(STATE).size:
+        return float(first)
+    states = bag.table(STATE)
+    times = states['t'][np.array(states['data']) == 'aligned']
+    return float(times[0]) if times.size else math.nan

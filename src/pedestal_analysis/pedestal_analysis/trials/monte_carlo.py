@@ -1,0 +1,149 @@
+"""Many runs at once: on the cores of this machine, or on the Dask cluster behind a scheduler.
+
+A study splits its runs into batches whose size and seeds do not depend on the workers, and adds their results in
+order, so that its numbers are equal to the last bit on any pool. A batch returns sums and a few numbers of every run
+instead of records, so that memory suffices for many --runs.
+"""
+import contextlib
+import logging
+import multiprocessing.resource_tracker
+import re
+import signal
+import threading
+import warnings
+
+import joblib
+import numpy as np
+from joblib.externals import loky
+
+from pedestal_common.law_cache import COLUMNS, ROOF, digest
+
+TIMEOUT = 10.0
+"""Longest time to wait for a scheduler, or for its first worker [s]."""
+
+
+def batches(runs, size):
+    """The (first, count) of every batch of at most `size` runs."""
+    return [(first, min(size, runs - first)) for first in range(0, runs, size)]
+
+
+class Pool:
+    """Workers for `map`: local processes (None: one per core), or a Dask scheduler's, 'tcp://host:port'.
+
+    Use as a context; one local worker is this process and needs none. Raises ValueError for no worker at all,
+    RuntimeError where Dask is missing or nobody answers.
+    """
+
+    def __init__(self, workers=None, scheduler=None):
+        if workers is not None and workers < 1:
+            raise ValueError(f'--workers {workers}: must be at least 1')
+        if scheduler is not None and not re.fullmatch(r'(\w+://)?.+:\d+', scheduler):
+            raise ValueError(f'--scheduler {scheduler}: must be an address such as tcp://host:8786')
+        self.workers = workers or joblib.cpu_count()
+        self.scheduler = scheduler
+        self._stack = contextlib.ExitStack()
+
+    def __enter__(self):
+        # joblib warns of wasted work when a study is stopped, at any time after that
+        warnings.filterwarnings('ignore', '.*tasks (which were|have been)', UserWarning, r'joblib\.parallel')
+        if self.scheduler is None:
+            if self.workers > 1:
+                self._stack.enter_context(_manager_in_silence())
+                self._stack.callback(_end_local)
+        else:
+            client = self._stack.enter_context(_client(self.scheduler))
+            self._stack.enter_context(joblib.parallel_config(backend='dask', client=client))
+        return self
+
+    def __exit__(self, *raised):
+        return self._stack.__exit__(*raised)
+
+    def map(self, function, items, progress=lambda share, text: None):
+        """Yield function(item) of every item, in their order. function: of a module, so that it can be sent.
+
+        progress(share done, text) is called after each.
+        """
+        items = list(items)
+        options = {'n_jobs': -1} if self.scheduler else {'n_jobs': min(self.workers, len(items) or 1),
+                                                         'backend': 'loky'}
+        with _ctrl_c_held_back() if options['n_jobs'] > 1 else contextlib.nullcontext():
+            results = joblib.Parallel(return_as='generator', **options)(map(joblib.delayed(function), items))
+            self._stack.callback(results.close)
+        for done, result in enumerate(results, 1):
+            progress(done / len(items), f'{done} of {len(items)} batches')
+            yield result
+
+    def of_cases(self, function, cases, runs, size, progress=lambda share, text: None):
+        """{case: the values of its runs, arrays (runs, ...)}: function((case, first, count)) gives those of a batch
+        of at most `size` runs."""
+        pieces = batches(runs, size)
+        done = self.map(function, [(case, *piece) for case in cases for piece in pieces], progress)
+        return {case: np.concatenate([next(done) for _ in pieces]) for case in cases}
+
+
+@contextlib.contextmanager
+def _ctrl_c_held_back():
+    """Keep Ctrl-C, which reaches every process of a terminal, from workers started now; this process ends them.
+
+    The resource trackers that start with the first worker unblock the signal, so they are started before. Here it must
+    not interrupt the start of the workers either, but a thread of numpy may receive it: it is raised afterwards.
+    """
+    multiprocessing.resource_tracker.ensure_running()
+    loky.backend.resource_tracker.ensure_running()
+    received = []
+    handler = signal.signal(signal.SIGINT, lambda *_: received.append(True))
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+    if received:
+        raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def _manager_in_silence():
+    """The thread of loky that hands out the work may still do so while its workers are ended, and print a KeyError."""
+    before = threading.excepthook
+    threading.excepthook = lambda failure: (
+        None if failure.thread and failure.thread.name == 'ExecutorManagerThread' else before(failure))
+    try:
+        yield
+    finally:
+        threading.excepthook = before
+
+
+def _end_local():
+    loky.get_reusable_executor(reuse=True).shutdown(kill_workers=True)
+
+
+def _client(address):
+    try:
+        import distributed
+    except ImportError:
+        raise RuntimeError(f"--scheduler {address}: Dask is not installed: pip install 'pedestal_analysis[cluster]'"
+                           ) from None
+    for name in ('distributed', 'tornado'):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what went wrong is raised as well
+    try:
+        client = distributed.Client(address, timeout=TIMEOUT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise RuntimeError(f'--scheduler {address}: nobody answers as a Dask scheduler: {error}') from None
+    try:
+        client.wait_for_workers(1, timeout=TIMEOUT)
+        others = [worker for worker, theirs in client.run(sources).items() if theirs != sources()]
+        problem = others and f'other versions of the pedestal packages or of numba on {", ".join(others)}'
+    except TimeoutError:
+        problem = f'no worker came within {TIMEOUT:g} s'
+    except Exception as error:  # Dask raises here what a worker could not import
+        problem = f'a worker cannot work: {error}'
+    if problem:
+        client.close()
+        raise RuntimeError(f'--scheduler {address}: {problem}')
+    return client
+
+
+def sources():
+    """Digest of all that determines the numbers: the packages' sources and the version of numba."""
+    return digest(('pedestal_common', *COLUMNS, *ROOF))

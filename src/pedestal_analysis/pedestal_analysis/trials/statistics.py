@@ -1,0 +1,149 @@
+"""What trials say: percentiles, rates and sensitivities of their results, each with its 95 % interval.
+
+percentile   by the order statistics (scipy.stats.quantile_test), whatever the distribution of the result
+rate         of a yes or no, by Clopper and Pearson (Biometrika 26 (1934) 404)
+sensitivity  of a result to a varied parameter: Spearman's rank correlation r, -1 to 1, with the interval
+
+                 tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3)))
+
+             of Bonett and Wright (Psychometrika 65 (2000) 23); texts rank in the order in which they first appear
+"""
+import math
+import typing
+
+import numpy as np
+from scipy import stats
+
+from pedestal_analysis.results import intervals, results
+from pedestal_common.graph import nodes
+from pedestal_common.parameters import did_you_mean
+
+PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
+Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE))
+
+
+class Question(typing.NamedTuple):
+    """A yes or no about a trial: name; the result it is asked of; holds(values (n,)) -> (n,) bool; a sentence."""
+    name: str
+    result: str
+    holds: typing.Callable
+    sentence: str
+
+
+QUESTIONS = (
+    Question('locked', 'lock_time_s', np.isfinite, 'The receiver locked.'),
+    Question('tracked', 'evaluated_time_s', lambda time: time > 0.0, 'The run reached settled autotrack.'),
+    Question('never_lost', 'loss_s', lambda loss: loss == 0.0,
+             'The target was never further than half a beamwidth off, once tracked.'),
+    Question('aligned', 'aligned_s', np.isfinite, 'The INS reported that it was aligned.'),
+    *(Question(f'{result.name}_met', result.name,
+               lambda values, target=result.target: np.array([intervals.meets(value, target) for value in values]),
+               f'{result.name} is {result.target}.')
+      for result in results.RESULTS if result.target and result.part not in ('run', 'supervised')),
+)
+
+
+def percentile(values, share):
+    """(value, low, high) of a percentile, 0 to 100, of values (n,); NaN where n is too small for a bound."""
+    interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE)
+    return np.percentile(values, share), interval.low, interval.high
+
+
+def rate(count, n):
+    """(share, low, high) [%] of `count` times yes out of n."""
+    interval = stats.binomtest(count, n).proportion_ci(intervals.CONFIDENCE, method='exact')
+    return 100.0 * count / n, 100.0 * interval.low, 100.0 * interval.high
+
+
+def rank_correlation(x, y):
+    """(r, low, high) of Spearman's correlation of x and y (n,); NaN where one of them does not vary, and low and high
+    of fewer than four."""
+    n = len(x)
+    if n < 2 or not (np.ptp(x) > 0.0 and np.ptp(y) > 0.0):
+        return math.nan, math.nan, math.nan
+    r = float(stats.spearmanr(x, y).statistic)
+    if n < 4:
+        return r, math.nan, math.nan
+    middle, half = math.atanh(min(max(r, -1.0 + 1e-12), 1.0 - 1e-12)), Z * math.sqrt((1.0 + 0.5 * r * r) / (n - 3))
+    return r, math.tanh(middle - half), math.tanh(middle + half)
+
+
+def unit(name):
+    """The unit of a column of a table, such as beam_2/loss_s."""
+    return results.BY_NAME[nodes.plain(name)].unit
+
+
+def case_of(case, name):
+    """(case, metric) of a column: that of its beam, as `pedestal run` writes it."""
+    beam, plain = nodes.beam_of(name), nodes.plain(name)
+    return f'{case}/{beam}'.rstrip('/'), plain
+
+
+def of_results(case, table):
+    """The rows of mean, least, percentiles and largest of every result of a table.Table."""
+    found = []
+    for name in table.there:
+        values = table.column(name)
+        values = values[np.isfinite(values)]
+        own, metric = case_of(case, name)
+        if not values.size:
+            continue
+        estimates = {'mean': intervals.interval(values), 'min': (values.min(), math.nan, math.nan),
+                     **{f'p{share:02d}': percentile(values, share) for share in PERCENTILES},
+                     'max': (values.max(), math.nan, math.nan)}
+        found += [intervals.estimated(own, f'{metric}/{key}', estimate, unit(name), values.size)
+                  for key, estimate in estimates.items()]
+    return found
+
+
+def of_questions(case, table):
+    """The rows of the rates of QUESTIONS over a table.Table."""
+    found = []
+    for name in table.there:
+        own, metric = case_of(case, name)
+        for question in QUESTIONS:
+            if question.result == metric:
+                yes = question.holds(table.column(name))
+                found.append(intervals.estimated(own, f'{question.name}/rate', rate(int(np.sum(yes)), len(yes)), '%',
+                                                 len(yes)))
+    return found
+
+
+def of_sensitivity(case, table):
+    """The rows of the rank correlation of every result with every varied parameter of a table.Table; none for a
+    result that does not vary."""
+    found = []
+    varied = {name: table.column(name) for name in table.varied}
+    for name in table.there:
+        own, metric = case_of(case, name)
+        values = table.column(name)
+        known = np.isfinite(values)
+        for parameter, given in varied.items():
+            estimate = rank_correlation(given[known], values[known])
+            if math.isfinite(estimate[0]):
+                found.append(intervals.estimated(own, f'{metric}/rank_correlation({parameter})', estimate, '',
+                                                 int(known.sum())))
+    return found
+
+
+def larger_is_better(name):
+    """Whether more of a result is better, by its target."""
+    return (results.BY_NAME[nodes.plain(name)].target or '').startswith('>')
+
+
+def ranking(name, values):
+    """Places (n,) of the values (n,) of a result from the worst to the best; one that was not measured is the
+    worst."""
+    badness = -values if larger_is_better(name) else values
+    return np.argsort(-np.where(np.isfinite(badness), badness, math.inf), kind='stable')
+
+
+def ranked_by(table, asked=None):
+    """The result of a table.Table by which its trials are ranked: the one asked for, else pointing, else what the axes
+    follow. Raises ValueError where no trial has it."""
+    for name in (asked,) if asked else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
+        for column in table.there:
+            if name in (column, nodes.plain(column)) and (asked or np.isfinite(table.column(column)).any()):
+                return column
+    raise ValueError(f'--by {asked}: no trial has it;{did_you_mean(asked or "", table.there)} there are '
+                     f'{", ".join(table.there)}')

@@ -1,0 +1,117 @@
+"""`pedestal new`: a scenario of your own antenna from the numbers of its data sheet.
+
+What a data sheet does not say is scaled from the antenna that comes with the product (paper 000's motors on a load of
+210 kg m2), which keeps the frequencies of gears and motors where they are there:
+
+    motor       flux from the voltage at rated speed; resistance and inductance from the share of the voltage they take
+                at rated torque; inertia with the torque to the power 5/3, friction and brake with the torque
+    gear, load  stiffness, damping and viscous friction with the load's inertia; its other friction and unbalance with
+                the inertia to the power 2/3
+    loops       the rigid design of trials/loops.py, which `pedestal tune --loops` then measures
+"""
+import math
+
+from adu_drive.params import AduParameters
+from pedestal_bringup.scenario import parameter_file, scenario
+from pedestal_bringup.scenario.program import Plan
+from pedestal_common.graph.topics import AXES
+from pedestal_common.parameters import ParameterError, as_dict, build, flatten
+from pedestal_common.text_files import plain_yaml
+
+VOLTAGE_AT_RATED_SPEED, OF_RESISTANCE, OF_INDUCTANCE = 0.85, 0.033, 0.24
+"""Shares of the phase voltage: back-EMF at rated speed; drops at rated torque over resistance and inductance."""
+
+
+def motor(sheet, known):
+    """{key: value} of a motor, from a known motor's values {key: value} and the DataSheet."""
+    share, pairs, voltage = sheet.motor_torque / 30.0, known['pole_pairs'], known['voltage']
+    electrical = pairs * sheet.motor_speed * math.pi / 30.0
+    flux = VOLTAGE_AT_RATED_SPEED * voltage / electrical
+    current = sheet.motor_torque / (1.5 * pairs * flux)
+    return {'flux_linkage': flux, 'resistance': OF_RESISTANCE * voltage / current,
+            'inductance': OF_INDUCTANCE * voltage / (electrical * current), 'torque_limit': 3.0 * sheet.motor_torque,
+            'inertia': known['inertia'] * share**(5.0 / 3.0), 'friction': known['friction'] * share,
+            'viscous': known['viscous'] * share, 'brake': known['brake'] * share}
+
+
+def axis(sheet, name):
+    """{key: value} of an axis of the drive, its loops left out."""
+    known = as_dict(getattr(AduParameters(), name))
+    inertia, ratio, rate = (getattr(sheet, f'{what}_{name}') for what in ('inertia', 'ratio', 'rate'))
+    share = inertia / known['load.inertia']
+    values = {'load.inertia': inertia, 'gear_train.reducer_ratio': ratio / known['gear_train.pinion_ratio'],
+              'gear_train.lash': 1e-3 * sheet.lash, 'limits.rate': math.radians(rate),
+              'encoder.load_bits': sheet.encoder_bits, 'faults.overspeed': 1.22 * math.radians(rate),
+              'thermal.rated_torque': sheet.motor_torque}
+    for number in (1, 2):
+        own = {key.partition('.')[2]: value for key, value in known.items() if key.startswith(f'motor_{number}.')}
+        values |= {f'motor_{number}.{key}': value for key, value in motor(sheet, own).items()}
+    constant = 1.5 * known['motor_1.pole_pairs'] * values['motor_1.flux_linkage']
+    values['faults.overcurrent'] = 1.3 * values['motor_1.torque_limit'] / constant
+    values |= {key: known[key] * share for key in ('gear_train.stiffness', 'gear_train.damping', 'load.viscous')}
+    values |= {f'friction.{key}': known[f'friction.{key}'] * share**(2.0 / 3.0)
+               for key in ('coulomb', 'breakaway', 'stiffness', 'damping')}
+    values['load.unbalance'] = known['load.unbalance'] * share**(2.0 / 3.0)
+    return values
+
+
+def sections(sheet, title):
+    """{node: {key: value}} of the scenario of a DataSheet. Raises ScenarioError, ParameterError,
+    LoopError."""
+    from pedestal_analysis.tuning import loops
+    _, content = scenario.text(sheet.like)
+    found = {parameter_file.node_of(node): parameter_file.dotted(body['ros__parameters'])
+             for node, body in plain_yaml.parse(content).items()}
+    found['scenario']['title'] = title
+    if 'program.time_offset' in found['scenario']:  # as far off in beamwidths as there
+        found['scenario']['program.time_offset'] *= min(1.0, sheet.theta / 0.0175)
+    found['tracking_receiver']['antenna.beamwidth'] = sheet.theta
+    w_s = 2.0 * math.pi * loops.SPEED
+    for name in AXES:
+        values = axis(sheet, name)
+        known = getattr(AduParameters(), name)
+        try:
+            plant = loops.Plant(name, build(type(known), {**as_dict(known), **values}))
+        except ParameterError as error:
+            raise ParameterError(f'adu.{name}: {error}') from None
+        values |= loops.drive_gains(plant, w_s)
+        found['adu'] |= {f'{name}.{key}': value for key, value in values.items()}
+        gains = loops.control_gains(plant, w_s, w_s / loops.RATIO)
+        found['acu'] |= {f'{name}.{key}': value for key, value in gains.items()}
+    rounded = {node: {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in own.items()}
+               for node, own in found.items()}
+    if not rounded['scenario'].get('ship'):
+        rounded['adu'] |= _at_the_target(sheet, rounded)
+    return rounded
+
+
+def _at_the_target(sheet, found):
+    """Initial angles three beamwidths beside where the target is predicted, so that a slow antenna is there soon."""
+    _, angles = Plan(scenario.parse(sheet.like, parameter_file.text(found))).tables['']
+    return {f'initial_{name}': float(f'{angle + 3.0 * sheet.theta:.4g}') for name, angle in zip(AXES, angles[0])}
+
+
+def text(found, head):
+    """The scenario file of sections {node: {key: value}}: a comment behind each value says what it is. head: lines."""
+    lines = [f'# {line}'.rstrip() for line in head]
+    for node, values in found.items():
+        fields = dict(flatten(scenario.parameters_of(node)))
+        lines += [node + ':' if node == 'scenario' else f'{parameter_file.ANYWHERE}{node}:', '  ros__parameters:']
+        for key, value in values.items():
+            meta = fields[key].metadata
+            unit = f'[{meta["unit"]}] ' if meta.get('unit') else ''
+            written = scenario.override(key, value).replace('=', ': ', 1)
+            lines.append(f'    {written:44}  # {unit}{meta["doc"]}')
+    return '\n'.join(lines) + '\n'
+
+
+def new(sheet, name, command):
+    """The text of the scenario file of a DataSheet. Raises ScenarioError where the sheet contradicts itself."""
+    title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
+    found = sections(sheet, title)
+    content = text(found, (f'made by: {command}', 'What is no number of the data sheet is scaled from the antenna of '
+                           'the product: replace it by what you know.',
+                           f'Next: pedestal tune {name}.yaml --loops, then pedestal run {name}.yaml --params-file '
+                           f'{name}-loops.yaml'))
+    scenario.parse(name, content)
+    return content

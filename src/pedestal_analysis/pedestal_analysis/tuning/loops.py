@@ -1,0 +1,272 @@
+"""`pedestal tune --loops`: gains of the drive's and the control unit's loops for the plant of a scenario.
+
+Each axis is designed as a rigid one; the margins are then measured on the simulated plant, with its gears, lash,
+friction, structure, delays and sampling (frequency_response), and a loop that falls short of them becomes slower
+until it holds them. Per motor on its shaft, with the motors' inertia J_m, the load's J_L and the ratio N:
+
+    J = J_m + J_L / (2 N^2)                          what one motor turns
+    K_p = w_s J,  K_i = K_p w_s / 5                  speed loop of crossover w_s
+    position loop: PI of K_p = w_s / 8               `feedforward.bandwidth`, or what is asked
+    feed-forward: J_L + 2 J_m N^2, the load's friction
+    shaper: a = 3/4 (2 T_max N - T_load) / (J_L + 2 J_m N^2), jerk a 3/4 w_s, h0 = 3.5 / w_s
+    bias: 0.4 of the rated torque, held to 0.47, gone at 1.5 of it
+
+T_load is friction, unbalance and mean wind together; a quarter of the torque stays for a load heavier than assumed.
+"""
+import dataclasses
+import math
+import pathlib
+
+import numpy as np
+
+from adu_drive.params import SPEED_PERIOD
+from pedestal_analysis.tuning import frequency_response as frequency
+from pedestal_bringup.scenario import parameter_file, scenario
+from pedestal_common.graph.topics import AXES
+from pedestal_recording import configuration
+
+SPEED, RATIO = 28.0, 8.0
+"""Where nothing is asked: crossover of the speed loop [Hz]; that over the one of the position loop."""
+
+SLOWER, TRIES = 0.85, 12
+"""A loop short of its margins becomes slower by this factor, at most so often."""
+
+STILL = {'scenario.ship': False, 'scenario.program.source': 'target', 'acu.initial_mode': 'program',
+         'adu.initially_enabled': True, 'adu.wind.azimuth': 0.0, 'adu.wind.elevation': 0.0,
+         'adu.wind.gust.kind': 'none'}
+"""A plant is measured ashore in still air."""
+
+
+class LoopError(ValueError):
+    """A plant whose loops cannot be designed, or closed with the margins that are asked; one line."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Asked:
+    """What the loops are to reach: crossovers of speed and position loop [Hz], None for what follows from the other;
+    margins [deg], [dB]."""
+    speed: float | None = None
+    position: float | None = None
+    phase_margin: float = 45.0
+    gain_margin: float = 6.0
+
+    def __post_init__(self):
+        for name, low, high, unit in (('speed', 0.1, 500.0, 'Hz'), ('position', 0.01, 50.0, 'Hz'),
+                                      ('phase_margin', 20.0, 80.0, 'deg'), ('gain_margin', 3.0, 20.0, 'dB')):
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise LoopError(f'{name} = {value:g} {unit}: must be {low:g} to {high:g}')
+
+
+@dataclasses.dataclass(frozen=True)
+class Plant:
+    """One axis as its design knows it, from its adu_drive.params.AxisParameters and the mean wind torque [Nm]. Raises
+    LoopError where its motors cannot move it."""
+    name: str
+    axis: object
+    wind: float = 0.0
+
+    def __post_init__(self):
+        if self.acceleration <= 0.0:
+            raise LoopError(f'adu.{self.name}: the motors cannot move it: friction, unbalance and wind take more than '
+                            'both torque limits')
+
+    @property
+    def motor_inertia(self):
+        """J_m [kg m2], the mean of both motors."""
+        return 0.5 * (self.axis.motor_1.inertia + self.axis.motor_2.inertia)
+
+    @property
+    def ratio(self):
+        """N."""
+        return self.axis.gear_train.ratio
+
+    @property
+    def inertia(self):
+        """J [kg m2] that one motor turns, on its shaft."""
+        return self.motor_inertia + self.axis.load.inertia / (2.0 * self.ratio**2)
+
+    @property
+    def whole_inertia(self):
+        """Load and motors [kg m2], seen at the load."""
+        return 2.0 * self.inertia * self.ratio**2
+
+    @property
+    def acceleration(self):
+        """Of the load [rad/s2] at the torque limit of the motors, less what the load takes."""
+        torque = (self.axis.motor_1.torque_limit + self.axis.motor_2.torque_limit) * self.ratio
+        return (torque - self.axis.friction.coulomb - abs(self.axis.load.unbalance) - abs(self.wind)
+                ) / self.whole_inertia
+
+
+def drive_gains(plant, w_s):
+    """{key of adu.AXIS: value} for a crossover w_s [rad/s] of the speed loop."""
+    K_p, rated = w_s * plant.inertia, plant.axis.thermal.rated_torque
+    return {'speed_loop.proportional': K_p, 'speed_loop.integral': K_p * w_s / 5.0,
+            'speed_loop.load_inertia': plant.axis.load.inertia, 'bias.torque': 0.4 * rated, 'bias.hold': 0.47 * rated,
+            'bias.out': 1.5 * rated, 'limits.deceleration': 0.5 * plant.acceleration}
+
+
+def control_gains(plant, w_s, w_p):
+    """{key of acu.AXIS: value} for crossovers w_s, w_p [rad/s] of the speed and the position loop."""
+    a = 0.75 * plant.acceleration
+    return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
+            'feedforward.friction': plant.axis.friction.coulomb, 'shaper.rate': 0.94 * plant.axis.limits.rate,
+            'shaper.acceleration': a, 'shaper.jerk': 0.75 * a * w_s, 'shaper.h0': 3.5 / w_s,
+            'limits.rate': plant.axis.limits.rate, 'limits.acceleration': 1.3 * a}
+
+
+def _rounded(gains):
+    return {key: value if isinstance(value, str) else float(f'{value:.4g}') for key, value in gains.items()}
+
+
+def holds(margins, asked):
+    """Whether margins, as frequency.margins gives them, are those that are asked. A gain margin beyond the band
+    counts as held; a loop that is never above 1 has none."""
+    phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
+    return phase >= asked.phase_margin and not gain < asked.gain_margin
+
+
+class Loops:
+    """The loops of a scenario while they are designed: gains {'adu.azimuth.speed_loop.proportional': value}.
+
+    source: a name or a path; overrides: texts 'node.key=value'. Raises LoopError for a drive without motors.
+    """
+
+    def __init__(self, source, overrides=()):
+        chosen = scenario.load(source, overrides)
+        if chosen.header.beam:
+            raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
+        self.source, self.overrides, self.name = source, tuple(overrides), chosen.name
+        drive = chosen.node_parameters('adu')
+        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name)) for name in AXES}
+        self.gains = {}
+
+    def set(self, node, name, gains):
+        """Take gains {key: value} of an axis of a node."""
+        self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
+
+    def _case(self):
+        said = dict(text.split('=', 1) for text in self.overrides)
+        return frequency.case(self.name, self.source, {**said, **self.gains, **STILL})
+
+    def _sweep(self, axis, sweep, period):
+        """A sweep whose torque stays below half of the bias, so that the teeth stay closed, and whose highest
+        frequency lies below half of the drive's steps."""
+        peak = 0.5 * axis.bias.torque / max(axis.speed_loop.proportional * axis.gear_train.ratio, 1e-9)
+        return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
+                                   highest=min(sweep.highest, 0.475 / period))
+
+    def response(self, loop, name):
+        """frequency.Response of a loop of an axis with the gains as they are, None where the drive trips; loop:
+        'current' (of the motor with less phase margin), 'speed', 'position'."""
+        drive = self._case().loaded().node_parameters('adu')
+        axis = getattr(drive, name)
+        if loop == 'current':
+            travel = drive.azimuth.limits
+            limits = dataclasses.replace(axis.limits, lower=travel.lower, upper=travel.upper)
+            found = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
+            return min(found.values(), key=lambda response: frequency.margins(response)['phase_margin_deg'][0])
+        if loop == 'speed':
+            return frequency.speed(drive, self._sweep(axis, frequency.SPEED, SPEED_PERIOD))[f'speed/{name}']
+        sweep = self._sweep(axis, frequency.POSITION, drive.period)
+        found = frequency.position(self._case(), (name,), sweep)[f'position/{name}/{self.name}']
+        # A drive that has tripped sends nothing.
+        return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
+
+    def measured(self, loop, name):
+        """frequency.margins of `response`, None where the drive trips."""
+        found = self.response(loop, name)
+        return frequency.margins(found) if found else None
+
+    def close(self, loop, name, asked, set_to, fastest):
+        """(w, margins) of the first loop, from crossover `fastest` [rad/s] down, that holds what is asked; set_to(w)
+        takes the gains for w. Raises LoopError where none does."""
+        for w in fastest * SLOWER**np.arange(TRIES):
+            set_to(w)
+            margins = self.measured(loop, name)
+            if margins and holds(margins, asked):
+                return w, margins
+        found = 'the drive trips'
+        if margins:
+            phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
+            found = f'it has {phase:.3g} deg and {gain:.3g} dB'
+        raise LoopError(f'{self.name}, {name}: the {loop} loop cannot be closed with {asked.phase_margin:g} deg and '
+                        f'{asked.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {found}')
+
+
+def design(loops, axes, asked, progress):
+    """Design the loops of some axes and return the table's rows [(loop, axis, asked Hz, margins)]. progress(share,
+    text) is called as it goes on. Raises LoopError."""
+    wanted_s = 2.0 * math.pi * (asked.speed or RATIO * (asked.position or SPEED / RATIO))
+    rows, reached = [], {}
+    for name in AXES:  # the other axis moves along, so it is designed too
+        plant = loops.plants[name]
+        loops.set('adu', name, drive_gains(plant, wanted_s))
+        loops.set('acu', name, control_gains(plant, wanted_s, wanted_s / RATIO))
+    for i, name in enumerate(axes):
+        plant = loops.plants[name]
+        progress(i / len(axes), f'{name}: current and speed loop')
+        current = plant.axis.current_loop.bandwidth
+        rows.append(('current', name, current, loops.measured('current', name)))
+
+        def set_speed(w, name=name, plant=plant):
+            loops.set('adu', name, drive_gains(plant, w))
+        reached[name], margins = loops.close('speed', name, asked, set_speed, wanted_s)
+        rows.append(('speed', name, wanted_s / (2.0 * math.pi), margins))
+    for i, name in enumerate(axes):
+        progress((i + 0.5) / len(axes), f'{name}: position loop')
+        plant, w_s = loops.plants[name], reached[name]
+        w_p = min(2.0 * math.pi * asked.position if asked.position else math.inf, wanted_s / RATIO)
+        if not asked.position:
+            w_p = w_s / RATIO
+
+        def set_position(w, name=name, plant=plant, w_s=w_s):
+            loops.set('acu', name, control_gains(plant, w_s, w))
+        _, margins = loops.close('position', name, asked, set_position, w_p)
+        rows.append(('position', name, w_p / (2.0 * math.pi), margins))
+    return rows
+
+
+def refuse_outside(loops):
+    """Raise ScenarioError where a gain leaves its range."""
+    scenario.load(loops.source, [*loops.overrides, *(scenario.override(*gain) for gain in loops.gains.items())])
+
+
+def table(rows, asked):
+    """Lines: every loop, its margins as measured beside those asked."""
+    lines = [f'{"loop":20} {"asked":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} {"gain margin":>20}']
+    for loop, name, wanted, margins in rows:
+        values = {key: value for key, (value, _) in margins.items()}
+        floor = (f'(>= {asked.phase_margin:g})', f'(>= {asked.gain_margin:g})') if loop != 'current' else ('', '')
+        lines.append(f'{f"{name} {loop}":20} {wanted:6.3g} Hz {_text(values["crossover_hz"]):>7} Hz '
+                     f'{_text(values["bandwidth_hz"]):>7} Hz {_text(values["phase_margin_deg"]):>9} deg {floor[0]:>7} '
+                     f'{_text(values["gain_margin_db"]):>9} dB {floor[1]:>7}')
+    return lines
+
+
+def _text(value):
+    return f'{value:.3g}' if math.isfinite(value) else 'beyond'
+
+
+def main(options, progress):
+    """Design as the verb's options say and write the parameter file: the lines to print. Raises LoopError."""
+    for name in ('filter', 'feedforward', 'runs', 'seed', 'duration'):
+        if getattr(options, name):
+            raise LoopError(f'--{name}: does not go with --loops, which measures the plant')
+    asked = Asked(options.speed_bandwidth, options.position_bandwidth, options.phase_margin, options.gain_margin)
+    axes = AXES if options.axis == 'both' else (options.axis,)
+    loops = Loops(options.source, options.param)
+    file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')
+    if file.exists() or not file.parent.is_dir():
+        raise LoopError(f'--output {file}: must be a new file in a directory that exists')
+    rows = design(loops, axes, asked, progress)
+    loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
+    refuse_outside(loops)
+    lines = table(rows, asked)
+    made = [f'made by: {options.command}', f'git {configuration.git_revision() or "unknown"}', *lines]
+    sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
+                       if key.startswith(f'{node}.')} for node in ('adu', 'acu')}
+    file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text(sections))
+    return [*lines, '', *(f'{name:44} {value}' for name, value in loops.gains.items()),
+            f'written: {file}  (pedestal run {options.source} --params-file {file})']

@@ -1,0 +1,318 @@
+"""`pedestal tune`: tunes the parameters of a filter, or the gains of the feed-forward, to a recording or a scenario.
+
+recording   the recorded inputs go through the ACU's step function, as in `pedestal recompute`, with changed
+            parameters. The criterion maximises the mean log-density of the innovations of the angle, log N(nu; 0, S),
+            which rewards small innovations and a correct S alike. Beyond HUBER sigmas it falls linearly, so that an
+            outlier counts as one. Every other PIECE of time is kept apart and validates the result.
+scenario    the compiled closed loop runs on stated seeds. The criterion minimises the rms of the true pointing error
+            of the axis (cross-elevation, elevation) in settled autotrack; another seed validates the result.
+feed-forward    the rate loop of the drive is identified (identification.py); k_v and k_a follow from it. The closed
+            loop validates them.
+
+The search is that of tuning.py. The result is a ROS 2 parameter file, for nodes and `pedestal run` alike.
+"""
+import dataclasses
+import math
+import pathlib
+
+import numpy as np
+
+from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.modes import AUTOTRACK, STANDBY
+from acu_tracker.params import AcuParameters
+from acu_tracker.unit import RANGE
+from pedestal_analysis.reprocess import recompute, what_if
+from pedestal_analysis.results import identification
+from pedestal_analysis.results.tracking import SETTLING
+from pedestal_analysis.tuning import tuning
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import parameter_file, scenario
+from pedestal_common import parameters
+from pedestal_common.graph import layouts, topics
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.wire import records
+from pedestal_recording import configuration
+
+HUBER = 4.0
+"""Standard deviations of an innovation beyond which it is an outlier."""
+CONVERGED, PIECE = 1.0, 0.5
+"""Recording: time for the filter to converge after the first error [s]; length of the pieces it is split into [s]."""
+AXES = topics.AXES
+RUNS = 2
+"""Seeds a scenario is tuned on."""
+ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
+UKF = ('cv_noise', 'ca_noise', 'dwell')
+"""Tuned parameters of tracker.ukf; the others matter only at the start."""
+
+
+class TuneError(ValueError):
+    """A request that cannot be tuned; the message is one line."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """How good parameters are on each axis (2,): the criterion, which is minimised, on the part that is searched and
+    on the one kept apart; mean NIS of the latter; pointing: {metric: (value, unit)}."""
+    searched: np.ndarray
+    kept: np.ndarray
+    nis: np.ndarray
+    pointing: dict
+
+
+def log_density(innovation, sigma):
+    """log N(nu; 0, sigma^2) less its constant, made linear beyond HUBER sigmas (Huber 1964)."""
+    z = np.abs(innovation / sigma)
+    return -np.where(z <= HUBER, 0.5 * z * z, HUBER * (z - 0.5 * HUBER)) - np.log(sigma)
+
+
+def _mean(values):
+    """Mean (2,) of the finite values of each column; infinite where there are none."""
+    return np.array([column[np.isfinite(column)].mean() if np.isfinite(column).any() else math.inf
+                     for column in values.T])
+
+
+class Recorded:
+    """A recording on which filters are tuned. criterion: the negative mean log-density of the innovations.
+
+    of_beams: whether it has several beams. Their nodes are `beam_1/acu`, ..., so that only pedestal resolves `acu`.
+    Raises TuneError where the receiver gave too few errors."""
+
+    criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the pieces kept apart'
+
+    def __init__(self, path):
+        self.recording = recompute.Recording(path)
+        self.params = recompute.parameters_of(self.recording, 'acu')
+        self.of_beams = self.recording.bag.beam != ''
+        done = recompute.recompute(self.recording, 'acu', self.params)
+        self.feed = done.feed
+        self.requests = {step: [command for command, _ in made] for step, made in done.requests.items()}
+        present = self.feed.inputs[RANGE]['stamp'] != records.NEVER
+        self.ranged = np.isfinite(self.feed.inputs[RANGE]['range'][present]).any()
+        t = self.feed.stamps / SECOND
+        compared = np.isfinite(self._innovations(done.steps)[0]).all(axis=1)
+        if not compared.any():
+            raise TuneError(f'{path}: the receiver gave no error that the filter could be compared with')
+        counted = compared & (t >= t[compared][0] + CONVERGED)
+        even = np.floor(t / PIECE).astype(int) % 2 == 0
+        self.parts = counted & even, counted & ~even
+        if not all(part.any() for part in self.parts):
+            raise TuneError(f'{path}: the receiver gave errors for {np.ptp(t[compared]):.3g} s; must be at least '
+                            f'{CONVERGED + 2.0 * PIECE:g} s')
+
+    def _innovations(self, steps):
+        """Innovation, its sigma and NIS (3, n, 2) of both axes in steps (n,)."""
+        return np.array([layouts.of_filter(steps, name) for name in ('innovation', 'innovation_sigma', 'nis')])
+
+    def _run(self, params):
+        """(the unit, what it writes in every step) with these parameters."""
+        unit = recompute.unit_of(self.recording, 'acu', params)
+        return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
+
+    def criterion(self, params):
+        """The criterion (2,) of AcuParameters on the pieces that are searched."""
+        innovation, sigma, _ = self._innovations(self._run(params)[1])
+        return _mean(-log_density(innovation, sigma)[self.parts[0]])
+
+    def score(self, params) -> Score:
+        """The Score of AcuParameters."""
+        unit, steps = self._run(params)
+        innovation, sigma, nis = self._innovations(steps)
+        density = log_density(innovation, sigma)
+        numbers = what_if.numbers(self.recording.bag, [recompute.outputs_of(unit, self.feed, steps)])
+        return Score(_mean(-density[self.parts[0]]), _mean(-density[self.parts[1]]), _mean(nis[self.parts[1]]),
+                     {name: (numbers[name][0][0], numbers[name][1]) for name in ESTIMATE_ERRORS if name in numbers})
+
+
+class Simulated:
+    """A scenario on whose closed loop parameters are tuned. criterion: rms pointing error [deg] in settled autotrack,
+    or in any mode but standby. Raises TuneError where it is never in such a mode."""
+
+    criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the seed kept apart'
+
+    def __init__(self, load, seed, runs, any_mode):
+        """load(seed) -> Scenario; seed None: the scenario's own."""
+        chosen = load(seed)
+        self.any_mode = any_mode
+        self.of_beams = chosen.prefixes != ('',)
+        self.params = chosen.node_parameters('acu')
+        self.ranged = chosen.node_parameters('tracking_receiver').receiver.ranging.measured
+        first = chosen.header.seed
+        self.seeds, self.kept_seeds = range(first, first + runs), (first + runs,)
+        self._scenarios = {seed: load(seed) for seed in (*self.seeds, *self.kept_seeds)}
+        if not np.isfinite(self.criterion(self.params)).all():
+            mode = 'out of standby' if any_mode else 'in autotrack'
+            raise TuneError(f'scenario {chosen.name}: never {mode} for more than {SETTLING:g} s')
+
+    def runs(self, params, seeds):
+        """(steps, truth) of the settled parts of all runs, records of closed_loop.STEP and TRUTH."""
+        parts = []
+        for seed in seeds:
+            run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
+            on = run['acu/mode'] != STANDBY if self.any_mode else run['acu/mode'] == AUTOTRACK
+            start = run.t[on][0] + SETTLING if on.any() else math.inf
+            settled = on & (run.t >= start)
+            parts.append((run.steps[settled], run.truth[settled]))
+        return tuple(map(np.concatenate, zip(*parts)))
+
+    def criterion(self, params):
+        """The criterion (2,) [deg] of AcuParameters on the seeds that are searched."""
+        return np.degrees(np.sqrt(_mean(self.runs(params, self.seeds)[1]['error']**2)))
+
+    def score(self, params) -> Score:
+        """The Score of AcuParameters."""
+        kept, truth = self.runs(params, self.kept_seeds)
+        rms = np.degrees(np.sqrt(_mean(truth['error']**2)))
+        difference = kept['acu/reference']['position'] - kept['joint_states']['position']
+        following = np.degrees(np.sqrt(_mean(difference**2)))
+        return Score(self.criterion(params), rms, _mean(layouts.of_filter(kept, 'nis')), {
+            **{f'{name}_rms_deg': (value, 'deg') for name, value in zip(('cross_elevation', 'elevation'), rms)},
+            **{f'{axis}_following_rms_deg': (value, 'deg') for axis, value in zip(AXES, following)}})
+
+
+def _with_filter(params, axis, changed):
+    return dataclasses.replace(params, **{axis: dataclasses.replace(getattr(params, axis), filter=changed)})
+
+
+def filters(source, kind, axes, progress):
+    """(AcuParameters with the tuned filter, {parameter: value} of it) for a Recorded or Simulated; raises
+    TuneError."""
+    count = 0
+
+    def counted(criterion, part):
+        nonlocal count
+        count += 1
+        progress((part + 1.0 - math.exp(-count / 40.0)) / len(axes), f'{axes[part]}: {count} tried')
+        return criterion
+
+    params = source.params
+    for axis in axes:
+        params = _with_filter(params, axis, dataclasses.replace(getattr(params, axis).filter, kind=kind))
+    settings = {f'{axis}.filter.kind': kind for axis in axes}
+    if kind == 'imm_ukf':
+        if not source.ranged:
+            raise TuneError('--filter imm_ukf: needs a measured range (tracking_receiver.receiver.ranging.measured); '
+                            'there is none, and without one it is imm')
+        rows = [AXES.index(axis) for axis in axes]
+
+        def with_ukf(ukf):
+            return dataclasses.replace(params, tracker=dataclasses.replace(params.tracker, ukf=ukf))
+
+        best, _ = tuning.tuned(params.tracker.ukf, lambda ukf: counted(source.criterion(with_ukf(ukf))[rows].sum(), 0),
+                               UKF)
+        best = _rounded(best, UKF)
+        return with_ukf(best), {**settings, **{f'tracker.ukf.{name}': getattr(best, name) for name in UKF}}
+    for part, axis in enumerate(axes):
+        count, i = 0, AXES.index(axis)
+
+        def cost(changed, axis=axis, i=i, part=part, params=params):
+            return counted(source.criterion(_with_filter(params, axis, changed))[i], part)
+
+        given = getattr(params, axis).filter
+        best = _rounded(tuning.tuned(given, cost)[0], tuning.names(given))
+        params = _with_filter(params, axis, best)
+        values = parameters.as_dict(best)
+        names = tuning.names(given) + (('imm.models',) if kind == 'imm' else ())
+        settings.update({f'{axis}.filter.{name}': values[name] for name in names})
+    return params, settings
+
+
+def _rounded(params, names):
+    """The parameters with those of these names rounded to four digits."""
+    values = parameters.as_dict(params)
+    return parameters.build(type(params), {**values, **{name: float(f'{values[name]:.4g}') for name in names}})
+
+
+def feedforward(chosen, source, axes, progress):
+    """(AcuParameters with the identified gains of the feed-forward, {parameter: value} of them); chosen: Scenario."""
+    progress(0.1, 'identifying the rate loop')
+    loops, params, settings = identification.identify(chosen), source.params, {}
+    for axis in axes:
+        old = getattr(params, axis)
+        new = dataclasses.replace(old.feedforward, rate_feedforward=float(f'{loops[axis].k_v:.5g}'),
+                                  acceleration_feedforward=float(f'{loops[axis].k_a:.3g}'))
+        params = dataclasses.replace(params, **{axis: dataclasses.replace(old, feedforward=new)})
+        settings |= {f'{axis}.feedforward.rate_feedforward': new.rate_feedforward,
+                  f'{axis}.feedforward.acceleration_feedforward': new.acceleration_feedforward}
+    return params, settings
+
+
+def main(options, command, progress):
+    """Tune as the verb's options say and write the parameter file: the lines to print. command: the whole command
+    line, for the head of the file. Raises TuneError."""
+    is_bag = pathlib.Path(options.source).is_dir() or options.source.endswith('.mcap')
+    axes = AXES if options.axis == 'both' else (options.axis,)
+    what = options.filter or 'feedforward'
+    file = options.output or pathlib.Path(f'{pathlib.Path(options.source).stem}-{what}.yaml')
+    _check(options, is_bag, file)
+    progress(0.0, 'reading' if is_bag else 'compiling the laws (the first time)')
+    if is_bag:
+        source = Recorded(pathlib.Path(options.source))
+    else:
+        def load(seed):
+            return scenario.load(options.source, options.param, seed, options.duration)
+        source = Simulated(load, options.seed, options.runs or RUNS, options.feedforward)
+    if options.feedforward:
+        params, settings = feedforward(load(options.seed), source, axes, progress)
+    else:
+        params, settings = filters(source, options.filter, axes, progress)
+    progress(0.98, 'judging')
+    old, new = source.score(source.params), source.score(params)
+    lines = [*_table(source, old, new, axes), *_remarks(source, old, new, axes, settings)]
+    made = [f'made by: {" ".join(command.split())}', f'git {configuration.git_revision() or "unknown"}', *lines]
+    file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text({'acu': settings}))
+    values = [f'{name:48} {value}' for name, value in settings.items()]
+    hint = f'pedestal run ... --params-file {file}'
+    if not source.of_beams:
+        hint += f', or ros2 run acu_tracker acu_node --ros-args --params-file {file}'
+    return [*lines, '', *values, f'written: {file}  ({hint})']
+
+
+def _check(options, is_bag, file):
+    """Raises TuneError for options that do not fit together, or a file that exists."""
+    if bool(options.filter) == options.feedforward:
+        raise TuneError('one of --filter KIND and --feedforward must be given')
+    if options.filter and options.filter not in KINDS:
+        raise TuneError(f'--filter {options.filter}: must be one of {", ".join(KINDS)}')
+    if is_bag and options.feedforward:
+        raise TuneError('--feedforward: identifies the drive of a scenario; a recording has none')
+    for name in ('seed', 'runs', 'duration', 'param'):
+        if is_bag and getattr(options, name) not in (None, []):
+            raise TuneError(f'--{name} {getattr(options, name)}: is for a scenario; a recording is as it is')
+    if options.runs is not None and options.runs < 1:
+        raise TuneError(f'--runs {options.runs}: must be at least 1')
+    if file.exists():
+        raise TuneError(f'--output {file} exists already; it is not overwritten')
+    if not file.parent.is_dir():
+        raise TuneError(f'--output {file}: must be a file in a directory that exists')
+
+
+def _table(source, old, new, axes):
+    """Lines that compare the old Score with the new."""
+    rows = []
+    for i, axis in enumerate(AXES):
+        if axis in axes:
+            rows += [(f'{axis}: {source.criterion_name}', old.searched[i], new.searched[i], source.unit),
+                     (f'{axis}: {source.kept}', old.kept[i], new.kept[i], source.unit),
+                     (f'{axis}: NIS mean', old.nis[i], new.nis[i], '')]
+    rows += [(name, value, new.pointing[name][0], unit) for name, (value, unit) in old.pointing.items()]
+    lines = [f'{"":52} {"old":>11} {"new":>11}']
+    return lines + [f'{name:52} {_text(a):>11} {_text(b):>11} {unit}'.rstrip() for name, a, b, unit in rows]
+
+
+def _remarks(source, old, new, axes, settings):
+    """Lines: reasons to doubt the result."""
+    doubts = []
+    for axis in axes:
+        i = AXES.index(axis)
+        if not new.kept[i] <= old.kept[i] + 1e-3 * abs(old.kept[i]):
+            doubts.append(f'{axis}: {source.kept} the new parameters are no better than the old')
+    fields = dict(parameters.flatten(AcuParameters))
+    for name, value in settings.items():
+        meta = fields[name].metadata
+        if 'low' in meta and not 1.05 * meta['low'] < value < 0.95 * meta['high'] and value > 0.0:
+            doubts.append(f'{name} is at the end of its range: the best lies there or beyond')
+    return doubts
+
+
+def _text(value):
+    return f'{value:.5g}' if math.isfinite(value) else 'none'

@@ -1,0 +1,22 @@
+from setuptools import find_packages, setup
+
+package_name = 'pedestal_analysis'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        ('share/' + package_name, ['package.xml']),
+    ],
+    install_requires=['numpy', 'scipy', 'matplotlib', 'rich', 'joblib', 'PyYAML'],
+    extras_require={'cluster': ['dask', 'distributed'],
+                    'test': ['pytest', 'dask', 'distributed', 'ccsds-ndm-py', 'beyond']},
+    python_requires='>=3.10',
+    zip_safe=False,
+    maintainer='pedestal maintainers',
+    maintainer_email='pedestal@example.org',
+    description='What recordings and trials of the antenna show: results, reports, reprocessing, trials, tuning.',
+    license='Apache-2.0',
+)

@@ -1,0 +1,81 @@
+"""`pedestal new`: the antenna that comes with the product from its own data sheet, the three that ship, refusals."""
+import math
+import shlex
+
+import pytest
+
+from pedestal_analysis.results import results
+from pedestal_analysis.tuning import data_sheet, loops
+from pedestal_analysis.tuning.sheet import DataSheet
+from pedestal_bringup.loop import recorded
+from pedestal_bringup.scenario import scenario
+from pedestal_common.parameters import as_dict
+
+SHIPPED = ('uav_tracker_3m', 'leo_station_7m', 'ship_terminal_1m2')
+
+
+def test_the_data_sheet_of_the_known_antenna_gives_it_back():
+    """Paper 000's motor and the plant around it, but for what the scaling rounds: 3 % of inductance and resistance."""
+    found = data_sheet.sections(DataSheet(), 'known')
+    chosen = scenario.parse('known', data_sheet.text(found, ['known']))
+    for axis in loops.AXES:
+        known = as_dict(getattr(scenario.load('leo_pass').node_parameters('adu'), axis))
+        made = as_dict(getattr(chosen.node_parameters('adu'), axis))
+        for key, value in known.items():
+            if isinstance(value, float) and not key.startswith(('speed_loop', 'bias', 'limits.deceleration')):
+                lash = key == 'gear_train.lash' and axis == 'elevation'  # 0.8 mrad there, one number in the sheet
+                assert lash or made[key] == pytest.approx(value, rel=0.03), (axis, key)
+
+
+def test_a_motor_turns_at_its_rated_speed_and_torque():
+    """Phasor of a synchronous machine, i_d = 0: the voltage at rated speed and torque is below what there is."""
+    known = as_dict(scenario.load('leo_pass').node_parameters('adu').azimuth.motor_1)
+    for torque, speed in ((30.0, 1500.0), (3.0, 3000.0), (200.0, 600.0)):
+        made = data_sheet.motor(DataSheet(motor_torque=torque, motor_speed=speed), known)
+        w = known['pole_pairs'] * speed * math.pi / 30.0
+        current = torque / (1.5 * known['pole_pairs'] * made['flux_linkage'])
+        u_q = w * made['flux_linkage'] + made['resistance'] * current
+        u_d = -w * made['inductance'] * current
+        assert 0.8 * known['voltage'] < math.hypot(u_d, u_q) < known['voltage']
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_what_ships_tracks_within_a_twentieth_of_its_beam(name):
+    chosen = scenario.load(name)
+    found = results.measured(results.of_bag(recorded.record(chosen)))
+    beamwidth = math.degrees(chosen.node_parameters('tracking_receiver').antenna.beamwidth)
+    assert found['pointing_rms_deg'][0] < 0.05 * beamwidth and found['loss_s'][0] == 0.0
+    assert found['evaluated_time_s'][0] > 0.9 * chosen.header.duration
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name):
+    """`pedestal new`, then `tune --loops`: the same antenna, and the loops with the margins that are asked."""
+    _, text = scenario.text(name)
+    made, _, tuned, *_ = (line.removeprefix('# ') for line in text.splitlines())
+    assert pedestal(*shlex.split(made.removeprefix('made by: '))[1:])[0] == 0
+    assert pedestal(*shlex.split(tuned.partition('of: ')[2])[1:])[0] == 0
+    again = scenario.load(tmp_path / f'{name}.yaml', scenario.file_overrides(tmp_path / f'{name}-loops.yaml'))
+    shipped = scenario.load(name)
+    for node in ('adu', 'acu'):
+        ours, theirs = as_dict(again.node_parameters(node)), as_dict(shipped.node_parameters(node))
+        assert {key: value for key, value in ours.items() if value != theirs[key] and '.filter.' not in key} == {}
+
+
+@pytest.mark.parametrize('arguments, expected', [
+    (('--rate-azimuth', '400'), 'adu.azimuth: limits.rate = 6.98132 rad/s: the motors reach'),
+    (('--mirror', '400'), 'mirror = 400 m: must be 0.1 to 40'),
+    (('--like', 'leo_pas'), "like = 'leo_pas': must be one of leo_pass, uav_flyby, ship_pass"),
+    (('--motor-torque', '0.2'), 'adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100'),
+    (('--motor-torque', '1', '--inertia-azimuth', '40000'), 'adu.azimuth: the motors cannot move it'),
+])
+def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expected):
+    code, output, errors = pedestal('new', 'my.yaml', *arguments)
+    assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_file_is_overwritten(pedestal, tmp_path):
+    (tmp_path / 'my.yaml').write_text('mine')
+    assert 'is there already' in pedestal('new', 'my.yaml')[2] and (tmp_path / 'my.yaml').read_text() == 'mine'
+    assert 'must end in .yaml' in pedestal('new', 'my.txt')[2]

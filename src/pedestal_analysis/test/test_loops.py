@@ -1,0 +1,77 @@
+"""`pedestal tune --loops`: the design against the drive as it comes, margins measured on the plant, refusals."""
+import math
+
+import pytest
+
+from pedestal_analysis.tuning import loops
+from pedestal_bringup.scenario import scenario
+
+SOFT = ('adu.azimuth.gear_train.stiffness=8e5', 'adu.azimuth.gear_train.damping=400')
+"""A gear on which the load swings close to the position loop."""
+
+
+SOFTER = ('adu.azimuth.gear_train.stiffness=2e4', 'adu.azimuth.gear_train.damping=10')
+
+
+def test_the_plant_that_comes_with_the_product_gets_the_gains_it_has(pedestal, tmp_path):
+    """Those were found by hand; the file is one that `pedestal run --params-file` takes."""
+    code, output, errors = pedestal('tune', 'leo_pass', '--loops')
+    assert (code, errors) == (0, '')
+    chosen = scenario.load('leo_pass', scenario.file_overrides(tmp_path / 'leo_pass-loops.yaml'))
+    before = scenario.load('leo_pass')
+    for axis in loops.AXES:
+        new, old = (getattr(each.node_parameters('adu'), axis) for each in (chosen, before))
+        assert new.speed_loop.proportional == pytest.approx(old.speed_loop.proportional, rel=0.03)
+        assert new.speed_loop.integral == pytest.approx(old.speed_loop.integral, rel=0.06)
+        assert new.bias.torque == pytest.approx(old.bias.torque, rel=0.01)
+        new, old = (getattr(each.node_parameters('acu'), axis) for each in (chosen, before))
+        assert new.feedforward.bandwidth == pytest.approx(old.feedforward.bandwidth, rel=0.1)
+        assert new.feedforward.inertia == pytest.approx(old.feedforward.inertia, rel=0.005)
+    assert all(line.count('(>= ') == 2 for line in output.splitlines() if ' speed ' in line or ' position ' in line)
+
+
+def test_a_soft_gear_makes_the_loop_slower_until_it_holds_its_margins():
+    asked = loops.Asked()
+    stiff, soft = (loops.Loops('leo_pass', changes) for changes in ((), SOFT))
+    key = 'acu.azimuth.feedforward.bandwidth'
+    for each in (stiff, soft):
+        rows = {(loop, axis): margins for loop, axis, _, margins in
+                loops.design(each, ('azimuth',), asked, lambda share, text: None)}
+        assert all(loops.holds(rows[loop, 'azimuth'], asked) for loop in ('speed', 'position'))
+    assert soft.gains[key] < 0.75 * stiff.gains[key]
+
+
+def test_what_is_asked_is_the_crossover_of_the_position_loop():
+    for asked in (1.5, 3.0):
+        each = loops.Loops('leo_pass')
+        rows = {loop: margins for loop, _, _, margins in loops.design(
+            each, ('azimuth',), loops.Asked(28.0, asked), lambda share, text: None)}
+        assert rows['position']['crossover_hz'][0] == pytest.approx(asked, rel=0.12)
+
+
+def test_the_design_is_that_of_a_rigid_drive():
+    """J dw/dt = T for one motor and its half of the load: crossover of K_p / (J s) at w_s."""
+    plant = loops.Loops('leo_pass').plants['azimuth']
+    half = 0.0085 + 210.0 / 64.0**2 / 2.0
+    assert plant.inertia == pytest.approx(half)
+    gains = loops.drive_gains(plant, 100.0)
+    assert abs(gains['speed_loop.proportional'] / (1j * 100.0 * half)) == pytest.approx(1.0)
+    torque = plant.acceleration * plant.whole_inertia + 60.0
+    assert torque == pytest.approx(2.0 * 90.0 * 64.0)
+    assert math.isclose(loops.control_gains(plant, 100.0, 10.0)['shaper.acceleration'], 0.75 * plant.acceleration)
+
+
+@pytest.mark.parametrize('arguments, expected', [
+    (('phased_array_sway',), 'an electronic beam has no loops to tune'),
+    (('leo_pass', '--param', 'adu.elevation.load.unbalance=50000'), 'adu.elevation: the motors cannot move it'),
+    (('leo_pass', '--phase-margin', '5'), 'phase_margin = 5 deg: must be 20 to 80'),
+    (('leo_pass', '--filter', 'ca'), '--filter: does not go with --loops'),
+    (('leo_pass', '--speed-bandwidth', '300', '--phase-margin', '75'),
+     'azimuth: the speed loop cannot be closed with 75 deg and 6 dB: at 50.2 Hz it has'),
+    (('leo_pass', *(part for text in SOFTER for part in ('--param', text))),
+     'azimuth: the position loop cannot be closed with 45 deg and 6 dB: at 0.586 Hz the drive trips'),
+])
+def test_refused(pedestal, tmp_path, arguments, expected):
+    code, output, errors = pedestal('tune', *arguments, '--loops')
+    assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
+    assert not list(tmp_path.iterdir())

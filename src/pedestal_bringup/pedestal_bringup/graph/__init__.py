@@ -1,0 +1,1 @@
+"""A scenario as a graph: its nodes as processes, started, watched and ended."""

@@ -1,0 +1,87 @@
+"""What pedestal.launch.py asks for and starts, without `launch`, which only a ROS 2 machine has."""
+import typing
+
+from pedestal_bringup.graph import beside, graph, supervisor
+from pedestal_bringup.graph.processes import Graph
+from pedestal_bringup.graph.start import begins, parameters_of_all
+from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.program import Plan
+from pedestal_common import parameters
+
+
+class Argument(typing.NamedTuple):
+    """An argument of the launch file: name, text for --show-args, value by default, the values there are (any)."""
+    name: str
+    doc: str
+    default: str = ''
+    choices: tuple = ()
+
+
+NO, YES = 'false', 'true'
+
+ARGUMENTS = (
+    Argument('scenario', 'name of a scenario that comes with the product, or path of a .yaml', 'leo_pass'),
+    Argument('pacing', 'who waits for whom; empty: what the scenario says', choices=('', 'lockstep', 'realtime')),
+    Argument('duration', "length of the run in the drive's time [s]; empty: what the scenario says"),
+    Argument('seed', 'seed of every noise stream, a whole number; empty: what the scenario says'),
+    Argument('params_file', 'ROS 2 parameter file whose values replace those of the scenario'),
+    Argument('bag', 'new folder for the recording; empty: bags/runs/SCENARIO-N'),
+    Argument('namespace', 'of all nodes, for example ship_1'),
+    *(Argument(name, f'in realtime: {server.does}' + (f' on 127.0.0.1: {NO}, {YES} (port {server.port}) or a port'
+                                                      if server.port else ''),
+               NO, () if server.port else (NO, YES))
+      for name, server in beside.SERVERS.items()))
+
+
+def mistaken(names):
+    """A line on each of the names that launch was given and that look like a misspelt argument: launch takes any."""
+    known = [argument.name for argument in ARGUMENTS]
+    return [f'no argument {name}:=;{meant}' for name in names
+            if name not in known and (meant := parameters.did_you_mean(name, known))]
+
+
+def _number(given, name, kind, what):
+    """A number among the given texts; None where it is empty. Raises ValueError."""
+    try:
+        return kind(given[name]) if given[name] else None
+    except ValueError:
+        raise ValueError(f'{name}:={given[name]}: must be {what}') from None
+
+
+def asked(given):
+    """The Scenario that the texts {argument: value} ask for. Raises ValueError."""
+    changes = scenario.file_overrides(given['params_file']) if given['params_file'] else ()
+    return scenario.load(given['scenario'], changes,
+                         _number(given, 'seed', int, 'a whole number'),
+                         _number(given, 'duration', float, 'a number of seconds'), given['pacing'] or None)
+
+
+def servers(given, chosen):
+    """[(Server, its parameters)] of those that are asked for. Raises ValueError in lockstep, and where a library is
+    missing."""
+    wanted = {name: given[name] for name in beside.SERVERS if given[name].lower() != NO}
+    beside.check(wanted, chosen.header, '{}:=')
+    started = []
+    for name, text in wanted.items():
+        server, values = beside.SERVERS[name], {'graph.beams': chosen.header.graph_beams}
+        if server.port:
+            try:
+                values['port'] = server.port if text.lower() == YES else beside.port(text)
+            except ValueError:
+                raise ValueError(f'{name}:={text}: must be {NO}, {YES} or a port, 1 to 65535') from None
+        started.append((server, values))
+    return started
+
+
+def prepare(given, chosen):
+    """Make what a Scenario starts with, its laws and the folder of its logs: (ROS 2 parameter file of all nodes, the
+    scenario as a file). Raises ValueError, RunError."""
+    graph.read_files(Plan(chosen))
+    bag = graph.new_bag(given['bag'], chosen.name)
+    if chosen.header.pacing == 'realtime':
+        supervisor.prepare(chosen)
+    made = Graph(chosen, bag)
+    made.write(parameters_of_all(chosen, bag, begins(chosen)))
+    whole = made.log / f'{chosen.name}.yaml'
+    whole.write_text(chosen.as_yaml())
+    return made.file, whole

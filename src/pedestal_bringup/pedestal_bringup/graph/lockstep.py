@@ -1,0 +1,66 @@
+"""A lockstep run: every node is needed for the next step, so one that dies or falls silent ends the run with its name.
+"""
+import time
+
+from rclpy.executors import SingleThreadedExecutor
+
+from pedestal_bringup.graph.processes import RunError, how
+from pedestal_common.graph import nodes
+
+ENDING = (nodes.DRIVE, 'recorder')
+"""Nodes that end by themselves when the run is over."""
+
+
+def watch(graph, operator, tracks, progress):
+    """From the start of the nodes to their end. progress(the drive's time [s]). Raises RunError."""
+    header = graph.scenario.header
+    sent = False
+    executor = SingleThreadedExecutor()
+    executor.add_node(operator)
+
+    def stuck(names):
+        return operator.stuck(names, executor)
+
+    while graph.ended().get(nodes.DRIVE) != 0:
+        executor.spin_once(timeout_sec=0.1 if sent else 0.02)
+        sent = sent or operator.send_to(graph.scenario.nodes, tracks)
+        progress(operator.time)
+        if any(code != 0 or node not in ENDING for node, code in graph.ended().items()):
+            raise failure(graph, stuck, operator.silent(header.deadline))
+        mute = operator.silent(2.0 * header.deadline)
+        if mute:
+            raise failure(graph, stuck, mute)
+    progress(header.duration)
+    if not graph.stop():
+        raise failure(graph, stuck)
+
+
+def failure(graph, stuck, unheard=None):
+    """The error of a run in which a node has ended before its time, or `unheard` says nothing any more.
+
+    stuck(names) -> those that do not answer. A node may accuse one that itself waits for the node that is stuck. When
+    the drive has come to its end all others were told to end, and only who could not do it well did so early.
+    """
+    time.sleep(0.5)
+    ended = graph.ended()
+    ending = graph.processes if ended.get(nodes.DRIVE) == 0 else ENDING
+    early = {node: code for node, code in ended.items() if code != 0 or node not in ending}
+    lines = {node: graph.last_lines(node) for node in graph.processes}
+    accused = {name for node in early for name in graph.result(node).get('silent', ())}
+    killed = [node for node, code in early.items() if code < 0]
+    silent = [node for node in graph.processes if node in accused and node not in early] or [
+        node for node in (unheard,) if node is not None and node not in early]
+    if silent and not killed:
+        mute = stuck([node for node in graph.processes if node not in early])
+        # Who waits for the recorder to take what he sent answers nobody either; the recorder waits for no one.
+        silent = [node for node in mute if node == 'recorder'] or [
+            node for node in silent if node in mute] or mute or silent
+    culprit = (killed or silent or list(early))[0]
+    if culprit in killed:
+        reason = how(early[culprit])
+    elif culprit in silent:
+        reason = 'has fallen silent'
+    else:
+        reason = f'ended before the run did, with exit code {early[culprit]}'
+    others = ''.join(f'\n  {node}: {lines[node][-1]}' for node in early if node != culprit and lines[node])
+    return RunError(graph.obituary(culprit, reason) + others)

@@ -1,0 +1,122 @@
+"""The operator inside `pedestal run` and `pedestal program`: sends the program tracks, hears who lives."""
+import contextlib
+import socket
+import time
+
+from rcl_interfaces.srv import GetParameters
+
+from pedestal_bringup.graph.processes import RunError
+from pedestal_common import parameters
+from pedestal_common.graph import nodes
+from pedestal_common.node.shell import Shell
+from pedestal_common.wire import messages
+
+DISCOVERY_TIME = 0.5
+"""Seconds a run looks for another graph on its domain before it starts its own."""
+
+ANSWER_TIME = 2.0
+"""Seconds a node has to answer a parameter service before it counts as stuck."""
+
+
+class Operator(Shell):
+    """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of its nodes:
+    on_diagnostics(status, monotonic time [s]) is called for each DiagnosticStatus. names: of these nodes; what others
+    publish there does not count.
+    """
+
+    def __init__(self, beams=0, names=()):
+        super().__init__('operator', parameters.Parameters)
+        self.links = nodes.links(beams)
+        self._names = frozenset(names)
+        self.time = 0.0
+        self.latest = {}
+        self.on_diagnostics = lambda status, now: None
+        self._writers = {}
+        self.message_reader('diagnostics', self._take)
+
+    def send(self, tracks):
+        """The program tracks {topic: message}, latched."""
+        self._open(tracks)
+        for topic, message in tracks.items():
+            self._writers[topic](messages.serialize(message))
+
+    def send_to(self, names, tracks):
+        """The same once all of the nodes that read them are there, or a short run may end before its recorder has
+        them; whether they are sent."""
+        self._open(tracks)
+        if any(self._missing(publisher, nodes.readers(link, names))
+               for link, publisher in self.publishers_by_link.items()):
+            return False
+        self.send(tracks)
+        return True
+
+    def _open(self, names):
+        for name in names:
+            if name not in self._writers:
+                self._writers[name] = self.writer(name)
+
+    def refuse_company(self):
+        """Raise RunError when the nodes of another graph are on this domain: they would hear this one."""
+        deadline = time.monotonic() + DISCOVERY_TIME
+        while time.monotonic() < deadline:
+            names = self.get_node_names()
+            if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.module):
+                raise another_graph(self.context.get_domain_id())
+            time.sleep(0.02)
+
+    def _take(self, array):
+        for status in array.status:
+            if status.name in self._names:
+                self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
+                self.latest[status.name] = time.monotonic()
+                self.on_diagnostics(status, self.latest[status.name])
+
+    def silent(self, limit):
+        """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""
+        last = min(self.latest, key=self.latest.get, default=None)
+        return last if last is not None and time.monotonic() - self.latest[last] > limit else None
+
+    def stuck(self, names, executor):
+        """Those of the nodes whose process does not even answer a parameter service."""
+        answers = self._ask(names, GetParameters.Request(), executor)
+        return [node for node in names if node not in answers]
+
+    def graph_start(self, node, executor):
+        """graph.start [ns UTC] of a running node. Raises RunError where it does not answer."""
+        answers = self._ask([node], GetParameters.Request(names=['graph.start']), executor)
+        if node not in answers or not answers[node].values:
+            raise RunError(f'{node} does not say when its graph began: is it running on ROS_DOMAIN_ID '
+                           f'{self.context.get_domain_id()}?')
+        return answers[node].values[0].integer_value
+
+    def _ask(self, names, request, executor):
+        """{node: its answer to a request for parameters} of those that answer in time."""
+        clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in names}
+        asked = {}
+        deadline = time.monotonic() + ANSWER_TIME
+        while time.monotonic() < deadline and not (len(asked) == len(clients) and all(
+                answer.done() for answer in asked.values())):
+            for node, client in clients.items():
+                if node not in asked and client.service_is_ready():
+                    asked[node] = client.call_async(request)
+            executor.spin_once(timeout_sec=0.02)
+        return {node: answer.result() for node, answer in asked.items() if answer.done()}
+
+
+def another_graph(domain_id):
+    """The RunError where somebody else runs a graph on this ROS domain."""
+    return RunError(f'another graph runs on ROS_DOMAIN_ID {domain_id}; set a free one')
+
+
+@contextlib.contextmanager
+def sole_run(domain_id):
+    """Hold a ROS domain for one run on this machine: an abstract socket, gone with its process however that ends.
+
+    Raises RunError when another run holds it; discovery alone is too slow to tell on a busy machine.
+    """
+    with socket.socket(socket.AF_UNIX) as holder:
+        try:
+            holder.bind(f'\0pedestal-domain-{domain_id}')
+        except OSError:
+            raise another_graph(domain_id) from None
+        yield

@@ -1,0 +1,205 @@
+"""The nodes of a run as processes: direct children with their logs, told to end in order, never left behind."""
+import contextlib
+import ctypes
+import functools
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+from pedestal_bringup.graph.child import Child
+from pedestal_common.graph import nodes
+
+LOG_LINES = 8
+STOP_TIME = 20.0
+
+LOG_SPACE = 64 * 1024
+"""Bytes of the disk that a log holds in advance, so that the cause of an end is kept also when it is full by then."""
+
+FALLOC_FL_KEEP_SIZE = 1
+_libc = ctypes.CDLL(None)
+
+
+class RunError(RuntimeError):
+    """A run ended before its time; the message names the node, the reason and its last log lines."""
+
+
+def command_line(node, module, file):
+    """What starts the module of a node, 'beam_2/acu' in the namespace of its beam, with a parameter file."""
+    beam = nodes.beam_of(node)
+    return [sys.executable, '-m', module, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []),
+            '--params-file', str(file)]
+
+
+@contextlib.contextmanager
+def uninterrupted():
+    """A second Ctrl-C, or whatever else ends `pedestal`, does not cut the clean stop short."""
+    before = {number: signal.signal(number, signal.SIG_IGN)
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _load_laws(scenario, node):
+    """Load the laws of a node, unless they are still to be compiled."""
+    from pedestal_common.compiled import is_compiled  # with numba, which only a run needs
+    if scenario.row(node).unit:
+        unit = scenario.unit(node)
+        if is_compiled(unit):
+            unit.prepare()
+
+
+class Graph:
+    """The processes of one run and their logs, beside the bag. Use as a context, in which they are held until `begin`:
+    leaving it stops whatever still runs.
+
+    They do not outlive `pedestal run`, however that ends: the kernel sends them SIGTERM then, and who does not listen
+    to it is ended by a process of its own (reaper).
+    Raises RunError when there is no writing beside the bag.
+    """
+
+    def __init__(self, scenario, bag):
+        self.scenario = scenario
+        self.bag = pathlib.Path(bag)
+        self.log = log_folder(bag)
+        self.file = self.log / 'parameters.yaml'
+        self.processes = {}
+        self._log_starts = {}
+        with self._beside_the_bag():
+            self.log.mkdir(parents=True, exist_ok=True)
+            for left in (*self.log.glob('*.log'), *self.log.glob('*.state')):
+                left.unlink()
+
+    @contextlib.contextmanager
+    def _beside_the_bag(self):
+        try:
+            yield
+        except OSError as error:
+            raise RunError(f'cannot record to {self.bag}: {error.filename}: {error.strerror}') from None
+
+    def __enter__(self):
+        self._reaper = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.graph.reaper'], stdin=subprocess.PIPE,
+                                        start_new_session=True)
+        for node in self.scenario.nodes:
+            if node != 'operator':
+                self._hold(node)
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+        self._reaper.stdin.close()
+        self._reaper.wait()
+
+    def write(self, parameters):
+        """The text of the ROS 2 parameter file with which every node starts."""
+        with self._beside_the_bag():
+            self.file.write_text(parameters)
+
+    def begin(self, parameters):
+        """Start the nodes with the text of their parameter file."""
+        self.write(parameters)
+        for process in self.processes.values():
+            process.begin()
+
+    def start(self, node):
+        """Start a node again, which goes on in its log."""
+        self._hold(node)
+        self.processes[node].begin()
+
+    def _hold(self, node):
+        with open(self._log_of(node), 'ab') as output:
+            self._log_starts[node] = size = output.seek(0, os.SEEK_END)
+            _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size), ctypes.c_long(LOG_SPACE))
+            self.processes[node] = Child(command_line(node, self.scenario.row(node).module, self.file),
+                                         output.fileno(), functools.partial(_load_laws, self.scenario, node))
+        with contextlib.suppress(OSError):
+            self._reaper.stdin.write(b'%d\n' % self.processes[node].pid)
+            self._reaper.stdin.flush()
+
+    def kill(self, node):
+        """Kill the process of a node and wait for its end."""
+        self.processes[node].kill()
+        self.processes[node].wait()
+
+    def stop(self):
+        """Ask the nodes that still run to end; whether each ends with exit code 0. The recorder ends last, and in
+        realtime the drive first: it stops its axes while the others are there."""
+        first = [nodes.DRIVE] if self.scenario.header.pacing == 'realtime' else []
+        others = [node for node in self.processes if node not in (*first, 'recorder')]
+        with uninterrupted():
+            return not any([code for group in (first, others, ['recorder']) for code in self._stop(group)])
+
+    def _stop(self, names):
+        """Their exit codes; who does not listen is killed."""
+        processes = [self.processes[node] for node in names if node in self.processes]
+        for process in processes:
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+                process.send_signal(signal.SIGCONT)
+        deadline = time.monotonic() + STOP_TIME
+        for process in processes:
+            try:
+                process.wait(max(deadline - time.monotonic(), 0.0))
+            except subprocess.TimeoutExpired:
+                process.kill()
+        return [process.wait() for process in processes]
+
+    def _log_of(self, node):
+        return self.log / f'{node.replace("/", ".")}.log'
+
+    def _lines(self, node):
+        """What a node said since its last start."""
+        with open(self._log_of(node), 'rb') as log:
+            log.seek(self._log_starts[node])
+            return log.read().decode(errors='replace').strip().splitlines()
+
+    def last_lines(self, node):
+        """The end of a node's log, its result left out."""
+        return [line for line in self._lines(node) if not line.startswith('{')][-LOG_LINES:]
+
+    def result(self, node):
+        """The last JSON object in a node's log: its result, or why it ended (shell.main); {} where there is none."""
+        for line in reversed(self._lines(node)):
+            if line.startswith('{'):
+                with contextlib.suppress(ValueError):
+                    return json.loads(line)
+        return {}
+
+    def outcome(self, node):
+        """The result of a node that has ended well. Raises RunError where it left none."""
+        result = self.result(node)
+        if not result:
+            raise RunError(f'{node} ended without its result; its log is {self._log_of(node)}')
+        return result
+
+    def ended(self):
+        """{node: exit code} of the processes that have ended."""
+        return {node: process.returncode for node, process in self.processes.items() if process.poll() is not None}
+
+    def obituary(self, node, reason):
+        """A text that says what became of a node, with the last lines of its log."""
+        log = '\n'.join(f'  | {line}' for line in self.last_lines(node)) or '  | (it logged nothing)'
+        return f'{node} {reason}; its last log lines ({self._log_of(node)}):\n{log}'
+
+    def cause(self, node, code):
+        """Why a node that ended by itself with this exit code did, as it said, in brackets; '' of one that was
+        killed."""
+        lines = self.last_lines(node)
+        return f' ({lines[-1]})' if lines and code > 0 else ''
+
+
+def how(code):
+    """How a process with this exit code ended."""
+    return f'died by signal {signal.Signals(-code).name}' if code < 0 else f'ended with exit code {code}'
+
+
+def log_folder(bag):
+    """Where the logs of a run lie, beside its bag."""
+    bag = pathlib.Path(bag)
+    return bag.with_name(bag.name + '.log')

@@ -1,0 +1,138 @@
+"""A realtime run: the antenna goes on, so a node that dies is started again; one that falls silent is killed first."""
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+
+from rclpy.executors import SingleThreadedExecutor
+
+from pedestal_bringup.graph.processes import RunError, how
+from pedestal_bringup.graph.restarts import Losses, Restarts, Silence
+from pedestal_common.compiled import is_compiled
+from pedestal_common.graph import nodes
+from pedestal_common.graph.steps import SECOND
+from pedestal_recording.verify import count
+
+LAST_START = 0.5
+"""A node that dies in the last seconds of a run is not started again."""
+
+LATE = 20.0
+"""Seconds the drive may go on after the end of the run before it is told to end."""
+
+CALL = 5.0
+"""Seconds without diagnostics, which come every second, after which a node is called silent."""
+
+
+def prepare(scenario):
+    """Compile the laws that are not yet, of each node in a process of its own, so that the nodes start warm. Raises
+    RunError."""
+    units = {nodes.plain(node): node for node in scenario.nodes
+             if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
+    processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.loop.prepare', node, scenario.name],
+                                        stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                        start_new_session=True) for node in units.values()}
+    try:
+        for process in processes.values():
+            with contextlib.suppress(BrokenPipeError), process.stdin:
+                process.stdin.write(scenario.as_yaml())
+        for node, process in processes.items():
+            complaint = process.stderr.read()
+            if process.wait() != 0:
+                lines = complaint.strip().splitlines()
+                raise RunError(f'the laws of {node} do not compile: it {how(process.returncode)}'
+                               + (f'; {lines[-1]}' if lines else ''))
+    finally:
+        for process in processes.values():
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)      # with the process that it compiles beside
+            process.wait()
+            process.stderr.close()
+
+
+class Supervisor:
+    """Watches the processes of a graph whose time is 0 at start [ns UTC]."""
+
+    def __init__(self, graph, operator, start):
+        header = graph.scenario.header
+        self._graph, self._operator = graph, operator
+        self._start, self._end = start, start + round(header.duration * SECOND)
+        self._limits = header.restart
+        self.restarts = Restarts(self._limits.attempts, self._limits.within, self._limits.delay)
+        self._silence, self.losses = Silence(), Losses()
+        self._called = set()
+        self._dead = set()
+        operator.on_diagnostics = self._note
+
+    def watch(self, tracks, progress):
+        """Until the end of the run in UTC, which no restart prolongs. progress(time of the run [s]).
+
+        Raises RunError when a node has died too often.
+        """
+        executor = SingleThreadedExecutor()
+        executor.add_node(self._operator)
+        self._operator.send(tracks)
+        while self._goes_on():
+            executor.spin_once(timeout_sec=0.1)
+            progress(min(max(time.time_ns() - self._start, 0), self._end - self._start) / SECOND)
+            self.look(time.monotonic())
+
+    def _goes_on(self):
+        """Until the drive ends at the end of the run; where it is not there to do so, or does not, nobody waits."""
+        now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE].poll() is None
+        if now < self._end:
+            return drive_runs or not self._is_nearly_over()
+        return drive_runs and now < self._end + LATE * SECOND
+
+    def _is_nearly_over(self):
+        return time.time_ns() > self._end - LAST_START * SECOND
+
+    def look(self, now):
+        """Start again what has died, kill what has been silent for too long. now: monotonic [s]."""
+        self._silence.look(now)
+        for node in self._silence.longer_than(min(CALL, self._limits.silence or CALL), now):
+            if node not in self._called:
+                self._called.add(node)
+                report(f'{node} is silent')
+        if self._limits.silence:
+            for node in self._silence.longer_than(self._limits.silence, now):
+                self._graph.kill(node)
+        for node, code in self._graph.ended().items():
+            if node not in self._dead and not self._is_nearly_over():
+                self._bury(node, code, now)
+        for node in self.restarts.due(now):
+            self._dead.discard(node)
+            self._graph.start(node)
+
+    def _bury(self, node, code, now):
+        """A node has died: it is started again, or the run is given up."""
+        limits = self._limits
+        reason = 'was silent and was killed' if node in self._called and code == -signal.SIGKILL else how(code)
+        self._dead.add(node)
+        self._called.discard(node)
+        self._silence.forget(node)
+        self.losses.died(now)
+        number = self.restarts.died(node, now)
+        if not number:
+            raise RunError(self._graph.obituary(node, f'{reason}, after {limits.attempts} starts within '
+                                                f'{limits.within:g} s'))
+        report(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
+               f'within {limits.within:g} s')
+
+    def _note(self, status, now):
+        node = status.name
+        self._silence.note(node, now)
+        if node == nodes.DRIVE:
+            for value in status.values:
+                if value.key == 'lost_steps' and (lost := count(value.value)) is not None:
+                    self.losses.note(lost, now)
+        if node in self._called:
+            self._called.discard(node)
+            report(f'{node} is heard again')
+
+
+def report(line):
+    """A line for people; a terminal that is gone does not end the run."""
+    with contextlib.suppress(OSError):
+        print(f'pedestal: {line}', file=sys.stderr, flush=True)

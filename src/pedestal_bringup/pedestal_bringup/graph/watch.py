@@ -1,0 +1,86 @@
+"""What this process does as a node of the graph itself, the operator: watch the others, send the program track.
+
+In lockstep a node that dies or falls silent ends the run with its name; in realtime it is started again (supervisor).
+"""
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+
+from pedestal_bringup.graph import lockstep, supervisor
+from pedestal_bringup.graph.operator_node import Operator, sole_run
+from pedestal_bringup.graph.start import Outcome, begins, parameters_of_all
+from pedestal_common.graph import nodes
+from pedestal_common.node import middleware
+from pedestal_common.wire import messages
+
+
+def run(graph, tracks, progress):
+    """Begin the nodes of a graph that are held and watch them to their end, or until Ctrl-C; the Outcome. tracks:
+    {topic: program track}. Raises RunError."""
+    middleware.initialise([])
+    try:
+        operator = Operator(graph.scenario.header.graph_beams, graph.scenario.nodes)
+        try:
+            with sole_run(operator.context.get_domain_id()):
+                operator.refuse_company()
+                realtime = graph.scenario.header.pacing == 'realtime'
+                return (_in_realtime if realtime else _in_lockstep)(graph, operator, tracks, progress)
+        finally:
+            operator.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _in_lockstep(graph, operator, tracks, progress):
+    graph.begin(parameters_of_all(graph.scenario, graph.bag, 0))
+    try:
+        lockstep.watch(graph, operator, tracks, progress)
+    except KeyboardInterrupt:
+        graph.stop()
+        return Outcome(graph.result(nodes.DRIVE), graph.result('recorder'), stopped=True)
+    return Outcome(graph.outcome(nodes.DRIVE), graph.outcome('recorder'))
+
+
+def _in_realtime(graph, operator, tracks, progress):
+    supervisor.prepare(graph.scenario)
+    start = begins(graph.scenario)
+    for track in tracks.values():
+        messages.put_stamp(track.header.stamp, start)
+    graph.begin(parameters_of_all(graph.scenario, graph.bag, start))
+    supervised = supervisor.Supervisor(graph, operator, start)
+    try:
+        supervised.watch(tracks, progress)
+        stopped = False
+    except KeyboardInterrupt:
+        stopped = True
+    graph.stop()
+    recorder = graph.result('recorder') if stopped else graph.outcome('recorder')
+    return Outcome(graph.result(nodes.DRIVE), recorder, supervised.restarts.count, supervised.losses.count, stopped)
+
+
+def send_program(plan, start=None, ros_arguments=()) -> int:
+    """Send the program track of a program.Plan to a running ACU and keep it latched until Ctrl-C.
+
+    start: when its time is 0 [ns UTC]; None: when the graph's is, which the ACU is asked for. ros_arguments: for the
+    node that sends it, in the namespace of the graph.
+    """
+    beams = plan.scenario.header.graph_beams
+    middleware.initialise(ros_arguments)
+    try:
+        operator = Operator(beams)
+        executor = SingleThreadedExecutor()
+        executor.add_node(operator)
+        tracks = plan.tracks
+        if start is None:
+            acu = nodes.members(('acu',), beams)[0]
+            print(f'asks {acu} on ROS_DOMAIN_ID {operator.context.get_domain_id()} when its time began', flush=True)
+            start = operator.graph_start(acu, executor)
+        for track in tracks.values():
+            messages.put_stamp(track.header.stamp, start)
+        operator.send(tracks)
+        print(f'{", ".join(tracks) or "nothing to be"} sent; kept for who comes later until Ctrl-C', flush=True)
+        while True:
+            executor.spin_once(timeout_sec=0.2)
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        rclpy.try_shutdown()

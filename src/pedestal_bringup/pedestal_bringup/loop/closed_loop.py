@@ -1,0 +1,185 @@
+"""The closed loop of a scenario without ROS: the units of its nodes in the graph's order, one compiled call.
+
+In step k the drive moves to t_k by what was said in step k - 1 and tells where it is; then ship, INS, receiver and
+control unit answer. All of them read and write one record that holds every topic, so a run holds what a lockstep
+recording of the scenario does, to the last bit. Of several beams each is a loop of its own: they share ship, INS and
+time, and nothing of one reaches another.
+"""
+import dataclasses
+
+import numpy as np
+from numba.core import types
+from numba.extending import overload
+
+from acu_tracker.operating import announcement
+from adu_drive import unit as drive_unit
+from adu_drive.array import beam_unit
+from pedestal_bringup.scenario.program import Plan
+from pedestal_common.compiled import compiled
+from pedestal_common.graph import layouts, nodes, topics
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.law import by_type
+from pedestal_common.node.unit import BLOCK, Unit, announced
+from pedestal_common.wire import records
+
+COMMAND, REFERENCE = 'acu/rate_command', 'acu/reference'
+
+STEP = records.of(*(topic.name for topic in topics.TOPICS if topic.rate == 'step' or records.is_text(topic.name)))
+"""One step: every topic but the program track, commands and the diagnostics."""
+
+TRUTH = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
+"""What no topic tells of t_k: bias torques [Nm], the true error of the beam (cross-elevation, elevation) [rad]."""
+
+_LAWS = {memory: law for node in nodes.UNITS for memory, (law, _) in node.unit_type().LAWS.items()}
+
+
+def step(memory, stamp, inputs, outputs):
+    """The step of any unit, known by the type of its memory; nothing where there is none. Compiled code calls it."""
+    raise NotImplementedError
+
+
+by_type(step, lambda memory: None if isinstance(memory, types.NoneType) else _LAWS[memory.instance_class])
+
+
+def true_bias(drive, truth):
+    """Fill bias of a TRUTH from the memory of the drive; a beam has none. Compiled code calls it."""
+    raise NotImplementedError
+
+
+@overload(true_bias)
+def _true_bias(drive, truth):
+    def of_axes(drive, truth):
+        y = drive.record[0].outputs
+        truth.bias[0], truth.bias[1] = y.azimuth.bias, y.elevation.bias
+
+    return {drive_unit.Memory: of_axes, beam_unit.Memory: lambda drive, truth: None}[drive.instance_class]
+
+
+@compiled
+def loop(units, first, period_ns, before, injected, steps, truth):
+    """Steps first, first + 1 ... into steps (n,) of STEP and truth (n,) of TRUTH.
+
+    units: memories of drive, ship, INS (both None ashore), receiver and control unit. before (1,): the step before, as
+    the drive obeys it; injected (n, 2): added to the rate commands [rad/s] and to the angles [rad] on their way to it.
+    """
+    drive, ship, ins, receiver, acu = units
+    for k in range(len(steps)):
+        stamp = (first + k) * period_ns
+        step(drive, stamp, before[0], steps[k])
+        step(ship, stamp, steps[k], steps[k])
+        step(ins, stamp, steps[k], steps[k])
+        step(receiver, stamp, steps[k], steps[k])
+        step(acu, stamp, steps[k], steps[k])
+        true_bias(drive, truth[k])
+        true = receiver.record[0].outputs
+        truth[k].error[0], truth[k].error[1] = true.true_cross_elevation, true.true_elevation
+        before[0] = steps[k]
+        for i in range(2):
+            before[0][COMMAND].velocity[i] += injected[k, i]
+            before[0][REFERENCE].position[i] += injected[k, i]
+
+
+ORDER = ('adu', 'ship_motion', 'ins', 'tracking_receiver', 'acu')
+"""Of the units in a step."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """A run in memory: steps (n,) of STEP, or of some of its topics, truth (n,) of TRUTH, the stamps (n,) [ns] of the
+    steps; units {name: Unit}; forecasts [(stamp [ns], announcement.numbers)] at every whole second, as the control
+    unit's diagnostics tell them.
+
+    `table` reads it as a recording of the run is read.
+    """
+    steps: np.ndarray
+    truth: np.ndarray
+    stamps: np.ndarray
+    units: dict
+    forecasts: list
+
+    @property
+    def t(self):
+        """Stamps of the steps (n,) [s]."""
+        return self.stamps * 1e-9
+
+    def __getitem__(self, topic):
+        """The records (n,) of a topic, one per step."""
+        return self.steps[topic]
+
+    def where(self, steps):
+        """The Run of some steps, a mask (n,)."""
+        return dataclasses.replace(self, steps=self.steps[steps], truth=self.truth[steps], stamps=self.stamps[steps])
+
+    @property
+    def topics(self):
+        """{name: type} of what its nodes said."""
+        written = [name for unit in self.units.values() for name in unit.writes]
+        kept = [topic for topic in topics.TOPICS if topic.name in written and topic.name in self.steps.dtype.names]
+        return {topic.name: topic.type for topic in kept
+                if records.is_text(topic.name) or (self.steps[topic.name]['stamp'] != records.NEVER).any()}
+
+    def table(self, topic):
+        """{column: array (n,)} of a topic, a row per message, as of a bag (columns.table)."""
+        if records.is_text(topic):
+            unit = next(unit for unit in self.units.values() if topic in unit.NODE.writes)
+            if topics.BY_NAME[topic].type != 'std_msgs/msg/String':
+                # A list: what it said is not kept, only when it changed.
+                return {'t': self.t[np.flatnonzero(np.diff(self.steps[topic], prepend=topics.SILENT))]}
+            stamps, texts = announced(unit, topic, self.stamps, self.steps)
+            return {'t': stamps / SECOND, 'data': texts}
+        sent = self.steps[topic]['stamp'] != records.NEVER
+        sent = slice(None) if sent.all() else sent
+        numbers = records.numbers(self.steps, topic)[sent]
+        return {'t': self.steps[topic]['stamp'][sent] / SECOND,
+                **{column.name: numbers[:, i] for i, column in enumerate(layouts.columns(topic))}}
+
+
+class Loop:
+    """The units of a scenario, ready for one run.
+
+    beam: of several, '' for the first; changed: {node: parameters} in the place of the scenario's.
+    """
+
+    def __init__(self, scenario, beam='', changed=()):
+        prefix = f'{beam}/' if beam else scenario.prefixes[0]
+        self.units: dict[str, Unit] = {}
+        for name in ORDER:
+            full = prefix + name if nodes.row(name).of_beam else name
+            if full in scenario.nodes:
+                self.units[name] = scenario.unit(full, dict(changed).get(name))
+        for topic, message in Plan(scenario).tracks.items():
+            if topic.startswith(prefix):
+                self.units['acu'].decode(nodes.plain(topic), message)
+        period = self.units[nodes.DRIVE].parameters.period
+        self.period_ns = round(period * SECOND)
+        self.steps = round(scenario.header.duration / period) + 1
+
+    def attend(self, first, forecasts):
+        """Before step `first`: add to forecasts where a second begins, obey what the units' schedules say."""
+        stamp = first * self.period_ns
+        if stamp // SECOND > (stamp - self.period_ns) // SECOND:
+            forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['lookahead'])))
+        for unit in self.units.values():
+            unit.obey_due(stamp)
+
+    def free_until(self, first):
+        """The step after `first` before which to `attend` again."""
+        due = min((first * self.period_ns // SECOND + 1) * SECOND, *(unit.next_due for unit in self.units.values()))
+        return min(-(-due // self.period_ns), self.steps)
+
+    def run(self, injected=None, watch=None) -> Run:
+        """Every step of the scenario. injected (steps, 2): see `loop`. watch(steps made) -> steps until it is called
+        again: sees the units in between. To be called once."""
+        if injected is None:
+            injected = np.zeros((self.steps, 2))
+        steps, truth = records.empty(STEP, self.steps), np.zeros(self.steps, TRUTH)
+        before, forecasts = records.empty(STEP, 1), []
+        first = 0
+        while first < self.steps:
+            self.attend(first, forecasts)
+            last = min(first + (watch(first) if watch else BLOCK), first + BLOCK, self.free_until(first))
+            part = slice(first, last)
+            memories = tuple(self.units[name].block(last - first) if name in self.units else None for name in ORDER)
+            loop(memories, first, self.period_ns, before, injected[part], steps[part], truth[part])
+            first = last
+        return Run(steps, truth, np.arange(self.steps) * self.period_ns, self.units, forecasts)

@@ -1,0 +1,92 @@
+"""Compiles laws that are not in the cache, so that what calls them starts warm.
+
+`python -m pedestal_bringup.loop.prepare` compiles those of every node on both cores, then those of the closed loop;
+`... NAME` those of the nodes of one of UNITS; `... NODE NAME` those of one node of a scenario: the scenario of this
+name as YAML on the standard input.
+"""
+import concurrent.futures
+import multiprocessing
+import os
+import sys
+import time
+
+from pedestal_bringup.loop import closed_loop, side_by_side
+from pedestal_bringup.scenario import scenario
+from pedestal_common.compiled import compiled_once, done, is_compiled
+
+UNITS = (('leo_pass', 'acu'), ('leo_pass', 'adu'), ('leo_pass', 'tracking_receiver'), ('ship_pass', 'ins'),
+         ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'))
+"""(scenario, node) that have the laws of every unit, the slowest first."""
+
+LOOPS = (('leo_pass', side_by_side.FEWEST), ('ship_pass', 1), ('leo_pass', 1))
+"""(scenario, how many side by side) of closed loops that have the laws on lanes, on a ship and ashore, the slowest
+first."""
+
+SHORT = 0.1
+"""Length [s] of the run that compiles a closed loop."""
+
+
+def of_node(unit):
+    """Compile the laws of a unit; two processes do that in less time than one."""
+    with compiled_once(unit):
+        ahead = multiprocessing.get_context('fork').Process(target=unit.prepare_ahead)
+        ahead.start()
+        unit.prepare()
+        ahead.join()
+
+
+def _unit(name, node):
+    return scenario.load(name).unit(node)
+
+
+def _compile_unit(name, node):
+    begun = time.perf_counter()
+    of_node(_unit(name, node))
+    return f'{node} of {name}', time.perf_counter() - begun
+
+
+def _loop_done(name, count):
+    return done(closed_loop.Loop, f'.{name}.{count}')
+
+
+def _compile_loop(name, count):
+    begun = time.perf_counter()
+    loops = [closed_loop.Loop(scenario.load(name, duration=SHORT)) for _ in range(count)]
+    if count > 1:
+        side_by_side.runs(loops, ('joint_states',))
+    else:
+        loops[0].run()
+    mark = _loop_done(name, count)
+    if mark:
+        mark.touch()
+    return f'closed loop{"s" * (count > 1)} of {name}{" side by side" * (count > 1)}', time.perf_counter() - begun
+
+
+def compile_cold(units, loops):
+    """Compile what is not in the cache of parts of UNITS and LOOPS, a line for each that was not."""
+    units = [part for part in units if not is_compiled(_unit(*part))]
+    loops = [part for part in loops if (mark := _loop_done(*part)) is None or not mark.exists()]
+    if not units and not loops:
+        return
+    print('compiling the laws (once for these sources) ...', flush=True)
+    with concurrent.futures.ProcessPoolExecutor(os.cpu_count() or 1) as pool:
+        for ended in concurrent.futures.as_completed([pool.submit(_compile_unit, *part) for part in units]):
+            print('  {}: {:.0f} s'.format(*ended.result()), flush=True)
+        for name, seconds in pool.map(_compile_loop, *zip(*loops)):
+            print(f'  {name}: {seconds:.0f} s', flush=True)
+
+
+def main():
+    """Compile what the command line names; the exit code."""
+    match sys.argv[1:]:
+        case []:
+            compile_cold(UNITS, LOOPS)
+        case [name]:
+            compile_cold([part for part in UNITS if part[0] == name], ())
+        case [node, name]:
+            of_node(scenario.parse(name, sys.stdin.read()).unit(node))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

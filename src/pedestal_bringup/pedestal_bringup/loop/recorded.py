@@ -1,0 +1,58 @@
+"""A run in memory as what analysis/ and report/ read of a bag.Bag: a recording of it without a file."""
+import functools
+
+import numpy as np
+
+from pedestal_bringup.loop import closed_loop
+from pedestal_common.graph.steps import SECOND
+from pedestal_common.parameters import as_dict
+from pedestal_common.wire import messages
+
+DIAGNOSTICS = 'diagnostics'
+
+
+def record(scenario, beam=''):
+    """The Recorded of a scenario.Scenario run in memory; beam: of several, '' for the first."""
+    return Recorded(scenario, closed_loop.Loop(scenario, beam).run())
+
+
+class Recorded:
+    """A closed_loop.Run of a scenario.Scenario, as the view of one beam of its recording.
+
+    Of the diagnostics it holds what the control unit announces of keyholes; everything else is in no result.
+    """
+
+    def __init__(self, scenario, run):
+        receiver = run.units['tracking_receiver'].parameters
+        self.path, self.beams = scenario.name, int(scenario.header.beam)
+        self.metadata = {'beamwidth': str(receiver.antenna.beamwidth)}
+        self.configuration = {'parameters': {'tracking_receiver': as_dict(receiver)}}
+        self._run, self.end = run, run.t[-1]
+        self._tables = {}
+        self._keyholes = [(stamp, values) for stamp, values in run.forecasts if ('keyhole', 'keyhole') in values]
+
+    @functools.cached_property
+    def topics(self):
+        """{name: type} of what is in it."""
+        of_diagnostics = {DIAGNOSTICS: messages.DiagnosticArray.__msgtype__} if self._keyholes else {}
+        return {**self._run.topics, **of_diagnostics}
+
+    def table(self, topic):
+        """{column: array (n,)} of a topic, as of a bag (columns.table)."""
+        if topic == DIAGNOSTICS:
+            return {'t': np.array([stamp for stamp, _ in self._keyholes]) / SECOND}
+        if topic not in self._tables:
+            self._tables[topic] = self._run.table(topic)
+        return self._tables[topic]
+
+    def rows(self, topic):
+        """Numbers (n,) of the messages of a topic."""
+        return np.arange(len(self.table(topic)['t']))
+
+    def messages(self, topic):
+        """Iterator of (topic, log time, publish time [ns], message) of the diagnostics."""
+        for stamp, values in self._keyholes:
+            status = messages.DiagnosticStatus(level=0, name='acu', message='', hardware_id='',
+                                               values=[messages.KeyValue(key=key, value=value) for key, value in
+                                                       values])
+            yield topic, stamp, stamp, messages.DiagnosticArray(header=messages.header(''), status=[status])

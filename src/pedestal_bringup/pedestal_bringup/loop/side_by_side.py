@@ -1,0 +1,162 @@
+"""The closed loops of trials of one scenario side by side: their drives on lanes, in one compiled call.
+
+The drive takes two thirds of the time of a closed loop; on lanes (adu_drive.lanes) it takes a quarter of that.
+Receivers and control units work one after the other, on the records and with the laws that they have alone, so that
+every number is equal to the last bit to that of closed_loop.Loop.
+"""
+import typing
+
+import numpy as np
+
+from acu_tracker import unit as acu_unit
+from acu_tracker.program.program_track import ProgramTrack
+from acu_tracker.program.tables import Tables
+from adu_drive import lanes
+from adu_drive import unit as drive_unit
+from pedestal_bringup.loop.closed_loop import STEP, TRUTH, Run
+from pedestal_common.compiled import compiled
+from pedestal_common.wire import records
+from tracking_receiver_sim import unit as receiver_unit
+
+UNITS = {'adu': drive_unit.Adu, 'tracking_receiver': receiver_unit.TrackingReceiver, 'acu': acu_unit.Acu}
+"""The units of a loop ashore, of which each trial has its own."""
+
+FEWEST = 8
+"""Loops that are worth the lanes, most of which would be idle."""
+
+BLOCK = 200
+"""Steps of one call at most, for which the noise is drawn at once."""
+
+MEMORY = 2**30
+"""For what trials side by side keep [bytes]."""
+
+
+@compiled
+def _receiver_law(receivers, i, stamp, step):
+    """The step of receiver i."""
+    r = receivers
+    receiver_unit.law(receiver_unit.Memory(r.record[i:i + 1], r.breaks[i], r.coefficients[i], r.normals[i]), stamp,
+                      step, step)
+
+
+@compiled
+def _track(rows, ends, i):
+    """Track i of `_one_after_another`."""
+    return ProgramTrack(rows.times[ends[i]:ends[i + 1]], rows.angles[ends[i]:ends[i + 1]])
+
+
+class ControlUnits(typing.NamedTuple):
+    """Control units one after the other. tables: those of all as one, which end at ends (tables, n + 1), as
+    `_one_after_another` gives them."""
+    record: np.ndarray
+    tables: Tables
+    ends: np.ndarray
+
+
+@compiled
+def _acu_law(acus, i, stamp, step):
+    """The step of control unit i."""
+    of_all, ends = acus.tables, acus.ends
+    tables = Tables(_track(of_all.program, ends[0], i), _track(of_all.tle, ends[1], i), _track(of_all.sun, ends[2], i))
+    acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
+
+
+class Kept(typing.NamedTuple):
+    """What is kept of steps. words (m,): which 8-byte words of a STEP; said: the steps as `_words`; rows (trials, n,
+    m): where they are put, of all steps, because `_loop` would be compiled anew for a part of the columns."""
+    words: np.ndarray
+    said: np.ndarray
+    rows: np.ndarray
+
+
+@compiled
+def _loop(drives, receivers, acus, first, last, period_ns, steps, kept):
+    """Steps first ... last - 1 of every trial, of which a Kept keeps what it says.
+
+    drives: as of lanes.beside; receivers: a memory whose arrays have the trials as a further first dimension; acus:
+    ControlUnits. steps (2, trials) of STEP: those of even and of odd numbers, the present ones and the ones before by
+    turns.
+    """
+    moving = drive_unit.LANES(drives)
+    for k in range(first, last):
+        stamp, now = k * period_ns, k % 2
+        drive_unit.law_of_lanes(moving, stamp, steps[1 - now], steps[now])
+        for i in range(len(kept.rows)):
+            _receiver_law(receivers, i, stamp, steps[now, i])
+            _acu_law(acus, i, stamp, steps[now, i])
+            for j in range(len(kept.words)):
+                kept.rows[i, k, j] = kept.said[now, i, kept.words[j]]
+
+
+def _words(records):
+    """View of records (n, m) as their 8-byte words (n, m, words)."""
+    return records.view(np.int64).reshape(*records.shape, -1)
+
+
+def room(scenario, names):
+    """How many trials of a scenario.Scenario can run side by side, which keep the topics named; 0 where none can."""
+    if scenario.header.ship or scenario.header.beam:
+        return 0
+    steps = scenario.header.duration / scenario.node_parameters('adu').period
+    return min(lanes.WIDTH, int(MEMORY / (steps * records.of(*names).itemsize)))
+
+
+def fit(loops):
+    """Whether closed_loop.Loops can run side by side: of drives with motors ashore, alike in period, length and in the
+    shapes of what they work on."""
+    ours = all({name: type(unit) for name, unit in loop.units.items()} == UNITS and loop.units['adu'].fits_lanes
+               for loop in loops)
+    return FEWEST <= len(loops) <= lanes.WIDTH and ours and len(set(map(_shape, loops))) == 1
+
+
+def _shape(loop):
+    receiver = loop.units['tracking_receiver'].memory
+    constants = loop.units['adu'].parts['constants']
+    return (loop.period_ns, loop.steps, int(constants['speed_ticks']), int(constants['substeps']),
+            receiver.breaks.shape, receiver.coefficients.shape, receiver.normals.shape[1])
+
+
+def _stacked(units):
+    """The memories of units as one, and their records in it: each unit goes on with its own part of it."""
+    record = np.empty(len(units), units[0].memory.record.dtype)
+    for i, unit in enumerate(units):
+        record[i:i + 1] = unit.memory.record
+        unit.memory = unit.memory._replace(record=record[i:i + 1])
+    return record
+
+
+def _one_after_another(tracks):
+    """(the rows of ProgramTracks in one, where each ends (n + 1,), 0 first): they may differ in length."""
+    return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
+
+
+def runs(loops, names, kept=None):
+    """The Run of each of some closed_loop.Loops that `fit`, of the topics named, without what no topic tells.
+
+    kept: memory (trials, steps) of records.of(names) for what they say, which others in it overwrite; None: new.
+    """
+    drives, receivers, acus = ([loop.units[name] for loop in loops] for name in UNITS)
+    drive_record, receiver_record, acu_record = _stacked(drives), _stacked(receivers), _stacked(acus)
+    moving = lanes.beside(drive_record)
+    breaks, coefficients = (np.stack([getattr(unit.memory, name) for unit in receivers])
+                            for name in ('breaks', 'coefficients'))
+    period_ns, count = loops[0].period_ns, loops[0].steps
+    steps = records.empty(STEP, 2 * len(loops)).reshape(2, len(loops))
+    kept = np.empty((len(loops), count), records.of(*names)) if kept is None else kept
+    words = np.arange(STEP.itemsize // lanes.WORD).view(STEP)[list(names)].astype(kept.dtype).view(np.int64)
+    keeps = Kept(words, _words(steps), _words(kept))
+    forecasts = [[] for _ in loops]
+    first = 0
+    while first < count:
+        for loop, told in zip(loops, forecasts):
+            loop.attend(first, told)
+        last = min(first + BLOCK, *(loop.free_until(first) for loop in loops))
+        blocks = [unit.block(last - first) for unit in receivers]
+        tables, ends = zip(*map(_one_after_another, zip(*(unit.memory.tables for unit in acus))))
+        _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
+                                           np.stack([block.normals for block in blocks])),
+              ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
+        first = last
+    lanes.take_back(moving, drive_record)
+    return [Run(steps, np.zeros(0, TRUTH), np.arange(count) * period_ns, loop.units, told)
+            for loop, steps, told in zip(loops, kept, forecasts)]

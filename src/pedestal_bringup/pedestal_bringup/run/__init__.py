@@ -1,1 +1,0 @@
-"""A run: its scenario, its nodes as processes, the same closed loop without them."""

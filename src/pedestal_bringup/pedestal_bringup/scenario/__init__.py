@@ -1,0 +1,1 @@
+"""A scenario: its file, its parameters, and the program track that follows from it."""

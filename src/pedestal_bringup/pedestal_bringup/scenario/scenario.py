@@ -1,0 +1,451 @@
+"""Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
+
+`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged, in any namespace
+where its sections are called /**/NODE, but without what several nodes must agree on (_spread). That is in the file
+that `pedestal run` leaves beside the bag, parameters.yaml.
+"""
+import contextlib
+import dataclasses
+import functools
+import importlib.resources
+import json
+import pathlib
+
+import numpy as np
+import yaml
+
+from pedestal_bringup.scenario import parameter_file
+from pedestal_common import parameters
+from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.graph_parameters import GraphParameters
+from pedestal_common.text_files import files, plain_yaml
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgramParameters(parameters.Parameters):
+    """The program track the operator sends the ACU before the run: the target as predicted, with its error."""
+    source: str = parameters.choice('target', ('target', 'none'), 'what the table is made of')
+    interval: float = parameters.parameter(1.0, 0.002, 60.0, 's', 'time between two points')
+    time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
+    azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
+    elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
+    refractivity: float = parameters.parameter(0.0, 0.0, 500.0, 'N', 'of the air as the operator measures it: its '
+                                               'refraction is added to the prediction; 0: none is')
+
+
+@dataclasses.dataclass(frozen=True)
+class RestartParameters(parameters.Parameters):
+    """How `pedestal run` treats a node that dies in realtime; in lockstep it ends the run."""
+    attempts: int = parameters.parameter(5, 0, 1_000_000, '', 'a node is started again at most so often within '
+                                         '`within`; 0: never')
+    within: float = parameters.parameter(60.0, 1.0, 86400.0, 's', 'the time in which its deaths are counted')
+    delay: float = parameters.parameter(0.5, 0.0, 60.0, 's', 'a node that dies is started again at once, and each '
+                                        'further time in `within` so much later after its death')
+    silence: float = parameters.parameter(30.0, 0.0, 3600.0, 's', 'a node that publishes no diagnostics for so long '
+                                          'is killed and started again; 0: never')
+
+
+def _of_graph(name):
+    """The parameter graph.NAME, which a scenario tells every node."""
+    field = GraphParameters.__dataclass_fields__[name]
+    return dataclasses.field(default=field.default, metadata=field.metadata)
+
+
+@dataclasses.dataclass(frozen=True)
+class ScenarioParameters(parameters.Parameters):
+    """The header of a scenario."""
+    title: str = parameters.text('', 'one line for people')
+    duration: float = parameters.parameter(60.0, 0.1, 86400.0, 's', "length of the run in the drive's time")
+    pacing: str = parameters.choice('lockstep', ('lockstep', 'realtime'), 'who waits for whom')
+    seed: int = parameters.parameter(1, 0, 2**31 - 1, '', 'seed of every noise stream')
+    ship: bool = parameters.flag(False, 'the pedestal stands on a ship: ship_motion and ins take part')
+    beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
+    beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
+                                      'in a namespace beam_1 ...')
+    deadline: float = _of_graph('deadline')
+    priority: int = _of_graph('priority')
+    program: ProgramParameters = parameters.group(ProgramParameters)
+    restart: RestartParameters = parameters.group(RestartParameters)
+
+    def check(self):
+        """Raises ParameterError for several beams of a drive that has none."""
+        if self.beams > 1 and not self.beam:
+            raise parameters.ParameterError(f'beams = {self.beams}: must be 1 unless beam = true')
+
+    @property
+    def graph_beams(self):
+        """Beams of the graph as nodes.links counts them."""
+        return self.beams if self.beam else 0
+
+
+RUN = tuple(node.name for node in nodes.NODES if node.module)
+"""Nodes that a scenario can have a section for."""
+
+OF_BEAMS = tuple(node.name for node in nodes.NODES if node.of_beam)
+"""Those that each beam of several has of its own."""
+
+
+SHARED = (
+    ('adu', 'period', 'acu', 'tracker.receiver.integration'),
+    ('adu', 'transport_delay', 'acu', 'command_delay'),
+    ('tracking_receiver', 'receiver.latency', 'acu', 'receiver_latency'),
+    ('tracking_receiver', 'antenna.beamwidth', 'acu', 'tracker.receiver.beamwidth'),
+    ('tracking_receiver', 'antenna.slope', 'acu', 'tracker.receiver.slope'),
+    ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
+    ('tracking_receiver', 'receiver.cn0_time_constant', 'acu', 'acquisition.time_constant'),
+    ('ins', 'latency', 'acu', 'attitude_latency'),
+    ('ship_motion', 'imu.output', 'ins', 'imu_output'),
+    *(('tracking_receiver', f'lever_arm.{axis}', 'acu', f'lever_arm.{axis}') for axis in 'xyz'),
+    ('tracking_receiver', 'blockage', 'acu', 'blockage'),
+    ('tracking_receiver', 'target.leo_pass.start_time', 'acu', 'prediction.start_time'),
+    *(('tracking_receiver', f'target.station.{name}', 'acu', f'prediction.station.{name}')
+      for name in ('latitude_deg', 'longitude_deg', 'height')),
+)
+"""(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
+
+
+MEASURED = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
+                 for topic in map(topics.BY_NAME.get, node.writes) if topic.measured)
+"""(node, its parameter, that of its readers): whether one of its topics is there at all."""
+
+
+class ScenarioError(ValueError):
+    """A scenario is unknown or says something that is not allowed; one line naming file, node, key and value."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    """A checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
+
+    Of several beams the values of `acu` hold for each `beam_2/acu`, whose own come on top.
+    """
+    name: str
+    header: ScenarioParameters
+    values: dict
+
+    @property
+    def nodes(self):
+        """Nodes that take part, in the order of nodes.NODES and of the beams; the operator where there is a program
+        track."""
+        ship = ('ship_motion', 'ins') if self.header.ship else ()
+        operator = ('operator',) if self.header.program.source != 'none' else ()
+        return nodes.members((*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator),
+                              self.header.graph_beams)
+
+    @property
+    def prefixes(self):
+        """What the names of each beam's nodes begin with; ('',) of a single one."""
+        return nodes.prefixes(self.header.graph_beams)
+
+    def row(self, node):
+        """The nodes.Node of one of its nodes."""
+        return nodes.row(node, self.header.beam)
+
+    def given(self, node):
+        """{dotted name: value} of what this scenario says of a node."""
+        return _whole(self.values, node)
+
+    def node_parameters(self, node):
+        """The parameter dataclass of one node as this scenario sets it."""
+        return _built(self.row(node).parameters_type(), self.given(node))
+
+    def unit(self, node, parameters=None):
+        """The unit of one of its nodes; parameters: in the place of the scenario's."""
+        row, chosen = self.row(node), parameters or self.node_parameters(node)
+        flags = [flag for flag in topics.FLAGS if getattr(chosen, flag, False)]
+        return row.unit_type()(chosen, nodes.reads(row, self.nodes, flags))
+
+    def as_yaml(self):
+        """The scenario as a ROS 2 parameter file."""
+        sections = {'scenario': parameters.as_dict(self.header), **self.values}
+        return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()}, sort_keys=True)
+
+
+def _folder():
+    return importlib.resources.files('pedestal_bringup') / 'scenarios'
+
+
+def available():
+    """{name: title} of the scenarios that come with the product."""
+    titles = {}
+    for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
+        if entry.name.endswith('.yaml'):
+            sections = plain_yaml.parse(entry.read_text())
+            titles[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
+    return titles
+
+
+def text(name_or_path):
+    """(name, YAML text) of a scenario that comes with the product, or of a .yaml file. Raises ScenarioError."""
+    path = pathlib.Path(name_or_path)
+    if path.suffix in ('.yaml', '.yml'):
+        try:
+            return path.stem, files.read_text(path, plain_yaml.LARGEST)
+        except (OSError, UnicodeDecodeError) as error:
+            raise ScenarioError(f'scenario file {path}: {plain_yaml.problem(error)}') from None
+    entry = _folder() / f'{name_or_path}.yaml'
+    if not entry.is_file():
+        names = list(available())
+        raise ScenarioError(f'unknown scenario {name_or_path!r};{parameters.did_you_mean(name_or_path, names)} there '
+                            f'are {", ".join(names)} (or give a path that ends in .yaml)')
+    return name_or_path, entry.read_text()
+
+
+def _whole(sections, node):
+    """The values of a node, what holds for every beam first."""
+    return {**sections.get(nodes.plain(node), {}), **sections.get(node, {})}
+
+
+def _is_node(name):
+    return nodes.plain(name) in (OF_BEAMS if nodes.beam_of(name) else RUN)
+
+
+def _sections(name, content):
+    try:
+        tree = plain_yaml.parse(content)
+    except yaml.YAMLError as error:
+        raise ScenarioError(f'scenario {name}: {plain_yaml.problem(error)}') from None
+    if not isinstance(tree, dict) or 'scenario' not in map(parameter_file.node_of, tree):
+        raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
+    sections = {}
+    for section, body in ((parameter_file.node_of(section), body) for section, body in tree.items()):
+        if section != 'scenario' and not _is_node(section):
+            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(RUN)}')
+        whole = isinstance(body, dict) and list(body) == ['ros__parameters']
+        values = body['ros__parameters'] or {} if whole else None
+        if not isinstance(values, dict):
+            raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
+        sections[section] = parameter_file.dotted(values)
+    return sections
+
+
+def parameters_of(node):
+    """The parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`; ScenarioError for
+    any other name."""
+    if node in ('scenario', 'beam_steering'):
+        return ScenarioParameters if node == 'scenario' else nodes.ARRAY.parameters_type()
+    if not _is_node(node):
+        raise ScenarioError(f'{node!r} is no node; there are {", ".join(RUN)}, beam_steering, scenario')
+    return nodes.row(node).parameters_type()
+
+
+def parse_override(text):
+    """'node.key=value' -> (node, key, value); the value is read as YAML."""
+    left, equals, right = text.partition('=')
+    node, dot, key = left.partition('.')
+    if not (equals and dot and key):
+        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.feedforward.bandwidth=20')
+    parameters_of(node)
+    try:
+        return node, key, plain_yaml.parse(right)
+    except yaml.YAMLError as error:
+        raise ScenarioError(f'--param {text!r}: {plain_yaml.problem(error)}') from None
+
+
+def override(name, value):
+    """'node.key=value' of a value, a text without quotes where it reads back as itself."""
+    with contextlib.suppress(yaml.YAMLError):
+        if isinstance(value, str) and plain_yaml.parse(value) == value:
+            return f'{name}={value}'
+    return f'{name}={json.dumps(value, ensure_ascii=False)}'
+
+
+def file_overrides(path):
+    """Texts 'node.key=value' of a ROS 2 parameter file."""
+    return [override(f'{node}.{key}', value)
+            for node, values in parameter_file.read(path).items() for key, value in values.items()]
+
+
+@dataclasses.dataclass(frozen=True)
+class Draft:
+    """A scenario before it is checked as a whole: sections {node or `scenario`: {dotted name: value}}."""
+    name: str
+    sections: dict
+
+    def changed(self, overrides):
+        """The Draft with texts 'node.key=value' on top. Raises ScenarioError."""
+        sections = {node: dict(values) for node, values in self.sections.items()}
+        for override in overrides:
+            node, key, value = parse_override(override)
+            sections.setdefault(node, {})[key] = value
+        return Draft(self.name, sections)
+
+    @property
+    def header(self):
+        """The ScenarioParameters."""
+        return _checked(self.name, 'scenario', ScenarioParameters, self.sections['scenario'])
+
+    @property
+    def target(self):
+        """The target of a single receiver."""
+        return _checked(self.name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
+                        self.sections.get('tracking_receiver', {})).target
+
+
+def draft(name_or_path):
+    """A Draft from a name or a YAML path. Raises ScenarioError."""
+    name, content = text(name_or_path)
+    return Draft(name, _sections(name, content))
+
+
+def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
+    """A Scenario from a name or a YAML path; see checked."""
+    return checked(draft(name_or_path).changed(overrides), seed, duration, pacing)
+
+
+def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
+    """A Scenario from its YAML text; parse(name, Scenario.as_yaml()) gives the same again.
+
+    overrides: texts 'node.key=value'; see checked.
+    """
+    return checked(Draft(name, _sections(name, content)).changed(overrides), seed, duration, pacing)
+
+
+def checked(changed, seed=None, duration=None, pacing=None):
+    """The Scenario of a Draft that `changed` made. seed, duration and pacing replace the header's where given.
+
+    Raises ScenarioError for anything unknown or out of range.
+    """
+    name, sections = changed.name, dict(changed.sections)
+    header_values = sections.pop('scenario')
+    for key, value in (('seed', seed), ('duration', duration), ('pacing', pacing)):
+        if value is not None:
+            header_values[key] = value
+    _follow_flight(name, sections.get('tracking_receiver', {}), header_values)
+    header = _checked(name, 'scenario', ScenarioParameters, header_values)
+    of_beams = [name for name in nodes.members(OF_BEAMS, header.graph_beams) if nodes.beam_of(name)]
+    for node in sections:
+        if nodes.beam_of(node) and node not in of_beams:
+            raise ScenarioError(f'scenario {name}: section {node!r}: the scenario has beams = {header.beams}')
+    if header.beam:
+        for axis in ('azimuth', 'elevation'):
+            sections.setdefault('acu', {}).setdefault(f'{axis}.controller', 'beam')
+    for node in (*RUN, *of_beams):
+        sections.setdefault(node, {})
+        _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
+    _spread(name, sections, header, seed)
+    for node in of_beams:
+        _spread_to_beam(name, node, sections, header, seed)
+    for node, values in sections.items():
+        checked = _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
+        with _named(name, node):
+            checked.check_graph(header.graph_beams, header.pacing == 'lockstep')
+        typed = parameters.as_dict(checked)
+        sections[node] = {key: typed[key] for key in values}
+    return Scenario(name, header, sections)
+
+
+def _follow_flight(name, receiver_values, header_values):
+    """Station, reference range and duration follow from the file of a recorded flight where the scenario leaves them
+    open. Raises ScenarioError, TableError."""
+    target = _checked(name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
+                      receiver_values).target
+    if target.kind != 'track_file' or not target.track_file.path:
+        return
+    from tracking_receiver_sim import track_files  # with scipy, which only a flight needs
+    given = {*receiver_values, *({'duration'} & set(header_values))}
+    if not given.issuperset(track_files.OPEN):
+        for key, value in track_files.left_open(target, given).items():
+            (header_values if key == 'duration' else receiver_values).setdefault(key, value)
+
+
+def _spread(name, sections, header, seed):
+    """Give every node what several must agree on: length and period of the run, seeds, ship, latencies, beam.
+
+    Raises ScenarioError where the section of a node has another value.
+    """
+    def share(node, key, value):
+        sections[node].setdefault(key, value)
+        for section in [section for section in sections if nodes.plain(section) == node]:
+            own = sections[section].get(key, value)
+            if own != value:
+                raise ScenarioError(f'scenario {name}, {section}: {key} = {own}: must be {value}, as is said '
+                                    'elsewhere; leave it out here')
+
+    for node in ('adu', 'recorder', 'tracking_receiver'):
+        share(node, 'duration', header.duration)
+    share('recorder', 'scenario', name)
+    share('recorder', 'seed', header.seed)
+    for node, key in (('ship_motion', 'ship.seed'), ('ship_motion', 'imu.seed'), ('ins', 'seed'),
+                      ('tracking_receiver', 'seed')):
+        if seed is not None or key not in sections[node]:
+            sections[node][key] = header.seed
+    for key, value in sections['ship_motion'].items():
+        if key.startswith('ship.'):
+            share('ins', key, value)
+
+    def said(node, key, otherwise=None):
+        default = parameters.defaults(nodes.row(node, header.beam).parameters_type()).get(key, otherwise)
+        return sections[node].get(key, default)
+
+    for node in ('acu', 'tracking_receiver'):
+        share(node, 'period', said('adu', 'period'))
+    for owner, key, flag in MEASURED:
+        measured = (header.ship or not nodes.row(owner).optional) and said(owner, key, False)
+        for node in ('acu', 'recorder'):
+            if measured or any(flag in values for section, values in sections.items()
+                               if nodes.plain(section) == node):
+                share(node, flag, measured)
+    modelled = [(section, key) for section in sections for key in sections[section]
+                if key.startswith('tracker.attitude.')]
+    if modelled and sections['acu'].get('ins_error'):
+        section, key = modelled[0]
+        raise ScenarioError(f'scenario {name}, {section}: {key}: the INS tells it; it is of use with '
+                            'ins.error_told = false')
+    for owner, key, node, known_as in SHARED:
+        if key in sections[owner]:
+            sections[node].setdefault(known_as, sections[owner][key])
+    if header.beam:
+        # Only here, because its laws take half a second to import.
+        from tracking_receiver_sim import receiver
+        sections['tracking_receiver'].setdefault('receiver.beam', 'held')
+        for prefix in nodes.prefixes(header.graph_beams):
+            tracking = _checked(name, f'{prefix}tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
+                                _whole(sections, f'{prefix}tracking_receiver'))
+            for key, value in (('age', receiver.age(tracking, tracking.period)),
+                               ('beam_age', receiver.beam_age(tracking, tracking.period))):
+                if f'tracker.receiver.{key}' not in sections['acu']:
+                    sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
+
+
+def _spread_to_beam(name, node, sections, header, seed):
+    """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
+    values, beam = sections[node], nodes.beam_of(node)
+    own_receiver = f'{beam}/tracking_receiver'
+    if node == own_receiver and (seed is not None or 'seed' not in values):
+        spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
+        values['seed'] = int(spread.generate_state(1)[0] >> 1)
+    for owner, key, other, known_as in SHARED:
+        own = sections.get(f'{beam}/{owner}', {})
+        if nodes.plain(node) == other and key in own:
+            values.setdefault(known_as, own[key])
+    for _, key, _ in MEASURED:
+        if key in sections[own_receiver]:
+            raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: is the same for every beam; say it in '
+                                'tracking_receiver')
+
+
+def _checked(name, section, parameters_type, values):
+    with _named(name, section):
+        return _built(parameters_type, values)
+
+
+def _built(parameters_type, values):
+    """parameters.build, once for the same values: trials of a scenario have most of theirs in common."""
+    key = tuple((name, type(value), value) for name, value in values.items())
+    hashable = all(isinstance(value, int | float | str | None) for value in values.values())
+    return _built_once(parameters_type, key) if hashable else parameters.build(parameters_type, values)
+
+
+@functools.lru_cache(256)
+def _built_once(parameters_type, key):
+    return parameters.build(parameters_type, {name: value for name, _, value in key})
+
+
+@contextlib.contextmanager
+def _named(name, section):
+    """A ParameterError becomes a ScenarioError that names the section."""
+    try:
+        yield
+    except parameters.ParameterError as error:
+        raise ScenarioError(f'scenario {name}, {section}: {error}') from None

@@ -1,0 +1,1 @@
+"""Directions, places on the earth, orbits and intervals of angles."""

@@ -1,0 +1,108 @@
+"""A satellite by SGP4: its TLE, where it is over a station, and Julian dates.
+
+Where no ut1_offset is given UT1 is taken for UTC; tracking_receiver_sim.target says what that costs.
+"""
+import datetime
+
+import numpy as np
+from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
+from sgp4.io import compute_checksum
+from sgp4.propagation import gstime
+
+from pedestal_common.geometry.geodesy import EARTH_RATE, station_frame
+from pedestal_common.graph.steps import DAY
+from pedestal_common.reproducible import arctan2, cos, sin, turned
+
+TLE_NUMBERS = (
+    {'epoch year': (18, 20), 'epoch day': (20, 32)},
+    {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
+     'mean anomaly': (43, 51), 'mean motion': (52, 63)})
+"""Columns of the fields of both TLE lines that must be numbers."""
+TLE_AGE = 30.0
+"""Largest time from the TLE epoch [days]: beyond it SGP4 is useless."""
+
+
+class TargetError(ValueError):
+    """A target cannot be built; one line naming file or TLE line, row, field and value."""
+
+
+def satellite(leo_pass) -> Satrec:
+    """The SGP4 record of the `line_1` and `line_2` of parameters; raises TargetError when the TLE is not one."""
+    lines = leo_pass.line_1.rstrip(), leo_pass.line_2.rstrip()
+    for number, line in enumerate(lines, 1):
+        name = f'TLE line {number}'
+        if len(line) != 69 or not line.isascii():
+            raise TargetError(f'{name}: {len(line)} characters, must be 69 of ASCII: {line!r}')
+        if not line.startswith(f'{number} '):
+            raise TargetError(f'{name}: line number {line[:2]!r}, must be {f"{number} "!r}')
+        checksum = str(compute_checksum(line))
+        if line[68] != checksum:
+            raise TargetError(f'{name}: checksum {line[68]!r}, must be {checksum!r}: {line!r}')
+        for field, (first, end) in TLE_NUMBERS[number - 1].items():
+            if not line[first:end].replace('.', '', 1).strip().isdigit():
+                raise TargetError(f'{name}: {field} {line[first:end]!r} is not a number')
+    if lines[0][2:7] != lines[1][2:7]:
+        raise TargetError(f'TLE line 2: satellite {lines[1][2:7]!r}, must be {lines[0][2:7]!r} as in line 1')
+    satrec = Satrec.twoline2rv(*lines, WGS72)
+    if satrec.error:
+        raise TargetError(f'TLE of satellite {lines[0][2:7]}: {SGP4_ERRORS[satrec.error]}')
+    return satrec
+
+
+def earth_fixed(julian, fractions, ut1_offset=0.0):
+    """Rotations (n, 3, 3) from TEME, the true equator and mean equinox of date, to the earth at julian + fractions
+    (n,), UTC."""
+    theta = gstime(julian) + EARTH_RATE * DAY * fractions + EARTH_RATE * ut1_offset
+    c, s = cos(theta), sin(theta)
+    to_fixed = np.zeros((len(fractions), 3, 3))
+    to_fixed[:, 0, 0], to_fixed[:, 0, 1], to_fixed[:, 1, 0], to_fixed[:, 1, 1], to_fixed[:, 2, 2] = c, s, -s, c, 1.0
+    return to_fixed
+
+
+def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
+    """ENU position [m] and velocity against the earth [m/s], each (n, 3), at times [s] past julian + fraction, UTC.
+
+    ut1_offset: UT1 - UTC [s].
+    """
+    fractions = fraction + times / DAY
+    error, position, velocity = satrec.sgp4_array(np.full(len(times), julian), fractions)
+    if error.any():
+        i = int(np.argmax(error != 0))
+        raise TargetError(f'TLE of satellite {satrec.satnum_str}: {iso(julian, fractions[i])}: '
+                          f'{SGP4_ERRORS[int(error[i])]}')
+    to_fixed = earth_fixed(julian, fractions, ut1_offset)
+    r = np.einsum('nij,nj->ni', to_fixed, 1e3 * position)
+    v = np.einsum('nij,nj->ni', to_fixed, 1e3 * velocity) - np.cross([0.0, 0.0, EARTH_RATE], r)
+    origin, to_enu = station_frame(station)
+    return turned(to_enu, r - origin), turned(to_enu, v)
+
+
+def elevations(satrec, station, julian, fraction, times):
+    """Elevation [deg] (n,) at times [s] past julian + fraction."""
+    east, north, up = enu(satrec, station, julian, fraction, times)[0].T
+    return np.degrees(arctan2(up, np.hypot(east, north)))
+
+
+def calendar(julian, fraction):
+    """Calendar time of a Julian date, to the millisecond."""
+    since_2000 = datetime.timedelta(days=julian - 2451544.5) + datetime.timedelta(days=fraction)
+    return datetime.datetime(2000, 1, 1) + datetime.timedelta(milliseconds=round(since_2000.total_seconds() * 1e3))
+
+
+def julian_date(when):
+    """(Julian day, fraction) of a datetime in UTC."""
+    return jday(when.year, when.month, when.day, when.hour, when.minute, when.second + when.microsecond * 1e-6)
+
+
+def instant(name, text):
+    """UTC as a datetime without a zone, from ISO 8601; raises TargetError, which calls the text `name`."""
+    try:
+        when = datetime.datetime.fromisoformat(text.replace('Z', '+00:00'))
+    except ValueError:
+        raise TargetError(f'{name} = {text!r}: must be UTC as ISO 8601, for example 2019-12-10T06:00:00') from None
+    return when if when.tzinfo is None else when.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+
+
+def iso(julian, fraction):
+    """Julian date as ISO 8601 to the millisecond."""
+    return calendar(julian, fraction).isoformat(timespec='milliseconds') + 'Z'

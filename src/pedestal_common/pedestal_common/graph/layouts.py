@@ -1,0 +1,130 @@
+"""What the numbers of a message are: their names, units and tolerances, by the type of the message.
+
+A column is one number of the messages of a topic, 'azimuth.velocity' of joint_states for example. The records of the
+nodes, the tables of a bag, the comparison of recordings and the export all take their columns from here.
+"""
+import re
+import typing
+
+from pedestal_common.graph import topics
+
+
+class Field(typing.NamedTuple):
+    """A group of numbers of a message.
+
+    name        of the field in a record
+    path        of its numbers in the message, a pattern whose group 1 says which of them
+    components  what group 1 can be, in the order of the record; None: the places of Topic.names
+    column      the name of a column, with {} for the component (or the name of the joint)
+    unit        of the numbers where the topic gives none
+    tolerance   absolute difference between recorded and recomputed numbers that is let pass, in that unit
+    recorded    whether it is in the record of our topics
+    """
+    name: str
+    path: str
+    components: tuple | None
+    column: str
+    unit: str = ''
+    tolerance: float = 1e-9
+    recorded: bool = True
+
+
+_XYZ, _XYZW = ('x', 'y', 'z'), ('x', 'y', 'z', 'w')
+
+LAYOUTS = {
+    'sensor_msgs/msg/JointState': (
+        Field('position', r'position\[(\d+)\]', None, '{}.position', 'rad', 1e-9),
+        Field('velocity', r'velocity\[(\d+)\]', None, '{}.velocity', 'rad/s', 1e-8),
+        Field('effort', r'effort\[(\d+)\]', None, '{}.effort', 'Nm', 1e-6)),
+    'trajectory_msgs/msg/JointTrajectory': (
+        Field('position', r'points\[0\]\.positions\[(\d+)\]', None, '{}.position', 'rad', 1e-9),
+        Field('velocity', r'points\[0\]\.velocities\[(\d+)\]', None, '{}.velocity', 'rad/s', 1e-8),
+        Field('acceleration', r'points\[0\]\.accelerations\[(\d+)\]', None, '{}.acceleration', 'rad/s2', 1e-6),
+        Field('effort', r'points\[0\]\.effort\[(\d+)\]', None, '{}.effort', 'Nm', 1e-6, recorded=False)),
+    'sensor_msgs/msg/Range': (
+        Field('range', r'(range)', ('range',), '{}', 'm'),
+        Field('variance', r'(variance)', ('variance',), '{}', 'm2')),
+    'geometry_msgs/msg/Vector3Stamped': (
+        Field('vector', r'vector\.([xyz])', _XYZ, '{}'),),
+    'nav_msgs/msg/Odometry': (
+        Field('position', r'pose\.pose\.position\.([xyz])', _XYZ, 'position.{}', 'm'),
+        Field('orientation', r'pose\.pose\.orientation\.([xyzw])', _XYZW, 'orientation.{}'),
+        Field('twist_linear', r'twist\.twist\.linear\.([xyz])', _XYZ, 'twist.linear.{}', 'm/s'),
+        Field('twist_angular', r'twist\.twist\.angular\.([xyz])', _XYZ, 'twist.angular.{}', 'rad/s')),
+    'sensor_msgs/msg/Imu': (
+        Field('orientation', r'orientation\.([xyzw])', _XYZW, 'orientation.{}'),
+        Field('angular_velocity', r'angular_velocity\.([xyz])', _XYZ, 'angular_velocity.{}', 'rad/s'),
+        Field('linear_acceleration', r'linear_acceleration\.([xyz])', _XYZ, 'linear_acceleration.{}', 'm/s2'),
+        Field('orientation_variance', r'orientation_covariance\[([048])\]', ('0', '4', '8'),
+              'orientation_variance.{}', 'rad2')),
+    'rosgraph_msgs/msg/Clock': (),
+}
+"""The diagonal of an Imu's orientation_covariance says how well an INS knows its attitude."""
+
+_JOINTS = {'sensor_msgs/msg/JointState': 'name', 'trajectory_msgs/msg/JointTrajectory': 'joint_names'}
+"""Where a message tells whose numbers its fields are."""
+
+
+class Column(typing.NamedTuple):
+    """One number of a topic's messages."""
+    name: str
+    field: str
+    unit: str
+    tolerance: float
+
+
+def fields(topic) -> tuple:
+    """The Fields of a topic of the table, whose numbers make its record; () of a text."""
+    row = topics.BY_NAME[topic]
+    return tuple(field for field in LAYOUTS.get(row.type, ())
+                 if field.recorded and field.name in (row.only or (field.name,)))
+
+
+def _names(field, row):
+    """What stands for {} in the columns of a field."""
+    if field.components is None:
+        return row.names
+    return tuple('xyz'[int(c) // 4] if c.isdigit() else c for c in field.components)
+
+
+def columns(topic) -> tuple:
+    """The Columns of a topic of the table, in the order of its record."""
+    row = topics.BY_NAME[topic]
+    return tuple(Column(name := field.column.format(part), field.name, row.units.get(name, field.unit),
+                        field.tolerance)
+                 for field in fields(topic) for part in _names(field, row))
+
+
+def column(type_name, path, texts):
+    """The name of the column of a number at a path in a message of any type, None for one that is left out: header and
+    covariances. texts: {path: text} of the message."""
+    for field in LAYOUTS.get(type_name, ()):
+        match = re.fullmatch(field.path, path)
+        if match:
+            part = match[1]
+            if field.components is None:
+                part = texts.get(f'{_JOINTS[type_name]}[{part}]', part)
+            return field.column.format('xyz'[int(part) // 4] if field.name == 'orientation_variance' else part)
+    if path.startswith('header.') or 'covariance' in path or type_name == 'trajectory_msgs/msg/JointTrajectory':
+        return None
+    return path
+
+
+def unit(topic, type_name, column) -> str:
+    """The unit of a column of a topic of this type, '' for one that has none or is not known."""
+    row = topics.BY_NAME.get(topic)
+    if row is None or row.type != type_name:
+        return ''
+    if column in row.units:
+        return row.units[column]
+    for field in LAYOUTS.get(type_name, ()):
+        head, _, tail = field.column.partition('{}')
+        if field.unit and column.startswith(head) and column.endswith(tail):
+            return field.unit
+    return 's' if column.endswith('time_from_start') else ''
+
+
+def of_filter(steps, name):
+    """(n, 2): a number of topics.FILTER for both axes, in records (n,) that hold acu/filter."""
+    numbers = steps['acu/filter']['position'].reshape(len(steps), len(topics.AXES), len(topics.FILTER))
+    return numbers[:, :, list(topics.FILTER).index(name)]

@@ -1,0 +1,148 @@
+"""How a node of a realtime graph hears its topics: what it takes of them, and what it says of the rest."""
+import collections
+import inspect
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import DurabilityPolicy
+
+from pedestal_common.graph import nodes, topics
+from pedestal_common.node import middleware
+from pedestal_common.node.unit import ERROR, WARN
+from pedestal_common.realtime import intake
+from pedestal_common.wire.commands import LATEST
+
+FRESH = 2_000_000_000
+"""Time [ns] for which the diagnostics speak of a message that was dropped."""
+
+UNKNOWN = '_NODE_NAME_UNKNOWN_'
+"""What rmw calls a node that is not discovered yet."""
+
+DISCOVERY = 10_000_000_000
+"""Time [ns] for which a text waits until the graph names every writer of its topic: it is said once only, often before
+its writer is discovered."""
+
+LOOK = 0.02
+"""Time [s] between two looks at who writes a text."""
+
+HELD = 1000
+"""Texts that wait at the most."""
+
+REMEMBERED = 100
+"""Messages of a topic with two subscriptions that are known again when the other one brings them."""
+
+
+def pair(function):
+    """function(data, info) as a callback of a subscription: EventsExecutor (rclpy 7.1.6) hands a callback of two
+    arguments one pair, SingleThreadedExecutor hands it two."""
+    def call(data, info=None):
+        function(*(data if info is None else (data, info)))
+    call.__signature__ = inspect.signature(lambda data, info: None)
+    return call
+
+
+def subscribe(node, link, ros_name, take, role):
+    """Call take(data, info) once for each message on the topic of a nodes.Link, which ROS calls ros_name: the list of
+    the subscriptions of the node for it. role: in realtime, `read` or `recorded`.
+
+    A latched reader does not match a writer that does not latch, so where topics.Qos says `unlatched` there is a
+    second subscription. A latched writer matches both; what it says comes twice and is taken once.
+    """
+    def open_with(profile, callback, **events):
+        return node.create_subscription(middleware.message_class(link.type), ros_name, pair(callback), profile,
+                                        raw=True, **events)
+    latched = middleware.qos(link.rate, role)
+    if not topics.QOS[link.rate].unlatched:
+        return [open_with(latched, take)]
+    heard = collections.deque(maxlen=REMEMBERED)
+
+    def take_once(data, info):
+        message = info['source_timestamp'], info['publication_sequence_number']
+        if message not in heard:
+            heard.append(message)
+            take(data, info)
+    volatile = middleware.qos(link.rate, role)
+    volatile.durability = DurabilityPolicy.VOLATILE
+    unmatched = SubscriptionEventCallbacks(use_default_callbacks=False)  # rclpy's would warn of every volatile writer
+    return [open_with(latched, take_once, event_callbacks=unmatched), open_with(volatile, take_once)]
+
+
+class Listener:
+    """Hears one topic and hands on what its Intake takes: take(message, whether it begins anew).
+
+    node: the shell.Shell that listens; link: nodes.Link of the topic, which ROS calls ros_name; decode: see Intake
+    """
+
+    def __init__(self, node, link, ros_name, decode, take):
+        self.link, self._node, self._ros_name, self._take = link, node, ros_name, take
+        everybodys = len(link.writers) > 1 or link.rate in ('once', 'command')
+        self._expected = any(writer in node.graph.members for writer in link.writers)
+        text = link.rate in topics.BETWEEN_STEPS and self._expected
+        self.intake = intake.Intake(decode, round(node.graph.future * 1e9), None if everybodys else self._count,
+                                    paced=not text, oldest=LATEST if link.rate == 'command' else None)
+        self._held, self._missed = collections.deque(maxlen=HELD), 0
+        self.callback = self._hold if text else self._hear
+        if text:
+            node.every(LOOK, self._look)
+
+    def open(self, subscribe):
+        """Begin to hear. subscribe() makes the subscriptions with `callback`."""
+        self._subscribe = subscribe
+        self._subscriptions = subscribe()
+
+    def _hold(self, data, info):
+        self._held.append((self._node.clock()[0], data, info))
+        self._look()
+
+    def _look(self):
+        """Hear the texts that wait, once every writer has a name. What was said beside a stranger is not taken; once
+        it has gone a subscription anew brings the last text again."""
+        while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > DISCOVERY):
+            self._hear(*self._held.popleft()[1:])
+        missed = self.intake.dropped[intake.ANOTHER_WRITER]
+        if missed > self._missed and not self.strangers():
+            self._missed = missed
+            for subscription in self._subscriptions:
+                self._node.destroy_subscription(subscription)
+            self._subscriptions = self._subscribe()
+
+    def _undiscovered(self):
+        return any(UNKNOWN in name for name in self._node.writers_of(self._ros_name))
+
+    def _hear(self, data, info):
+        taker = self.intake
+        now, utc = self._node.clock()
+        message = taker.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
+        if message is not None:
+            self._take(message, taker.anew)
+        elif taker.reason in intake.ALARMING:
+            self._node.diagnose_now()
+
+    def strangers(self):
+        """Names of the nodes that write this topic and should not; none in a graph without those that should."""
+        if not self._expected:
+            return []
+        return [name for name in self._node.writers_of(self._ros_name)
+                if name not in self.link.writers and name != nodes.STAND_IN]
+
+    def _count(self):
+        """As Intake wants it. Who is not discovered yet may be a stranger."""
+        return len(self.strangers()) if self._expected else None
+
+    def finding(self, now):
+        """(level, text) of what was dropped lately; None where nothing was."""
+        taker = self.intake
+        if taker.dropped_at is None or now - taker.dropped_at > FRESH:
+            return None
+        reason, count = taker.reason, taker.dropped[taker.reason]
+        if reason not in intake.ALARMING:
+            return WARN, f'{self.link.name}: {count} dropped: {reason}: {taker.detail}'
+        who = ', '.join(self.strangers() if self._expected else self._node.writers_of(self._ros_name)) or 'it has gone'
+        return ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
+
+    def values(self):
+        """[(key, text)] for the diagnostics: what was dropped so far, the smallest time from sent to heard."""
+        taker = self.intake
+        values = [(f'dropped {self.link.name}: {reason}', str(count)) for reason, count in taker.dropped.items()]
+        if taker.offset is not None:
+            values.append((f'offset {self.link.name}_ms', f'{taker.offset * 1e-6:.3f}'))
+        return values

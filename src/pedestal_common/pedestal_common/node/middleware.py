@@ -1,0 +1,65 @@
+"""What the nodes ask of the middleware: quality of service, discovery on this machine, the executor."""
+import importlib
+import os
+import pathlib
+import sys
+
+import rclpy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from pedestal_common.graph import topics
+
+PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
+"""{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
+
+
+def qos(rate, role='lockstep') -> QoSProfile:
+    """The profile of topics of a rate: in lockstep for writers and readers, in realtime of a role `written`, `read` or
+    `recorded` (see topics.Qos)."""
+    row = topics.QOS[rate]
+    depth, reliable = getattr(row, role), role != 'read' or row.reliable
+    return QoSProfile(history=HistoryPolicy.KEEP_LAST if depth else HistoryPolicy.KEEP_ALL, depth=depth or 1,
+                      reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+                      durability=DurabilityPolicy.TRANSIENT_LOCAL if row.latched else DurabilityPolicy.VOLATILE)
+
+
+def message_class(type_name):
+    """The rclpy class of 'package/msg/Name'."""
+    package, _, name = type_name.split('/')
+    return getattr(importlib.import_module(f'{package}.msg'), name)
+
+
+def set_defaults():
+    """What DDS of this process and its children does, by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
+    profile of his own.
+
+    Not set, or LOCALHOST: the graph stays on this machine and on its loopback (fastdds.xml). rclpy is then told
+    SYSTEM_DEFAULT, because under LOCALHOST rmw_fastrtps opens transports of its own on every interface.
+    SUBNET: the graph may spread over several hosts, by UDP (fastdds_subnet.xml).
+    """
+    scope = os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    if scope in PROFILES:
+        profile = str(pathlib.Path(__file__).parents[1] / PROFILES[scope])
+        chosen = os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', profile)
+        if (scope, chosen) == ('LOCALHOST', profile):
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SYSTEM_DEFAULT'
+
+
+def initialise(args=None):
+    """rclpy in this process, its arguments those of the command line unless given: DDS as in set_defaults, signals
+    left to the caller, and logs on stderr only, for which neither a home nor a disk is needed."""
+    set_defaults()
+    given = sys.argv if args is None else args
+    rclpy.init(args=[*given, '--ros-args', '--disable-external-lib-logs'],
+               signal_handler_options=SignalHandlerOptions.NO)
+
+
+def make_executor(context=None):
+    """The executor every node runs in. context: an rclpy.Context, None for the default one."""
+    try:
+        from rclpy.experimental.events_executor import EventsExecutor
+        return EventsExecutor(context=context)
+    except ImportError:
+        from rclpy.executors import SingleThreadedExecutor
+        return SingleThreadedExecutor(context=context)

@@ -1,0 +1,413 @@
+"""What every node is: parameters, clock, topics of the table, waiting for its graph, `main`."""
+import contextlib
+import gc
+import inspect
+import json
+import os
+import signal
+import sys
+import time
+
+import rclpy
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+
+from pedestal_common import parameters
+from pedestal_common.graph import nodes
+from pedestal_common.graph.graph_parameters import GraphParameters
+from pedestal_common.graph.steps import DAY, SECOND, GraphError
+from pedestal_common.node import middleware
+from pedestal_common.node.diagnostics import Diagnostics
+from pedestal_common.node.listening import Listener, subscribe
+from pedestal_common.realtime import utc
+from pedestal_common.wire import messages
+
+START_DEADLINE = 300.0
+"""Seconds a node waits for its graph: the others may be compiling their laws for the first time."""
+
+PARTING = 1.0
+"""Seconds a node that ends waits for readers to take what it published."""
+
+FAREWELL = 0.1
+"""Seconds it stays when its endpoints have left."""
+
+class Stopped(BaseException):  # noqa: N818  no error: the node was told to stop
+    """SIGINT or SIGTERM came while a node was waiting or compiling. Like KeyboardInterrupt it is no Exception, which
+    numba would take for an error of the law it compiles."""
+
+
+EXPECTED = (parameters.ParameterError, GraphError, ValueError, OSError, InvalidParameterTypeException,
+            InvalidParameterValueException, Stopped)
+"""What a node may end with in one line; anything else is a defect and shows its traceback."""
+
+_stop = []
+"""Not empty once SIGINT or SIGTERM has come to this process."""
+
+_compiling = []
+"""Not empty while it compiles, which can be cut short."""
+
+
+STOPS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
+"""What a node is stopped by; the last only by itself, see _on_signal."""
+
+AGAIN = 0.02
+"""Seconds after which a node that could not be stopped at once stops itself."""
+
+_HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
+"""Functions of llvmlite that LLVM calls around making machine code, in which it hears of no exception."""
+
+
+def _on_signal(_number, frame):
+    _stop.append(True)
+    if not _compiling:
+        return
+    while frame is not None:
+        if frame.f_code.co_name in _HOOKS:
+            # A signal that comes while machine code is made is always told here: it would be a message on stderr, and
+            # the code would be lost.
+            signal.setitimer(signal.ITIMER_REAL, AGAIN)
+            return
+        frame = frame.f_back
+    raise Stopped
+
+
+def readings():
+    """(steady, system) clock [ns] at one moment: read anew where something came between."""
+    for _ in range(3):
+        steady, system = time.monotonic_ns(), time.time_ns()
+        if time.monotonic_ns() - steady < 100_000:
+            break
+    return steady, system
+
+
+def node_of(info, root='/'):
+    """The name in the graph at a namespace (with a '/' at its end) of the node behind an endpoint, as 'beam_2/acu'."""
+    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'.removeprefix(root)
+
+
+def _descriptor(field, read_only):
+    meta = field.metadata
+    unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
+    descriptor = ParameterDescriptor(description=meta['doc'] + unit, read_only=read_only)
+    if 'options' in meta:
+        descriptor.additional_constraints = 'one of ' + ', '.join(meta['options'])
+    elif 'low' in meta and field.type is int:
+        descriptor.integer_range = [IntegerRange(from_value=int(meta['low']), to_value=int(meta['high']), step=0)]
+    elif 'low' in meta:
+        descriptor.floating_point_range = [
+            FloatingPointRange(from_value=float(meta['low']), to_value=float(meta['high']), step=0.0)]
+    return descriptor
+
+
+class Shell(Node):
+    """A node of the graph.
+
+    parameters_type: the node's dataclass; its fields become ROS parameters of the same dotted names.
+    live: prefixes of parameters that may change while running; the node then implements `reconfigure()`.
+    Raises parameters.ParameterError for an unknown or refused parameter.
+    """
+
+    def __init__(self, name, parameters_type, live=()):
+        super().__init__(name)
+        self._parameters_type = parameters_type
+        self._declare(live)
+        self.links = nodes.links(self.graph.beams)
+        self._root, self.beam = self._place(name)
+        self.name = self.beam + name
+        self.finished = False
+        self.failure = None
+        self.result = {}
+        self.publishers_by_link = {}
+        self._next_second = 0
+        self._stamp = 0
+        self._started = False
+        self.diagnostics = None
+        self.utc = utc.Utc(*readings())
+        self._epoch = 0 if self.graph.lockstep else self.graph.start or None
+        self.listeners = []
+
+    def _place(self, name):
+        """(namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their end."""
+        namespace = self.get_namespace().rstrip('/') + '/'
+        prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NAMES
+                       and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')
+        return namespace.removesuffix(prefix), prefix
+
+    def _declare(self, live):
+        graph = self._declare_all(GraphParameters, (), 'graph.')
+        own = self._declare_all(self._parameters_type, live)
+        known = {'use_sim_time', 'start_type_description_service', *graph, *own}
+        unknown = [name for name in self._parameter_overrides
+                   if name not in known and not name.startswith('qos_overrides')]
+        self.parameters = parameters.build(self._parameters_type, {**own, **dict.fromkeys(unknown)})
+        self.graph = parameters.build(GraphParameters, graph, 'graph.')
+        self.parameters.check_graph(self.graph.beams, self.graph.lockstep)
+        if '--params-file' in sys.argv and not self._parameter_overrides:
+            self.get_logger().warning(f'no parameter of {self.get_fully_qualified_name()} is in the parameter file: a '
+                                      'section /**/NODE is for a node in any namespace, NODE for one in none')
+        if live:
+            self.add_on_set_parameters_callback(self._on_set)
+            self.add_post_set_parameters_callback(self._post_set)
+
+    def _declare_all(self, cls, live, prefix=''):
+        """{dotted name: value} of the ROS parameters of a dataclass, those that begin with one of `live` writable."""
+        defaults = parameters.as_dict(cls(), prefix)
+        return {name: self.declare_parameter(name, defaults[name],
+                                             _descriptor(field, not name.startswith(tuple(live)))).value
+                for name, field in parameters.flatten(cls, prefix)}
+
+    def _changed(self, changes):
+        values = parameters.as_dict(self.parameters)
+        values.update({change.name: change.value for change in changes if change.name in values})
+        changed = parameters.build(self._parameters_type, values)
+        changed.check_graph(self.graph.beams, self.graph.lockstep)
+        return changed
+
+    def _on_set(self, changes):
+        try:
+            self._changed(changes)
+        except parameters.ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _post_set(self, changes):
+        self.parameters = self._changed(changes)
+        self.reconfigure()
+
+    def reconfigure(self):
+        """`self.parameters` has changed; overridden by a node with live parameters."""
+
+    def _link(self, name):
+        """(Link, its name for ROS) of a topic of the graph; a node of a beam names its own without the prefix."""
+        link = self.links.get(self.beam + name) or self.links[name]
+        return link, self._root + link.name if self.beam else link.name
+
+    def clock(self):
+        """(steady clock, UTC) of now [ns]."""
+        steady, system = readings()
+        return steady, self.utc.at(steady, system)
+
+    def epoch(self, stamp):
+        """The stamp [ns] at which the time of the units is 0: 0 in lockstep, `graph.start`, or the day's beginning
+        of the first stamp that is asked for."""
+        if self._epoch is None:
+            self._epoch = stamp // (DAY * SECOND) * DAY * SECOND
+        return self._epoch
+
+    def writer(self, name):
+        """A function that publishes the CDR bytes of a message on a topic of the graph."""
+        link, ros_name = self._link(name)
+        publisher = self.create_publisher(middleware.message_class(link.type), ros_name,
+                                          middleware.qos(link.rate, 'lockstep' if self.graph.lockstep else 'written'))
+        self.publishers_by_link[link] = publisher
+        return publisher.publish
+
+    def reader(self, name, decode, take):
+        """Call take(message, anew) for every message on a topic of the graph that decode(CDR bytes) -> (stamp [ns] or
+        None, message) can read; it raises ValueError for others. In lockstep these end the node. In realtime they are
+        dropped, as is all that an Intake does not take; anew: it does not continue the one before."""
+        link, ros_name = self._link(name)
+
+        if self.graph.lockstep:
+            self.create_subscription(middleware.message_class(link.type), ros_name,
+                                     self._guarded(lambda data: take(decode(data)[1], False)),
+                                     middleware.qos(link.rate), raw=True)
+        else:
+            listener = Listener(self, link, ros_name, decode, take)
+            self.listeners.append(listener)
+            listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
+
+    def writers_of(self, ros_name):
+        """Names of the nodes that write a topic now."""
+        return [node_of(info, self._root) for info in self.get_publishers_info_by_topic(ros_name)]
+
+    def message_reader(self, name, take):
+        """Call take(message) for every message on a topic."""
+        type_name = self._link(name)[0].type
+        self.reader(name, lambda data: (None, messages.deserialize(data, type_name)),
+                    lambda message, anew: take(message))
+
+    def every(self, period, function):
+        """A timer on the steady wall clock [s]."""
+        return self.create_timer(period, self._guarded(function), clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _guarded(self, function):
+        """The same callback, an expected error kept for `main`: rclpy would print a traceback of its own first."""
+        def call(*args):
+            try:
+                function(*args)
+            except EXPECTED as error:
+                self.failure = self.failure or error
+                self.finished = True
+        call.__signature__ = inspect.signature(function)
+        return call
+
+    def diagnose_with(self, diagnose):
+        """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time,
+        in realtime at every second of the wall and when what is urgent changes."""
+        self.diagnostics = Diagnostics(self, diagnose)
+
+    def diagnose_now(self):
+        """Realtime: something has changed, which its diagnostics tell before their second; False where that would be
+        too soon after the last ones."""
+        return self.diagnostics is not None and not self.graph.lockstep and self.diagnostics.publish_urgent()
+
+    def begin_step(self, stamp):
+        """To be called with t_k [ns] before anything of step k is published. In lockstep the first call waits for the
+        graph, and every whole second publishes diagnostics; in realtime nobody is waited for."""
+        self._stamp = stamp
+        if not self._started:
+            self._started = True
+            if self.graph.lockstep:
+                self.await_graph()
+                self._next_second = -(-stamp // SECOND) * SECOND
+            self.get_logger().info('runs')
+        if self.graph.lockstep and stamp >= self._next_second:
+            self._next_second = (stamp // SECOND + 1) * SECOND
+            self.diagnostics.publish(stamp)
+
+    def prepare(self, unit):
+        """Compile the laws of a unit, cold half a minute and more, unless told to stop."""
+        from pedestal_common.compiled import compiled_once  # with numba, which a node without a law does not need
+        _compiling.append(True)
+        try:
+            if _stop:
+                raise Stopped
+            with compiled_once(unit):
+                unit.prepare()
+        finally:
+            _compiling.clear()
+
+    def await_acknowledged(self):
+        """Wait until every reader has received all that this node published. Raises GraphError after the deadline: in
+        lockstep it is the recorder that is silent, for everyone else has answered the step before."""
+        for link, publisher in self.publishers_by_link.items():
+            if not publisher.wait_for_all_acked(Duration(seconds=self.graph.deadline)):
+                raise GraphError(f'a reader of {link.name} took nothing for {self.graph.deadline:g} s', ('recorder',))
+
+    def announce(self, publish, message):
+        """Publish what has no stamp. In lockstep it keeps its place between two steps: what was published
+        before has arrived everywhere before it, and it has before anything that follows."""
+        if self.graph.lockstep:
+            self.await_acknowledged()
+        publish(messages.serialize(message))
+        if self.graph.lockstep:
+            self.await_acknowledged()
+
+    def await_graph(self):
+        """Wait until every topic this node writes has all its readers of the run.
+
+        Raises GraphError after START_DEADLINE, or when another graph writes the same topics.
+        """
+        deadline = time.monotonic() + START_DEADLINE
+        for link, publisher in self.publishers_by_link.items():
+            wanted = nodes.readers(link, self.graph.members)
+            while missing := self._missing(publisher, wanted):
+                if time.monotonic() > deadline:
+                    raise GraphError(f'{link.name} is not read by {", ".join(missing)} after {START_DEADLINE:g} s')
+                if _stop:
+                    raise Stopped
+                time.sleep(0.01)
+        for link, publisher in self.publishers_by_link.items():
+            if len(link.writers) == 1 and self.count_publishers(publisher.topic_name) > 1:
+                raise GraphError(f'{link.name} already has a writer: another graph runs on ROS_DOMAIN_ID '
+                                 f'{self.context.get_domain_id()}; set a free one')
+
+    def _missing(self, publisher, wanted):
+        """Which of the wanted readers a topic has not got yet. By name: a stranger who listens is no substitute, but
+        a replay stands in for whoever is not there."""
+        if not wanted:
+            return []
+        there = self.get_subscriptions_info_by_topic(publisher.topic_name)
+        names = {node_of(info, self._root) for info in there}
+        missing = [name for name in wanted if name not in names and nodes.STAND_IN not in names]
+        return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
+
+    def spin(self, executor):
+        """Take one turn of the executor; overridden by who has steps of his own to make."""
+        executor.spin_once(timeout_sec=0.1)
+
+    @property
+    def awaits(self):
+        """What a node that is ready waits for, as a person calls it; overridden by who begins otherwise."""
+        return 'messages'
+
+    def draining(self):
+        """Asked after the end: True while a node must go on receiving before `close`; overridden by the recorder."""
+        return False
+
+    def close(self):
+        """Called once before the node ends; overridden by a node that has something to put away. What was published
+        and is still on its way would die with the node, so it waits a little for the readers."""
+        deadline = time.monotonic() + PARTING
+        for publisher in self.publishers_by_link.values():
+            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+
+
+def _say(stream, line):
+    """A last line, past Python's buffer: what a full disk or a closed pipe does not take is no reason for another end
+    than the one it tells."""
+    with contextlib.suppress(OSError):
+        os.write(stream.fileno(), f'{line}\n'.encode())
+
+
+def _leave(node, code):
+    """End the process with an exit code as soon as the endpoints of its node have left the graph.
+
+    The participant is not destroyed: where others leave at that moment Fast DDS 2.14 may hang in it, in 1 of 100 ends
+    of a graph (DomainParticipant::set_listener waits for a callback with the mutex that the callback wants). So it
+    stays for FAREWELL: others who do not hear that a reader has left wait for it, for the 20 s of its lease."""
+    with node.handle, contextlib.suppress(OSError):
+        node.destroy_node()
+        sys.stdout.flush()
+    time.sleep(FAREWELL)
+    os._exit(code)
+
+
+def main(make_node, args=None):
+    """Run the node of make_node() until it is finished or told to stop, and end the process.
+
+    Exit code 0; 1 with one line on stderr. On stdout its `result`, if it has one, as a JSON object, to which an error
+    adds {'error': the line, 'silent': the nodes that it waited for}.
+    """
+    for number in STOPS:
+        signal.signal(number, _on_signal)
+    node, code = None, 0
+    name = os.path.basename(sys.argv[0])
+    try:
+        middleware.initialise(args)
+        node = make_node()
+        name = node.get_name()
+        executor = middleware.make_executor()
+        executor.add_node(node)
+        gc.freeze()
+        node.get_logger().info(f'ready, waits for {node.awaits}')
+        while not (_stop or node.finished) or node.draining():
+            node.spin(executor)
+        node.close()
+        if node.failure is not None:
+            raise node.failure
+        if node.result:
+            _say(sys.stdout, json.dumps(node.result))
+    except Stopped:
+        pass
+    except EXPECTED as error:
+        code = 1
+        result = node.result if node is not None else {}
+        _say(sys.stdout, json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}))
+        _say(sys.stderr, f'{name}: error: {error}')
+    # It ends anyway; Python's own end would give a late signal its deadly default back.
+    for number in STOPS:
+        signal.signal(number, signal.SIG_IGN)
+    if node is not None:
+        _leave(node, code)
+    rclpy.try_shutdown()
+    return code

@@ -1,0 +1,341 @@
+"""The node of a unit: what its topics hold becomes a record, the unit answers it, the answer becomes messages.
+
+One class runs every unit. A node of its own kind adds what is no law: the drive owns the time
+(adu_drive.timekeeper_node), the ship speaks NMEA.
+"""
+import collections
+import dataclasses
+import time
+
+import numpy as np
+from std_srvs.srv import Trigger
+
+from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.steps import SECOND, Steps
+from pedestal_common.node import shell
+from pedestal_common.node.unit import ERROR, WARN
+from pedestal_common.realtime import priority
+from pedestal_common.wire import commands, messages, records
+
+
+class Port:
+    """A unit and its topics. prefix: of the beam it serves in a node that serves several, else ''."""
+
+    def __init__(self, node, unit, prefix=''):
+        self.unit, self.prefix = unit, prefix
+        self.decoders = {self.named(name): records.Decoder(name, unit.inputs)
+                         for name in (unit.trigger, *unit.latencies)}
+        self.stamps = np.zeros(1, np.int64)
+        self._initial = unit.memory.record.copy()
+        written = [name for name in unit.writes if not prefix or name in nodes.OF_BEAM
+                   or prefix == nodes.prefixes(node.graph.beams)[0]]
+        self._encoders = [(records.Encoder(name, message, unit.outputs), node.writer(self.named(name)))
+                          for name, message in unit.messages.items() if name in written]
+        self._texts = {name: [node.writer(self.named(name)), topics.SILENT, '']
+                       for name in written if records.is_text(name)}
+        self._reply = node.writer(self.named(unit.NODE.replies)) if unit.NODE.replies else None
+        self._announce, self._epoch_of = node.announce, node.epoch
+        self._clock, self._epoch, self._last = node.clock, 0, None
+
+    def named(self, topic):
+        """The topic as the graph names it."""
+        return self.prefix + topic if topic in nodes.OF_BEAM else topic
+
+    def step(self, stamp, values):
+        """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing came}. The unit counts
+        its time from the epoch on: its numbers keep their places however late it is."""
+        self._epoch, self._last = self._epoch_of(stamp), stamp
+        self.unit.epoch = self._epoch
+        for name, decoder in self.decoders.items():
+            came, numbers = values.get(name) or (records.NEVER, None)
+            decoder.put(came - self._epoch, numbers)
+        self.stamps[0] = stamp - self._epoch
+        self.unit.step(self.stamps, self.unit.inputs, self.unit.outputs)
+
+    def begin_anew(self):
+        """Forget what the unit knows of the steps so far, not what it was told once."""
+        self.unit.memory.record[...] = self._initial
+        self.unit.configure(self.unit.parameters)
+
+    def command(self, command):
+        """Ask the unit for a Command and tell what came of it: the Reply."""
+        reply = self.unit.command(command)
+        self.reply()
+        return reply
+
+    def reply(self):
+        """Tell what came of what was asked."""
+        while self.unit.answered:
+            answer = commands.reply_message(*self.unit.answered.popleft())
+            if self._reply:
+                self._announce(self._reply, answer)
+
+    def publish(self):
+        """What was asked since the last step, the texts that have changed, then every message that is due."""
+        self.reply()
+        self.announce()
+        for encoder, publish in self._encoders:
+            if encoder.due:
+                publish(encoder.encoded(self._epoch))
+
+    def announce(self):
+        """The texts that have changed; a list of them has the stamp of the step."""
+        outputs = self.unit.outputs[0]
+        for name, last in self._texts.items():
+            code = outputs[name]
+            if code != last[1]:
+                last[1] = code
+                said = self.unit.encode(name, int(code))
+                if said != last[2]:
+                    last[2] = said
+                    self._announce(last[0], messages.String(data=said) if isinstance(said, str)
+                                   else self._stamped(said))
+
+    def _stamped(self, message):
+        """A message with the stamp of the last step, of now before the first."""
+        header = messages.header('')
+        messages.put_stamp(header.stamp, self._clock()[1] if self._last is None else self._last)
+        return dataclasses.replace(message, header=header)
+
+
+class UnitNode(shell.Shell):
+    """Runs the unit of a module (nodes.Node.module)."""
+
+    PRECEDENCE = 0
+    """Added to graph.priority."""
+
+    def __init__(self, module, serves_beams=False):
+        self.row = nodes.of_executable(module)
+        unit_type = self.row.unit_type()
+        super().__init__(self.row.name, self.row.parameters_type(), unit_type.LIVE)
+        flags = [flag for flag in topics.FLAGS if getattr(self.parameters, flag, False)]
+        reads = nodes.reads(self.row, self.graph.members, flags)
+        prefixes = nodes.prefixes(self.graph.beams) if serves_beams else ('',)
+        self.ports = []
+        for prefix in prefixes:
+            unit = unit_type(self.parameters, reads)
+            unit.lockstep = self.graph.lockstep
+            self.prepare(unit)
+            self.ports.append(Port(self, unit, prefix))
+        self.unit = self.ports[0].unit
+        self.steps = None
+        self.refused = ''
+        self._waiting_for_once, self._held = set(), collections.deque()
+        self._settled, self._settling = not self.graph.lockstep, None
+        self._urgent = [port.unit.urgent for port in self.ports]
+        self._callees = {} if self.graph.lockstep else {
+            name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
+        self._called = set()
+        for port in self.ports:
+            self._listen(port)
+        for name in unit_type.REQUESTS:
+            self.create_service(Trigger, name, self._service(name))
+        self.diagnose_with(self.diagnose)
+        self.begin()
+        if self.graph.priority and not self.graph.lockstep:
+            refusal = priority.take(self.graph.priority + self.PRECEDENCE)
+            if refusal:
+                self.get_logger().info(f'runs like any process: graph.priority = {self.graph.priority}: {refusal}')
+
+    def _listen(self, port):
+        """Subscribe to what does not belong to a step: texts, what comes once, commands."""
+        if self.row.obeys:
+            self.message_reader(port.named(self.row.obeys), self._command_taker(port))
+        for name in port.unit.reads:
+            rate = topics.BY_NAME[name].rate
+            if rate == 'change':
+                self.message_reader(port.named(name), self._text_taker(port, name))
+            elif rate == 'once':
+                self.message_reader(port.named(name), self._once_taker(port, name))
+                if self.graph.lockstep and any(writer in self.graph.members for writer in self.links[
+                        self.beam + name if self.beam + name in self.links else name].writers):
+                    self._waiting_for_once.add(name)
+
+    def _command_taker(self, port):
+        def take(message):
+            try:
+                port.command(commands.of_message(message))
+            except ValueError as error:
+                self.refused = f'{self.row.obeys} refused: {error}'
+                self.get_logger().warning(self.refused)
+        return take
+
+    @staticmethod
+    def _text_taker(port, name):
+        return lambda message: port.unit.take_text(name, message.data)
+
+    def _once_taker(self, port, name):
+        def take(message):
+            stamp = messages.nanoseconds(message.header.stamp)
+            try:
+                port.unit.decode(name, messages.since(message, self.epoch(stamp) if stamp else 0))
+                self.refused = ''
+            except ValueError as error:
+                self.refused = f'{name} refused: {error}'
+                self.get_logger().warning(self.refused)
+            self._waiting_for_once.discard(name)
+            self._release()
+        return take
+
+    def _settle(self):
+        """What had arrived when the executor began has been taken."""
+        self._settling.cancel()
+        self._settled = True
+        self._release()
+
+    def _release(self):
+        """Answer the first steps once nothing keeps them any more."""
+        while self._held and self._settled and not self._waiting_for_once:
+            self.answer(*self._held.popleft())
+
+    @property
+    def awaits(self):
+        """What it waits for: its trigger, and the messages that come once and have not come yet."""
+        return ', '.join((self.unit.trigger, *sorted(self._waiting_for_once)))
+
+    def begin(self):
+        """Start to follow the trigger of the unit; overridden by who makes the time."""
+        self.follow(self.unit.trigger, self.unit.latencies)
+
+    def follow(self, trigger, latencies):
+        """Bring the inputs of each step together (see Steps) and `answer` it. latencies: {topic: s}.
+
+        In lockstep a step whose inputs stay away for the deadline ends the node with the names of the silent writers.
+        """
+        self.steps = Steps(trigger, {name: round(latency * SECOND) for name, latency in latencies.items()},
+                           self.graph.lockstep, self._answer, held=nodes.held(latencies))
+        decoders = {name: decoder for port in self.ports for name, decoder in port.decoders.items()}
+        for name in (trigger, *latencies):
+            if nodes.plain(name) not in self.row.writes:
+                self.reader(name, decoding(decoders[name]), self._step_taker(name))
+        self._progress = (None, time.monotonic())
+        if self.graph.lockstep:
+            self.every(0.2, self._watch)
+        else:
+            self._answered = self._watched = self._begun = time.monotonic_ns()
+            self.every(0.05, self._watch_trigger)
+
+    def _step_taker(self, name):
+        steps = self.steps
+
+        def take(message, anew):
+            if anew:
+                steps.begin_anew(name)
+                if name == steps.trigger and message[0] <= self._stamp:
+                    for port in self.ports:
+                        port.begin_anew()
+            steps.take(name, message[0], message)
+        return take
+
+    def _answer(self, stamp, trigger, values):
+        """A step is complete. In lockstep the first one waits for what comes once, and for the texts that arrived
+        before the executor began: it takes what it finds then in any order."""
+        values[self.steps.trigger] = trigger
+        if self._settled and not self._waiting_for_once:
+            self.answer(stamp, values)
+            return
+        self._held.append((stamp, values))
+        if self._settling is None:
+            self._settling = self.every(0.001, self._settle)
+
+    def answer(self, stamp, values):
+        """Answer the step of a stamp [ns]. values: {topic: (stamp, numbers) or None}."""
+        for port in self.ports:
+            port.step(stamp, values)
+        self.begin_step(stamp)
+        for port in self.ports:
+            port.publish()
+        self.look_after()
+
+    def look_after(self):
+        """Realtime, after a step: tell what has become wrong, call for what a unit wants of others."""
+        if self.graph.lockstep:
+            return
+        if [port.unit.urgent for port in self.ports] != self._urgent and self.diagnose_now():
+            # A diagnosis takes notes away: this is what is left of them.
+            self._urgent = [port.unit.urgent for port in self.ports]
+        self._answered = time.monotonic_ns()
+        if self._callees:
+            calls = {name for port in self.ports for name in port.unit.calls}
+            for name in calls - self._called:
+                self._callees[name].call_async(Trigger.Request())
+            self._called = calls
+
+    def _watch_trigger(self):
+        """Realtime: whether the trigger stays away; unless it was this node that was held up, or the graph has not
+        begun."""
+        now, limit = time.monotonic_ns(), self.graph.silence * SECOND
+        if self.clock()[1] < self.graph.start:
+            self._answered = self._begun = now
+        held_up, self._watched = now - self._watched > limit, now
+        silent = now - self._answered > limit and not held_up
+        if silent and self.steps.pending_stamp is not None:
+            # Its trigger was the last one. Left until the others are back it would be a step of before the silence
+            # that meets what they say after it.
+            answered = self._answered
+            self.steps.give_up()
+            self._answered = answered
+        if silent != self.unit.silent:
+            for port in self.ports:
+                port.unit.silent = silent
+                port.announce()
+            if silent:
+                self.diagnose_now()
+
+    def _watch(self):
+        pending = self.steps.pending_stamp
+        if pending is None or self._progress[0] != pending:
+            self._progress = (pending, time.monotonic())
+        elif time.monotonic() - self._progress[1] > self.graph.deadline:
+            waiting = self.steps.waiting_for
+            silent = [writer for name in waiting for writer in self._link(name)[0].writers]
+            raise shell.GraphError(f'no {", ".join(waiting)} for step {pending / SECOND:.6f} s after '
+                                   f'{self.graph.deadline:g} s', silent)
+
+    def _service(self, name):
+        """The callback of a service: asks every unit between two steps and answers with what it reads back."""
+        def serve(_request, response):
+            [reply] = {port.command(commands.Command(name, commands.SERVICE)) for port in self.ports}
+            if name.endswith('/reset_faults') and reply.granted:
+                self.refused = ''
+            response.success, response.message = reply
+            return response
+        return serve
+
+    def reconfigure(self):
+        """Hand the changed parameters to the units."""
+        for port in self.ports:
+            port.unit.configure(self.parameters)
+
+    def diagnosed(self):
+        """The Diagnosis of the unit; overridden by who runs several."""
+        return self.unit.diagnose()
+
+    def diagnose(self):
+        """A silent trigger and a refused input come before anything but an error of the unit."""
+        diagnosis = self.diagnosed()
+        if self.unit.silent:
+            since = (time.monotonic_ns() - self._answered) * 1e-9
+            text = (f'no {self.steps.trigger} so far' if self._answered == self._begun else
+                    f'no {self.steps.trigger} for {since:.1f} s')
+            text = f'{text}; {diagnosis.message}' if diagnosis.level == ERROR else text
+            return diagnosis._replace(level=ERROR, message=text)
+        refusal = self.refused or (self.steps.refusal if self.steps else '')
+        if refusal and diagnosis.level < ERROR:
+            return diagnosis._replace(level=WARN, message=refusal)
+        return diagnosis
+
+
+def decoding(decoder):
+    """decode(CDR bytes) -> (stamp [ns], what the Decoder makes of them), for Shell.reader."""
+    decoded = decoder.decoded
+
+    def decode(data):
+        message = decoded(data)
+        return message[0], message
+    return decode
+
+
+def main(module, args=None) -> int:
+    """Run the unit of a module."""
+    return shell.main(lambda: UnitNode(module), args)

@@ -1,9 +1,0 @@
-"""Seeded noise: one independent stream per node and purpose, the same on every machine and in every caller."""
-import numpy as np
-
-from pedestal_common import nodes
-
-
-def generator(seed, node) -> np.random.Generator:
-    """The stream of a node (a name of nodes.NODES) for a run's seed."""
-    return np.random.default_rng((seed, nodes.NAMES.index(node)))

@@ -1,0 +1,82 @@
+"""Where the numbers of a message lie in its CDR bytes.
+
+Messages of a topic that differ in their numbers only have them at the same places, so one is walked by the definition
+of its type, and the others are read at the places found.
+"""
+import struct
+
+from rosbags.interfaces import Nodetype
+
+from pedestal_common.wire.messages import TYPESTORE
+
+_SIZES = {'bool': 1, 'byte': 1, 'char': 1, 'int8': 1, 'uint8': 1, 'int16': 2, 'uint16': 2, 'int32': 4, 'uint32': 4,
+          'int64': 8, 'uint64': 8, 'float32': 4, 'float64': 8}
+_DTYPES = {'bool': 'u1', 'byte': 'u1', 'char': 'u1', **{name: f'{name[0]}{size}' for name, size in _SIZES.items()
+                                                       if name[0] in 'iuf'}}
+
+STAMPED = {'rosgraph_msgs/msg/Clock'}
+STAMPED.update(name for name, (_, fields) in TYPESTORE.fielddefs.items()
+               if fields and fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header')))
+"""Types whose bytes 4 to 12 are their stamp."""
+
+NUMBERS = 400_000
+"""Numbers in one message at the most; a program track of a whole day has 350,000."""
+
+PADDING = 4
+"""Bytes that DDS may add behind a message, less than this."""
+
+
+class Places:
+    """The places in one message, CDR bytes of a type.
+
+    numbers [(path, start, dtype)], texts {path: text}, fixed [(start, stop)]: the bytes that must be the same in
+    another message for its numbers to lie at these places; stop: where the message ends.
+    Raises ValueError when the bytes are no message of the type.
+    """
+
+    def __init__(self, data, type_name):
+        if len(data) < 4:
+            raise ValueError(f'{len(data)} bytes are no {type_name}')
+        self.data = data
+        self.order = '<' if data[1] & 1 else '>'
+        self.stop = 4
+        self.numbers, self.texts, self.fixed = [], {}, [(0, 4)]
+        try:
+            self._fields(type_name, '')
+        except (struct.error, KeyError, UnicodeDecodeError) as error:
+            raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
+
+    def _fields(self, type_name, prefix):
+        for name, node in TYPESTORE.fielddefs[type_name][1]:
+            self._node(node, prefix + name)
+
+    def _take(self, size, alignment, path):
+        """Start of the next `size` bytes."""
+        self.stop += -(self.stop - 4) % alignment
+        start, self.stop = self.stop, self.stop + size
+        if self.stop > len(self.data):
+            raise struct.error(f'{path} is missing')
+        return start
+
+    def _length(self, path):
+        start = self._take(4, 4, path)
+        self.fixed.append((start, self.stop))
+        return struct.unpack_from(self.order + 'I', self.data, start)[0]
+
+    def _node(self, node, path):
+        kind, what = node
+        if kind == Nodetype.NAME:
+            self._fields(what, path + '.')
+        elif kind == Nodetype.BASE and what[0] in ('string', 'wstring'):
+            start = self._take(self._length(path), 1, path)
+            self.fixed.append((start, self.stop))
+            self.texts[path] = bytes(self.data[start:self.stop]).rstrip(b'\0').decode()
+        elif kind == Nodetype.BASE:
+            size = _SIZES[what[0]]
+            self.numbers.append((path, self._take(size, size, path), self.order + _DTYPES[what[0]]))
+            if len(self.numbers) > NUMBERS:
+                raise ValueError(f'a {len(self.data)} bytes long message has more than {NUMBERS} numbers')
+        else:
+            count = what[1] if kind == Nodetype.ARRAY else self._length(path)
+            for i in range(count):
+                self._node(what[0], f'{path}[{i}]')

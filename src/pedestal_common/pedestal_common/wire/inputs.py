@@ -1,0 +1,57 @@
+"""The inputs of a unit that follow from the rows of the topics that it reads: their record, and the copy into it.
+
+Topic.inputs names them by the fields of the record of the topic. A name that stands for several numbers is an array.
+Beside the fields of its layout a message has `stamp`, here in seconds, and `came`: 1 in a step in which it came, else
+0. The others keep what the last message said. A text has `code`.
+"""
+import itertools
+
+from numba.extending import overload
+
+from pedestal_common.graph import layouts, topics
+from pedestal_common.wire.records import NEVER
+
+
+def _numbers(topic):
+    """Yield (input, [its numbers in the record of a topic as source text]) of the fields of its layout."""
+    given, row = topics.BY_NAME[topic].inputs, topics.BY_NAME[topic]
+    for field in layouts.fields(topic):
+        if field.name in given:
+            count = len(field.components or row.names)
+            named = (given[field.name],) * count if isinstance(given[field.name], str) else given[field.name]
+            for name, places in itertools.groupby(range(count), named.__getitem__):
+                yield name, [f'm.{field.name}[{place}]' for place in places]
+
+
+def fields(names) -> list:
+    """Return the fields of a record of these topics' inputs, as numpy takes them."""
+    kinds = {'came': 'i8', 'code': 'i8', 'stamp': 'f8'}
+    return [field for topic in names for field in (
+        *((name, kinds[key]) for key, name in topics.BY_NAME[topic].inputs.items() if key in kinds),
+        *((name, 'f8', (len(places),)) if len(places) > 1 else (name, 'f8') for name, places in _numbers(topic)))]
+
+
+def _lines(topic):
+    """Yield the source lines of the copy of one topic."""
+    given = topics.BY_NAME[topic].inputs
+    yield f'    m = inputs[{topic!r}]'
+    if 'code' in given:
+        yield f'    u.{given["code"]} = m'
+        return
+    if 'came' in given:
+        yield f'    u.{given["came"]} = m.stamp != {NEVER}'
+    yield f'    if m.stamp != {NEVER}:'
+    if 'stamp' in given:
+        yield f'        u.{given["stamp"]} = m.stamp * 1e-9'
+    for name, places in _numbers(topic):
+        for i, place in enumerate(places):
+            yield f'        u.{name}{f"[{i}]" if len(places) > 1 else ""} = {place}'
+
+
+def taking(names):
+    """Return the function take(u, inputs) for laws: the records of these topics -> inputs u."""
+    made = {}
+    lines = [line for topic in names if topics.BY_NAME[topic].inputs for line in _lines(topic)]
+    exec('\n'.join(('def take(u, inputs):', *lines)), made)    # static, as the compiler needs the names of fields
+    overload(made['take'], inline='always')(lambda u, inputs: made['take'])
+    return made['take']

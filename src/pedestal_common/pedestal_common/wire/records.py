@@ -1,0 +1,185 @@
+"""The numbers of messages as records: of one message in a node, of a whole run in the closed loop, of many in a bag.
+
+A unit reads and writes one record that has a field for each of its topics:
+
+    stamped message     stamp [ns], then the fields of its layout; one that did not come, or is not to be sent, has
+                        stamp NEVER
+    text, list of texts a whole number, its code; topics.SILENT before the first
+
+A Decoder takes the numbers out of the CDR bytes of a message, an Encoder puts numbers into them, both by the places at
+which they lie (cdr.Places); neither builds a message object.
+"""
+import struct
+
+import numpy as np
+
+from pedestal_common.graph import layouts, topics
+from pedestal_common.wire import cdr, messages
+
+NEVER = -2**63
+"""Stamp [ns] of a message that did not come."""
+
+TEXTS = ('std_msgs/msg/String', 'diagnostic_msgs/msg/DiagnosticArray')
+"""Types of a text and of a list of texts."""
+
+_STAMP = struct.Struct('<iI')
+_FORMATS = {'f8': 'd', 'f4': 'f'}
+
+
+def _type(topic):
+    row = topics.BY_NAME[topic]
+    if is_text(topic):
+        return 'i8'
+    sizes = [(field.name, 'f8', (len(field.components or row.names),)) for field in layouts.fields(topic)]
+    return np.dtype([('stamp', 'i8'), *sizes])
+
+
+def of(*names) -> np.dtype:
+    """The record of these topics."""
+    return np.dtype([(name, _type(name)) for name in names])
+
+
+def is_text(topic) -> bool:
+    """Whether a topic of the table is a text, or a list of them, told by its code."""
+    return topics.BY_NAME[topic].type in TEXTS and topics.BY_NAME[topic].rate == 'change'
+
+
+def empty(record_type, count) -> np.ndarray:
+    """Records (count,) in which nothing came and nothing was said."""
+    made = np.zeros(count, record_type)
+    for name in record_type.names:
+        if record_type[name].names is None:
+            made[name] = topics.SILENT
+        else:
+            made[name]['stamp'] = NEVER
+    return made
+
+
+def numbers(records, topic) -> np.ndarray:
+    """View (n, columns) of the numbers of a stamped topic in records (n,)."""
+    start = records.dtype.fields[topic][1] // 8 + 1
+    return records.view('f8').reshape(len(records), -1)[:, start:start + len(layouts.columns(topic))]
+
+
+def code_of(topic, text) -> int:
+    """The code of a text that a reader tells apart; of any other the number of those."""
+    texts = topics.BY_NAME[topic].texts
+    return texts.index(text) if text in texts else len(texts)
+
+
+class _Shape:
+    """Where the columns of a topic lie in messages alike in everything but their numbers, from one of them.
+
+    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once.
+    """
+
+    def __init__(self, topic, data):
+        type_name = topics.BY_NAME[topic].type
+        places = cdr.Places(data, type_name)
+        index = {column.name: i for i, column in enumerate(layouts.columns(topic))}
+        self.size = places.stop
+        self.guard = [(start, stop, bytes(data[start:stop])) for start, stop in _joined(places.fixed)]
+        self.fields = [(index[name], start, dtype) for path, start, dtype in places.numbers
+                      if (name := layouts.column(type_name, path, places.texts)) in index]
+        self.in_order = [column for column, _, _ in self.fields] == list(range(len(index)))
+        form, at = places.order, 0
+        for _, start, dtype in self.fields:
+            form += f'{start - at}x{_FORMATS[dtype[1:]]}'
+            at = start + int(dtype[2:])
+        self.reader = struct.Struct(form)
+
+    def fits(self, data):
+        """Whether the numbers of a message lie at the same places."""
+        return 0 <= len(data) - self.size < cdr.PADDING and all([data[start:stop] == text
+                                                                 for start, stop, text in self.guard])
+
+
+def _joined(fixed):
+    """Neighbouring (start, stop) as one."""
+    joined = []
+    for start, stop in sorted(fixed):
+        if joined and joined[-1][1] == start:
+            joined[-1] = joined[-1][0], stop
+        elif start < stop:
+            joined.append((start, stop))
+    return joined
+
+
+def _runs(fields):
+    """[(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], neighbours written at once."""
+    runs = []
+    for column, start, dtype in fields:
+        dtype = np.dtype(dtype)
+        if runs:
+            first, kind, count, begin = runs[-1]
+            if kind == dtype and column == first + count and start == begin + count * kind.itemsize:
+                runs[-1] = first, kind, count + 1, begin
+                continue
+        runs.append((column, dtype, 1, start))
+    return [(slice(first, first + count), kind, count, begin) for first, kind, count, begin in runs]
+
+
+class Decoder:
+    """Takes the messages of one stamped topic apart. record: (1,), whose field of this topic `put` fills."""
+
+    def __init__(self, topic, record):
+        self.topic = topic
+        self._columns = len(layouts.columns(topic))
+        self._shape = _Shape(topic, messages.serialize(messages.template(topic)))
+        self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
+
+    def decoded(self, data):
+        """(stamp [ns], numbers (columns,)) of CDR bytes; NaN for a number the message has not. Raises ValueError when
+        they are no message of the topic's type, or their stamp is none."""
+        if not self._shape.fits(data):
+            self._shape = _Shape(self.topic, data)
+        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        if seconds < 0 or nanoseconds >= 1_000_000_000:
+            raise ValueError(f'{self.topic}: {seconds} s {nanoseconds} ns is no stamp')
+        values = self._shape.reader.unpack_from(data)
+        if not self._shape.in_order:
+            given, values = values, [np.nan] * self._columns
+            for (column, _, _), value in zip(self._shape.fields, given):
+                values[column] = value
+        return seconds * 1_000_000_000 + nanoseconds, values
+
+    def put(self, stamp, values):
+        """Put what `decoded` gave into the record; values None: nothing came."""
+        if values is None:
+            self._stamp[0] = NEVER
+        else:
+            self._stamp[0] = stamp
+            self._numbers[:] = values
+
+
+class Encoder:
+    """Makes the messages of one stamped topic.
+
+    template: a message whose names, frames and constants stay; record: (1,), whose field of this topic holds the
+    numbers; None where only `bytes_of` is asked for.
+    """
+
+    def __init__(self, topic, template, record=None):
+        data = messages.serialize(template)
+        shape = _Shape(topic, data)
+        self._buffer = bytearray(data)
+        self._views = [(columns, np.frombuffer(self._buffer, dtype, count, start))
+                       for columns, dtype, count, start in _runs(shape.fields)]
+        if record is not None:
+            self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
+
+    @property
+    def due(self):
+        """Whether the record holds a message."""
+        return self._stamp[0] != NEVER
+
+    def encoded(self, epoch=0) -> bytes:
+        """The message with the numbers of the record, its stamp counted from the epoch [ns]."""
+        return self.bytes_of(self._stamp.item() + epoch, self._numbers)
+
+    def bytes_of(self, stamp, values) -> bytes:
+        """The message with a stamp [ns] and numbers (columns,)."""
+        _STAMP.pack_into(self._buffer, 4, *divmod(stamp, 1_000_000_000))
+        for columns, view in self._views:
+            view[:] = values[columns]
+        return bytes(self._buffer)

@@ -1,0 +1,115 @@
+"""What the sky plot of the page shows: in earth angles [deg], whatever the deck does. No ROS here."""
+import collections
+import math
+import typing
+
+import numpy as np
+
+from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph import topics
+from pedestal_common.wire import messages
+
+STEP = 5.0
+"""Degrees of azimuth between two points of what is drawn around the horizon."""
+
+MOST = 240
+"""Points of a path at the most."""
+
+MOVED = 0.3
+"""Degrees from one place of the past to the next: less than a line is wide."""
+
+
+class Path(typing.NamedTuple):
+    """A program track: times (n,) [s UTC], angles (n, 2) [deg] earth azimuth, unwrapped, and elevation."""
+    times: np.ndarray
+    angles: np.ndarray
+
+
+def path(message, midnight):
+    """The Path of an acu/program_track, None of a preset; midnight: to what a stamp 0 belongs [s UTC]."""
+    if len(message.points) < 2 or not set(topics.AXES) <= set(message.joint_names):
+        return None
+    start = messages.nanoseconds(message.header.stamp) * 1e-9 or midnight
+    columns = [message.joint_names.index(axis) for axis in topics.AXES]
+    times = [start + point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 for point in message.points]
+    angles = [[point.positions[column] for column in columns] for point in message.points]
+    return Path(np.array(times), np.degrees(angles))
+
+
+def thinned(path):
+    """[[azimuth, elevation, time], ...] of a Path, MOST rows."""
+    if path is None:
+        return []
+    rows = np.unique(np.linspace(0, len(path.times) - 1, MOST).astype(int))
+    return np.column_stack((path.angles[rows], path.times[rows])).round(3).tolist()
+
+
+def passage(path, loss):
+    """What an operator wants to know of a Path before it begins; loss: text of the predicted loss [s], '' for none."""
+    if path is None:
+        return []
+    up = np.flatnonzero(path.angles[:, 1] > 0.0)
+    if not up.size:
+        return []
+    rise, fall = up[0], up[-1]
+    azimuth, elevation = path.angles[:, 0], path.angles[:, 1]
+    top = rise + int(np.argmax(elevation[rise:fall + 1]))
+    return [{'aos': float(path.times[rise]), 'los': float(path.times[fall]),
+             'highest': round(float(elevation[top]), 1), 'from': round(float(azimuth[rise] % 360.0), 1),
+             'to': round(float(azimuth[fall] % 360.0), 1),
+             'travel': round(float(azimuth[fall] - azimuth[rise]), 1), 'loss': loss}]
+
+
+class Past:
+    """Where the beam was in the last `span` seconds. places: [[azimuth, elevation], ...] [deg]."""
+
+    def __init__(self, span):
+        self._span, self._rows = span, collections.deque()
+
+    def add(self, t, place):
+        """The beam is there at t [s]; a place of NaN is not known."""
+        while self._rows and self._rows[0][0] < t - self._span:
+            self._rows.popleft()
+        last = self._rows[-1][1] if self._rows else (math.inf, math.inf)
+        if max(abs(a - b) for a, b in zip(place, last)) >= MOVED:
+            self._rows.append((t, place))
+
+    @property
+    def places(self):
+        """What is drawn of the path, in order of time."""
+        return [place for _, place in self._rows]
+
+
+class Deck:
+    """The deck at an attitude, a quaternion deck -> earth (x, y, z, w); None: ashore, where its angles are earth's."""
+
+    def __init__(self, quaternion):
+        self._to_earth = None
+        if quaternion is not None:
+            self._to_earth = np.zeros((3, 3))
+            line_of_sight.rotation(*quaternion, self._to_earth)
+
+    def seen(self, azimuth, elevation):
+        """[azimuth, elevation] [deg] against the earth of deck angles [deg]; NaN stays NaN."""
+        if self._to_earth is None or not math.isfinite(azimuth + elevation):
+            return [round(azimuth, 3), round(elevation, 3)]
+        deck = line_of_sight.direction(math.radians(azimuth), math.radians(elevation))
+        earth = line_of_sight.earth_angles(*line_of_sight.to_earth(self._to_earth, *deck))
+        return [round(math.degrees(angle), 3) for angle in earth]
+
+    def line(self, points):
+        """[[azimuth, elevation], ...] of deck angles [deg], a point each STEP between two of them."""
+        found = []
+        for (A, E), (B, F) in zip(points, points[1:]):
+            count = max(int(abs(B - A) / STEP), 1)
+            found += [self.seen(A + (B - A) * i / count, E + (F - E) * i / count) for i in range(count)]
+        return found + [self.seen(*points[-1])] if points else found
+
+    def sector(self, low, high, top):
+        """The outline of a hidden sector of the deck from azimuth low to high [deg], up to elevation top [deg]."""
+        return self.line([(low, 0.0), (low, top), (high, top), (high, 0.0)])
+
+
+def numbers(text):
+    """[[number [deg], ...], ...] of a parameter 'a b; c d' [rad]."""
+    return [[math.degrees(float(word)) for word in part.split()] for part in text.split(';') if part.strip()]

@@ -1,0 +1,155 @@
+"""What the page is sent, in sections of JSON: of a running antenna or of a recording alike. No ROS here.
+
+An antenna here is whatever tells, as remote_node.Remote does: numbers {topic: numbers of its last message}, texts
+{topic: its last text}, status, present(topic), told(node) -> {key: text}, angles(topic) [deg], rates() [deg/s];
+and now [s UTC], alarms (list of DiagnosticStatus), configuration {name of a parameter: value}, path (page_sky.Path or
+None).
+"""
+import json
+import math
+
+from acu_tracker.modes import TABLE
+from pedestal_common.graph import topics
+from pedestal_operator.page import page_sky
+
+RECEIVER, MOTORS, ATTITUDE = 'tracking_receiver/angle_error', 'adu/motor_states', 'ship/imu/data'
+NUMBERS = (MOTORS, ATTITUDE)
+"""Topics that the page needs beside those of every client."""
+
+TEXTS = {'mode': 'acu/mode', 'drive': 'adu/state', 'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
+"""{what the page calls it: the topic of the text}."""
+
+STATION, ELEMENTS = ('latitude_deg', 'longitude_deg', 'height'), ('line_1', 'line_2')
+"""Parameters of the station, and of the elements of a satellite."""
+
+WANTED = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor', 'prediction.start_time',
+                  *(f'prediction.station.{name}' for name in STATION),
+                  *(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high')),
+                  *(f'{axis}.stow' for axis in topics.AXES)),
+          'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz', 'target.kind',
+                                *(f'target.leo_pass.{name}' for name in ELEMENTS))}
+"""{node: its parameters that are shown}."""
+
+MODES = tuple(row.name for row in TABLE if row.button)
+"""Modes with a button; `stop` has one of its own, `rate` is the jog, `slave` is for programs."""
+
+SPAN, PERIOD = 600.0, 0.5
+"""Time [s] of the strip charts, and from one of their points to the next."""
+
+REFUSED = 'refused '
+"""Before the name of a mode in the diagnostics of the control unit."""
+
+HISTORY = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate', 'elevation_rate',
+           *topics.MOTORS, 'level')
+
+
+def encoded(value):
+    """JSON of a value; a number that is none is null, which JSON has and browsers read."""
+    return json.dumps(_plain(value), separators=(',', ':'), allow_nan=False)
+
+
+def _plain(value):
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def _deck(antenna):
+    return page_sky.Deck(antenna.numbers[ATTITUDE][:4] if antenna.present(ATTITUDE) else None)
+
+
+def now(antenna) -> dict:
+    """The numbers of this moment: angles and rates [deg, deg/s], errors [deg], level [dB-Hz], torques [Nm]."""
+    actual, commanded = antenna.angles('joint_states'), antenna.angles('acu/reference')
+    receiver, torques = (math.nan,) * 3, ()
+    if antenna.present(RECEIVER):
+        x, y, level = antenna.numbers[RECEIVER]
+        receiver = math.degrees(x), math.degrees(y), level
+    if antenna.present(MOTORS):
+        torques = [round(float(torque), 3) for torque in antenna.numbers[MOTORS][-len(topics.MOTORS):]]
+    return {'t': antenna.now, 'mode': antenna.texts.get('acu/mode', ''),
+            'axes': [{'actual': a, 'commanded': c, 'error': c - a, 'rate': rate}
+                     for a, c, rate in zip(actual, commanded, antenna.rates())],
+            'receiver': [float(value) for value in receiver], 'torques': torques,
+            'beam': _deck(antenna).seen(*actual)}
+
+
+def history_row(frame) -> list:
+    """A row of HISTORY from `now`."""
+    azimuth, elevation = frame['axes']
+    x, y, level = frame['receiver']
+    torques = [*frame['torques'], *(math.nan,) * len(topics.MOTORS)][:len(topics.MOTORS)]
+    row = (x, y, azimuth['error'], elevation['error'], azimuth['rate'], elevation['rate'], *torques, level)
+    return [round(frame['t'], 2), *(round(float(value), 5) for value in row)]
+
+
+def told(antenna, heard=('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')) -> dict:
+    """What changes once a second at the most: mode and why, control, axes, times to the limits, refusals."""
+    acu = antenna.told('acu')
+    texts = {name: antenna.texts.get(topic, '') for name, topic in TEXTS.items()}
+    return {'present': bool(acu), **texts,
+            **{key: acu.get(key, '') for key in ('reason', 'fallback', 'control', 'faults', 'locked', 'coasting')},
+            'axes': [{'limit_s': acu.get(f'{axis} limit_s', ''), 'limited': acu.get(f'{axis} limited', '')}
+                     for axis in topics.AXES],
+            'steps': acu.get('clock_steps', ''), 'offset_ms': acu.get('offset joint_states_ms', ''),
+            'nodes': {name: antenna.status[name].message if antenna.present(name) else 'silent'
+                      for name in heard if name in antenna.status},
+            'refused': refusals(acu) if acu else dict.fromkeys((*MODES, 'rate'), 'the control unit is silent')}
+
+
+def refusals(acu) -> dict:
+    """{mode: why it would be refused now}, which the control unit asks its own table of modes."""
+    return {key.removeprefix(REFUSED): why for key, why in acu.items() if key.startswith(REFUSED)}
+
+
+def alarms(antenna) -> list:
+    """The list of acu/alarms, in its order; times in [s UTC]."""
+    begin = epoch(antenna)
+    found = []
+    for status in antenna.alarms:
+        values = {pair.key: pair.value for pair in status.values}
+        raised = float(values.get('raised_s', 'nan'))
+        found.append({'name': status.name, 'meaning': status.message, 'raised': begin + raised,
+                      **{key: values.get(key, '') for key in ('state', 'priority', 'annunciated', 'first_out', 'cause',
+                                                              'action', 'detail', 'shelved_reason')}})
+    return found
+
+
+def epoch(antenna):
+    """When the time of the graph is 0 [s UTC]: graph.start, or the day's beginning."""
+    return antenna.configuration.get('graph.start', 0) * 1e-9 or antenna.now // 86400.0 * 86400.0
+
+
+def fixed(antenna) -> dict:
+    """What a run does not change: beamwidth and limits [deg], thresholds of the level [dB-Hz], the axes of the
+    charts."""
+    p = antenna.configuration
+
+    def degrees(name):
+        return math.degrees(p.get(name, math.nan))
+    return {'beamwidth': degrees('tracker.receiver.beamwidth'), 'history': HISTORY, 'span': SPAN, 'modes': MODES,
+            'limits': [[degrees(f'{axis}.limits.{end}') for end in ('low', 'high')] for axis in topics.AXES],
+            'stow': [degrees(f'{axis}.stow') for axis in topics.AXES],
+            'detect': p.get('receiver.acquire_level_dbhz'), 'loss': p.get('receiver.lose_level_dbhz')}
+
+
+def sky(antenna, coming) -> dict:
+    """The sky plot: the path, what hides it, what the antenna cannot reach, the sun, and passes; coming: those after
+    the program track, as page_passes.Coming knows them."""
+    deck, p, acu = _deck(antenna), antenna.configuration, antenna.told('acu')
+    begin = epoch(antenna)
+    hole = [begin + float(acu[key]) for key in ('keyhole_begins_s', 'keyhole_ends_s') if key in acu]
+    floor = page_sky.numbers(p.get('floor', ''))
+    low, high = (math.degrees(p.get(f'elevation.limits.{end}', math.nan)) for end in ('low', 'high'))
+    sun = [float(acu[key]) for axis in topics.AXES if (key := f'sun_{axis}_deg') in acu]
+    last = antenna.path.times[-1] if antenna.path else -math.inf
+    return {'path': page_sky.thinned(antenna.path), 'hole': hole, 'sun': sun,
+            'coming': [each for each in coming if each['aos'] > last],
+            'passes': page_sky.passage(antenna.path, acu.get('keyhole_loss_s', '')),
+            'sectors': [deck.sector(*row) for row in page_sky.numbers(p.get('blockage', ''))],
+            'floor': deck.line([*floor, [floor[0][0] + 360.0, floor[0][1]]]) if floor else
+                     deck.line([[0.0, low], [360.0, low]]) if low > 0.0 else [],
+            'top': deck.line([[0.0, high], [360.0, high]]) if high < 90.0 else [],
+            'bow': deck.seen(0.0, 0.0) if antenna.present(ATTITUDE) else []}

@@ -1,0 +1,1 @@
+"""The protocols of antenna rotators, and the controller behind them."""

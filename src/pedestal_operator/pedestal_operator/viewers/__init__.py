@@ -1,0 +1,1 @@
+"""What viewers of ROS read: frames on demand, and the files that they open (`files`)."""

@@ -1,0 +1,93 @@
+"""The frames of the pedestal, from the earth to the beam: right-handed, z up, x ahead (REP 103, REP 105). No ROS here.
+
+    earth -> base_link       attitude of the deck; ashore the bow points north
+    base_link -> azimuth     turned by the azimuth
+    azimuth -> elevation     turned by the elevation
+    elevation -> beam        x along the beam
+
+All but the first are the joints of `viewers/pedestal.urdf`, whose names are those of joint_states and whose axes say
+which way an angle turns: the azimuth clockwise seen from above, about -z; the elevation upwards, about -y.
+"""
+import importlib.resources
+import math
+import typing
+import xml.etree.ElementTree as ElementTree
+
+from pedestal_common.geometry.line_of_sight import ASHORE
+from pedestal_common.graph import topics
+from pedestal_common.wire import messages
+
+VIEWERS = importlib.resources.files('pedestal_operator.viewers') / 'files'
+"""The folder of what viewers open: layouts, the model of the pedestal."""
+
+DESCRIPTION = (VIEWERS / 'pedestal.urdf').read_text()
+"""The model of the pedestal, as the topic robot_description has it."""
+
+
+class Transform(typing.NamedTuple):
+    """Where a frame `child` is in its `parent`: place of its origin [m], rotation as quaternion (x, y, z, w)."""
+    parent: str
+    child: str
+    translation: tuple
+    rotation: tuple
+
+
+class Joint(typing.NamedTuple):
+    """A joint of the model. axis: about which it turns, in the frame of its child; None of a fixed one."""
+    name: str
+    parent: str
+    child: str
+    origin: tuple
+    axis: tuple | None
+
+
+def _numbers(text):
+    return tuple(float(word) for word in text.split())
+
+
+def joints(description=DESCRIPTION) -> tuple:
+    """The Joints of a URDF whose frames are parallel where every angle is 0 (no `rpy`), in its order."""
+    found = []
+    for joint in ElementTree.fromstring(description).iter('joint'):
+        axis = joint.find('axis')
+        found.append(Joint(joint.get('name'), joint.find('parent').get('link'), joint.find('child').get('link'),
+                           _numbers(joint.find('origin').get('xyz')), None if axis is None else
+                           _numbers(axis.get('xyz'))))
+    return tuple(found)
+
+
+JOINTS = joints()
+
+
+def _turned(axis, angle):
+    """The quaternion of a turn about a unit vector."""
+    sine = math.sin(0.5 * angle)
+    return *(sine * part for part in axis), math.cos(0.5 * angle)
+
+
+def of_deck(attitude=ASHORE) -> Transform:
+    """The deck in the earth. attitude: quaternion (x, y, z, w) deck -> earth."""
+    return Transform('earth', 'base_link', (0.0, 0.0, 0.0), tuple(attitude))
+
+
+def of_pedestal(angles, prefix='') -> list:
+    """The Transforms from the deck to the beam. angles: of joint_states, azimuth and elevation [rad]; prefix: of one
+    beam of several, whose frames are called beam_2/azimuth for example."""
+    turned = dict(zip(topics.AXES, angles))
+    return [Transform(joint.parent if joint.parent == 'base_link' else prefix + joint.parent, prefix + joint.child,
+                      joint.origin, _turned(joint.axis or (0.0, 0.0, 0.0), turned.get(joint.name, 0.0)))
+            for joint in JOINTS]
+
+
+def tf_message(stamp, transforms):
+    """The tf2_msgs/msg/TFMessage of Transforms at a stamp [ns]."""
+    types = messages.TYPESTORE.types
+    stamped, transform = (types[f'geometry_msgs/msg/{name}'] for name in ('TransformStamped', 'Transform'))
+    of_all = []
+    for given in transforms:
+        header = messages.header(given.parent)
+        messages.put_stamp(header.stamp, stamp)
+        of_all.append(stamped(header=header, child_frame_id=given.child, transform=transform(
+            translation=messages.vector3(*given.translation),
+            rotation=messages.Quaternion(**dict(zip('xyzw', given.rotation))))))
+    return types['tf2_msgs/msg/TFMessage'](transforms=of_all)

@@ -1,0 +1,94 @@
+"""Messages of one topic as columns: the numbers of many CDR messages read at once through numpy.
+
+Messages of a topic that differ in their numbers only have them at the same places. The first message is walked by the
+type's definition to find these places; all messages alike in everything that is not a number are then one array of
+bytes, and a column is a slice of it. What is left over (other names, other lengths) is done again the same way.
+"""
+import numpy as np
+
+from pedestal_common.graph import layouts
+from pedestal_common.wire import cdr
+from pedestal_common.wire.cdr import STAMPED
+
+SHAPES = 100
+"""Kinds of messages of one length that are read all at once; what is left is read one by one."""
+
+CELLS = 4_000_000, 4
+"""Numbers in the columns at the most: so many, and one more for so many bytes of the messages. Messages that name
+other columns each time would fill a table as wide as it is long."""
+
+
+def stamps(data, type_name, log):
+    """Header stamps [ns] (n,) of messages; the log times where the type has none or a message is too short."""
+    log = np.asarray(log, np.int64)
+    if type_name not in STAMPED or not len(data) or min(map(len, data)) < 12:
+        return log.copy()
+    pairs = np.frombuffer(b''.join([message[4:12] for message in data]), '<u4').reshape(-1, 2)
+    return pairs[:, 0].astype(np.int32).astype(np.int64) * 1_000_000_000 + pairs[:, 1]
+
+
+def table(data, type_name, log, start=0):
+    """The columns of CDR messages of one type, log times [ns] given.
+
+    `t` [s] is the header stamp, or the log time of a type without one, after start [ns]. Then one array per number:
+    JointState     azimuth.position, azimuth.velocity, azimuth.effort, elevation.position, ...
+    JointTrajectory  the first point: azimuth.position, azimuth.velocity, azimuth.acceleration, ...
+    Vector3Stamped x, y, z
+    Odometry       position.x, orientation.w, twist.linear.x, twist.angular.z, ...
+    Imu            orientation.w, angular_velocity.x, linear_acceleration.z, orientation_variance.z, ...
+    String         data (a list of texts)
+    others         the path of the field. Covariances and header are left out; a DiagnosticArray has `t` only.
+    A number that a message lacks is NaN in its row. Raises ValueError when bytes are no such message.
+    """
+    out = {'t': (stamps(data, type_name, log) - start) / 1e9}
+    if type_name == 'std_msgs/msg/String':
+        out['data'] = [cdr.Places(message, type_name).texts['data'] for message in data]
+    elif type_name not in ('diagnostic_msgs/msg/DiagnosticArray', 'rosgraph_msgs/msg/Clock'):
+        lengths = np.array([len(message) for message in data], np.int64)
+        most = CELLS[0] + int(lengths.sum()) // CELLS[1]
+        for length in np.unique(lengths):
+            rows = np.flatnonzero(lengths == length)
+            block = np.frombuffer(b''.join([data[row] for row in rows]), np.uint8).reshape(rows.size, length)
+            _fill(out, block, rows, type_name, len(data), most)
+    return out
+
+
+def _fill(out, block, rows, type_name, count, most):
+    """Put the numbers of messages of one length (m, length) into rows of the columns, of at most so many numbers."""
+    shapes = 0
+    while rows.size:
+        walk = cdr.Places(block[0].tobytes(), type_name)
+        fixed = np.concatenate([np.arange(start, stop) for start, stop in walk.fixed])
+        shapes += 1
+        tried = len(block) if shapes < SHAPES else 1
+        alike = (block[:tried, fixed] == block[0, fixed]).all(axis=1)
+        same, where = block[:tried][alike], rows[:tried][alike]
+        for path, start, dtype in walk.numbers:
+            name = layouts.column(type_name, path, walk.texts)
+            if name is not None:
+                size = int(dtype[2:])
+                values = np.ascontiguousarray(same[:, start:start + size]).view(dtype)[:, 0]
+                if name not in out:
+                    if (len(out) + 1) * count > most:
+                        raise ValueError(f'more than {len(out)} columns in {count} messages')
+                    out[name] = np.full(count, np.nan)
+                out[name][where] = values
+        block, rows = (block[~alike], rows[~alike]) if tried == len(block) else (block[tried:], rows[tried:])
+
+
+def alike(data, type_name, template, names):
+    """Which of the messages (n,) equal a template (CDR bytes) in all but the stamp and the columns of these names; the
+    padding that DDS adds at their end does not count."""
+    walk = cdr.Places(template, type_name)
+    fixed = [np.arange(start, stop) for start, stop in walk.fixed]
+    for path, start, dtype in walk.numbers:
+        column = layouts.column(type_name, path, walk.texts)
+        if not path.startswith(('header.stamp.', 'clock.')) and column not in names:
+            fixed.append(np.arange(start, start + int(dtype[2:])))
+    fixed = np.concatenate(fixed)
+    wanted = np.frombuffer(template, np.uint8)[fixed]
+    size = len(template)
+    same = np.array([0 <= len(message) - size < cdr.PADDING for message in data], bool)
+    block = np.frombuffer(b''.join([message[:size] for message, fits in zip(data, same) if fits]), np.uint8)
+    same[same] = (block.reshape(-1, size)[:, fixed] == wanted).all(axis=1)
+    return same

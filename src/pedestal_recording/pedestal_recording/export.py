@@ -1,0 +1,149 @@
+"""`pedestal export`: a recording as one table per topic, for MATLAB, pandas and whoever else reads CSV or Parquet.
+
+A row is a message, a column a number of it (columns.table), after its stamp in seconds and in integer nanoseconds.
+Where a row for each message would leave something out, there is one for each point of a trajectory of several points,
+one for each status of a diagnostics message.
+"""
+import contextlib
+import csv
+import os
+import pathlib
+
+import numpy as np
+
+from pedestal_common.graph import layouts, nodes
+from pedestal_common.wire import messages
+from pedestal_recording import bag as bags
+
+STAMP, NANOSECONDS = 't [s]', 'stamp [ns]'
+
+
+def export(path, file_format='csv', output=None, names=(), overwrite=False):
+    """Write the topics of a bag as tables; iterator of (file, rows, columns), or (None, why, topic) of one left out.
+
+    file_format: 'csv' or 'parquet'. names: topics to write, all when empty; of those named each must be readable, of
+    all the unreadable ones are left out. output: folder, default `export` in the bag (beside a bare .mcap). overwrite:
+    replace files. A file is `acu.rate_command.csv` and so on.
+    Raises bag.BagError, ValueError where Parquet cannot be written, or, before anything is written, FileExistsError.
+    """
+    write = _parquet_writer() if file_format == 'parquet' else _write_csv
+    bag = bags.read(path)
+    chosen = bags.chosen_topics(bag, names) if names else list(bag.topics)
+    folder = pathlib.Path(output) if output is not None else bag.file.parent / 'export'
+    files = {name: folder / f'{name.replace("/", ".")}.{file_format}' for name in chosen}
+    existing = [file for file in files.values() if file.exists()]
+    if existing and not overwrite:
+        more = f' and {len(existing) - 1} more' if len(existing) > 1 else ''
+        raise FileExistsError(f'{existing[0]} exists already{more}; --overwrite replaces')
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, file in files.items():
+        if bag.topics[name] not in messages.TYPESTORE.fielddefs:
+            reason = f'{name} is of type {bag.topics[name]}, which is not known here'
+            if names:
+                raise bags.BagError(f'{path}: {reason}')
+            yield None, reason, name
+            continue
+        content = table(bag, name)
+        with whole(file) as part:
+            write(part, content, {'topic': name, 'type': bag.topics[name], **bag.metadata})
+        yield file, len(content[NANOSECONDS]), len(content)
+
+
+@contextlib.contextmanager
+def whole(file):
+    """The path of a file that becomes `file` once it is whole, and nothing otherwise."""
+    part = file.with_name(file.name + '.part')
+    try:
+        yield part
+        os.replace(part, file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def table(bag, name):
+    """{header: array or list} of a topic: `t [s]`, `stamp [ns]`, then its columns, each with its unit."""
+    type_name = bag.topics[name]
+    rows = bag.rows(name)
+    stamps = rows.stamp
+    if type_name == 'diagnostic_msgs/msg/DiagnosticArray':
+        return _diagnostics(bag, name, stamps)
+    if type_name == 'trajectory_msgs/msg/JointTrajectory' and _has_tracks(bag, name):
+        return _tracks(bag, name, stamps)
+    numbers = bag.table(name)
+    del numbers['t']
+    return {**_times(stamps), **{_header(name, type_name, column): values for column, values in numbers.items()}}
+
+
+def _times(stamps):
+    return {STAMP: stamps / 1e9, NANOSECONDS: stamps}
+
+
+def _header(name, type_name, column):
+    """The head of a column: its unit behind it, where the topic is one of the graph and of its type."""
+    unit = layouts.unit(nodes.plain(name), type_name, column)
+    return f'{column} [{unit}]' if unit else column
+
+
+def _has_tracks(bag, name):
+    """Whether a message has other than one point; messages of one length are taken to be alike."""
+    of_length = {len(data): data for _, _, _, data in bag.raw(name)}
+    try:
+        return any(len(messages.deserialize(data, bag.topics[name]).points) != 1 for data in of_length.values())
+    except ValueError:
+        return False
+
+
+def _tracks(bag, name, stamps):
+    """Trajectories of several points: a row is a point, at its time after the stamp of its message."""
+    type_name = bag.topics[name]
+    points = []
+    for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name)):
+        for point in message.points:
+            row = {'time_from_start': point.time_from_start.sec + point.time_from_start.nanosec * 1e-9}
+            for field, values in (('position', point.positions), ('velocity', point.velocities),
+                                  ('acceleration', point.accelerations), ('effort', point.effort)):
+                row.update({f'{joint}.{field}': value for joint, value in zip(message.joint_names, values)})
+            points.append((stamp, row))
+    return {**_times(np.array([stamp for stamp, _ in points], np.int64)),
+            **{_header(name, type_name, column): np.array([row.get(column, np.nan) for _, row in points], float)
+               for column in dict.fromkeys(column for _, row in points for column in row)}}
+
+
+def _diagnostics(bag, name, stamps):
+    """Diagnostics: a row is a status; its values are one text, key=value, separated by '; '."""
+    statuses = [(stamp, status) for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name))
+                for status in message.status]
+    return {**_times(np.array([stamp for stamp, _ in statuses], np.int64)),
+            'level': np.array([status.level for _, status in statuses], np.int64),
+            'name': [status.name for _, status in statuses], 'message': [status.message for _, status in statuses],
+            'values': ['; '.join(f'{value.key}={value.value}' for value in status.values) for _, status in statuses]}
+
+
+def _write_csv(file, content, _description):
+    """Numbers as the shortest text that reads back as the same float, NaN as NaN, texts quoted where needed."""
+    with open(file, 'w', newline='', encoding='utf-8') as stream:
+        writer = csv.writer(stream, lineterminator='\n')
+        writer.writerow(content)
+        writer.writerows(zip(*(_texts(values) for values in content.values())))
+
+
+def _texts(values):
+    if isinstance(values, list) or values.dtype.kind == 'i':
+        return values
+    return ['NaN' if value != value else repr(value) for value in values.tolist()]
+
+
+def _parquet_writer():
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise ValueError("Parquet is written by pyarrow, which is not installed: pip install pyarrow, or the extra "
+                         "'pedestal_recording[parquet]'") from None
+
+    def write(file, content, description):
+        arrays = {header: pyarrow.array(values, pyarrow.string()) if isinstance(values, list) else values
+                  for header, values in content.items()}
+        pyarrow.parquet.write_table(pyarrow.table(arrays).replace_schema_metadata(description), file,
+                                    compression='zstd')
+    return write

@@ -1,0 +1,200 @@
+"""One MCAP file, record by record: where each begins and ends, and the records of a chunk unpacked.
+
+What a file claims is held against what it is: a few bytes can stand for gigabytes of zeros in a compressed chunk, or
+for millions of empty messages. So time and memory are bounded by the length of the file (CHUNK, UNPACKED, MESSAGES).
+"""
+import fcntl
+import io
+import os
+import struct
+import zlib
+
+import lz4.frame
+import zstandard
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC as MAGIC
+
+from pedestal_common.text_files import files
+
+CHUNK = 32_000_000
+"""Bytes of a chunk, packed or unpacked, at the most."""
+
+UNPACKED = 32_000_000, 200
+"""Bytes of all chunks, unpacked, at the most: so many, and so many more for each byte of the file."""
+
+MESSAGES = 500_000, 0.25
+"""Messages at the most: so many, and so many more for each byte of the file."""
+
+MESSAGE = struct.Struct('<xQHIQQ')
+"""Length, channel, sequence, log and publish time: the head of a message record after its opcode."""
+
+SQLITE = b'SQLite format 3'
+_RECORD = struct.Struct('<BQ')
+_WINDOW = 1_000_000
+_READ = {Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
+         Opcode.METADATA: records.Metadata.read, Opcode.STATISTICS: records.Statistics.read,
+         Opcode.CHUNK: records.Chunk.read, Opcode.FOOTER: records.Footer.read,
+         Opcode.MESSAGE_INDEX: records.MessageIndex.read}
+
+
+class BagError(ValueError):
+    """A bag cannot be written or read; one line that names the file and what is wrong with it."""
+
+
+def reason(error):
+    """What an OSError says, without the path."""
+    return error.strerror or str(error)
+
+
+def frame(data, at):
+    """(opcode, where its content ends) of the record at a place in bytes; ValueError when none is there."""
+    if at + 9 > len(data):
+        raise ValueError('the file ends')
+    opcode, length = _RECORD.unpack_from(data, at)
+    if not Opcode.HEADER <= opcode <= Opcode.DATA_END:
+        raise ValueError('no record')
+    if at + 9 + length > len(data):
+        raise ValueError('the file ends inside a record')
+    return opcode, at + 9 + length
+
+
+def parsed(opcode, content):
+    """The record of the mcap library in the bytes behind its head; None of a kind that is not read here."""
+    return _READ[opcode](ReadDataStream(io.BytesIO(content))) if opcode in _READ else None
+
+
+def unpacked(chunk) -> bytes:
+    """The records in a records.Chunk. Raises ValueError where it is longer than CHUNK, is not as long as it claims, or
+    its checksum is wrong."""
+    size = chunk.uncompressed_size
+    if max(size, len(chunk.data)) > CHUNK:
+        raise ValueError(f'a chunk of {size} bytes, must be at most {CHUNK}')
+    try:
+        data = _UNPACK[chunk.compression](chunk.data, size)
+    except KeyError:
+        raise ValueError(f'a chunk compressed by {chunk.compression!r}') from None
+    except (zstandard.ZstdError, RuntimeError, EOFError):  # lz4 raises RuntimeError
+        raise ValueError('a corrupted chunk') from None
+    if len(data) != size:
+        raise ValueError('a chunk that is not as long as it claims')
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError('a corrupted chunk')
+    return data
+
+
+def _zstd(data, size):
+    """Refuses a frame of another length before the memory for it is taken."""
+    if not size or zstandard.frame_content_size(data) not in (-1, size):
+        return b''
+    return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+
+
+_UNPACK = {'': lambda data, size: data, 'zstd': _zstd,
+           'lz4': lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)}
+
+
+class McapFile:
+    """An open MCAP file, read in pieces; `size`: its length [bytes]; locked: this process writes it itself.
+
+    Raises BagError when it is missing, empty, foreign or no regular file, or while its recorder still writes it.
+    """
+
+    def __init__(self, path, locked=False):
+        self.path = path
+        try:
+            self._stream = files.open_regular(path)
+            self.size = os.fstat(self._stream.fileno()).st_size
+            if not locked:
+                self._check_lock()
+            self._start, self._window = 0, b''
+            head = self.read(0, len(SQLITE))
+        except OSError as error:
+            raise BagError(f'{path}: {reason(error)}') from None
+        if not head:
+            raise BagError(f'{path}: empty file')
+        if head == SQLITE:
+            raise BagError(f'{path}: an SQLite bag, not an MCAP file; `ros2 bag convert` makes one of it')
+        if not head.startswith(MAGIC):
+            raise BagError(f'{path}: not an MCAP file')
+        self._left = UNPACKED[0] + UNPACKED[1] * self.size
+        self._messages = 0
+
+    def _check_lock(self):
+        try:
+            fcntl.flock(self._stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            fcntl.flock(self._stream, fcntl.LOCK_UN)
+        except BlockingIOError:
+            raise BagError(f'{self.path}: is being written; wait until its recorder has ended') from None
+        except OSError:  # a file system without locks
+            pass
+
+    def read(self, start, stop) -> bytes:
+        """The bytes [start, stop) of the file, as far as they are there."""
+        if stop - start > _WINDOW:
+            return os.pread(self._stream.fileno(), stop - start, start)
+        if start < self._start or stop > self._start + len(self._window):
+            self._start, self._window = start, os.pread(self._stream.fileno(), _WINDOW, start)
+        return self._window[start - self._start:stop - self._start]
+
+    def pieces(self):
+        """Iterator of (opcode, start, stop) of the records up to the footer, neighbouring messages as one piece.
+
+        Raises EOFError, which says where and why the file ends before its end.
+        """
+        messages = None
+        try:
+            for opcode, start, stop in self._frames():
+                if opcode == Opcode.MESSAGE and messages and stop - messages[0] <= _WINDOW:
+                    messages = messages[0], stop
+                    continue
+                if messages:
+                    yield Opcode.MESSAGE, *messages
+                messages = (start, stop) if opcode == Opcode.MESSAGE else None
+                if not messages:
+                    yield opcode, start, stop
+        except EOFError:
+            if messages:
+                yield Opcode.MESSAGE, *messages
+            raise
+
+    def _frames(self):
+        at, opcode = len(MAGIC), None
+        while opcode != Opcode.FOOTER:
+            if at + 9 > self.size:
+                raise EOFError(f'the file ends at byte {self.size} without a summary (recorder killed, or disk full)')
+            opcode, length = _RECORD.unpack(self.read(at, at + 9))
+            if not opcode:
+                raise EOFError(f'broken record at byte {at}: no record')
+            stop = at + 9 + length
+            if stop > self.size:
+                raise EOFError(f'the file ends at byte {self.size} inside a record that goes on to {stop}')
+            yield opcode, at, stop
+            at = stop
+        if self.read(at, at + len(MAGIC) + 1) != MAGIC:
+            raise EOFError(f'the file does not end where its footer does, at byte {at}')
+
+    def chunk(self, start, stop, again=False) -> bytes:
+        """The records in the chunk record at [start, stop); again: it was unpacked before.
+
+        Raises ValueError when it cannot be unpacked, or when the chunks of the file unpack to more than UNPACKED.
+        """
+        if stop - start > 2 * CHUNK:
+            raise ValueError(f'a chunk of {stop - start} bytes, must be at most {CHUNK}')
+        chunk = parsed(Opcode.CHUNK, self.read(start + 9, stop))
+        if not again:
+            self.spend(chunk)
+        return unpacked(chunk)
+
+    def spend(self, chunk):
+        """Count the bytes that a records.Chunk claims to hold. Raises ValueError when all are more than UNPACKED."""
+        self._left -= chunk.uncompressed_size
+        if self._left < 0:
+            raise ValueError(f'its chunks unpack to more than {UNPACKED[1]} times its length')
+
+    def count(self, messages):
+        """Count messages that are read. Raises ValueError when all are more than MESSAGES."""
+        self._messages += messages
+        if self._messages > MESSAGES[0] + MESSAGES[1] * self.size:
+            raise ValueError(f'more than {self._messages - messages} messages in {self.size} bytes')

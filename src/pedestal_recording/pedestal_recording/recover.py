@@ -1,0 +1,332 @@
+"""Makes a readable bag of what is there in a damaged one: killed recorder, full disk, cut or corrupted file.
+
+Each file is read through mmap, chunk after chunk, and the messages of each chunk whose checksum holds are written
+anew: the memory taken is that of one chunk and of the index, whatever the size of the recording. A bag of several
+files becomes one of one file.
+"""
+import collections
+import dataclasses
+import mmap
+import pathlib
+import re
+import shutil
+import struct
+import zlib
+
+from mcap import records
+from mcap.opcode import Opcode
+
+from pedestal_common.graph import nodes, topics
+from pedestal_recording import bag as bags
+from pedestal_recording.mcap_file import MAGIC, MESSAGE, BagError, McapFile, frame, parsed, reason, unpacked
+from pedestal_recording.writer import BagFile
+
+_KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
+_END = (Opcode.DATA_END, Opcode.FOOTER)
+_COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
+_BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
+"""Bytes of a chunk record before the name of its compression."""
+
+_LENGTH = struct.Struct('<Q')
+_FOOTER = 9 + 20 + len(MAGIC)
+
+
+@dataclasses.dataclass
+class Gap:
+    """Bytes [start, stop) of a file that cannot be used, why, and the log times [ns] before and after them; None where
+    no message is there. file: its name, '' of a bag that has only one."""
+    start: int
+    stop: int
+    why: str
+    before: int | None
+    after: int | None = None
+    file: str = ''
+
+    def line(self, start=0):
+        """The gap as text, in time after start [ns]."""
+        return (f'bytes {self.start} to {self.stop}{self.file and f" of {self.file}"} unused ({self.why})'
+                + (f', after {(self.before - start) / 1e9:.6f} s' if self.before is not None else '')
+                + (f', before {(self.after - start) / 1e9:.6f} s' if self.after is not None else ''))
+
+
+@dataclasses.dataclass
+class Recovered:
+    """What was recovered into the bag at `path`, and what is missing.
+
+    counts: {topic: messages}; first, last: log times [ns]; ended: whether the recorder came to its end;
+    planned_end: of the run [ns], None when the bag does not say; start: of the scenario's time [ns]; gaps: [Gap];
+    lost: {topic: messages missing between those that are there, by the recorder's sequence numbers}.
+    """
+    path: pathlib.Path
+    counts: dict
+    first: int
+    last: int
+    ended: bool
+    planned_end: int | None
+    start: int
+    gaps: list
+    lost: dict
+
+    @property
+    def unused(self):
+        """Bytes of the file that cannot be used."""
+        return sum(gap.stop - gap.start for gap in self.gaps)
+
+    def lines(self):
+        """The report as text: the gaps, what is lost by them and at the end, the new bag last."""
+        lines = [gap.line(self.start) for gap in self.gaps]
+        first, last = self.first - self.start, self.last - self.start
+        if self.lost:
+            steps = max((count for name, count in self.lost.items()
+                         if nodes.plain(name) in topics.BY_NAME
+                         and topics.BY_NAME[nodes.plain(name)].rate == 'step'), default=0)
+            lines.append(f'lost in the middle: {steps} steps, {sum(self.lost.values())} messages: '
+                         + ', '.join(f'{count} of {name}' for name, count in self.lost.items()))
+        planned = self.planned_end is not None and self.last < self.planned_end
+        if planned or not self.ended:
+            lines.append(f'the recording {"ends" if self.ended else "breaks off"} after {last / 1e9:.6f} s'
+                         + (f', the run was to go on to {(self.planned_end - self.start) / 1e9:.6f} s'
+                            if planned else ''))
+        total = sum(self.counts.values())
+        return [*(lines or ['nothing is missing']),
+                f'{self.path}: {total} messages, {len(self.counts)} topics, {first / 1e9:.6f} to '
+                f'{last / 1e9:.6f} s; {self.unused} bytes unused']
+
+
+def recover(path, output=None) -> Recovered:
+    """Write what can be read of a bag as a new bag, by default beside it with '-recovered' after its name.
+
+    Raises BagError when nothing can be read, when it is being written, or when the new bag cannot be written; then
+    nothing of the new one is left. The old one is only read.
+    """
+    files = [McapFile(file) for file in bags.locate(path)]
+    if output is None:
+        whole = pathlib.Path(path).absolute()
+        output = whole.with_name((whole.name if whole.is_dir() else whole.stem) + '-recovered')
+    bag = BagFile(output)
+    try:
+        salvage = _Salvage(bag, len(files) > 1)
+        for file in files:
+            with open(file.path, 'rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+                salvage.take_all(file, data)
+        if not bag.messages:
+            raise BagError(f'{files[0].path}: not one message in it can be read')
+        bag.flush()
+        recovered = salvage.recovered()
+        bag.add_metadata('recovered', {'messages_lost': str(sum(recovered.lost.values())),
+                                       'bytes_unused': str(recovered.unused)})
+        bag.close()
+    except BaseException as error:
+        shutil.rmtree(output, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise BagError(f'{path}: {reason(error)}') from None
+        raise
+    return recovered
+
+
+def _follows(data, at):
+    try:
+        return bool(frame(data, at))
+    except ValueError:
+        return False
+
+
+def _read(file, opcode, data, start, stop):
+    """The record at [start, stop), None of a kind that is not kept; of a chunk its records as bytes."""
+    if opcode not in _KEPT:
+        return None
+    record = parsed(opcode, data[start + 9:stop])
+    if opcode != Opcode.CHUNK:
+        return record
+    file.spend(record)
+    return unpacked(record)
+
+
+def _next_chunk(file, data, start):
+    """Where the next chunk begins whose checksum holds; the end of the data when there is none."""
+    for name in _COMPRESSION.finditer(data, start):
+        at = name.start() - _BEFORE_COMPRESSION
+        try:
+            if at >= start and data[at] == Opcode.CHUNK:
+                opcode, stop = frame(data, at)
+                if name.end() + 8 + _LENGTH.unpack_from(data, name.end())[0] == stop:
+                    _read(file, opcode, data, at, stop)
+                    return at
+        except Exception:  # whatever a decoder makes of bytes that are no chunk
+            continue
+    return len(data)
+
+
+def _pieces(file, data):
+    """Iterator of (opcode, start, stop, record) of the records of the data section; of bytes that cannot be used
+    (0, start, stop, why).
+
+    After a broken record comes the one behind it if there is one, else the next whole chunk behind everything that
+    was good.
+    """
+    at = good = len(MAGIC)
+    while at < len(data):
+        stop = None
+        try:
+            opcode, stop = frame(data, at)
+            record = _read(file, opcode, data, at, stop)
+        except Exception as error:  # whatever a decoder makes of broken bytes
+            if stop is None or not _follows(data, stop):
+                stop = _next_chunk(file, data, good)
+            if stop > at:
+                yield 0, at, stop, str(error) or type(error).__name__
+        else:
+            yield opcode, at, stop, record
+            if opcode in _END:
+                return
+            if record is not None:
+                good = stop
+        at = stop
+
+
+def _summary(file, data):
+    """Schemas and channels of the summary, where there is one: the chunk that declares them may be broken."""
+    footer = len(data) - _FOOTER
+    if footer < len(MAGIC) or data[footer] != Opcode.FOOTER or data[-len(MAGIC):] != MAGIC:
+        return
+    at, _, crc = struct.unpack_from('<QQI', data, footer + 9)
+    if not at or at > footer or crc and zlib.crc32(data[at:footer + 25]) != crc:
+        return
+    while at < footer:
+        opcode, stop = frame(data, at)
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            yield _read(file, opcode, data, at, stop)
+        at = stop
+
+
+class _Salvage:
+    """Adds the messages of damaged files to a new BagFile and keeps count of what cannot be used.
+
+    several: whether a gap must say in which file it is. _schemas, _channels: {number in the file: number in the bag};
+    _names: {channel of the bag: topic}; _counts: {topic: messages added}; _first, _last: their log times [ns];
+    _sequence, _before: {channel of the bag: number of its last message, and of the last one of the files before};
+    _unsure: channels of the bag without a message since the last gap.
+    """
+
+    def __init__(self, bag, several):
+        self._bag, self._several = bag, several
+        self._file = None
+        self._schemas, self._channels, self._names, self._metadata = {}, {}, {}, {}
+        self._declared = {}
+        self._counts, self._lost = {}, collections.Counter()
+        self._first = self._last = None
+        self._sequence, self._before, self._unsure = {}, {}, set()
+        self._gaps = []
+        self._ended = False
+
+    def take_all(self, file, data):
+        """One pass over the bytes of a McapFile."""
+        self._file = file
+        self._schemas, self._channels, self._before = {}, {}, dict(self._sequence)
+        try:
+            for record in _summary(file, data):
+                self._declare(record)
+        except BagError:
+            raise
+        except Exception:  # whatever a decoder makes of broken bytes: what it declares, the file declares as well
+            pass
+        for opcode, start, stop, record in _pieces(file, data):
+            try:
+                self._take(opcode, record, data[start:stop] if opcode == Opcode.MESSAGE else b'')
+            except BagError:
+                raise
+            except (ValueError, struct.error) as error:
+                self._skip(start, stop, str(error))
+
+    def _take(self, opcode, record, message):
+        if opcode == 0:
+            raise ValueError(record)
+        if opcode == Opcode.MESSAGE:
+            self._add_messages(message)
+        elif opcode == Opcode.CHUNK:
+            self._add_messages(record)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._declare(record)
+        elif opcode == Opcode.METADATA and record.name != 'recovered' and record.name not in self._metadata:
+            self._metadata[record.name] = record.metadata
+            self._bag.add_metadata(record.name, record.metadata)
+        elif opcode == Opcode.ATTACHMENT:
+            raise ValueError('an attachment')
+        self._ended = opcode in _END
+
+    def _declare(self, record):
+        """Take over a schema or channel that is new."""
+        if isinstance(record, records.Schema):
+            if record.id not in self._schemas:
+                self._schemas[record.id] = self._once(self._bag.add_schema, record.name, record.encoding, record.data)
+        elif record.message_encoding != 'cdr':
+            raise bags.foreign_encoding(self._file.path, record)
+        elif record.id not in self._channels and record.schema_id in self._schemas:
+            channel = self._once(self._bag.add_channel, record.topic, self._schemas[record.schema_id], record.metadata)
+            self._channels[record.id] = channel
+            self._names[channel] = record.topic.lstrip('/')
+            self._counts.setdefault(self._names[channel], 0)
+
+    def _once(self, add, *content):
+        """The number under which the bag has this schema or channel; files of a bag declare the same."""
+        key = add.__name__, str(content)
+        if key not in self._declared or not self._several:
+            self._declared[key] = add(*content)
+        return self._declared[key]
+
+    def _skip(self, start, stop, why):
+        file = self._file.path.name if self._several else ''
+        if self._gaps and self._gaps[-1].stop == start and self._gaps[-1].file == file:
+            self._gaps[-1].stop = stop
+            return
+        self._gaps.append(Gap(start, stop, why, self._last, file=file))
+        self._unsure = set(self._channels.values())
+
+    def _add_messages(self, raw):
+        """Add the messages of a chunk's bytes; ValueError, and none added, when one belongs to no known channel."""
+        first = last = None
+        number = at = 0
+        while at < len(raw):
+            opcode, stop = frame(raw, at)
+            if opcode == Opcode.MESSAGE:
+                _, channel, _, log, _ = MESSAGE.unpack_from(raw, at)
+                if channel not in self._channels:
+                    raise ValueError(f'channel {channel} is declared nowhere')
+                if stop < at + MESSAGE.size or log >= 2**63:
+                    raise ValueError('a message with a head that cannot be')
+                first, last = (log, log) if first is None else (min(first, log), max(last, log))
+                number += 1
+            else:
+                self._declare(parsed(opcode, raw[at + 9:stop]))
+            at = stop
+        if not number:
+            return
+        self._file.count(number)
+        at = 0
+        while at < len(raw):
+            opcode, stop = frame(raw, at)
+            if opcode == Opcode.MESSAGE:
+                _, channel, sequence, log, publish = MESSAGE.unpack_from(raw, at)
+                self._add(self._channels[channel], sequence, log, publish, raw[at + MESSAGE.size:stop])
+            at = stop
+        for gap in self._gaps:
+            gap.after = first if gap.after is None else gap.after
+        self._first = first if self._first is None else min(self._first, first)
+        self._last = last if self._last is None else max(self._last, last)
+
+    def _add(self, channel, sequence, log, publish, data):
+        """Add a message. Where the recorder numbers them from 1, the first after a gap says how many were in it."""
+        sequence += self._before.get(channel, 0)
+        self._bag.add_message(channel, sequence & 0xffffffff, log, publish, data)
+        if channel in self._unsure:
+            self._lost[channel] += sequence - self._sequence.get(channel, 0) - 1
+            self._unsure.remove(channel)
+        self._sequence[channel] = sequence
+        self._counts[self._names[channel]] += 1
+
+    def recovered(self):
+        """The Recovered of the bag, once a message was added."""
+        ours = 'pacing' in self._metadata.get('pedestal', {})
+        lost = {self._names[channel]: count for channel, count in self._lost.items() if ours and count > 0}
+        return Recovered(self._bag.path, self._counts, self._first, self._last, self._ended,
+                         bags.planned_end(self._metadata), bags.start(self._metadata), self._gaps, lost)

@@ -1,0 +1,339 @@
+"""Writes a bag: a rosbag2 directory (metadata.yaml version 9) with an MCAP file. No ROS here.
+
+The mcap library's Writer makes the records. Added to it here: a chunk ends by log time, the file stays whole when the
+disk is full, it is locked while it is written, and every schema and channel also stands before the first chunk, so
+that a broken chunk takes none of them with it. Nothing in the file depends on its path, the host or the wall clock:
+equal messages give equal bytes.
+
+The recorder of a realtime run that died may be started again: it goes on in a new file of the bag, NAME_1.mcap and so
+on, until one has come to the planned end of the run.
+"""
+import collections
+import contextlib
+import fcntl
+import pathlib
+import struct
+import sys
+
+import yaml
+from mcap import records, writer
+from mcap.data_stream import RecordBuilder
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from pedestal_common.graph import topics
+from pedestal_common.text_files import plain_yaml
+from pedestal_common.wire import messages
+from pedestal_recording.bag import locate, planned_end
+from pedestal_recording.mcap_file import BagError, McapFile, parsed, reason
+
+CHUNK_SIZE = 1_000_000
+CHUNK_SPAN = 1_000_000_000
+CHUNK_MESSAGES = 100_000
+"""A chunk ends after this many bytes, ns of log time (so that a crash loses at most the last second) or messages."""
+
+RUN = ('scenario', 'pacing', 'seed', 'planned_end_ns')
+"""What the metadata of all files of a bag say alike."""
+
+_INFINITE = {'sec': 9223372036, 'nsec': 854775807}
+
+
+_PAIR, _INDEX = struct.Struct('<QQ'), struct.Struct('<HI')
+"""First and last log time of a chunk; channel and bytes of its message index, whose entries are pairs."""
+
+
+def _qos(rate):
+    """The offered_qos_profiles of a topic of a rate."""
+    depth, latched = topics.QOS[rate].lockstep, topics.QOS[rate].latched
+    return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
+             'durability': 'transient_local' if latched else 'volatile',
+             'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',
+             'liveliness_lease_duration': dict(_INFINITE), 'avoid_ros_namespace_conventions': False}]
+
+
+class _Disk:
+    """The stream under the library's Writer: what it wrote since the last flush comes into the file as a whole or not
+    at all. size: bytes that are in the file already; they are not written again."""
+
+    def __init__(self, path, stream, size=0):
+        self.path, self.stream, self.end = path, stream, 0
+        self._size, self._pending = size, bytearray()
+
+    def write(self, data):
+        """Keep bytes for the next flush."""
+        self._pending += data
+
+    def tell(self):
+        """Where in the file the next byte comes."""
+        return self.end + len(self._pending)
+
+    def flush(self):
+        """Put what was kept into the file. Raises BagError when the disk does not take it; the file is then as it was.
+        """
+        data, self._pending = bytes(self._pending), bytearray()
+        if self.end >= self._size:
+            view = memoryview(data)
+            try:
+                while view:
+                    view = view[self.stream.write(view):]
+            except OSError as error:
+                self.stream.seek(self.end)
+                self.stream.truncate()
+                raise BagError(f'{self.path}: {reason(error)}') from None
+        self.end += len(data)
+
+
+class BagFile:
+    """A bag in the making: `path` its directory, `file` the MCAP file in it.
+
+    directory: must not exist; earlier: files of the bag in it, behind which this one comes.
+    Raises BagError, naming the file, when the disk does not take a chunk. What was written by then stays readable;
+    every message after it is dropped, so that a bag has no hole.
+    """
+
+    def __init__(self, directory, earlier=()):
+        self.path = pathlib.Path(directory).absolute()
+        self.file = self.path / f'{self.path.name}_{len(earlier)}.mcap'
+        self._earlier = list(earlier)
+        try:
+            self.path.mkdir(parents=True, exist_ok=bool(earlier))
+            stream = open(self.file, 'xb', buffering=0)
+        except FileExistsError:
+            raise BagError(f'{directory} exists already; a recording is never overwritten') from None
+        except OSError as error:
+            raise BagError(f'{directory}: {reason(error)}') from None
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        self._full = False
+        self._in_file = self._in_chunk = self._chunk_size = self._chunk_start = 0
+        self._start(_Disk(self.file, stream))
+
+    def _start(self, disk):
+        self._disk = disk
+        self._mcap = writer.Writer(disk, chunk_size=sys.maxsize)  # flush() alone ends a chunk
+        self._mcap.start('ros2', 'pedestal')
+
+    def add_schema(self, name, encoding, data):
+        """Declare a message type by its name and its definition (text as bytes) in an encoding; its number."""
+        number = self._mcap.register_schema(name, encoding, data)
+        return self._declared(records.Schema(id=number, name=name, encoding=encoding, data=data))
+
+    def add_channel(self, topic, schema, metadata):
+        """Declare a topic of CDR messages by its name with '/', the number of its schema and {text: text}; its
+        number."""
+        number = self._mcap.register_channel(topic, 'cdr', schema, metadata)
+        return self._declared(records.Channel(id=number, topic=topic, message_encoding='cdr', schema_id=schema,
+                                              metadata=metadata))
+
+    def _declared(self, record):
+        builder = RecordBuilder()
+        record.write(builder)
+        self._disk.write(builder.end())
+        return record.id
+
+    def add_metadata(self, name, content):
+        """Add a metadata record {text: text}; the one named `pedestal` is also custom_data of metadata.yaml."""
+        self._mcap.add_metadata(name, content)
+
+    def add_message(self, channel, sequence, log_time, publish_time, data):
+        """Add a message: number of its channel, its sequence number, times [ns], CDR bytes."""
+        if self._full:
+            return
+        if not self._in_chunk:
+            self._chunk_start = log_time
+        elif (log_time - self._chunk_start >= CHUNK_SPAN or self._chunk_size >= CHUNK_SIZE
+              or self._in_chunk >= CHUNK_MESSAGES):
+            self.flush()
+            self._chunk_start = log_time
+        self._in_chunk += 1
+        self._chunk_size += len(data)
+        self._mcap.add_message(channel, log_time, data, publish_time, sequence)
+
+    def flush(self):
+        """End the chunk: everything added is in the file when this returns."""
+        added, self._in_chunk, self._chunk_size = self._in_chunk, 0, 0
+        if self._full:
+            return
+        try:
+            self._mcap.flush()
+        except BagError:
+            self._full = True
+            raise
+        self._in_file += added
+
+    @property
+    def messages(self):
+        """How many messages were added and not dropped."""
+        return self._in_file + self._in_chunk
+
+    def close(self):
+        """Write what is left, the summary and metadata.yaml; on a full disk whatever of it fits, then BagError."""
+        with contextlib.closing(self._disk.stream):
+            try:
+                self.flush()
+            finally:
+                if self._full:
+                    self._forget_what_did_not_fit()
+                self._mcap.finish()
+                self._disk.flush()
+                self._write_metadata_file()
+
+    def _forget_what_did_not_fit(self):
+        """The library's Writer cannot take back a chunk: a new one is given what is in the file, to end it."""
+        self._start(_Disk(self.file, self._disk.stream, self._disk.end))
+        with open(self.file, 'rb') as stream, contextlib.suppress(EndOfFile):
+            for record in StreamReader(stream, emit_chunks=True).records:
+                if isinstance(record, records.Schema):
+                    self.add_schema(record.name, record.encoding, record.data)
+                elif isinstance(record, records.Channel):
+                    self.add_channel(record.topic, record.schema_id, record.metadata)
+                elif isinstance(record, records.Metadata):
+                    self.add_metadata(record.name, record.metadata)
+                elif isinstance(record, records.Chunk):
+                    for message in breakup_chunk(record):
+                        if isinstance(message, records.Message):
+                            self._mcap.add_message(message.channel_id, message.log_time, message.data,
+                                                   message.publish_time, message.sequence)
+                    self._mcap.flush()
+        self._mcap.flush()
+
+    def _write_metadata_file(self):
+        """metadata.yaml, from what is in the files."""
+        contents = [_Content(file) for file in (*self._earlier, self.file)]
+        files = [{'path': content.path.name, **_times([content]), 'message_count': content.total}
+                 for content in contents]
+        described, counts = {}, collections.Counter()
+        for content in contents:
+            for channel, schema, count in content.topics():
+                counts[channel.topic] += count
+                described[channel.topic] = {
+                    'name': channel.topic, 'type': schema, 'serialization_format': 'cdr',
+                    'offered_qos_profiles': _profiles(channel),
+                    'type_description_hash': channel.metadata.get('topic_type_hash', '')}
+        custom, last = dict(contents[0].metadata.get('pedestal', {})), max(content.last for content in contents)
+        planned = planned_end(contents[0].metadata)
+        if planned is not None:
+            custom['finished'] = str(last >= planned).lower()
+        information = {
+            'version': 9, 'storage_identifier': 'mcap', **_times(contents),
+            'message_count': sum(content.total for content in contents),
+            'topics_with_message_count': [{'topic_metadata': topic, 'message_count': counts[name]}
+                                          for name, topic in described.items()],
+            'compression_format': '', 'compression_mode': '',
+            'relative_file_paths': [content.path.name for content in contents], 'files': files,
+            'custom_data': custom or None, 'ros_distro': 'jazzy'}
+        file = self.path / 'metadata.yaml'
+        try:
+            file.write_text(yaml.safe_dump({'rosbag2_bagfile_information': information}, sort_keys=False))
+        except OSError as error:
+            file.unlink(missing_ok=True)
+            raise BagError(f'{file}: {reason(error)}') from None
+
+
+class _Content:
+    """What is in an MCAP file of ours, without a look at its messages, also where its recorder was killed.
+
+    path; metadata: {record: {text: text}}; first, last: log times [ns], 0 without a message.
+    """
+
+    def __init__(self, path):
+        self.path, self.metadata = path, {}
+        self._channels, self._schemas, self._counts, times = {}, {}, collections.Counter(), []
+        file = McapFile(path, locked=True)
+        with contextlib.suppress(EOFError):
+            for opcode, start, stop in file.pieces():
+                if opcode == Opcode.CHUNK:
+                    times += _PAIR.unpack(file.read(start + 9, start + 9 + _PAIR.size))
+                elif opcode == Opcode.MESSAGE_INDEX:
+                    channel, size = _INDEX.unpack(file.read(start + 9, start + 9 + _INDEX.size))
+                    self._counts[channel] += size // _PAIR.size
+                elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA, Opcode.METADATA):
+                    self._declare(parsed(opcode, file.read(start + 9, stop)))
+        self.first, self.last, self.total = min(times, default=0), max(times, default=0), self._counts.total()
+
+    def _declare(self, record):
+        if isinstance(record, records.Metadata):
+            self.metadata[record.name] = record.metadata
+        elif isinstance(record, records.Schema):
+            self._schemas[record.id] = record.name
+        else:
+            self._channels[record.id] = record
+
+    def topics(self):
+        """Iterator of (records.Channel, name of its type, messages) of every topic."""
+        for number, channel in self._channels.items():
+            yield channel, self._schemas[channel.schema_id], self._counts[number]
+
+
+def _times(contents):
+    """The span of some _Contents as metadata.yaml says it."""
+    known = [content for content in contents if content.total] or contents[:1]
+    start, end = min(content.first for content in known), max(content.last for content in known)
+    return {'duration': {'nanoseconds': end - start}, 'starting_time': {'nanoseconds_since_epoch': start}}
+
+
+def _profiles(channel):
+    try:
+        return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', '')) or []
+    except yaml.YAMLError:
+        return []
+
+
+def _earlier_files(directory, metadata):
+    """The files of a bag that is to be gone on with: the one of a realtime run, with this metadata, that has not come
+    to its end; [] where there is none. Raises BagError for any other bag, and while its recorder still writes it."""
+    path = pathlib.Path(directory)
+    if metadata.get('pacing') != 'realtime' or not any(path.glob('*.mcap')):
+        return []
+    files = locate(path)
+    if not files[-1].stat().st_size:  # its recorder died before the first byte
+        files.pop().unlink()
+        if not files:
+            path.rmdir()
+            return []
+    McapFile(files[-1])
+    earlier = _Content(files[0]).metadata.get('pedestal', {})
+    if any(earlier.get(key) != str(metadata[key]) for key in RUN if key in metadata):
+        raise BagError(f'{directory} exists already, of another run; a recording is never overwritten')
+    try:
+        information = plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information']
+        finished = information['custom_data'].get('finished') != 'false'
+    except FileNotFoundError:  # its recorder was killed
+        finished = False
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, AttributeError):
+        finished = True
+    if finished:
+        raise BagError(f'{directory} exists already; a recording is never overwritten')
+    return files
+
+
+class Writer(BagFile):
+    """A bag of topics of the graph, whose messages it numbers from 1.
+
+    directory: must not exist, or be a bag that is to be gone on with (see this module). rows: of topics.TOPICS, or
+    nodes.Links; a message names its topic by the index in them. metadata: {text: text} of the run, kept as the
+    metadata record `pedestal`. more: {name: {text: text}} of further metadata records. Raises BagError as a BagFile
+    does.
+    """
+
+    def __init__(self, directory, rows, metadata, more=()):
+        super().__init__(directory, _earlier_files(directory, metadata))
+        schemas = {name: self.add_schema(name, 'ros2msg', messages.definition(name))
+                   for name in dict.fromkeys(topic.type for topic in rows)}
+        self._channels = [self.add_channel('/' + topic.name, schemas[topic.type], {
+            'offered_qos_profiles': yaml.safe_dump(_qos(topic.rate), sort_keys=False),
+            'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)}) for topic in rows]
+        self._sequences = [0] * len(rows)
+        for name, content in (('pedestal', metadata), *dict(more).items()):
+            self.add_metadata(name, {str(key): str(value) for key, value in content.items()})
+        self.flush()
+
+    def write(self, topic, log_time, publish_time, data):
+        """Add a message: index of its topic, times [ns], CDR bytes."""
+        self._sequences[topic] = sequence = self._sequences[topic] + 1
+        self.add_message(self._channels[topic], sequence & 0xffffffff, log_time, publish_time, data)
+
+    def skip(self, topic, count):
+        """Leave a gap in the topic's sequence numbers: messages that were lost before they came here."""
+        self._sequences[topic] += count

@@ -1,0 +1,100 @@
+"""The floor of `pedestal bench graph`: bare rclpy nodes that pass the graph's messages and compute nothing.
+
+python -m pedestal_studies.bench.bare_ring ROLE STEPS, one process per role; the role `adu` prints the time of a lap.
+Same topics, types, QoS and executor as the graph, messages made once and published by rclpy itself.
+"""
+import json
+import sys
+import time
+
+from rclpy.node import Node
+
+from pedestal_common.graph import layouts, nodes, topics
+from pedestal_common.node import middleware, shell
+
+ROLES = ('tracking_receiver', 'acu', 'adu', 'recorder')
+TRIGGERS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
+WARM_UP = 300
+"""Laps before the clock starts."""
+
+
+def _filled(topic):
+    """An rclpy message with as many values as the graph's."""
+    type_name = topic.type
+    message = middleware.message_class(type_name)()
+    if type_name.endswith('JointState'):
+        message.name = list(topics.BY_NAME[topic.name].names)
+        for field in layouts.fields(topic.name):
+            setattr(message, field.name, [0.0] * len(message.name))
+    elif type_name.endswith('JointTrajectory'):
+        from trajectory_msgs.msg import JointTrajectoryPoint
+        message.joint_names = ['azimuth', 'elevation']
+        message.points = [JointTrajectoryPoint(positions=[0.0, 0.0], velocities=[0.0, 0.0], accelerations=[0.0, 0.0])]
+    return message
+
+
+class Ring(Node):
+    """A node of the ring: it passes on what comes on its trigger and drops everything else."""
+    awaits = 'its trigger'
+    spin = shell.Shell.spin
+
+    def __init__(self, role, steps):
+        super().__init__(role)
+        self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
+        step_topics = [link for link in nodes.recorded(ROLES) if link.rate == 'step']
+        profile = middleware.qos('step')
+        self.writers = [(self.create_publisher(middleware.message_class(topic.type), topic.name, profile),
+                         _filled(topic), len(nodes.readers(topic, ROLES)))
+                        for topic in step_topics if role in topic.writers]
+        for topic in step_topics:
+            kind = middleware.message_class(topic.type)
+            if role == 'recorder':
+                self.create_subscription(kind, topic.name, self.ignore, profile, raw=True)
+            elif role in topic.readers:
+                take = self.pass_on if TRIGGERS[role] == topic.name else self.ignore
+                self.create_subscription(kind, topic.name, take, profile)
+        if role == 'adu':
+            self.start_timer = self.create_timer(0.01, self.start)
+
+    def start(self):
+        """Send the first lap when every reader is there."""
+        if all(publisher.get_subscription_count() >= readers for publisher, _, readers in self.writers):
+            self.start_timer.cancel()
+            time.sleep(1.0)
+            self.send()
+
+    def ignore(self, _message):
+        """Read a message, no more."""
+
+    def draining(self):
+        """Nothing is waited for at the end."""
+        return False
+
+    def close(self):
+        """Nothing is left to do at the end."""
+
+    def pass_on(self, _message):
+        """Send what this node writes in a lap; the drive prints the time of a lap [us] after the last."""
+        self.lap += 1
+        if self.lap == WARM_UP:
+            self.begun = time.perf_counter()
+        if self.lap == self.steps + WARM_UP and self.get_name() == 'adu':
+            print(json.dumps({'lap_us': (time.perf_counter() - self.begun) / self.steps * 1e6}), flush=True)
+            self.finished = True
+            return
+        self.send()
+
+    def send(self):
+        """Publish every message of this node once."""
+        for publisher, message, _ in self.writers:
+            publisher.publish(message)
+
+
+def main(args=None) -> int:
+    """ROLE STEPS of the command line; the exit code."""
+    role, steps = (args or sys.argv[1:])[:2]
+    return shell.main(lambda: Ring(role, int(steps)), args=[])
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,187 @@
+"""The compiled core on this machine, against its targets, the same axis through scipy and the filters of filterpy."""
+import math
+import time
+
+import llvmlite.binding
+import numba
+import numpy as np
+from filterpy.kalman import IMMEstimator, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+
+from acu_tracker.estimation.filters import axis_filter, unscented
+from acu_tracker.estimation.filters.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
+from acu_tracker.estimation.params import FilterParameters, UkfParameters
+from acu_tracker.geometry.motion import AxisMotion, Motion
+from adu_drive import axis, drive_unit, lanes
+from adu_drive import unit as adu_unit
+from adu_drive.params import AduParameters
+from pedestal_analysis.results.results import row
+from pedestal_analysis.trials import ensemble
+from pedestal_bringup.loop import closed_loop, side_by_side
+from pedestal_bringup.scenario import scenario
+from pedestal_common.compiled import compiled
+from pedestal_common.parameters import build
+from pedestal_studies.bench import solve_ivp_axis
+from pedestal_studies.bench.table import best_of, show
+
+CORE_SECONDS, TRIAL_SECONDS = 20.0, 10.0
+SHORT, ROUNDS = 40, 100
+"""Drive steps that nobody else is likely to interrupt, and how often."""
+SUBSTEPS = 2 * 100
+"""Plant sub-steps of both axes in one drive step of 5 ms."""
+SOLVE_IVP_TICKS = 100
+
+
+@compiled
+def _drive_steps(state, constants, inputs, outputs, count):
+    for _ in range(count):
+        drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
+
+
+@compiled
+def _steps_on_lanes(drives, count):
+    moving = adu_unit.LANES(drives)
+    for _ in range(count):
+        drive_unit.step(moving.state, moving.constants, moving.inputs, moving.outputs)
+
+
+FILTER_STEPS = 20_000
+FILTERPY_STEPS = 500
+FILTER_PERIOD = 0.01
+
+
+def filter_step(**parameters):
+    """Time [us] of one prediction and correction of an axis_filter of FilterParameters on a noisy ramp."""
+    constants = axis_filter.constants(build(FilterParameters, parameters))
+    t = FILTER_PERIOD * np.arange(FILTER_STEPS)
+    y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
+    variance, state = np.full(FILTER_STEPS, 2.5e-7), np.zeros(1, axis_filter.FILTER)
+    _filter_steps(state, constants, t, y, variance)
+    return best_of(lambda: _filter_steps(state, constants, t, y, variance)) / FILTER_STEPS * 1e6
+
+
+@compiled
+def _filter_steps(state, constants, t, y, R):
+    f, c = state[0], constants[0]
+    axis_filter.start(f, c, y[0], R[0], 0.1)
+    for k in range(1, len(y)):
+        axis_filter.predict(f, c, t[k] - t[k - 1])
+        axis_filter.correct(f, c, AxisMeasurement(y[k], R[k], math.nan, math.nan))
+
+
+def unscented_step():
+    """Time [us] of one prediction and correction of both Cartesian filters, azimuth, elevation and range measured."""
+    state, constants = np.zeros(1, unscented.STATE), unscented.constants(UkfParameters())
+    noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
+    measured = noise + np.outer(FILTER_PERIOD * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
+    _unscented_steps(state, constants, measured)
+    return best_of(lambda: _unscented_steps(state, constants, measured)) / FILTER_STEPS * 1e6
+
+
+@compiled
+def _unscented_steps(state, constants, measured):
+    s, c = state[0], constants[0]
+    R = 2.5e-7
+    known = AxisVariances(R, 0.0, 0.01)
+    first = Estimate(Motion(AxisMotion(0.0, 0.0, 0.0), AxisMotion(0.3, 0.0, 0.0)), (known, known))
+    unscented.start(s, c, first, 500.0, 1.0)
+    for k in range(len(measured)):
+        A, E, r = measured[k]
+        unscented.predict(s, c, FILTER_PERIOD)
+        m = Measurement(0.0, (AxisMeasurement(A, R, math.nan, math.nan), AxisMeasurement(E, R, math.nan, math.nan)),
+                        r, 1.0)
+        unscented.innovation(s, m)
+        unscented.correct(s, m)
+
+
+def filterpy_unscented():
+    """filterpy's IMMEstimator of two UnscentedKalmanFilter of nine states, three numbers measured."""
+    def one():
+        made = UnscentedKalmanFilter(
+            9, 3, FILTER_PERIOD, lambda x: np.array([np.arctan2(x[0], x[1]), np.arctan2(x[2], np.hypot(x[0], x[1])),
+                                                     np.linalg.norm(x[:3])]),
+            lambda x, dt: F @ x, MerweScaledSigmaPoints(9, unscented.ALPHA, unscented.BETA, unscented.KAPPA))
+        made.x = np.array([0.0, 478.0, 148.0, 0.5, *np.zeros(5)])
+        made.Q, made.R = 0.01 * np.eye(9), np.diag([2.5e-7, 2.5e-7, 1.0])
+        return made
+
+    T = FILTER_PERIOD
+    F = np.kron([[1.0, T, 0.5 * T * T], [0.0, 1.0, T], [0.0, 0.0, 1.0]], np.eye(3))
+    return IMMEstimator([one(), one()], np.full(2, 0.5), np.array([[0.998, 0.002], [0.002, 0.998]]))
+
+
+def filterpy_steps():
+    """Times [us] of predict and update of filterpy's KalmanFilter of three states, and of IMMEstimator of three such
+    and of two unscented filters."""
+    def three():
+        made = KalmanFilter(3, 1)
+        made.F = np.array([[1.0, FILTER_PERIOD, 0.5 * FILTER_PERIOD**2], [0.0, 1.0, FILTER_PERIOD], [0.0, 0.0, 1.0]])
+        made.H, made.R, made.Q = np.array([[1.0, 0.0, 0.0]]), np.array([[2.5e-7]]), 1e-6 * np.eye(3)
+        return made
+
+    def steps(estimator, measured):
+        for _ in range(FILTERPY_STEPS):
+            estimator.predict()
+            estimator.update(measured)
+
+    chain = 0.001 + 0.997 * np.eye(3)
+    angle = np.zeros((1, 1))
+    cases = ((three(), angle), (IMMEstimator([three() for _ in range(3)], np.full(3, 1 / 3), chain), angle),
+             (filterpy_unscented(), np.array([0.0, 0.3, 500.0])))
+    return [best_of(lambda case=case: steps(*case), 3) / FILTERPY_STEPS * 1e6 for case in cases]
+
+
+def filter_rows():
+    """One step of one filter, of three interacting and of two unscented ones, against filterpy's in the same run."""
+    steps = (filter_step(kind='current_statistical'),
+             filter_step(**{'kind': 'imm', 'imm.models': 'cv ca current_statistical'}), unscented_step())
+    rows = []
+    for metric, ours, target, theirs in zip(('kalman', 'imm3', 'imm_ukf'), steps, ('<= 2', '<= 10', None),
+                                            filterpy_steps()):
+        rows += [row('core', f'{metric}_step_us', ours, 'us', target),
+                 row('filterpy', f'{metric}_step_us', theirs, 'us'),
+                 row('filterpy', f'{metric}_ratio', theirs / ours, '')]
+    return rows
+
+
+def drive_rows():
+    """One drive beside as many as there are lanes, by turns; whole trials on lanes, by the time of one core."""
+    params = AduParameters(initial_elevation=0.7)
+    one = np.zeros(1, adu_unit.RECORD)
+    one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)
+    one['inputs']['azimuth']['rate'], one['inputs']['elevation']['rate'], one['inputs']['enable'] = 0.02, -0.01, 1
+    drives, (state, constants, inputs, outputs) = lanes.beside(one), (
+        one[name] for name in ('state', 'constants', 'inputs', 'outputs'))
+    _drive_steps(state, constants, inputs, outputs, 200)
+    _steps_on_lanes(drives, 200)
+    alone, together = zip(*((best_of(lambda: _drive_steps(state, constants, inputs, outputs, SHORT), 1),
+                             best_of(lambda: _steps_on_lanes(drives, SHORT), 1)) for _ in range(ROUNDS)))
+    substep = min(alone) / SHORT / SUBSTEPS * 1e9
+    on_lanes = min(together) / SHORT / SUBSTEPS / lanes.WIDTH * 1e9
+    trials = [scenario.load('leo_pass', seed=seed, duration=TRIAL_SECONDS) for seed in range(lanes.WIDTH)]
+    side_by_side.runs([closed_loop.Loop(trial) for trial in trials], ensemble.TOPICS)
+    seconds = math.inf
+    for _ in range(3):
+        loops, begun = [closed_loop.Loop(trial) for trial in trials], time.process_time()
+        side_by_side.runs(loops, ensemble.TOPICS)
+        seconds = min(seconds, time.process_time() - begun)
+    return [row('core', 'substep_ns', substep, 'ns', '<= 45'), row('lanes', 'substep_ns', on_lanes, 'ns', '<= 8'),
+            row('lanes', 'ratio', substep / on_lanes, '-', '>= 4'),
+            row('lanes', 'realtime_factor', lanes.WIDTH * TRIAL_SECONDS / seconds, '', '>= 1000')]
+
+
+def run():
+    """Print the table and return its rows."""
+    drives = drive_rows()
+    loop = scenario.load('ship_pass', duration=CORE_SECONDS)
+    closed_loop.Loop(loop).run()
+    loops = [closed_loop.Loop(loop) for _ in range(5)]
+    factor = CORE_SECONDS / best_of(lambda: loops.pop().run())
+
+    tick = axis.CURRENT_PERIOD
+    scipy_time = best_of(lambda: solve_ivp_axis.run(AduParameters().azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)
+    scipy_substep = scipy_time / SOLVE_IVP_TICKS / 2 * 1e9
+    rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'),
+            row('solve_ivp', 'substep_ns', scipy_substep, 'ns'),
+            row('solve_ivp', 'ratio', scipy_substep / drives[0]['value'], ''), *filter_rows()]
+    show(f'compiled core, one core of {llvmlite.binding.get_host_cpu_name()}, numba {numba.__version__}', rows)
+    return rows

@@ -1,0 +1,79 @@
+"""The lockstep ring against its floor, the bare ring, interleaved on this machine; latency of the ring in realtime."""
+import contextlib
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+from pedestal_analysis.results.results import row
+from pedestal_bringup.graph import graph
+from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.program import Plan
+from pedestal_recording import bag
+from pedestal_studies.bench import bare_ring
+from pedestal_studies.bench.table import show
+
+ROUNDS = 3
+RING_STEPS = 3000
+RUN_SECONDS = 15.0
+LATENCY_SECONDS = 10.0
+
+
+def bare_lap():
+    """Lap time [us] of the bare ring: as many processes, the same messages, no work."""
+    processes = {role: subprocess.Popen([sys.executable, '-m', bare_ring.__name__, role, str(RING_STEPS)],
+                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                 for role in bare_ring.ROLES}
+    try:
+        output, complaint = processes['adu'].communicate(timeout=120.0)
+    except subprocess.TimeoutExpired:
+        raise RuntimeError('the bare ring did not close within 120 s') from None
+    finally:
+        for process in processes.values():
+            process.kill()
+            process.wait()
+    if not output:
+        raise RuntimeError(f'the bare ring failed: {complaint.strip()}')
+    return json.loads(output.splitlines()[-1])['lap_us']
+
+
+def graph_run(folder, number, pacing, seconds):
+    """(start.Outcome, bag folder) of a run of the demo scenario."""
+    path = pathlib.Path(folder) / f'run-{number}'
+    chosen = scenario.load('leo_pass', pacing=pacing, duration=seconds)
+    return graph.run(Plan(chosen), path, contextlib.nullcontext(lambda seconds: None)), path
+
+
+def latencies(path):
+    """Wall-clock times [s] from the publication of joint_states(t_k) to that of rate_command(t_k), a realtime bag."""
+    sent = {topic: {log: published for _, log, published, _ in bag.read(path).raw(topic)}
+            for topic in ('joint_states', 'acu/rate_command')}
+    return np.array([(published - sent['joint_states'][stamp]) * 1e-9
+                     for stamp, published in sent['acu/rate_command'].items() if stamp in sent['joint_states']])
+
+
+def run():
+    """Print the table and return its rows."""
+    bare, laps, factors = [], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(ROUNDS):
+            bare.append(bare_lap())
+            result, _ = graph_run(folder, number, 'lockstep', RUN_SECONDS)
+            laps.append(result.drive['wall_s'] / result.drive['steps'] * 1e6)
+            factors.append(result.drive['realtime_factor'])
+        result, path = graph_run(folder, 'realtime', 'realtime', LATENCY_SECONDS)
+        latency = latencies(path)
+    lap, floor = statistics.median(laps), statistics.median(bare)
+    rows = [row('graph', 'lap_us', lap, 'us'), row('graph', 'bare_ring_us', floor, 'us'),
+            row('graph', 'ratio', lap / floor, '', '<= 1.25'),
+            row('graph', 'realtime_factor', statistics.median(factors), '', '>= 4'),
+            row('realtime', 'latency_p50_us', float(np.percentile(latency, 50)) * 1e6, 'us'),
+            row('realtime', 'latency_p99_us', float(np.percentile(latency, 99)) * 1e6, 'us'),
+            row('realtime', 'lost_steps', result.drive['lost_steps'], '')]
+    show(f'lockstep ring, median of {ROUNDS} interleaved rounds, {len(os.sched_getaffinity(0))} cores', rows)
+    return rows

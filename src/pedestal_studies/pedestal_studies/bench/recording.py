@@ -1,0 +1,102 @@
+"""The recorder, verify and recompute on this machine, against its disk and bare deserialisation."""
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+from pedestal_analysis.reprocess import recompute, replay
+from pedestal_analysis.results.results import row
+from pedestal_common.wire import messages
+from pedestal_recording import bag
+from pedestal_recording.verify import verify
+from pedestal_studies.bench.lockstep import graph_run
+from pedestal_studies.bench.table import best_of, show
+
+ROUNDS = 3
+BAG_SECONDS = 30.0
+TRAFFIC = 5.0
+"""Times the traffic of the demo in real time that the recorder is given."""
+DISK_BYTES = 200_000_000
+
+
+def recorded(path, again, rate):
+    """(messages/s, lost, CPU time over wall time) of a recorder given a bag's messages, rate times real time."""
+    with open(pathlib.Path(again).with_suffix('.log'), 'w+') as log:
+        recorder = subprocess.Popen([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args',
+                                     '--params-file', str(path.with_name(path.name + '.log') / 'parameters.yaml'),
+                                     '-p', f'recorder:bag:={again}'], stdout=log, stderr=subprocess.STDOUT)
+        begun = []
+        try:
+            result = replay.replay(path, replay.ReplayOptions(rate=rate), lambda: begun.extend(
+                (time.perf_counter(), _cpu_time(recorder.pid))))
+            if result.ended != 'whole':
+                raise KeyboardInterrupt
+            _, status, used = os.wait4(recorder.pid, 0)
+            wall = time.perf_counter() - begun[0]
+            recorder.returncode = os.waitstatus_to_exitcode(status)
+        finally:
+            if recorder.returncode is None:
+                recorder.kill()
+                recorder.wait()
+        log.seek(0)
+        lines = log.read().splitlines()
+    if recorder.returncode:
+        raise RuntimeError(f'the recorder failed: {lines[-1] if lines else recorder.returncode}')
+    report = json.loads(lines[-1])
+    return report['messages'] / wall, report['lost'], (used.ru_utime + used.ru_stime - begun[1]) / wall
+
+
+def _cpu_time(pid):
+    """CPU time [s] a process has used."""
+    fields = pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+
+def disk_rate(folder):
+    """Bytes/s that a file of the folder takes, all of it on the disk in the end."""
+    block = os.urandom(1_000_000)
+
+    def fill():
+        with open(pathlib.Path(folder) / 'block', 'wb', buffering=0) as file:
+            for _ in range(DISK_BYTES // len(block)):
+                file.write(block)
+            os.fsync(file.fileno())
+    return DISK_BYTES / best_of(fill, 3)
+
+
+def run():
+    """Print the table and return its rows: the recorder under TRAFFIC, and given all at once."""
+    with tempfile.TemporaryDirectory() as folder:
+        _, path = graph_run(folder, 'demo', 'lockstep', BAG_SECONDS)
+        rate, lost, load = recorded(path, f'{folder}/paced', TRAFFIC)
+        limit, lost_at_limit, _ = recorded(path, f'{folder}/flooded', 1e6)
+        content = bag.read(path)
+        raw = [(content.topics[name], data) for name, _, _, data in content.raw()]
+        count, size = len(raw), content.file.stat().st_size
+        checked = count / best_of(lambda: verify(bag.load(path)), 3)
+        scanned = count / best_of(lambda: bag.read(path), 3)
+        read = count / best_of(lambda: [messages.deserialize(data, kind) for kind, data in raw], 3)
+        disk = disk_rate(folder)
+        factor = statistics.median(recompute.measure(path) for _ in range(ROUNDS))
+    rows = [row('record', 'messages_per_s', rate, '1/s'), row('record', 'lost', lost, '', '0'),
+            row('record', 'cpu_percent', 100.0 * load, '%'),
+            row('record', 'bytes_per_message', size / count, 'B'),
+            row('record', 'cdr_bytes_per_message', sum(len(data) for _, data in raw) / count, 'B'),
+            row('record', 'limit_messages_per_s', limit, '1/s'), row('record', 'limit_lost', lost_at_limit, '', '0'),
+            row('record', 'disk_messages_per_s', disk / (size / count), '1/s'),
+            row('verify', 'messages_per_s', checked, '1/s'),
+            row('verify', 'scan_messages_per_s', scanned, '1/s'),
+            row('verify', 'deserialise_messages_per_s', read, '1/s'),
+            row('recompute', 'realtime_factor', factor, '', '>= 100')]
+    show(f'bags: {count} messages of the demo, {BAG_SECONDS:g} s, recorded again at {TRAFFIC:g} x real time', rows)
+    print(f'record: given all at once, the recorder and whoever feeds it reach {limit:.0f} messages/s, '
+          f'{limit * BAG_SECONDS / count:.0f} x the demo; the disk ({disk / 1e6:.0f} MB/s) would take '
+          f'{disk * count / size:.0f}.\n'
+          f'The limit is their own work per message, at {limit * size / count / disk:.2%} of the disk.\n'
+          f'verify: {checked / scanned:.0%} of what finding the messages in the file allows; to deserialise them all '
+          f'would allow {read:.0f} messages/s.')
+    return rows

@@ -1,0 +1,1 @@
+"""The numbers that the documentation prints, and where each comes from."""

@@ -1,0 +1,321 @@
+"""The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made of them.
+
+`python -m pedestal_studies.numbers.published` (make numbers) runs the studies and writes the rows that the tables use,
+with names of studies those of them only; make docs writes the tables from those.
+"""
+import inspect
+import json
+import math
+import pathlib
+import sys
+
+import pedestal_studies
+from pedestal_analysis import console
+from pedestal_analysis.results.intervals import missed
+from pedestal_analysis.trials import monte_carlo
+from pedestal_studies.numbers import claims
+from pedestal_studies.papers import (
+    alignment,
+    imm_feedforward,
+    manoeuvre,
+    pareto,
+    phased_array,
+    rate_measurement,
+    telemetry_flight,
+)
+from pedestal_studies.rigs.feedforward_loop import REVERSALS
+from pedestal_studies.rigs.profiles import PROFILES
+from pedestal_studies.system import acquisition, budget, filters
+
+FILE = 'docs/rows.json'
+
+SEEN = (
+    ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
+    ('the same, largest', 'leo_pass', 'pointing_max_deg'),
+    ("the rms over the receiver's single-sample noise", 'leo_pass', 'pointing_to_noise'),
+    ('`ship_pass`, sea state 5, INS one step late: rms', 'ship_pass', 'pointing_rms_deg'),
+    ('the same over that of `leo_pass`', 'ship_pass', 'pointing_to_leo_pass'),
+    ('the same, INS 20 ms late (`ins.latency=0.02`)', 'ship_pass-late', 'pointing_to_leo_pass'),
+    ("isolation from the ship's rotation", 'ship_pass', 'isolation_db'),
+    ('what noise alone would show', 'ship_pass', 'isolation_limit_db'),
+    ('isolation without noise', 'ship_pass-quiet', 'isolation_db'),
+    ('`ship_pass_ss6`: rms over that of `leo_pass`', 'ship_pass_ss6', 'pointing_to_leo_pass'),
+    ('isolation', 'ship_pass_ss6', 'isolation_db'),
+    ('`ship_overhead`: time outside half a beamwidth', 'ship_overhead', 'loss_s'),
+    ('the same over what is announced before the slew', 'ship_overhead', 'loss_to_predicted'),
+    ('`ship_align_and_track`: heading from 180 deg wrong to a stated 0.2 deg', 'ship_align_and_track', 'aligned_s'),
+    ('heading error from then on, rms', 'ship_align_and_track', 'heading_error_rms_deg'),
+    ('autotrack after that', 'ship_align_and_track', 'autotrack_after_alignment_s'),
+    ('`uav_flyby`, 500 m: noise of a sample over that of the estimate, cross-elevation', 'uav_flyby',
+     'noise_reduction_cross_elevation'),
+    ('the same, elevation', 'uav_flyby', 'noise_reduction_elevation'),
+    ('at 60 m (`pedestal study scenarios` says how), cross-elevation', 'uav_flyby-60m',
+     'noise_reduction_cross_elevation'),
+    ('the same, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
+"""(what, case, metric) of the study scenarios in docs/measured.md."""
+HEADLINE = (
+    ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
+    ("the same over the receiver's single-sample noise", 'leo_pass', 'pointing_to_noise'),
+    ('a UAV at 500 m: noise of a sample over that of the estimate, elevation', 'uav_flyby',
+     'noise_reduction_elevation'),
+    ('the pass from a ship in sea state 5: its rms over that ashore', 'ship_pass', 'pointing_to_leo_pass'),
+    ('from a ship in sea state 6: isolation from its rotation', 'ship_pass_ss6', 'isolation_db'))
+"""The few of them in README.md."""
+
+
+class Rows(dict):
+    """{(study, case, metric): row}; `used` are the keys that were asked for."""
+
+    def __init__(self, rows):
+        super().__init__(rows)
+        self.used = {}
+
+    def __getitem__(self, key):
+        self.used[key] = super().__getitem__(key)
+        return self.used[key]
+
+
+def of_studies(rows_of):
+    """Rows of {study: its rows}."""
+    return Rows({(study, row['case'], row['metric']): row for study, rows in rows_of.items() for row in rows})
+
+
+def read(root='.'):
+    """The Rows in FILE of a checkout."""
+    return of_studies(json.loads(pathlib.Path(root, FILE).read_text()))
+
+
+def write(rows, root='.'):
+    """Write the rows that all tables use into FILE."""
+    for table in TABLES.values():
+        table(rows)
+    lines = {}
+    for (study, *_), row in sorted(rows.used.items()):
+        lines.setdefault(study, []).append('  ' + json.dumps(row))
+    content = ',\n'.join(f' "{study}": [\n' + ',\n'.join(of) + ']' for study, of in lines.items())
+    pathlib.Path(root, FILE).write_text('{\n' + content + '\n}\n')
+
+
+def _cells(row):
+    """Texts of a row: its value with the unit, its interval, its runs."""
+    value = f'{console.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
+    return value, console.interval(row), str(row.get('runs', ''))
+
+
+def _asked(row):
+    return f'{row["target"] or ""}{" MISSED" if missed(row) else ""}'.strip()
+
+
+def _spread(row):
+    """The mean of a row and half its interval to two digits, 'a +- b'; the mean alone where all runs give the same."""
+    half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
+    if half <= 1e-9 * abs(row['value']):
+        return console.number(row['value'])
+    decimals = max(0, 1 - math.floor(math.log10(half)))
+    return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
+
+
+def seen_table(seen):
+    """rows -> the table of what is said of the scenarios, SEEN or HEADLINE."""
+    def table(rows):
+        of = [rows['scenarios', case, metric] for _, case, metric in seen]
+        return ('what', 'mean', '95 % interval', 'seeds', 'asked'), [
+            (what, *_cells(row), _asked(row)) for (what, *_), row in zip(seen, of)]
+    return table
+
+
+def claim_table(paper):
+    """rows -> the table of the claims of a paper."""
+    def table(rows):
+        lines = []
+        for claim in claims.PAPERS[paper]:
+            where, asked, cells = '', '', ('', '', '')
+            if claim.study:
+                row = rows[claim.study, claim.case, claim.metric]
+                where, asked, cells = f'{claim.study}: {claim.case}', _asked(row), _cells(row)
+            lines.append((claim.claim, claim.reading, *cells, asked, where))
+        return ('claim', 'reading', 'ours', '95 % interval', 'runs', 'asked', 'study: case'), lines
+    return table
+
+
+COLOURED = filters.SHOWN.replace('white', 'coloured')
+FILTER_METRICS = ('angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'rate_over_sigma')
+
+
+def filter_numbers(rows):
+    """Angle rms, reduction and rate rms of every filter on every motion."""
+    lines = []
+    for name in filters.SHOWN_FILTERS:
+        on = [profile for profile in PROFILES
+              if ('filters', f'{profile}/{name}/{filters.SHOWN}', 'reduction') in rows]
+        lines += [(name, profile, *(_spread(rows['filters', f'{profile}/{name}/{filters.SHOWN}', metric])
+                                    for metric in FILTER_METRICS),
+                   _spread(rows['filters', f'{profile}/{name}/{COLOURED}', 'reduction'])) for profile in on]
+    return ('filter', 'motion', 'angle rms deg', 'reduction', 'rate rms deg/s', 'mean NIS',
+            'rate error over own sigma', 'reduction of noise within 5 Hz'), lines
+
+
+def manoeuvre_numbers(rows):
+    """Errors of rate and acceleration inside every reversal."""
+    lines = [(name, f'{reversal:g} s', *(_spread(rows['manoeuvre', f'reversal-{reversal:g}s/{name}', metric])
+                                         for metric in ('rate_rms_deg_s', 'acceleration_rms_deg_s2')))
+             for name in manoeuvre.FILTERS for reversal in manoeuvre.REVERSALS]
+    return ('filter', 'reversal', 'rate deg/s', 'acceleration deg/s2'), lines
+
+
+def feedforward_numbers(rows):
+    """Miss and rate noise of the sources of paper 003's feed-forward."""
+    lines = []
+    for axis in REVERSALS:
+        for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state', 'kalman-ca-40-predicted'):
+            case = f'{axis}/{name}'
+            ratio = _spread(rows['imm-feedforward', case, 'miss_ratio_at_equal_rate_noise']) if (
+                case in imm_feedforward.RATIOS) else ''
+            lines.append((case, *(_spread(rows['imm-feedforward', case, metric]) for metric in (
+                'miss_rms_deg', 'rate_noise_deg_s')), ratio))
+        lines += [(case, _spread(rows['imm-feedforward', case, 'miss_rms_deg']), '', '')
+                  for case in imm_feedforward.DRIVE_CASES if case.startswith(axis)]
+    return ('case', 'miss rms deg', 'rate noise deg/s', 'x less than a conventional filter of equal rate noise'), lines
+
+
+def matrix_table(rows):
+    """The matrices of paper 004's proof of stability, in seconds, with rank and condition."""
+    lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
+              *(console.number(rows['telemetry-flight', name, metric]['value'])
+                for metric in ('rank', 'condition', 'condition_in_seconds')))
+             for name, (matrix, _) in telemetry_flight.matrices().items()]
+    return ('matrix', 'its lines, in seconds', 'rank', 'condition, time in T', 'in seconds'), lines
+
+
+def pareto_numbers(rows):
+    """What is left of the miss by any tuning of a filter, and at the rate noise of the IMM."""
+    lines = [(name, *(_spread(rows['pareto', name, metric]) for metric in (
+        'least_miss_deg', 'rate_noise_at_least_miss_deg_s')),
+        _spread(rows['pareto', name, 'miss_ratio_at_equal_rate_noise'])
+        if ('pareto', name, 'miss_ratio_at_equal_rate_noise') in rows else '') for name in pareto.TUNINGS]
+    return ('filter', 'least miss of any tuning, deg', 'rate noise then, deg/s',
+            'miss over that of imm-predicted, with its rate noise'), lines
+
+
+def flyby_numbers(rows):
+    """Errors on the 60 m flyby with a rate that is measured, or differenced from the angles."""
+    lines = [(name, *(_spread(rows['rate-measurement', f'{rate_measurement.PROFILE}/{name}', metric])
+                      for metric in ('angle_rms_deg', 'rate_rms_deg_s'))) for name in rate_measurement.FLYBYS]
+    return ('rate', 'angle rms deg', 'rate rms deg/s'), lines
+
+
+def alignment_numbers(rows):
+    """The methods of alignment beside the information limit."""
+    metrics = ('time_to_12arcmin_rms_s', *(f'azimuth_rms_arcmin_{t}s' for t in (100, 250, 300, 600)),
+               'level_rms_arcmin')
+    swell = [f'azimuth_{metric}_{alignment.SWELL_TIME}s' for metric in ('rms_arcmin', 'error_over_sigma')]
+    lines = [(name, *(_spread(rows['alignment', name, metric]) for metric in metrics),
+              *(_spread(rows['alignment', f'{name}/swell', metric]) for metric in swell)) for name in alignment.CASES]
+    return ('method', 'below 12 arcmin, s', '100 s', '250 s', '300 s', '600 s', 'level', 'on swell, 200 s',
+            'the same over own sigma'), [
+        *lines, ('limit', *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
+
+
+def acquisition_numbers(rows):
+    """How long acquisition takes, and how often it succeeds."""
+    lines = []
+    for case in acquisition.CASES:
+        if case == 'steptrack_geo':
+            continue
+        time, found, least = (rows['acquisition', case, metric] for metric in (
+            'tracked_after_s', 'found_percent', 'found_percent_low'))
+        lines.append((f'`{case}`', *_cells(time), f'{found["value"]:.0f} %', f'{least["value"]:.1f} %',
+                      _asked(found)))
+    loss, off = (rows['acquisition', 'steptrack_geo', metric] for metric in (
+        'level_loss_rms_db', 'pointing_max_beamwidths'))
+    return ('case', 'tracked after', '95 % interval', 'runs', 'found', 'at least', 'asked'), [
+        *lines, ('`steptrack_geo`: level lost after 90 s, rms', *_cells(loss), '', '', _asked(loss)),
+        ('the same: largest error', *_cells(off), '', '', '')]
+
+
+ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms', 'best')
+
+
+def array_numbers(rows):
+    """True errors of the loops of paper 002's plant without noise, and the jitter that noise adds."""
+    lines = []
+    for case in (*(f'{loop}/{target}' for loop in ARRAY_LOOPS for target in ('ramp', 'sine', 'sway')
+                   if target == 'sway' or not loop.endswith('-delta')),
+                 *phased_array.INS_LOOPS, *phased_array.GRAPH):
+        isolation = _spread(rows['phased-array', case, 'isolation_db']) if (
+            'phased-array', case, 'isolation_db') in rows else ''
+        lines.append((case, _spread(rows['phased-array', case, 'max_error_deg']), isolation,
+                      _spread(rows['phased-array', case, 'jitter_rms_deg'])))
+    return ('loop', 'largest error without noise, deg', 'isolation dB', 'jitter rms deg'), lines
+
+
+MILLI = 1e3
+
+
+def _milli(row):
+    """A row in degrees as millidegrees, mean and half its interval."""
+    return _spread({key: value * MILLI if key in ('value', 'ci_low', 'ci_high') else value
+                    for key, value in row.items()})
+
+
+def budget_table(mode):
+    """rows -> the error budget of a mode: each term alone, then what they add up to."""
+    sums = {'systematic': ('', 'the systematic ones, added as signed vectors'),
+            'whole': ('', 'the run with everything on')}
+
+    def table(rows):
+        kinds = {**{name: ('systematic', doc) for name, doc in budget.documented(mode, random=False).items()},
+                 **{name: ('random', doc) for name, doc in budget.documented(mode, random=True).items()}, **sums}
+        lines = [(name, kind, doc, *(_milli(rows['budget', f'{mode}/{name}', metric]) for metric in (
+            'cross_elevation_rms_deg', 'elevation_rms_deg', 'rms_deg'))) for name, (kind, doc) in kinds.items()]
+        whole = lines.pop()
+        ratio = rows['budget', f'{mode}/combined', 'to_whole']
+        combined = ('combined', '', f'all of it; over the whole {_spread(ratio)}, asked {_asked(ratio)}', '', '',
+                    _milli(rows['budget', f'{mode}/combined', 'rms_deg']))
+        return ('term', 'kind', 'what it is', 'cross-elevation, mdeg rms', 'elevation', 'together'), [
+            *lines, combined, whole]
+    return table
+
+
+def direction_table(mode):
+    """rows -> the systematic contributions of a mode along the pass, both axes with their signs."""
+    def table(rows):
+        cases = [f'{mode}/{time}s' for time in budget.TIMES]
+        head = [f'az {rows["budget", case, "azimuth_deg"]["value"]:.0f}, '
+                f'el {rows["budget", case, "elevation_deg"]["value"]:.0f} deg' for case in cases]
+        names = [*budget.documented(mode, random=False), 'systematic']
+        return ('term', *head), [
+            (name, *(', '.join(f'{MILLI * rows["budget", case, f"{name}_{axis}_deg"]["value"]:+.2f}'
+                               for axis in budget.ACROSS) for case in cases)) for name in names]
+    return table
+
+
+TABLES = {'results over seeds': seen_table(SEEN), 'headline results': seen_table(HEADLINE),
+          **{f'budget of {mode}': budget_table(mode) for mode in budget.MODES},
+          **{f'directions of {mode}': direction_table(mode) for mode in budget.MODES},
+          **{f'claims of paper {paper}': claim_table(paper) for paper in claims.PAPERS},
+          'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
+          'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
+          'acquisition': acquisition_numbers, 'array loops': array_numbers, 'matrices': matrix_table}
+"""{name: rows -> (head, lines)}."""
+
+STUDIES = tuple(dict.fromkeys((*(claim.study for of in claims.PAPERS.values() for claim in of if claim.study),
+                               'filters', 'pareto', 'scenarios', 'budget', 'acquisition')))
+
+
+def main(names=(), root='.') -> int:
+    """Run the STUDIES of these names, by default all, with their own number of runs, and write FILE; the rows of the
+    others stay."""
+    rows_of = json.loads(pathlib.Path(root, FILE).read_text()) if names else {}
+    with monte_carlo.Pool() as pool, console.progress_of_share() as progress:
+        for name in names or STUDIES:
+            study = pedestal_studies.study(name)
+            many = {'pool': pool} if 'pool' in inspect.signature(study.run).parameters else {}
+            print(name, flush=True)
+            rows_of[name] = study.run(progress, **many).rows
+    write(of_studies(rows_of), root)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,266 @@
+"""Backlash: standstill, reversal and fast moves under the bias schedules, two speed loops against one.
+
+With the paper's controller (the scenarios as they are): bias-off, bias-on (5 Nm, fading, as in paper 000),
+hold-fade. With the controller `best` of the study servo: every schedule, sine and fast step. Every case is
+`pedestal run servo_step|servo_sine --param ...` too (Case.command).
+"""
+import math
+
+import numpy as np
+
+from pedestal_analysis.report.figures import FILTERED, INK, RAW, TRUTH
+from pedestal_analysis.results import tracking
+from pedestal_analysis.results.intervals import row
+from pedestal_analysis.trials import cases
+from pedestal_analysis.trials.cases import Case
+from pedestal_studies.papers import servo
+from pedestal_studies.rigs import drawing, metrics
+from pedestal_studies.rigs.rows import Result
+
+SETTLED = 2.0
+"""Standstill is evaluated from this time on after a step [s]."""
+
+REVERSAL_AMPLITUDE = 0.05
+"""Sine of the reversals [rad]."""
+
+REVERSALS = {'reversal': 0.2, 'fast_reversal': 4.0}
+"""Its angular frequency [rad/s]: slow, so that only lash is left; 0.2 rad/s at its peak, where friction joins in."""
+
+
+def bias(schedule, torque=12.0, hold=14.0, out=45.0):
+    """Parameters of a bias schedule, torques per motor [Nm]."""
+    return {'adu.azimuth.bias.schedule': schedule, 'adu.azimuth.bias.torque': torque,
+            'adu.azimuth.bias.hold': hold, 'adu.azimuth.bias.out': out}
+
+
+PAPER_CASES = {'bias-off': bias('off'), 'bias-on': {}, 'hold-fade': bias('hold_fade')}
+
+SCHEDULES = {
+    'off': bias('off'), 'constant-5': bias('constant', 5.0), 'constant-12': bias('constant', 12.0),
+    'fade-5': bias('fade', 5.0, 0.0, 30.0), 'fade-12': bias('fade', 12.0, 0.0, 30.0), 'hold-fade': bias('hold_fade')}
+
+STRUCTURES = {
+    'mean-speed': {'adu.azimuth.speed_loop.structure': 'mean'},
+    'independent-loops': {'adu.azimuth.speed_loop.structure': 'independent'}}
+
+TARGETS = {
+    ('bias-off', 'standstill_peak_to_peak_rad'): '> 5e-4', ('bias-on', 'standstill_peak_to_peak_rad'): '< 2e-6',
+    ('hold-fade', 'standstill_peak_to_peak_rad'): '< 2e-6', ('bias-on', 'reversal_ratio_off_to_on'): '> 30',
+    ('hold-fade', 'reversal_ratio_off_to_on'): '> 30',
+    ('hold-fade', 'sine_residual_rad'): '<= 1e-4', ('hold-fade', 'step_overshoot_percent'): '<= 2.5'}
+
+
+def standstill_case(name):
+    """The Case of a step and the standstill after it."""
+    return Case(name, 'servo_step', PAPER_CASES[name], SETTLED + 1.0)
+
+
+def reversal_case(kind, name):
+    """The Case of three periods of a sine of REVERSALS."""
+    return cases.sine_case(Case(name, 'servo_sine', {
+        **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE}),
+        REVERSALS[kind], 3)
+
+
+def fast_case(name):
+    """The Case of a step at 40 rad/s2, which needs all torque."""
+    return Case(name, 'servo_step', {**servo.FULL_TORQUE, 'acu.azimuth.shaper.acceleration': 40.0, **SCHEDULES[name]})
+
+
+def sine_case(name):
+    """The Case of the sine of 0.4 Hz."""
+    return Case(name, 'servo_sine', {**servo.BEST, **SCHEDULES[name]})
+
+
+MOVED = 0.5
+"""The step of the two structures is over by then [s]."""
+
+
+def structure_case(name):
+    """The Case of a step with one speed loop, or one for each motor."""
+    return Case(name, 'servo_step', STRUCTURES[name], SETTLED)
+
+
+def standstill(record):
+    """(times [s], load angle [rad]) from SETTLED on."""
+    late = record.t >= SETTLED
+    return record.t[late], record['adu/truth']['position'][late, 0]
+
+
+def steady_residual(record, amplitude, w):
+    """(times [s], error without its fundamental w [rad/s], (n,) [rad]) over the whole periods after the first."""
+    t, period = record.t, 2.0 * math.pi / w
+    error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
+    steady = metrics.whole_periods(t, period, period)
+    return t[steady], metrics.residual(t[steady], error[steady], period)
+
+
+def fight(record):
+    """Torque (n,) [Nm] with which the motors oppose each other beyond the commanded bias."""
+    motors = record['adu/motor_states']['effort'][:, :2]
+    return 0.5 * (motors[:, 0] - motors[:, 1]) - record.truth['bias'][:, 0]
+
+
+def synchronism_error(record):
+    """Measured speed of motor 1 less that of motor 2 (n,) [rad/s]."""
+    return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
+
+
+CASES = {('standstill', name): standstill_case(name) for name in PAPER_CASES}
+CASES |= {(kind, name): reversal_case(kind, name) for kind in REVERSALS for name in PAPER_CASES}
+CASES |= {('sine', name): sine_case(name) for name in SCHEDULES}
+CASES |= {('step', name): fast_case(name) for name in SCHEDULES}
+CASES |= {('structure', name): structure_case(name) for name in STRUCTURES}
+
+
+def measured(kind, name, record):
+    """{metric: (value, unit)} of one record."""
+    if kind == 'standstill':
+        return {'standstill_peak_to_peak_rad': (np.ptp(standstill(record)[1]), 'rad')}
+    if kind in REVERSALS:
+        left = steady_residual(record, REVERSAL_AMPLITUDE, REVERSALS[kind])[1]
+        return {f'{kind}_error_rad': (metrics.peak(left), 'rad')}
+    if kind == 'sine':
+        left = steady_residual(record, servo.AMPLITUDE, servo.FREQUENCIES['0p4hz'])[1]
+        return {'sine_residual_rad': (metrics.peak(left), 'rad')}
+    if kind == 'step':
+        overshoot = metrics.overshoot_percent(record['adu/truth']['position'][:, 0], servo.STEP)
+        return {'step_overshoot_percent': (overshoot, '%')}
+    moving = record.t < MOVED
+    return {'fight_torque_rms_nm': (tracking.rms(fight(record)[~moving]), 'Nm'),
+            'synchronism_error_rms_rad_s': (tracking.rms(synchronism_error(record)[~moving]), 'rad/s'),
+            'move_fight_torque_rms_nm': (tracking.rms(fight(record)[moving]), 'Nm'),
+            'move_synchronism_error_rms_rad_s': (tracking.rms(synchronism_error(record)[moving]), 'rad/s')}
+
+
+def rows(done):
+    """The rows of records {(kind, case): closed_loop.Run}, all or some."""
+    table = []
+    for (kind, name), record in done.items():
+        values = measured(kind, name, record)
+        if kind in REVERSALS and name != 'bias-off' and (kind, 'bias-off') in done:
+            without = measured(kind, 'bias-off', done[kind, 'bias-off'])[f'{kind}_error_rad'][0]
+            values[f'{kind}_ratio_off_to_on'] = without / values[f'{kind}_error_rad'][0], ''
+        case = f'schedule-{name}' if kind in ('sine', 'step') and name != 'hold-fade' else name
+        table += [row(case, metric, value, unit, target=TARGETS.get((name, metric)))
+                  for metric, (value, unit) in values.items()]
+    return table
+
+
+def run(progress) -> Result:
+    """Run all CASES."""
+    done = {}
+    for i, (key, case) in enumerate(CASES.items()):
+        progress(i / len(CASES), f'{key[0]}: {key[1]}')
+        done[key] = case.run()
+    return Result(rows(done), figures(done), remarks(rows(done)))
+
+
+def remarks(table):
+    """Sentences that the rows need; table: those rows."""
+    values = {(row['case'], row['metric']): row['value'] for row in table}
+    return [
+        f'reversal is the sine {REVERSAL_AMPLITUDE:g} rad sin({REVERSALS["reversal"]:g} t); fast_reversal goes '
+        f'through it at up to {REVERSAL_AMPLITUDE * REVERSALS["fast_reversal"]:g} rad/s. What bias leaves of the fast '
+        'one is the friction that changes its sign, no lash: its ratio is '
+        f'{values["bias-on", "fast_reversal_ratio_off_to_on"]:.0f}, not '
+        f'{values["bias-on", "reversal_ratio_off_to_on"]:.0f}.',
+        'The overshoot of the fast step hardly depends on the schedule: the shaper ends the move gently. A constant '
+        'bias costs what it takes from the peak torque, which a sharper move would show.',
+        f'Two speed loops keep the motors closer together in the move (move_*, the first {MOVED:g} s). Then their '
+        'integrals take the bias that comes back for an error and remove it: the lash opens and they fight on.',
+    ]
+
+
+def figures(done):
+    """{name: function that draws it} of the records of all cases."""
+    return {'standstill': lambda: standstill_figure(done), 'reversal': lambda: reversal_figure(done),
+            'torques': lambda: torques_figure(done), 'schedules': lambda: schedules_figure(done),
+            'structures': lambda: structures_figure(done)}
+
+
+def standstill_figure(done):
+    """Limit cycle of the load at rest and the torque of both motors, without and with bias."""
+    figure, axes = drawing.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
+    for column, name in enumerate(('bias-off', 'bias-on')):
+        record = done['standstill', name]
+        t, y = standstill(record)
+        axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH, FILTERED)[column])
+        axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
+        drawing.draw_torques(axes[1, column], record)
+        axes[1, column].set_xlabel('time [s]')
+    axes[0, 0].set_xlim(SETTLED, SETTLED + 0.5)
+    axes[0, 0].set_ylabel('azimuth [\N{MICRO SIGN}rad]')
+    axes[1, 0].set_ylim(-20.0, 20.0)
+    axes[1, 0].set_ylabel('torque [Nm]')
+    return drawing.legend(figure)
+
+
+def reversal_figure(done):
+    """What lash leaves of a slow sine: reference and load, then the error without its fundamental."""
+    figure, axes = drawing.panels(3, size=(7.4, 5.6), sharex=True, height_ratios=(1, 1.2, 1.2))
+    t = done['reversal', 'bias-off'].t
+    w = REVERSALS['reversal']
+    axes[0, 0].plot(t, REVERSAL_AMPLITUDE * np.sin(w * t), color=INK)
+    axes[0, 0].set_ylabel('reference [rad]')
+    for panel, name in zip(axes[1:, 0], ('bias-off', 'bias-on')):
+        t, left = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE, w)
+        panel.plot(t, 1e6 * left, color=TRUTH if name == 'bias-off' else FILTERED)
+        panel.set_ylabel('error [\N{MICRO SIGN}rad]')
+        panel.set_title(f'{name}: error without its fundamental')
+    axes[2, 0].set_xlim(*reversal_window())
+    axes[2, 0].set_xlabel('time [s]')
+    return figure
+
+
+def reversal_window():
+    """(begin, end) [s] of the 3 s about the first reversal in the second period of the slow sine."""
+    at = 1.25 * 2.0 * math.pi / REVERSALS['reversal']
+    return at - 1.0, at + 2.0
+
+
+def torques_figure(done):
+    """Torque of both motors over the reversal, without and with bias."""
+    figure, axes = drawing.panels(3, size=(7.4, 5.6), sharex=True, sharey=True)
+    for panel, name in zip(axes[:, 0], PAPER_CASES):
+        record = done['reversal', name]
+        drawing.draw_torques(panel, record)
+        panel.set_title(name)
+        panel.set_ylabel('torque [Nm]')
+    axes[2, 0].set_xlim(*reversal_window())
+    axes[2, 0].set_xlabel('time [s]')
+    return drawing.legend(figure)
+
+
+def schedules_figure(done):
+    """Every schedule twice: what it leaves of the sine, and what it costs the fast step."""
+    names = list(SCHEDULES)
+    sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
+    step = [measured('step', name, done['step', name])['step_overshoot_percent'][0] for name in names]
+    figure, axes = drawing.panels(1, 2, size=(7.4, 3.2), sharey=True)
+    for panel, values, bound, label in ((axes[0, 0], sine, 100.0, 'left of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
+                                        (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
+        bars = panel.barh(names, values, color=[FILTERED if name == 'hold-fade' else RAW for name in names])
+        panel.bar_label(bars, [f'{value:.0f}' if value >= 100.0 else f'{value:.3g}' for value in values], padding=3,
+                        bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.0})
+        panel.axvline(bound, color=INK, linewidth=0.8, linestyle='--')
+        panel.set_xlim(0.0, 1.2 * max(*values, bound))
+        panel.grid(axis='y', visible=False)
+        panel.set_xlabel(f'{label}, dashed: target')
+    axes[0, 0].invert_yaxis()
+    return figure
+
+
+def structures_figure(done):
+    """One speed loop on the mean speed against one for each motor, over the step of the paper."""
+    figure, axes = drawing.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
+    for column, name in enumerate(STRUCTURES):
+        record = done['structure', name]
+        drawing.draw_torques(axes[0, column], record)
+        axes[1, column].plot(record.t, fight(record), color=INK)
+        axes[0, column].set_title(name)
+        axes[1, column].set_xlabel('time [s]')
+    axes[0, 0].set_xlim(0.0, 1.0)
+    axes[0, 0].set_ylabel('torque [Nm]')
+    axes[1, 0].set_ylabel('fight torque [Nm]')
+    return drawing.legend(figure)

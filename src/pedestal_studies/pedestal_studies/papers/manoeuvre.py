@@ -1,0 +1,161 @@
+"""Manoeuvre: rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
+
+A target moves to and fro through 20 deg at 3.5 deg/s with reversals of half a cosine that last 4, 2, 1, 0.5 and
+0.35 s, one after the other; it is measured at 100 Hz with 0.02 deg. Cases reversal-<s>/<filter>: rms of a run
+inside the reversal. cv and ca are conventional filters, imm-a and imm-b those of the study imm-feedforward.
+"""
+import math
+
+import numpy as np
+
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH
+from pedestal_analysis.results.intervals import row
+from pedestal_analysis.trials import monte_carlo
+from pedestal_studies.rigs import drawing, ensemble, feedforward_loop, profiles
+from pedestal_studies.rigs.rows import Result
+
+RUNS = 200
+"""Of the motion; the paper has 50."""
+
+BATCH, SEED = 25, 1
+
+REVERSALS = (4.0, 2.0, 1.0, 0.5, 0.35)
+"""Duration of each [s]: 2.7 to 31 deg/s2 at its peak."""
+
+LEAD = 5.0
+"""Uniform motion before it all begins [s]."""
+
+NOISE = ensemble.Noise(feedforward_loop.SIGMA)
+
+FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
+           'imm-a': feedforward_loop.imm(40.0, False).filter, 'imm-b': feedforward_loop.imm(5.0, False).filter}
+
+COLOURS = {'cv': TRUTH, 'ca': RAW, 'imm-a': MOTOR_1, 'imm-b': FILTERED}
+
+RATIO_TARGET = '>= 3'
+"""Of the rate error of cv over that of imm-b."""
+
+
+def motion():
+    """(times (n,) [s], truth (angle, rate, acceleration), each (n,), {reversal: mask (n,) of it}) of all reversals."""
+    stroke, rate = profiles.STROKE, profiles.RATE
+    begin, legs, starts = LEAD, [], {}
+    for reversal in REVERSALS:
+        uniform = stroke / rate - 2.0 * reversal / math.pi
+        legs.append(begin)
+        starts[reversal] = begin + 0.5 * uniform
+        begin += uniform + reversal
+    t = ensemble.PERIOD * np.arange(round(begin / ensemble.PERIOD))
+    truth = np.array([rate * (t - LEAD), np.full(len(t), rate), np.zeros(len(t))])
+    for i, (reversal, begin) in enumerate(zip(REVERSALS, legs)):
+        later = t >= begin
+        truth[:, later] = (-1.0) ** i * np.array(profiles.s_motion(t[later] - begin, stroke, rate, reversal))
+    return t, tuple(truth), {reversal: (t >= start) & (t <= start + reversal) for reversal, start in starts.items()}
+
+
+def batch(item):
+    """(MOMENTS (n,) over the runs, rms (count, len(REVERSALS), 2) of rate [deg/s] and acceleration [deg/s2] of every
+    run inside the reversals) of an item (filter, first run, number of runs)."""
+    name, first, count = item
+    t, truth, reversals = motion()
+    sums = ensemble.moments(FILTERS[name], t, truth, NOISE, ensemble.records(truth, NOISE, SEED, first, count))
+    inside = [ensemble.over_time(sums[:, mask]) for mask in reversals.values()]
+    rms = np.degrees([[ensemble.rms(of, what) for what in ('rate', 'acceleration')] for of in inside])
+    return ensemble.over_runs(sums), rms.transpose(2, 0, 1)
+
+
+def run(progress, runs=RUNS, pool=None) -> Result:
+    """Filter `runs` noisy records with each of FILTERS; pool: monte_carlo.Pool, None for this process."""
+    pool = pool or monte_carlo.Pool(1)
+    items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH)]
+    sums_of, errors = {}, {}
+    for (name, *_), (sums, rms) in zip(items, pool.map(batch, items, progress)):
+        sums_of[name] = ensemble.added(sums_of[name], sums) if name in sums_of else sums
+        errors.setdefault(name, []).append(rms)
+    values = measured({name: np.concatenate(rms) for name, rms in errors.items()})
+    figures = {'figure-3': lambda: rate_figure(sums_of), 'figure-4': lambda: acceleration_figure(sums_of),
+               'sharpness': lambda: sharpness_figure(values)}
+    return Result(rows(values), figures, remarks(values))
+
+
+def measured(errors):
+    """{(reversal, filter): rms (2, runs) of rate [deg/s] and acceleration [deg/s2]}; errors {filter: (runs,
+    len(REVERSALS), 2)}."""
+    return {(reversal, name): rms[:, i].T for i, reversal in enumerate(REVERSALS) for name, rms in errors.items()}
+
+
+def rows(values):
+    """The rows of values as of `measured`."""
+    table = []
+    for (reversal, name), (rate, acceleration) in values.items():
+        case = f'reversal-{reversal:g}s/{name}'
+        table += [row(case, 'rate_rms_deg_s', rate, 'deg/s'),
+                  row(case, 'acceleration_rms_deg_s2', acceleration, 'deg/s2')]
+        if name != 'cv':
+            cv = values[reversal, 'cv']
+            table += [row(case, 'rate_ratio_of_cv', cv[0] / rate, '', None, RATIO_TARGET if name == 'imm-b' else None),
+                      row(case, 'acceleration_ratio_of_cv', cv[1] / acceleration, '')]
+    return table
+
+
+def peak_acceleration(reversal):
+    """Peak acceleration [deg/s2] of a reversal of this duration [s]."""
+    return math.pi * math.degrees(profiles.RATE) / reversal
+
+
+def remarks(values):
+    """Sentences that the rows need; values as of `measured`."""
+    worse = [f'{peak_acceleration(reversal):.1f}' for reversal in REVERSALS
+             if values[reversal, 'imm-a'][1].mean() > values[reversal, 'cv'][1].mean()]
+    lines = ['_ratio_of_cv: how many times the error of cv is that of the filter. cv has no acceleration: its error '
+             'is the acceleration itself.']
+    if worse:
+        lines.append(f'The acceleration of imm-a, tuned for the miss, is worse than the zero of cv in reversals of '
+                     f'{", ".join(worse)} deg/s2: it is no estimate of the acceleration there.')
+    return lines
+
+
+def _panels(sums_of, what, label, names):
+    """Truth and mean estimates above, mean errors +-1 sigma below; sums_of: {filter: MOMENTS (n,)}."""
+    t, truth, _ = motion()
+    figure, axes = drawing.panels(2, size=(7.4, 5.4), sharex=True)
+    of = truth[('angle', 'rate', 'acceleration').index(what)]
+    axes[0, 0].plot(t, np.degrees(of), color=INK, linestyle='--', linewidth=0.8, label='truth')
+    for name in names:
+        sums = sums_of[name]
+        mean = sums[what] / sums['runs']
+        sigma = np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - mean * mean, 0.0))
+        axes[0, 0].plot(t, np.degrees(of + mean), color=COLOURS[name], label=name)
+        axes[1, 0].plot(t, np.degrees(mean), color=COLOURS[name])
+        axes[1, 0].fill_between(t, np.degrees(mean - sigma), np.degrees(mean + sigma), color=COLOURS[name], alpha=0.25,
+                                linewidth=0.0)
+    axes[0, 0].set_ylabel(label)
+    axes[1, 0].set_ylabel(f'error of the {label}')
+    axes[1, 0].set_xlabel('time [s]')
+    axes[1, 0].set_xlim(LEAD - 1.0, t[-1])
+    return drawing.legend(figure)
+
+
+def rate_figure(sums_of):
+    """Rate through the reversals and its error, mean of the runs and +-1 sigma (paper 003, figure 3)."""
+    return _panels(sums_of, 'rate', 'rate [deg/s]', ('cv', 'imm-b'))
+
+
+def acceleration_figure(sums_of):
+    """Acceleration through the reversals and its error (paper 003, figure 4)."""
+    return _panels(sums_of, 'acceleration', 'acceleration [deg/s2]', ('cv', 'imm-b'))
+
+
+def sharpness_figure(values):
+    """Errors of rate and acceleration against the sharpness of the reversal."""
+    figure, axes = drawing.panels(1, 2, size=(7.4, 3.6), sharex=True)
+    x = [peak_acceleration(reversal) for reversal in REVERSALS]
+    for i, (panel, label) in enumerate(zip(axes[0], ('rate rms [deg/s]', 'acceleration rms [deg/s2]'))):
+        for name, colour in COLOURS.items():
+            y = [values[reversal, name][i].mean() for reversal in REVERSALS]
+            panel.loglog(x, y, 'o-', ms=3.5, color=colour, label=name)
+        panel.set_ylabel(label)
+        panel.set_xlabel('peak acceleration of the reversal [deg/s2]')
+        panel.set_xticks(x, [f'{value:.2g}' for value in x])
+        panel.set_xticks([], minor=True)
+    return drawing.legend(figure)

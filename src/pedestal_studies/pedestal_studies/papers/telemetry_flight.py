@@ -1,0 +1,191 @@
+"""Paper 004's filter on a flight of its kind (figures 1 to 8), and the matrices from which its stability follows.
+
+The paper prints T = 0.01 s, the windows of its figures and that the filter begins with the first measured angle and
+rate; flight, noises and parameters of the filter are chosen here. A target flies straight past the antenna and is
+nearest at CULMINATION, inside the paper's figures 2 and 6. Cases <axis>/filtered, the 'current' statistical filter on
+angle and rate; <axis>/measured, both as they are measured, and the acceleration as the difference of the measured rate
+over DIFFERENCED steps.
+
+With x = (angle, rate, acceleration), x+ = Phi x + U abar and the mean acceleration abar as its input, y = H x:
+
+    controllability (U, Phi U, Phi^2 U),        observability (H', (H Phi)', (H Phi^2)')'.
+
+`condition` is theirs in the unit T of time, in which the entries are of one size; in seconds they differ by up to
+1 / T^2, and condition_in_seconds tells no more than that.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.estimation.filters import axis_filter, motion_models
+from pedestal_analysis.report.figures import FILTERED, INK, RAW
+from pedestal_analysis.results import tracking
+from pedestal_analysis.results.intervals import row
+from pedestal_analysis.trials import monte_carlo
+from pedestal_common.graph.topics import AXES
+from pedestal_studies.papers.rate_measurement import ALPHA, filter_of
+from pedestal_studies.rigs import drawing, ensemble
+from pedestal_studies.rigs.ensemble import PERIOD as T
+from pedestal_studies.rigs.rows import Result
+
+RUNS, SEED = 40, 1
+"""Flights; seed of their noise."""
+
+BATCH = 5
+"""Flights that one worker makes at a time."""
+
+SPEED, ABEAM, HEIGHT, CULMINATION = 300.0, 3000.0, 2500.0, 42.0
+"""Of the target [m/s]; its least distance over ground [m]; its height [m]; when it is nearest [s]."""
+
+START, END = 20.0, 100.0
+"""The times of the paper's figures [s]; the filter begins at the first."""
+
+SETTLED = 5.0
+"""What of it is left out of the rows [s]."""
+
+ZOOM = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
+"""Of figures 2 and 6 [s]."""
+
+SIGMA, RATE_SIGMA = math.radians(0.03), math.radians(0.1)
+"""Of a measured angle [rad] and rate [rad/s]."""
+
+PEAK_SHARE, FLOOR = 1.2, 0.3
+"""Of the filter: a_max over the largest acceleration of the flight, and the least sigma_a over that."""
+
+DIFFERENCED = 20
+"""Steps over which the measured rate is differenced."""
+
+QUANTITIES = {'angle': 'deg', 'rate': 'deg/s', 'acceleration': 'deg/s2'}
+
+
+def flight():
+    """(times (n,) [s], {axis: angle, rate, acceleration (n, 3) [rad, rad/s, rad/s2]}) of the target.
+
+    With x = v (t - t_0) along the track, d abeam and h up, rho^2 = x^2 + d^2 and r^2 = rho^2 + h^2,
+
+        A = atan2(x, d),    A' = v d / rho^2,           A'' = -2 v^2 d x / rho^4,
+        E = atan2(h, rho),  E' = -v h x / (rho r^2),
+        E'' = -v^2 h (1 / (rho r^2) - x^2 (3 rho^2 + h^2) / (rho^3 r^4)).
+    """
+    t = START + T * np.arange(round((END - START) / T) + 1)
+    v, d, h, x = SPEED, ABEAM, HEIGHT, SPEED * (t - CULMINATION)
+    rho2 = x * x + d * d
+    rho, r2 = np.sqrt(rho2), rho2 + h * h
+    azimuth = np.arctan2(x, d), v * d / rho2, -2.0 * v * v * d * x / rho2**2
+    elevation = (np.arctan2(h, rho), -v * h * x / (rho * r2),
+                 -v * v * h * (1.0 / (rho * r2) - x * x * (3.0 * rho2 + h * h) / (rho**3 * r2 * r2)))
+    return t, {'azimuth': np.column_stack(azimuth), 'elevation': np.column_stack(elevation)}
+
+
+def flown(axis, run):
+    """(measured, filtered) angle, rate and acceleration, each (n, 3), of one flight; the noise depends on axis and run
+    alone."""
+    t, target = flight()
+    truth = target[axis]
+    nu, nu_rate = ensemble.drawn(SEED + AXES.index(axis), run, 1, len(t))[:, 0]
+    y, y_rate = truth[:, 0] + SIGMA * nu, truth[:, 1] + RATE_SIGMA * nu_rate
+    c = axis_filter.constants(filter_of(PEAK_SHARE * np.abs(truth[:, 2]).max(), FLOOR))
+    out = np.zeros(len(t), axis_filter.ESTIMATE)
+    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), RATE_SIGMA * RATE_SIGMA),
+                          ensemble.INITIAL_RATE, out)
+    difference = np.full(len(t), math.nan)
+    difference[DIFFERENCED:] = (y_rate[DIFFERENCED:] - y_rate[:-DIFFERENCED]) / (DIFFERENCED * T)
+    return np.column_stack((y, y_rate, difference)), np.column_stack([out[name] for name in QUANTITIES])
+
+
+def batch(item):
+    """Rms errors (count, 2, 3) [deg, deg/s, deg/s2] of what is measured and filtered; item: (axis, first run, number
+    of runs)."""
+    axis, first, count = item
+    t, target = flight()
+    counts = t >= START + SETTLED
+    return np.degrees([[[tracking.rms(error) for error in (values - target[axis])[counts].T]
+                        for values in flown(axis, run)] for run in range(first, first + count)])
+
+
+def model(T):
+    """(Phi (3, 3), U (3,)) of the 'current' statistical model over T (paper 004, equations 5 and 6)."""
+    angle, rate, kept = motion_models.fading(ALPHA, T)
+    return (np.array([[1.0, T, angle], [0.0, 1.0, rate], [0.0, 0.0, kept]]),
+            np.array([0.5 * T * T - angle, T - rate, 1.0 - kept]))
+
+
+MEASURED = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}
+"""{case: H} of the two kinds of measurement."""
+
+
+def controllability(Phi, U):
+    """(U, Phi U, Phi^2 U), (3, 3)."""
+    return np.column_stack([np.linalg.matrix_power(Phi, i) @ U for i in range(3)])
+
+
+def observability(Phi, H):
+    """H, H Phi, H Phi^2 one below the other."""
+    return np.vstack([H @ np.linalg.matrix_power(Phi, i) for i in range(3)])
+
+
+def matrices():
+    """{case: (matrix in seconds, the same in the unit T of time)}."""
+    Phi, U = model(T)
+    unit = np.diag([1.0, T, T * T])         # (angle, rate T, acceleration T^2) of (angle, rate, acceleration)
+    back = np.linalg.inv(unit)
+    return {'controllability': (controllability(Phi, U), controllability(unit @ Phi @ back, unit @ U / (T * T))),
+            **{f'observability/{name}': (observability(Phi, H), observability(unit @ Phi @ back, H))
+               for name, H in MEASURED.items()}}
+
+
+def rows(errors):
+    """The rows of errors {axis: as of `batch`, of all runs}, and of the matrices."""
+    table = []
+    for axis, of_runs in errors.items():
+        for name, column in zip(('measured', 'filtered'), of_runs.transpose(1, 2, 0)):
+            table += [row(f'{axis}/{name}', f'{quantity}_rms', values, unit)
+                      for (quantity, unit), values in zip(QUANTITIES.items(), column)]
+        table += [row(f'{axis}/filtered', f'{quantity}_reduction', values, '', target='> 1')
+                  for quantity, values in zip(QUANTITIES, (of_runs[:, 0] / of_runs[:, 1]).T)]
+    for name, (matrix, scaled) in matrices().items():
+        table += [row(name, 'rank', np.linalg.matrix_rank(scaled), '', target='3 +- 0'),
+                  row(name, 'condition', np.linalg.cond(scaled), ''),
+                  row(name, 'condition_in_seconds', np.linalg.cond(matrix), '')]
+    return table
+
+
+def remarks():
+    """Sentences that the rows need, with the matrices in seconds."""
+    lines = ['Without the filter the acceleration is the difference of the measured rate over '
+             f'{DIFFERENCED * T:g} s. The paper prints no error: "smooth" and "does not diverge" are its claims.']
+    for name, (matrix, _) in matrices().items():
+        lines += [f'{name}, in seconds:', *('    ' + '  '.join(f'{value:11.4g}' for value in line) for line in matrix)]
+    return lines
+
+
+def figures():
+    """{name: function that draws it}: the paper's figures 1 to 4 and 5 to 8."""
+    return {'figures-1-to-4': lambda: axis_figure('azimuth', 1), 'figures-5-to-8': lambda: axis_figure('elevation', 5)}
+
+
+def axis_figure(axis, first):
+    """Angle, a part of it, rate and acceleration of one flight, measured, filtered and true; first: the number of the
+    first of the paper's four figures."""
+    figure, axes = drawing.panels(4, size=(7.4, 9.0))
+    t, target = flight()
+    measured, filtered = flown(axis, 0)
+    for i, (panel, column) in enumerate(zip(axes[:, 0], (0, 0, 1, 2))):
+        begin, end = ZOOM[axis] if i == 1 else (START, END)
+        shown = (t >= begin) & (t <= end)
+        for values, colour, label, width in ((measured, RAW, 'measured', 0.5), (filtered, FILTERED, 'filtered', 1.2)):
+            panel.plot(t[shown], np.degrees(values[shown, column]), color=colour, label=label, linewidth=width)
+        panel.plot(t[shown], np.degrees(target[axis][shown, column]), color=INK, linestyle='--', linewidth=0.8,
+                   label='truth')
+        name, unit = list(QUANTITIES.items())[column]
+        panel.set_ylabel(f'{name} [{unit}]')
+        panel.set_title(f'{axis}: {name} (figure {first + i} of the paper)')
+    axes[3, 0].set_ylim(*np.degrees(2.0 * np.abs(target[axis][:, 2]).max() * np.array((-1.0, 1.0))))
+    axes[-1, 0].set_xlabel('time [s]')
+    return drawing.legend(figure)
+
+
+def run(progress, runs=RUNS, pool=None) -> Result:
+    """Fly `runs` flights; pool: monte_carlo.Pool, None for this process."""
+    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, AXES, runs, BATCH, progress)
+    return Result(rows(errors), figures(), remarks())

@@ -1,0 +1,255 @@
+"""The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and one on a target filter.
+
+Each is one compiled kernel of the laws the nodes run: the receiver's smoothing and pattern, the loop of the beam or a
+target filter, the electronic beam. Sample i of the grid is measured over the millisecond that ends at its stamp
+i GRID, against the beam in force in it; a target is given at the middles of these milliseconds. A command stamped
+i GRID is in force from the millisecond after i GRID + delay on.
+"""
+import dataclasses
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from acu_tracker.estimation.filters import axis_filter, constant_gain
+from acu_tracker.estimation.filters.measurement import AxisMeasurement
+from acu_tracker.estimation.params import CaParameters, FilterParameters
+from acu_tracker.geometry import attitude as attitudes
+from acu_tracker.servo import beam_loop
+from adu_drive.array import electronic_beam
+from pedestal_common.compiled import compiled
+from tracking_receiver_sim import monopulse, smoothing
+from tracking_receiver_sim.params import AntennaParameters, ReceiverParameters
+
+GRID = 1e-3
+GRID_NS = round(GRID * 1e9)
+
+SMOOTHINGS = {'S0': smoothing.NO_SMOOTHING, 'S1': smoothing.RECURSION, 'S2': smoothing.MOVING_AVERAGE}
+"""S0: the last sample, S1: paper 002's eq. (1), S2: the moving average it is called."""
+
+LENGTH = 20
+"""n of the smoothing in samples: the paper's example."""
+
+FULL_SCALE, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
+
+SMOOTHERS = np.dtype([('error', smoothing.SMOOTHER)], align=True)
+
+Target = namedtuple('Target', 'angle attitude rate noise')
+"""Target and carrier on the grid, each (n,): true angle [rad]; the part of it that the carrier's attitude causes [rad]
+and its rate [rad/s], as measured for the loop; noise of the samples [rad]."""
+
+Beam = namedtuple('Beam', 'state constants inputs outputs')
+"""Records (1,) of an electronic beam without elevation."""
+
+Receiver = namedtuple('Receiver', 'slope beamwidth lost')
+"""slope: true over assumed [-]; beamwidth [rad], 0 for a linear receiver; lost: power over that on axis below which
+the signal is lost [-]."""
+
+PaperConstants = namedtuple('PaperConstants', 'form alpha period delta smoothing')
+"""The constants of a Paper: code of beam_loop.FORMS, gain [-], period in samples, share of the carrier's rate that is
+compensated [-], code of smoothing.SMOOTHINGS."""
+
+BetterConstants = namedtuple('BetterConstants', 'filter variance period hold delay tau')
+"""The constants of a Better: those (1,) of its filter, variance of a measurement [rad2], period and hold in samples,
+delay and low-pass of the acceleration [s]."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Paper:
+    """Paper 002's loop. period, delay: in samples of the grid; slope, beamwidth, lost: as in Receiver; delta: share of
+    the carrier's rate that is compensated."""
+    alpha: float = 0.1
+    period: int = 10
+    delay: int = 0
+    smoothing: str = 'S1'
+    form: str = 'type_1'
+    delta: float = 0.0
+    slope: float = 1.0
+    beamwidth: float = 0.0
+    lost: float = 0.0
+
+    def run(self, target, rate=None, noise=None):
+        """(beam, smoothed error in the loop), each (n,) [rad], of a target (n,) [rad]; rate (n,) [rad/s]: of its
+        motion by the carrier; noise (n,) [rad] of the samples. None for zeros."""
+        zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
+        constants = PaperConstants(beam_loop.FORMS.index(self.form), self.alpha, self.period, self.delta,
+                                   SMOOTHINGS[self.smoothing])
+        _paper(constants, Receiver(self.slope, self.beamwidth, self.lost),
+               Target(np.asarray(target), zeros, zeros if rate is None else rate, zeros if noise is None else noise),
+               np.zeros(1, SMOOTHERS), _beam(self.delay, self.period), beam, errors)
+        return beam, errors
+
+
+@dataclasses.dataclass(frozen=True)
+class Better:
+    """A loop in which beam in force + error goes into a target filter; the command is the filter's prediction for the
+    middle of the interval in which it will be in force.
+
+    period: samples averaged to one measurement; hold: samples between two commands; delay: true delay, known: the
+    delay that the loop assumes (None: the true one), all in samples. jerk: noise of the constant-acceleration filter
+    [rad/s3/sqrt(Hz)]; sigma: of one sample [rad]. ins: the filter works in the earth frame; late: error of the INS's
+    stamps in samples; tau: low-pass of its acceleration [s], 0 without the acceleration.
+    """
+    jerk: float
+    sigma: float
+    period: int = 10
+    hold: int = 1
+    delay: int = 20
+    known: int | None = None
+    ins: bool = False
+    late: int = 0
+    tau: float = 0.05
+
+    def run(self, target, noise=None, attitude=None, rate=None):
+        """(beam, innovation of the filter), each (n,) [rad], of a target (n,) [rad]; noise (n,) [rad] of the samples;
+        attitude, rate (n,) [rad, rad/s]: rotation of the target by the carrier, as the INS measures it."""
+        n = len(target)
+        zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
+        late = np.maximum(np.arange(n) - self.late, 0)
+        c = axis_filter.constants(FilterParameters(kind='ca', ca=CaParameters(noise=self.jerk)))
+        constants = BetterConstants(c, self.sigma**2 / self.period, self.period, self.hold,
+                                    GRID * (self.delay if self.known is None else self.known), self.tau)
+        _better(constants, Target(np.asarray(target), attitude[late] if self.ins else zeros,
+                                  rate[late] if self.ins else zeros, zeros if noise is None else noise),
+                np.zeros(1, SMOOTHERS), np.zeros(1, axis_filter.FILTER), _beam(self.delay, self.hold), beam, errors)
+        return beam, errors
+
+
+def _beam(delay, hold):
+    """A Beam at rest at 0; delay, hold: in samples of the grid."""
+    return Beam(electronic_beam.initial_state(0.0, 0.0),
+                electronic_beam.constants(GRID, delay * GRID, 2 * hold * GRID), np.zeros(1, electronic_beam.INPUTS),
+                np.zeros(1, electronic_beam.OUTPUTS))
+
+
+@compiled
+def received(offset, receiver):
+    """The error [rad] that a Receiver measures for an offset [rad] of the target from the beam: linear without a
+    beamwidth, else by its monopulse pattern within full scale; NaN where the signal is lost."""
+    slope, beamwidth, lost = receiver
+    if beamwidth == 0.0:
+        return slope * offset
+    S, D, _ = monopulse.channels(offset / beamwidth, 0.0, slope * K_M, 1.0, 0.0)
+    if S * S < lost:
+        return math.nan
+    return beamwidth * max(-FULL_SCALE, min(D / (K_M * S), FULL_SCALE))
+
+
+@compiled
+def command(u, stamp, due, beam):
+    """Put a command, beam [rad] at sample `stamp` of the grid, into the inputs u of the electronic beam; due: whether
+    it is a new one."""
+    u.stamp_ns = u.command_stamp_ns = stamp * GRID_NS
+    u.due = 1 if due else 0
+    u.position[0] = beam
+
+
+@compiled
+def _paper(constants, receiver, target, smoothers, plant, beam, errors):
+    """Paper 002's loop over a Target into beam and errors (n,) [rad]; plant: the Beam."""
+    form, alpha, period, delta, kind = constants
+    s, beta, T = smoothers[0].error, constant_gain.benedict_bordner(alpha), period * GRID
+    R = v = error = 0.0
+    for i in range(len(target.angle)):
+        beam[i] = plant.outputs[0].position[0]
+        sample = received(target.angle[i] - beam[i], receiver) + target.noise[i]
+        if not math.isnan(sample):
+            smoothing.begin(s)
+            smoothing.put(s, sample, 1.0 / LENGTH)
+        if i % period == 0:
+            error = math.nan if math.isnan(sample) else smoothing.smoothed(s, kind, 1, LENGTH)
+            R, v = beam_loop.step(form, R, v, error, alpha, beta, T, delta * target.rate[i])
+        errors[i] = error
+        command(plant.inputs[0], i, i % period == 0, R)
+        electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
+
+
+@compiled
+def _better(constants, target, smoothers, filters, plant, beam, errors):
+    """The loop on a target filter over a Target into beam and innovations `errors` (n,) [rad]; plant: the Beam."""
+    s, f, c = smoothers[0].error, filters[0], constants.filter[0]
+    period, hold, rate = constants.period, constants.hold, target.rate
+    running, aimed, acceleration = False, 0.0, 0.0
+    for i in range(len(target.angle)):
+        beam[i] = plant.outputs[0].position[0]
+        if i % period == 0:
+            smoothing.begin(s)
+        # Less the rotation by the carrier it is the angle in the earth frame.
+        smoothing.put(s, beam[i] + (target.angle[i] - beam[i] + target.noise[i]) - target.attitude[i], 0.0)
+        if i > 0 and constants.tau > 0.0:
+            acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID, constants.tau)
+        if (i + 1) % period == 0:
+            y = smoothing.smoothed(s, smoothing.NO_SMOOTHING, period, period)
+            if running:
+                m = AxisMeasurement(y, constants.variance, math.nan, 0.0)
+                axis_filter.predict(f, c, period * GRID)
+                errors[i] = axis_filter.innovation(f, c, m).nu
+                axis_filter.correct(f, c, m)
+            else:
+                axis_filter.start(f, c, y, constants.variance, 1.0)
+            running = True
+            block = i
+        if running and i % hold == 0:
+            # From the stamp to the middle of the interval in force.
+            lead = constants.delay + 0.5 * hold * GRID
+            earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + lead).angle
+            aimed = earth + target.attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID + lead)
+        command(plant.inputs[0], i, running and i % hold == 0, aimed)
+        electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
+
+
+def stable(loop, size=1e-9, seconds=20.0):
+    """Whether the paper's loop (Paper) settles after a step of `size` [rad]: its error keeps falling."""
+    n = round(seconds / GRID)
+    error = np.abs(size - loop.run(np.full(n, size))[0])
+    middle, last = error[n // 3:2 * n // 3].max(), error[2 * n // 3:].max()
+    return last <= middle < 1e3 * size
+
+
+def delay_limit(loop, highest=400):
+    """Largest delay, in samples of the grid up to `highest`, at which the paper's loop (Paper) is stable; by
+    bisection."""
+    low, high = 0, highest
+    while high - low > 1:
+        middle = (low + high) // 2
+        if stable(dataclasses.replace(loop, delay=middle)):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def spectral_radius(loop):
+    """Largest modulus of the eigenvalues of the paper's linear loop over one period.
+
+    loop: Paper. State: v T, the smoothing's output, and the commands k, k - 1, ... that are in force in the samples of
+    the next period (and of the moving average before it). In sample j = 1 ... period after the update k the command
+    k + floor((j - 1 - delay) / period) is in force.
+    """
+    M, beta, n = loop.period, constant_gain.benedict_bordner(loop.alpha), LENGTH
+    first = {'S0': M, 'S1': 1, 'S2': M - n + 1}[loop.smoothing]
+    ages = [-((j - 1 - loop.delay) // M) for j in range(first, M + 1)]
+    V, E, C = 0, 1, 2
+    size = C + max(ages) + 1
+    e = np.zeros(size)
+    if loop.smoothing == 'S1':
+        e[E] = 1.0
+        for age in ages:
+            e *= 1.0 - 1.0 / n
+            e[C + age] -= loop.slope / n
+    else:
+        for age in ages:
+            e[C + age] -= loop.slope / len(ages)
+    A = np.zeros((size, size))
+    A[E] = e
+    if loop.form == 'type_1':
+        A[V, V] = 1.0 - beta
+        A[C, V] = 1.0 - loop.alpha
+    else:
+        A[V, V] = A[C, V] = 1.0
+    A[V] += beta * e
+    A[C] += (loop.alpha if loop.form == 'type_1' else loop.alpha + beta) * e
+    A[C, C] += 1.0
+    for k in range(C + 1, size):
+        A[k, k - 1] = 1.0
+    return float(np.abs(np.linalg.eigvals(A)).max())

@@ -1,0 +1,41 @@
+"""Figures of the studies: sheets of panels in one style, saved as PNG, and as a vector file where one is asked for."""
+import matplotlib
+from matplotlib.figure import Figure
+
+from pedestal_analysis.report import figures
+
+SIZE = (7.4, 4.6)
+"""Of a figure [inch]."""
+
+
+def panels(rows, columns=1, size=SIZE, **options):
+    """(figure, axes (rows, columns)) on one sheet."""
+    figure = Figure(figsize=size, layout='constrained')
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def legend(figure):
+    """The figure, with one legend below all panels, where it covers no curve: every label once."""
+    handles = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels()):
+            handles.setdefault(label, handle)
+    longest = max(map(len, handles))
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / (0.6 + 0.075 * longest))))
+    figure.legend(handles.values(), handles.keys(), loc='outside lower center', ncols=columns)
+    return figure
+
+
+def draw_torques(axes, record):
+    """Draw the torque [Nm] of both azimuth motors of a closed_loop.Run over time."""
+    for i, (colour, style) in enumerate(((figures.MOTOR_1, '-'), (figures.MOTOR_2, '--'))):
+        axes.plot(record.t, record['adu/motor_states']['effort'][:, i], style, color=colour, label=f'motor {i + 1}')
+
+
+def save(draw, *paths):
+    """Draw a figure once into files; the same bytes every time."""
+    with matplotlib.rc_context({**figures.STYLE, 'svg.hashsalt': paths[0].stem}):
+        figure = draw()
+        figures.tidy(figure)
+        for path in paths:
+            figures.store(figure, path)

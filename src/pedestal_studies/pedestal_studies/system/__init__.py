@@ -1,0 +1,1 @@
+"""Studies of the whole product against our own targets."""

@@ -1,0 +1,158 @@
+"""Acquisition: how long it takes to track a target, from power-up or after a loss, and whether a search finds it.
+
+Cases <scenario>: the closed loop of a scenario under other seeds, of late_tle with the satellite 1 to 3 s late.
+tracked_after_s is the time from the start, or from the loss of the signal, until the antenna is in autotrack with the
+receiver locked and stays so. Cases search-<pattern>: a target that stands still, anywhere in the searched area with
+equal chance; one round. found_percent is the share of the runs that end in autotrack with the target in the beam,
+found_percent_low the lower end of its 95 % interval (Clopper and Pearson 1934).
+"""
+import math
+
+import numpy as np
+from scipy.stats import beta
+
+from acu_tracker import modes
+from acu_tracker.search.params import SearchParameters
+from acu_tracker.search.pattern import PATTERNS, SPIRAL, SQUARE
+from pedestal_analysis.report.figures import FILTERED
+from pedestal_analysis.results.intervals import CONFIDENCE, row
+from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.cases import Case
+from pedestal_studies.rigs import drawing
+from pedestal_studies.rigs.rows import Result
+
+RUNS, SEED = 100, 1
+
+BATCH = 5
+"""Runs that one worker makes at a time."""
+
+ERRORS, MODE = 'tracking_receiver/angle_error', 'acu/mode'
+
+FROM_POWER_UP = ('late_tle', 'sidelobe')
+AFTER_LOSS = ('fade', 'blockage', 'manoeuvre_in_coast')
+
+ELEVATION = 0.6
+"""Of the target of the search cases [rad]."""
+
+SEARCH = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.acquisition.expected_dbhz': 0.0,
+          'tracking_receiver.receiver.cn0_dbhz': 46.4}
+"""What makes of the scenario sidelobe one of a search."""
+
+SEARCH_DURATION = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}
+"""One round and what follows [s]."""
+
+FOUND = '>= 99'
+"""Target of found_percent."""
+
+CASES = (*FROM_POWER_UP, *AFTER_LOSS, 'steptrack_geo', *(f'search-{name}' for name in PATTERNS))
+
+IN_THE_BEAM = 0.2
+"""Largest true error of a target that is found [beamwidths]."""
+
+SETTLED = 90.0
+"""Time [s] after which step track is on its target."""
+
+
+def case_of(name, seed):
+    """The Case of a run."""
+    rng = np.random.default_rng(seed)
+    if name == 'late_tle':
+        return Case(name, name, {'scenario.program.time_offset': -rng.uniform(1.0, 3.0)}, seed=seed)
+    if not name.startswith('search-'):
+        return Case(name, name, seed=seed)
+    pattern = name.removeprefix('search-')
+    x, e = offset(PATTERNS.index(pattern), rng)
+    return Case(name, 'sidelobe', {**SEARCH, 'acu.search.pattern': pattern, 'scenario.program.elevation_offset': e,
+                                   'scenario.program.azimuth_offset': x / math.cos(ELEVATION)},
+                SEARCH_DURATION[pattern], seed)
+
+
+def offset(pattern, rng, beamwidth=0.0175):
+    """(cross-elevation, elevation) [rad] of a place in the full area of a pattern."""
+    p = SearchParameters()
+    while True:
+        x, e = rng.uniform(-1.0, 1.0, 2) * p.full * beamwidth
+        if pattern not in (SPIRAL, SQUARE):
+            return x, e * p.across
+        if math.hypot(x, e) <= p.full * beamwidth:
+            return x, e
+
+
+def tracked_after(run, from_loss):
+    """Time [s] from the start, or from the first loss of the signal in autotrack, until the target is tracked for
+    good; NaN where it is not at the end."""
+    tracked = (run[MODE] == modes.AUTOTRACK) & np.isfinite(run[ERRORS]['vector'][:, 0])
+    if not tracked[-1]:
+        return math.nan
+    bad = np.flatnonzero(~tracked)
+    first = np.flatnonzero(tracked)[0]
+    last = bad[-1] + 1 if bad.size else 0
+    if not from_loss:
+        return run.t[last]
+    lost = bad[bad > first]
+    return run.t[last] - run.t[lost[0]] if lost.size else math.nan
+
+
+def off_axis(run):
+    """True error of the beam (n,) [beamwidths]; NaN where it is not known."""
+    return np.hypot(*run.truth['error'].T) / run.units['tracking_receiver'].parameters.antenna.beamwidth
+
+
+def batch(item):
+    """Values (count, 2) of an item (case, first run, number of runs): tracked_after_s and whether the target is in the
+    beam at the end; of steptrack_geo the rms of the level lost [dB] and the largest error [beamwidths]."""
+    name, first, count = item
+    values = []
+    for seed in range(SEED + first, SEED + first + count):
+        run = case_of(name, seed).run()
+        off = off_axis(run)
+        if name == 'steptrack_geo':
+            settled = off[run.t > SETTLED]
+            values.append((math.sqrt(np.mean((12.0 * settled**2)**2)), settled.max()))
+        else:
+            after = tracked_after(run, name in AFTER_LOSS)
+            values.append((after, float(math.isfinite(after) and off[-1] < IN_THE_BEAM)))
+    return np.array(values)
+
+
+def least_share(found, runs):
+    """Lower end of the CONFIDENCE interval of the share of which `found` of so many runs are a sample (Clopper and
+    Pearson, Biometrika 26 (1934) 404)."""
+    return float(beta.ppf(0.5 * (1.0 - CONFIDENCE), found, runs - found + 1)) if found else 0.0
+
+
+def rows(values):
+    """The rows of values {case: (runs, 2)} as of `batch`."""
+    table = []
+    for name, of_runs in values.items():
+        first, second = of_runs.T
+        if name == 'steptrack_geo':
+            table += [row(name, 'level_loss_rms_db', first, 'dB', target='<= 0.25'),
+                      row(name, 'pointing_max_beamwidths', second, 'beamwidths')]
+            continue
+        found = second == 1.0
+        if found.any():
+            table.append(row(name, 'tracked_after_s', first[found], 's'))
+        table += [row(name, 'found_percent', 100.0 * float(found.mean()), '%', target=FOUND),
+                  row(name, 'found_percent_low', 100.0 * least_share(int(found.sum()), len(found)), '%')]
+    return table
+
+
+def run(progress, runs=RUNS, pool=None) -> Result:
+    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH, progress)
+    return Result(rows(values), {'time': lambda: time_figure(values)},
+                  [f'Seeds {SEED} to {SEED + runs - 1}. tracked_after_s: of the runs that found their target.'])
+
+
+def time_figure(values):
+    """The time of every run that found its target."""
+    figure, axes = drawing.panels(1, size=(7.4, 3.8))
+    for name, of_runs in values.items():
+        if name != 'steptrack_geo':
+            found = of_runs[of_runs[:, 1] == 1.0, 0]
+            axes[0, 0].plot(found, [name] * len(found), '|', color=FILTERED)
+    axes[0, 0].invert_yaxis()
+    axes[0, 0].set_xlim(left=0.0)
+    axes[0, 0].set_xlabel('time until the target is tracked [s]')
+    return figure

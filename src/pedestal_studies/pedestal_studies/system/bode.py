@@ -1,0 +1,166 @@
+"""Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
+
+The loops are measured by trials/frequency_response. The grey line of a figure is the design of the gains: w_c / s for
+the current, (K_p + K_i / s) / (J s) for the speed of a rigid drive, K_p / s + K_i / s^2 for the position. The
+difference is sampling, delay, elasticity.
+"""
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+from acu_tracker.params import AcuParameters
+from adu_drive.params import AduParameters
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.results.intervals import row
+from pedestal_analysis.tuning import frequency_response as frequency
+from pedestal_common.graph.topics import AXES
+from pedestal_studies.papers import servo
+from pedestal_studies.rigs import drawing
+from pedestal_studies.rigs.rows import Result
+
+
+def controller(name):
+    """The Case of the default position loop with a position controller of this name on both axes."""
+    return frequency.case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
+
+
+FAST = {'acu.azimuth.feedforward.bandwidth': 40.0}
+STRUCTURE = {**FAST, 'adu.azimuth.structure.inertia_share': 0.5, 'adu.azimuth.structure.frequency': 8.0}
+NOTCH = {**STRUCTURE, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
+         'acu.azimuth.notch.depth': 0.3}
+"""Half of the load swings on the other half; the notch lies where the loop without it has its resonance."""
+
+CASES = {
+    'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
+    'adrc': (controller('adrc'), AXES),
+    'paper-r1': (frequency.case('paper-r1', 'servo_sine', servo.R1), AXES[:1]),
+    'best': (frequency.case('best', 'servo_sine', servo.BEST), AXES[:1]),
+    'rigid': (frequency.case('rigid', 'leo_pass', FAST), AXES[:1]),
+    'structure': (frequency.case('structure', 'leo_pass', STRUCTURE), AXES[:1]),
+    'structure-notch': (frequency.case('structure-notch', 'leo_pass', NOTCH), AXES[:1])}
+"""Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's; a
+faster one with a rigid load, with a flexible one, and with a notch against that."""
+
+MARGIN_BAND = math.sqrt(10.0)
+"""Band about crossover, in which the margins are read: |L| within this factor of 1, +-10 dB."""
+
+
+def nonlinearity(measured, smaller):
+    """Largest relative change of L between two excitations, within MARGIN_BAND."""
+    change = np.abs(smaller.open_loop / measured.open_loop - 1.0)
+    return float(change[np.abs(np.log(np.abs(measured.open_loop))) < math.log(MARGIN_BAND)].max())
+
+
+def rows(responses):
+    """The rows of {name: Response}."""
+    return [row(name, metric, value, unit) for name, measured in responses.items()
+            for metric, (value, unit) in frequency.margins(measured).items()]
+
+
+def run(progress) -> Result:
+    """Measure all loops, each also with half the excitation."""
+    drive = AduParameters()
+    parts = {'current loops': (functools.partial(frequency.current, drive), frequency.CURRENT),
+             'speed loops': (functools.partial(frequency.speed, drive), frequency.SPEED)}
+    parts |= {f'position loop {name}': (functools.partial(frequency.position, case, axes), frequency.POSITION)
+              for name, (case, axes) in CASES.items()}
+    responses, change = {}, {}
+    for i, (text, (measure, sweep)) in enumerate(parts.items()):
+        progress(i / len(parts), text)
+        measured, smaller = measure(sweep), measure(dataclasses.replace(sweep, peak=0.5 * sweep.peak))
+        change |= {name: nonlinearity(measured[name], smaller[name]) for name in measured}
+        responses |= measured
+    worst = max(change, key=change.get)
+    remarks = [f'Linear: half the excitation changes no open loop by more than {100.0 * change[worst]:.1f} % within '
+               f'10 dB of |L| = 1 ({worst}).']
+    return Result(rows(responses), drawings(responses, drive), remarks)
+
+
+def drawings(responses, drive):
+    """{name: function that draws a Figure}."""
+    p, c = drive.azimuth, AcuParameters().azimuth.feedforward
+    w_c = 2.0 * math.pi * p.current_loop.bandwidth
+    J = p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
+
+    def chosen(title, curves, design=None):
+        measured = {label: (responses[name], colour) for label, (name, colour) in curves.items()}
+        return lambda: bode_figure(title, measured, design)
+
+    return {
+        'current': chosen('current loops of the azimuth motors',
+                          {'motor 1': ('current/motor_1', MOTOR_1), 'motor 2': ('current/motor_2', MOTOR_2)},
+                          lambda s: w_c / s),
+        'speed': chosen('speed loops',
+                        {'azimuth': ('speed/azimuth', FILTERED), 'elevation': ('speed/elevation', TRUTH)},
+                        lambda s: (p.speed_loop.proportional + p.speed_loop.integral / s) / (J * s)),
+        'position': chosen('position loops', {'feed-forward (and pid)': ('position/azimuth/feedforward', FILTERED),
+                            'the same, elevation': ('position/elevation/feedforward', TRUTH),
+                            'adrc': ('position/azimuth/adrc', MOTOR_2)},
+                           lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
+        'structure': chosen('position loop, azimuth, with a flexible load', {'rigid': ('position/azimuth/rigid', RAW),
+                             'flexible': ('position/azimuth/structure', TRUTH),
+                             'flexible, notch': ('position/azimuth/structure-notch', FILTERED)}),
+        'paper': chosen("position loop, azimuth, paper 000's and ours",
+                        {'paper': ('position/azimuth/paper-r1', RAW), 'best': ('position/azimuth/best', FILTERED)})}
+
+
+def decibel(x):
+    """Magnitude [dB] of x (n,) complex."""
+    return 20.0 * np.log10(np.abs(x))
+
+
+def degrees(x):
+    """Phase (n,) without jumps, the first in (-360, 0]."""
+    phase = np.degrees(np.unwrap(np.angle(x)))
+    return phase - 360.0 * math.ceil(phase[0] / 360.0)
+
+
+def bode_figure(title, curves, design):
+    """Bode diagrams of the open and the closed loop: {label: (Response, colour)}, design(s) the open loop or None.
+
+    Crosses mark the crossover in gain and phase; the margins stand beside the name. The first of two curves that
+    coincide is drawn wide, so that it shows behind the second.
+    """
+    figure, axes = drawing.panels(2, 2, size=(7.4, 5.4), sharex=True)
+    figure.suptitle(title)
+    for column, loop in enumerate(('open loop', 'closed loop')):
+        gain, phase = axes[:, column]
+        if design:
+            f = next(iter(curves.values()))[0].frequency
+            L = design(2j * math.pi * f)
+            x = L / (1.0 + L) if column else L
+            gain.semilogx(f, decibel(x), color=INK, lw=0.8, ls='--', label='as designed')
+            phase.semilogx(f, degrees(x), color=INK, lw=0.8, ls='--')
+        for i, (label, (measured, colour)) in enumerate(curves.items()):
+            keep = measured.deviation < 0.2
+            f, x = measured.frequency[keep], (measured.closed_loop if column else measured.open_loop)[keep]
+            width = 3.2 if i == 0 and len(curves) > 1 else 1.1
+            gain.semilogx(f, decibel(x), color=colour, lw=width, alpha=0.6 if width > 2.0 else 1.0,
+                          label=f'{label}: {margin_text(measured)}')
+            phase.semilogx(f, degrees(x), color=colour, lw=width, alpha=0.6 if width > 2.0 else 1.0)
+            at = frequency.margins(measured)['crossover_hz'][0]
+            if not column and math.isfinite(at):
+                phase_there = float(np.interp(math.log(at), np.log(f), degrees(x)))
+                gain.plot(at, 0.0, 'x', color=INK, ms=6.0)
+                phase.plot(at, phase_there, 'x', color=INK, ms=6.0)
+                phase.plot([at, at], [-180.0, phase_there], color=colour, lw=0.8, ls=':')
+        gain.set_title(loop)
+        gain.axhline(-3.0 if column else 0.0, color=INK, lw=0.6, ls=':')
+        gain.set_ylim(bottom=-40.0)
+        if not column:
+            phase.axhline(-180.0, color=INK, lw=0.6, ls=':')
+        phase.set_ylim(-360.0, 60.0)
+        phase.set_yticks(np.arange(-360.0, 1.0, 90.0))
+        phase.set_xlabel('frequency [Hz]')
+    axes[0, 0].set_ylabel('gain [dB]')
+    axes[1, 0].set_ylabel('phase [deg]')
+    return drawing.legend(figure)
+
+
+def margin_text(measured):
+    """Gain and phase margin of a Response in words, for a legend."""
+    gain, phase = (frequency.margins(measured)[name][0] for name in ('gain_margin_db', 'phase_margin_deg'))
+    parts = [f'{value:.0f} {unit}' for value, unit in ((gain, 'dB'), (phase, 'deg')) if math.isfinite(value)]
+    return f'margins {", ".join(parts)}' if parts else 'no margin in the band'

@@ -1,0 +1,272 @@
+"""The error budget of scenario station_real: each term alone, all of them added up, and the whole run beside it.
+
+A contribution is the pointing error of a run with one term on less that of a run with none, step by step and under the
+same seed. Systematic contributions are added as signed vectors where the antenna points, random ones as squares:
+
+    combined^2 = mean |servo + sum of systematic|^2 + sum of mean |random|^2
+
+A random term has both: its mean over the seeds, <term>-mean, and what differs between them. servo is what remains
+with every term off (lag, friction, quantisation, the structure under the unbalance of its axis), noise what differs
+then between the seeds of the receiver. Cases <mode>/<term>; <mode>/<time>s: the signed contributions at that time of
+the pass.
+"""
+import dataclasses
+import functools
+import typing
+
+import numpy as np
+
+from pedestal_analysis.results import tracking
+from pedestal_analysis.results.intervals import pseudo_values, row
+from pedestal_analysis.trials import monte_carlo
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph import topics
+from pedestal_common.parameters import defaults
+from pedestal_studies.rigs import drawing
+from pedestal_studies.rigs.rows import Result
+
+SCENARIO = 'station_real'
+RUNS, SEED = 30, 1
+"""Runs of what is random; seed of the first."""
+
+SETTLED, EVERY = 15.0, 0.1
+"""From when on, and how often, the error is taken [s]."""
+
+TIMES = (30, 90, 150, 210, 270)
+"""Times of the pass [s] at which contributions are shown with their signs."""
+
+ACROSS = ('cross_elevation', 'elevation')
+"""The two columns of an error."""
+
+MODES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
+"""{mode: overrides}."""
+
+
+class Term(typing.NamedTuple):
+    """A source of error: its parameters (node.key, a * for both axes or motors); whether it is random; what it is."""
+    name: str
+    parameters: tuple
+    random: bool
+    doc: str
+
+
+TERMS = (
+    Term('encoder-zero', ('adu.*.encoder.error.zero',), False, 'zeros of both encoders'),
+    Term('encoder-eccentricity', ('adu.*.encoder.error.eccentricity_sin', 'adu.*.encoder.error.eccentricity_cos'),
+         False, 'discs off their centre, once a turn'),
+    Term('encoder-interpolation', ('adu.*.encoder.error.interpolation',), False, 'once per line of the disc'),
+    Term('tilt', ('adu.mount.tilt_forward', 'adu.mount.tilt_starboard'), False, 'azimuth axis off the vertical'),
+    Term('non-perpendicularity', ('adu.mount.non_perpendicularity',), False, 'of the two axes'),
+    Term('collimation', ('adu.mount.collimation',), False, 'beam off the normal of the elevation axis'),
+    Term('sag', ('adu.mount.sag',), False, 'of the dish and its feed, with cos E'),
+    Term('gear-transmission', ('adu.*.gear_train.runout', 'adu.*.gear_train.tooth_error'), False,
+         'runout and teeth of the pinions'),
+    Term('cogging', ('adu.*.motor_1.cogging', 'adu.*.motor_2.cogging'), False, 'of the motors'),
+    Term('turning-bodies', ('adu.elevating.about_beam',), False, 'inertia with elevation, gyroscopic, cross-axis'),
+    Term('wind', ('adu.wind.field.speed',), True, 'mean and gusts on both axes, structure included'),
+    Term('refraction', ('tracking_receiver.path.refractivity', 'scenario.program.refractivity'), False,
+         'by the air that the operator did not measure'),
+    Term('ut1', ('tracking_receiver.target.leo_pass.ut1_offset',), False, 'the earth ahead of UTC'),
+    Term('light-time', ('tracking_receiver.path.light_time',), False, 'target seen where it was'),
+    Term('prediction', ('scenario.program.time_offset',), False, 'satellite ahead of its elements'),
+    Term('boresight', ('tracking_receiver.antenna.boresight_cross_elevation',
+                       'tracking_receiver.antenna.boresight_elevation'), False, 'null of the channels off the beam'),
+    Term('multipath', ('tracking_receiver.path.multipath.reflection',), False, 'image in the ground'),
+    Term('scintillation', ('tracking_receiver.path.scintillation.level_db',
+                           'tracking_receiver.path.scintillation.angle'), True, 'turbulent air: level, direction'),
+    Term('polarisation', ('tracking_receiver.target.polarisation.axial_ratio_db',
+                          'tracking_receiver.antenna.polarisation.axial_ratio_db'), False, 'level lost to a mismatch'))
+BY_NAME = {term.name: term for term in TERMS}
+NONE, WHOLE = 'none', 'whole'
+
+BLIND = ('boresight', 'multipath', 'scintillation', 'polarisation')
+"""Terms of the receiver, which program track does not follow."""
+
+
+def felt(mode):
+    """The TERMS that reach the antenna in a mode."""
+    return [term for term in TERMS if not (mode == 'program' and term.name in BLIND)]
+
+
+def documented(mode, random):
+    """{name: what it is} of the systematic or of the random contributions in a mode."""
+    if random:
+        noise = {'noise': 'of the receiver'} if mode == 'autotrack' else {}
+        return noise | {term.name: f'{term.doc}: off its mean' for term in felt(mode) if term.random}
+    return {'servo': 'lag, friction, quantisation, structure under the unbalance',
+            **{term.name: term.doc for term in felt(mode) if not term.random},
+            **{f'{term.name}-mean': f'{term.doc}: mean of the seeds' for term in felt(mode) if term.random}}
+
+
+def parameters_of(term):
+    """The parameters node.key of a Term, each axis' own."""
+    return [key.replace('*', axis) for key in term.parameters
+            for axis in (topics.AXES if '*' in key else topics.AXES[:1])]
+
+
+def switched_off(term):
+    """Overrides that give the parameters of a Term their defaults."""
+    texts = []
+    for key in parameters_of(term):
+        node, _, name = key.partition('.')
+        texts.append(f'{key}={str(defaults(scenario.parameters_of(node))[name]).lower()}')
+    return texts
+
+
+def overrides(mode, on):
+    """Overrides of a mode with one term on (a name), or NONE, or WHOLE."""
+    off = [] if on == WHOLE else [text for term in TERMS if term.name != on for text in switched_off(term)]
+    return [*MODES[mode], *off]
+
+
+@dataclasses.dataclass(frozen=True)
+class Pass:
+    """Where the antenna points, deg: azimuth and elevation (n,) at the times (n,) [s] of an error."""
+    times: np.ndarray
+    azimuth: np.ndarray
+    elevation: np.ndarray
+
+
+def _run(mode, on, seed, duration):
+    chosen = scenario.load(SCENARIO, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
+                           duration=duration)
+    run = closed_loop.Loop(chosen).run()
+    every = round(EVERY / (run.t[1] - run.t[0]))
+    return run.where(np.arange(len(run.t)) % every == 0).where(run.t[::every] >= SETTLED)
+
+
+def flown(duration):
+    """The Pass of the scenario."""
+    run = _run('program', NONE, SEED, duration)
+    azimuth, elevation = np.degrees(run['joint_states']['position'].T)
+    return Pass(run.t, azimuth, elevation)
+
+
+def batch(item, duration=None):
+    """Errors (count, n, 2) [deg], cross-elevation and elevation, of an item ((mode, on), first run, count)."""
+    (mode, on), first, count = item
+    return np.array([np.degrees(_run(mode, on, SEED + first + i, duration).truth['error']) for i in range(count)])
+
+
+def rms(errors):
+    """Root mean square of the length of errors (..., n, 2): (...,)."""
+    return np.sqrt(np.mean(np.sum(errors ** 2, axis=-1), axis=-1))
+
+
+@dataclasses.dataclass(frozen=True)
+class Budget:
+    """The budget of a mode [deg]: base (runs, n, 2) with every term off, one run where no noise reaches the antenna;
+    once {term: (n, 2)} and seeded {term: (runs, n, 2)}, contributions; whole (runs, n, 2)."""
+    base: np.ndarray
+    once: dict
+    seeded: dict
+    whole: np.ndarray
+
+    def of(self, seeds):
+        """The Budget from some of its runs, a list of indices."""
+        return Budget(self.base[seeds] if len(self.base) > 1 else self.base, self.once,
+                      {name: e[seeds] for name, e in self.seeded.items()}, self.whole[seeds])
+
+    @property
+    def systematic(self):
+        """{name: (n, 2)}."""
+        return {'servo': self.base.mean(axis=0), **self.once,
+                **{f'{name}-mean': e.mean(axis=0) for name, e in self.seeded.items()}}
+
+    @property
+    def random(self):
+        """{name: (runs, n, 2)}: off their mean, of the size that they have off the true one."""
+        off = {'noise': self.base} if len(self.base) > 1 else {}
+        return {name: (e - e.mean(axis=0)) * np.sqrt(len(e) / (len(e) - 1.0))
+                for name, e in (off | self.seeded).items()}
+
+    @property
+    def combined(self):
+        """All contributions in one number, rms."""
+        square = sum(np.mean(rms(e) ** 2) for e in self.random.values())
+        # The mean of n runs still holds one n-th of what is random.
+        return float(np.sqrt(rms(sum(self.systematic.values())) ** 2 + square * (1.0 - 1.0 / len(self.whole))))
+
+    @property
+    def to_whole(self):
+        """The same over the rms of all whole runs."""
+        return self.combined / float(np.sqrt(np.mean(rms(self.whole) ** 2)))
+
+
+def budget(mode, runs, duration, pool, progress):
+    """The Budget of a mode from so many runs of what is random."""
+    of_batch = functools.partial(batch, duration=duration)
+    seeded, once = ([term.name for term in felt(mode) if term.random == kind] for kind in (True, False))
+    noisy = mode == 'autotrack'
+    many, few = [*seeded, WHOLE, *[NONE] * noisy], [*once, *[NONE] * (not noisy)]
+    errors = pool.of_cases(of_batch, [(mode, on) for on in many], runs, 3,
+                           lambda share, text: progress(0.8 * share, text))
+    errors |= pool.of_cases(of_batch, [(mode, on) for on in few], 1, 1,
+                            lambda share, text: progress(0.8 + 0.2 * share, text))
+    base = errors[mode, NONE]
+    return Budget(base, {name: (errors[mode, name] - base[:1])[0] for name in once},
+                  {name: errors[mode, name] - base for name in seeded}, errors[mode, WHOLE])
+
+
+def _sizes(case, e):
+    """Rows of an error (n, 2), or of one of several runs (runs, n, 2)."""
+    return [row(case, 'rms_deg', rms(e), 'deg'),
+            *(row(case, f'{axis}_rms_deg', tracking.rms(e[..., i], axis=-1), 'deg')
+              for i, axis in enumerate(ACROSS))]
+
+
+def rows(mode, made, place):
+    """The rows of a Budget of a mode on a Pass."""
+    systematic = {**made.systematic, 'systematic': sum(made.systematic.values())}
+    table = []
+    for name, e in (*systematic.items(), *made.random.items(), ('whole', made.whole)):
+        table += _sizes(f'{mode}/{name}', e)
+    seeds = list(range(len(made.whole)))
+    table += [row(f'{mode}/combined', 'rms_deg', made.combined, 'deg'),
+              row(f'{mode}/combined', 'to_whole', pseudo_values(seeds, lambda some: made.of(some).to_whole), '',
+                  target='0.9 to 1.1')]
+    for time in TIMES:
+        if place.times[0] <= time <= place.times[-1]:
+            k = int(np.argmin(np.abs(place.times - time)))
+            near, case = slice(max(k - 5, 0), k + 6), f'{mode}/{time}s'
+            table += [row(case, 'azimuth_deg', float(place.azimuth[k]), 'deg'),
+                      row(case, 'elevation_deg', float(place.elevation[k]), 'deg')]
+            table += [row(case, f'{name}_{axis}_deg', float(e[near, i].mean()), 'deg')
+                      for name, e in systematic.items() for i, axis in enumerate(ACROSS)]
+    return table
+
+
+def run(progress, runs=RUNS, pool=None, duration=None) -> Result:
+    """The budget of every mode; pool: monte_carlo.Pool, None for this process; duration [s]: of the pass, None for the
+    scenario's."""
+    if runs < 3:
+        raise ValueError(f'--runs {runs}: must be at least 3, to tell what is random from what is not')
+    pool, place, made = pool or monte_carlo.Pool(1), flown(duration), {}
+    for i, mode in enumerate(MODES):
+        made[mode] = budget(mode, runs, duration, pool,
+                            lambda share, text, i=i: progress((i + share) / len(MODES), text))
+    table = [line for mode, of_mode in made.items() for line in rows(mode, of_mode, place)]
+    return Result(table, {'budget': functools.partial(figure, made, place)},
+                  [f'Seeds {SEED} to {SEED + runs - 1}; pedestal run {SCENARIO} is the whole of autotrack.'],
+                  [line for line in table if not line['case'].endswith('s')])
+
+
+def figure(made, place):
+    """Contributions of every mode, rms, and the systematic sum over the pass beside the whole."""
+    drawn, axes = drawing.panels(len(made), 2, size=(7.4, 7.0))
+    for (left, right), (mode, of_mode) in zip(axes, made.items()):
+        sizes = {name: np.mean(rms(e)) for name, e in (*of_mode.systematic.items(), *of_mode.random.items())}
+        left.barh(list(sizes), list(sizes.values()))
+        left.invert_yaxis()
+        left.set_title(mode)
+        left.set_xlabel('rms [deg]')
+        total = sum(of_mode.systematic.values())
+        for i, axis in enumerate(ACROSS):
+            line, = right.plot(place.times, of_mode.whole.mean(axis=0)[:, i], linewidth=0.7, label=axis)
+            right.plot(place.times, total[:, i], '--', color=line.get_color())
+        right.set_title('whole (mean of the seeds) and systematic sum (dashed)')
+        right.set_ylabel('[deg]')
+        right.set_xlabel('time [s]')
+        right.legend()
+    return drawn

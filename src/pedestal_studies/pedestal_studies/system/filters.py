@@ -1,0 +1,355 @@
+"""Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
+
+Cases <profile>/<filter>/<noise>, measurements at 100 Hz. Every filter but those of FIXED is tuned for each profile and
+noise by the procedure of `tuning` for the least angle rms over TUNING_RUNS records of other seeds; imm has its default
+parameters, imm-manoeuvre those of one that expects a manoeuvre any time. `-rate-X`: with an independent rate
+measurement of X deg/s rms. `-expecting`: knows the bandwidth of coloured noise, and has no case with white noise.
+Every run has its own rms and means, after SETTLED.
+"""
+import dataclasses
+import math
+
+import numpy as np
+
+from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.motion_models import MODELS
+from acu_tracker.estimation.params import FilterParameters, UkfParameters
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.results.intervals import row
+from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.tuning import tuning
+from pedestal_common.parameters import build
+from pedestal_studies.rigs import drawing, ensemble, profiles
+from pedestal_studies.rigs.ensemble import Noise
+from pedestal_studies.rigs.rows import Result
+
+RUNS = 200
+"""Of each case."""
+
+BATCH = 25
+"""Runs that one worker makes at a time."""
+
+SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
+
+SETTLED = 3.0
+"""Moments are taken from here on [s]."""
+
+NOISES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
+          for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
+"""rms [deg]; coloured: through a first-order lag of 5 Hz."""
+
+RATES = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
+"""Filters with a rate measurement: standard deviation of that [rad/s]."""
+
+MANOEUVRE = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0, 'imm.cv.noise': math.radians(0.003),
+             'imm.ca.noise': math.radians(0.1)}
+
+EXPECTING = ('ca-expecting', 'imm-expecting')
+
+FILTERS = {**{kind: FilterParameters(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
+           'imm-manoeuvre': build(FilterParameters, {'kind': 'imm', **MANOEUVRE}),
+           **{name: FilterParameters(kind=name.partition('-')[0]) for name in (*RATES, *EXPECTING)}}
+
+FIXED = ('imm', 'imm-manoeuvre', 'imm-expecting', 'imm_ukf')
+"""Filters that are not tuned."""
+
+RANGED = ('flyby-60m', 1.0)
+"""Where imm_ukf is shown, and the standard deviation of the range it measures [m]."""
+
+SHOWN_FILTERS = (*FILTERS, 'imm_ukf')
+
+SHOWN = 'white-0.03'
+"""The noise of the figures and of the table of remarks."""
+
+TARGETS = {
+    ('flyby-500m', 'current_statistical', 'reduction'): '>= 6.5',
+    ('flyby-60m', 'current_statistical', 'reduction'): '>= 2.8',
+    ('flyby-500m', 'current_statistical-rate-0.1', 'reduction'): '>= 7.3',
+    ('flyby-60m', 'current_statistical-rate-0.1', 'reduction'): '>= 5.2',
+    **{(profile, 'imm-manoeuvre', 'angle_rms_deg'): target for profile, target in (
+        ('flyby-500m', '<= 0.0075'), ('flyby-60m', '<= 0.0090'), ('s-turn-500m', '<= 0.0078'),
+        ('s-20deg', '<= 0.0097'))},
+    ('flyby-500m', 'imm', 'angle_rms_deg'): '<= 0.0048', ('flyby-60m', 'imm', 'angle_rms_deg'): '<= 0.0102',
+    ('s-turn-500m', 'imm', 'angle_rms_deg'): '<= 0.0089', ('s-20deg', 'imm', 'angle_rms_deg'): '<= 0.0155'}
+"""Of the noise white-0.03; of imm: 1.15 times the best tuned filter of one model."""
+
+CONSISTENT = (0.8, 1.25)
+"""Range of mean NIS per degree of freedom, and of rms error over the filter's own sigma, of a consistent filter."""
+
+
+def freedom(name):
+    """Degrees of freedom of the innovation of a filter."""
+    return 1 + (name in RATES)
+
+
+def times():
+    """Instants of the measurements of a record (n,) [s]."""
+    return ensemble.PERIOD * np.arange(round(profiles.DURATION / ensemble.PERIOD))
+
+
+def noise_of(noise, name):
+    """The Noise of a name of NOISES, as the filter of a name of FILTERS gets it."""
+    return dataclasses.replace(NOISES[noise], rate_sigma=RATES.get(name), expected=name in EXPECTING)
+
+
+def measured(params, profile, noise, seed, first, count):
+    """MOMENTS (count, n) of one filter (FilterParameters) with a Noise, runs first ... first + count - 1."""
+    t = times()
+    truth = profiles.truth(profile, t)
+    return ensemble.moments(params, t, truth, noise, ensemble.records(truth, noise, seed, first, count))
+
+
+def settled(sums):
+    """Sum (runs,) of MOMENTS (runs, n) over the time once the filter has settled."""
+    return ensemble.over_time(sums[:, round(SETTLED / ensemble.PERIOD):])
+
+
+def tune(item):
+    """FilterParameters of an item (profile, noise, filter), tuned on the records of TUNING_SEED."""
+    profile, noise, name = item
+    t = times()
+    noise_known = noise_of(noise, name)
+    truth = profiles.truth(profile, t)
+    records = ensemble.records(truth, noise_known, TUNING_SEED, 0, TUNING_RUNS)
+
+    def angle_rms(params):
+        sums = settled(ensemble.moments(params, t, truth, noise_known, records))
+        return math.sqrt(sums['angle2'].sum() / sums['runs'].sum())
+
+    return tuning.tuned(FILTERS[name], angle_rms)[0]
+
+
+THINNED = 10
+"""Figures show every tenth measurement."""
+
+
+def batch(item):
+    """{filter: (MOMENTS (count,) of every run, MOMENTS over the runs at thinned times)} of an item (profile, noise,
+    {filter: parameters}, first, count)."""
+    profile, noise, filters, first, count = item
+    sums_of = {}
+    for name, params in filters.items():
+        sums = measured(params, profile, noise_of(noise, name), SEED, first, count)
+        sums_of[name] = settled(sums), ensemble.over_runs(sums[:, ::THINNED])
+    if profile == RANGED[0]:
+        t = times()
+        sums = ensemble.unscented_moments(UkfParameters(), profiles.truth(profile, t), profiles.distance(profile, t),
+                                          NOISES[noise], RANGED[1], (SEED, first, count))
+        sums_of['imm_ukf'] = settled(sums), ensemble.over_runs(sums[:, ::THINNED])
+    return sums_of
+
+
+def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISES)) -> Result:
+    """on: the profiles, noises: names of NOISES; fewer than all for a quick look."""
+    pool = pool or monte_carlo.Pool(1)
+    able = {noise: [name for name in FILTERS if NOISES[noise].bandwidth or name not in EXPECTING] for noise in noises}
+    wanted = [(profile, noise, name) for profile in on for noise in noises for name in able[noise]
+              if name not in FIXED]
+    tuned = {(profile, noise): {name: FILTERS[name] for name in able[noise] if name in FIXED}
+             for profile in on for noise in noises}
+    for (profile, noise, name), params in zip(wanted, pool.map(
+            tune, wanted, lambda share, text: progress(0.5 * share, f'tuning, {text}'))):
+        tuned[profile, noise][name] = params
+    items = [(*key, tuned[key], first, count) for key in tuned for first, count in monte_carlo.batches(runs, BATCH)]
+    of_runs, over_time = {}, {}
+    for (profile, noise, *_), sums_of in zip(items, pool.map(
+            batch, items, lambda share, text: progress(0.5 + 0.5 * share, f'{runs} runs of each case, {text}'))):
+        for name, (sums, thinned) in sums_of.items():
+            case = profile, name, noise
+            of_runs.setdefault(case, []).append(sums)
+            over_time[case] = ensemble.added(over_time[case], thinned) if case in over_time else thinned
+    values = {case: metrics(np.concatenate(sums)) for case, sums in of_runs.items()}
+    means = {case: {metric: float(value.mean()) for metric, (value, _) in measured.items()}
+             for case, measured in values.items()}
+    table = rows(values)
+    return Result(table, figures(means, over_time), remarks(means, tuned, runs), shown=shown(table))
+
+
+def metrics(sums):
+    """{metric: (values (runs,), unit)} of MOMENTS (runs,); a consistent filter has a nis_mean of its freedom, a
+    nees_mean (angle and rate, per degree of freedom) and both _over_sigma of 1."""
+    angle, rate, raw = (ensemble.rms(sums, name) for name in ('angle', 'rate', 'raw'))
+    n = sums['runs']
+    return {'angle_rms_deg': (np.degrees(angle), 'deg'), 'rate_rms_deg_s': (np.degrees(rate), 'deg/s'),
+            'reduction': (raw / angle, ''), 'nis_mean': (sums['nis'] / n, ''),
+            'nees_mean': (0.5 * sums['nees'] / n, ''),
+            'angle_over_sigma': (angle / np.sqrt(sums['variance'] / n), ''),
+            'rate_over_sigma': (rate / np.sqrt(sums['rate_variance'] / n), '')}
+
+
+def rows(values):
+    """A row for every metric of every case (profile, filter, noise)."""
+    return [row('/'.join(case), metric, value, unit,
+                target=TARGETS.get((*case[:2], metric)) if case[2] == SHOWN else None)
+            for case, measured in values.items() for metric, (value, unit) in measured.items()]
+
+
+def shown(table):
+    """The rows that are printed, those with a target: all are too many for a terminal."""
+    return [row for row in table if row['target']]
+
+
+def _cell(measured):
+    if measured is None:
+        return 34 * ' '
+    return (f'{measured["angle_rms_deg"]:.4f} ({measured["reduction"]:.1f})  {measured["rate_rms_deg_s"]:.4f}  '
+            f'{measured["angle_over_sigma"]:.2f} {measured["rate_over_sigma"]:.2f}').ljust(34)
+
+
+def remarks(values, tuned, runs):
+    """Sentences that the rows need, with a table of the profiles; values {case: {metric: mean over the runs}}."""
+    lines = [f'{runs} runs of each case. Angle rms [deg] (reduction), rate rms [deg/s], error over own sigma of angle '
+             f'and rate, noise {SHOWN} deg; every case is in the rows of --json.']
+    on = [profile for profile, noise in tuned if noise == SHOWN]
+    if on:
+        lines.append(f'{"":30}' + ''.join(f'{profile:34}' for profile in on).rstrip())
+        lines += [f'{name:30}' + ''.join(_cell(values.get((profile, name, SHOWN))) for profile in on).rstrip()
+                  for name in SHOWN_FILTERS]
+    for colour in ('white', 'coloured'):
+        inconsistent = {}
+        for (_, name, noise), measured in values.items():
+            measures = {'NIS': measured['nis_mean'] / freedom(name), 'angle': measured['angle_over_sigma'],
+                        'rate': measured['rate_over_sigma']}
+            if noise.startswith(colour):
+                for what, value in measures.items():
+                    if not CONSISTENT[0] <= value <= CONSISTENT[1]:
+                        inconsistent.setdefault(name, {}).setdefault(what, []).append(value)
+        listed = [f'    {name}: '
+                  + ', '.join(f'{what} {min(outside):.2f} to {max(outside):.2f}' for what, outside in ranges.items())
+                  for name, ranges in inconsistent.items()]
+        if listed:
+            lines += [f'Not honest under {colour} noise, NIS per degree of freedom or error over own sigma outside '
+                      f'{CONSISTENT[0]:g} to {CONSISTENT[1]:g} in some case:', *listed]
+    pairs = [(values[profile, name, noise]['reduction'],
+              values[profile, name, noise.replace('white', 'coloured')]['reduction'])
+             for profile, name, noise in values if noise == SHOWN
+             and (profile, name, noise.replace('white', 'coloured')) in values and name == 'current_statistical']
+    if pairs:
+        lines.append('A reduction is one of white noise at 100 Hz: at the same rms within 5 Hz current_statistical '
+                     f'comes down from {", ".join(f"{white:.1f}" for white, _ in pairs)} to '
+                     f'{", ".join(f"{colour:.1f}" for _, colour in pairs)}. Only `-expecting` filters do not '
+                     'take it for white.')
+    return lines
+
+
+def figures(values, over_time):
+    """{name: function that draws it} of the cases with the noise SHOWN; values as of `remarks`."""
+    on = list(dict.fromkeys(profile for profile, _, noise in values if noise == SHOWN))
+    if not on:
+        return {}
+    return {'errors': lambda: errors_figure(over_time, on), 'rates': lambda: errors_figure(over_time, on, 'rate'),
+            'rms': lambda: rms_figure(values, on), 'nis': lambda: nis_figure(values, on),
+            'probabilities': lambda: probabilities_figure(over_time, on),
+            'noise': lambda: noise_figure(values, on)}
+
+
+COMPARED = {'current_statistical': RAW, 'current_statistical-rate-0.1': FILTERED, 'imm': TRUTH}
+"""Filters of the error figures, with their colours."""
+
+
+def errors_figure(over_time, on, what='angle'):
+    """Ensemble of the error over time, mean +-1 sigma, and dashed the filter's own sigma."""
+    figure, axes = drawing.panels(len(on), len(COMPARED), size=(7.4, 1.0 + 1.4 * len(on)), sharex=True,
+                                     sharey='row')
+    t = times()[::THINNED]
+    after = t >= SETTLED
+    for line, profile in zip(axes, on):
+        for panel, (name, colour) in zip(line, COMPARED.items()):
+            sums = over_time[profile, name, SHOWN][after]
+            mean = np.degrees(sums[what] / sums['runs'])
+            sigma = np.degrees(np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - (sums[what] / sums['runs']) ** 2,
+                                                  0.0)))
+            own_sigma = np.degrees(np.sqrt(sums['variance' if what == 'angle' else 'rate_variance'] / sums['runs']))
+            panel.fill_between(t[after], mean - sigma, mean + sigma, color=colour, alpha=0.35, linewidth=0.0)
+            panel.plot(t[after], mean, color=colour, linewidth=0.8)
+            for side in (-1.0, 1.0):
+                panel.plot(t[after], side * own_sigma, color=INK, linewidth=0.7, linestyle='--')
+        line[0].set_ylabel(f'{profile}\n[deg{"" if what == "angle" else "/s"}]')
+    for panel, name in zip(axes[0], COMPARED):
+        panel.set_title(name)
+    for panel in axes[-1]:
+        panel.set_xlabel('time [s]')
+    return figure
+
+
+def profile_panels(on):
+    """(figure, panels (n,)) with a panel for each profile, two in a row, and room for a line for each filter."""
+    rows = (len(on) + 1) // 2
+    figure, axes = drawing.panels(rows, 2, size=(7.4, 0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS))), sharey=True)
+    for panel in axes.flat[len(on):]:
+        panel.set_visible(False)
+    return figure, axes.flat[:len(on)]
+
+
+def bars(values, on, metric, label, colour, text):
+    """(figure, panels (n,)), a panel of bars for each profile; metric, text(filter, metrics), colour(filter)."""
+    figure, panels = profile_panels(on)
+    for panel, profile in zip(panels, on):
+        measured = {name: values.get((profile, name, SHOWN)) for name in SHOWN_FILTERS}
+        drawn = panel.barh(list(measured), [metric(name, at) if at else 0.0 for name, at in measured.items()],
+                           color=[colour(name) for name in measured])
+        panel.bar_label(drawn, [text(name, at) if at else '' for name, at in measured.items()], padding=2, fontsize=8)
+        panel.margins(x=0.35)
+        panel.locator_params(axis='x', nbins=3)
+        panel.grid(axis='y', visible=False)
+        panel.set_title(profile)
+        panel.set_xlabel(label)
+    panels[0].invert_yaxis()
+    return figure, panels
+
+
+def _colour(name):
+    return TRUTH if name in FIXED else FILTERED if name in RATES else RAW
+
+
+def rms_figure(values, on):
+    """Angle rms of every filter; the number on a bar is the reduction."""
+    return bars(values, on, lambda name, at: at['angle_rms_deg'], 'angle rms [deg]', _colour,
+                lambda name, at: f'{at["reduction"]:.1f}')[0]
+
+
+def nis_figure(values, on):
+    """Mean NIS per degree of freedom of every filter; 1 for a consistent one."""
+    def nis(name, at):
+        return at['nis_mean'] / freedom(name)
+
+    figure, panels = bars(values, on, nis, 'NIS per degree of freedom', _colour,
+                          lambda name, at: f'{nis(name, at):.2f}')
+    for panel in panels:
+        panel.axvline(1.0, color=INK, linewidth=0.8)
+        panel.axvspan(*CONSISTENT, color=INK, alpha=0.12, linewidth=0.0)
+    return figure
+
+
+def probabilities_figure(over_time, on):
+    """Mode probabilities of the imm, mean over the runs."""
+    figure, axes = drawing.panels(len(on), size=(7.4, 1.0 + 1.2 * len(on)), sharex=True, sharey=True)
+    for panel, profile in zip(axes[:, 0], on):
+        sums = over_time[profile, 'imm', SHOWN]
+        for j, (name, colour) in enumerate(zip(MODELS, (MOTOR_1, MOTOR_2, RAW, TRUTH))):
+            mu = sums['mu'][:, j] / sums['runs']
+            if np.isfinite(mu).any():
+                panel.plot(times()[::THINNED], mu, color=colour, label=name)
+        panel.set_title(profile)
+        panel.set_ylim(0.0, 1.0)
+    axes[-1, 0].set_xlabel('time [s]')
+    return drawing.legend(figure)
+
+
+def noise_figure(values, on):
+    """Reduction of every filter under each noise: its dependence on the bandwidth of the receiver."""
+    figure, panels = profile_panels(on)
+    for panel, profile in zip(panels, on):
+        for noise, colour, marker in zip(NOISES, (RAW, RAW, FILTERED, FILTERED), 'o^o^'):
+            there = [name for name in SHOWN_FILTERS if (profile, name, noise) in values]
+            panel.plot([values[profile, name, noise]['reduction'] for name in there], there, marker,
+                           color=colour, ms=4.0, linestyle='', label=f'{noise} deg',
+                           fillstyle='full' if marker == 'o' else 'none')
+        panel.axvline(1.0, color=INK, linewidth=0.8)
+        panel.margins(x=0.06)
+        panel.set_xlim(left=0.0)
+        panel.locator_params(axis='x', nbins=4)
+        panel.set_title(profile)
+        panel.set_xlabel('reduction')
+    panels[0].invert_yaxis()
+    return drawing.legend(figure)

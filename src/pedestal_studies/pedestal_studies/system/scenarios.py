@@ -1,0 +1,154 @@
+"""Scenarios over many seeds: the results that `pedestal run` prints for one, with their intervals.
+
+Every run is the closed loop without ROS of the scenario with another seed, measured as its recording would be. Cases
+<scenario>[-<variant>]; CASES says which parameters a variant changes. A ratio to another case is one of the two under
+the same seed.
+"""
+import math
+
+import numpy as np
+
+from pedestal_analysis.report.figures import FILTERED, INK, RAW
+from pedestal_analysis.results import results, tracking
+from pedestal_analysis.results.intervals import row
+from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.cases import Case
+from pedestal_bringup.loop.recorded import Recorded
+from pedestal_studies.rigs import drawing
+from pedestal_studies.rigs.rows import Result
+
+RUNS, SEED = 40, 1
+"""Runs of each case; seed of the first."""
+
+BATCH = 5
+"""Runs that one worker makes at a time."""
+
+NEAR = {'tracking_receiver.target.flyby.closest_distance': 60.0, 'tracking_receiver.target.flyby.height': 20.0}
+
+QUIET = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.tracker.receiver.sigma_floor': 5e-4,
+         **{f'ins.{name}': 0.0 for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
+                                            'heading_wander')}}
+"""Receiver and INS without noise; the filter is told of 5e-4 rad, or it would follow every quirk."""
+
+CASES = {case.name: case for case in (
+    Case('leo_pass', 'leo_pass'), Case('ship_pass', 'ship_pass'),
+    Case('ship_pass-late', 'ship_pass', {'ins.latency': 0.02}), Case('ship_pass-quiet', 'ship_pass', QUIET),
+    Case('ship_pass_ss6', 'ship_pass_ss6'), Case('ship_overhead', 'ship_overhead'),
+    Case('ship_align_and_track', 'ship_align_and_track'), Case('uav_flyby', 'uav_flyby'),
+    Case('uav_flyby-60m', 'uav_flyby', NEAR))}
+
+TRACKING = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
+ISOLATION = ('isolation_db', 'isolation_limit_db')
+NOISE = ('noise_reduction_cross_elevation', 'noise_reduction_elevation')
+ALIGNMENT = ('aligned_s', 'heading_sigma_at_alignment_deg', 'heading_error_rms_deg', 'autotrack_after_alignment_s')
+MEASURED = {
+    'leo_pass': TRACKING, 'ship_pass': (*TRACKING, *ISOLATION), 'ship_pass-late': (*TRACKING, *ISOLATION),
+    'ship_pass-quiet': ('pointing_rms_deg', 'isolation_db'), 'ship_pass_ss6': (*TRACKING, *ISOLATION),
+    'ship_overhead': ('loss_s', 'keyhole_loss_predicted_s', 'loss_to_predicted'),
+    'ship_align_and_track': (*ALIGNMENT, *TRACKING), 'uav_flyby': (*TRACKING, *NOISE),
+    'uav_flyby-60m': (*TRACKING, *NOISE)}
+"""{case: names of its results}, of analysis/results.py or of `more_results`."""
+
+AT_SEA = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')
+"""Cases whose pointing is compared with that of leo_pass."""
+
+TARGETS = {
+    **{(case, 'pointing_to_noise'): '<= 0.4' for case in ('leo_pass', 'ship_pass', 'ship_pass-late')},
+    ('ship_pass', 'pointing_to_leo_pass'): '<= 1.3', ('ship_pass-late', 'pointing_to_leo_pass'): '<= 1.5',
+    ('ship_pass_ss6', 'pointing_to_leo_pass'): '<= 1.5',
+    **{(case, 'isolation_db'): '>= 60' for case in ('ship_pass', 'ship_pass-late', 'ship_pass-quiet',
+                                                    'ship_pass_ss6')},
+    ('ship_overhead', 'loss_to_predicted'): '0.8 to 1.2',
+    **{('uav_flyby', metric): '>= 7' for metric in NOISE}, **{('uav_flyby-60m', metric): '>= 3' for metric in NOISE}}
+
+MORE_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 'autotrack_after_alignment_s': 's'}
+
+
+def more_results(values, run):
+    """{name: value} of what no recording is asked for: of a slew through a keyhole, of the time after alignment."""
+    more = {}
+    slew = run.units['acu'].parts['state']['lookahead']['slew']
+    if slew['loss'] > 0.0:
+        more = {'keyhole_loss_predicted_s': float(slew['loss']),
+                'loss_to_predicted': values['loss_s'] / float(slew['loss'])}
+    if 'aligned_s' in values:
+        modes = run.table('acu/mode')
+        automatic = modes['t'][np.array(modes['data']) == 'autotrack']
+        more['autotrack_after_alignment_s'] = (float(automatic[0]) if automatic.size else math.nan) - values[
+            'aligned_s']
+    return more
+
+
+def measured(case):
+    """{name: value} of one run of a Case."""
+    scenario, run = case.loaded(), case.run()
+    values = {name: value for name, (value, _) in results.measured(results.of_bag(Recorded(scenario, run))).items()}
+    return {**values, **more_results(values, run)}
+
+
+def batch(item):
+    """Values (count, len(MEASURED[case])) of an item (case, first run, number of runs)."""
+    name, first, count = item
+    runs = [measured(CASES[name].with_seed(SEED + first + i)) for i in range(count)]
+    return np.array([[values[metric] for metric in MEASURED[name]] for values in runs])
+
+
+def rows(values):
+    """The rows of values {case: (runs, len(MEASURED[case]))}."""
+    table = []
+    for name, of_runs in values.items():
+        for metric, column in zip(MEASURED[name], of_runs.T):
+            unit = MORE_UNITS[metric] if metric in MORE_UNITS else results.BY_NAME[metric].unit
+            table.append(row(name, metric, column, unit, target=TARGETS.get((name, metric))))
+        if name in AT_SEA:
+            here, there = (values[case][:, MEASURED[case].index('pointing_rms_deg')] for case in (name, 'leo_pass'))
+            table.append(row(name, 'pointing_to_leo_pass', here / there, '',
+                             target=TARGETS.get((name, 'pointing_to_leo_pass'))))
+    return table
+
+
+def run(progress, runs=RUNS, pool=None) -> Result:
+    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH, progress)
+    return Result(rows(values), {'pointing': lambda: pointing_figure(values), 'uav-flyby': flyby_figure},
+                  [f'Seeds {SEED} to {SEED + runs - 1}. ship_pass-late: {CASES["ship_pass-late"].command()}',
+                   f'uav_flyby-60m: {CASES["uav_flyby-60m"].command()}'])
+
+
+def flyby_figure():
+    """Paper 000's figures 7 to 11 on uav_flyby: error and angle before and after the filter, and the azimuth flown."""
+    figure, axes = drawing.panels(3, size=(7.4, 7.2))
+    case = CASES['uav_flyby'].with_seed(SEED)
+    flown = tracking.read(Recorded(case.loaded(), case.run()))
+    middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
+    true = np.column_stack((flown.cross_elevation, flown.elevation_error))
+    for panel, errors, title, label_y in ((axes[0, 0], (flown.measured[:, 0], flown.filtered[:, 0], true[:, 0]),
+                                  'error in cross-elevation (figures 7, 8)', 'error [deg]'),
+                                 (axes[1, 0], tuple(angles[:, 1] - true[:, 1] + flown.target_earth[:, 1] for angles in
+                                                    (flown.measured, flown.filtered, true)),
+                                  'elevation of the target (figures 9, 10)', 'elevation [deg]')):
+        for values, colour, label in zip(errors, (RAW, FILTERED, INK), ('receiver', 'filtered', 'truth')):
+            panel.plot(flown.t[middle], np.degrees(values[middle]), color=colour, label=label,
+                       linewidth=0.6 if label == 'receiver' else 1.2)
+        panel.set_title(title)
+        panel.set_ylabel(label_y)
+    axes[2, 0].plot(flown.t, np.degrees(flown.azimuth), color=FILTERED)
+    axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
+    axes[2, 0].set_ylabel('azimuth [deg]')
+    axes[2, 0].set_xlabel('time [s]')
+    return drawing.legend(figure)
+
+
+def pointing_figure(values):
+    """Pointing error of every seed, rms to the left and largest to the right; values as of `rows`."""
+    figure, axes = drawing.panels(1, 2, size=(7.4, 3.8), sharey=True)
+    for panel, metric, label in zip(axes[0], ('pointing_rms_deg', 'pointing_max_deg'),
+                                    ('pointing error, rms [deg]', 'pointing error, largest [deg]')):
+        shown = [name for name in values if metric in MEASURED[name]]
+        for name in shown:
+            column = values[name][:, MEASURED[name].index(metric)]
+            panel.plot(column, [name] * len(column), '|', color=FILTERED)
+        panel.set_xlim(left=0.0)
+        panel.set_xlabel(label)
+    axes[0, 0].invert_yaxis()
+    return figure

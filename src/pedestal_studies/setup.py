@@ -1,0 +1,21 @@
+from setuptools import find_packages, setup
+
+package_name = 'pedestal_studies'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        ('share/' + package_name, ['package.xml']),
+    ],
+    install_requires=['numpy', 'numba', 'scipy', 'matplotlib', 'rich', 'filterpy'],
+    extras_require={'test': ['pytest', 'control']},
+    python_requires='>=3.10',
+    zip_safe=False,
+    maintainer='pedestal maintainers',
+    maintainer_email='pedestal@example.org',
+    description='Studies of the tracking antenna: five papers, published numbers, benchmarks.',
+    license='Apache-2.0',
+)

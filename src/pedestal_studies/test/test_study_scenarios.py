@@ -1,0 +1,39 @@
+"""The study scenarios: a run in memory is measured as its recording is; its rows."""
+import pathlib
+
+import numpy as np
+import pytest
+
+from pedestal_analysis.results import results
+from pedestal_bringup.loop import recorded
+from pedestal_bringup.scenario import scenario
+from pedestal_recording import bag
+from pedestal_studies.system import scenarios as study
+
+REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
+
+
+@pytest.mark.parametrize('name', ['leo_pass', 'ship_pass', 'uav_flyby'])
+def test_a_run_in_memory_has_the_results_of_its_recording(name):
+    from_file = bag.read(REFERENCES / name)
+    again = recorded.record(scenario.parse(name, from_file.configuration['scenario']))
+    expected, found = (results.measured(results.of_bag(run)) for run in (from_file, again))
+    assert list(found) == list(expected)
+    for metric, (value, unit) in found.items():
+        assert found[metric][1] == unit and np.array_equal(value, expected[metric][0], equal_nan=True), metric
+
+
+def test_the_runs_do_not_depend_on_their_batch():
+    together = study.batch(('uav_flyby', 0, 2))
+    assert np.array_equal(together[1:], study.batch(('uav_flyby', 1, 1)))
+    assert not np.array_equal(together[0], together[1])
+
+
+def test_rows_of_every_case():
+    values = {name: np.arange(3.0)[:, None] + 1.0 + np.arange(len(metrics))
+              for name, metrics in study.MEASURED.items()}
+    table = study.rows(values)
+    named = {(row['case'], row['metric']): row for row in table}
+    assert len(named) == len(table) and study.TARGETS.keys() <= named.keys()
+    assert all(row['runs'] == 3 for row in table)
+    assert named['ship_pass', 'pointing_to_leo_pass']['value'] == 1.0

@@ -1,0 +1,1 @@
+"""Inertial navigation systems: stated errors, or an alignment and a strapdown computer."""

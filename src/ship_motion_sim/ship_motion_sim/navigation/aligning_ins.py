@@ -1,0 +1,153 @@
+"""The INS that integrates its IMU, of every method but `model`: it aligns, navigates and knows its accuracy.
+
+It reads `ship/imu/data_raw` and puts out attitude and deck rate after a latency, like `ins`. Of the ship's parameters
+it uses the latitude, and the velocity that an aid measures with noise.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
+from pedestal_common.parameters import ParameterError
+from ship_motion_sim import earth
+from ship_motion_sim.navigation import ins, navigator
+from ship_motion_sim.navigation.ins import NEVER, RING, UNDER_WAY
+from ship_motion_sim.params import InsParameters
+from ship_motion_sim.sea import motion
+
+LONGEST_GAP = 0.1
+"""Time without a usable IMU message [s] over which its rates may be taken for steady: a deck's angular acceleration of
+0.1 rad/s2 makes that wrong by 0.5 mrad."""
+
+CONSTANTS = np.dtype([
+    ('ship', motion.CONSTANTS),
+    ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
+    ('latency_ns', 'i8'),
+    ('increment', 'i8'),                    # 1: the IMU gives mean rates since its last sample, 0: rates at the stamp
+    ('aid_noise', 'f8'),                    # [m/s]
+    ('navigator', navigator.CONSTANTS),
+    ('power_up', navigator.STATE),
+], align=True)
+
+STATE = np.dtype([
+    ('last_stamp_ns', 'i8'),
+    ('truth', motion.OUTPUTS),              # the ship as the aid measures it
+    *UNDER_WAY,
+    ('navigator', navigator.STATE),
+    ('imu_stamp_ns', 'i8'),                 # of the last IMU message that could be used
+    ('last_rate', 'f8', (3,)), ('last_force', 'f8', (3,)),      # in it
+    ('angle', 'f8', (3,)), ('force', 'f8', (3,)),   # increments since [rad, m/s]
+    ('aid', 'f8', (3,)),                    # velocity that the aid measures [m/s]
+    ('mat_ed', 'f8', (3, 3)),               # deck -> earth as known
+], align=True)
+
+
+def constants(params: InsParameters) -> np.ndarray:
+    """The record (1,) of CONSTANTS. Raises ParameterError where the azimuth can never become as good as
+    alignment.aligned_sigma demands."""
+    record, latitude = np.zeros(1, CONSTANTS), math.radians(params.ship.latitude_deg)
+    record['ship'] = motion.constants(params.ship)
+    record['earth_rate'] = earth.rate(latitude)
+    record['latency_ns'] = round(params.latency * 1e9)
+    record['increment'], record['aid_noise'] = params.imu_output == 'increment', params.aid.noise
+    record['navigator'] = navigator.constants(params.alignment, params.method, params.aid.source, latitude)
+    wanted, least = params.alignment.aligned_sigma, navigator.least_azimuth_sigma(record['navigator'][0])
+    if wanted <= least:
+        raise ParameterError(f'alignment.aligned_sigma = {wanted:g} rad: must be above {least:.3g} rad, the best that '
+                             f'method {params.method} reaches at latitude {params.ship.latitude_deg:g} deg with '
+                             f'alignment.gyro_bias = {params.alignment.gyro_bias:g} rad/s')
+    yaw = math.radians(90.0 - params.alignment.initial_heading_deg)
+    record['power_up'] = navigator.initial_state(record['navigator'], quaternion(0.0, 0.0, yaw))
+    return record
+
+
+def initial_state(constants) -> np.ndarray:
+    """The record (1,) of STATE before the first sample; constants: CONSTANTS (1,)."""
+    state = np.zeros(1, STATE)
+    state['last_stamp_ns'] = state['imu_stamp_ns'] = NEVER
+    state['navigator'] = constants['power_up']
+    return state
+
+
+@compiled
+def measure_aid(c, s, stamp_ns, normals):
+    """Put the velocity [m/s] that the aid measures at stamp_ns, with noise, into s.aid; normals: three or more."""
+    if c.navigator.aid == navigator.NO_AID:
+        return
+    motion.truth(c.ship, 1e-9 * stamp_ns, s.truth)
+    for i in range(3):
+        v = s.truth.velocity_deck[i] if c.navigator.aid == navigator.LOG else s.truth.velocity[i]
+        s.aid[i] = v + c.aid_noise * normals[i]
+
+
+@compiled
+def integrate(c, s, stamp_ns, rate, force):
+    """Integrate an IMU message, rate (3,) [rad/s] and force (3,) [m/s2]; False after a gap, which is a new power-up.
+
+    Mean rates are the increments themselves; rates at the stamps are integrated by the trapezoidal rule. The first
+    message after a power-up ends an interval that began before it, and is not integrated."""
+    dt = 1e-9 * (stamp_ns - s.imu_stamp_ns) if s.imu_stamp_ns != NEVER else 0.0
+    if dt > LONGEST_GAP:
+        s.navigator, s.imu_stamp_ns = c.power_up, NEVER
+        return False
+    if dt > 0.0:
+        for i in range(3):
+            if c.increment == 1:
+                s.angle[i], s.force[i] = dt * rate[i], dt * force[i]
+            else:
+                s.angle[i] = 0.5 * dt * (rate[i] + s.last_rate[i])
+                s.force[i] = 0.5 * dt * (force[i] + s.last_force[i])
+        navigator.step(s.navigator, c.navigator, s.angle, s.force, dt, s.aid)
+    return True
+
+
+@compiled
+def measure(c, s, stamp_ns, rate, force):
+    """Put the navigator's attitude and deck rate at stamp_ns into the ring; rate, force (3,): of the IMU message."""
+    n = s.measured % RING
+    q, w = s.quaternion, s.angular_velocity
+    q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(s.navigator, c.navigator)
+    rotation(q[n, 0], q[n, 1], q[n, 2], q[n, 3], s.mat_ed)
+    e = c.earth_rate
+    ex, ey, ez = to_deck(s.mat_ed, e[0], e[1], e[2])
+    first = s.imu_stamp_ns == NEVER
+    for i in range(3):
+        # A mean rate is valid half an interval ago: extrapolate it to the stamp.
+        half = 0.5 * (rate[i] - s.last_rate[i]) if c.increment == 1 and not first else 0.0
+        w[n, i] = rate[i] + half - (ex if i == 0 else ey if i == 1 else ez)
+        s.last_rate[i], s.last_force[i] = rate[i], force[i]
+        s.linear_acceleration[n, i] = force[i]
+    s.variance[n, 0] = s.variance[n, 1] = s.navigator.level_sigma**2
+    s.variance[n, 2] = s.navigator.azimuth_sigma**2
+    s.stage[n] = s.navigator.stage
+    s.stamp_ns[n] = s.imu_stamp_ns = stamp_ns
+    s.measured += 1
+
+
+@compiled
+def step(s, c, i, out, normals):
+    """Take one IMU message, as ins.step does; the first three of the normals (NORMALS,) are the aid's noise."""
+    out.status, out.due = ins.OK, 0
+    if i.stamp_ns <= s.last_stamp_ns:
+        out.status = ins.BAD_STAMP
+        return
+    s.last_stamp_ns = i.stamp_ns
+    for n in range(3):
+        if not (math.isfinite(i.angular_velocity[n]) and math.isfinite(i.linear_acceleration[n])):
+            out.status = ins.BAD_IMU
+    if out.status == ins.OK:
+        if s.measured - s.released == RING:
+            s.released += 1
+            out.status = ins.BUFFER_FULL
+        measure_aid(c, s, i.stamp_ns, normals)
+        if not integrate(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration):
+            out.status = ins.ATTITUDE_LOST
+        measure(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration)
+    if s.released == 0:
+        out.stage = navigator.ALIGNING
+    for n in range(3):
+        out.velocity[n] = s.navigator.strapdown.velocity[n]
+        # Integrated, the noise of a gyro is a walk and nothing else.
+        out.noise[n], out.walk[n] = 0.0, c.navigator.conditions.gyro_noise
+    ins.release(c, s, i.stamp_ns, out)

@@ -1,0 +1,193 @@
+"""The INS of method `model`: the true attitude with parametrised errors, released after a latency.
+
+The node reads `ship/imu/data_raw` only, which carries no attitude (REP 145 leaves that to `imu/data`). So the INS
+evaluates the stateless law of the ship's motion, with the same `ship` parameters, at the stamp of each IMU message and
+adds its errors. It compares the IMU's rate with the ship's: where the `ship` parameters differ from those of
+ship_motion_node, its status says so. `aligning_ins` integrates the IMU instead.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import quaternion
+from ship_motion_sim import earth, imu
+from ship_motion_sim.params import InsParameters
+from ship_motion_sim.sea import motion
+
+NORMALS = 9     # standard normals a step takes: three wander, three attitude, three rate
+STATUS = ('ok', 'stamp does not advance', 'IMU data are not finite',
+          'IMU disagrees with the ship parameters of the INS', 'more samples than the latency buffer holds',
+          'IMU was silent for too long, the attitude is lost: it aligns anew')
+OK, BAD_STAMP, BAD_IMU, IMU_DISAGREES, BUFFER_FULL, ATTITUDE_LOST = range(len(STATUS))
+
+RING = 256      # samples under way: latency / step, the largest latency at 1 kHz
+NEVER = -2 ** 63
+
+CONSTANTS = np.dtype([
+    ('ship', motion.CONSTANTS),
+    ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
+    ('bias', 'f8', (3,)),                   # roll, pitch, yaw [rad]
+    ('wander', 'f8', (3,)),                 # rms of the slow error of roll, pitch, yaw [rad]
+    ('wander_time', 'f8'),                  # [s]
+    ('noise', 'f8', (3,)),                  # rms of roll, pitch, yaw [rad]
+    ('rate_noise', 'f8'),                   # [rad/s]
+    ('imu_tolerance', 'f8'),                # [rad/s]
+    ('latency_ns', 'i8'),
+    ('variance', 'f8', (3,)),               # of roll, pitch, heading that the model declares [rad2]
+    ('walk', 'f8', (3,)),                   # what they wander by [rad/sqrt(s)]
+], align=True)
+
+UNDER_WAY = [
+    ('measured', 'i8'), ('released', 'i8'),     # samples counted; sample n lies at n % RING
+    ('stamp_ns', 'i8', (RING,)),
+    ('quaternion', 'f8', (RING, 4)),
+    ('angular_velocity', 'f8', (RING, 3)),
+    ('linear_acceleration', 'f8', (RING, 3)),
+    ('variance', 'f8', (RING, 3)),
+    ('stage', 'i8', (RING,)),
+]
+"""Results that wait for their latency to pass."""
+
+STATE = np.dtype([
+    ('last_stamp_ns', 'i8'),
+    ('wander', 'f8', (3,)),                 # slow error of roll, pitch, yaw [rad]
+    ('truth', motion.OUTPUTS),              # ship at the last stamp
+    *UNDER_WAY,
+], align=True)
+
+INPUTS = np.dtype([
+    ('stamp_ns', 'i8'),                     # of the IMU message
+    ('angular_velocity', 'f8', (3,)),       # of the IMU message [rad/s]
+    ('linear_acceleration', 'f8', (3,)),    # of the IMU message [m/s2]
+], align=True)
+
+OUTPUTS = np.dtype([
+    ('status', 'i8'),                       # index into STATUS
+    ('due', 'i8'),                          # 1: the result below is new; 0: nothing to publish
+    ('stamp_ns', 'i8'),                     # of the measurement
+    ('quaternion', 'f8', (4,)),             # x, y, z, w, deck -> earth, with error
+    ('angular_velocity', 'f8', (3,)),       # deck against earth, FLU, with noise [rad/s]
+    ('linear_acceleration', 'f8', (3,)),    # of the IMU message with this stamp [m/s2]
+    ('variance', 'f8', (3,)),               # of roll, pitch, heading as declared [rad2]
+    ('stage', 'i8'),                        # of this result, navigator.STAGES; NO_STAGE: the model, which has none
+    ('noise', 'f8', (3,)), ('walk', 'f8', (3,)),    # of roll, pitch, heading as declared [rad], [rad/sqrt(s)]
+    ('velocity', 'f8', (3,)),               # ENU, now, of an INS that navigates [m/s]
+], align=True)
+
+NO_STAGE = -1
+
+
+def constants(params: InsParameters) -> np.ndarray:
+    """The record (1,) of CONSTANTS."""
+    record = np.zeros(1, CONSTANTS)
+    record['ship'] = motion.constants(params.ship)
+    record['earth_rate'] = earth.rate(math.radians(params.ship.latitude_deg))
+    record['bias'] = params.roll_bias, params.pitch_bias, -params.heading_bias
+    record['wander'] = params.tilt_wander, params.tilt_wander, params.heading_wander
+    record['wander_time'] = params.wander_time
+    record['noise'] = params.tilt_noise, params.tilt_noise, params.heading_noise
+    record['rate_noise'] = params.rate_noise
+    record['imu_tolerance'] = params.imu_tolerance
+    record['latency_ns'] = round(params.latency * 1e9)
+    record['variance'] = model_variance(params)
+    record['walk'] = math.sqrt(2.0 / params.wander_time) * record['wander']
+    return record
+
+
+def model_variance(p):
+    """Variance of roll, pitch and heading [rad2] that method model declares."""
+    return (p.roll_bias**2 + p.tilt_wander**2 + p.tilt_noise**2, p.pitch_bias**2 + p.tilt_wander**2 + p.tilt_noise**2,
+            p.heading_bias**2 + p.heading_wander**2 + p.heading_noise**2)
+
+
+def initial_state() -> np.ndarray:
+    """The record (1,) of STATE before the first sample."""
+    state = np.zeros(1, STATE)
+    state['last_stamp_ns'] = NEVER
+    return state
+
+
+@compiled
+def wander(c, s, stamp_ns, normals):
+    """Advance the slow errors [rad] to stamp_ns: first-order Gauss-Markov, exact for any step, stationary from the
+    start; normals: three or more."""
+    kept = 0.0
+    if s.last_stamp_ns != NEVER:
+        kept = math.exp(-1e-9 * (stamp_ns - s.last_stamp_ns) / c.wander_time)
+    fresh = math.sqrt(1.0 - kept * kept)
+    for i in range(3):
+        s.wander[i] = kept * s.wander[i] + fresh * c.wander[i] * normals[i]
+    s.last_stamp_ns = stamp_ns
+
+
+@compiled
+def disagrees(truth, c, measured):
+    """Whether a measured rate (3,) [rad/s] differs by more than imu_tolerance from the ship's."""
+    wx, wy, wz = imu.inertial_rate(truth, c.earth_rate)
+    return max(abs(measured[0] - wx), abs(measured[1] - wy), abs(measured[2] - wz)) > c.imu_tolerance
+
+
+@compiled
+def measure(c, s, stamp_ns, force, normals):
+    """Put attitude and rate at stamp_ns, errors added, into the ring, with the IMU's specific force (3,) [m/s2]."""
+    n, truth = s.measured % RING, s.truth
+    roll = truth.roll + c.bias[0] + s.wander[0] + c.noise[0] * normals[3]
+    pitch = truth.pitch + c.bias[1] + s.wander[1] + c.noise[1] * normals[4]
+    yaw = truth.yaw + c.bias[2] + s.wander[2] + c.noise[2] * normals[5]
+    q, w = s.quaternion, s.angular_velocity
+    q[n, 0], q[n, 1], q[n, 2], q[n, 3] = quaternion(roll, pitch, yaw)
+    for i in range(3):
+        w[n, i] = truth.angular_velocity[i] + c.rate_noise * normals[6 + i]
+        s.linear_acceleration[n, i] = force[i]
+        s.variance[n, i] = c.variance[i]
+    s.stage[n] = NO_STAGE
+    s.stamp_ns[n] = stamp_ns
+    s.measured += 1
+
+
+@compiled
+def release(c, s, now_ns, out):
+    """Release the newest sample that is at least the latency old at now_ns; due = 0 where it was released before."""
+    out.due = 0
+    while s.released < s.measured and s.stamp_ns[s.released % RING] <= now_ns - c.latency_ns:
+        s.released += 1
+        out.due = 1
+    if out.due == 1:
+        n = (s.released - 1) % RING
+        out.stamp_ns = s.stamp_ns[n]
+        for i in range(4):
+            out.quaternion[i] = s.quaternion[n, i]
+        for i in range(3):
+            out.angular_velocity[i] = s.angular_velocity[n, i]
+            out.linear_acceleration[i] = s.linear_acceleration[n, i]
+            out.variance[i] = s.variance[n, i]
+        out.stage = s.stage[n]
+
+
+@compiled
+def step(s, c, i, out, normals):
+    """Take one IMU message. Records STATE, CONSTANTS, INPUTS, OUTPUTS; normals (NORMALS,) standard normals.
+
+    A stamp that does not advance changes nothing, and a message that is not finite is not measured; the status names
+    either.
+    """
+    out.status, out.due, out.stage = OK, 0, NO_STAGE
+    if i.stamp_ns <= s.last_stamp_ns:
+        out.status = BAD_STAMP
+        return
+    wander(c, s, i.stamp_ns, normals)
+    motion.truth(c.ship, 1e-9 * i.stamp_ns, s.truth)
+    for n in range(3):
+        if not (math.isfinite(i.angular_velocity[n]) and math.isfinite(i.linear_acceleration[n])):
+            out.status = BAD_IMU
+    if out.status == OK:
+        if disagrees(s.truth, c, i.angular_velocity):
+            out.status = IMU_DISAGREES
+        if s.measured - s.released == RING:
+            s.released += 1
+            out.status = BUFFER_FULL
+        measure(c, s, i.stamp_ns, i.linear_acceleration, normals)
+    for n in range(3):
+        out.noise[n], out.walk[n] = c.noise[n], c.walk[n]
+    release(c, s, i.stamp_ns, out)

@@ -1,0 +1,250 @@
+"""A strapdown INS from power-up on: alignment by the selected method, then navigation.
+
+aligning    strapdown at the IMU's rate, the method's step every `step` seconds: its commands rotate n'. oba
+            commands nothing and integrates the gyros in inertial space.
+navigating  from the moment the 1-sigma of azimuth is small enough. Without aid free inertial; with one, riccati_eso
+            continues with the velocity less the aid's, so level and azimuth keep improving.
+
+An aid is a velocity in deck axes (log) or ENU (gnss).
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import to_earth
+from pedestal_common.geometry.quaternion import product
+from ship_motion_sim import strapdown
+from ship_motion_sim.alignment import adrc, adrc_scheduled, classical, extended_observer, oba, riccati_eso
+from ship_motion_sim.alignment.conditions import CONDITIONS, SIGMA_UNKNOWN, conditions
+from ship_motion_sim.params import AIDS, METHODS
+
+STAGES = ('aligning', 'aligned')
+ALIGNING, NAVIGATING = range(len(STAGES))
+CLASSICAL, ADRC, ADRC_SCHEDULED, RICCATI_ESO, OBA = map(
+    METHODS.index, ('classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba'))
+NO_AID, LOG, GNSS = range(len(AIDS))
+
+CONSTANTS = np.dtype([
+    ('method', 'i8'), ('aid', 'i8'),            # index into METHODS, AIDS
+    ('step', 'f8'),                             # of the laws [s]
+    ('aligned_sigma', 'f8'),                    # [rad]
+    ('conditions', CONDITIONS),
+    ('classical', classical.CONSTANTS), ('adrc', adrc.CONSTANTS),
+], align=True)
+
+STATE = np.dtype([
+    ('stage', 'i8'),
+    ('begun', 'i8'),                            # 1 once the velocity has been set to the aid's
+    ('since', 'f8'),                            # since the laws' last step [s]
+    ('free', 'f8'),                             # since navigation began [s]
+    ('strapdown', strapdown.STATE),
+    ('command', 'f8', (3,)),                    # w_c [rad/s]
+    ('levelling', 'f8'),                        # w_cN of the gyrocompass, smoothed [rad/s]
+    ('azimuth', 'f8'),                          # of n', known so far [rad]
+    ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),         # [rad]
+    ('aligned_azimuth_sigma', 'f8'), ('aligned_level_sigma', 'f8'),     # when navigation began
+    ('no_rate', 'f8', (3,)),                    # zeros: inertial space, and no command
+    ('classical', classical.STATE), ('adrc', adrc.STATE), ('adrc_scheduled', adrc_scheduled.STATE),
+    ('riccati_eso', riccati_eso.STATE), ('oba', oba.STATE),
+], align=True)
+
+
+def constants(p, method, aid, latitude) -> np.ndarray:
+    """The record (1,) of CONSTANTS: AlignmentParameters, names out of METHODS and AIDS, latitude [rad]."""
+    record = np.zeros(1, CONSTANTS)
+    k = conditions(p, latitude)
+    record['method'], record['aid'] = METHODS.index(method), AIDS.index(aid)
+    record['step'], record['aligned_sigma'] = p.step, p.aligned_sigma
+    record['conditions'] = k
+    record['classical'] = classical.constants(k, p.classical_bandwidth, p.step)
+    record['adrc'] = adrc.constants(k, p.adrc, p.step)
+    return record
+
+
+def least_azimuth_sigma(c):
+    """The 1 sigma [rad] of azimuth that the method approaches after a long time; c: record of CONSTANTS."""
+    if c['method'] == CLASSICAL:
+        return float(c['classical']['azimuth'])
+    k = c['conditions']
+    return float(k['gyro_bias'] / k['earth_rate'][1])
+
+
+def initial_state(constants, quaternion) -> np.ndarray:
+    """The record (1,) of STATE at power-up; quaternion (x, y, z, w) deck -> n' as it is taken for true."""
+    state = np.zeros(1, STATE)
+    begin(state[0], constants[0], *map(float, quaternion))
+    return state
+
+
+@compiled
+def begin(s, c, qx, qy, qz, qw):
+    """Power-up: records STATE, zero so far, and CONSTANTS."""
+    if c.method == OBA:
+        qx, qy, qz, qw = 0.0, 0.0, 0.0, 1.0
+    strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
+    s.azimuth_sigma = s.level_sigma = SIGMA_UNKNOWN
+    for o in (s.adrc.observer, s.adrc_scheduled.observer, s.riccati_eso.observer, s.oba.observer):
+        extended_observer.start(o, c.conditions, extended_observer.LEVEL_SIGMA, extended_observer.AZIMUTH_SIGMA)
+
+
+@compiled
+def aided_velocity(s, c, aid):
+    """(E, N) components in n' [m/s] of the velocity (3,) the aid measures; a GNSS is used once n' is aligned with n.
+
+    A GNSS velocity is not rotated by the azimuth estimated since: 7 m/s that rotate with the estimate would feed back
+    into it, enlarged.
+    """
+    if c.aid == LOG:
+        east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
+        return east, north
+    if c.aid == GNSS:
+        return aid[0], aid[1]
+    return 0.0, 0.0
+
+
+@compiled
+def take(s, m):
+    """Copy the commands, azimuth and 1 sigmas of the method's record m into the state."""
+    for i in range(3):
+        s.command[i] = m.command[i]
+    s.azimuth, s.azimuth_sigma, s.level_sigma = m.azimuth, m.azimuth_sigma, m.level_sigma
+
+
+@compiled
+def align_in_inertial_space(s, c, aid, h):
+    """One step of oba, h [s] after the last; aid (3,) [m/s]."""
+    a, k = s.strapdown.velocity, c.conditions
+    ux = uy = uz = vx = vy = vz = 0.0
+    if c.aid == LOG:
+        ux, uy, uz = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
+    elif c.aid == GNSS:
+        vx, vy, vz = aid[0], aid[1], aid[2]
+    oba.step(s.oba, k, (a[0] - ux, a[1] - uy, a[2] - uz), (vx, vy, vz), h)
+    s.azimuth_sigma, s.level_sigma = s.oba.azimuth_sigma, s.oba.level_sigma
+
+
+@compiled
+def doubt_the_opposite(s, c, h):
+    """Declare the gyrocompass's azimuth unknown where the level command shows that az is beyond 60 deg.
+
+    At 180 deg of azimuth its loop is at rest too, but the level command to the north is twice the earth's rate there:
+    (19) of paper 001, cos az = 1 + w_cN / w_N."""
+    s.levelling += c.classical.s0 * h * (s.command[1] - s.levelling)
+    if 1.0 + s.levelling / c.conditions.earth_rate[1] < 0.5:
+        s.azimuth_sigma = SIGMA_UNKNOWN
+
+
+@compiled
+def follow(s, c, method, aid, h):
+    """One step, h [s] after the last, of a method that commands n'; aid (3,) [m/s]."""
+    v, k = s.strapdown.velocity, c.conditions
+    east, north = aided_velocity(s, c, aid)
+    if s.begun == 0:
+        v[0], v[1], s.begun = east, north, 1
+    v[2] = 0.0
+    v_east, v_north = v[0] - east, v[1] - north
+    if method == CLASSICAL:
+        classical.step(s.classical, c.classical, k, v_east, v_north, h)
+        v[0] -= s.classical.taken[0]
+        v[1] -= s.classical.taken[1]
+        take(s, s.classical)
+        doubt_the_opposite(s, c, h)
+    elif method == ADRC:
+        adrc.step(s.adrc, c.adrc, k, v_east, v_north, h)
+        take(s, s.adrc)
+    elif method == ADRC_SCHEDULED:
+        adrc_scheduled.step(s.adrc_scheduled, k, v_east, v_north, h)
+        take(s, s.adrc_scheduled)
+    else:
+        w_c = riccati_eso.W_C_NAVIGATING if s.stage == NAVIGATING else riccati_eso.W_C_ALIGNING
+        riccati_eso.step(s.riccati_eso, k, v_east, v_north, h, w_c)
+        take(s, s.riccati_eso)
+
+
+@compiled
+def attitude(s, c):
+    """Estimated quaternion (x, y, z, w) deck -> earth."""
+    q = s.strapdown.quaternion
+    if c.method == OBA and s.stage == ALIGNING:
+        if s.oba.count < 2.0:
+            return q[0], q[1], q[2], q[3]
+        return oba.attitude(s.oba, c.conditions, q[0], q[1], q[2], q[3])
+    return product((0.0, 0.0, math.sin(0.5 * s.azimuth), math.cos(0.5 * s.azimuth)), q)
+
+
+@compiled
+def error_velocity(s, c):
+    """(E, N) components in n' [m/s] of the velocity that the method attributes to an error of the INS."""
+    if c.method == ADRC:
+        return s.adrc.observer.z[0, 0], s.adrc.observer.z[1, 0]
+    if c.method == ADRC_SCHEDULED:
+        return s.adrc_scheduled.observer.z[0, 0], s.adrc_scheduled.observer.z[1, 0]
+    if c.method == RICCATI_ESO:
+        return s.riccati_eso.observer.z[0, 0], s.riccati_eso.observer.z[1, 0]
+    return 0.0, 0.0
+
+
+@compiled
+def begin_navigation(s, c, aid):
+    """Rotate n' onto n and start to navigate. The velocity becomes the aid's (3,) [m/s]; without an aid, the part that
+    alignment did not attribute to an error, and zero after oba, whose velocity has an unknown origin."""
+    k, v = c.conditions, s.strapdown.velocity
+    qx, qy, qz, qw = attitude(s, c)
+    wrong_east, wrong_north = error_velocity(s, c)
+    cos, sin = math.cos(s.azimuth), math.sin(s.azimuth)
+    east, north = v[0] - wrong_east, v[1] - wrong_north
+    v[0], v[1], v[2] = cos * east - sin * north, sin * east + cos * north, 0.0
+    if c.method == OBA:
+        v[0] = v[1] = 0.0
+    strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
+    s.stage, s.azimuth = NAVIGATING, 0.0
+    if c.aid != NO_AID:
+        v[0], v[1] = aided_velocity(s, c, aid)
+    for i in range(3):
+        s.command[i] = 0.0
+    s.aligned_azimuth_sigma, s.aligned_level_sigma = s.azimuth_sigma, s.level_sigma
+    known = max(s.azimuth_sigma**2 - (k.gyro_bias / k.earth_rate[1])**2, 0.0)
+    m = s.riccati_eso
+    extended_observer.start(m.observer, k, s.level_sigma, math.sqrt(known))
+    for i in range(2):
+        m.v1[i] = m.v2[i] = 0.0
+
+
+@compiled
+def fly_free(s, k, h):
+    """Grow the 1 sigmas of an INS without aid over h [s]: random walk and bias of the gyros, and the earth's rate
+    resolved with a heading that is wrong by its 1 sigma, which tilts the level."""
+    s.free += h
+    walk = k.gyro_noise**2 * s.free
+    s.azimuth_sigma = math.sqrt(s.aligned_azimuth_sigma**2 + walk + (k.gyro_bias * s.free)**2)
+    drift = math.hypot(k.gyro_bias, k.earth_rate[1] * s.aligned_azimuth_sigma) * s.free
+    s.level_sigma = math.sqrt(s.aligned_level_sigma**2 + walk + drift * drift)
+
+
+@compiled
+def step(s, c, angle, force, dt, aid):
+    """Process one IMU interval of dt [s]; records STATE, CONSTANTS.
+
+    angle, force (3,): its increments, FLU [rad, m/s]; aid (3,) [m/s], finite.
+    """
+    k, inertial = c.conditions, c.method == OBA and s.stage == ALIGNING
+    if inertial:
+        strapdown.step(s.strapdown, angle, force, dt, s.no_rate, s.no_rate, 0.0)
+    else:
+        strapdown.step(s.strapdown, angle, force, dt, k.earth_rate, s.command, k.gravity)
+    s.since += dt
+    if s.since < c.step - 0.5 * dt:
+        return
+    h, s.since = s.since, 0.0
+    if inertial:
+        align_in_inertial_space(s, c, aid, h)
+    elif s.stage == ALIGNING:
+        follow(s, c, c.method, aid, h)
+    elif c.aid == NO_AID:
+        s.strapdown.velocity[2] = 0.0
+        fly_free(s, k, h)
+    else:
+        follow(s, c, RICCATI_ESO, aid, h)
+    if s.stage == ALIGNING and s.azimuth_sigma <= c.aligned_sigma:
+        begin_navigation(s, c, aid)

@@ -1,0 +1,1 @@
+"""The seaway and the motion of a ship on it."""

@@ -1,0 +1,166 @@
+"""The ship's truth at an instant: position, attitude and their exact derivatives. Stateless.
+
+    outputs = np.zeros(1, OUTPUTS)
+    truth(constants(params)[0], 12.5, outputs[0])
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
+from ship_motion_sim.params import ShipParameters
+from ship_motion_sim.sea import recording, waves
+from ship_motion_sim.sea.waves import COMPONENTS, FREEDOMS, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+
+STATUS = ('ok', 'time is not finite')
+OK, BAD_TIME = range(len(STATUS))
+
+CONSTANTS = np.dtype([
+    ('frequency', 'f8', (COMPONENTS,)),             # w_e [rad/s]; components not in use are 0
+    ('phase', 'f8', (COMPONENTS,)),                 # [rad]
+    ('cosine', 'f8', (COMPONENTS, FREEDOMS)),       # Re X [m, rad]
+    ('sine', 'f8', (COMPONENTS, FREEDOMS)),         # -Im X
+    ('yaw', 'f8'), ('cos_yaw', 'f8'), ('sin_yaw', 'f8'),    # mean heading as REP 103 yaw
+    ('speed', 'f8'),
+    ('pieces', 'i8'),                               # of a recorded motion; 0: the components it is
+    ('breaks', 'f8', (recording.PIECES + 1,)),      # [s]
+    ('coefficients', 'f8', (recording.PIECES, FREEDOMS, recording.ORDER)),      # [m, rad], highest power first
+], align=True)
+
+OUTPUTS = np.dtype([
+    ('status', 'i8'),                               # index into STATUS; not OK: everything else is NaN
+    ('freedoms', 'f8', (3, FREEDOMS)),              # surge, sway, heave [m], roll, pitch, yaw about the mean
+                                                    # heading [rad]; rows: value, first, second derivative
+    ('position', 'f8', (3,)),                       # ENU [m]
+    ('velocity', 'f8', (3,)),                       # ENU [m/s]
+    ('acceleration', 'f8', (3,)),                   # ENU [m/s2]
+    ('velocity_deck', 'f8', (3,)),                  # FLU [m/s]
+    ('roll', 'f8'), ('pitch', 'f8'), ('yaw', 'f8'),     # REP 103 [rad]
+    ('quaternion', 'f8', (4,)),                     # x, y, z, w, deck -> earth
+    ('mat_ed', 'f8', (3, 3)),                       # deck -> earth
+    ('angular_velocity', 'f8', (3,)),               # FLU, against the earth [rad/s]
+    ('angular_acceleration', 'f8', (3,)),           # FLU [rad/s2]
+], align=True)
+
+
+def constants(params: ShipParameters) -> np.ndarray:
+    """The record (1,) of CONSTANTS: the seaway of the seed and the mean course, or a record of both.
+
+    Raises csv_table.TableError where a file is needed and cannot be used.
+    """
+    record = np.zeros(1, CONSTANTS)
+    if params.motion == 'recorded':
+        yaw = _put_recorded(record, params.recorded)
+    else:
+        yaw = math.radians(90.0 - params.heading_deg)
+        _put_components(record, waves.build(params))
+    record['yaw'], record['cos_yaw'], record['sin_yaw'] = yaw, math.cos(yaw), math.sin(yaw)
+    record['speed'] = params.speed
+    return record
+
+
+def _put_components(record, sines):
+    count = len(sines.frequency)
+    record['frequency'][0, :count] = sines.frequency
+    record['phase'][0, :count] = sines.phase
+    record['cosine'][0, :count] = sines.response.real
+    record['sine'][0, :count] = -sines.response.imag
+
+
+def _put_recorded(record, params):
+    """Put a recording into record; its mean yaw [rad]."""
+    times, freedoms = recording.read(params)
+    mean = float(np.mean(freedoms[:, YAW]))
+    freedoms[:, YAW] -= mean
+    breaks, coefficients = recording.pieces(times, freedoms)
+    count = len(coefficients)
+    record['pieces'] = count
+    record['breaks'][0, :count + 1] = breaks
+    record['coefficients'][0, :count] = coefficients
+    return mean
+
+
+@compiled
+def sin_cos(angle):
+    """(sin, cos), within 1e-15 up to 1e6 rad. Over an array four times as fast as libm's, which no compiler
+    vectorises. Reduction and polynomials of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c, k_cos.c)."""
+    n = math.floor(angle * (2.0 / math.pi) + 0.5)
+    r = angle - n * 1.57079632673412561417 - n * 6.07710050630396597660e-11 - n * 2.02226624879595063154e-21
+    z = r * r
+    s = r + r * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * (
+        -1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * (
+            -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))))
+    c = 1.0 - 0.5 * z + z * z * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * (
+        2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * (
+            2.08757232129817482790e-09 - z * 1.13596475577881948265e-11)))))
+    quadrant = n - 4.0 * math.floor(0.25 * n)
+    odd = quadrant == 1.0 or quadrant == 3.0
+    sine, cosine = (c, s) if odd else (s, c)
+    return (-sine if quadrant >= 2.0 else sine,
+            -cosine if quadrant == 1.0 or quadrant == 2.0 else cosine)
+
+
+@compiled
+def sum_components(ship, t, freedoms):
+    """freedoms (3, 6) = sum of all components at t and its first and second derivative: one sine and cosine each."""
+    wave = np.empty((2, COMPONENTS))
+    for i in range(COMPONENTS):
+        wave[0, i], wave[1, i] = sin_cos(ship.frequency[i] * t + ship.phase[i])
+    for d in range(FREEDOMS):
+        freedoms[0, d] = freedoms[1, d] = freedoms[2, d] = 0.0
+    for i in range(COMPONENTS):
+        w, s, c = ship.frequency[i], wave[0, i], wave[1, i]
+        for d in range(FREEDOMS):
+            x = ship.cosine[i, d] * c + ship.sine[i, d] * s
+            freedoms[0, d] += x
+            freedoms[1, d] += w * (ship.sine[i, d] * c - ship.cosine[i, d] * s)
+            freedoms[2, d] -= w * w * x
+
+
+@compiled
+def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
+    """(w [rad/s], dw [rad/s2]), three floats each, FLU, of fixed-axis roll, pitch [rad] and their first and second
+    derivatives and those of yaw.
+
+    mat_ed = Rz(yaw) Ry(pitch) Rx(roll): reference/nav.md section 3.2 (in FLU as in FRD), differentiated.
+    """
+    sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    wx = roll_1 - yaw_1 * sp
+    wy = pitch_1 * cr + yaw_1 * sr * cp
+    wz = -pitch_1 * sr + yaw_1 * cr * cp
+    dwx = roll_2 - yaw_2 * sp - yaw_1 * pitch_1 * cp
+    dwy = pitch_2 * cr + yaw_2 * sr * cp - yaw_1 * pitch_1 * sr * sp + roll_1 * wz
+    dwz = -pitch_2 * sr + yaw_2 * cr * cp - yaw_1 * pitch_1 * cr * sp - roll_1 * wy
+    return (wx, wy, wz), (dwx, dwy, dwz)
+
+
+@compiled
+def course_to_earth(ship, along, port):
+    """(east, north) of a horizontal vector given along the mean course and to port of it, any unit."""
+    return ship.cos_yaw * along - ship.sin_yaw * port, ship.sin_yaw * along + ship.cos_yaw * port
+
+
+@compiled
+def truth(ship, t, out):
+    """Fill the record out (OUTPUTS) with the ship (record CONSTANTS) at time t [s]."""
+    out.status = OK if math.isfinite(t) else BAD_TIME
+    x = out.freedoms
+    if ship.pieces > 0 and out.status == OK:
+        recording.evaluate(ship.breaks, ship.coefficients, ship.pieces, t, x)
+    else:
+        sum_components(ship, t, x)
+    p, v, a = out.position, out.velocity, out.acceleration
+    p[0], p[1] = course_to_earth(ship, ship.speed * t + x[0, SURGE], x[0, SWAY])
+    v[0], v[1] = course_to_earth(ship, ship.speed + x[1, SURGE], x[1, SWAY])
+    a[0], a[1] = course_to_earth(ship, x[2, SURGE], x[2, SWAY])
+    p[2], v[2], a[2] = x[0, HEAVE], x[1, HEAVE], x[2, HEAVE]
+    roll, pitch, yaw = x[0, ROLL], x[0, PITCH], ship.yaw + x[0, YAW]
+    out.roll, out.pitch, out.yaw = roll, pitch, yaw
+    q = out.quaternion
+    q[0], q[1], q[2], q[3] = quaternion(roll, pitch, yaw)
+    rotation(q[0], q[1], q[2], q[3], out.mat_ed)
+    w, dw, u = out.angular_velocity, out.angular_acceleration, out.velocity_deck
+    (w[0], w[1], w[2]), (dw[0], dw[1], dw[2]) = body_rates(
+        roll, pitch, x[1, ROLL], x[1, PITCH], x[1, YAW], x[2, ROLL], x[2, PITCH], x[2, YAW])
+    u[0], u[1], u[2] = to_deck(out.mat_ed, v[0], v[1], v[2])

@@ -1,0 +1,82 @@
+"""A recorded motion of a ship as piecewise polynomials with a continuous second derivative, made once at the start.
+
+    time_s      [s], growing; stamp 0 of the run is `start` after the first row
+    roll_deg    positive with the port side up
+    pitch_deg   positive with the bow up: the signs of a ship's instruments (PASHR), where FLU has the bow down
+    heading_deg clockwise from north, 0 to 360 or -180 to 180
+    surge_m     forward along the mean heading; this and the next two columns are optional, 0 without
+    sway_m      to port
+    heave_m     up
+
+Between the rows runs a cubic spline through all of them (not-a-knot ends), so rates and accelerations are exact
+derivatives of the motion, and what is recorded is taken for true: smooth a noisy recording before. Outside the record
+the ship comes to rest within HOLD in the attitude of the nearest end: a quintic from its value, rate and acceleration
+to the same value at rest.
+"""
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.interval import interval
+from pedestal_common.text_files import csv_table
+
+ROWS = 16384
+"""Most rows of a recording."""
+PIECES = ROWS + 1
+ORDER = 6
+"""Coefficients of a piece, the highest power first."""
+HOLD = 5.0
+"""Time [s] within which the ship comes to rest before and after the record."""
+
+COLUMNS = {'time_s': (-1e12, 1e12), 'roll_deg': (-80.0, 80.0), 'pitch_deg': (-80.0, 80.0),
+           'heading_deg': (-360.0, 360.0)}
+DISPLACEMENTS = {'surge_m': (-1e3, 1e3), 'sway_m': (-1e3, 1e3), 'heave_m': (-100.0, 100.0)}
+"""Columns of the file with the range of each; those of DISPLACEMENTS may be missing."""
+
+
+def read(params):
+    """(times (n,) [s] from stamp 0 on, surge, sway, heave [m], roll, pitch, yaw (n, 6) [rad], REP 103) of a
+    RecordedParameters; yaw is unwrapped. Raises csv_table.TableError."""
+    rows = csv_table.read(params.path, COLUMNS, 4, params.max_gap, 'ship.recorded.max_gap', DISPLACEMENTS)
+    if len(rows) > ROWS:
+        raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {ROWS}; cut or thin it out')
+    column = dict(zip((*COLUMNS, *DISPLACEMENTS), rows.T))
+    time = column['time_s']
+    length = time[-1] - time[0]
+    if params.start >= length:
+        raise csv_table.TableError(f'{params.path}: ship.recorded.start = {params.start:g} s: must be below the '
+                                   f'length of the record, {length:.10g} s')
+    return time - time[0] - params.start, np.column_stack((
+        *(column[name] for name in DISPLACEMENTS), np.radians(column['roll_deg']), -np.radians(column['pitch_deg']),
+        np.unwrap(np.radians(90.0 - column['heading_deg']))))
+
+
+def pieces(times, freedoms):
+    """(breaks (n + 2,), coefficients (n + 1, 6, ORDER)) of freedoms (n, 6) at times (n,), holds included."""
+    from scipy.interpolate import BPoly, CubicSpline, PPoly  # slow to import, and most ships move by themselves
+    spline = CubicSpline(times, freedoms)
+    first, last = times[0], times[-1]
+    at_first, at_last = ([spline(time, order) for order in range(3)] for time in (first, last))
+    rest = np.zeros(freedoms.shape[1])
+    ends = [PPoly.from_bernstein_basis(BPoly.from_derivatives(*segment)) for segment in (
+        ((first - HOLD, first), (np.array([at_first[0], rest, rest]), np.array(at_first))),
+        ((last, last + HOLD), (np.array(at_last), np.array([at_last[0], rest, rest]))))]
+    inside = np.zeros((ORDER, *spline.c.shape[1:]))
+    inside[2:] = spline.c
+    coefficients = np.concatenate((ends[0].c, inside, ends[1].c), axis=1)
+    return np.concatenate(((first - HOLD,), times, (last + HOLD,))), np.ascontiguousarray(
+        np.moveaxis(coefficients, 0, -1))
+
+
+@compiled
+def evaluate(breaks, coefficients, count, t, freedoms):
+    """freedoms (3, 6) = the first `count` pieces at t and their first and second derivative; outside, the ends'."""
+    t = min(max(t, breaks[0]), breaks[count])
+    piece = interval(breaks[:count + 1], t)
+    s = t - breaks[piece]
+    for d in range(freedoms.shape[1]):
+        x = dx = half_ddx = 0.0
+        for i in range(ORDER):
+            half_ddx = half_ddx * s + dx
+            dx = dx * s + x
+            x = x * s + coefficients[piece, d, i]
+        freedoms[0, d], freedoms[1, d], freedoms[2, d] = x, dx, 2.0 * half_ddx

@@ -1,0 +1,159 @@
+"""A seaway as a sum of sine waves, and the response of the hull to each. Plain numpy, run once at the start.
+
+reference/nav.md section 3.1. The surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}); a wave that travels
+along the deck's unit vector (d_x, d_y) (FLU) is zeta ~ e^{-j k (d_x x + d_y y)}, so the slope along x is -j k d_x a.
+"""
+import math
+import typing
+
+import numpy as np
+
+from pedestal_common.reproducible import cos, exp, power, sin
+from pedestal_common.text_files import csv_table
+from ship_motion_sim import earth
+from ship_motion_sim.params import HullParameters, ShipParameters
+
+COMPONENTS = 80
+SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
+FREEDOMS = 6
+SEA_STATES = {3: (0.88, 7.5), 4: (1.88, 8.8), 5: (3.25, 9.7), 6: (5.0, 12.4)}
+"""Sea state -> (Hs [m], Tp [s])."""
+
+SPECTRUM_COLUMNS = {'frequency_hz': (1e-3, 10.0), 'density_m2_per_hz': (0.0, 1e4)}
+"""Of the file of a measured spectrum, with the range of each."""
+
+_FINE = 100     # grid points per component where the spectrum is integrated
+
+
+class Waves(typing.NamedTuple):
+    """n components: encounter frequency (n,) [rad/s], phase (n,) [rad], X (n, 6) complex [m, rad]."""
+    frequency: np.ndarray
+    phase: np.ndarray
+    response: np.ndarray
+
+
+def shape(w, tp, gamma):
+    """JONSWAP without its level (Hasselmann et al. 1973): any positive w [rad/s] -> relative density."""
+    wp = 2.0 * math.pi / tp
+    width = np.where(w <= wp, 0.07, 0.09)
+    return power(w, -5.0) * exp(-1.25 * power(wp / w, 4.0)) * power(gamma, exp(-0.5 * ((w - wp) / (width * wp)) ** 2))
+
+
+def band(tp):
+    """(lowest, highest) frequency [rad/s] of the components: 0.55 wp to 4 wp, but no ripples above 2.2 rad/s."""
+    wp = 2.0 * math.pi / tp
+    return 0.55 * wp, min(4.0 * wp, 2.2)
+
+
+def _grid(tp):
+    return np.linspace(*band(tp), COMPONENTS * _FINE + 1)
+
+
+def _integral(x, y):
+    return np.concatenate(((0.0,), np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))))
+
+
+def spectrum(w, hs, tp, gamma):
+    """S(w) [m2 s/rad] on the band, zero outside it; its integral is Hs^2/16."""
+    low, high = band(tp)
+    grid = _grid(tp)
+    level = hs ** 2 / 16.0 / _integral(grid, shape(grid, tp, gamma))[-1]
+    return np.where((w >= low) & (w <= high), level * shape(w, tp, gamma), 0.0)
+
+
+def _second_order(w, period, damping):
+    """w_n^2 / (w_n^2 - w^2 + 2 j z w_n w): an oscillator's answer to e^{jwt}, 1 at rest."""
+    wn = 2.0 * math.pi / period
+    return wn ** 2 / (wn ** 2 - w ** 2 + 2j * damping * wn * w)
+
+
+def _mean_over(u):
+    """sin u / u: a sine averaged over a length, u half its phase along it."""
+    v = np.where(u == 0.0, 1.0, u)
+    return np.where(u == 0.0, 1.0, sin(v) / v)
+
+
+def _slope_over(u):
+    """3 (sin u - u cos u) / u^3: the best straight line through a sine along a length, against its slope."""
+    small = np.abs(u) < 1e-2
+    v = np.where(small, 1.0, u)
+    return np.where(small, 1.0 - u ** 2 / 10.0, 3.0 * (sin(v) - v * cos(v)) / (v * v * v))
+
+
+def transfer(hull: HullParameters, w, mu, speed, gravity):
+    """(w_e, RAO): encounter frequency [rad/s] and complex response (..., 6) to 1 m of wave at w [rad/s] from mu [rad].
+
+    Pressure fades with depth (Smith e^{-k d/2}) and averages out over length and beam; roll, pitch and yaw follow
+    the slope along the hull. Surge and sway are the orbital motion of the water, which at a crest moves the way the
+    wave travels, so it is -j times the elevation; yaw follows the change of that sway along the hull.
+    """
+    k = w ** 2 / gravity
+    d_x, d_y = cos(mu), -sin(mu)
+    w_e = w - k * speed * d_x
+    u_length, u_beam = 0.5 * k * hull.length * d_x, 0.5 * k * hull.beam * d_y
+    level = exp(-0.5 * k * hull.draught) * _mean_over(u_beam)
+    force = level * _mean_over(u_length)
+    moment = level * _slope_over(u_length)
+    roll = _second_order(w_e, hull.roll_period, hull.roll_damping)
+    pitch = _second_order(w_e, hull.pitch_period, hull.pitch_damping)
+    heave = _second_order(w_e, hull.heave_period, hull.heave_damping)
+    yaw = _second_order(w_e, hull.yaw_period, hull.yaw_damping)
+    rao = np.stack((-1j * d_x * force,
+                    -1j * d_y * force,
+                    heave * force,
+                    -1j * k * d_y * hull.roll_gain * roll * force,
+                    1j * k * d_x * pitch * moment,
+                    -hull.yaw_gain * k * d_x * d_y * yaw * moment), axis=-1)
+    return w_e, rao
+
+
+def density(params: ShipParameters):
+    """(w [rad/s], S [m2 s/rad]) on COMPONENTS bins of _FINE steps each: of the sea state, or as measured.
+
+    A measured density runs in straight lines between its rows. Raises csv_table.TableError.
+    """
+    if params.spectrum == 'file':
+        frequency, measured = csv_table.read(params.spectrum_file, SPECTRUM_COLUMNS).T
+        w = 2.0 * math.pi * frequency
+        grid = np.linspace(w[0], w[-1], COMPONENTS * _FINE + 1)
+        return grid, np.interp(grid, w, measured / (2.0 * math.pi))
+    hs, tp = SEA_STATES.get(params.sea_state, (params.significant_height, params.peak_period))
+    grid = _grid(tp)
+    return grid, spectrum(grid, hs, tp, params.gamma)
+
+
+def seaway(params: ShipParameters):
+    """The waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (COMPONENTS,).
+
+    One wave in each of equal bins, at a random place in its bin (equal spacing would repeat after 2 pi / dw), with
+    the bin's whole energy: sum a^2/2 = Hs^2/16 for every seed.
+    """
+    grid, S = density(params)
+    energy = _integral(grid, S)
+    random = np.random.default_rng(params.seed)
+    w = grid[0] + (np.arange(COMPONENTS) + random.random(COMPONENTS)) * (grid[-1] - grid[0]) / COMPONENTS
+    amplitude = np.sqrt(2.0 * np.diff(energy[::_FINE]))
+    phase = random.uniform(0.0, 2.0 * math.pi, COMPONENTS)
+    mu = np.radians(params.wave_angle_deg + params.spread_deg * random.standard_normal(COMPONENTS))
+    return w, amplitude, phase, mu
+
+
+def _plain(params: ShipParameters) -> Waves:
+    plain = params.plain
+    sines = ((HEAVE, plain.heave_amplitude, plain.heave_period),
+             (ROLL, math.radians(plain.roll_amplitude_deg), plain.roll_period),
+             (PITCH, math.radians(plain.pitch_amplitude_deg), plain.pitch_period),
+             (YAW, math.radians(plain.yaw_amplitude_deg), plain.yaw_period))
+    response = np.zeros((len(sines), FREEDOMS), complex)
+    for row, (freedom, amplitude, _) in enumerate(sines):
+        response[row, freedom] = -1j * amplitude
+    return Waves(2.0 * math.pi / np.array([period for _, _, period in sines]), np.zeros(len(sines)), response)
+
+
+def build(params: ShipParameters) -> Waves:
+    """The components of the ship's motion: at most COMPONENTS of them, from waves or plain sines."""
+    if params.motion == 'plain':
+        return _plain(params)
+    w, amplitude, phase, mu = seaway(params)
+    w_e, rao = transfer(params.hull, w, mu, params.speed, earth.gravity(math.radians(params.latitude_deg)))
+    return Waves(w_e, phase, rao * amplitude[:, None])

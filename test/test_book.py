@@ -1,0 +1,49 @@
+"""The pages that are made of the code hold all of it, and every page of docs/ has a place in the book."""
+import pathlib
+
+import pytest
+import yaml
+from tools import book
+
+from pedestal import cli
+from pedestal_bringup.scenario import scenario
+from pedestal_common import parameters
+
+ROOT = pathlib.Path(__file__).parents[1]
+
+
+@pytest.fixture(scope='module')
+def pages(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('book') / 'pages'
+    assert book.main(folder, ROOT) == 0
+    return folder
+
+
+def test_every_parameter_verb_and_law_is_there(pages):
+    listed = (pages / 'reference' / 'parameters.md').read_text()
+    for node in ('acu', 'adu', 'tracking_receiver', 'ship_motion', 'ins', 'beam_steering', 'scenario'):
+        section = listed.partition(f'\n## {node}\n')[2].partition('\n## ')[0]
+        assert all(f'| `{name}` |' in section for name in parameters.defaults(scenario.parameters_of(node)))
+    verbs = (pages / 'reference' / 'verbs.md').read_text()
+    assert all(f'\n## {name}\n' in verbs and f'usage: pedestal {name}' in verbs for name in cli.VERBS)
+    laws = (pages / 'reference' / 'laws.md').read_text()
+    for module, test in (('acu_tracker.estimation.filters.kalman', 'test_kalman.py'),
+                         ('adu_drive.plant.friction', 'test_laws.py'),
+                         ('ship_motion_sim.sea.motion', 'test_motion.py')):
+        section = laws.partition(f'\n### {module}\n')[2].partition('\n### ')[0]
+        assert '```text' in section and f'`{test}`' in section
+
+
+def test_every_page_is_in_the_table_of_contents(pages):
+    def names(entries):
+        for entry in entries:
+            for value in entry.values():
+                yield from [value] if isinstance(value, str) else names(value)
+
+    there = {str(path.relative_to(pages)) for path in pages.rglob('*.md')}
+    assert set(names(yaml.safe_load((ROOT / 'mkdocs.yml').read_text())['nav'])) == there
+
+
+def test_every_law_has_a_sentence(pages):
+    laws = (pages / 'reference' / 'laws.md').read_text()
+    assert '- `step(' in laws and not any(line.endswith('`: ') for line in laws.splitlines())

@@ -1,0 +1,54 @@
+"""The rooms of the packages: a room is a folder of at most 14 modules, and rooms import each other one way only."""
+import ast
+import collections
+import graphlib
+import pathlib
+
+import pytest
+
+SOURCES = pathlib.Path(__file__).parents[1] / 'src'
+MAX_MODULES = 14
+MAX_SHARE = 0.25
+FILES = {'.'.join(path.relative_to(package).with_suffix('').parts).removesuffix('.__init__'): path
+         for package in SOURCES.iterdir() for path in (package / package.name).rglob('*.py')}
+
+
+def imported(path):
+    """Return the names of our modules that a file imports, inside functions too."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            names.update(f'{node.module}.{alias.name}' if f'{node.module}.{alias.name}' in FILES else node.module
+                         for alias in node.names)
+    return names & FILES.keys()
+
+
+def room(module):
+    """Return the folder that a module is in; a module at the top of its package is a room of its own."""
+    parent = module.rpartition('.')[0]
+    return module if FILES[module].stem == '__init__' or '.' not in parent else parent
+
+
+def test_no_room_has_more_than_14_modules():
+    counts = collections.Counter(path.parent for path in FILES.values() if path.stem != '__init__')
+    assert {str(folder): count for folder, count in counts.items() if count > MAX_MODULES} == {}
+
+
+@pytest.mark.parametrize('package', sorted(path.name for path in SOURCES.iterdir()))
+def test_rooms_have_no_circle(package):
+    arrows = collections.defaultdict(set)
+    for module, path in FILES.items():
+        if module.partition('.')[0] == package:
+            arrows[room(module)] |= {room(name) for name in imported(path) if name.startswith(package)}
+    for name, others in arrows.items():
+        others.discard(name)
+    graphlib.TopologicalSorter(arrows).prepare()    # raises CycleError, which names the circle
+
+
+def test_no_package_holds_more_than_a_quarter():
+    lines = collections.Counter()
+    for module, path in FILES.items():
+        lines[module.partition('.')[0]] += path.read_text().count('\n')
+    assert max(lines.values()) <= MAX_SHARE * lines.total(), lines

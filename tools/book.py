@@ -1,0 +1,105 @@
+"""The pages of the documentation that are made of the code: parameters of every node, verbs, laws.
+
+`python -m tools.book FOLDER` (make book) copies docs/ there and writes them beside it, under reference/.
+"""
+import argparse
+import ast
+import inspect
+import pathlib
+import shutil
+import sys
+
+from pedestal import cli
+from pedestal_bringup.scenario import scenario
+from pedestal_common import parameters
+from pedestal_common.graph import nodes
+from pedestal_common.graph.graph_parameters import GraphParameters
+
+COLUMNS = ('pedestal_common', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive', 'ship_motion_sim')
+"""Packages that hold laws, in the order of the signal."""
+
+
+def parameter_page():
+    """Every parameter of every node: default, range, unit, meaning."""
+    lines = ['# Parameters', '', 'Every parameter of every node, as the node declares it. `pedestal parameters NODE` '
+             'prints the same. All is SI and radians; a name that ends in `_deg` or `_dbhz` says so.']
+    kinds = {node: scenario.parameters_of(node) for node in
+             ('scenario', *(node.name for node in nodes.NODES if node.module), 'beam_steering')}
+    for node, kind in {**kinds, 'graph, of every node': GraphParameters}.items():
+        values = parameters.defaults(kind)
+        lines += ['', f'## {node}', '', '| parameter | default | range | unit | meaning |', '|---|---|---|---|---|']
+        for name, field in parameters.flatten(kind):
+            meta, value = field.metadata, values[name]
+            allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ()))
+            text = f'{value:g}' if isinstance(value, float) else str(value)
+            cells = (f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc'])
+            lines.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
+    return lines
+
+
+def verb_page():
+    """Every verb of `pedestal`: what it does and its options, as its --help says it."""
+    lines = ['# Verbs', '', 'What `pedestal VERB --help` says.']
+    for name in cli.VERBS:
+        verb = cli.module_of(name)
+        summary, _, more = inspect.cleandoc(verb.__doc__).partition('\n\n')
+        parser = argparse.ArgumentParser(prog=f'pedestal {name}', add_help=False,
+                                         formatter_class=lambda prog: argparse.HelpFormatter(prog, width=100))
+        verb.add_arguments(parser)
+        lines += ['', f'## {name}', '', f'{summary[0].upper()}{summary[1:]}.', '', more, '', '```',
+                  *parser.format_help().rstrip().splitlines(), '```']
+    return lines
+
+
+def law_page(root):
+    """Every law: the module's docstring with its equations and symbols, its compiled functions, and its tests."""
+    lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. What '
+             'stands here is what stands in the module: the equation, the symbols, the source.']
+    for package in COLUMNS:
+        folder = root / 'src' / package
+        tests = {test.name: set(_imported(test)) for test in sorted((folder / 'test').glob('test_*.py'))}
+        lines += ['', f'## {package}', '', '```text', _docstring(folder / package / '__init__.py'), '```']
+        for module in sorted((folder / package).rglob('*.py')):
+            laws = _laws(module)
+            if laws is not None:
+                name = '.'.join(module.relative_to(folder).with_suffix('').parts)
+                judged = [test for test, modules in tests.items() if name in modules]
+                lines += ['', f'### {name}', '', '```text', _docstring(module), '```', '',
+                          *(f'- `{law}`: {first}' for law, first in laws),
+                          *([f'- tests: {", ".join(f"`{test}`" for test in judged)}'] if judged else [])]
+    return lines
+
+
+def _docstring(module):
+    return ast.get_docstring(ast.parse(module.read_text())) or ''
+
+
+def _imported(test):
+    """Dotted names of what a test imports."""
+    for node in ast.walk(ast.parse(test.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            yield from (node.module, *(f'{node.module}.{alias.name}' for alias in node.names))
+
+
+def _laws(module):
+    """[(signature, first sentence)] of the public compiled functions of a module; None where none is compiled."""
+    compiled = [node for node in ast.parse(module.read_text()).body if isinstance(node, ast.FunctionDef) and any(
+        ast.unparse(decorator) in ('compiled', 'inlined') for decorator in node.decorator_list)]
+    return [(f'{node.name}({", ".join(argument.arg for argument in node.args.args)})',
+             ' '.join((ast.get_docstring(node) or '').split('\n\n')[0].split()).replace('<', '&lt;'))
+            for node in compiled if not node.name.startswith('_')] if compiled else None
+
+
+def main(folder, root='.') -> int:
+    """Write all pages of the book into a folder."""
+    root, folder = pathlib.Path(root), pathlib.Path(folder)
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(root / 'docs', folder)
+    (folder / 'reference').mkdir()
+    for name, lines in (('parameters', parameter_page()), ('verbs', verb_page()), ('laws', law_page(root))):
+        (folder / 'reference' / f'{name}.md').write_text('\n'.join(lines) + '\n')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,208 @@
+"""The tables of README.md and docs/, written from the tables of the code and from docs/rows.json: `make docs`.
+
+A table stands between <!-- table NAME --> and <!-- end --> in a file; a test holds the files against it.
+"""
+import pathlib
+import re
+import sys
+
+import pedestal_studies
+from acu_tracker import modes
+from acu_tracker.alarms import table as alarms
+from acu_tracker.estimation.filters.kinds import KINDS
+from adu_drive.controller import faults
+from pedestal_analysis.reprocess import what_if
+from pedestal_analysis.results import results
+from pedestal_bringup.scenario import scenario
+from pedestal_common import parameters
+from pedestal_common.graph import nodes, topics
+from pedestal_common.injection.table import FAULTS
+from pedestal_studies.numbers import published
+from pedestal_studies.rigs.fault_expectations import EXPECTED
+
+FILES = ('README.md', *(f'docs/{name}.md' for name in (
+    'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools')))
+FIRST = (
+    'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
+    'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
+    'adu.azimuth.speed_loop.disturbance_observer', 'adu.azimuth.structure.inertia_share', 'adu.wind.gust.kind',
+    'adu.wind.field.speed', 'adu.mount.collimation', 'adu.azimuth.encoder.error.zero',
+    'adu.azimuth.gear_train.lash', 'acu.azimuth.filter.kind', 'acu.azimuth.filter.current_statistical.a_max',
+    'acu.azimuth.filter.current_statistical.alpha', 'acu.tracker.ukf.cv_noise',
+    'acu.azimuth.feedforward.acceleration_feedforward', 'acu.azimuth.filter.imm.models', 'acu.tracker.gate',
+    'acu.azimuth.controller', 'acu.azimuth.feedforward.bandwidth', 'acu.azimuth.notch.frequency',
+    'acu.azimuth.shaper.acceleration', 'acu.initial_mode', 'tracking_receiver.receiver.cn0_dbhz',
+    'tracking_receiver.antenna.beamwidth', 'tracking_receiver.path.refractivity',
+    'tracking_receiver.receiver.latency', 'ship_motion.ship.motion', 'ship_motion.ship.sea_state',
+    'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
+"""The parameters in the table of docs/parameters.md."""
+
+RATES = {'step': 'step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
+         'reply': 'after each request', 'command': 'when somebody asks'}
+
+
+def _table(head, rows):
+    """Lines of a Markdown table."""
+    return ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head), *('| ' + ' | '.join(row) + ' |' for row in rows)]
+
+
+def node_table():
+    """Every node: executable, what it is, what takes its place on a real antenna."""
+    rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.module else '', node.doc,
+             node.stands_for) for node in (*nodes.NODES, nodes.ARRAY)]
+    return _table(('node', 'executable (package)', 'what it is', 'stands for'), rows)
+
+
+def topic_table():
+    """Every topic: type, who writes and reads it, when, what it holds."""
+    links = nodes.links()
+    rows = []
+    for topic in topics.TOPICS:
+        link, kind = links[topic.name], topic.type.replace('/msg/', '/')
+        writers = 'every node' if len(link.writers) > 1 else ''.join(link.writers)
+        when = RATES[topic.rate] + (f'; with `{topic.flag}`' if topic.flag else '')
+        rows.append((f'`{topic.name}`', kind, writers, ', '.join(link.readers), when, topic.doc))
+    return _table(('topic', 'type', 'from', 'to', 'rate', 'content'), rows)
+
+
+def service_table():
+    """The services of every node."""
+    rows = [(f'`{node.name}` ({node.executable})', ', '.join(f'`{name}`' for name in node.unit_type().REQUESTS))
+            for node in nodes.UNITS if node.unit_type().REQUESTS]
+    return _table(('node', 'services (std_srvs/Trigger)'), rows)
+
+
+def command_table():
+    """What every node can be asked for on its topic of commands."""
+    rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
+            for node in nodes.UNITS if node.obeys and node.name not in FAULTS for verb in node.unit_type().VERBS]
+    return _table(('topic', 'verb', 'arguments', 'what it does'), rows)
+
+
+def injection_table():
+    """What every simulated node can be broken by."""
+    rows = [(f'`{node}`', f'`{fault.name}`', ', '.join(map(_defaulted, fault.arguments[:-1])), fault.doc,
+             '' if fault.lockstep else 'no') for node, faults in FAULTS.items() for fault in faults]
+    return _table(('node', 'fault', 'arguments', 'what it breaks', 'in lockstep'), rows)
+
+
+def _defaulted(argument):
+    """An argument of a fault: its default, range, unit and meaning."""
+    text = f'{argument.name} = {argument.default}' if argument.options else f'{argument.name} = {argument.default:g}'
+    return f'`{text}` ({argument.range} {argument.unit}; {argument.doc})'.replace(' ;', ';')
+
+
+def expectation_table():
+    """What is expected of every fault; modes of which the same is expected together."""
+    rows = []
+    for fault, of_modes in EXPECTED.items():
+        alike = {}
+        for mode, expected in of_modes.items():
+            alike.setdefault(expected.sentence('the same mode'), []).append(mode)
+        rows += [(f'`{fault}`', ', '.join(modes), sentence) for sentence, modes in alike.items()]
+    return _table(('fault', 'in', 'expected'), rows)
+
+
+def _argument(argument):
+    """An argument with its range and unit; in brackets where it may be left out."""
+    text = f'{argument.name} = {argument.range} {argument.unit}'.rstrip()
+    return f'`{text}`' if argument.default is None else f'[`{text}`]'
+
+
+def mode_table():
+    """The modes of the control unit."""
+    return _table(('mode', 'the axes follow', 'entered', 'left by itself'),
+                  [(f'`{mode.name}`', mode.doc, mode.entry, mode.exit) for mode in modes.TABLE])
+
+
+def filter_table():
+    """The kinds of target filter."""
+    return _table(('`filter.kind`', 'what it is'), [(f'`{name}`', kind.doc) for name, kind in KINDS.items()])
+
+
+def fault_table():
+    """The faults on which the drive trips."""
+    return _table(('fault, per axis', 'from', 'parameter'),
+                  [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
+                   for fault in faults.FAULTS])
+
+
+def alarm_table():
+    """The alarms of the control unit; those of both axes in one line."""
+    def both(text):
+        return text.replace(f'{topics.AXES[0]} ', 'AXIS ')
+    return _table(('alarm', 'priority', 'delay on, off [s]', 'latched', 'stands under', 'what is wrong',
+                   'what the operator shall do'),
+                  [(f'`{both(alarm.name)}`', alarm.priority, f'{alarm.on_delay:g}, {alarm.off_delay:g}',
+                    'yes' if alarm.latched else '', ', '.join(both(name) for name in alarm.cause
+                                                              if not name.startswith(topics.AXES[1])),
+                    alarm.meaning, alarm.action)
+                   for alarm in alarms.ALARMS if not alarm.name.startswith(topics.AXES[1])])
+
+
+def scenario_table():
+    """The scenarios that come with the product."""
+    return _table(('scenario', 'what happens'), [(f'`{name}`', title) for name, title in scenario.available().items()])
+
+
+def study_table():
+    """The studies."""
+    return _table(('study', 'what it measures'),
+                  [(f'`{name}`', line) for name, line in pedestal_studies.descriptions().items()])
+
+
+def parameter_table():
+    """The parameters of FIRST."""
+    rows = []
+    for name in FIRST:
+        node, _, key = name.partition('.')
+        kind = scenario.parameters_of(node)
+        field, value = dict(parameters.flatten(kind))[key], parameters.defaults(kind)[key]
+        meta = field.metadata
+        allowed = (f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ())))
+        text = f'{value:g}' if isinstance(value, float) else str(value)
+        rows.append((f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc']))
+    return _table(('parameter', 'default', 'range', 'unit', 'meaning'), rows)
+
+
+def result_table(table=results.RESULTS):
+    """The results of a run: name, unit, what it is, target."""
+    return _table(('result', 'unit', 'what it is', 'target'),
+                  [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
+                   results.documented(table)])
+
+
+TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
+          'services': service_table,
+          'modes': mode_table, 'commands': command_table, 'faults that can be injected': injection_table,
+         'expected of faults': expectation_table,
+          'filter kinds': filter_table, 'drive faults': fault_table,
+          'alarms': alarm_table, 'results': result_table,
+          'recomputed results': lambda: result_table(what_if.NUMBERS),
+          'first parameters': parameter_table}
+
+
+def written(text, rows):
+    """A file's text with its tables written again; rows: published.Rows. Raises KeyError for an unknown table."""
+    def table(match):
+        name = match[1]
+        lines = _table(*published.TABLES[name](rows)) if name in published.TABLES else TABLES[name]()
+        return '\n'.join((f'<!-- table {name} -->', *lines, '<!-- end -->'))
+    return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)
+
+
+def main(root='.') -> int:
+    """Write the tables of every file under a checkout."""
+    rows = published.read(root)
+    for name in FILES:
+        file = pathlib.Path(root, name)
+        old = file.read_text()
+        new = written(old, rows)
+        if new != old:
+            file.write_text(new)
+            print(f'{name}: tables written')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
