@@ -54,7 +54,7 @@ def test_in_a_pipe_a_row_is_a_line(capsys):
                                      ['parameters', 'adu']])
 def test_a_verb_that_computes_nothing_imports_no_compiler(command):
     """Nor ROS: each takes longer than the verb itself."""
-    code = ('import sys; from pedestal_bringup import cli; assert cli.main(sys.argv[1:]) == 0; '
+    code = ('import sys; from pedestal import cli; assert cli.main(sys.argv[1:]) == 0; '
             'sys.stderr.write(", ".join({"numba", "rclpy", "scipy"} & set(sys.modules)))')
     done = subprocess.run([sys.executable, '-c', code, *command], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, '')
@@ -62,9 +62,9 @@ def test_a_verb_that_computes_nothing_imports_no_compiler(command):
 
 @pytest.mark.parametrize('code, without', [
     ('import pedestal_recording.recorder_node', {'numba', 'scipy'}),
-    ('from pedestal_bringup.graph import graph, program, scenario; '
+    ('from pedestal_bringup.graph import graph; from pedestal_bringup.scenario import program, scenario; '
      'graph.read_files(program.Plan(scenario.load("ship_pass")))', {'rclpy'}),
-    ('from pedestal_bringup.graph import program, scenario; program.Plan(scenario.load("leo_pass")).tracks; '
+    ('from pedestal_bringup.scenario import program, scenario; program.Plan(scenario.load("leo_pass")).tracks; '
      'scenario.load("leo_pass").unit("tracking_receiver").prepare()', {'scipy.linalg'})])
 def test_a_run_imports_before_its_first_step_what_it_needs(code, without):
     done = subprocess.run([sys.executable, '-c', f'{code}; import sys; print({without} & sys.modules.keys())'],

@@ -207,7 +207,7 @@ def test_what_cannot_be_recovered_leaves_nothing_behind(whole, tmp_path):
     with pytest.raises(bag.BagError, match='not one message'):
         recover(tmp_path / 'live')
     command = ('import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)); '
-               'from pedestal_bringup import cli; sys.exit(cli.main(["recover", sys.argv[1], "--output", "out"]))')
+               'from pedestal import cli; sys.exit(cli.main(["recover", sys.argv[1], "--output", "out"]))')
     done = subprocess.run([sys.executable, '-c', command, whole[0]], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1
     assert done.stderr == f'pedestal: error: {tmp_path}/out/out_0.mcap: File too large\n'
