@@ -119,9 +119,9 @@ def main(limit, *command):
     signal.signal(signal.SIGINT, lambda *_: None)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     end = time.monotonic() + float(limit)
-    pid = subprocess.Popen(command).pid
+    process = subprocess.Popen(command)     # held: it would take the exit code with it
     try:
-        while (code := _reap(pid)) is None and time.monotonic() < end:
+        while (code := _reap(process.pid)) is None and time.monotonic() < end:
             time.sleep(0.05)
         if code is None:
             print(f'\n{" ".join(command)}: not ended after {float(limit):g} s. Its processes:', file=sys.stderr)
