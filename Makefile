@@ -24,6 +24,10 @@ REALTIME := test/test_operating.py test/test_page.py test/test_supervision.py te
 # The files in the order of pyproject.toml, where those of graphs come first: a file of few tests, each a graph, would
 # else be the last, and one core idle.
 IN_TURN := --dist loadfile --no-loadscope-reorder
+# SECONDS COMMAND: three times what it takes. A test process that hangs is ended and named, and is the last: xdist would
+# try its test again and again.
+LIMITED := .venv/bin/python test/limited.py
+PYTEST_IN_TURN = .venv/bin/python -m pytest $(IN_TURN) --max-worker-restart 0 $(PYTEST)
 # Containers often set it: every process would compile the sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -40,8 +44,8 @@ demo: .venv/installed
 
 test: install
 	.venv/bin/ruff check .
-	.venv/bin/python -m pytest --numprocesses 3 $(IN_TURN) $(addprefix --ignore=,$(REALTIME))
-	.venv/bin/python -m pytest --numprocesses 2 $(IN_TURN) $(REALTIME)
+	$(LIMITED) 1800 $(PYTEST_IN_TURN) --numprocesses 3 $(addprefix --ignore=,$(REALTIME))
+	$(LIMITED) 1000 $(PYTEST_IN_TURN) --numprocesses 2 $(REALTIME)
 
 update-references: install
 	.venv/bin/python bags/reference/update.py
@@ -85,7 +89,7 @@ clean:
 
 .venv/tests: .venv/installed
 	@echo 'Installing what the tests use into .venv ...'
-	.venv/bin/python $(PIP) ruff pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),'$(package)[test]')
+	.venv/bin/python $(PIP) ruff py-spy pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),'$(package)[test]')
 	@touch $@
 
 .venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip

@@ -1,12 +1,42 @@
-"""What tests of every package use."""
+"""What holds for every test: it ends processes by signals, and none of its phases lasts for ever."""
+import faulthandler
+import os
 import signal
 
 import pytest
 
-# Tests end processes by signals, which a session in the background, or under nohup, ignores and hands on.
+# A session in the background, or under nohup, ignores them and hands that on.
 for number in (signal.SIGINT, signal.SIGHUP):
     if signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, signal.SIG_DFL)
+
+STDERR = pytest.StashKey()
+
+
+def pytest_addoption(parser):
+    """The limit of pyproject.toml."""
+    parser.addini('phase_timeout', 'seconds after which a set-up, call or tear-down ends the process with its stacks')
+
+
+def pytest_configure(config):
+    """Keep the standard error that is not captured."""
+    config.stash[STDERR] = os.dup(2)
+
+
+def _within_its_limit(item):
+    """pytest-timeout guards a test until its first failure only, and interrupts Python code only. This is a thread of
+    C: it also ends a tear-down after a failure, and a call that never comes back from a library. xdist names the test
+    and goes on in a new process."""
+    faulthandler.dump_traceback_later(float(item.config.getini('phase_timeout')), exit=True,
+                                      file=item.config.stash[STDERR])
+    try:
+        return (yield)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+pytest_runtest_setup = pytest_runtest_call = pytest_runtest_teardown = pytest.hookimpl(wrapper=True, tryfirst=True)(
+    _within_its_limit)
 
 
 @pytest.fixture

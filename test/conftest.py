@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 
+import limited
 import numpy as np
 import pytest
 
@@ -87,7 +88,7 @@ def start_process(environment, tmp_path):
 
     yield start
     for process in started:
-        _kill_group(process)
+        limited.kill_tree(process)
 
 
 @pytest.fixture
@@ -109,8 +110,11 @@ def _finished(process, timeout):
     try:
         output, errors = process.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
-        _kill_group(process)
-        output, errors = process.communicate()
+        limited.kill_tree(process)
+        try:
+            output, errors = process.communicate(timeout=limited.DEATH_TIME_S)
+        except subprocess.TimeoutExpired as held:       # by a process that had left the tree before
+            output, errors = held.stdout, held.stderr
         pytest.fail(f'{" ".join(map(str, process.args))} ran longer than {timeout:g} s\n{output}\n{errors}')
     return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
 
@@ -123,14 +127,6 @@ def _complaints(errors):
 def complaints():
     """complaints(stderr of a node) -> it without what is mere information."""
     return _complaints
-
-
-def _kill_group(process):
-    try:
-        os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
-    process.wait()
 
 
 @dataclasses.dataclass
@@ -161,7 +157,7 @@ class Run:
 
     def recorded(self, size=100_000):
         """Whether this many bytes are in the bag: its first chunk, so the drive is well under way."""
-        assert self.process.poll() is None, self.process.communicate()
+        assert self.process.poll() is None, self.finish()
         return sum(file.stat().st_size for file in self.bag.glob('*.mcap')) > size
 
     def finish(self, timeout=180.0):
@@ -173,9 +169,8 @@ class Run:
         return self.finish()
 
     def kill(self):
-        _kill_group(self.process)
-        for pid in self.pids().values():
-            os.kill(pid, signal.SIGKILL)
+        limited.kill_tree(self.process)
+        limited.kill(*self.pids().values())
 
 
 @pytest.fixture(scope='module')
@@ -246,7 +241,7 @@ def recorded(reserve_domain, tmp_path_factory):
 MODULES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'ins': 'ship_motion_sim.ins_node',
            'tracking_receiver': 'tracking_receiver_sim.tracking_receiver_node', 'acu': 'acu_tracker.acu_node',
            'adu': 'adu_drive.adu_node', 'beam_steering': 'adu_drive.beam_steering_node',
-           'recorder': 'pedestal_recording.recorder_node'}
+           'recorder': 'pedestal_recording.recorder_node', 'page': 'pedestal_operator.page_node'}
 
 
 @dataclasses.dataclass
@@ -274,7 +269,7 @@ def start_node(reserve_domain, tmp_path_factory):
 
     yield start
     for node in started:
-        _kill_group(node.process)
+        limited.kill_tree(node.process)
 
 
 class Client:

@@ -502,13 +502,13 @@ def _do_all(output):
         if verb not in ('replay', 'rerun', 'tune'):
             with open(os.devnull, 'w') as sink, contextlib.redirect_stdout(sink):
                 cli.main([verb.split(',')[0], *arguments])
-    load('again.replay', 'trials.tune', 'run.graph')
+    load('pedestal_analysis.reprocess.replay', 'pedestal_analysis.tuning.tune', 'pedestal_bringup.graph.graph')
 
 
 def load(*modules):
-    """Import modules of bringup once for all children."""
+    """Import modules once for all children."""
     for name in modules:
-        importlib.import_module(f'pedestal_bringup.{name}')
+        importlib.import_module(name)
 
 
 def attack(folder, names, seed=1, verbs=None):

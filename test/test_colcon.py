@@ -14,7 +14,8 @@ EXECUTABLES = {
     'tracking_receiver_sim': ['tracking_receiver_node'],
     'acu_tracker': ['acu_node'],
     'adu_drive': ['adu_node', 'beam_steering_node'],
-    'pedestal_bringup': ['pedestal', 'recorder_node'],
+    'pedestal_recording': ['recorder_node'],
+    'pedestal': ['pedestal'],
 }
 
 if 'colcon' not in os.environ.get('COLCON_PREFIX_PATH', ''):

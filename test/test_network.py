@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import limited
 import numpy as np
 import pytest
 
@@ -94,8 +95,7 @@ class Hosts:
 
     def close(self):
         for process in self._started:
-            process.kill()
-            process.wait()
+            limited.kill_tree(process)
         for name in (*self.NAMES, 'switch'):
             subprocess.run(['ip', 'netns', 'delete', self._of(name)], capture_output=True, timeout=30)
 

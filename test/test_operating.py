@@ -4,9 +4,11 @@ import os
 import pty
 import select
 import signal
+import subprocess
 import sys
 import time
 
+import limited
 import pytest
 
 from pedestal import cli
@@ -70,13 +72,23 @@ def test_one_shot_verbs_ask_wait_and_say(running, terminal, tmp_path):
     assert terminal('ask', 'release', '--who', 'anna').returncode == 0
 
 
-def test_the_console_stops_jogs_while_a_key_is_held_and_quits(running, environment):
-    run, client = running
+@pytest.fixture
+def console(running, environment):
+    """(Popen, descriptor of the terminal) of `pedestal operate`."""
+    screen, theirs = pty.openpty()
+    process = subprocess.Popen([*PEDESTAL, 'operate', '--who', 'hand'], stdin=theirs, stdout=theirs, stderr=theirs,
+                               start_new_session=True, env={**environment, 'ROS_DOMAIN_ID': str(running[0].domain_id),
+                                                            'TERM': 'xterm', 'COLUMNS': '120'})
+    yield process, screen
+    limited.kill_tree(process)
+    os.close(theirs)
+    os.close(screen)
+
+
+def test_the_console_stops_jogs_while_a_key_is_held_and_quits(running, console):
+    _, client = running
+    process, screen = console
     client.until(lambda: client.heard['joint_states'])
-    child, screen = pty.fork()
-    if child == 0:
-        os.execvpe(PEDESTAL[0], [*PEDESTAL, 'operate', '--who', 'hand'],
-                   {**environment, 'ROS_DOMAIN_ID': str(run.domain_id), 'TERM': 'xterm', 'COLUMNS': '120'})
     shown = b''
 
     def watch(condition, seconds=60.0):
@@ -106,8 +118,7 @@ def test_the_console_stops_jogs_while_a_key_is_held_and_quits(running, environme
         watch(lambda held=held: time.monotonic() > held)
     watch(lambda: abs(client.heard['joint_states'][-1].velocity[0]) < 1e-3)               # the key was let go
     os.write(screen, b'q')
-    assert os.waitpid(child, 0)[1] == 0
-    os.close(screen)
+    watch(lambda: process.poll() == 0)
 
 
 def test_the_antenna_is_stowed_with_its_pins_and_unstowed(running, terminal):

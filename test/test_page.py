@@ -16,6 +16,7 @@ import threading
 import time
 import urllib.parse
 
+import limited
 import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect as connect_web_socket
@@ -43,8 +44,8 @@ def free_port():
 
 
 def begins_with(process, count):
-    """The first lines that a process, head of its group, writes; one that does not is killed, which ends them."""
-    timer = threading.Timer(PATIENCE, os.killpg, (process.pid, signal.SIGKILL))
+    """The first lines that a process writes; one that does not is killed, which ends them."""
+    timer = threading.Timer(PATIENCE, limited.kill_tree, (process,))
     timer.start()
     try:
         return ''.join(process.stdout.readline() for _ in range(count))
@@ -105,19 +106,10 @@ def reply(verb):
 
 
 @pytest.fixture(scope='module')
-def lone(reserve_domain, tmp_path_factory):
-    """(Process, Site) of a page without a graph."""
-    folder = tmp_path_factory.mktemp('page')
-    with open(folder / 'errors', 'w') as errors:
-        process = subprocess.Popen(
-            [sys.executable, '-m', 'pedestal_operator.page_node', '--ros-args', '-p', 'port:=0', '-p', 'clients:=12'],
-            env={**os.environ, 'ROS_DOMAIN_ID': str(reserve_domain())}, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=errors, text=True, start_new_session=True)
-        process.errors = folder / 'errors'
-        yield process, Site(begins_with(process, 3))
-    process.kill()
-    process.wait()
-    process.stdout.close()
+def lone(start_node):
+    """(NodeProcess, Site) of a page without a graph."""
+    page = start_node('page', '-p', 'port:=0', '-p', 'clients:=12')
+    return page, Site(begins_with(page.process, 3))
 
 
 def test_who_is_served(lone):
@@ -159,17 +151,17 @@ def test_a_monitor_may_only_look_and_an_operator_takes_nothing_away(lone):
                                   '{"jog": [1e9, 0]}', '{"jog": [NaN, 0]}', '[' * 4000,
                                   '{"ask": "stow", "arguments": {"a": [1]}}', '{"jog": [true, 0]}'))
 def test_what_is_no_message_is_answered_in_a_line(lone, text):
-    process, site = lone
+    server, site = lone
     with site.open() as page:
         page.send(text)
         given = hear(page, lambda message: [given for given in message.get('replies', ()) if 'you' not in given])[0]
         assert given.get('error') or not given['granted']
-    assert process.poll() is None
+    assert server.process.poll() is None
 
 
 def test_pages_that_never_read_are_dropped(lone):
     """Ten of them, and a page beside them is told as before; what they are sent is not kept."""
-    process, site = lone
+    server, site = lone
     mute = []
     with site.open() as page:
         mute += [site.mute() for _ in range(10)]
@@ -178,7 +170,7 @@ def test_pages_that_never_read_are_dropped(lone):
             with site.open(), site.open():
                 pass
         assert refused.value.response.status_code == 503                                 # there are twelve at the most
-        before = _resident(process.pid)
+        before = _resident(server.process.pid)
 
         def room():
             with contextlib.suppress(InvalidStatus), site.open(), site.open():
@@ -187,7 +179,7 @@ def test_pages_that_never_read_are_dropped(lone):
         while not room():
             assert time.monotonic() < deadline
             hear(page, lambda message: message.get('now'))
-        assert _resident(process.pid) - before < 20e6
+        assert _resident(server.process.pid) - before < 20e6
     for connection in mute:
         connection.close()
 
@@ -203,12 +195,12 @@ def test_a_busy_port_is_said_in_one_line(lone, run_process, one_line):
     assert done.returncode == 1 and 'in use' in one_line(done.stderr)
 
 
-def test_it_ends_without_a_word(lone, complaints):
-    process, site = lone
+def test_it_ends_without_a_word(lone):
+    server, site = lone
     with site.open():
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(PATIENCE) == 0
-    assert complaints(process.errors.read_text()) == ''
+        server.process.send_signal(signal.SIGTERM)
+        done = server.finish(PATIENCE)
+    assert (done.returncode, done.stderr) == (0, '')
 
 
 @pytest.fixture(scope='module')
@@ -228,9 +220,7 @@ def browser(tmp_path_factory):
             yield process, playwright.chromium.connect_over_cdp(f'http://127.0.0.1:{port.read_text().split()[0]}',
                                                                 timeout=PATIENCE * 1e3)
     finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        limited.kill_tree(process)
 
 
 def opened(browser, url, requests=None):

@@ -64,7 +64,7 @@ def test_a_run_goes_at_the_pace_of_the_clock(run):
 
 def test_who_has_a_step_to_make_goes_first(run):
     if subprocess.run([sys.executable, '-c', 'import os; os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(10))'],
-                      stderr=subprocess.DEVNULL).returncode:
+                      stderr=subprocess.DEVNULL, timeout=60.0).returncode:
         pytest.skip('this machine allows no priority')
     assert {node for node, policy in run.policies.items() if policy == os.SCHED_RR} == {'adu', 'acu',
                                                                                       'tracking_receiver'}

@@ -113,7 +113,7 @@ def test_start_and_duration(run, connect, start_process, domain):
     for name in ('joint_states', 'acu/program_track'):
         client.read(name)
     client.until(lambda: replay.poll() is not None and sum(map(len, client.heard.values())) == 52)
-    output, errors = replay.communicate()
+    output, errors = replay.communicate(timeout=30.0)
     assert (replay.returncode, errors) == (0, '')
     assert len(client.heard['acu/program_track']) == 1
     assert [messages.nanoseconds(m.header.stamp) for m in client.heard['joint_states']] == [
@@ -148,7 +148,7 @@ class Terminal:
 
     def close(self):
         self.process.kill()
-        self.process.wait()
+        self.process.wait(30.0)
         os.close(self.slave)
         os.close(self.master)
 

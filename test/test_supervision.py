@@ -1,20 +1,15 @@
 """`pedestal run` in realtime: who dies is started again, the run ends in order, and nobody is left behind."""
-import importlib.util
-import pathlib
 import re
 import signal
 import subprocess
 import time
 
+import kills
 import pytest
 
 from pedestal_bringup.graph import reaper
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
-
-_spec = importlib.util.spec_from_file_location('kills', pathlib.Path(__file__).with_name('kills.py'))
-kills = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(kills)
 
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 
@@ -121,7 +116,8 @@ exec "$@"
 
 def test_the_cause_of_an_end_is_kept_on_a_full_disk(start_run, tmp_path):
     alone = ('unshare', '--mount', 'sh', '-c', FULL, tmp_path)
-    if subprocess.run([*alone[:4], 'mount -t tmpfs tmpfs "$0"', tmp_path], capture_output=True).returncode != 0:
+    if subprocess.run([*alone[:4], 'mount -t tmpfs tmpfs "$0"', tmp_path], capture_output=True,
+                      timeout=60.0).returncode != 0:
         pytest.skip('this machine mounts nothing')
     result = start_run('leo_pass', bag=tmp_path / 'bag', prefix=alone).finish()
     assert result.returncode == 1

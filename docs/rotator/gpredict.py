@@ -11,6 +11,7 @@ import datetime
 import math
 import os
 import pathlib
+import select
 import shutil
 import socket
 import subprocess
@@ -40,6 +41,9 @@ FILES = {
     'hwconf/pedestal.rot': '[Rotator]\nHost=127.0.0.1\nPort={}\nCycle=100\nThreshold=0.1\nMinAz=0\nMaxAz=360\n'
                            'MinEl=0\nMaxEl=90\nAzType=0\nAzStopPos=0\n'}
 """Of its folder of settings."""
+
+START_TIME_S = 120.0
+"""For what gpredict and its screen do in some seconds on a quiet machine."""
 
 MENU, ANTENNA_CONTROL = (681, 44), ('Up',) * 5 + ('Return',)
 """The button of the module's menu in a window of 700 x 700, and the keys from there."""
@@ -95,23 +99,39 @@ class Gpredict:
             file = pathlib.Path(home, 'Gpredict', name)
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text.format(*values.get(name, ())))
+        self._processes = []
+        self._environment = {**os.environ, 'HOME': str(home), 'XDG_CONFIG_HOME': str(home), 'NO_AT_BRIDGE': '1'}
+        try:
+            self._environment['DISPLAY'] = self._screen()
+            self._start('gpredict')
+            self._engage()
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self, *command, **options):
+        """A process that is silent, because one that is left behind would keep the output of its parent open."""
+        self._processes.append(subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                                stderr=subprocess.DEVNULL, env=self._environment, **options))
+
+    def _screen(self):
+        """Start Xvfb; the name of its display."""
         reader, writer = os.pipe()
-        self._processes = [subprocess.Popen(['Xvfb', '-displayfd', str(writer), '-screen', '0', '1280x900x24',
-                                             '-nolisten', 'tcp'], pass_fds=(writer,), stderr=subprocess.DEVNULL)]
+        self._start('Xvfb', '-displayfd', str(writer), '-screen', '0', '1280x900x24', '-nolisten', 'tcp',
+                    pass_fds=(writer,))
         os.close(writer)
         with open(reader) as told:
-            display = f':{told.readline().strip()}'
-        self._environment = {**os.environ, 'DISPLAY': display, 'HOME': str(home), 'XDG_CONFIG_HOME': str(home),
-                             'NO_AT_BRIDGE': '1'}
-        self._processes.append(subprocess.Popen(['gpredict'], env=self._environment, stdout=subprocess.DEVNULL,
-                                                stderr=subprocess.DEVNULL))
-        self._engage()
+            if not select.select([told], [], [], START_TIME_S)[0]:
+                raise TimeoutError('Xvfb does not start')
+            return f':{told.readline().strip()}'
 
     def _engage(self):
         """Open the antenna control; a machine that is busy draws late."""
         self._await('Gpredict: Test')
-        control = ''
+        control, deadline = '', time.monotonic() + START_TIME_S
         while not control:
+            if time.monotonic() > deadline:
+                raise TimeoutError('gpredict shows no antenna control')
             time.sleep(2.0)
             self._do('mousemove', *MENU, 'click', 1)
             time.sleep(1.0)
@@ -132,16 +152,17 @@ class Gpredict:
         return found[0] if found else ''
 
     def _do(self, *words):
-        return subprocess.run(['xdotool', *map(str, words)], env=self._environment, capture_output=True,
-                              text=True).stdout
+        return subprocess.run(['xdotool', *map(str, words)], env=self._environment, capture_output=True, text=True,
+                              timeout=START_TIME_S).stdout
 
     def close(self):
         """End it and its screen. gpredict is killed: told to end, it may wait for a lock of its own for ever."""
-        screen, gpredict = self._processes
-        gpredict.kill()
-        gpredict.wait()
-        screen.terminate()
-        screen.wait()
+        for process in self._processes[1:]:
+            process.kill()
+            process.wait(START_TIME_S)
+        for screen in self._processes[:1]:
+            screen.terminate()
+            screen.wait(START_TIME_S)
 
 
 def main(port='4533', seconds='60'):

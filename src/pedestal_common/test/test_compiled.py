@@ -208,27 +208,36 @@ def test_a_function_is_the_law_for_its_type():
 
 
 STOPPED = """
-import os, signal
+import os
+import signal
+import typing
+
 from numba.core.codegen import JITCodeLibrary
-from pedestal_common import shell
+from pedestal_common.node import shell
 
 made = JITCodeLibrary._object_compiled_hook
 
 def told(cls, module, code):
     # As if it had come while LLVM was at work.
-    if not shell._stop:
+    if shell._compiling and not shell._stop:
         os.kill(os.getpid(), signal.SIGINT)
     made(module, code)
 
 JITCodeLibrary._object_compiled_hook = classmethod(told)
+import numba
 from pedestal_common.compiled import compiled
+
+numba.njit(lambda x: x)(1.0)    # imports what cannot be imported again by the call after the stop
 
 @compiled
 def law(x):
     return x + 1.0
 
+class Memory(typing.NamedTuple):
+    pass
+
 class Unit:
-    memory = 1.0
+    memory = Memory()
 
     def prepare(self):
         while True:

@@ -1,4 +1,5 @@
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -15,16 +16,20 @@ STILL = dict(motion='plain', plain=PlainParameters(roll_amplitude_deg=0.0), spee
 NO_NOISE = np.zeros(imu.NORMALS)
 
 
+constants_of = functools.cache(motion.constants)
+"""A spectrum of waves is cut into components anew by each call."""
+
+
 def truth_at(params, t):
     truth = np.zeros(1, motion.OUTPUTS)
-    motion.truth(motion.constants(params.ship)[0], t, truth[0])
+    motion.truth(constants_of(params.ship)[0], t, truth[0])
     return truth
 
 
 def sample(params, t, dt=0.005, normals=NO_NOISE):
     inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
     inputs['t'], inputs['dt'] = t, dt
-    imu.step(imu.initial_state()[0], imu.constants(params)[0], motion.constants(params.ship)[0], inputs[0],
+    imu.step(imu.initial_state()[0], imu.constants(params)[0], constants_of(params.ship)[0], inputs[0],
              truth_at(params, t)[0], outputs[0], normals)
     return outputs[0]
 
