@@ -80,7 +80,7 @@ PAPER_001 = (
 
 _STEP, _RAMP = 'step/alpha=0.1/T=10ms/{}', 'ramp/{}deg_s/T={}ms'
 PAPER_002 = (
-    Claim('figures 1, 2, 8: block diagrams', 'built: studies/rigs/angle_loop.py'),
+    Claim('figures 1, 2, 8: block diagrams', 'built: pedestal_studies/rigs/angle_loop.py'),
     Claim('(2): 8.4 Hz for n = 20, T = 1 ms', '1/((n - 1) T) is 8.38 Hz; the recursion is at -3 dB at 8.17 Hz'),
     *_of('phased-array',
          *((f'figure 3: overshoot about 20 %{of}', f'alpha 0.1, T = 10 ms, {smoothing}', _STEP.format(kind),
@@ -104,7 +104,7 @@ PAPER_002 = (
           'loss/half-beamwidth/type-1', 'linear_lag_beamwidths')))
 
 PAPER_003 = (
-    Claim('figures 1, 2, 5 to 7: block diagrams, test stand', 'built: studies/rigs/feedforward_loop.py'),
+    Claim('figures 1, 2, 5 to 7: block diagrams, test stand', 'built: pedestal_studies/rigs/feedforward_loop.py'),
     Claim('20 deg to and fro at 3.50 deg/s, as 30 m/s at 500 m', 'as printed; 3.44 deg/s'),
     *_of('manoeuvre',
          ('figure 3: rate, 50 runs: the stronger the manoeuvre, the larger the gap (no number)',
