@@ -1,4 +1,5 @@
 # make demo    set up, run the main scenario as separate nodes, record it, check the recording, write the report
+# make quick   set up, lint, run the tests of all laws: a minute
 # make test    set up, lint, run every test
 # make update-references  record bags/reference anew and print the difference that is accepted with it
 # make docs    write the tables of README.md and docs/ anew from the tables of the code and from docs/rows.json
@@ -21,6 +22,10 @@ DEMO := bags/runs/demo
 # Graphs in realtime that are killed, frozen and cut, not beside other tests; the files that take longest come first.
 REALTIME := test/test_operating.py test/test_page.py test/test_supervision.py test/test_realtime.py \
 	test/test_field.py test/test_rotctld.py test/test_network.py test/test_live.py
+# Tests of laws, which lie beside their packages and start no graph. That of the compiler starts processes by the
+# dozen, and compiles.
+LAWS := $(foreach package,ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_common,src/$(package)) \
+	--ignore src/pedestal_common/test/test_compiled.py
 # The files in the order of pyproject.toml, where those of graphs come first: a file of few tests, each a graph, would
 # else be the last, and one core idle.
 IN_TURN := --dist loadfile --no-loadscope-reorder
@@ -41,6 +46,10 @@ demo: .venv/installed
 	.venv/bin/pedestal verify $(DEMO)
 	.venv/bin/pedestal report $(DEMO)
 	@echo 'Report: $(CURDIR)/$(DEMO)/report.html'
+
+quick: install
+	.venv/bin/ruff check .
+	$(LIMITED) 300 $(PYTEST_IN_TURN) --numprocesses 2 $(LAWS)
 
 test: install
 	.venv/bin/ruff check .
@@ -119,4 +128,4 @@ APT := apt-get -qq -o APT::Sandbox::User=root
 	    rm -r usr python3-pip-whl_*.deb ); fi || \
 	    { rm -rf $*; echo 'This Python cannot make an environment with pip: sudo apt-get install python3-venv'; exit 1; }
 
-.PHONY: install demo test update-references docs book numbers bench colcon clean
+.PHONY: install demo quick test update-references docs book numbers bench colcon clean

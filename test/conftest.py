@@ -16,6 +16,7 @@ import time
 import limited
 import numpy as np
 import pytest
+from shared import PEDESTAL
 
 FIRST_PORT = 22119
 """Port of domain id 0 in the scheme of ROS's domain_coordinator; binding it reserves the id for this session."""
@@ -190,8 +191,7 @@ def start_run(reserve_domain, tmp_path_factory):
 
 def _run(scenario, arguments, domain, folder, bag=None, prefix=()):
     run = Run(None, bag or folder / 'bag', domain)
-    command = [*prefix, sys.executable, '-m', 'pedestal.cli', 'run', scenario, '--bag', run.bag, '--json',
-               run.json, *arguments]
+    command = [*prefix, *PEDESTAL, 'run', scenario, '--bag', run.bag, '--json', run.json, *arguments]
     run.process = _popen(command, folder, _environment(domain, folder))
     return run
 

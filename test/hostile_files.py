@@ -20,6 +20,7 @@ import struct
 import sys
 import time
 
+import foreign_bag
 import zstandard
 from mcap.writer import Writer as McapWriter
 
@@ -135,16 +136,8 @@ def header(stamp=0):
     return b'\0\1\0\0' + STAMP.pack(*divmod(stamp, 10**9)) + text('') + b'\0\0\0'
 
 
-def foreign(files, write, **options):
-    """A bag of the mcap library, of what write(writer, channel(topic, type)) puts into it."""
-    path = files.new('.mcap')
-    with open(path, 'wb') as stream:
-        writer = McapWriter(stream, **options)
-        writer.start('ros2', 'hostile')
-        write(writer, lambda topic, kind: writer.register_channel(
-            topic, 'cdr', writer.register_schema(kind, 'ros2msg', b'')))
-        writer.finish()
-    return path
+def foreign(files, put, **options):
+    return foreign_bag.write(files.new('.mcap'), put, **options)
 
 
 def changed_messages(files, change):

@@ -18,6 +18,7 @@ import tempfile
 import time
 
 import rclpy
+from shared import PEDESTAL
 
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node import middleware
@@ -127,8 +128,7 @@ def orphans(log):
 
 def started(folder, pacing, *arguments):
     bag = pathlib.Path(folder) / f'run-{time.time_ns()}'
-    command = [sys.executable, '-m', 'pedestal.cli', 'run', 'leo_pass', '--pacing', pacing, '--bag', str(bag),
-               *arguments]
+    command = [*PEDESTAL, 'run', 'leo_pass', '--pacing', pacing, '--bag', str(bag), *arguments]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                                start_new_session=True)
     return process, bag, bag.with_name(bag.name + '.log')

@@ -18,6 +18,7 @@ import time
 
 import numpy as np
 from kills import children
+from shared import PEDESTAL
 
 from pedestal_recording import bag as bags
 
@@ -84,7 +85,7 @@ def main():
         bag = options.bag or bag
         seconds = 3600.0 * options.hours
         flight(track, seconds)
-        process = subprocess.Popen([sys.executable, '-m', 'pedestal.cli', 'run', 'track_file', '--param',
+        process = subprocess.Popen([*PEDESTAL, 'run', 'track_file', '--param',
                                     f'tracking_receiver.target.track_file.path={track}', '--pacing', 'realtime',
                                     '--duration', str(seconds), '--bag', str(bag), '--json', str(rows),
                                     '--param', f'scenario.priority={options.priority}'],

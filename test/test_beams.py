@@ -4,11 +4,11 @@ import itertools
 import json
 import math
 import signal
-import sys
 import time
 
 import numpy as np
 import pytest
+from shared import PEDESTAL
 
 from pedestal_analysis.report.page import write as write_report
 from pedestal_analysis.reprocess import difference, recompute
@@ -82,8 +82,7 @@ def test_the_results_are_told_by_beam(runs):
 
 
 def test_the_same_run_gives_the_same_file(runs, run_process, tmp_path):
-    rerun = [sys.executable, '-m', 'pedestal.cli', 'rerun', runs['four'].bag, '--bag', tmp_path / 'again']
-    done = run_process(rerun, 90.0)
+    done = run_process([*PEDESTAL, 'rerun', runs['four'].bag, '--bag', tmp_path / 'again'], 90.0)
     assert (done.returncode, done.stderr) == (0, '')
     assert ': equal to the last byte, ' in done.stdout
 

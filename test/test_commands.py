@@ -1,10 +1,8 @@
 """Commands with arguments through the graph: by schedule, topic and service; recorded, recomputed, made again."""
-import signal
-import sys
 
 import pytest
+from shared import PEDESTAL
 
-from pedestal import cli
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages
@@ -53,15 +51,13 @@ def test_the_closed_loop_obeys_it_in_the_same_steps(scheduled, differences):
     assert differences(run, bags.read(scheduled)) == {}
 
 
-def test_it_is_recomputed_and_made_again(scheduled, tmp_path, capsys, monkeypatch, environment):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    assert cli.main(['recompute', str(scheduled), '--node', 'acu', *EXACT]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == 'acu: identical'
+def test_it_is_recomputed(scheduled, pedestal):
+    code, said, _ = pedestal('recompute', scheduled, '--node', 'acu', *EXACT)
+    assert code == 0 and said.splitlines()[-1] == 'acu: identical'
 
 
 def test_a_run_with_an_operator_is_made_again_to_the_byte(scheduled, start_process, tmp_path):
-    process = start_process([sys.executable, '-m', 'pedestal.cli', 'rerun', scheduled,
-                             '--bag', tmp_path / 'again'])
+    process = start_process([*PEDESTAL, 'rerun', scheduled, '--bag', tmp_path / 'again'])
     said, _ = process.communicate(timeout=180)
     assert process.returncode == 0 and 'equal to the last byte' in said
 
@@ -69,7 +65,6 @@ def test_a_run_with_an_operator_is_made_again_to_the_byte(scheduled, start_proce
 @pytest.mark.parametrize(('schedule', 'said'), (
     ('2 presett', "unknown verb 'presett'; did you mean 'preset'?"),
     ('2 preset azimuth=nan', 'preset: azimuth = nan rad: must be -20 to 20')))
-def test_a_wrong_schedule_is_refused_before_anything_runs(schedule, said, capsys, monkeypatch):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    assert cli.main(['run', 'uav_flyby', '--param', f'acu.commands={schedule}']) == 1
-    assert said in capsys.readouterr().err
+def test_a_wrong_schedule_is_refused_before_anything_runs(schedule, said, pedestal):
+    code, _, errors = pedestal('run', 'uav_flyby', '--param', f'acu.commands={schedule}')
+    assert code == 1 and said in errors

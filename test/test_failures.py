@@ -6,7 +6,6 @@ import time
 import numpy as np
 import pytest
 
-from pedestal import cli
 from pedestal_recording import bag as bags
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
@@ -84,14 +83,12 @@ def test_a_silent_node_is_named(stopped, node):
 
 
 @pytest.mark.parametrize('target', ['recorder', 'everything'])
-def test_what_a_kill_left_is_recovered(killed, target, monkeypatch, capsys):
+def test_what_a_kill_left_is_recovered(killed, target, pedestal):
     run, _ = killed[target]
     if target == 'everything':
         assert not (run.bag / 'metadata.yaml').exists()
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    assert cli.main(['recover', str(run.bag)]) == 0
-    said, errors = capsys.readouterr()
-    assert errors == '' and 'the recording breaks off after' in said
+    code, said, errors = pedestal('recover', run.bag)
+    assert (code, errors) == (0, '') and 'the recording breaks off after' in said
     recovered = run.bag.with_name('bag-recovered')
     report = verify(load(recovered))
     assert report.complete and report.steps >= 200, report.lines()

@@ -1,13 +1,11 @@
 """Filters in the graph as a user starts it: rate and range measured, models by probability, changed while tracking."""
 import json
-import signal
 
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
-from pedestal import cli
 from pedestal_analysis.results import consistency, tracking
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
@@ -66,13 +64,10 @@ def test_every_topic_is_recorded(runs):
         topic.name for topic in verify(load(runs['switched'].bag)).topics}
 
 
-def test_recomputed_to_the_last_bit(runs, capsys, monkeypatch):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+def test_recomputed_to_the_last_bit(runs, pedestal):
     for node in ('tracking_receiver', 'acu'):
-        assert cli.main(['recompute', str(runs['measured'].bag), '--node', node, '--absolute', '0', '--relative',
-                         '0']) == 0
-        said = capsys.readouterr().out
-        assert said.splitlines()[-1] == f'{node}: identical'
+        code, said, _ = pedestal('recompute', runs['measured'].bag, '--node', node, '--absolute', 0, '--relative', 0)
+        assert code == 0 and said.splitlines()[-1] == f'{node}: identical'
     assert 'acu/filter' in said
 
 
@@ -104,13 +99,13 @@ def test_what_the_filter_tells(told):
     assert 'range [m]' in export.table(bag, 'tracking_receiver/range')
 
 
-def test_rows_and_report(runs, told, run_process):
+def test_rows_and_report(runs, told, run_process, pedestal):
     run = runs['measured']
     values = {row['metric']: row['value'] for row in json.loads(run.json.read_text())['rows']}
     for i, axis in enumerate(topics.AXES):
         judged = consistency.axis(told[1], i)
         assert (values[f'{axis}_nis_mean'], values[f'{axis}_nees_mean']) == (judged.nis, judged.nees)
-    assert cli.main(['report', str(run.bag)]) == 0
+    assert pedestal('report', run.bag)[0] == 0
     page = (run.bag / 'report.html').read_text()
     assert '<figure id="probabilities"><h3>Motion models</h3><figcaption>' in page
     assert 'Azimuth: ' in page and 'of honest filters have' in page

@@ -1,10 +1,8 @@
 """Injected faults through the graph, by parameter in lockstep, recorded and recomputed; by topic: test_realtime."""
-import signal
 
 import numpy as np
 import pytest
 
-from pedestal import cli
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages
@@ -52,16 +50,14 @@ def test_each_node_tells_of_its_faults_in_their_steps(injected):
 
 
 @pytest.mark.parametrize('node', ('adu', 'tracking_receiver', 'ins'))
-def test_a_node_with_faults_is_recomputed(injected, node, capsys, monkeypatch):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    assert cli.main(['recompute', str(injected), '--node', node, '--absolute', '0', '--relative', '0']) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == f'{node}: identical'
+def test_a_node_with_faults_is_recomputed(injected, node, pedestal):
+    code, said, _ = pedestal('recompute', injected, '--node', node, '--absolute', 0, '--relative', 0)
+    assert code == 0 and said.splitlines()[-1] == f'{node}: identical'
 
 
 @pytest.mark.parametrize(('inject', 'said'), (
     ('ins.inject=2 drop', 'ins: inject: drop of ins: its attitude does not come; in lockstep everybody would wait'),
     ('adu.inject=2 gost', "inject = '2 gost': unknown verb 'gost'; did you mean 'gust'?")))
-def test_a_fault_that_cannot_be_is_refused_before_anything_runs(inject, said, capsys, monkeypatch):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    assert cli.main(['run', 'ship_pass', '--param', inject]) == 1
-    assert said in capsys.readouterr().err
+def test_a_fault_that_cannot_be_is_refused_before_anything_runs(inject, said, pedestal):
+    code, _, errors = pedestal('run', 'ship_pass', '--param', inject)
+    assert code == 1 and said in errors

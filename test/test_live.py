@@ -4,7 +4,6 @@ import contextlib
 import json
 import pathlib
 import signal
-import socket
 import struct
 import sys
 import time
@@ -16,9 +15,9 @@ from ikpy.chain import Chain
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
+from shared import PEDESTAL, free_port
 from websockets.sync.client import connect as open_socket
 
-from pedestal import cli
 from pedestal_bringup.scenario.program import program_message
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import nodes
@@ -30,12 +29,6 @@ from pedestal_recording import bag as bags
 SOON = 60.0
 TRACK = 'acu/program_track'
 REFERENCES = pathlib.Path(__file__).parents[1] / 'bags' / 'reference'
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
 
 
 class Viewer:
@@ -218,7 +211,7 @@ def test_a_program_track_is_taken_once_whether_its_writer_latches_or_not(graph):
 
 def test_a_viewer_of_its_own_ends_when_told_to(graph, start_process):
     run, _, port = graph
-    live = [sys.executable, '-m', 'pedestal.cli', 'live', '--port']
+    live = [*PEDESTAL, 'live', '--port']
     taken = start_process([*live, port], ROS_DOMAIN_ID=str(run.domain_id))
     assert taken.wait(60.0) == 1 and f'127.0.0.1:{port}' in taken.stderr.read()
     own = free_port()
@@ -245,19 +238,16 @@ def test_the_recording_has_every_track_once(graph, complaints):
 @pytest.mark.parametrize(('options', 'said'), (
     (['--frames'], '--frames needs --pacing realtime'),
     (['--pacing', 'realtime', '--foxglove'], "--foxglove needs foxglove: pip install 'pedestal_operator[live]'")))
-def test_what_cannot_be_is_refused_before_anything_runs(options, said, capsys, monkeypatch):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+def test_what_cannot_be_is_refused_before_anything_runs(options, said, pedestal, monkeypatch):
     monkeypatch.setitem(sys.modules, 'foxglove', None)
-    assert cli.main(['run', 'uav_flyby', *options]) == 1
-    assert capsys.readouterr().err == f'pedestal: error: {said}\n'
+    assert pedestal('run', 'uav_flyby', *options) == (1, '', f'pedestal: error: {said}\n')
 
 
-def test_the_files_for_viewers_are_written(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    assert cli.main(['live', '--layouts', str(tmp_path / 'viewers')]) == 0
+def test_the_files_for_viewers_are_written(pedestal, tmp_path):
+    code, said, _ = pedestal('live', '--layouts', tmp_path / 'viewers')
+    assert code == 0 and str(tmp_path / 'viewers' / 'tracking.json') in said.splitlines()
     assert (tmp_path / 'viewers' / 'pedestal.urdf').read_text() == frames.DESCRIPTION
-    assert str(tmp_path / 'viewers' / 'tracking.json') in capsys.readouterr().out.splitlines()
-    assert cli.main(['live', '--layouts', str(tmp_path / 'viewers')]) == 1
+    assert pedestal('live', '--layouts', tmp_path / 'viewers')[0] == 1
 
 
 @pytest.mark.parametrize('name', ['leo_pass', 'ship_pass'])

@@ -2,16 +2,14 @@
 import hashlib
 import json
 import pathlib
-import signal
-import sys
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
+from shared import PEDESTAL
 
-from pedestal import cli
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
@@ -80,8 +78,7 @@ def test_another_seed_gives_another_file(runs):
 
 
 def test_rerun_makes_the_same_file_again(runs, run_process, tmp_path):
-    pedestal = [sys.executable, '-m', 'pedestal.cli']
-    done = run_process([*pedestal, 'rerun', runs['first'].bag, '--bag', tmp_path / 'again'], 90.0)
+    done = run_process([*PEDESTAL, 'rerun', runs['first'].bag, '--bag', tmp_path / 'again'], 90.0)
     assert (done.returncode, done.stderr) == (0, '')
     assert done.stdout == f'{tmp_path}/again: equal to the last byte, sha256 {digest(runs["first"])}\n'
 
@@ -108,10 +105,9 @@ ANNOUNCED = {'acu/keyhole', 'acu/blockage', 'ins/state', *(
 
 
 @pytest.mark.parametrize('name, topics', [('first', 20), ('ship', 27)])
-def test_recording_is_complete(runs, name, topics, monkeypatch, capsys):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    assert cli.main(['verify', str(runs[name].bag)]) == 0
-    assert ': complete: ' in capsys.readouterr().out
+def test_recording_is_complete(runs, name, topics, pedestal):
+    code, said, _ = pedestal('verify', runs[name].bag)
+    assert code == 0 and ': complete: ' in said
     report = verify(load(runs[name].bag))
     assert report.steps == round(LENGTH['leo_pass' if name == 'first' else 'ship_pass'] / 0.005) + 1
     assert len(report.topics) == topics

@@ -3,12 +3,12 @@ import os
 import pathlib
 import signal
 import subprocess
-import sys
 import time
 
 import limited
 import numpy as np
 import pytest
+from shared import PEDESTAL
 
 from pedestal_bringup.graph import processes, supervisor
 from pedestal_bringup.graph.start import begins, parameters_of_all
@@ -143,8 +143,7 @@ def cut(hosts, tmp_path_factory, reserve_domain):
             assert time.monotonic() < deadline and not any(process.poll() for process in started), said()
             time.sleep(0.1)
     wait_until(lambda: 'runs' in (folder / 'acu.log').read_text())
-    hosts.start('far', [sys.executable, '-m', 'pedestal.cli', 'program', 'leo_pass'], folder / 'program.log',
-                **domain)
+    hosts.start('far', [*PEDESTAL, 'program', 'leo_pass'], folder / 'program.log', **domain)
     wait_until(lambda: 'sent' in (folder / 'program.log').read_text())
     time.sleep(FOLLOWED)
     times = []

@@ -3,19 +3,16 @@ import json
 import os
 import pty
 import select
-import signal
 import subprocess
-import sys
 import time
 
 import limited
 import pytest
+from shared import PEDESTAL
 
-from pedestal import cli
 from pedestal_common.wire import commands, messages
 from pedestal_recording import bag as bags
 
-PEDESTAL = (sys.executable, '-m', 'pedestal.cli')
 ARROW_RIGHT = b'\x1b[C'
 BURST = tuple(str(number) for number in range(40))
 
@@ -165,7 +162,7 @@ def test_without_a_graph_it_is_said_in_one_line(run_process, reserve_domain, one
     assert done.returncode == 1 and 'needs a terminal' in one_line(done.stderr)
 
 
-def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, patient, capsys, monkeypatch):
+def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, patient, pedestal):
     """In realtime, by topic and by service, from two who are strangers to the graph."""
     run = start_run('uav_flyby', '--duration', '240', '--pacing', 'realtime', *patient)
     operator = connect(run.domain_id)
@@ -186,6 +183,4 @@ def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, 
     assert told == [('preset', 'anna', True), ('preset', 'anna', False), ('dance', 'anna', False),
                     ('acu/program', 'service', True)]
     assert len(list(bags.read(run.bag).raw('acu/command'))) == 3
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    cli.main(['recompute', str(run.bag), '--node', 'acu'])
-    assert 'preset azimuth=0.2 elevation=0.4 asked for at' in capsys.readouterr().out
+    assert 'preset azimuth=0.2 elevation=0.4 asked for at' in pedestal('recompute', run.bag, '--node', 'acu')[1]

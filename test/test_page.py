@@ -18,6 +18,7 @@ import urllib.parse
 
 import limited
 import pytest
+from shared import PEDESTAL, free_port
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect as connect_web_socket
 
@@ -35,12 +36,6 @@ CHEAP = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-software-rast
 """Options of a Chromium that does nothing but show pages."""
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason='chromium is not installed')
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
 
 
 def begins_with(process, count):
@@ -249,8 +244,7 @@ def holds(page, condition, argument=None):
 @needs_chromium
 def test_a_recording_on_the_page(browser, start_process):
     port = free_port()
-    player = start_process([sys.executable, '-m', 'pedestal.cli', 'replay', REFERENCE, '--page', port,
-                            '--paused'])
+    player = start_process([*PEDESTAL, 'replay', REFERENCE, '--page', port, '--paused'])
     page = opened(browser[1], re.search(r'http\S+', begins_with(player, 1))[0])
     joints = bags.read(REFERENCE).table('joint_states')
     reads(page, '#link', 'recording')

@@ -1,14 +1,13 @@
 """`pedestal recompute`: recorded inputs through the nodes' step functions and, once, through a node's process."""
+import functools
 import json
 import math
 import pathlib
-import signal
-import sys
 
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
+from shared import PEDESTAL
 
-from pedestal import cli
 from pedestal_analysis.reprocess import difference, recompute, recompute_report
 from pedestal_analysis.results import results, tracking
 from pedestal_common.graph import nodes as graph
@@ -33,16 +32,9 @@ def runs(recorded):
 
 
 @pytest.fixture
-def pedestal(capsys, monkeypatch):
-    """pedestal(*arguments) -> (exit code, what it printed, what it complained) of `pedestal recompute` in this
-    process."""
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-
-    def call(*arguments):
-        code = cli.main(['recompute', *map(str, arguments)])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-    return call
+def pedestal(pedestal):
+    """That of all tests, with the verb of these."""
+    return functools.partial(pedestal, 'recompute')
 
 
 @pytest.fixture
@@ -266,8 +258,8 @@ def test_a_bag_with_inputs_only_gets_its_outputs(inputs_only, runs, pedestal, tm
 
 def test_a_changed_parameter_on_a_ship_and_rows_alone_on_the_standard_output(run_process):
     ship = pathlib.Path(__file__).parents[1] / 'bags' / 'reference' / 'ship_pass'
-    done = run_process([sys.executable, '-m', 'pedestal.cli', 'recompute', ship, '--param',
-                        'acu.azimuth.filter.kind=ca', '--json', '-'], 120.0)
+    done = run_process([*PEDESTAL, 'recompute', ship, '--param', 'acu.azimuth.filter.kind=ca', '--json', '-'],
+                       120.0)
     assert done.returncode == 0, done.stderr
     metrics = {row['metric'] for row in json.loads(done.stdout)['rows']}
     assert any('pointing' in metric or 'estimate' in metric for metric in metrics), metrics
@@ -361,8 +353,8 @@ def test_what_was_asked_for_is_found_and_asked_for_again(requested, pedestal):
 def test_the_process_of_the_node_says_the_same(requested, run_process, reserve_domain):
     """Inputs, program track and services, over DDS."""
     node, path = requested
-    done = run_process([sys.executable, '-m', 'pedestal.cli', 'recompute', path, '--node', node, '--live',
-                        *EXACT], 120.0, ROS_DOMAIN_ID=str(reserve_domain()))
+    done = run_process([*PEDESTAL, 'recompute', path, '--node', node, '--live', *EXACT], 120.0,
+                       ROS_DOMAIN_ID=str(reserve_domain()))
     assert done.returncode == 0, done.stdout + done.stderr
     assert f'compared is what the process of {node} published' in done.stdout
     assert done.stdout.splitlines()[-1] == f'{node}: identical'

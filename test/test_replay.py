@@ -12,13 +12,13 @@ import termios
 import time
 
 import pytest
+from shared import PEDESTAL
 
 from pedestal_common.graph import topics
 from pedestal_common.node import middleware
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 
-CLI = [sys.executable, '-m', 'pedestal.cli']
 ANSWERS = ('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/mode')
 INPUTS = ('clock', 'adu/state', 'joint_states', 'ship/imu/data', 'ins/state', 'ins/error',
           'tracking_receiver/angle_error', 'acu/program_track')
@@ -77,7 +77,7 @@ def end(process):
 def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, domain, tmp_path):
     pacing = 'lockstep' if pace == ['--lockstep'] else 'realtime'
     acu, recorder = acu_and_recorder(pacing)
-    done = run_process([*CLI, 'replay', run.bag, '--node', 'acu', *pace], 60.0, ROS_DOMAIN_ID=str(domain))
+    done = run_process([*PEDESTAL, 'replay', run.bag, '--node', 'acu', *pace], 60.0, ROS_DOMAIN_ID=str(domain))
     assert (done.returncode, done.stderr) == (0, '')
     assert sent(done.stdout) == {name: len(data(run.bag, name)) for name in INPUTS}
     [answered] = re.findall(f'^acu answered (\\d+) of {STEPS} steps$', done.stdout, re.MULTILINE)
@@ -97,7 +97,7 @@ def test_all_of_it_into_a_recorder_gives_the_same_file(run, start_process, run_p
     recorder = start_process([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args', '--params-file',
                               run.log / 'parameters.yaml', '-p', f'recorder:bag:={tmp_path / "bag"}'],
                              ROS_DOMAIN_ID=str(domain))
-    done = run_process([*CLI, 'replay', run.bag, '--rate', '5'], 60.0, ROS_DOMAIN_ID=str(domain))
+    done = run_process([*PEDESTAL, 'replay', run.bag, '--rate', '5'], 60.0, ROS_DOMAIN_ID=str(domain))
     assert (done.returncode, done.stderr) == (0, '')
     output, errors = recorder.communicate(timeout=30.0)
     assert (recorder.returncode, complaints(errors)) == (0, '')
@@ -108,8 +108,8 @@ def test_all_of_it_into_a_recorder_gives_the_same_file(run, start_process, run_p
 
 def test_start_and_duration(run, connect, start_process, domain):
     client = connect(domain)
-    replay = start_process([*CLI, 'replay', run.bag, '--topics', 'joint_states', 'acu/program_track', '--start', '0.5',
-                            '--duration', '0.25', '--rate', '5'], ROS_DOMAIN_ID=str(domain))
+    replay = start_process([*PEDESTAL, 'replay', run.bag, '--topics', 'joint_states', 'acu/program_track', '--start',
+                            '0.5', '--duration', '0.25', '--rate', '5'], ROS_DOMAIN_ID=str(domain))
     for name in ('joint_states', 'acu/program_track'):
         client.read(name)
     client.until(lambda: replay.poll() is not None and sum(map(len, client.heard.values())) == 52)
@@ -158,7 +158,7 @@ def terminal(environment, domain):
     opened = []
 
     def open_terminal(*arguments):
-        opened.append(Terminal([*CLI, 'replay', *arguments], {**environment, 'ROS_DOMAIN_ID': str(domain)}))
+        opened.append(Terminal([*PEDESTAL, 'replay', *arguments], {**environment, 'ROS_DOMAIN_ID': str(domain)}))
         return opened[-1]
 
     yield open_terminal
@@ -224,7 +224,7 @@ def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_lin
     client = connect(domain)
     topic = topics.BY_NAME['joint_states']
     client.node.create_publisher(middleware.message_class(topic.type), topic.name, middleware.qos(topic.rate))
-    done = run_process([*CLI, 'replay', run.bag, '--node', 'acu'], 60.0, ROS_DOMAIN_ID=str(domain))
+    done = run_process([*PEDESTAL, 'replay', run.bag, '--node', 'acu'], 60.0, ROS_DOMAIN_ID=str(domain))
     assert done.returncode == 1 and done.stdout == ''
     assert one_line(done.stderr) == ('pedestal: error: joint_states already has a writer, client: its messages would '
                                      'come twice')
@@ -232,7 +232,8 @@ def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_lin
 
 def test_a_topic_that_nobody_reads_is_named(run, run_process, one_line, domain):
     for options, who in ((['--node', 'acu'], 'acu'), (['--topics', 'joint_states'], 'anyone')):
-        done = run_process([*CLI, 'replay', run.bag, *options, '--deadline', '1'], 60.0, ROS_DOMAIN_ID=str(domain))
+        done = run_process([*PEDESTAL, 'replay', run.bag, *options, '--deadline', '1'], 60.0,
+                           ROS_DOMAIN_ID=str(domain))
         assert done.returncode == 1 and done.stdout == ''
         assert one_line(done.stderr) == (f'pedestal: error: nobody reads joint_states after 1 s; waited for {who}; '
                                          'present: no node')
@@ -240,7 +241,7 @@ def test_a_topic_that_nobody_reads_is_named(run, run_process, one_line, domain):
 
 def test_a_reader_that_goes_ends_it(run, connect, start_process, one_line, domain):
     client = connect(domain)
-    replay = start_process([*CLI, 'replay', run.bag, '--topics', 'joint_states', '--rate', '0.2'],
+    replay = start_process([*PEDESTAL, 'replay', run.bag, '--topics', 'joint_states', '--rate', '0.2'],
                            ROS_DOMAIN_ID=str(domain))
     client.read('joint_states')
     client.until(lambda: len(client.heard['joint_states']) > 10)

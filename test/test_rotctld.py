@@ -13,6 +13,7 @@ import sys
 import time
 
 import pytest
+from shared import free_port
 
 from pedestal_common.graph import topics
 from pedestal_common.wire import commands, messages
@@ -23,12 +24,6 @@ _SPEC = importlib.util.spec_from_file_location('rotator_gpredict',
                                                pathlib.Path(__file__).parents[1] / 'docs' / 'rotator' / 'gpredict.py')
 gpredict = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(gpredict)
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture(scope='module')

@@ -1,7 +1,6 @@
 """`pedestal tune`: through the command line on a recording and on a scenario; its file in a real node."""
 import math
 import pathlib
-import signal
 import types
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 import yaml
 from rcl_interfaces.srv import GetParameters
 
-from pedestal import cli
 from pedestal_analysis.reprocess import recompute
 from pedestal_analysis.tuning import tune
 from pedestal_bringup.scenario import scenario
@@ -24,18 +22,6 @@ BAG = pathlib.Path(__file__).parent.parent / 'bags' / 'reference' / 'uav_flyby'
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp('tune')
-
-
-@pytest.fixture
-def pedestal(capsys, monkeypatch):
-    """pedestal(*arguments) -> (exit code, what it printed, what it complained), in this process."""
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-
-    def call(*arguments):
-        code = cli.main(list(map(str, arguments)))
-        said = capsys.readouterr()
-        return code, said.out, said.err
-    return call
 
 
 def told(output, metric):

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from oracles import van_loan
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 from scipy.signal import lfilter
 
@@ -44,14 +45,12 @@ def rms(values):
     return math.sqrt(np.mean(np.square(values)))
 
 
-def van_loan(kind, T):
+def discrete(kind, T):
     """Phi and Q of the continuous model; the third state of cv is 0 at once."""
-    A, g = np.array(SOURCES[kind][0], float), np.array(SOURCES[kind][1])
-    block = expm(np.block([[-A, np.outer(g, g)], [np.zeros((3, 3)), A.T]]) * T)
-    phi = block[3:, 3:].T
+    phi, Q = van_loan(*SOURCES[kind], T)
     if kind == 'cv':
         phi[2, 2] = 0.0
-    return phi, phi @ block[:3, 3:]
+    return phi, Q
 
 
 def test_parameters_of_the_bank_are_checked():
@@ -90,7 +89,7 @@ def test_estimate_is_the_batch_posterior(kind, with_rate, bandwidth):
     # Joint covariance of all states, less their mean y[0].
     phis, blocks = [np.eye(3)], [np.diag([SIGMA**2, 0.01, variance])]
     for step in np.diff(t):
-        phi, Q = van_loan(kind, step)
+        phi, Q = discrete(kind, step)
         phis.append(phi)
         blocks.append(Q)
     lower = np.eye(120)
@@ -118,7 +117,7 @@ def test_estimate_is_the_batch_posterior(kind, with_rate, bandwidth):
 def bound(noise, bandwidth):
     """Steady covariance (3, 3) of constant acceleration by the Riccati equation; the noise of the angle is a fourth
     state where it has a bandwidth [Hz]."""
-    phi, unit = van_loan('ca', T)
+    phi, unit = discrete('ca', T)
     F, Q = phi, unit * (noise / PARAMS['ca.noise'])**2
     H, R = np.eye(3)[:1], SIGMA**2
     if bandwidth:
@@ -163,7 +162,7 @@ def test_coloured_noise_that_is_expected_costs_what_it_must():
 def test_steady_state_solves_the_riccati_equation(kind, with_rate):
     t = T * np.arange(6000)
     got = run(t, 0.0 * t, 0.0 * t if with_rate else None, kind=kind, **PARAMS)[-1]
-    n, phi_Q = (2 if kind == 'cv' else 3), van_loan(kind, T)
+    n, phi_Q = (2 if kind == 'cv' else 3), discrete(kind, T)
     F, Q = (matrix[:n, :n] for matrix in phi_Q)
     H, R = np.eye(n)[:2 if with_rate else 1], np.diag([SIGMA**2, RATE_SIGMA**2][:2 if with_rate else 1])
     P = solve_discrete_are(F.T, H.T, Q, R)
@@ -181,7 +180,7 @@ def test_an_angle_that_walks_solves_the_riccati_equation_with_that_noise(kind):
     for _ in range(3000):
         axis_filter.predict(f, c, T)
         axis_filter.correct(f, c, AxisMeasurement(0.0, SIGMA**2, math.nan, math.nan))
-    n, phi_Q = (2 if kind == 'cv' else 3), van_loan(kind, T)
+    n, phi_Q = (2 if kind == 'cv' else 3), discrete(kind, T)
     F, Q = (matrix[:n, :n] for matrix in phi_Q)
     Q[0, 0] += walk * T
     H, R = np.eye(n)[:1], np.array([[SIGMA**2]])
@@ -226,7 +225,7 @@ def test_constant_gains_begin_as_least_squares(kind, degree):
 def test_filter_is_honest_when_the_model_fits(with_rate):
     """Innovations of unit variance and white, errors as large as claimed, on a target that moves as singer says."""
     n, rng = 40_000, np.random.default_rng(5)
-    phi, Q = van_loan('singer', T)
+    phi, Q = discrete('singer', T)
     drive = rng.multivariate_normal(np.zeros(3), Q, n, method='cholesky')
     X = np.zeros((n, 3))
     for k in range(1, n):
@@ -348,12 +347,10 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
         X[held == i] = rng.multivariate_normal(f['x'][i], P, np.count_nonzero(held == i))
     holds = np.where(rng.random(len(held)) < expm(np.array([[-1, 1], [1, -1]]) / dwell * ahead)[0, 0], held, 1 - held)
     for j, (kind, g) in enumerate((('cv', (0, 1e-2, 0)), ('ca', (0, 0, 3e-2)))):
-        A = SOURCES[kind][0]
-        block = expm(np.block([[-np.array(A), np.outer(g, g)], [np.zeros((3, 3)), np.transpose(A)]]) * ahead)
-        phi = block[3:, 3:].T
+        phi, Q = van_loan(SOURCES[kind][0], g, ahead)
         # The third state of cv is 0 at once, its angle and rate do not hear of it.
         moved = X[holds == j] @ (phi if kind == 'ca' else np.diag([1.0, 1.0, 0.0]) @ phi).T
-        X[holds == j] = moved + rng.multivariate_normal(np.zeros(3), phi @ block[:3, 3:], len(moved))
+        X[holds == j] = moved + rng.multivariate_normal(np.zeros(3), Q, len(moved))
     np.testing.assert_allclose(axis_filter.outlook(f, c, ahead), X.mean(axis=0), atol=3e-5)
     C = np.cov(X[:, :2].T)
     np.testing.assert_allclose(variances(f, c, ahead), (C[0, 0], C[0, 1], C[1, 1]), rtol=5e-3)

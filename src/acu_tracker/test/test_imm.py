@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 from filterpy.kalman import IMMEstimator, KalmanFilter
+from oracles import van_loan
 from scipy.linalg import expm
 
 from acu_tracker.estimation.filters import axis_filter, imm
@@ -15,11 +16,6 @@ MODELS = {'imm.models': 'cv ca singer', 'imm.cv.noise': 1e-3, 'imm.ca.noise': 0.
           'imm.singer.alpha': 2.0, 'imm.dwell': 0.5}
 
 
-def van_loan(A, g):
-    block = expm(np.block([[-A, np.outer(g, g)], [np.zeros((3, 3)), A.T]]) * T)
-    return block[3:, 3:].T, block[3:, 3:].T @ block[:3, 3:]
-
-
 def filterpys(y, with_rate):
     """filterpy's bank of cv, ca and singer from the same start; cv padded to three states."""
     sources = [([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [0, 1e-3, 0], 0.0),
@@ -28,7 +24,7 @@ def filterpys(y, with_rate):
     filters = []
     for A, g, variance in sources:
         made = KalmanFilter(3, 2 if with_rate else 1)
-        made.F, made.Q = van_loan(np.array(A, float), np.array(g, float))
+        made.F, made.Q = van_loan(A, g, T)
         if variance == 0.0:
             made.F[2, 2] = 0.0
         made.H = np.eye(3)[:2 if with_rate else 1]

@@ -2,8 +2,8 @@ import math
 
 import numpy as np
 import pytest
+from oracles import van_loan
 from scipy.integrate import quad
-from scipy.linalg import expm
 
 from acu_tracker.estimation.filters import kalman, motion_models
 from acu_tracker.geometry.motion import AxisMotion
@@ -12,18 +12,13 @@ from pedestal_common.graph import topics
 CASES = [(0.1, 0.01), (0.5, 0.005), (0.5, 0.0999), (0.7, 0.3), (2.0, 0.24999), (2.0, 0.25001), (5.0, 0.4), (1.0, 3.0)]
 
 
-def van_loan(alpha, T):
-    """Phi and q of the continuous model by one matrix exponential (Van Loan 1978)."""
-    A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -alpha]])
-    # Scaled to T = 1, so that the blocks of small T keep their digits.
+def singer(alpha, T):
+    """Phi and q of the continuous model, scaled to T = 1, so that the blocks of small T keep their digits."""
     S = np.diag([1.0, T, T * T])
-    A = S @ A @ np.linalg.inv(S) * T
-    G = np.zeros((3, 3))
-    G[2, 2] = 1.0
-    block = expm(np.block([[-A, G], [np.zeros((3, 3)), A.T]]))
-    phi = block[3:, 3:].T
+    A = S @ np.array([[0, 1, 0], [0, 0, 1], [0, 0, -alpha]]) @ np.linalg.inv(S) * T
+    phi, q = van_loan(A, [0, 0, 1], 1.0)
     S = np.linalg.inv(S)
-    return S @ phi @ np.linalg.inv(S), S @ (phi @ block[:3, 3:]) @ S.T * T**5
+    return S @ phi @ np.linalg.inv(S), S @ q @ S.T * T**5
 
 
 def model(kind, **values):
@@ -40,7 +35,7 @@ def symmetric(q11, q12, q13, q22, q23, q33):
 
 @pytest.mark.parametrize('alpha, T', CASES)
 def test_transition_and_noise_against_van_loan(alpha, T):
-    phi, q = van_loan(alpha, T)
+    phi, q = singer(alpha, T)
     f13, f23, f33 = motion_models.fading(alpha, T)
     np.testing.assert_allclose([[1, T, f13], [0, 1, f23], [0, 0, f33]], phi, rtol=1e-11, atol=1e-300)
     np.testing.assert_allclose(symmetric(*motion_models.fading_noise(alpha, T)), q, rtol=2e-9)
@@ -93,16 +88,14 @@ CONTINUOUS = {'cv': ([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [0, 0.3, 0]),
 @pytest.mark.parametrize('T', [0.005, 0.3, 2.0])
 def test_every_model_against_van_loan(kind, T):
     """dX = A X dt + g dw: transition and Q by one matrix exponential; the third state of cv is 0 at once."""
-    A, g = np.array(CONTINUOUS[kind][0], float), np.array(CONTINUOUS[kind][1])
-    block = expm(np.block([[-A, np.outer(g, g)], [np.zeros((3, 3)), A.T]]) * T)
-    phi = block[3:, 3:].T
+    phi, Q = van_loan(*CONTINUOUS[kind], T)
     m = model(kind, noise=0.3, alpha=0.7, sigma=0.2)
     discrete = motion_models.discretised(m, 5.0, T)
     f13, f23, f33 = discrete.F
     np.testing.assert_allclose([[1, T, f13], [0, 1, f23]], phi[:2], rtol=1e-12, atol=1e-15)
     assert f33 == (0.0 if kind == 'cv' else pytest.approx(phi[2, 2], rel=1e-12))
     assert discrete.mean == discrete.F
-    np.testing.assert_allclose(symmetric(*discrete.Q), phi @ block[:3, 3:], rtol=1e-7, atol=1e-18)
+    np.testing.assert_allclose(symmetric(*discrete.Q), Q, rtol=1e-7, atol=1e-18)
 
 
 def test_modified_rayleigh_variance_by_quadrature():

@@ -4,10 +4,10 @@ import pathlib
 import subprocess
 import sys
 
+import foreign_bag
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
-from mcap.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
 
 from pedestal_recording import bag
@@ -156,18 +156,13 @@ def test_a_whole_bag_comes_back_with_everything_in_it(whole, tmp_path, made):
 
 
 def foreign(path, made, **options):
-    """A bag of another writer: topics and types are declared inside the chunks, no configuration."""
-    with open(path, 'wb') as stream:
-        writer = McapWriter(stream, chunk_size=200_000, **options)
-        writer.start(profile='ros2', library='other')
+    def put(writer, channel):
         channels = {}
         for name, stamp, data in without_seconds(made):
             if name not in channels:
-                schema = writer.register_schema(f'pkg/msg/T{len(channels)}', 'ros2msg', b'float64 x')
-                channels[name] = writer.register_channel('/' + name, 'cdr', schema)
+                channels[name] = channel('/' + name, f'pkg/msg/T{len(channels)}')
             writer.add_message(channels[name], stamp, data, stamp)
-        writer.finish()
-    return path.read_bytes()
+    return foreign_bag.write(path, put, b'float64 x', chunk_size=200_000, **options).read_bytes()
 
 
 @pytest.mark.parametrize('options', [{}, {'compression': CompressionType.NONE}, {'use_chunking': False}], ids=str)
