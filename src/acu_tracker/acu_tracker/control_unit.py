@@ -11,7 +11,6 @@ from acu_tracker.alarms import conditions
 from acu_tracker.estimation import divergence, repetition, slope_sign, target, tracker
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, deck_reference, direction, encoders
-from acu_tracker.geometry.vector import vector
 from acu_tracker.guidance import guidance, manual
 from acu_tracker.lookahead import planner
 from acu_tracker.mode import by_level, mode_change, outage, resumption, stow, supervision
@@ -105,8 +104,10 @@ def _deck_rates(s, c):
     """(azimuth, elevation) rate [rad/s] at which the deck's motion moves an earth-fixed direction at the beam; 0 where
     no axis compensates for it."""
     wanted = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
-    if wanted and s.attitude.stabilised and attitude.at(s.attitude, c.p, s.stamp):
-        return deck_reference.fixed_rates(vector(s.attitude.w), s.axis[0].reference.angle, s.axis[1].reference.angle)
+    if wanted and s.attitude.stabilised:
+        known, deck = attitude.at(s.attitude, c.p, s.stamp)
+        if known:
+            return deck_reference.fixed_rates(deck.w, s.axis[0].reference.angle, s.axis[1].reference.angle)
     return 0.0, 0.0
 
 

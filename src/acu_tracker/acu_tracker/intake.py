@@ -110,8 +110,8 @@ def _watch_slope(s, c, u, at):
     """Note an error that shows that the slope of autotrack is reversed; at: Pointing of the beam it belongs to."""
     p = c.p.tracker
     t = u.error_stamp - p.receiver.age
-    attitude.at(s.attitude, c.p, t)
-    error, beam = (u.cross_elevation, u.elevation), slope_sign.beam(s.attitude.mat_ed, at.A, at.E)
+    _, deck = attitude.at(s.attitude, c.p, t)
+    error, beam = (u.cross_elevation, u.elevation), slope_sign.beam(deck.mat, at.A, at.E)
     variance = measurement.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, p.receiver)
     if slope_sign.take(s.slope_sign, t, beam, error, variance, p.coast_after):
         s.divergence.diverged = 1

@@ -9,8 +9,11 @@ from acu_tracker.geometry import deck_reference, lever_arm
 from acu_tracker.geometry.azimuth_wrap import Travel, nearest
 from acu_tracker.geometry.deck_reference import STILL, Attitude
 from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, line_of_sight, north_west_up
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry.vector import Vector, rotation, turn
 from acu_tracker.lookahead.slew import best_elevation
+from acu_tracker.params import AcuParameters, SharedParameters
+from pedestal_common.geometry.line_of_sight import ashore_matrix
+from pedestal_common.parameters import record
 
 LOW, HIGH = -1.5 * math.pi, 1.5 * math.pi
 
@@ -45,7 +48,7 @@ def deck_by_rotation(t):
 def test_deck_angles_rates_and_accelerations(t):
     w = body_rate(t)
     dw = (body_rate(t + 1e-3) - body_rate(t - 1e-3)) / 2e-3
-    deck = Attitude(attitude(t).as_matrix(), Vector(*w), Vector(*dw))
+    deck = Attitude(rotation(attitude(t).as_matrix()), Vector(*w), Vector(*dw))
     got = np.array(angles(deck_reference.on_deck(deck, line_of_sight(earth_motion(t)))))
     h = 1e-3
     before, here, after = (deck_by_rotation(t + d) for d in (-h, 0.0, h))
@@ -55,7 +58,7 @@ def test_deck_angles_rates_and_accelerations(t):
 
 
 def test_the_zenith_gives_finite_numbers():
-    deck = Attitude(np.eye(3), Vector(0.1, 0.1, 0.1), STILL)
+    deck = Attitude(turn(0.0, 0.0, 0.0, 1.0), Vector(0.1, 0.1, 0.1), STILL)
     zenith = Motion(AxisMotion(0.0, 0.01, 0.0), AxisMotion(0.5 * math.pi, 0.01, 0.0))
     assert np.isfinite(angles(deck_reference.on_deck(deck, line_of_sight(zenith)))).all()
     up = LineOfSight(Vector(0.0, 0.0, 1.0), Vector(0.1, 0.0, 0.0), Vector(0.0, 0.0, -0.01))
@@ -68,6 +71,23 @@ def test_turned_is_the_rotation_by_a_vector():
         q, r = Rotation.from_rotvec(rng.normal(size=3)), size * rng.normal(size=3)
         got = Rotation.from_quat(attitudes.rotated(q.as_quat(), tuple(r)))
         assert (got.inv() * q * Rotation.from_rotvec(r)).magnitude() < 1e-14
+
+
+def test_every_instant_has_its_own_attitude():
+    """Between two samples and ahead of them against scipy; NaN where nothing is known; ashore always the same."""
+    p, s = record(AcuParameters(), SharedParameters)[0], np.zeros(1, attitudes.ATTITUDE)
+    s['stabilised'] = 1
+    assert not attitudes.at(s[0], p, 0.0)[0] and np.isnan(np.array(attitudes.at(s[0], p, 0.0)[1].mat)).all()
+    for k in range(20):
+        attitudes.take(s[0], p, 0.005 * k, 0.005 * k, attitude(0.005 * k).as_quat(), body_rate(0.005 * k), False)
+    asked = {t: attitudes.at(s[0], p, t) for t in (0.0521, 0.1, 0.0, 0.4)}
+    for t, (known, deck) in asked.items():
+        assert known == (t < 0.3)
+        if known:
+            np.testing.assert_allclose(np.array(deck.mat), attitude(t).as_matrix(), atol=1e-6)
+            np.testing.assert_allclose(deck.w, body_rate(t), atol=1e-3)
+    s['stabilised'] = 0
+    assert np.array(attitudes.at(s[0], p, 9.0)[1].mat) == pytest.approx(ashore_matrix(), abs=1e-15)
 
 
 @pytest.mark.parametrize('azimuth, near, travel, expected', [
@@ -88,7 +108,7 @@ def test_a_deck_rate_comes_back_to_earth(t):
     before, after = (attitude(t + d).inv().apply([math.cos(E) * math.sin(A), math.cos(E) * math.cos(A), math.sin(E)])
                      for d in (-h, h) for A, E in [earth(t + d)])
     here = 0.5 * (before + after)
-    deck = Attitude(attitude(t).as_matrix(), Vector(*body_rate(t)), STILL)
+    deck = Attitude(rotation(attitude(t).as_matrix()), Vector(*body_rate(t)), STILL)
     got = deck_reference.earth_rates(deck, Vector(*here), Vector(*(after - before) / (2.0 * h)))
     assert got == pytest.approx((0.03 + 0.004 * t, 0.02 - 0.002 * t), abs=1e-7)
 

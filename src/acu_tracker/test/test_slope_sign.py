@@ -6,11 +6,11 @@ import pytest
 
 from acu_tracker import signals
 from acu_tracker.estimation import slope_sign
-from acu_tracker.geometry.vector import Vector
-from pedestal_common.geometry.line_of_sight import ashore_matrix
+from acu_tracker.geometry.vector import Vector, turn
+from pedestal_common.geometry.line_of_sight import ASHORE as BOW_NORTH
 
 T, SIGMA, GAP = 0.005, 5e-4, 0.1
-ASHORE = ashore_matrix()
+ASHORE = turn(*BOW_NORTH)
 
 
 @pytest.fixture

@@ -47,7 +47,7 @@ Beam = namedtuple('Beam', 'u across up')
 
 @compiled
 def beam(mat_ed, A, E):
-    """The Beam at deck angles A, E [rad] on a deck of attitude mat_ed (3, 3), deck -> earth."""
+    """The Beam at deck angles A, E [rad] on a deck of attitude mat_ed, a Rotation deck -> earth."""
     sA, cA, sE, cE = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
     return Beam(rotated(mat_ed, Vector(cE * cA, -cE * sA, sE)), rotated(mat_ed, Vector(-sA, -cA, 0.0)),
                 rotated(mat_ed, Vector(-sE * cA, sE * sA, cE)))

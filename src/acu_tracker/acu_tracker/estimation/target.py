@@ -22,7 +22,7 @@ from acu_tracker.estimation.filters.measurement import (
 from acu_tracker.geometry import attitude, attitude_error, deck_reference, estimate_frame, lever_arm
 from acu_tracker.geometry.deck_reference import STILL, Attitude
 from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, line_of_sight
-from acu_tracker.geometry.vector import Vector, rotated
+from acu_tracker.geometry.vector import Vector, rotated, rotation
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
@@ -43,12 +43,12 @@ def initialise(g):
 
 
 @compiled
-def _measured_direction(g, p, deck, u, azimuth, elevation):
-    """(azimuth, elevation) [rad] in the frame of a direction given by deck angles [rad], at the current attitude."""
+def _measured_direction(g, p, mat_ed, distance, azimuth, elevation):
+    """(azimuth, elevation) [rad] in the frame of a direction given by deck angles [rad]; mat_ed: Rotation deck ->
+    earth; distance: measured range [m], NaN: none."""
     x, y, z = pointing.direction(azimuth, elevation)
-    v = lever_arm.from_ins(g.lever_arm, p.lever_arm, u.range if deck.stabilised else math.nan, g.tracker.running,
-                           Vector(x, y, z))
-    v = rotated(deck.mat_ed, v)
+    v = lever_arm.from_ins(g.lever_arm, p.lever_arm, distance, g.tracker.running, Vector(x, y, z))
+    v = rotated(mat_ed, v)
     azimuth, elevation = pointing.earth_angles(v.x, v.y, v.z)
     if g.frame.tilted:
         return estimate_frame.direction_to_frame(g.frame, azimuth, elevation)
@@ -56,14 +56,14 @@ def _measured_direction(g, p, deck, u, azimuth, elevation):
 
 
 @compiled
-def _measured_rates(g, deck, u, at):
-    """(azimuth, elevation) rates [rad/s] of the target in the frame, from those of the antenna and of the error, at
-    the current attitude."""
+def _measured_rates(g, moves, deck, u, at):
+    """(azimuth, elevation) rates [rad/s] of the target in the frame, from those of the antenna and of the error;
+    moves: whether the deck does, of this Attitude."""
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, u.cross_elevation, u.elevation, u.error_rate[0],
                                   u.error_rate[1])
     v, dv = Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5])
-    if deck.stabilised or g.frame.tilted:
-        framed = estimate_frame.of_deck(g.frame, attitude.current(deck))
+    if moves or g.frame.tilted:
+        framed = estimate_frame.of_deck(g.frame, deck)
         v, dv = lever_arm.to_ins(g.lever_arm, v, dv)
         return deck_reference.earth_rates(framed, v, dv)
     motion = angles(LineOfSight(v, dv, STILL))
@@ -84,13 +84,15 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     if not g.tracker.running:
         estimate_frame.level(g.frame)
     azimuth, elevation = measured
+    known, now = attitude.at(deck, p, t)
     if deck.stabilised or g.frame.tilted:
-        if not attitude.at(deck, p, t):
+        if not known:
             return NO_ATTITUDE, NO_INNOVATION
-        azimuth, elevation = _measured_direction(g, p, deck, u, azimuth, elevation)
+        azimuth, elevation = _measured_direction(g, p, now.mat, u.range if deck.stabilised else math.nan, azimuth,
+                                                 elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
-        azimuth_rate, elevation_rate = _measured_rates(g, deck, u, at)
+        azimuth_rate, elevation_rate = _measured_rates(g, deck.stabilised, now, u, at)
     R_cross = R_elevation = error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e)
     cos_el = max(math.cos(elevation), 0.01)
     walk_cross = walk_elevation = 0.0
@@ -144,18 +146,15 @@ def earth_outlook(g, c, t):
 def on_deck(g, p, deck, t, source):
     """Motion on the deck (ATTITUDE) at t [s] of a Source; p: record of SharedParameters."""
     if source.framed and (g.frame.tilted or g.lever_arm.range != 0.0):
-        attitude.at(deck, p, t)
-        framed = estimate_frame.of_deck(g.frame, attitude.current(deck))
+        framed = estimate_frame.of_deck(g.frame, attitude.at(deck, p, t)[1])
         return angles(lever_arm.to_antenna(g.lever_arm, deck_reference.on_deck(framed, line_of_sight(source.motion))))
-    if deck.stabilised and attitude.at(deck, p, t):
-        return angles(deck_reference.on_deck(attitude.current(deck), line_of_sight(source.motion)))
-    return source.motion
+    return attitude.on_deck(deck, p, t, source.motion)
 
 
 @compiled
 def levelled_azimuth(g, level, source):
     """AxisMotion of the azimuth of a Source on a deck that stands still, level (3, 3) deck -> earth."""
-    still = Attitude(level, STILL, STILL)
+    still = Attitude(rotation(level), STILL, STILL)
     if source.framed:
         still = estimate_frame.of_deck(g.frame, still)
     return angles(deck_reference.on_deck(still, line_of_sight(source.motion))).azimuth
@@ -172,6 +171,8 @@ def read(g, p, c, deck, t):
         A12, E12 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p12, elevation.p12)
         A22, E22 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p22, elevation.p22)
         azimuth, elevation = AxisVariances(A11, A12, A22), AxisVariances(E11, E12, E22)
-    if g.lever_arm.range > 0.0 and attitude.at(deck, p, t):
-        motion = lever_arm.earth_angles_to_antenna(g.lever_arm, deck.mat_ed, motion)
+    if g.lever_arm.range > 0.0:
+        known, now = attitude.at(deck, p, t)
+        if known:
+            motion = lever_arm.earth_angles_to_antenna(g.lever_arm, now.mat, motion)
     return Estimate(motion, (azimuth, elevation))

@@ -3,26 +3,27 @@ import math
 
 import numpy as np
 
-from acu_tracker.geometry import attitude_error, attitude_jump
-from acu_tracker.geometry.deck_reference import Attitude
+from acu_tracker.geometry import attitude_error, attitude_jump, deck_reference
+from acu_tracker.geometry.deck_reference import STILL, Attitude
 from acu_tracker.geometry.history import bracket, history_type, push
-from acu_tracker.geometry.vector import vector
+from acu_tracker.geometry.motion import angles, line_of_sight
+from acu_tracker.geometry.vector import Rotation, Vector, turn
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import ASHORE, rotation
+from pedestal_common.geometry.line_of_sight import ASHORE
 from pedestal_common.geometry.quaternion import product
 
 ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('told', 'f8', (7,)),
                      ('aligned', 'i8'), ('jump', attitude_jump.JUMP),
-                     ('error', attitude_error.ERROR),
-                     ('mat_ed', 'f8', (3, 3)), ('w', 'f8', (3,)), ('dw', 'f8', (3,))], align=True)
+                     ('error', attitude_error.ERROR)], align=True)
 """stabilised: 1 on a ship, 0 ashore, where the attitude never changes; history: quaternion (x, y, z, w) deck -> earth,
 w [rad/s], dw [rad/s2] of the last steps, as they are believed; told: the last q and w as they came; aligned: whether
-the INS was; error: how its error changes. mat_ed (deck -> earth), w, dw: at the instant that `at` was last called
-for.
+the INS was; error: how its error changes.
 """
 
 TURNS = 1e-6
 """Rate [rad/s] of a deck from which its attitude changes from one measurement to the next."""
+
+UNKNOWN = Vector(math.nan, math.nan, math.nan)
 
 INVALID, REPEATED, NEW = range(3)
 """What `take` makes of an attitude."""
@@ -110,39 +111,35 @@ def take(s, p, t_k, stamp, q, w, aligning):
 
 @compiled
 def at(s, p, t):
-    """Whether there is an attitude at t [s], between two samples or predicted from the last; `current` gives it."""
+    """(whether there is an attitude at t [s], between two samples or predicted from the last; the Attitude, deck ->
+    earth, of NaN where there is none)."""
     if not s.stabilised:
-        rotation(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3], s.mat_ed)
-        s.w[:] = 0.0
-        s.dw[:] = 0.0
-        return True
+        return True, Attitude(turn(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3]), STILL, STILL)
     h = s.history
     last = h.sample[h.newest]
     T = t - h.stamp[h.newest]
-    if h.count == 0 or T > p.attitude_timeout:
-        return False
+    i, j, f = (h.newest, h.newest, 0.0) if T >= 0.0 else bracket(h, t)
+    if h.count == 0 or T > p.attitude_timeout or i < 0:
+        return False, Attitude(Rotation(UNKNOWN, UNKNOWN, UNKNOWN), UNKNOWN, UNKNOWN)
     if T >= 0.0:
-        for i in range(3):
-            s.dw[i] = last[7 + i]
-            s.w[i] = last[4 + i] + T * last[7 + i]
+        dw = Vector(last[7], last[8], last[9])
+        rate = Vector(last[4] + T * dw.x, last[5] + T * dw.y, last[6] + T * dw.z)
         x, y, z, w = rotated(last, (rotation_angle(last[4], last[7], T), rotation_angle(last[5], last[8], T),
                                     rotation_angle(last[6], last[9], T)))
     else:
-        i, j, f = bracket(h, t)
-        if i < 0:
-            return False
         a, b = h.sample[i], h.sample[j]
-        for k in range(3):
-            s.w[k] = a[4 + k] + f * (b[4 + k] - a[4 + k])
-            s.dw[k] = b[7 + k]
+        dw = Vector(b[7], b[8], b[9])
+        rate = Vector(a[4] + f * (b[4] - a[4]), a[5] + f * (b[5] - a[5]), a[6] + f * (b[6] - a[6]))
         x, y, z, w = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), \
             a[3] + f * (b[3] - a[3])
     norm = math.sqrt(x * x + y * y + z * z + w * w)
-    rotation(x / norm, y / norm, z / norm, w / norm, s.mat_ed)
-    return True
+    return True, Attitude(turn(x / norm, y / norm, z / norm, w / norm), rate, dw)
 
 
 @compiled
-def current(s):
-    """The Attitude, deck -> earth, at the instant that `at` was last called for."""
-    return Attitude(s.mat_ed, vector(s.w), vector(s.dw))
+def on_deck(s, p, t, motion):
+    """Return the Motion on the deck at t [s] of a Motion in earth angles; ashore, or without an attitude, itself."""
+    known, deck = at(s, p, t)
+    if s.stabilised and known:
+        return angles(deck_reference.on_deck(deck, line_of_sight(motion)))
+    return motion

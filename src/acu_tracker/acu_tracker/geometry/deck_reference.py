@@ -14,7 +14,7 @@ STILL = Vector(0.0, 0.0, 0.0)
 
 
 Attitude = namedtuple('Attitude', 'mat w dw')
-"""Rotation (3, 3) from the deck to the frame the target is given in; rate w [rad/s] and angular acceleration dw
+"""Rotation from the deck to the frame the target is given in; rate w [rad/s] and angular acceleration dw
 [rad/s2] of the deck, FLU."""
 
 

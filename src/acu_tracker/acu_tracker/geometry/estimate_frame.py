@@ -9,15 +9,15 @@ import numpy as np
 
 from acu_tracker.geometry.deck_reference import Attitude
 from acu_tracker.geometry.motion import LineOfSight, earth_angles, line_of_sight
-from acu_tracker.geometry.vector import Vector, cross, dot, rotated, rotated_back
+from acu_tracker.geometry.vector import Rotation, Vector, cross, dot, rotated, rotated_back, rotation, transposed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
 
 RAISE, LOWER = math.radians(75.0), math.radians(70.0)
 """Elevation in the earth's frame [rad] above which the frame is tilted, below which it is not any more."""
 
-FRAME = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8'), ('mat_fd', 'f8', (3, 3))], align=True)
-"""mat: frame -> earth; tilted: 0 where both are the same; mat_fd: deck -> frame, of the last `on_deck`."""
+FRAME = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8')], align=True)
+"""mat: frame -> earth; tilted: 0 where both are the same."""
 
 
 @compiled
@@ -52,15 +52,16 @@ def to_earth(f, motion):
     sight = line_of_sight(motion)
     if not f.tilted:
         return sight
-    return LineOfSight(rotated(f.mat, sight.u), rotated(f.mat, sight.du), rotated(f.mat, sight.ddu))
+    mat = rotation(f.mat)
+    return LineOfSight(rotated(mat, sight.u), rotated(mat, sight.du), rotated(mat, sight.ddu))
 
 
 @compiled
 def to_frame(f, sight):
     """Motion in the frame of a LineOfSight in ENU; the inverse of to_earth."""
     if f.tilted:
-        sight = LineOfSight(rotated_back(f.mat, sight.u), rotated_back(f.mat, sight.du),
-                            rotated_back(f.mat, sight.ddu))
+        mat = rotation(f.mat)
+        sight = LineOfSight(rotated_back(mat, sight.u), rotated_back(mat, sight.du), rotated_back(mat, sight.ddu))
     return earth_angles(sight)
 
 
@@ -68,7 +69,7 @@ def to_frame(f, sight):
 def direction_to_frame(f, azimuth, elevation):
     """(azimuth, elevation) [rad] in the frame of a direction's earth angles."""
     e, n, u = earth_direction(azimuth, elevation)
-    v = rotated_back(f.mat, Vector(e, n, u))
+    v = rotated_back(rotation(f.mat), Vector(e, n, u))
     return math.atan2(v.x, v.y), math.atan2(v.z, math.hypot(v.x, v.y))
 
 
@@ -82,12 +83,10 @@ def verticals(f, azimuth, elevation):
 
 @compiled
 def of_deck(f, attitude):
-    """The Attitude, deck -> frame, of an Attitude deck -> earth. It stands until the next call."""
-    mat = attitude.mat
-    for i in range(3):
-        for j in range(3):
-            f.mat_fd[i, j] = f.mat[0, i] * mat[0, j] + f.mat[1, i] * mat[1, j] + f.mat[2, i] * mat[2, j]
-    return Attitude(f.mat_fd, attitude.w, attitude.dw)
+    """The Attitude, deck -> frame, of an Attitude deck -> earth."""
+    mat, (x, y, z) = rotation(f.mat), transposed(attitude.mat)
+    columns = Rotation(rotated_back(mat, x), rotated_back(mat, y), rotated_back(mat, z))
+    return Attitude(transposed(columns), attitude.w, attitude.dw)
 
 
 @compiled
@@ -99,7 +98,7 @@ def earth_variances(f, framed, earth, p_A, p_E):
     A, E = framed.azimuth.angle, framed.elevation.angle
     azimuth, elevation = earth.azimuth.angle, earth.elevation.angle
     # Unit vectors of both frames in the direction of growing azimuth.
-    across = rotated(f.mat, Vector(math.cos(A), -math.sin(A), 0.0))
+    across = rotated(rotation(f.mat), Vector(math.cos(A), -math.sin(A), 0.0))
     c = across.x * math.cos(azimuth) - across.y * math.sin(azimuth)
     p_across = p_A * math.cos(E)**2
     cos_el = max(math.cos(elevation), 0.01)

@@ -1,4 +1,4 @@
-"""Vectors of three components, and their products."""
+"""Vectors of three components, their products and rotations."""
 from collections import namedtuple
 
 from pedestal_common.compiled import compiled
@@ -7,11 +7,28 @@ from pedestal_common.geometry import line_of_sight
 Vector = namedtuple('Vector', 'x y z')
 """Components along the axes of a frame, which the docstring of the caller names."""
 
+Rotation = namedtuple('Rotation', 'x y z')
+"""Matrix of a rotation: its rows, each a Vector."""
+
 
 @compiled
 def vector(row):
     """The Vector of an array (3,)."""
     return Vector(row[0], row[1], row[2])
+
+
+@compiled
+def rotation(mat):
+    """Return the Rotation of an array (3, 3)."""
+    return Rotation(Vector(mat[0, 0], mat[0, 1], mat[0, 2]), Vector(mat[1, 0], mat[1, 1], mat[1, 2]),
+                    Vector(mat[2, 0], mat[2, 1], mat[2, 2]))
+
+
+@compiled
+def turn(x, y, z, w):
+    """Return the Rotation of a unit quaternion."""
+    a, b, c = line_of_sight.rows(x, y, z, w)
+    return Rotation(Vector(*a), Vector(*b), Vector(*c))
 
 
 @compiled
@@ -39,12 +56,19 @@ def cross(a, b):
 
 
 @compiled
+def transposed(mat):
+    """M', of a Rotation M."""
+    return Rotation(Vector(mat.x.x, mat.y.x, mat.z.x), Vector(mat.x.y, mat.y.y, mat.z.y),
+                    Vector(mat.x.z, mat.y.z, mat.z.z))
+
+
+@compiled
 def rotated(mat, a):
-    """M a, of a rotation M (3, 3)."""
-    return Vector(*line_of_sight.to_earth(mat, a.x, a.y, a.z))
+    """M a, of a Rotation M."""
+    return Vector(dot(mat.x, a), dot(mat.y, a), dot(mat.z, a))
 
 
 @compiled
 def rotated_back(mat, a):
-    """M' a, of a rotation M (3, 3)."""
-    return Vector(*line_of_sight.to_deck(mat, a.x, a.y, a.z))
+    """M' a, of a Rotation M."""
+    return rotated(transposed(mat), a)

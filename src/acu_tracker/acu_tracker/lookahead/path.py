@@ -3,7 +3,7 @@ import math
 from collections import namedtuple
 
 from acu_tracker.geometry.great_circle import turned
-from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back
+from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back, rotation
 from acu_tracker.program import bridge as program_bridge
 from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
@@ -23,6 +23,7 @@ def along_program(path, mat, program, bridge):
 
     mat (3, 3): levelled deck -> earth.
     """
+    level = rotation(mat)
     for i in range(len(path.rows)):
         t = path.t0 + i * path.h
         if t > program.times[-1]:
@@ -30,16 +31,16 @@ def along_program(path, mat, program, bridge):
         u = program_track.direction(program, t)
         if bridge.valid:
             u = program_bridge.rotated(bridge, u)
-        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(mat, u)
+        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, u)
     return len(path.rows)
 
 
 @compiled
 def along_great_circle(path, mat, u, du):
     """Lay out the path of an ENU unit vector u that keeps its rate du [1/s]: how many rows it covers, all."""
-    W = math.sqrt(dot(du, du))
+    W, level = math.sqrt(dot(du, du)), rotation(mat)
     for i in range(len(path.rows)):
-        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(mat, turned(u, du, W, W * i * path.h))
+        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, turned(u, du, W, W * i * path.h))
     return len(path.rows)
 
 

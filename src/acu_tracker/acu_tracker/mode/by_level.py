@@ -144,9 +144,9 @@ def _remember_place(s, c):
         place.remember(s.acquisition.place, s.stamp, sight.u, sight.du)
         return
     _, at = encoders.at(s.encoders, s.stamp)
-    attitude.at(s.attitude, c.p, s.stamp)
+    _, deck = attitude.at(s.attitude, c.p, s.stamp)
     x, y, z = pointing.direction(at.A, at.E)
-    place.remember(s.acquisition.place, s.stamp, rotated(s.attitude.mat_ed, Vector(x, y, z)), place.STILL)
+    place.remember(s.acquisition.place, s.stamp, rotated(deck.mat, Vector(x, y, z)), place.STILL)
 
 
 @compiled

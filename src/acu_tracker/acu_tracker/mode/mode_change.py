@@ -20,7 +20,7 @@ def _situation(s, c, u, of_all, request, fallback):
     if s.attitude.stabilised:
         # Before the first attitude the state of the INS may not have arrived yet.
         unstable = (modes.INS_ALIGNING if s.aligning and s.attitude.history.count > 0 else
-                    modes.NONE if attitude.at(s.attitude, c.p, t_m) else modes.ATTITUDE_INVALID)
+                    modes.NONE if attitude.at(s.attitude, c.p, t_m)[0] else modes.ATTITUDE_INVALID)
     since = outage.since_accepted(s, c)
     silent = not outage.permitted(s, c)
     spread = by_level.sigma(s, c) if s.target.tracker.running and silent and outage.coasting(s, c) else 0.0

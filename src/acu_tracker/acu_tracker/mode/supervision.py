@@ -41,7 +41,7 @@ def step(s, c, u, o, dt, signal_lost):
     jumped, ship = dt > c.p.step_gap, s.attitude.stabilised and s.attitude.history.count > 0
     facts = conditions.Facts(
         0.0 if jumped else dt, dt if jumped else 0.0, dt > 1.5 * c.p.period, latched(s),
-        ship and not attitude.at(s.attitude, c.p, s.stamp + c.lead), ship and s.attitude.jump.apart, signal_lost,
+        ship and not attitude.at(s.attitude, c.p, s.stamp + c.lead)[0], ship and s.attitude.jump.apart, signal_lost,
         c.p.unasked_rate, c.p.tracker.receiver.beamwidth)
     mode = modes.STANDBY if stow.rests(s.stow, c.p.stow_pins, u.pins, s.mode) else s.mode
     conditions.take(s.supervision, mode, u, o, c.axis, s.unasked, facts)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import special
 
 from acu_tracker.geometry.motion import motion_of_position
-from acu_tracker.geometry.vector import Vector, minus, rotated, vector
+from acu_tracker.geometry.vector import Vector, minus, rotated, turn, vector
 from pedestal_analysis.results import tracking
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
@@ -66,11 +66,9 @@ class Consistency:
 def _rates(relative, velocity, attitude, ship_velocity, rates):
     """Fill the rates (n, 2) of earth azimuth and elevation of a target at `relative` [m], moving with `velocity`
     [m/s], from a ship that moves with `ship_velocity` in its own frame."""
-    mat_ed = np.empty((3, 3))
     for k in range(len(relative)):
         q = attitude[k]
-        line_of_sight.rotation(q[0], q[1], q[2], q[3], mat_ed)
-        v = minus(vector(velocity[k]), rotated(mat_ed, vector(ship_velocity[k])))
+        v = minus(vector(velocity[k]), rotated(turn(q[0], q[1], q[2], q[3]), vector(ship_velocity[k])))
         motion = motion_of_position(vector(relative[k]), v, Vector(0.0, 0.0, 0.0))
         rates[k, 0], rates[k, 1] = motion.azimuth.rate, motion.elevation.rate
 

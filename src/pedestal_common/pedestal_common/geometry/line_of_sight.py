@@ -141,11 +141,20 @@ def displaced_motion(azimuth, elevation, azimuth_rate, elevation_rate, cross_ele
 
 
 @compiled
+def rows(qx, qy, qz, qw):
+    """Return the three rows of the rotation matrix of a unit quaternion (x, y, z, w)."""
+    return ((1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw)),
+            (2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw)),
+            (2 * (qx * qz - qy * qw), 2 * (qy * qz + qx * qw), 1 - 2 * (qx * qx + qy * qy)))
+
+
+@compiled
 def rotation(qx, qy, qz, qw, mat):
     """Fill mat (3, 3) with the rotation of a unit quaternion (x, y, z, w)."""
-    mat[0, 0], mat[0, 1], mat[0, 2] = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw)
-    mat[1, 0], mat[1, 1], mat[1, 2] = 2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw)
-    mat[2, 0], mat[2, 1], mat[2, 2] = 2 * (qx * qz - qy * qw), 2 * (qy * qz + qx * qw), 1 - 2 * (qx * qx + qy * qy)
+    x, y, z = rows(qx, qy, qz, qw)
+    mat[0, 0], mat[0, 1], mat[0, 2] = x
+    mat[1, 0], mat[1, 1], mat[1, 2] = y
+    mat[2, 0], mat[2, 1], mat[2, 2] = z
 
 
 @compiled
