@@ -8,7 +8,8 @@ from pedestal_common.compiled import compiled
 class Mode(typing.NamedTuple):
     """A row of TABLE.
 
-    doc: what the axes do; entry: when it can be entered; exit: when it ends by itself. follows: it follows a target
+    doc: what the axes do; entry: when it can be entered; exit: when it ends by itself. needs, ends: of Conditions, the
+    one without which it cannot be entered and the one without which it ends, '' for none. follows: it follows a target
     through the sky, for which the deck's attitude must be known; by_level: it goes by the level of the signal about
     the expected place of the target; fallback: the mode it falls back on when its target ends, of `program` the mode
     whose table was followed last; handover: the mode it hands over to by itself, once that can be entered. Both are
@@ -19,6 +20,8 @@ class Mode(typing.NamedTuple):
     doc: str
     entry: str
     exit: str = ''
+    needs: str = ''
+    ends: str = ''
     follows: bool = False
     by_level: bool = False
     fallback: str = ''
@@ -33,41 +36,42 @@ TABLE = (
     Mode('standby', 'rate command 0', 'always; after a fault'),
     Mode('stop', 'the axes stand where they come to rest', 'encoders valid', button=False),
     Mode('stow', 'the stow angles; with `stow_pins` the pins go in once the axes stand there',
-         'encoders valid, angles inside the limits', pinned=True),
+         'encoders valid, angles inside the limits', needs='stow', pinned=True),
     Mode('unstow', 'rate command 0; the stow pins go out', 'encoders valid, a stow pin is not out',
-         'to `standby` when both are out', pinned=True),
-    Mode('preset', 'the preset angles', 'encoders valid, angles inside the limits'),
+         'to `standby` when both are out', needs='pin', ends='pin', pinned=True),
+    Mode('preset', 'the preset angles', 'encoders valid, angles inside the limits', needs='preset'),
     Mode('rate', 'the rates of the last ask `rate`, for 0.5 s; nobody asks again: the axes stand', 'encoders valid',
          button=False),
     Mode('slave', 'the direction of the last ask `slave`, in earth angles, moved on by its rates',
          'a direction was given and holds, 1 s by default', 'to `stop` when it holds no longer',
-         follows=True, fallback='stop', button=False),
+         needs='direction', ends='direction', follows=True, fallback='stop', button=False),
     Mode('program', 'the time-tagged table', 'the table is there, valid now and inside the limits',
          'to `autotrack` after `lock_count` accepted errors; to `standby` past its end, or where rows are missing',
-         follows=True, handover='autotrack', table=True),
+         needs='program', ends='program', follows=True, handover='autotrack', table=True),
     Mode('tle', 'a satellite by its elements', 'there are elements, not older than `prediction.oldest`; the satellite '
          'is above the horizon and inside the limits',
          'to `autotrack` after `lock_count` accepted errors; to `standby` when it has set',
-         follows=True, handover='autotrack', table=True, predicted='satellite'),
+         needs='tle', ends='tle', follows=True, handover='autotrack', table=True, predicted='satellite'),
     Mode('sun', 'the sun, to calibrate the pointing', 'the sun is above the horizon and inside the limits',
-         'to `standby` when it has set', follows=True, table=True, predicted='sun'),
+         'to `standby` when it has set', needs='sun', ends='sun', follows=True, table=True, predicted='sun'),
     Mode('autotrack', 'the filtered target, through short losses the prediction of the filter',
          'receiver locked, filter converged',
          'after `coast_time` without an error, or once the estimate is uncertain by half a beamwidth, to the fallback '
          'chosen beforehand, diverged to the table, in a side lobe to `acquire`; to `standby` where that cannot be '
          'entered',
-         follows=True, fallback='program'),
+         needs='lock', ends='track', follows=True, fallback='program'),
     Mode('search', 'a pattern about the expected place of the target: the last place, a small area, the full one',
          'not after `diverged`', 'to `acquire` where the level has passed a peak; after `search.rounds` to the table, '
-         'or to `standby` without one', follows=True, by_level=True, fallback='program', handover='acquire'),
+         'or to `standby` without one',
+         needs='slope', ends='level', follows=True, by_level=True, fallback='program', handover='acquire'),
     Mode('acquire', 'the place of the highest level, a look around it for a main lobe, a small circle to check the '
          'slopes of the errors', 'not after `diverged`',
          'to `autotrack` once the slopes are right and the receiver is locked; to `search` without a signal there; '
          'diverged, to `standby`, where a slope is wrong',
-         follows=True, by_level=True, fallback='search', handover='autotrack'),
+         needs='slope', ends='level', follows=True, by_level=True, fallback='search', handover='autotrack'),
     Mode('steptrack', 'the highest level, found by steps to either side', 'always', 'to `search` without a signal',
-         follows=True, by_level=True, fallback='search'))
-"""Another mode is a row here, its entries in `situation`, and what it asks of the axes in guidance."""
+         ends='level', follows=True, by_level=True, fallback='search'))
+"""Another mode is a row here, its own conditions in Conditions, and what it asks of the axes in control_unit."""
 
 MODES = tuple(row.name for row in TABLE)
 (STANDBY, STOP, STOW, UNSTOW, PRESET, RATE, SLAVE, PROGRAM, TLE, SUN, AUTOTRACK, SEARCH, ACQUIRE,
@@ -103,30 +107,23 @@ REASONS = ('none', 'requested', 'locked', 'signal lost', 'encoder invalid', 'att
 NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
 
 
-Situation = namedtuple('Situation', 'encoder_valid drive_ready attitude pins table obstacle end')
-"""The conditions of a change of mode.
+Conditions = namedtuple('Conditions', 'nothing stow pin preset direction program tle sun lock slope track level')
+"""Of each condition of a mode NONE, or the reason that it does not hold.
 
-drive_ready: the drive follows commands; a mode that runs ends with it, and none begins without it. attitude: NONE
-or why it is not known; pins: NONE or why the stow pins forbid the axes to move; table: the mode whose table was
-followed last; obstacle: for each mode NONE or the reason that it cannot be entered; end: for each mode NONE or the
-reason that it ends."""
+nothing: always holds; stow, preset: these angles can be pointed at; pin: one is not out; direction: one was given and
+holds; program, tle, sun: the table can be followed; lock: autotrack can begin; slope: nothing has diverged; track:
+autotrack has its target; level: so has a mode that goes by the level."""
 
+_NEEDS, _ENDS = (tuple(Conditions._fields.index(name or 'nothing') for name in names)
+                 for names in zip(*((row.needs, row.ends) for row in TABLE)))
 
-@compiled
-def _end_of_table(obstacle):
-    """A table that leads outside the limits cannot be entered, but is not ended by that."""
-    return obstacle if obstacle != OUTSIDE_LIMITS else NONE
+Situation = namedtuple('Situation', 'encoder_valid drive attitude pins handover table chosen conditions')
+"""What a change of mode is decided by.
 
-
-@compiled
-def situation(drive, attitude, pins, table, obstacle, ends):
-    """The Situation of these conditions. drive: (encoder_valid, drive_ready); obstacle: for each mode NONE or the
-    reason against it; ends: (lost, level), NONE or the reason that autotrack and a mode that goes by the level end."""
-    lost, level = ends
-    unstowed = PINS_OUT if pins == NONE else NONE
-    return Situation(drive[0], drive[1], attitude, pins, table, obstacle, (
-        NONE, NONE, NONE, unstowed, NONE, NONE, obstacle[SLAVE], _end_of_table(obstacle[PROGRAM]),
-        _end_of_table(obstacle[TLE]), _end_of_table(obstacle[SUN]), lost, level, level, level))
+drive: NONE, or why it follows no commands; a mode that runs ends with it, and none begins without it. attitude: NONE
+or why it is not known; pins: NONE or why the stow pins forbid the axes to move; handover: whether a mode may hand over
+by itself; table: the mode whose table was followed last; chosen: the mode for the loss of the track, AUTOTRACK: none;
+conditions: the Conditions."""
 
 
 Decision = namedtuple('Decision', 'mode reason result')
@@ -144,17 +141,24 @@ def obstacle(request, now):
         return ENCODER_INVALID
     if now.pins != NONE:
         return NONE if _PINNED[request] and now.pins == PINNED else now.pins
-    if not now.drive_ready:
-        return DRIVE_NOT_READY
+    if now.drive != NONE:
+        return now.drive
     if FOLLOWS[request] and now.attitude != NONE:
         return now.attitude
-    return now.obstacle[request]
+    return now.conditions[_NEEDS[request]]
 
 
 @compiled
-def next_mode(mode, request, now, handover, chosen):
-    """The Decision of one step in a Situation; request: a mode or NO_REQUEST; handover: whether a mode may hand over
-    by itself; chosen: the mode for the loss of the track, AUTOTRACK: none."""
+def _end(mode, now):
+    """Why a mode ends in a Situation, NONE if it goes on. A table that leads outside the limits cannot be entered, but
+    is not ended by that."""
+    why = now.conditions[_ENDS[mode]]
+    return NONE if BY_TABLE[mode] and why == OUTSIDE_LIMITS else why
+
+
+@compiled
+def next_mode(mode, request, now):
+    """The Decision of one step in a Situation; request: a mode or NO_REQUEST."""
     why, result = NONE, NO_REQUEST
     if request != NO_REQUEST:
         why = obstacle(request, now)
@@ -168,19 +172,20 @@ def next_mode(mode, request, now, handover, chosen):
     if now.pins != NONE:
         stays = _PINNED[mode] and now.pins == PINNED
         return Decision(mode, why, result) if stays else Decision(STANDBY, now.pins, result)
-    if not now.drive_ready and mode != UNSTOW:
-        return Decision(STANDBY, DRIVE_NOT_READY, result)
+    if now.drive != NONE and mode != UNSTOW:
+        return Decision(STANDBY, now.drive, result)
     if FOLLOWS[mode] and now.attitude != NONE:
         return Decision(STANDBY, now.attitude, result)
-    if handover and _HANDOVER[mode] != NEVER and now.obstacle[_HANDOVER[mode]] == NONE:
-        return Decision(_HANDOVER[mode], LOCKED if _HANDOVER[mode] == AUTOTRACK else FOUND, result)
-    if now.end[mode] != NONE:
-        fallback = ACQUIRE if now.end[mode] == SIDE_LOBE else _FALLBACK[mode]
-        if mode == AUTOTRACK and now.end[mode] == SIGNAL_LOST:
-            if chosen == AUTOTRACK:
-                return Decision(mode, now.end[mode], result)
-            fallback = chosen
-        if fallback == PROGRAM:
-            fallback = now.table
-        return Decision(fallback if now.obstacle[fallback] == NONE else STANDBY, now.end[mode], result)
-    return Decision(mode, why, result)
+    handover, end = _HANDOVER[mode], _end(mode, now)
+    if now.handover and handover != NEVER and now.conditions[_NEEDS[handover]] == NONE:
+        return Decision(handover, LOCKED if handover == AUTOTRACK else FOUND, result)
+    if end == NONE:
+        return Decision(mode, why, result)
+    fallback = ACQUIRE if end == SIDE_LOBE else _FALLBACK[mode]
+    if mode == AUTOTRACK and end == SIGNAL_LOST:
+        if now.chosen == AUTOTRACK:
+            return Decision(mode, end, result)
+        fallback = now.chosen
+    if fallback == PROGRAM:
+        fallback = now.table
+    return Decision(fallback if now.conditions[_NEEDS[fallback]] == NONE else STANDBY, end, result)

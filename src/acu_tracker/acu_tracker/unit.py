@@ -7,7 +7,7 @@ import numpy as np
 
 from acu_tracker import control_unit, modes, signals
 from acu_tracker.alarms import annunciator, report, table
-from acu_tracker.mode import mode_change, supervision
+from acu_tracker.mode import mode_change
 from acu_tracker.operating import announcement, diagnosis
 from acu_tracker.operating.authority import Authority
 from acu_tracker.operating.desk import Desk
@@ -139,7 +139,7 @@ class Acu(Unit):
             parameters.azimuth, parameters.elevation)])
         self.predictor, self.predicted = Predictor(parameters.prediction), {}
         self.offset, self._laid = (0.0, 0.0, 0.0), (NEVER_DUE, NEVER)
-        self.desk = Desk(self.parts['state'])
+        self.desk = Desk(self.parts['state'], control_unit.reset)
         self._silent = False
 
     @property
@@ -190,7 +190,7 @@ class Acu(Unit):
     def _append(self, times, angles):
         """Append a segment to the program track. Raises ValueError."""
         state, inputs = self.parts['state'], self.parts['inputs']
-        followed = state['mode'] == modes.PROGRAM
+        followed = state['mode']['now'] == modes.PROGRAM
         try:
             self.segments.append(times, angles, float(state['stamp']) - self.offset[0], followed)
         except segments.TurnaroundError:
@@ -272,7 +272,7 @@ class Acu(Unit):
         if verb == 'release':
             return self.authority.release()
         if verb == 'fallback':
-            state['fallback'] = modes.FALLBACKS[arguments['mode']]
+            mode_change.choose(state['mode'], arguments['mode'])
             return Reply(True, f'fallback is {arguments["mode"]}')
         if verb == 'offset':
             self.offset = (arguments['time'], *(arguments[axis] for axis in topics.AXES))
@@ -331,7 +331,7 @@ class Acu(Unit):
     def refusals(self):
         """{mode: why it would be refused now} of the modes that would be."""
         m, why = self.parts, np.zeros(len(modes.MODES), int)
-        mode_change.refusals(m['state'].copy(), m['constants'], m['inputs'], self.memory.tables, why)
+        control_unit.refusals(m['state'], m['constants'], m['inputs'], self.memory.tables, why)
         words = {code: modes.REASONS[code] for code in set(why) - {modes.NONE}}
         if modes.DRIVE_NOT_READY in words:
             words[modes.DRIVE_NOT_READY] += f': {self.drive_told}'
@@ -360,14 +360,14 @@ class Acu(Unit):
     @property
     def faults(self):
         """Names of the faults that wait for acu/reset_faults."""
-        bits = supervision.latched(self.parts['state'])
+        bits = control_unit.latched(self.parts['state'])
         return tuple(fault for fault in diagnosis.FAULTS if bits >> table.INDEX[fault] & 1)
 
     @property
     def urgent(self):
         """What is told at once when it changes: faults, the mode, silence, the lock, the drive, pins, alignment."""
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
-        return (supervision.latched(self.parts['state']), outputs['mode'], outputs['reason'] == modes.SILENCE,
+        return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == modes.SILENCE,
                 outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])
 
     @staticmethod

@@ -4,9 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker import signals
+from acu_tracker import control_unit, signals
 from acu_tracker.alarms import annunciator, conditions, detectors, machine, report, table
-from acu_tracker.mode import supervision
 from acu_tracker.modes import MODES, PRESET, STANDBY
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import ALARMS, DRIVE, JOINTS, Acu
@@ -166,7 +165,7 @@ def test_a_jump_of_the_encoder_is_latched_and_its_error_stands_under_it(moving):
     moving.run(20.0)
     i = table.INDEX['azimuth encoder jump']
     assert alarms(moving)['alarm'][i]['state'] == machine.LATCHED_UNACKNOWLEDGED
-    assert supervision.reset(moving.state[0]) == annunciator.NONE
+    assert control_unit.reset(moving.state[0]) == annunciator.NONE
     assert alarms(moving)['alarm'][i]['state'] == machine.RETURNED and moving.mode == 'preset'
 
 
@@ -208,12 +207,12 @@ def test_a_runaway_is_the_first_and_what_it_leads_to_stands_under_it(moving):
         moving.step()
     assert annunciated(moving) == ['azimuth runaway'] and 'moves unasked' in told(moving)
     assert (moving.mode, moving.reason) == ('standby', 'moves unasked')
-    assert table.NAMES[supervision.reset(moving.state[0])] == 'moves unasked'
+    assert table.NAMES[control_unit.reset(moving.state[0])] == 'moves unasked'
     moving.velocity[:] = 0.0
     moving.run(0.5)
-    assert table.NAMES[supervision.reset(moving.state[0])] == 'azimuth runaway'        # its time off is not over
+    assert table.NAMES[control_unit.reset(moving.state[0])] == 'azimuth runaway'        # its time off is not over
     moving.run(1.0)
-    assert supervision.reset(moving.state[0]) == annunciator.NONE and not moving.state['unasked']['moves']
+    assert control_unit.reset(moving.state[0]) == annunciator.NONE and not moving.state['unasked']['moves']
     moving.run(1.0)
     assert moving.mode == 'standby' and np.abs(moving.velocity).max() == 0.0
     assert moving.ask(PRESET)
@@ -226,7 +225,7 @@ def test_reset_forgets_a_mode_that_waited(Rig):
     rig.angle = rig.angle + (0.05, 0.0)
     rig.run(8.0)
     rig.ask(STANDBY)
-    assert supervision.reset(rig.state[0]) == annunciator.NONE
+    assert control_unit.reset(rig.state[0]) == annunciator.NONE
     rig.receiver_on = True
     rows = rig.run(3.0)
     assert rig.mode == 'standby' and not rows[:, :2].any()

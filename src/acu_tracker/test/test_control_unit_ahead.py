@@ -75,7 +75,7 @@ def slewing(Rig, **parameters):
     rig = Rig(overhead(math.radians(88.0)), at=overhead(math.radians(88.0))(0.0), initial_mode='program', **SLOW,
               **{'tracker.handover': False}, **parameters)
     rig.program(start=-2.0, rows=90)
-    while not rig.state['pointing_offset'][0] > 0.5 * BEAMWIDTH:
+    while not rig.state['guidance']['pointing_offset'][0] > 0.5 * BEAMWIDTH:
         rig.run(0.1)
         assert rig.k * rig.T < CULMINATION
     return rig
@@ -145,7 +145,7 @@ def test_a_program_that_fits_no_turn_is_told(Rig):
                   **{'tracker.handover': False})
         rig.program(rows=51)
         rig.run(0.1)
-        assert rig.mode == 'program' and rig.state['overtravel'][0] == overtravel
+        assert rig.mode == 'program' and rig.state['guidance']['overtravel'][0] == overtravel
 
 
 def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
@@ -210,7 +210,7 @@ def test_the_levelled_deck_is_the_mean_of_its_attitudes():
     tilts = []
     for t in times:
         attitude = Rotation.from_euler('ZYX', [0.7, 0.03 * math.sin(0.9 * t), 0.05 * math.sin(0.6 * t)])
-        levelled_deck.take(h[0], t, attitude.as_quat() * (-1.0 if int(t) % 2 else 1.0), 60.0)
+        levelled_deck.take(h[0], t, attitude.as_quat() * (-1.0 if int(t) % 2 else 1.0), 60.0, False)
         tilts.append(math.acos(attitude.as_matrix()[2, 2]))
     difference = Rotation.from_quat(h['mean'][0]).inv() * Rotation.from_euler('Z', 0.7)
     assert difference.magnitude() < 3e-3

@@ -34,19 +34,18 @@ def test_mean(state):
 def test_a_burst_of_interference_is_not_held_against_the_filter(state):
     for _ in range(20):
         divergence.take(state, innovation(1e6))
-    divergence.watch(state, False)
-    assert not state['diverged']
+    assert not divergence.diverges(state, False)
 
 
 @pytest.mark.parametrize('without_signal, errors', [(False, 74), (True, 10)])
 def test_it_stays_until_it_is_reset(state, without_signal, errors):
     """m = 1 + 11.5 (1 - 0.99^n) passes 7 with the 74th error that counts 12.5, and 2 with the 10th."""
     for _ in range(errors):
-        divergence.watch(state, without_signal)
-        assert not state['diverged']
+        assert not divergence.diverges(state, without_signal)
         divergence.take(state, innovation(100.0))
-    divergence.watch(state, without_signal)
-    assert state['diverged']
+    assert divergence.diverges(state, without_signal) and not state['diverged']
+    divergence.latch(state)
     divergence.restart(state)
-    divergence.watch(state, without_signal)
-    assert state['diverged'] and state['m'] == 1.0
+    assert not divergence.diverges(state, without_signal) and state['diverged'] and state['m'] == 1.0
+    divergence.release(state)
+    assert not state['diverged']

@@ -73,11 +73,13 @@ def test_the_bridge_is_the_program_turned_to_the_target():
     h = 1e-3
     A, E = np.array([(math.atan2(v[0], v[1]), math.asin(v[2])) for v in
                      (turn.apply(program_track.direction(program, 17.5 + d)) for d in (-h, 0.0, h))]).T
-    got = bridge.motion_at(b[0], program, 17.5)
+    got = bridge.motion_at(bridge.way(b[0], program), 17.5)
     for x, (angle, rate, acceleration) in zip((A, E), got):
         assert angle == pytest.approx(x[1], abs=1e-12)
         assert rate == pytest.approx((x[2] - x[0]) / (2 * h), abs=1e-8)
         assert acceleration == pytest.approx((x[2] - 2 * x[1] + x[0]) / h**2, abs=1e-6)
+    bridge.forget(b[0])
+    assert bridge.motion_at(bridge.way(b[0], program), 17.5) == program_track.motion_at(program, 17.5)
     bridge.begin(b[0], program, 10.0, Vector(0.0, 0.0, 1.0))
     assert b['valid'][0] == 0
     bridge.begin(b[0], program, 50.0, Vector(*estimated))

@@ -19,7 +19,7 @@ class Watch:
         self.u['stamp'] = self.k * T
         for name, value in told.items():
             self.u[name][0] = value
-        seen = frozen.watch(self.s, self.u, HOLD)
+        seen = frozen.watch(self.s, self.u, HOLD, False)
         frozen.command(self.s, 0, rate, T)
         return seen
 
@@ -36,8 +36,7 @@ def test_numbers_that_stand_while_it_is_sent_on_a_way(watch, rate):
     steps = next(k for k in range(1, 1000) if watch.step(rate))
     assert steps * T == pytest.approx(HOLD + frozen.LOOK / abs(rate), abs=2.1 * T)
     assert watch.step(0.0, position=0.5)                # until it is reset
-    watch.s['frozen'] = 0
-    frozen.restart(watch.s, watch.k * T)
+    frozen.release(watch.s, watch.k * T)
     assert not any(watch.step(0.0, position=0.5) for _ in range(1000))
 
 

@@ -9,6 +9,7 @@ from acu_tracker.modes import (
     AUTOTRACK,
     BEFORE_PROGRAM,
     BELOW_HORIZON,
+    DIVERGED,
     DRIVE_NOT_READY,
     ENCODER_INVALID,
     FOUND,
@@ -50,10 +51,33 @@ def next_mode(mode, request=NO_REQUEST, encoder_ok=True, drive_ready=True, attit
               preset=NONE, slave=NONE, locked=True, lost=NONE, level=NONE, handover=False, chosen=PROGRAM, pins=NONE,
               tle=NONE, sun=NONE, table=PROGRAM):
     """Of a situation in which all is well but for what is named."""
-    obstacle = (NONE, NONE, stow, PINS_OUT, preset, NONE, slave, program, tle, sun, NONE if locked else NOT_LOCKED,
-                NONE, NONE, NONE)
-    now = modes.situation((encoder_ok, drive_ready), attitude, pins, table, obstacle, (lost, level))
-    return modes.next_mode(mode, request, now, handover, chosen)
+    conditions = modes.Conditions(
+        nothing=NONE, stow=stow, pin=PINS_OUT if pins == NONE else NONE, preset=preset, direction=slave,
+        program=program, tle=tle, sun=sun, lock=NONE if locked else NOT_LOCKED, slope=NONE, track=lost, level=level)
+    drive = NONE if drive_ready else DRIVE_NOT_READY
+    now = modes.Situation(encoder_ok, drive, attitude, pins, handover, table, chosen, conditions)
+    return modes.next_mode(mode, request, now)
+
+
+CONDITIONS = {
+    'stow': ('stow', ''), 'unstow': ('pin', 'pin'), 'preset': ('preset', ''), 'slave': ('direction', 'direction'),
+    'program': ('program', 'program'), 'tle': ('tle', 'tle'), 'sun': ('sun', 'sun'), 'autotrack': ('lock', 'track'),
+    'search': ('slope', 'level'), 'acquire': ('slope', 'level'), 'steptrack': ('', 'level')}
+"""{mode: the condition that it needs, the one that ends it}; of all others none."""
+
+
+def test_each_mode_has_its_own_conditions():
+    assert {row.name: (row.needs, row.ends) for row in modes.TABLE if row.needs or row.ends} == CONDITIONS
+
+
+@pytest.mark.parametrize('condition', modes.Conditions._fields[1:])
+@pytest.mark.parametrize('mode', range(1, len(modes.MODES)))
+def test_a_condition_that_does_not_hold_bars_and_ends_the_modes_of_its_own_and_no_other(mode, condition):
+    why = modes.Conditions(*(DIVERGED if name == condition else NONE for name in modes.Conditions._fields))
+    now = modes.Situation(True, NONE, NONE, NONE, False, PROGRAM, PROGRAM, why)
+    needs, ends = CONDITIONS.get(modes.MODES[mode], ('', ''))
+    assert modes.obstacle(mode, now) == (DIVERGED if needs == condition else NONE)
+    assert (modes.next_mode(mode, NO_REQUEST, now).reason == DIVERGED) == (ends == condition)
 
 
 MOVING = tuple(mode for mode, row in enumerate(modes.TABLE) if not row.pinned and mode != STANDBY)

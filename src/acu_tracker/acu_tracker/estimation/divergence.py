@@ -41,7 +41,18 @@ def take(s, innovation):
 
 
 @compiled
-def watch(s, without_signal):
-    """Note a filter that has diverged. without_signal: it coasts, and nothing explains why."""
-    if s.m > (LIMIT_WITHOUT_SIGNAL if without_signal else LIMIT):
-        s.diverged = 1
+def diverges(s, without_signal):
+    """Return whether the filter has diverged by now. without_signal: it coasts, and nothing explains why."""
+    return s.m > (LIMIT_WITHOUT_SIGNAL if without_signal else LIMIT)
+
+
+@compiled
+def latch(s):
+    """Hold against the filter, until `release`, that it has diverged."""
+    s.diverged = 1
+
+
+@compiled
+def release(s):
+    """Reset what was held against the filter."""
+    s.diverged = 0

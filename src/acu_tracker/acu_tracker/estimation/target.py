@@ -22,7 +22,7 @@ from acu_tracker.estimation.filters.measurement import (
 from acu_tracker.geometry import attitude, attitude_error, deck_reference, estimate_frame, lever_arm
 from acu_tracker.geometry.deck_reference import STILL, Attitude
 from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, line_of_sight
-from acu_tracker.geometry.vector import Vector, rotated, rotation
+from acu_tracker.geometry.vector import Vector, rotated
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
@@ -153,8 +153,8 @@ def on_deck(g, p, deck, t, source):
 
 @compiled
 def levelled_azimuth(g, level, source):
-    """AxisMotion of the azimuth of a Source on a deck that stands still, level (3, 3) deck -> earth."""
-    still = Attitude(rotation(level), STILL, STILL)
+    """AxisMotion of the azimuth of a Source on a deck that stands still, level: Rotation deck -> earth."""
+    still = Attitude(level, STILL, STILL)
     if source.framed:
         still = estimate_frame.of_deck(g.frame, still)
     return angles(deck_reference.on_deck(still, line_of_sight(source.motion))).azimuth

@@ -52,6 +52,18 @@ def constants(params, axes) -> np.ndarray:
 
 
 @compiled
+def stop(t):
+    """Drop the estimate."""
+    t.running = 0
+
+
+@compiled
+def recount(t):
+    """Count the accepted measurements from 0 again, so that the lock takes lock_count new ones."""
+    t.accepted_in_a_row = 0
+
+
+@compiled
 def transfer(t, p, c):
     """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one.
 

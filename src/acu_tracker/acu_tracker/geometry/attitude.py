@@ -30,6 +30,20 @@ INVALID, REPEATED, NEW = range(3)
 
 
 @compiled
+def put(s, stabilised):
+    """Put the pedestal on a ship or ashore; whether that is new."""
+    new = s.stabilised != stabilised
+    s.stabilised = stabilised
+    return new
+
+
+@compiled
+def newest(s):
+    """Return the quaternion (4,) and rates that were taken last."""
+    return s.history.sample[s.history.newest]
+
+
+@compiled
 def smoothed_acceleration(before, w, w_before, T, tau):
     """Angular acceleration [rad/s2] from two rates [rad/s] T [s] apart, low-passed with tau [s]; before: its value T
     ago."""

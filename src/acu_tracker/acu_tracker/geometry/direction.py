@@ -12,6 +12,17 @@ DIRECTION = np.dtype([('stamp', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,
 [s]; it is good for `holds` [s]."""
 
 
+def give(d, stamp, angles, rates, moves, holds=0.0):
+    """Give angles and rates (2,) at a stamp [s]; d: view of DIRECTION."""
+    d['stamp'], d['angle'], d['rate'], d['moves'], d['holds'] = stamp, angles, rates, moves, holds
+
+
+@compiled
+def put(d, angle):
+    """Put angles (2,) [rad] that do not move in the place of the ones before."""
+    d.angle[0], d.angle[1], d.moves = angle[0], angle[1], 0.0
+
+
 @compiled
 def there(d, t):
     """Whether a direction is good at t [s]."""

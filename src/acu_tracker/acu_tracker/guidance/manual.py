@@ -3,9 +3,11 @@
     r       rate of the commanded point [rad/s], ramped with the acceleration a towards the rate asked for
     A       commanded angle [rad], the integral of r
 """
+import math
+
 import numpy as np
 
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
 DEAD_MAN = 0.5
@@ -17,6 +19,22 @@ SHARE = 0.5
 MANUAL = np.dtype([('asked', 'f8', (2,)), ('until', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)),
                    ('acceleration', 'f8', (2,))], align=True)
 """asked: rates [rad/s] that hold until the stamp `until` [s]; angle, rate, acceleration of the commanded point."""
+
+
+def initialise(m):
+    """Nobody has asked; m: view of MANUAL."""
+    m['until'] = -math.inf
+
+
+def ask(m, rates, stamp):
+    """Ask for rates (2,) [rad/s] at a stamp [s]; m: view of MANUAL."""
+    m['asked'], m['until'] = rates, stamp + DEAD_MAN
+
+
+@compiled
+def heard(m, t):
+    """Return whether the rates asked for hold at t [s]."""
+    return t <= m.until
 
 
 @compiled
@@ -43,6 +61,7 @@ def step(m, i, shaper, ends, heard, dt):
 
 
 @compiled
-def motion(m, i, later):
-    """AxisMotion of the commanded point of axis i, `later` [s] after the last step."""
-    return AxisMotion(m.angle[i] + m.rate[i] * later, m.rate[i], m.acceleration[i])
+def motion(m, later):
+    """Motion of the commanded point, `later` [s] after the last step."""
+    return Motion(AxisMotion(m.angle[0] + m.rate[0] * later, m.rate[0], m.acceleration[0]),
+                  AxisMotion(m.angle[1] + m.rate[1] * later, m.rate[1], m.acceleration[1]))

@@ -17,13 +17,14 @@ def initialise(s):
 
 
 @compiled
-def take(s, stamp, q, mean_time):
-    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s].
+def take(s, stamp, q, mean_time, anew):
+    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s]. anew: it begins with this
+    one.
 
     A ship whose mean is not known yet is taken to be level.
     """
     mean = s.mean
-    if not s.latest > -math.inf:
+    if anew or not s.latest > -math.inf:
         s.since = stamp
         heading = math.hypot(q[2], q[3])
         mean[0] = mean[1] = 0.0
@@ -46,9 +47,3 @@ def take(s, stamp, q, mean_time):
         y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
         s.spread += T / (min(stamp - s.since, mean_time) + T) * (x * x + y * y - s.spread)
     s.latest = stamp
-
-
-@compiled
-def restart(s):
-    """Restart the mean with the next attitude."""
-    s.latest = -math.inf

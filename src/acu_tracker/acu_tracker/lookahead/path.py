@@ -4,8 +4,7 @@ from collections import namedtuple
 
 from acu_tracker.geometry.great_circle import turned
 from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back, rotation
-from acu_tracker.program import bridge as program_bridge
-from acu_tracker.program import program_track
+from acu_tracker.program import bridge
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
@@ -18,20 +17,17 @@ the unwrapped azimuth, the least and the largest azimuth from there to the end [
 
 
 @compiled
-def along_program(path, mat, program, bridge):
-    """Lay out the path of a ProgramTrack, rotated by its `bridge` where that is valid: how many rows it covers.
+def along_program(path, mat, way):
+    """Lay out the path of a bridge.Way: how many rows it covers.
 
     mat (3, 3): levelled deck -> earth.
     """
     level = rotation(mat)
     for i in range(len(path.rows)):
         t = path.t0 + i * path.h
-        if t > program.times[-1]:
+        if t > way.program.times[-1]:
             return i
-        u = program_track.direction(program, t)
-        if bridge.valid:
-            u = program_bridge.rotated(bridge, u)
-        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, u)
+        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, bridge.direction(way, t))
     return len(path.rows)
 
 

@@ -83,11 +83,11 @@ def due(h, t):
 
 
 @compiled
-def look_along_program(h, c, t, azimuth, program, bridge):
-    """Look for a keyhole and hidden sectors from t [s] on along the program, rotated by its bridge where that is
-    valid; azimuth: of the axis at t, on the deck [rad]."""
-    path = _begin(h, c, t)
-    count = paths.along_program(path, h.next_level, program, bridge)
+def look_along_program(h, c, t, azimuth, way):
+    """Look for a keyhole and hidden sectors from t [s] on along a bridge.Way; azimuth: of the axis at t, on the deck
+    [rad]."""
+    path, program = _begin(h, c, t), way.program
+    count = paths.along_program(path, h.next_level, way)
     travel = Travel(0.0, 0.0)
     if count >= 3 and t + count * path.h < program.times[-1]:
         travel = program_track.azimuth_travel(program, t + (count - 1) * path.h)

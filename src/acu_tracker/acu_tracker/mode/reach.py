@@ -1,12 +1,11 @@
 """What the antenna can point at: angles inside the limits and above the floor, the tables that modes follow.
 
-s, c, u: records of control_unit.STATE and CONSTANTS, of signals.INPUTS.
+c, u: records of control_unit.CONSTANTS and of signals.INPUTS.
 """
 import math
 
 from acu_tracker import modes, signals
-from acu_tracker.estimation import target
-from acu_tracker.geometry import azimuth_wrap
+from acu_tracker.geometry import attitude, azimuth_wrap
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.program import program_track, tables
 from acu_tracker.servo import floor
@@ -22,39 +21,34 @@ def outside(c, A, E):
 
 
 @compiled
-def _followed(s, c, track, t_m):
-    """(NONE or why the program cannot be followed, by its times or its place at t_m [s]; signals.PROGRAM if it is bad,
-    else 0).
+def _followed(deck, c, track, t, azimuth):
+    """(NONE or why the program cannot be followed, by its times or its place when the next command is in force;
+    signals.PROGRAM if it is bad, else 0).
     """
-    obstacle = program_track.status(track, s.stamp)
+    obstacle = program_track.status(track, t)
     if obstacle != modes.NONE:
         return obstacle, 0
-    source = target.Source(0, program_track.motion_at(track, t_m))
-    motion = target.on_deck(s.target, c.p, s.attitude, t_m, source)
+    t_m = t + c.lead
+    motion = attitude.on_deck(deck, c.p, t_m, program_track.motion_at(track, t_m))
     A, E, limits = motion.azimuth.angle, motion.elevation.angle, c.axis[0].p.limits
     if not math.isfinite(A + E):
         return modes.NO_PROGRAM, signals.PROGRAM
-    return outside(c, azimuth_wrap.nearest(A, s.azimuth, limits.low, limits.high, Travel(0.0, 0.0)), E), 0
+    return outside(c, azimuth_wrap.nearest(A, azimuth, limits.low, limits.high, Travel(0.0, 0.0)), E), 0
 
 
 @compiled
-def table(s, c, u, mode, of_all):
-    """(NONE or why the table of a mode cannot be followed, signals.PROGRAM if it is bad, else 0)."""
+def table(deck, c, u, mode, of_all, t, azimuth):
+    """(NONE or why the table of a mode cannot be followed at t [s], signals.PROGRAM if it is bad, else 0). deck:
+    ATTITUDE; azimuth: raw one of the last reference [rad]."""
     track = tables.of_mode(of_all, mode)
     if mode != modes.PROGRAM:
         unpredicted = u.unpredicted[tables.PLACE[mode]]
         if unpredicted != modes.NONE:
             return unpredicted, 0
-        if (program_track.status(track, s.stamp) == modes.NONE
-                and program_track.motion_at(track, s.stamp).elevation.angle < 0.0):
+        if (program_track.status(track, t) == modes.NONE
+                and program_track.motion_at(track, t).elevation.angle < 0.0):
             return modes.BELOW_HORIZON, 0
-    obstacle, flag = _followed(s, c, track, s.stamp + c.lead)
+    obstacle, flag = _followed(deck, c, track, t, azimuth)
     if mode == modes.PROGRAM and u.gap and obstacle == modes.BEFORE_PROGRAM:
         return modes.PROGRAM_GAP, flag
     return obstacle, flag
-
-
-@compiled
-def matters(s, mode, request, fallback, falls_back):
-    """Whether it matters if a mode's table can be followed."""
-    return request == mode or s.mode == mode or (falls_back and (s.table == mode or fallback == mode))

@@ -13,6 +13,11 @@ DRIVE_RESTART = 0.3
 """Silence [s] in which a drive may have been started again: a mode that it then ends for a while is resumed."""
 
 
+def initialise(s):
+    """Nothing was interrupted; s: view of RESUMPTION."""
+    s['until'] = -math.inf
+
+
 @compiled
 def mode_after(s, mode, last, stamp, resume_time):
     """The mode after a silence from the stamp `last` to `stamp` [s]: it goes on, or is STANDBY after resume_time."""
@@ -39,3 +44,9 @@ def pending(s, stamp, ended, locked, before):
     if not ended:
         return before
     return modes.PROGRAM if s.mode == modes.AUTOTRACK and not locked else s.mode
+
+
+@compiled
+def forget(s):
+    """Resume nothing."""
+    s.until = -math.inf

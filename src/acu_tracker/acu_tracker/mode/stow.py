@@ -76,7 +76,8 @@ def _at_rest(c, u):
 
 @compiled
 def step(s, c, u, mode):
-    """Ask of the pins what the mode needs. c, u: records of control_unit.CONSTANTS and of signals.INPUTS."""
+    """Ask of the pins what the mode needs; whether mode stow has them in. c, u: records of control_unit.CONSTANTS and
+    of signals.INPUTS."""
     t = u.stamp
     if mode == modes.UNSTOW:
         _ask(s, OUT, t)
@@ -87,6 +88,7 @@ def step(s, c, u, mode):
             _ask(s, IN, t)
     else:
         s.off = t
+    return mode == modes.STOW and u.pins == BOTH_IN
 
 
 @compiled

@@ -1,16 +1,17 @@
 """What an operator does with the alarms: acknowledge, reset, shelve, take back."""
 from acu_tracker.alarms import annunciator, machine, table
-from acu_tracker.mode import supervision
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.wire.commands import Reply
 
 
 class Desk:
-    """state: view of control_unit.STATE, which holds the alarms and the stamp. Its methods have the names of
-    verbs.ALARM_VERBS; they raise ValueError for the name of an alarm that there is not."""
+    """state: view of control_unit.STATE, which holds the alarms and the stamp; reset: control_unit's, of it.
 
-    def __init__(self, state):
-        self._state = state
+    Its methods have the names of verbs.ALARM_VERBS; they raise ValueError for the name of an alarm that there is not.
+    """
+
+    def __init__(self, state, reset):
+        self._state, self._reset = state, reset
         self.reasons = {}
 
     def prepare(self):
@@ -28,7 +29,7 @@ class Desk:
 
     def reset(self):
         """The Reply to a reset of all that is latched; refused while a cause is there."""
-        cause = supervision.reset(self._state)
+        cause = self._reset(self._state)
         if cause == annunciator.NONE:
             return Reply(True, 'cleared')
         return Reply(False, f'refused: the cause of {table.NAMES[cause]} is still there')

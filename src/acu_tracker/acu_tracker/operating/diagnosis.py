@@ -31,7 +31,7 @@ def of(unit):
         return Diagnosis(WARN, GATED[invalid], values)
     if invalid:
         return Diagnosis(ERROR, f'invalid input: {" ".join(invalid)}', values)
-    if state['overtravel']:
+    if state['guidance']['overtravel']:
         return Diagnosis(WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit', values)
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
     return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
@@ -41,7 +41,7 @@ def _values(unit, faults, invalid):
     """[(key, text)]."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
-              ('fallback', modes.FALLBACK_OF[int(state['fallback'])]), ('control', unit.authority.holder),
+              ('fallback', modes.FALLBACK_OF[int(state['mode']['fallback'])]), ('control', unit.authority.holder),
               ('faults', ', '.join(faults)), ('locked', str(int(outputs['locked']))),
               ('coasting', str(int(outputs['coasting']))), ('drive', unit.drive_told)]
     if unit.parameters.stow_pins:

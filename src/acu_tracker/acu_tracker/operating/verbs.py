@@ -4,7 +4,8 @@ import math
 import numpy as np
 
 from acu_tracker.alarms.annunciator import LONGEST_SHELVED
-from acu_tracker.guidance.manual import DEAD_MAN
+from acu_tracker.geometry import direction
+from acu_tracker.guidance import manual
 from acu_tracker.modes import FALLBACKS, MODES, TABLE
 from acu_tracker.operating.authority import ROLES
 from pedestal_common.graph.topics import AXES
@@ -22,7 +23,7 @@ _MOVING = (*_of_axes('its rate', -10.0, 10.0, 'rad/s', 0.0, '_rate'),
 ARGUMENTS = {
     'preset': (*_of_axes('deck angle; left out: as it was', -20.0, 20.0, 'rad', math.nan), *_MOVING,
                Argument('point', 'one of those that the parameter `points` names, instead of angles', default='')),
-    'rate': _of_axes(f'holds for {DEAD_MAN:g} s', -10.0, 10.0, 'rad/s', 0.0),
+    'rate': _of_axes(f'holds for {manual.DEAD_MAN:g} s', -10.0, 10.0, 'rad/s', 0.0),
     'slave': (*_of_axes('earth angle', -20.0, 20.0, 'rad'), *_MOVING,
               Argument('holds', 'for so long it is good', 0.01, 86400.0, 's', default=1.0)),
     'tle': tuple(Argument(f'line_{i}', f'line {i} of the elements, _ for blanks; left out: as they are', default='')
@@ -87,21 +88,19 @@ def _take_preset(unit, arguments):
             raise ValueError(f'point = {arguments["point"]}: must be one of {", ".join(named) or "none"}')
         angles = named[arguments['point']]
     state = unit.parts['state']
-    preset = state['preset']
-    preset['angle'] = np.where(np.isfinite(angles), angles, preset['angle'])
-    preset['stamp'], preset['moves'], preset['rate'] = state['stamp'], arguments['moves'], _rates(arguments)
+    angles = np.where(np.isfinite(angles), angles, state['preset']['angle'])
+    direction.give(state['preset'], state['stamp'], angles, _rates(arguments), arguments['moves'])
 
 
 def _take_rate(unit, arguments):
     state = unit.parts['state']
-    state['manual']['asked'] = [arguments[axis] for axis in AXES]
-    state['manual']['until'] = state['stamp'] + DEAD_MAN
+    manual.ask(state['manual'], [arguments[axis] for axis in AXES], state['stamp'])
 
 
 def _take_slave(unit, arguments):
     state = unit.parts['state']
-    state['slave'] = (state['stamp'], [arguments[axis] for axis in AXES], _rates(arguments), arguments['moves'],
-                      arguments['holds'])
+    direction.give(state['slave'], state['stamp'], [arguments[axis] for axis in AXES], _rates(arguments),
+                   arguments['moves'], arguments['holds'])
 
 
 def _take_tle(unit, arguments):

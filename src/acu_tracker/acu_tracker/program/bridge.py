@@ -4,6 +4,7 @@ It bridges an outage of the receiver with the shape of the program at the place 
 is better than the filter's own rate and acceleration.
 """
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from pedestal_common.compiled import compiled
 
 BRIDGE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], align=True)
 """axis: ENU, of the length of the rotation's sine; cos: of its angle; valid: 0 where there is none."""
+
+Way = namedtuple('Way', 'program valid axis cos')
+"""A ProgramTrack, rotated where valid; fields as of BRIDGE."""
 
 LIKE_PROGRAM = math.cos(math.radians(3.0))
 """Cosine of the largest angle between program and estimate at which the program is used."""
@@ -31,16 +35,38 @@ def begin(b, program, t, u):
 
 
 @compiled
-def rotated(b, v):
-    """An ENU Vector of the program after the rotation (Rodrigues)."""
-    axis = vector(b.axis)
-    d = cross(axis, v)
-    k = dot(axis, v) / (1.0 + b.cos)
-    return Vector(b.cos * v.x + d.x + k * axis.x, b.cos * v.y + d.y + k * axis.y, b.cos * v.z + d.z + k * axis.z)
+def forget(b):
+    """Follow the program as it is."""
+    b.valid = 0
 
 
 @compiled
-def motion_at(b, program, t):
-    """Motion in earth angles of the rotated program at t [s]."""
-    sight = line_of_sight(program_track.motion_at(program, t))
-    return earth_angles(LineOfSight(rotated(b, sight.u), rotated(b, sight.du), rotated(b, sight.ddu)))
+def way(b, program):
+    """Return the Way of the program as it is bridged now."""
+    return Way(program, b.valid, vector(b.axis), b.cos)
+
+
+@compiled
+def _rotated(w, v):
+    """An ENU Vector of the program after the rotation (Rodrigues)."""
+    axis = w.axis
+    d = cross(axis, v)
+    k = dot(axis, v) / (1.0 + w.cos)
+    return Vector(w.cos * v.x + d.x + k * axis.x, w.cos * v.y + d.y + k * axis.y, w.cos * v.z + d.z + k * axis.z)
+
+
+@compiled
+def direction(w, t):
+    """ENU unit Vector of a Way at t [s]."""
+    u = program_track.direction(w.program, t)
+    return _rotated(w, u) if w.valid else u
+
+
+@compiled
+def motion_at(w, t):
+    """Motion in earth angles of a Way at t [s]."""
+    motion = program_track.motion_at(w.program, t)
+    if not w.valid:
+        return motion
+    sight = line_of_sight(motion)
+    return earth_angles(LineOfSight(_rotated(w, sight.u), _rotated(w, sight.du), _rotated(w, sight.ddu)))

@@ -116,6 +116,19 @@ def searched(s, p, tau, beamwidth, t):
 
 
 @compiled
+def stand(s, x, e):
+    """Put the beam at an offset (x, e) [rad] from the expected place."""
+    s.centre[0], s.centre[1] = x, e
+
+
+@compiled
+def judge(s, t, fair):
+    """Keep at t [s] whether the level of autotrack is fair."""
+    if fair:
+        s.fair = t
+
+
+@compiled
 def waiting(s, p, t):
     """Whether the search at t [s] still stands on the last place."""
     return t < s.began + p.wait

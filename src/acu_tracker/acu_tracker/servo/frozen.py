@@ -18,21 +18,30 @@ LOOK = 3e-3
 
 
 @compiled
-def restart(s, t):
+def _restart(s, t):
     """Watch anew from t [s] on."""
     s.since, s.way[0], s.way[1] = t, 0.0, 0.0
 
 
 @compiled
-def watch(s, u, hold):
+def release(s, t):
+    """Reset, at t [s], that the drive was frozen."""
+    s.frozen = 0
+    _restart(s, t)
+
+
+@compiled
+def watch(s, u, hold, anew):
     """Take the numbers of a step, signals.INPUTS; whether the drive is frozen. hold [s]: how long it may take until a
-    command is seen in them."""
+    command is seen in them; anew: no command is in force from before."""
+    if anew:
+        _restart(s, u.stamp)
     same = True
     for i in range(2):
         same &= u.position[i] == s.told[i] and u.velocity[i] == s.told[2 + i] and u.torque[i] == s.told[4 + i]
         s.told[i], s.told[2 + i], s.told[4 + i] = u.position[i], u.velocity[i], u.torque[i]
     if not same:
-        restart(s, u.stamp)
+        _restart(s, u.stamp)
     elif max(abs(s.way[0]), abs(s.way[1])) <= LOOK:
         s.since = u.stamp
     elif u.stamp - s.since > hold:

@@ -73,6 +73,12 @@ def realised(command, dy):
 
 
 @compiled
+def take_back(axis, rate):
+    """Take the rate command in force for another [rad/s]: what the axis has made of it."""
+    axis.command = rate
+
+
+@compiled
 def initialise(axis, p, t_k, y, dy):
     """Targets := actual: the controller starts from the encoder's angle y [rad] and rate dy [rad/s] at t_k [s].
 

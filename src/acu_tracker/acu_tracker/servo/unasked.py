@@ -5,6 +5,8 @@
 with a = dt / tau once the time is over for which a command may stay in force, else 0. An axis may lag behind its
 commands and overshoot them, so that any rate between 0 and the envelope is expected, and part of its width beyond it.
 """
+import math
+
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -30,8 +32,13 @@ TIME = 0.014
 less."""
 
 
+def initialise(s):
+    """Nothing was watched yet; s: view of ENVELOPE."""
+    s['since'] = -math.inf
+
+
 @compiled
-def restart(s, t):
+def _restart(s, t):
     """Watch anew from t [s] on: what was commanded before is not in force any more."""
     s.since, s.beyond = t, t
     s.high[:] = 0.0
@@ -39,9 +46,17 @@ def restart(s, t):
 
 
 @compiled
-def watch(s, t, velocity, threshold):
+def release(s):
+    """Reset that the antenna has moved unasked."""
+    s.moves = 0
+
+
+@compiled
+def watch(s, t, velocity, threshold, anew):
     """Take the rates (2,) [rad/s] of a step at t [s], that obey the commands of the steps before; whether the antenna
-    moves unasked."""
+    moves unasked. anew: no command is in force from before."""
+    if anew or not math.isfinite(s.since):
+        _restart(s, t)
     outside = False
     for i in range(2):
         allowed = threshold + OVERSHOOT * (s.high[i] - s.low[i])
