@@ -112,7 +112,7 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     run = closed_loop.Loop(chosen).run()
     automatic = run['acu/mode'] == modes.AUTOTRACK
     first = np.argmax(automatic)
-    plan = run.units['acu'].parts['state']['lookahead']['slew']
+    plan = run.units['acu'].parts['state']['guidance']['lookahead']['slew']
     assert automatic[first:].all() and plan['needed'] > math.radians(100.0)
     off = np.hypot(*run.truth['error'].T)
     t = run.t

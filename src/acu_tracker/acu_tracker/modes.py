@@ -71,7 +71,7 @@ TABLE = (
          needs='slope', ends='level', follows=True, by_level=True, fallback='search', handover='autotrack'),
     Mode('steptrack', 'the highest level, found by steps to either side', 'always', 'to `search` without a signal',
          ends='level', follows=True, by_level=True, fallback='search'))
-"""Another mode is a row here, its own conditions in Conditions, and what it asks of the axes in control_unit."""
+"""Another mode is a row here; a condition of its own is one of Conditions, what it asks of the axes is in guidance."""
 
 MODES = tuple(row.name for row in TABLE)
 (STANDBY, STOP, STOW, UNSTOW, PRESET, RATE, SLAVE, PROGRAM, TLE, SUN, AUTOTRACK, SEARCH, ACQUIRE,

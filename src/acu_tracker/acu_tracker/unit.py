@@ -101,7 +101,7 @@ def law(memory, stamp, inputs, outputs):
     control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.tables)
     m.inputs.preset_valid = 0
     m.invalid |= m.outputs.invalid_input
-    encode(m.outputs, m.state.lookahead, stamp, outputs)
+    encode(m.outputs, m.state.guidance.lookahead, stamp, outputs)
 
 
 @compiled
@@ -248,7 +248,7 @@ class Acu(Unit):
 
     def encode(self, topic, code):
         """The text of a code on a text topic; the message on acu/alarms."""
-        lookahead = self.parts['state']['lookahead']
+        lookahead = self.parts['state']['guidance']['lookahead']
         if topic == KEYHOLE:
             return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
         if topic == ALARMS:
@@ -281,13 +281,14 @@ class Acu(Unit):
         if verb == 'elements':
             self.take_elements(*arguments.values())
             return Reply(True, f'elements of satellite {self.predictor.number}')
-        before, predictor = {name: state[name].copy() for name in ('preset', 'manual', 'slave')}, self.predictor
+        asked, predictor = state['guidance'], self.predictor
+        before = {name: asked[name].copy() for name in ('preset', 'manual', 'slave')}
         if verb in TAKEN:
             TAKEN[verb](self, arguments)
         reply = self.request(f'acu/{verb}')
         if not reply.granted:
             for name, value in before.items():
-                state[name] = value
+                asked[name] = value
             if self.predictor is not predictor:
                 self._predict_by(predictor)
                 self.lay_tables()

@@ -49,9 +49,9 @@ def test_through_the_keyhole(Rig, mode, with_program):
     pointing_errors(rig, 2.0)
     rig.track = rig.track if with_program else NO_TRACK
     before = pointing_errors(rig, 18.0)
-    text = announcement.keyhole(rig.state[0]['lookahead'], BEAMWIDTH)
-    numbers = dict(announcement.numbers(rig.state[0]['lookahead']))
-    plan = rig.state['lookahead']['slew'][0].copy()
+    text = announcement.keyhole(rig.state[0]['guidance']['lookahead'], BEAMWIDTH)
+    numbers = dict(announcement.numbers(rig.state[0]['guidance']['lookahead']))
+    plan = rig.state['guidance']['lookahead']['slew'][0].copy()
     assert before[:, 1].max() < 1e-3 and plan['t1'] > before[-1, 0]
     during = pointing_errors(rig, 25.0)
     assert rig.mode == mode
@@ -65,7 +65,7 @@ def test_through_the_keyhole(Rig, mode, with_program):
     np.testing.assert_allclose(rig.outputs['estimate'][0, :, 0], [A, E], atol=2e-3)
     assert f'expected loss {plan["loss"]:.1f} s' in text and 'clockwise' in text and 'rough' not in text
     assert numbers['keyhole_loss_s'] == f'{plan["loss"]:.3f}' and float(numbers['deck_motion_deg']) == 0.0
-    moving = rig.state[0]['lookahead'].copy()
+    moving = rig.state[0]['guidance']['lookahead'].copy()
     moving['deck_motion'] = 0.5 * BEAMWIDTH
     assert f'the deck moves by {math.degrees(0.5 * BEAMWIDTH):.2f} deg rms' in announcement.keyhole(moving, BEAMWIDTH)
 
@@ -96,7 +96,7 @@ def test_another_program_ends_what_was_planned_for_the_last(Rig):
     rig.target = lambda t: (A, 0.5)
     rig.program(start=-2.0, rows=90)
     rig.run(0.02)
-    assert planner.FORECASTS[rig.state['lookahead']['forecast'][0]] == 'none'
+    assert planner.FORECASTS[rig.state['guidance']['lookahead']['forecast'][0]] == 'none'
     rig.run(6.0)
     np.testing.assert_allclose(rig.angle, [A, 0.5], atol=1e-4)
 
@@ -107,9 +107,9 @@ def test_a_mast_hides_the_target(Rig):
     rig = Rig(lambda t: (0.5 + 0.03 * t, 0.5), at=(0.5, 0.5), initial_mode='autotrack', sigma=2e-5, **Rig.QUICK,
               **{'tracker.receiver.sigma_floor': 2e-5, 'blockage': f'{sector[0]} {sector[1]} 0.8'})
     pointing_errors(rig, 3.5)
-    begin, end = rig.state['lookahead']['hidden'][0]
+    begin, end = rig.state['guidance']['lookahead']['hidden'][0]
     assert (begin, end) == (pytest.approx(4.0, abs=0.2), pytest.approx(32.0 / 3.0, abs=0.2))
-    assert announcement.hidden(rig.state[0]['lookahead']).startswith('target hidden from')
+    assert announcement.hidden(rig.state[0]['guidance']['lookahead']).startswith('target hidden from')
     rig.run(0.1)
     for _ in range(2):
         errors = pointing_errors(rig, 3.4, lambda deck: not sector[0] <= deck[0] <= sector[1])
@@ -132,7 +132,7 @@ def test_every_sector_on_the_way_is_announced(Rig):
     intervals = []
     for _ in range(12):
         rig.run(1.0)
-        h = rig.state[0]['lookahead']
+        h = rig.state[0]['guidance']['lookahead']
         if h['blockages'] > len(intervals):
             intervals.append(h['hidden'].tolist())
     np.testing.assert_allclose(intervals, [[5.0, 20.0 / 3.0], [26.0 / 3.0, 35.0 / 3.0]], atol=0.07)
@@ -165,7 +165,7 @@ def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     rig.run(0.1, aligning=0)
     rig.run(0.1, aligning=1)
     assert (rig.mode, rig.reason) == ('standby', 'INS aligning')
-    np.testing.assert_allclose(rig.state['lookahead']['deck']['mean'][0], line_of_sight.ASHORE, atol=1e-9)
+    np.testing.assert_allclose(rig.state['guidance']['lookahead']['deck']['mean'][0], line_of_sight.ASHORE, atol=1e-9)
     ashore = Rig()
     ashore.program()
     ashore.step(aligning=1)
@@ -192,7 +192,7 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
         if k > 1400:
             worst = max(worst, error)
             estimate = rig.outputs['estimate'][0]
-            azimuth = rig.state[0]['target']['tracker']['filter']['axis'][0]
+            azimuth = rig.state[0]['tracking']['target']['tracker']['filter']['axis'][0]
             swing.append((*(estimate[:, 0] - direction(t)), azimuth['x'][0, 1]))
     swing = np.array(swing)
     print(f'range measured {ranged}: off {worst:.2e} rad, filtered rate {np.ptp(swing[:, 2]):.2e} rad/s')

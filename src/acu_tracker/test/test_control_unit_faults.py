@@ -48,11 +48,12 @@ def test_error_stamps_that_stand_still_go_back_or_lie_ahead(Rig):
     rig = Rig(initial_mode='autotrack', **Rig.QUICK)
     rig.run(1.0)
     for stamp in (0.99, 0.5, -3.0, 1.2):
-        before = rig.state['target']['tracker'].copy()
-        rig.step(error_stamp=stamp if stamp != 0.99 else rig.state['target']['tracker']['stamp'][0])
-        assert rig.invalid == {'error_stamp'} and rig.state['target']['tracker']['stamp'] == before['stamp']
+        tracker = rig.state['tracking']['target']['tracker']
+        before = tracker.copy()
+        rig.step(error_stamp=stamp if stamp != 0.99 else tracker['stamp'][0])
+        assert rig.invalid == {'error_stamp'} and tracker['stamp'] == before['stamp']
         for name in ('x', 'p', 'mu'):
-            after = rig.state['target']['tracker']['filter']['axis']
+            after = tracker['filter']['axis']
             assert after[name].tobytes() == before['filter']['axis'][name].tobytes()
         assert np.isnan(rig.outputs['innovation']).all()
 

@@ -43,7 +43,7 @@ class Level:
 
     @property
     def state(self):
-        return self.rig.state['acquisition'][0]
+        return self.rig.state['guidance']['acquisition'][0]
 
 
 def test_a_late_target_is_found_along_its_track_and_tracked(Rig):

@@ -43,7 +43,7 @@ def test_no_preset_beyond_the_limit_is_reached_whatever_the_controller(Rig, cont
     rig = Rig(initial_mode='preset', delay=delay, at=(0.0, 0.5), **{
         'azimuth.controller': controller, 'azimuth.limits.high': 1.0, 'azimuth.preset': 0.99, 'elevation.preset': 0.5})
     rig.run(0.2)
-    rig.state['preset']['angle'][0, 0] = 5.0
+    rig.state['guidance']['preset']['angle'][0, 0] = 5.0
     reached = []
     for _ in range(1000):
         rig.step()
@@ -94,7 +94,7 @@ def test_the_elevation_rises_over_a_hill_before_the_azimuth_goes_there(Rig, cont
 def test_a_jog_does_not_go_into_the_hill(Rig):
     rig = Rig(initial_mode='stop', at=(0.0, 0.05), floor=HILL)
     rig.run(0.1)
-    rig.state['manual']['asked'], rig.state['manual']['until'] = (1.5, -1.0), math.inf
+    rig.state['guidance']['manual']['asked'], rig.state['guidance']['manual']['until'] = (1.5, -1.0), math.inf
     assert rig.ask(RATE)
     assert heights(rig, 400).min() > -1e-3
     assert rig.angle[0] > 1.3
@@ -103,9 +103,9 @@ def test_a_jog_does_not_go_into_the_hill(Rig):
 def test_a_place_below_the_floor_is_refused(Rig):
     rig = Rig(at=(0.0, 0.5), floor=HILL)
     rig.run(0.1)
-    rig.state['preset']['angle'] = 0.9, 0.3
+    rig.state['guidance']['preset']['angle'] = 0.9, 0.3
     assert not rig.ask(PRESET) and rig.reason == 'outside limits' and 'outside limits' in REASONS
-    rig.state['preset']['angle'] = 0.9, 0.45
+    rig.state['guidance']['preset']['angle'] = 0.9, 0.45
     assert rig.ask(PRESET)
 
 

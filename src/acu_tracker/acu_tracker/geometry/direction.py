@@ -12,6 +12,11 @@ DIRECTION = np.dtype([('stamp', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,
 [s]; it is good for `holds` [s]."""
 
 
+def initialise(d, angles):
+    """Angles (2,) [rad] that nobody has given; d: view of DIRECTION."""
+    d['stamp'], d['angle'] = -math.inf, angles
+
+
 def give(d, stamp, angles, rates, moves, holds=0.0):
     """Give angles and rates (2,) at a stamp [s]; d: view of DIRECTION."""
     d['stamp'], d['angle'], d['rate'], d['moves'], d['holds'] = stamp, angles, rates, moves, holds

@@ -1,15 +1,51 @@
-"""Where the axes are sent: the azimuth wrap that fits, and how far the beam is meant to be off the target."""
+"""Where the axes are sent: the target of the mode on the deck, on the azimuth wrap that fits, or a slew ahead of it.
+
+g: record of GUIDANCE; k: of tracking.TRACKING; c: of control_unit.CONSTANTS; way: the bridge.Way of the program; gap:
+the outage.Outage.
+"""
+from collections import namedtuple
+
 import numpy as np
 
-from acu_tracker.geometry import azimuth_wrap
-from acu_tracker.geometry.motion import AxisMotion, Motion
-from acu_tracker.program import program_track
+from acu_tracker import modes, tracking
+from acu_tracker.estimation import target
+from acu_tracker.geometry import attitude, azimuth_wrap, direction
+from acu_tracker.geometry.azimuth_wrap import Travel
+from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
+from acu_tracker.geometry.vector import rotation
+from acu_tracker.guidance import manual
+from acu_tracker.lookahead import planner
+from acu_tracker.mode import by_level
+from acu_tracker.program import bridge, program_track, tables
+from acu_tracker.search import acquisition
+from acu_tracker.servo import position_loop
 from pedestal_common.compiled import compiled
 
-GUIDANCE = np.dtype([('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('pointing_offset', 'f8'),
-                     ('overtravel', 'i8')], align=True)
-"""azimuth: raw one of the last reference; target_angles: deck angles of its target; pointing_offset: intended angle
-between beam and target [rad]; overtravel: 1: no azimuth wrap held the whole program."""
+GUIDANCE = np.dtype([
+    ('preset', direction.DIRECTION), ('slave', direction.DIRECTION), ('manual', manual.MANUAL),
+    ('bridge', bridge.BRIDGE), ('acquisition', acquisition.ACQUISITION), ('lookahead', planner.PLANNER),
+    ('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('pointing_offset', 'f8'), ('overtravel', 'i8')], align=True)
+"""bridge: the program where the target was last tracked; azimuth: raw one of the last reference; target_angles: deck
+angles of its target; pointing_offset: intended angle between beam and target [rad]; overtravel: 1: no azimuth wrap
+held the whole program."""
+
+Order = namedtuple('Order', 'mode begins azimuth stamp')
+"""The mode, whether it begins, the azimuth [rad] that the axis was sent to last, the stamp of the step [s]."""
+
+
+def initialise(g, preset):
+    """No direction but the preset one (2,) [rad]; g: view of GUIDANCE."""
+    direction.initialise(g['preset'], preset)
+    direction.initialise(g['slave'], 0.0)
+    manual.initialise(g['manual'])
+    acquisition.initialise(g['acquisition'])
+    planner.initialise(g['lookahead'])
+
+
+@compiled
+def way(g, of_all, table):
+    """Return the bridge.Way of the table of a mode."""
+    return bridge.way(g.bridge, tables.of_mode(of_all, table))
 
 
 @compiled
@@ -19,38 +55,141 @@ def start_from(g, azimuth):
 
 
 @compiled
-def forget(g):
-    """Follow no target."""
-    g.overtravel, g.pointing_offset = 0, 0.0
+def move_by_hand(g, c, order, ends, actual, dt):
+    """Move the point that is commanded by hand on by dt [s]. ends: of both axes; actual: Motion of the axes, where it
+    begins."""
+    heard = order.mode == modes.RATE and manual.heard(g.manual, order.stamp)
+    for i in range(2):
+        if order.begins:
+            manual.begin(g.manual, i, actual[i])
+        if order.mode == modes.STOP or order.mode == modes.RATE:
+            manual.step(g.manual, i, c.axis[i].p.shaper, ends[i], heard, dt)
 
 
 @compiled
-def aim(g, motion):
-    """Take the Motion of the target on the deck."""
+def motion(g, k, c, order, way, gap, now):
+    """`_reference` of each axis at the instant that its controller needs; now: the Instants."""
+    t_azimuth, t_elevation = (position_loop.instant(c.axis[0].p, now.t_k, now.t_m),
+                              position_loop.instant(c.axis[1].p, now.t_k, now.t_m))
+    motion = _reference(g, k, c, order, way, gap, t_azimuth)
+    if t_elevation != t_azimuth:
+        motion = Motion(motion.azimuth, _reference(g, k, c, order, way, gap, t_elevation).elevation)
+    return motion
+
+
+@compiled
+def _reference(g, k, c, order, way, gap, t):
+    """Reference Motion on the deck at t [s] of the mode: its target, on the azimuth wrap that fits, or a slew."""
+    mode = order.mode
+    if not modes.FOLLOWS[mode]:
+        start_from(g, order.azimuth)
+    if mode == modes.STOW:
+        return Motion(AxisMotion(c.axis[0].p.stow, 0.0, 0.0), AxisMotion(c.axis[1].p.stow, 0.0, 0.0))
+    if mode == modes.PRESET:
+        return direction.motion_at(g.preset, t)
+    if mode == modes.STOP or mode == modes.RATE:
+        return manual.motion(g.manual, t - order.stamp)
+    source = _source(g, k, c, mode, way, gap, t)
+    motion = target.on_deck(k.target, c.p, k.attitude, t, source)
     g.target_angles[0], g.target_angles[1] = motion.azimuth.angle, motion.elevation.angle
     g.pointing_offset = 0.0
+    if planner.slewing(g.lookahead, t):
+        level = motion.azimuth
+        if k.attitude.stabilised:
+            level = target.levelled_azimuth(k.target, rotation(g.lookahead.level), source)
+        motion, g.pointing_offset = planner.motion_at(g.lookahead, c.lookahead, t, motion, level)
+        start_from(g, motion.azimuth.angle)
+        return motion
+    return Motion(_wrapped(g, c.axis[0].p.limits, order, way.program, t, motion.azimuth), motion.elevation)
 
 
 @compiled
-def slew(g, motion, offset):
-    """Return the Motion of a slew, which is off the target by an offset [rad]."""
-    g.azimuth, g.pointing_offset = motion.azimuth.angle, offset
-    return motion
+def _source(g, k, c, mode, way, gap, t):
+    """The target.Source of the mode at t [s]; the program bridges an outage that has a reason."""
+    if mode == modes.SLAVE:
+        return target.Source(0, direction.motion_at(g.slave, t))
+    if modes.BY_TABLE[mode]:
+        return target.Source(0, program_track.motion_at(way.program, t))
+    if modes.BY_LEVEL[mode]:
+        return by_level.source(g.acquisition, mode, c, way, t)
+    if way.valid and gap.coasting and gap.permitted and program_track.status(way.program, t) == modes.NONE:
+        return target.Source(0, bridge.motion_at(way, t))
+    return target.outlook(k.target, c.tracker, t)
 
 
 @compiled
-def follow(g, limits, motion, travel):
-    """Return the Motion with the azimuth on the wrap that fits, for a program that begins with a Travel on one that
-    holds all of it. limits: of the azimuth."""
-    A = motion.azimuth
-    g.azimuth = azimuth_wrap.nearest(A.angle, g.azimuth, limits.low, limits.high, travel)
-    return Motion(AxisMotion(g.azimuth, A.rate, A.acceleration), motion.elevation)
+def _wrapped(g, limits, order, program, t, azimuth):
+    """AxisMotion of the azimuth at t [s] on the wrap that fits; when a program begins, on one that holds all of it."""
+    travel = Travel(0.0, 0.0)
+    begins = order.begins and modes.BY_TABLE[order.mode]
+    if begins:
+        travel = program_track.azimuth_travel(program, t)
+    g.azimuth = azimuth_wrap.nearest(azimuth.angle, g.azimuth, limits.low, limits.high, travel)
+    if begins:
+        g.overtravel = g.azimuth + travel.below < limits.low or g.azimuth + travel.above > limits.high
+    return AxisMotion(g.azimuth, azimuth.rate, azimuth.acceleration)
 
 
 @compiled
-def begin_program(g, limits, motion, program, t):
-    """`follow` a program that begins at t [s], and keep whether its wrap holds all of it."""
-    travel = program_track.azimuth_travel(program, t)
-    motion = follow(g, limits, motion, travel)
-    g.overtravel = g.azimuth + travel.below < limits.low or g.azimuth + travel.above > limits.high
-    return motion
+def bridge_to(g, k, c, program, t):
+    """Put the program where the target is tracked at t [s]."""
+    bridge.begin(g.bridge, program, t, tracking.sight(k, c, t).u)
+
+
+@compiled
+def begin_by_level(g, k, c, before, mode, t):
+    """Enter a mode that goes by the level at t [s] from the one before. Its target is where the estimate says that
+    autotrack followed, or else where the antenna points."""
+    tracked = before == modes.AUTOTRACK
+    if tracked:
+        sight = tracking.sight(k, c, t)
+        by_level.remember(g.acquisition, t, sight.u, sight.du)
+    elif not modes.BY_LEVEL[before]:
+        u, du = tracking.beam(k, c, t)
+        by_level.remember(g.acquisition, t, u, du)
+    by_level.begin(g.acquisition, mode, c, t, tracking.spread(k, c, t) if tracked and mode == modes.SEARCH else np.nan)
+
+
+@compiled
+def check_slope(g, k, c, u, at, way):
+    """Judge an error of signals.INPUTS by the place where the target is expected; at: Pointing of the beam."""
+    t = u.error_stamp - c.p.tracker.receiver.age
+    motion = attitude.on_deck(k.attitude, c.p, t, by_level.expected(g.acquisition, way, t))
+    by_level.check_slope(g.acquisition, at, motion, (u.cross_elevation, u.elevation))
+
+
+@compiled
+def look_ahead(g, k, c, mode, program, gap, t):
+    """Plan ahead once in planner.INTERVAL: keyholes and hidden sectors on the path of the target; whether the mode
+    begins anew, as there is another program."""
+    h = g.lookahead
+    if not modes.FOLLOWS[mode] or mode == modes.SLAVE:
+        planner.forget(h)
+        g.overtravel, g.pointing_offset = 0, 0.0
+        return False
+    another = planner.another_program(h, program)
+    if another:
+        # The plan was for the previous program.
+        planner.forget(h)
+        bridge.forget(g.bridge)
+    if planner.due(h, t):
+        _look(g, k, c, mode, program, gap, t)
+    return another
+
+
+@compiled
+def _look(g, k, c, mode, program, gap, t):
+    """Look ahead from t [s] on along the program, or along the great circle of the target."""
+    if modes.BY_TABLE[mode]:
+        bridge.forget(g.bridge)
+        planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, bridge.way(g.bridge, program))
+        return
+    if mode == modes.AUTOTRACK and not gap.coasting:
+        bridge_to(g, k, c, program, t)
+    way = bridge.way(g.bridge, program)
+    if way.valid and program_track.status(program, t) == modes.NONE:
+        planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, way)
+        return
+    sight = (line_of_sight(by_level.expected(g.acquisition, way, t)) if modes.BY_LEVEL[mode] else
+             tracking.sight(k, c, t))
+    planner.look_along_great_circle(g.lookahead, c.lookahead, t, g.azimuth, sight.u, sight.du)

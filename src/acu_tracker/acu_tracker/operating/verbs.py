@@ -88,19 +88,20 @@ def _take_preset(unit, arguments):
             raise ValueError(f'point = {arguments["point"]}: must be one of {", ".join(named) or "none"}')
         angles = named[arguments['point']]
     state = unit.parts['state']
-    angles = np.where(np.isfinite(angles), angles, state['preset']['angle'])
-    direction.give(state['preset'], state['stamp'], angles, _rates(arguments), arguments['moves'])
+    preset = state['guidance']['preset']
+    angles = np.where(np.isfinite(angles), angles, preset['angle'])
+    direction.give(preset, state['stamp'], angles, _rates(arguments), arguments['moves'])
 
 
 def _take_rate(unit, arguments):
     state = unit.parts['state']
-    manual.ask(state['manual'], [arguments[axis] for axis in AXES], state['stamp'])
+    manual.ask(state['guidance']['manual'], [arguments[axis] for axis in AXES], state['stamp'])
 
 
 def _take_slave(unit, arguments):
     state = unit.parts['state']
-    direction.give(state['slave'], state['stamp'], [arguments[axis] for axis in AXES], _rates(arguments),
-                   arguments['moves'], arguments['holds'])
+    direction.give(state['guidance']['slave'], state['stamp'], [arguments[axis] for axis in AXES],
+                   _rates(arguments), arguments['moves'], arguments['holds'])
 
 
 def _take_tle(unit, arguments):

@@ -158,7 +158,7 @@ class Loop:
         """Before step `first`: add to forecasts where a second begins, obey what the units' schedules say."""
         stamp = first * self.period_ns
         if stamp // SECOND > (stamp - self.period_ns) // SECOND:
-            forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['lookahead'])))
+            forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))
         for unit in self.units.values():
             unit.obey_due(stamp)
 

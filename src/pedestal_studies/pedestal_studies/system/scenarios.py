@@ -67,7 +67,7 @@ MORE_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 'autotra
 def more_results(values, run):
     """{name: value} of what no recording is asked for: of a slew through a keyhole, of the time after alignment."""
     more = {}
-    slew = run.units['acu'].parts['state']['lookahead']['slew']
+    slew = run.units['acu'].parts['state']['guidance']['lookahead']['slew']
     if slew['loss'] > 0.0:
         more = {'keyhole_loss_predicted_s': float(slew['loss']),
                 'loss_to_predicted': values['loss_s'] / float(slew['loss'])}

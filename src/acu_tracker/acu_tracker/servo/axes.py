@@ -1,0 +1,55 @@
+"""Both axes of the antenna: where they start from, and their commands. axis: records (2,) of position_loop.AXIS.
+
+c, u, o: records of control_unit.CONSTANTS, of signals.INPUTS and OUTPUTS.
+"""
+from acu_tracker.geometry.motion import Motion
+from acu_tracker.servo import floor, position_loop, reference
+from acu_tracker.servo.position_loop import Feedback
+from pedestal_common.compiled import compiled
+
+
+@compiled
+def now(axis):
+    """Return the Motion of the references."""
+    return Motion(reference.now(axis[0].reference), reference.now(axis[1].reference))
+
+
+@compiled
+def start_from_actual(axis, c, u, immobile, begins, silence):
+    """Targets := actual, of both axes where they begin anew; of one that does not obey in every step until it does, or
+    it would wind up behind its commands and make good for them at once when it hears them again. immobile: whether it
+    does not, of each; silence: whether no command was heard for long."""
+    for i in range(2):
+        rate, disobeys = u.velocity[i], immobile[i] and not begins
+        if disobeys:
+            rate = position_loop.realised(axis[i].command, rate)
+        if silence or disobeys:
+            position_loop.take_back(axis[i], rate)
+        if begins or disobeys:
+            position_loop.initialise(axis[i], c.axis[i].p, u.stamp, u.position[i], rate)
+
+
+@compiled
+def follow(axis, c, u, o, motion, now, beam):
+    """Run the position loops of both axes towards a Motion; now: the Instants; beam: of each axis the error [rad] and
+    the rate of the deck [rad/s], and whether its own loop is closed."""
+    (error, V, closed), now_ends = beam, floor.ends(c, u, motion.azimuth.angle)
+    for i in range(2):
+        feedback = Feedback(u.position[i], u.velocity[i], error[i], V[i], closed, now_ends[i])
+        _write(o, i, position_loop.follow(axis[i], c.axis[i], motion[i], feedback, now))
+
+
+@compiled
+def rest(axis, c, o, dt):
+    """Bring both axes to rest; dt [s]: since the last command."""
+    for i in range(2):
+        _write(o, i, position_loop.stop(axis[i], c.axis[i].p, dt))
+
+
+@compiled
+def _write(o, i, command):
+    """The Command of axis i into the outputs."""
+    o.rate[i], o.torque[i] = command.rate, command.torque
+    o.reference[i, 0], o.reference[i, 1], o.reference[i, 2] = command.reference
+    o.angle_limited[i], o.rate_limited[i] = command.angle_limited, command.rate_limited
+    o.acceleration_limited[i] = command.acceleration_limited

@@ -1,0 +1,153 @@
+"""What is known of the target by the receiver: beam and deck in the last steps, the filter, what watches over it.
+
+k: record of TRACKING; c, u, o: of control_unit.CONSTANTS, of signals.INPUTS and OUTPUTS; gap: the outage.Outage.
+"""
+import math
+
+import numpy as np
+
+from acu_tracker import intake, modes
+from acu_tracker.estimation import divergence, repetition, slope_sign, target, tracker
+from acu_tracker.estimation.filters import measurement, target_filter
+from acu_tracker.geometry import attitude, deck_reference, encoders
+from acu_tracker.geometry.vector import Vector, rotated
+from acu_tracker.search import coast, place
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight as pointing
+
+TRACKING = np.dtype([
+    ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('target', target.TARGET), ('error', 'f8', (2,)),
+    ('repetition', repetition.REPETITION), ('divergence', divergence.DIVERGENCE),
+    ('slope_sign', slope_sign.SLOPE_SIGN)], align=True)
+"""error: of this step, in deck angles [rad], NaN: none came."""
+
+
+def initialise(k):
+    """No estimate; k: view of TRACKING."""
+    target.initialise(k['target'])
+
+
+@compiled
+def take_place(k, u):
+    """Take whether the pedestal stands on a ship; another place ends the estimate. Whether it is another."""
+    another = attitude.put(k.attitude, u.stabilised)
+    if another:
+        tracker.stop(k.target.tracker)
+    return another
+
+
+@compiled
+def used(k, c, u, by_level, offset):
+    """(flags of what the receiver says, whether its error is used, the Pointing of the beam that it belongs to);
+    by_level, offset: as of intake.error_at."""
+    k.error[0] = k.error[1] = math.nan
+    flags, believed, at = intake.error_at(k.encoders, c.p.tracker.receiver, u, by_level, offset)
+    return flags, believed and not repetition.take(k.repetition, u, at), at
+
+
+@compiled
+def take_error(k, c, u, o, at, restart_gap, closed, obeys):
+    """Filter y = encoder at the instant of the error, displaced by the error, and watch over it; a flag where it is
+    not accepted, else 0.
+
+    at: Pointing of the beam; restart_gap: as in tracker.observe; closed: whether the loop is, on the errors; obeys:
+    whether the axes do.
+    """
+    receiver = c.p.tracker.receiver
+    measured = pointing.displaced(at.A, at.E, u.cross_elevation, u.elevation)
+    k.error[0], k.error[1] = measured[0] - at.A, measured[1] - at.E
+    outcome, innovation = target.take(k.target, c.p, c.tracker, k.attitude, u, at, measured, restart_gap)
+    if outcome != target.NOISY and obeys:
+        divergence.take(k.divergence, innovation)
+    if closed and outcome != target.NO_ATTITUDE and slope_sign.near(u, receiver.beamwidth):
+        _watch_slope(k, c, u, at)
+    return intake.tell_error(o, outcome, innovation)
+
+
+@compiled
+def _watch_slope(k, c, u, at):
+    """Note an error that shows that the slope of autotrack is reversed; at: Pointing of the beam it belongs to."""
+    p = c.p.tracker
+    t = u.error_stamp - p.receiver.age
+    _, deck = attitude.at(k.attitude, c.p, t)
+    error, beam = (u.cross_elevation, u.elevation), slope_sign.beam(deck.mat, at.A, at.E)
+    variance = measurement.error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, p.receiver)
+    if slope_sign.take(k.slope_sign, t, beam, error, variance, p.coast_after):
+        divergence.latch(k.divergence)
+
+
+@compiled
+def unstable(k, c, u, t):
+    """NONE, or why the attitude is not known when the command of t [s] is in force."""
+    if not k.attitude.stabilised:
+        return modes.NONE
+    # Before the first attitude the state of the INS may not have arrived yet.
+    if u.aligning and k.attitude.history.count > 0:
+        return modes.INS_ALIGNING
+    return modes.NONE if attitude.at(k.attitude, c.p, t + c.lead)[0] else modes.ATTITUDE_INVALID
+
+
+@compiled
+def conditions(k, c, t, gap, closed):
+    """Conditions lock, slope and track of the modes at t [s]; closed: whether the loop is, on axes that obey."""
+    p, silent, running = c.p.tracker, not gap.permitted, k.target.tracker.running
+    spread_now = spread(k, c, t) if running and silent and gap.coasting else 0.0
+    lost = not running or (silent and coast.over(gap.since, p.coast_time, spread_now, p.receiver.beamwidth))
+    if k.divergence.diverged or (closed and divergence.diverges(k.divergence, gap.coasting and silent)):
+        return modes.DIVERGED, modes.DIVERGED, modes.DIVERGED
+    lock = modes.NONE if tracker.locked(k.target.tracker, p, gap.since) else modes.NOT_LOCKED
+    return lock, modes.NONE, modes.SIGNAL_LOST if lost else modes.NONE
+
+
+@compiled
+def restart(k):
+    """A mode begins: nothing is held against filter and slope."""
+    divergence.restart(k.divergence)
+    slope_sign.restart(k.slope_sign)
+
+
+@compiled
+def spread(k, c, t):
+    """Standard deviation of the estimate across the line of sight at t [s], in rad."""
+    estimate = target.read(k.target, c.p, c.tracker, k.attitude, t)
+    azimuth, elevation = estimate.variances
+    return coast.sigma(azimuth.p11, elevation.p11, estimate.motion.elevation.angle)
+
+
+@compiled
+def sight(k, c, t):
+    """LineOfSight in ENU of the estimate at t [s]."""
+    return target.earth_outlook(k.target, c.tracker, t)
+
+
+@compiled
+def beam(k, c, t):
+    """(ENU unit vector along the beam at t [s], no rate)."""
+    _, at = encoders.at(k.encoders, t)
+    _, deck = attitude.at(k.attitude, c.p, t)
+    return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.STILL
+
+
+@compiled
+def deck_rates(k, c, t, A, E):
+    """(azimuth, elevation) rate [rad/s] at which the deck's motion moves an earth-fixed direction at deck angles A, E
+    [rad] at t [s]; 0 where no axis compensates for it."""
+    wanted = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
+    if wanted and k.attitude.stabilised:
+        known, deck = attitude.at(k.attitude, c.p, t)
+        if known:
+            return deck_reference.fixed_rates(deck.w, A, E)
+    return 0.0, 0.0
+
+
+@compiled
+def tell(k, c, t, o):
+    """Put counts, and the estimate of the target at t [s] in earth angles of the antenna, into the outputs."""
+    filtered = k.target.tracker
+    o.gated, o.rates_gated, o.ranges_gated = filtered.gated, filtered.rates_gated, filtered.ranges_gated
+    if filtered.running:
+        estimate = target.read(k.target, c.p, c.tracker, k.attitude, t)
+        for i in range(2):
+            o.estimate[i, 0], o.estimate[i, 1], o.estimate[i, 2] = estimate.motion[i]
+            o.covariance[i, 0], o.covariance[i, 1], o.covariance[i, 2] = estimate.variances[i]
+        target_filter.probabilities(filtered.filter, c.tracker.filter, o.probability)
