@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode
 from pedestal_analysis.trials.cases import Case
 from pedestal_studies.system import acquisition as study
 
@@ -18,7 +18,7 @@ def went_through(run):
 def assert_on_target(run, seconds=2.0):
     """Locked, in autotrack, within a tenth of a beamwidth for the last seconds."""
     last = run.t > run.t[-1] - seconds
-    assert np.all(run['acu/mode'][last] == modes.AUTOTRACK)
+    assert np.all(run['acu/mode'][last] == Mode.AUTOTRACK)
     assert study.off_axis(run)[last].max() < 0.1
 
 
@@ -33,7 +33,7 @@ def test_a_side_lobe_is_left_for_the_main_lobe():
     one = run('sidelobe', 12)
     assert went_through(one) == ['program', 'autotrack', 'acquire', 'autotrack']
     off = study.off_axis(one)
-    begun = one.t[np.flatnonzero(one['acu/mode'] == modes.ACQUIRE)[0]]
+    begun = one.t[np.flatnonzero(one['acu/mode'] == Mode.ACQUIRE)[0]]
     assert off[np.searchsorted(one.t, begun) - 1] == pytest.approx(1.68, abs=0.05)
     assert_on_target(one, 10.0)
 

@@ -3,8 +3,8 @@ alarm and those of other faults are told, acknowledged and shelved by commands."
 import numpy as np
 import pytest
 
-from acu_tracker import modes
 from acu_tracker.alarms import report, table
+from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag as bags
@@ -88,7 +88,7 @@ def raised(acu):
 def test_with_one_motor_of_a_pair_it_tracks_on_and_says_so(axis, motor):
     run, acu = under_way(f'adu.inject=6 motor_loss axis={axis} motor={motor}', duration=20.0)
     assert list(run.table('adu/state')['data']) == ['enabled', f'enabled: {axis} motor lost']
-    assert run['acu/mode'][-1] == modes.AUTOTRACK
+    assert run['acu/mode'][-1] == Mode.AUTOTRACK
     assert np.hypot(*run.truth['error'][run.t > 7.0].T).max() < 0.25 * 0.0175           # a quarter of the beamwidth
     assert annunciated(acu) == {f'{axis} motor lost'}
 

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from acu_tracker import modes
+from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import topics
@@ -111,12 +112,12 @@ class Operated(RuleBasedStateMachine):
     def standby(self):
         assert self.ask('acu', 'standby').granted
         self.go(0.05)
-        assert (self.history['acu/mode'][-1:] == modes.STANDBY).all()
+        assert (self.history['acu/mode'][-1:] == Mode.STANDBY).all()
 
     @invariant()
     def standby_commands_no_motion(self):
         modes_of_late = self.history['acu/mode']
-        if len(modes_of_late) and (modes_of_late == modes.STANDBY).all() and len(modes_of_late) * 5e-3 >= RAMP:
+        if len(modes_of_late) and (modes_of_late == Mode.STANDBY).all() and len(modes_of_late) * 5e-3 >= RAMP:
             assert np.abs(self.history['acu/rate_command']['velocity'][-1]).max() < 1e-9
 
     @invariant()

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.node.unit import ERROR
@@ -29,10 +29,10 @@ def test_errors_that_lead_away_are_recognised_and_left(name, wrong):
     somebody resets the fault."""
     done = run(f'tracking_receiver.antenna.{wrong}', name=name)
     mode, t = done['acu/mode'], done.t
-    automatic = np.flatnonzero(mode == modes.AUTOTRACK)
+    automatic = np.flatnonzero(mode == Mode.AUTOTRACK)
     assert automatic.size and t[automatic[-1]] - t[automatic[0]] < 1.0
     assert off(done)[automatic].max() < 10.0
-    assert (mode[automatic[-1] + 1:] == modes.PROGRAM).all() and off(done)[-1] < 0.25
+    assert (mode[automatic[-1] + 1:] == Mode.PROGRAM).all() and off(done)[-1] < 0.25
     acu = done.units['acu']
     diagnosis = acu.diagnose()
     assert diagnosis.level == ERROR and diagnosis.message.startswith('autotrack diverged')
@@ -50,8 +50,8 @@ def test_a_slope_that_turns_over_in_autotrack_is_seen_before_the_target_leaves_t
     for seed in range(1, 4):
         done = run(f'tracking_receiver.inject=4 {fault}', name=name, seed=seed)
         mode, t = done['acu/mode'], done.t
-        automatic = np.flatnonzero(mode == modes.AUTOTRACK)
-        assert 4.0 < t[automatic[-1]] < SECONDS - 0.5 and (mode[automatic[-1] + 1:] == modes.PROGRAM).all()
+        automatic = np.flatnonzero(mode == Mode.AUTOTRACK)
+        assert 4.0 < t[automatic[-1]] < SECONDS - 0.5 and (mode[automatic[-1] + 1:] == Mode.PROGRAM).all()
         assert off(done)[t > 4.0].max() < 0.5
         assert done.units['acu'].faults == ('diverged',)
 
@@ -65,8 +65,8 @@ def test_a_reset_while_the_slope_is_still_wrong_is_followed_by_the_same_verdict(
             loop.units['acu'].request('acu/reset_faults')
         return 1000
     done = loop.run(watch=reset)
-    ends = np.flatnonzero(np.diff((done['acu/mode'] == modes.AUTOTRACK).astype(int)) < 0)
-    assert len(ends) == 3 and done['acu/mode'][-1] == modes.PROGRAM
+    ends = np.flatnonzero(np.diff((done['acu/mode'] == Mode.AUTOTRACK).astype(int)) < 0)
+    assert len(ends) == 3 and done['acu/mode'][-1] == Mode.PROGRAM
     assert off(done)[-1] < 0.25 and done.units['acu'].faults == ('diverged',)
 
 
@@ -76,20 +76,20 @@ def test_a_target_that_reverses_is_no_reversed_slope(name):
     for seed in (1, 2):
         done = imm_feedforward.DRIVE_CASES[name].with_seed(seed).run()
         state = done.units['acu'].parts['state']
-        assert done['acu/mode'][-1] == modes.AUTOTRACK and not state['divergence']['diverged']
+        assert done['acu/mode'][-1] == Mode.AUTOTRACK and not state['divergence']['diverged']
 
 
 @pytest.mark.parametrize('wrong', ['slope_factor=2', 'cross_coupling=0.6', 'slope_factor=0.5', 'phase_error=0.8'])
 def test_errors_that_are_merely_wrong_are_tracked(wrong):
     done = run(f'tracking_receiver.antenna.{wrong}')
-    assert done['acu/mode'][-1] == modes.AUTOTRACK and off(done)[-200:].max() < 0.2
+    assert done['acu/mode'][-1] == Mode.AUTOTRACK and off(done)[-200:].max() < 0.2
 
 
 @pytest.mark.parametrize('name', ['leo_pass', 'uav_flyby', 'ship_pass_ss6'])
 def test_a_filter_that_knows_its_errors_never_counts_as_diverged(name):
     for seed in range(1, 6):
         done = run(name=name, seed=seed)
-        assert done['acu/mode'][-1] == modes.AUTOTRACK
+        assert done['acu/mode'][-1] == Mode.AUTOTRACK
         assert done.units['acu'].parts['state']['divergence']['m'] < 1.5
 
 
@@ -97,10 +97,10 @@ def test_a_gust_of_4000_nm_on_both_axes_is_no_end_of_autotrack():
     done = run('adu.wind.gust.kind=step', 'adu.wind.gust.azimuth=4000', 'adu.wind.gust.elevation=4000',
                'adu.wind.gust.start=4')
     assert off(done)[round(4.0 / 0.005):].max() > 0.05
-    assert done['acu/mode'][-1] == modes.AUTOTRACK and off(done)[-200:].max() < 0.02
+    assert done['acu/mode'][-1] == Mode.AUTOTRACK and off(done)[-200:].max() < 0.02
 
 
 @pytest.mark.parametrize('delay', [0.07, 0.1])
 def test_the_loop_is_slowed_with_a_command_that_comes_late(delay):
     done = run(f'adu.transport_delay={delay}')
-    assert done['acu/mode'][-1] == modes.AUTOTRACK and off(done)[-200:].max() < 0.05
+    assert done['acu/mode'][-1] == Mode.AUTOTRACK and off(done)[-200:].max() < 0.05

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
@@ -34,7 +34,7 @@ def test_two_options_are_enough(adsb):
     chosen = scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH])
     assert chosen.header.duration == SECONDS - 1.1
     run = closed_loop.Loop(chosen).run()
-    assert run['acu/mode'][-1] == modes.AUTOTRACK
+    assert run['acu/mode'][-1] == Mode.AUTOTRACK
     error = run.truth['error'][run.t > 5.0]
     half_beam = 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
     assert np.isfinite(error).all() and np.abs(error).max() < 0.5 * half_beam
@@ -103,7 +103,7 @@ def test_an_orbit_from_a_file_is_tracked(oem):
     begin = 'tracking_receiver.target.track_file.start=200'
     chosen = scenario.load('track_file', [f'{PATH}={oem}', begin], duration=20.0)
     run = closed_loop.Loop(chosen).run()
-    assert run['acu/mode'][-1] == modes.AUTOTRACK
+    assert run['acu/mode'][-1] == Mode.AUTOTRACK
     error = run.truth['error'][run.t > 10.0]
     half_beam = 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
     assert np.isfinite(error).all() and np.abs(error).max() < 0.5 * half_beam

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import yaml
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode
 from pedestal import cli, satellite
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
@@ -48,5 +48,5 @@ def test_a_pass_is_tracked_until_it_sets():
     east, north, up = run['target/truth']['position'].T
     elevation = np.degrees(np.arctan2(up, np.hypot(east, north)))
     assert abs(elevation[0]) < 0.1 and -0.1 < elevation[-1] < 0.05 and elevation.max() > 30.0
-    tracked = run['acu/mode'] == modes.AUTOTRACK
+    tracked = run['acu/mode'] == Mode.AUTOTRACK
     assert tracked[elevation > 20.0].mean() > 0.99 and tracked.mean() > 0.4

@@ -3,7 +3,7 @@ autotrack; the servo scenarios are in test_servo_graph.py."""
 import numpy as np
 import pytest
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 
@@ -29,7 +29,7 @@ def test_a_scenario_tracks(name, tmp_path):
     chosen = scenario.load(name, overrides, duration=DURATION)
     run = closed_loop.Loop(chosen).run()
     assert len(run.steps) == round(DURATION / chosen.node_parameters('adu').period) + 1
-    assert run['acu/mode'][-1] == modes.AUTOTRACK
+    assert run['acu/mode'][-1] == Mode.AUTOTRACK
     error = run.truth['error'][run.t > DURATION - 0.5]
     assert np.isfinite(error).all()
     half_beam = 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth

@@ -11,7 +11,7 @@ import numpy as np
 import pynmea2
 import pytest
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode
 from pedestal_analysis.reprocess import difference, recompute
 from pedestal_analysis.results import isolation, known_attitude, results, tracking
 from pedestal_bringup.loop import closed_loop
@@ -27,7 +27,7 @@ def track(name, *overrides):
     """(scenario, Run of its closed loop, bool: evaluated): the lockstep run to the last bit (test_lockstep)."""
     chosen = scenario.load(name, overrides)
     run = closed_loop.Loop(chosen).run()
-    automatic = run['acu/mode'] == modes.AUTOTRACK
+    automatic = run['acu/mode'] == Mode.AUTOTRACK
     return chosen, run, automatic & (run.t >= run.t[automatic][0] + tracking.SETTLING)
 
 
@@ -110,7 +110,7 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     """Following would take over 100 deg/s where the azimuth has 12; autotrack is kept all the same."""
     chosen = scenario.load('ship_overhead', seed=seed)
     run = closed_loop.Loop(chosen).run()
-    automatic = run['acu/mode'] == modes.AUTOTRACK
+    automatic = run['acu/mode'] == Mode.AUTOTRACK
     first = np.argmax(automatic)
     plan = run.units['acu'].parts['state']['guidance']['lookahead']['slew']
     assert automatic[first:].all() and plan['needed'] > math.radians(100.0)

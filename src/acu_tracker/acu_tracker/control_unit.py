@@ -16,6 +16,7 @@ from acu_tracker.geometry import attitude, direction, encoders
 from acu_tracker.guidance import guidance
 from acu_tracker.lookahead import levelled_deck, planner
 from acu_tracker.mode import by_level, mode_change, outage, reach, resumption, stow, supervision
+from acu_tracker.modes import Mode, Reason
 from acu_tracker.params import AxisParameters, SharedParameters
 from acu_tracker.program import bridge, tables
 from acu_tracker.servo import axes, ends, floor, frozen, notch, position_loop, unasked
@@ -126,12 +127,12 @@ def step(s, c, u, o, of_all):
     """
     dt = u.stamp - s.stamp
     if not (dt > 0.0 and math.isfinite(u.stamp)):
-        o.invalid_input = signals.STAMP
-        o.reason = modes.BAD_STAMP
+        o.invalid_input = signals.Flag.STAMP
+        o.reason = Reason.BAD_STAMP
         return
     signals.clear(o)
     silence = c.p.step_gap < dt < math.inf
-    if silence and s.mode.now != modes.STANDBY:
+    if silence and s.mode.now != Mode.STANDBY:
         # The axes stand. The mode goes on, from where they are, if the silence was short enough.
         mode_change.go_on(s.mode, resumption.mode_after(s.resumption, s.mode.now, s.stamp, u.stamp, c.p.resume_time))
     s.stamp = u.stamp
@@ -153,7 +154,7 @@ def _observe(s, c, u, o, of_all, silence):
     bits of signals.INVALID_INPUTS. silence: whether the step before is long ago."""
     g, k, mode, way = s.guidance, s.tracking, s.mode.now, guidance.way(s.guidance, of_all, s.mode.table)
     tracker.transfer(k.target.tracker, c.p.tracker, c.tracker)
-    flags = signals.STEP_GAP if silence else 0
+    flags = signals.Flag.STEP_GAP if silence else 0
     flags |= intake.take_encoders(k.encoders, u) | _hear_attitude(s, c, u) | _hear_receiver(s, c, u, o, way)
     flags |= intake.take_preset(g.preset, u)
     unasked.watch(s.unasked, s.stamp, u.velocity, c.p.unasked_rate, silence or not u.drive_ready)
@@ -185,10 +186,10 @@ def _hear_receiver(s, c, u, o, way):
     flags, used, at = tracking.used(k, c, u, modes.BY_LEVEL[mode], g.pointing_offset)
     if not used:
         return flags
-    if mode == modes.ACQUIRE:
+    if mode == Mode.ACQUIRE:
         guidance.check_slope(g, k, c, u, at, way)
     restart_gap = math.inf if _outage(s, c).permitted else c.p.tracker.restart_gap
-    return tracking.take_error(k, c, u, o, at, restart_gap, mode == modes.AUTOTRACK, supervision.obeys(s.supervision))
+    return tracking.take_error(k, c, u, o, at, restart_gap, mode == Mode.AUTOTRACK, supervision.obeys(s.supervision))
 
 
 @compiled
@@ -207,12 +208,12 @@ def _rests(s, c, u):
 def _decide(s, c, u, o, of_all, gap):
     """Decide on the mode, and on what waits to be one; flags of the tables."""
     m = s.mode
-    waiting = m.pending if m.now == modes.STANDBY else modes.NO_REQUEST
+    waiting = m.pending if m.now == Mode.STANDBY else modes.NO_REQUEST
     _, flags = _change(s, c, u, o, of_all, waiting, gap)
     if c.p.stow_pins and stow.step(s.stow, c, u, m.now):
         mode_change.stowed(m)
     if resumption.waits(s.resumption):
-        ended = m.now == modes.STANDBY and m.reason == modes.DRIVE_NOT_READY
+        ended = m.now == Mode.STANDBY and m.reason == Reason.DRIVE_NOT_READY
         mode_change.wait_for(m, resumption.pending(s.resumption, s.stamp, ended, o.locked, m.pending))
     return flags
 
@@ -223,9 +224,9 @@ def _change(s, c, u, o, of_all, request, gap):
     tables)."""
     g, k, before, table = s.guidance, s.tracking, s.mode.now, s.mode.table
     now, flags = _situation(s, c, u, of_all, request, gap)
-    if now.conditions.slope != modes.NONE:
+    if now.conditions.slope != Reason.NONE:
         divergence.latch(k.divergence)
-    o.locked = now.conditions.lock == modes.NONE
+    o.locked = now.conditions.lock == Reason.NONE
     result = mode_change.change(s.mode, now, request)
     mode = s.mode.now
     if result == modes.ACCEPTED and modes.BY_TABLE[mode]:
@@ -234,10 +235,10 @@ def _change(s, c, u, o, of_all, request, gap):
         bridge.forget(g.bridge)
     if mode != before:
         if modes.BY_LEVEL[mode]:
-            if before == modes.AUTOTRACK and not gap.coasting:
+            if before == Mode.AUTOTRACK and not gap.coasting:
                 guidance.bridge_to(g, k, c, tables.of_mode(of_all, s.mode.table), s.stamp)
             guidance.begin_by_level(g, k, c, before, mode, s.stamp)
-        if before == modes.AUTOTRACK and now.conditions.track != modes.NONE:
+        if before == Mode.AUTOTRACK and now.conditions.track != Reason.NONE:
             tracker.stop(k.target.tracker)
         tracking.restart(k)
     return result, flags
@@ -249,29 +250,29 @@ def _situation(s, c, u, of_all, request, gap):
     m, g, k, t = s.mode, s.guidance, s.tracking, s.stamp
     unstable, pins = tracking.unstable(k, c, u, t), stow.obstacle(s.stow, c.p.stow_pins, u.pins)
     lock, slope, track = tracking.conditions(k, c, t, gap,
-                                             m.now == modes.AUTOTRACK and supervision.obeys(s.supervision))
-    if track == modes.NONE and by_level.in_side_lobe(g.acquisition, c, t):
-        track = modes.SIDE_LOBE
+                                             m.now == Mode.AUTOTRACK and supervision.obeys(s.supervision))
+    if track == Reason.NONE and by_level.in_side_lobe(g.acquisition, c, t):
+        track = Reason.SIDE_LOBE
     # There is no coasting on a filter that has begun anew.
-    chosen = m.fallback if m.fallback != modes.AUTOTRACK or k.target.tracker.running else modes.PROGRAM
-    falls_back = m.now == modes.SEARCH or (m.now == modes.AUTOTRACK and track != modes.NONE)
+    chosen = m.fallback if m.fallback != Mode.AUTOTRACK or k.target.tracker.running else Mode.PROGRAM
+    falls_back = m.now == Mode.SEARCH or (m.now == Mode.AUTOTRACK and track != Reason.NONE)
     wanted = (request, m.now, m.table if falls_back else m.now, chosen if falls_back else m.now)
-    program = tle = sun = modes.NONE
+    program = tle = sun = Reason.NONE
     flags = flag = 0
-    if unstable == modes.NONE:
-        if modes.PROGRAM in wanted:
-            program, flags = reach.table(k.attitude, c, u, modes.PROGRAM, of_all, t, g.azimuth)
-        if modes.TLE in wanted:
-            tle, flag = reach.table(k.attitude, c, u, modes.TLE, of_all, t, g.azimuth)
+    if unstable == Reason.NONE:
+        if Mode.PROGRAM in wanted:
+            program, flags = reach.table(k.attitude, c, u, Mode.PROGRAM, of_all, t, g.azimuth)
+        if Mode.TLE in wanted:
+            tle, flag = reach.table(k.attitude, c, u, Mode.TLE, of_all, t, g.azimuth)
             flags |= flag
-        if modes.SUN in wanted:
-            sun, flag = reach.table(k.attitude, c, u, modes.SUN, of_all, t, g.azimuth)
+        if Mode.SUN in wanted:
+            sun, flag = reach.table(k.attitude, c, u, Mode.SUN, of_all, t, g.azimuth)
             flags |= flag
     why = modes.Conditions(
-        nothing=modes.NONE, stow=reach.outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
-        pin=modes.PINS_OUT if pins == modes.NONE else modes.NONE,
+        nothing=Reason.NONE, stow=reach.outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
+        pin=Reason.PINS_OUT if pins == Reason.NONE else Reason.NONE,
         preset=reach.outside(c, g.preset.angle[0], g.preset.angle[1]),
-        direction=modes.NONE if direction.there(g.slave, t) else modes.NO_DIRECTION,
+        direction=Reason.NONE if direction.there(g.slave, t) else Reason.NO_DIRECTION,
         program=program, tle=tle, sun=sun, lock=lock, slope=slope, track=track,
         level=by_level.end(g.acquisition, m.now, c, t))
     return modes.Situation(
@@ -303,10 +304,10 @@ def _move(s, c, u, o, of_all, gap, begins, dt):
         now, order = Instants(t, t + c.lead, dt), guidance.Order(m.now, m.begins, actual.azimuth.angle, t)
         motion = guidance.motion(g, k, c, order, guidance.way(g, of_all, m.table), gap, now)
         V = tracking.deck_rates(k, c, t, actual.azimuth.angle, actual.elevation.angle)
-        axes.follow(s.axis, c, u, o, motion, now, (k.error, V, m.now == modes.AUTOTRACK))
+        axes.follow(s.axis, c, u, o, motion, now, (k.error, V, m.now == Mode.AUTOTRACK))
         mode_change.begun(m)
         _explain_outage(s, c, of_all, gap)
-        o.blocked, o.coasting = s.outage.blocked, m.now == modes.AUTOTRACK and gap.coasting
+        o.blocked, o.coasting = s.outage.blocked, m.now == Mode.AUTOTRACK and gap.coasting
     for i in range(2):
         unasked.command(s.unasked, i, o.rate[i], t, min(dt, c.p.period), c.p.step_gap + c.p.command_delay)
         frozen.command(s.frozen, i, o.rate[i], c.p.period)
@@ -319,7 +320,7 @@ def _explain_outage(s, c, of_all, gap):
     hidden = follows and blockage.blocked(c.lookahead.sectors, g.target_angles[0], g.target_angles[1])
     reason = outage.watch(s.outage, hidden, follows and planner.slewing(g.lookahead, s.stamp), s.stamp)
     mode_change.explain(s.mode, reason)
-    if reason != modes.NONE and s.mode.now == modes.AUTOTRACK and not gap.coasting:
+    if reason != Reason.NONE and s.mode.now == Mode.AUTOTRACK and not gap.coasting:
         guidance.bridge_to(g, s.tracking, c, tables.of_mode(of_all, s.mode.table), s.stamp)
 
 
@@ -340,11 +341,11 @@ def _supervise(s, c, u, o, dt):
     jumped, deck = dt > c.p.step_gap, s.tracking.attitude
     ship = deck.stabilised and deck.history.count > 0
     # Autotrack is without signal, and nothing explains it.
-    signal_lost = s.mode.reason == modes.SIGNAL_LOST or (o.coasting and not _outage(s, c).permitted)
+    signal_lost = s.mode.reason == Reason.SIGNAL_LOST or (o.coasting and not _outage(s, c).permitted)
     facts = conditions.Facts(
         0.0 if jumped else dt, dt if jumped else 0.0, dt > 1.5 * c.p.period, latched(s),
         ship and not attitude.at(deck, c.p, s.stamp + c.lead)[0], ship and deck.jump.apart, signal_lost,
         c.p.unasked_rate, c.p.tracker.receiver.beamwidth)
-    mode = modes.STANDBY if _rests(s, c, u) else s.mode.now
+    mode = Mode.STANDBY if _rests(s, c, u) else s.mode.now
     conditions.take(s.supervision, mode, u, o, c.axis, s.unasked, facts)
     o.alarms = s.supervision.alarms.revision

@@ -18,23 +18,23 @@ NOWHERE = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
 
 @compiled
 def take_encoders(s, u):
-    """Take the encoders of this step into ENCODERS; signals.ENCODER where they are not valid, else 0."""
-    return 0 if u.encoder_valid and encoders.take(s, u.stamp, u.position, u.velocity) else signals.ENCODER
+    """Take the encoders of this step into ENCODERS; signals.Flag.ENCODER where they are not valid, else 0."""
+    return 0 if u.encoder_valid and encoders.take(s, u.stamp, u.position, u.velocity) else signals.Flag.ENCODER
 
 
 @compiled
 def take_attitude(s, p, u):
-    """Take the attitude of this step into ATTITUDE, and what its INS says of its error: (flags signals.ATTITUDE,
+    """Take the attitude of this step into ATTITUDE, and what its INS says of its error: (flags signals.Flag.ATTITUDE,
     ATTITUDE_ERROR of what is not valid; whether it is a new one). p: record of SharedParameters."""
     if not u.stabilised:
         return 0, False
     flags = 0
     if u.attitude_error_came and not attitude_error.take(s.error, u.attitude_noise, u.attitude_walk):
-        flags = signals.ATTITUDE_ERROR
+        flags = signals.Flag.ATTITUDE_ERROR
     if not u.attitude_valid:
-        return flags | signals.ATTITUDE, False
+        return flags | signals.Flag.ATTITUDE, False
     outcome = attitude.take(s, p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate, u.aligning)
-    return flags | (signals.ATTITUDE if outcome == attitude.INVALID else 0), outcome == attitude.NEW
+    return flags | (signals.Flag.ATTITUDE if outcome == attitude.INVALID else 0), outcome == attitude.NEW
 
 
 @compiled
@@ -44,9 +44,9 @@ def _wrong_level(s, u):
     if not u.error_came:
         return 0
     if not math.isfinite(u.cn0_dbhz):
-        return signals.ERROR
+        return signals.Flag.ERROR
     known, _ = encoders.at(s, u.error_stamp)
-    return 0 if known else signals.ERROR_STAMP
+    return 0 if known else signals.Flag.ERROR_STAMP
 
 
 @compiled
@@ -62,11 +62,11 @@ def error_at(s, receiver, u, by_level, offset):
     if wrong or not u.error_valid:
         return wrong, False, NOWHERE
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
-        return signals.ERROR, False, NOWHERE
+        return signals.Flag.ERROR, False, NOWHERE
     if offset > ON_TARGET * receiver.beamwidth:
         return 0, False, NOWHERE
     known, at = encoders.at(s, u.error_stamp - receiver.beam_age)
-    return 0 if known else signals.ERROR_STAMP, known, at
+    return 0 if known else signals.Flag.ERROR_STAMP, known, at
 
 
 @compiled
@@ -77,20 +77,20 @@ def tell_error(o, outcome, innovation):
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
         o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(one.S)
     if outcome == target.NO_ATTITUDE:
-        return signals.ATTITUDE
+        return signals.Flag.ATTITUDE
     if outcome == target.STALE:
-        return signals.ERROR_STAMP
+        return signals.Flag.ERROR_STAMP
     if outcome == target.NOISY:
-        return signals.ERROR_NOISY
-    return signals.ERROR_GATED if outcome == target.GATED else 0
+        return signals.Flag.ERROR_NOISY
+    return signals.Flag.ERROR_GATED if outcome == target.GATED else 0
 
 
 @compiled
 def take_preset(s, u):
-    """Take a new preset into a DIRECTION; signals.PRESET where it is not finite, else 0."""
+    """Take a new preset into a DIRECTION; signals.Flag.PRESET where it is not finite, else 0."""
     if not u.preset_valid:
         return 0
     if not math.isfinite(u.preset[0] + u.preset[1]):
-        return signals.PRESET
+        return signals.Flag.PRESET
     direction.put(s, u.preset)
     return 0

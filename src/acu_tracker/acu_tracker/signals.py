@@ -5,6 +5,7 @@ import numpy as np
 
 from acu_tracker.estimation.filters.motion_models import MODELS
 from acu_tracker.modes import TABLE
+from pedestal_common.codes import bits
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.wire import inputs
@@ -12,8 +13,7 @@ from pedestal_common.wire import inputs
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
                   'step_gap', 'error_noisy', 'attitude_error')
 """Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
-(STAMP, ENCODER, ERROR, ERROR_STAMP, ERROR_GATED, ATTITUDE, PROGRAM, PRESET,
- STEP_GAP, ERROR_NOISY, ATTITUDE_ERROR) = (1 << i for i in range(len(INVALID_INPUTS)))
+Flag = bits(INVALID_INPUTS)
 
 DRIVE_STATES = topics.BY_NAME['adu/state'].texts
 READY = len(topics.ENABLED) - 1

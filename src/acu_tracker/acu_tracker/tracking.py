@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
-from acu_tracker import intake, modes
+from acu_tracker import intake
 from acu_tracker.estimation import divergence, repetition, slope_sign, target, tracker
 from acu_tracker.estimation.filters import measurement, target_filter
 from acu_tracker.geometry import attitude, deck_reference, encoders
 from acu_tracker.geometry.vector import Vector, rotated
+from acu_tracker.modes import Reason
 from acu_tracker.search import coast, place
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
@@ -80,11 +81,11 @@ def _watch_slope(k, c, u, at):
 def unstable(k, c, u, t):
     """NONE, or why the attitude is not known when the command of t [s] is in force."""
     if not k.attitude.stabilised:
-        return modes.NONE
+        return Reason.NONE
     # Before the first attitude the state of the INS may not have arrived yet.
     if u.aligning and k.attitude.history.count > 0:
-        return modes.INS_ALIGNING
-    return modes.NONE if attitude.at(k.attitude, c.p, t + c.lead)[0] else modes.ATTITUDE_INVALID
+        return Reason.INS_ALIGNING
+    return Reason.NONE if attitude.at(k.attitude, c.p, t + c.lead)[0] else Reason.ATTITUDE_INVALID
 
 
 @compiled
@@ -94,9 +95,9 @@ def conditions(k, c, t, gap, closed):
     spread_now = spread(k, c, t) if running and silent and gap.coasting else 0.0
     lost = not running or (silent and coast.over(gap.since, p.coast_time, spread_now, p.receiver.beamwidth))
     if k.divergence.diverged or (closed and divergence.diverges(k.divergence, gap.coasting and silent)):
-        return modes.DIVERGED, modes.DIVERGED, modes.DIVERGED
-    lock = modes.NONE if tracker.locked(k.target.tracker, p, gap.since) else modes.NOT_LOCKED
-    return lock, modes.NONE, modes.SIGNAL_LOST if lost else modes.NONE
+        return Reason.DIVERGED, Reason.DIVERGED, Reason.DIVERGED
+    lock = Reason.NONE if tracker.locked(k.target.tracker, p, gap.since) else Reason.NOT_LOCKED
+    return lock, Reason.NONE, Reason.SIGNAL_LOST if lost else Reason.NONE
 
 
 @compiled

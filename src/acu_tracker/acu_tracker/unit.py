@@ -8,6 +8,7 @@ import numpy as np
 from acu_tracker import control_unit, modes, signals
 from acu_tracker.alarms import annunciator, report, table
 from acu_tracker.mode import mode_change
+from acu_tracker.modes import Mode, Reason
 from acu_tracker.operating import announcement, diagnosis
 from acu_tracker.operating.authority import Authority
 from acu_tracker.operating.desk import Desk
@@ -131,7 +132,7 @@ class Acu(Unit):
         super().__init__(parameters, reads)
         self.memory = Memory(_initial(parameters).copy(), tables.NO_TABLES)
         self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE in self.reads, 1
-        self.parts['outputs']['mode'], self.parts['outputs']['pins'] = modes.STANDBY, topics.SILENT
+        self.parts['outputs']['mode'], self.parts['outputs']['pins'] = Mode.STANDBY, topics.SILENT
         signals.clear(self.parts['outputs'])
         self.drive_state = 'unknown'
         self.authority = Authority()
@@ -190,7 +191,7 @@ class Acu(Unit):
     def _append(self, times, angles):
         """Append a segment to the program track. Raises ValueError."""
         state, inputs = self.parts['state'], self.parts['inputs']
-        followed = state['mode']['now'] == modes.PROGRAM
+        followed = state['mode']['now'] == Mode.PROGRAM
         try:
             self.segments.append(times, angles, float(state['stamp']) - self.offset[0], followed)
         except segments.TurnaroundError:
@@ -232,7 +233,7 @@ class Acu(Unit):
             known = self.predicted.get(row.name)
             if row.predicted and (known is None or not known.since <= t < known.until):
                 known = self.predicted[row.name] = getattr(self.predictor, row.predicted)(t)
-            inputs['unpredicted'][place] = known.reason if known else modes.NONE
+            inputs['unpredicted'][place] = known.reason if known else Reason.NONE
         piece, inputs['gap'], ends = self.segments.at(t - self.offset[0])
         until = min(ends + self.offset[0], *(known.until for known in self.predicted.values()))
         self._laid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE
@@ -321,7 +322,7 @@ class Acu(Unit):
 
     def _refusal(self, mode, reason):
         """Why a mode is refused, in words."""
-        more = self.predictor.explained(mode, reason, self.now * 1e-9) if mode in (modes.TLE, modes.SUN) else ''
+        more = self.predictor.explained(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
         return modes.REASONS[reason] + (f', {more}' if more else '')
 
     @property
@@ -333,9 +334,9 @@ class Acu(Unit):
         """{mode: why it would be refused now} of the modes that would be."""
         m, why = self.parts, np.zeros(len(modes.MODES), int)
         control_unit.refusals(m['state'], m['constants'], m['inputs'], self.memory.tables, why)
-        words = {code: modes.REASONS[code] for code in set(why) - {modes.NONE}}
-        if modes.DRIVE_NOT_READY in words:
-            words[modes.DRIVE_NOT_READY] += f': {self.drive_told}'
+        words = {code: modes.REASONS[code] for code in set(why) - {Reason.NONE}}
+        if Reason.DRIVE_NOT_READY in words:
+            words[Reason.DRIVE_NOT_READY] += f': {self.drive_told}'
         return {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
 
     def requests_for(self, topic, text):
@@ -368,7 +369,7 @@ class Acu(Unit):
     def urgent(self):
         """What is told at once when it changes: faults, the mode, silence, the lock, the drive, pins, alignment."""
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
-        return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == modes.SILENCE,
+        return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == Reason.SILENCE,
                 outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])
 
     @staticmethod

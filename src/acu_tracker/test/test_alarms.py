@@ -6,7 +6,7 @@ import pytest
 
 from acu_tracker import control_unit, signals
 from acu_tracker.alarms import annunciator, conditions, detectors, machine, report, table
-from acu_tracker.modes import MODES, PRESET, STANDBY
+from acu_tracker.modes import MODES, Mode
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import ALARMS, DRIVE, JOINTS, Acu
 from pedestal_common.parameters import build
@@ -164,9 +164,9 @@ def test_a_jump_of_the_encoder_is_latched_and_its_error_stands_under_it(moving):
     assert annunciated(moving) == ['azimuth encoder jump'] and 'azimuth encoder disagreement' in told(moving)
     moving.run(20.0)
     i = table.INDEX['azimuth encoder jump']
-    assert alarms(moving)['alarm'][i]['state'] == machine.LATCHED_UNACKNOWLEDGED
+    assert alarms(moving)['alarm'][i]['state'] == machine.State.LATCHED_UNACKNOWLEDGED
     assert control_unit.reset(moving.state[0]) == annunciator.NONE
-    assert alarms(moving)['alarm'][i]['state'] == machine.RETURNED and moving.mode == 'preset'
+    assert alarms(moving)['alarm'][i]['state'] == machine.State.RETURNED_UNACKNOWLEDGED and moving.mode == 'preset'
 
 
 def test_an_axis_that_does_not_move_and_one_that_pushes(moving):
@@ -215,7 +215,7 @@ def test_a_runaway_is_the_first_and_what_it_leads_to_stands_under_it(moving):
     assert control_unit.reset(moving.state[0]) == annunciator.NONE and not moving.state['unasked']['moves']
     moving.run(1.0)
     assert moving.mode == 'standby' and np.abs(moving.velocity).max() == 0.0
-    assert moving.ask(PRESET)
+    assert moving.ask(Mode.PRESET)
 
 
 def test_reset_forgets_a_mode_that_waited(Rig):
@@ -224,7 +224,7 @@ def test_reset_forgets_a_mode_that_waited(Rig):
     rig.run(1.0)
     rig.angle = rig.angle + (0.05, 0.0)
     rig.run(8.0)
-    rig.ask(STANDBY)
+    rig.ask(Mode.STANDBY)
     assert control_unit.reset(rig.state[0]) == annunciator.NONE
     rig.receiver_on = True
     rows = rig.run(3.0)
@@ -348,5 +348,5 @@ def test_an_array_has_no_motors(Rig):
     rig.run(2.0)
     assert not told(rig)
     state = alarms(rig)['alarm'][table.INDEX['azimuth encoder jump']]['state']
-    assert state == machine.SUPPRESSED
+    assert state == machine.State.SUPPRESSED_BY_DESIGN
     assert conditions.OFF_TIME > 0.0

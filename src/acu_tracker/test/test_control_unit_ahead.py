@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acu_tracker.lookahead import levelled_deck, planner
-from acu_tracker.modes import AUTOTRACK, MODES, PRESET, PROGRAM, STANDBY, STOW
+from acu_tracker.modes import MODES, Mode
 from acu_tracker.operating import announcement
 from acu_tracker.program.program_track import NO_TRACK
 from pedestal_common.geometry import line_of_sight
@@ -84,7 +84,7 @@ def slewing(Rig, **parameters):
 def test_a_slew_that_is_ended_leaves_no_error_unbelieved(Rig):
     rig = slewing(Rig)
     assert rig.mode == 'program' and np.isnan(rig.step()['innovation']).all()
-    rig.ask(STANDBY)
+    rig.ask(Mode.STANDBY)
     rig.step()
     rig.angle = rig.deck(rig.k * rig.T)
     assert rig.mode == 'standby' and np.isfinite(rig.step()['innovation']).all()
@@ -154,14 +154,14 @@ def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     rig.program()
     rig.run(0.4, aligning=1, quaternion=wrong)
     rig.run(0.1, aligning=1)
-    for mode in (PROGRAM, AUTOTRACK):
+    for mode in (Mode.PROGRAM, Mode.AUTOTRACK):
         assert not rig.ask(mode) and (rig.mode, rig.reason) == ('standby', 'INS aligning')
-    for mode in (STOW, PRESET):
+    for mode in (Mode.STOW, Mode.PRESET):
         assert rig.ask(mode)
         rig.run(0.1, aligning=1)
         assert rig.mode == MODES[mode]
     rig.run(0.1, aligning=0)
-    assert rig.ask(PROGRAM)
+    assert rig.ask(Mode.PROGRAM)
     rig.run(0.1, aligning=0)
     rig.run(0.1, aligning=1)
     assert (rig.mode, rig.reason) == ('standby', 'INS aligning')
@@ -169,7 +169,7 @@ def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     ashore = Rig()
     ashore.program()
     ashore.step(aligning=1)
-    assert ashore.ask(PROGRAM)
+    assert ashore.ask(Mode.PROGRAM)
 
 
 @pytest.mark.parametrize('ranged', [True, False])

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.modes import AUTOTRACK, STEPTRACK
+from acu_tracker.modes import Mode
 
 NAN_FIELDS = [
     ('position', (math.nan, 0.5), 'encoder'), ('velocity', (0.0, math.inf), 'encoder'),
@@ -27,7 +27,7 @@ def test_nan_is_flagged_and_never_spreads(Rig, field, value, flag, first):
     if flag == 'encoder' and not first:
         assert (rig.mode, rig.reason) == ('standby', 'encoder invalid')
         rig.step()
-        assert rig.ask(AUTOTRACK)
+        assert rig.ask(Mode.AUTOTRACK)
     rows = rig.run(2.0)
     assert np.isfinite(rows).all() and not rig.invalid and rig.mode == 'autotrack'
     assert np.abs(rows[-1, 2:]).max() < 1e-4
@@ -68,7 +68,7 @@ def test_a_message_that_a_mode_goes_by_the_level_of_is_judged_locked_or_not(Rig,
     said = {'error_came': 1, 'error_valid': locked}
     rig.step(**said, **{field: value})
     assert rig.invalid == ({flag} if locked else set())
-    assert rig.ask(STEPTRACK)
+    assert rig.ask(Mode.STEPTRACK)
     rig.step(**said)
     assert not rig.invalid and rig.mode == 'steptrack'
     rig.step(**said, **{field: value})

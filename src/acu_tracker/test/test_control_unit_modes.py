@@ -4,24 +4,23 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker import modes
-from acu_tracker.modes import AUTOTRACK, MODES, PRESET, PROGRAM, REASONS, STANDBY, STOW
+from acu_tracker.modes import MODES, REASONS, Mode, Reason
 
 
 def test_request_between_two_steps(Rig):
     rig = Rig(Rig.moving)
-    assert not rig.ask(STOW)
+    assert not rig.ask(Mode.STOW)
     assert (rig.mode, rig.reason) == ('standby', 'encoder invalid')
     rig.run(0.5)
-    assert not rig.ask(PROGRAM)
+    assert not rig.ask(Mode.PROGRAM)
     assert (rig.mode, rig.reason) == ('standby', 'no program track')
     rig.program()
-    assert rig.ask(PROGRAM)
+    assert rig.ask(Mode.PROGRAM)
     assert rig.mode == 'program'
     rates = rig.run(2.0)[:, :2]
     assert rig.mode == 'autotrack'
     assert np.abs(np.diff(rates, axis=0, prepend=0.0)).max() <= rig.params.azimuth.limits.acceleration * Rig.T
-    assert rig.ask(STANDBY)
+    assert rig.ask(Mode.STANDBY)
     rig.run(0.1)
     assert rig.mode == 'standby' and not np.any(rig.outputs['rate'])
 
@@ -33,8 +32,9 @@ def test_every_mode_moves_without_a_bump(Rig):
     largest = np.array([rig.params.azimuth.limits.acceleration, rig.params.elevation.limits.acceleration]) * Rig.T
     rig.step()
     commands = [np.zeros(2)]
-    for request, seconds, mode in ((STOW, 2.0, 'stow'), (PRESET, 2.0, 'preset'), (PROGRAM, 0.05, 'program'),
-                                   (None, 3.0, 'autotrack'), (STANDBY, 1.0, 'standby')):
+    for request, seconds, mode in ((Mode.STOW, 2.0, 'stow'), (Mode.PRESET, 2.0, 'preset'),
+                                   (Mode.PROGRAM, 0.05, 'program'), (None, 3.0, 'autotrack'),
+                                   (Mode.STANDBY, 1.0, 'standby')):
         reference = rig.angle.copy()
         assert request is None or rig.ask(request)
         o = rig.step()
@@ -117,26 +117,26 @@ def test_requests_are_refused_with_the_reason(Rig):
         assert not rig.ask(request) and rig.mode == 'standby'
         return rig.reason
 
-    assert refused(PROGRAM) == 'no program track'
+    assert refused(Mode.PROGRAM) == 'no program track'
     rig.program(start=10.0)
-    assert refused(PROGRAM) == 'before program track'
+    assert refused(Mode.PROGRAM) == 'before program track'
     rig.program(start=-200.0)
-    assert refused(PROGRAM) == 'after program track'
+    assert refused(Mode.PROGRAM) == 'after program track'
     rig.program(target=lambda t: (0.0, -0.3))
-    assert refused(PROGRAM) == 'outside limits'
+    assert refused(Mode.PROGRAM) == 'outside limits'
     rig.program()
     rig.track.angles[1, 0] = math.nan
-    assert refused(PROGRAM) == 'no program track'
-    assert refused(AUTOTRACK) == 'receiver not locked'
-    assert refused(PRESET, preset=(0.0, 3.0), preset_valid=1) == 'outside limits'
+    assert refused(Mode.PROGRAM) == 'no program track'
+    assert refused(Mode.AUTOTRACK) == 'receiver not locked'
+    assert refused(Mode.PRESET, preset=(0.0, 3.0), preset_valid=1) == 'outside limits'
     assert refused(17) == 'unknown mode'
-    assert refused(STOW, position=(math.nan, 0.0)) == 'encoder invalid'
+    assert refused(Mode.STOW, position=(math.nan, 0.0)) == 'encoder invalid'
     fresh = Rig(stabilised=True)
     fresh.program()
     fresh.step(attitude_valid=0)
-    assert not fresh.ask(PROGRAM) and fresh.reason == 'attitude invalid' and 'attitude' in fresh.invalid
+    assert not fresh.ask(Mode.PROGRAM) and fresh.reason == 'attitude invalid' and 'attitude' in fresh.invalid
     fresh.step()
-    assert fresh.ask(PROGRAM)
+    assert fresh.ask(Mode.PROGRAM)
 
 
 def test_initial_mode_waits_until_it_can_be(Rig):
@@ -150,7 +150,7 @@ def test_initial_mode_waits_until_it_can_be(Rig):
     rig.program()
     rig.run(0.1)
     assert rig.mode == 'program'
-    assert rig.ask(STANDBY)
+    assert rig.ask(Mode.STANDBY)
     rig.run(0.1)
     assert rig.mode == 'standby'
 
@@ -160,7 +160,7 @@ def test_initial_mode_waits_for_the_drive(Rig):
     rig = Rig(initial_mode='preset')
     rig.run(0.1, drive_ready=0)
     assert (rig.mode, rig.reason) == ('standby', 'drive not ready')
-    assert not rig.ask(STOW) and (rig.mode, rig.reason) == ('standby', 'drive not ready')
+    assert not rig.ask(Mode.STOW) and (rig.mode, rig.reason) == ('standby', 'drive not ready')
     rig.run(0.2, drive_ready=1)
     assert (rig.mode, rig.reason) == ('preset', 'requested') and np.any(rig.outputs['rate'])
     rig.run(0.1, drive_ready=0)
@@ -169,7 +169,7 @@ def test_initial_mode_waits_for_the_drive(Rig):
     rates = rig.run(0.5, drive_ready=1)[:, :2]
     assert rig.mode == 'standby' and not np.any(rates)
     before = rig.angle.copy()
-    assert rig.ask(PRESET)
+    assert rig.ask(Mode.PRESET)
     o = rig.step()
     assert rig.mode == 'preset'
     np.testing.assert_allclose(o['reference'][:, 0], before, atol=1e-3)
@@ -210,5 +210,5 @@ def test_preset_from_the_topic(Rig):
 
 
 def test_reasons_and_modes_have_names():
-    assert MODES[AUTOTRACK] == 'autotrack' and REASONS[modes.BAD_STAMP] == 'stamp does not advance'
+    assert MODES[Mode.AUTOTRACK] == 'autotrack' and REASONS[Reason.BAD_STAMP] == 'stamp does not advance'
     assert len(set(REASONS)) == len(REASONS)

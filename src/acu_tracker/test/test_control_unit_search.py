@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.modes import ACQUIRE, AUTOTRACK, PROGRAM, SEARCH, STANDBY, STEPTRACK
+from acu_tracker.modes import Mode
 
 B, FLOOR, PEAK, LOCK = 0.0175, 14.0, 50.0, 40.0
 
@@ -50,10 +50,10 @@ def test_a_late_target_is_found_along_its_track_and_tracked(Rig):
     level = Level(Rig, shift=(2.6, 0.3), **{'search.pattern': 'raster', 'search.wait': 0.5})
     level.run(2.5)
     assert level.state['level']['learnt'] >= 2.0
-    assert level.rig.ask(PROGRAM)
+    assert level.rig.ask(Mode.PROGRAM)
     level.run(3.0)
     assert level.rig.mode == 'program'
-    assert level.rig.ask(SEARCH)
+    assert level.rig.ask(Mode.SEARCH)
     assert level.run(60.0, 'autotrack')
     assert level.modes() == ['standby', 'program', 'search', 'acquire', 'autotrack']
     level.run(3.0)
@@ -64,21 +64,21 @@ def test_a_late_target_is_found_along_its_track_and_tracked(Rig):
 def test_a_wrong_slope_is_seen_before_the_loop_is_closed(Rig, slope):
     level = Level(Rig, shift=(0.1, 0.1), slope=slope)
     level.run(2.5)
-    assert level.rig.ask(ACQUIRE)
+    assert level.rig.ask(Mode.ACQUIRE)
     level.run(0.3)
-    assert level.rig.ask(PROGRAM) and level.rig.ask(ACQUIRE)
+    assert level.rig.ask(Mode.PROGRAM) and level.rig.ask(Mode.ACQUIRE)
     assert level.run(10.0, 'standby')
     assert level.rig.reason == 'wrong slope'
     assert 'autotrack' not in level.modes()
-    assert not level.rig.ask(AUTOTRACK) and level.rig.reason == 'diverged'
+    assert not level.rig.ask(Mode.AUTOTRACK) and level.rig.reason == 'diverged'
 
 
 def test_nothing_to_be_found_ends_in_the_program(Rig):
     level = Level(Rig, shift=(30.0, 0.0), **{'search.rounds': 1, 'search.full': 2.0})
     level.run(2.5)
-    assert level.rig.ask(PROGRAM)
+    assert level.rig.ask(Mode.PROGRAM)
     level.run(1.0)
-    assert level.rig.ask(SEARCH)
+    assert level.rig.ask(Mode.SEARCH)
     assert level.run(60.0, 'program')
     assert level.rig.reason == 'not found'
     assert level.modes() == ['standby', 'program', 'search', 'program']
@@ -88,9 +88,9 @@ def test_step_track_finds_the_peak_by_the_level_alone(Rig):
     level = Level(Rig, shift=(0.3, -0.2), **{'steptrack.cycle': 8.0, 'steptrack.dwell': 0.5,
                                                  'tracker.handover': False})
     level.run(2.5)
-    assert level.rig.ask(PROGRAM)
+    assert level.rig.ask(Mode.PROGRAM)
     level.run(1.0)
-    assert level.rig.ask(STEPTRACK)
+    assert level.rig.ask(Mode.STEPTRACK)
     level.run(60.0)
     assert level.rig.mode == 'steptrack'
     assert level.state['step_track']['place'] / B == pytest.approx([0.3, -0.2], abs=0.05)
@@ -99,7 +99,7 @@ def test_step_track_finds_the_peak_by_the_level_alone(Rig):
 def test_a_lost_signal_sends_step_track_to_search(Rig):
     level = Level(Rig, shift=(30.0, 0.0))
     level.run(2.5)
-    assert level.rig.ask(PROGRAM) and level.rig.ask(STEPTRACK)
+    assert level.rig.ask(Mode.PROGRAM) and level.rig.ask(Mode.STEPTRACK)
     assert level.run(2.0, 'search')
     assert level.rig.reason == 'signal lost'
 
@@ -109,10 +109,10 @@ def test_hand_overs_are_smooth(Rig):
     level = Level(Rig, shift=(2.0, 1.0), **{'search.wait': 0.5})
     rates = []
     level.run(2.5)
-    level.rig.ask(PROGRAM)
+    level.rig.ask(Mode.PROGRAM)
     for _ in range(12000):
         if level.rig.k == 800:
-            assert level.rig.ask(SEARCH)
+            assert level.rig.ask(Mode.SEARCH)
         level.step()
         rates.append(level.rig.outputs['rate'][0].copy())
         if level.rig.mode == 'autotrack' and len(rates) % 400 == 0:
@@ -124,12 +124,12 @@ def test_hand_overs_are_smooth(Rig):
 
 
 def test_standby_can_always_be_had(Rig):
-    for mode in (SEARCH, ACQUIRE, STEPTRACK):
+    for mode in (Mode.SEARCH, Mode.ACQUIRE, Mode.STEPTRACK):
         level = Level(Rig, shift=(2.0, 0.0))
         level.run(0.1)
         assert level.rig.ask(mode)
         level.run(0.2)
-        assert level.rig.ask(STANDBY)
+        assert level.rig.ask(Mode.STANDBY)
         level.run(0.1)
         assert level.rig.mode == 'standby'
 

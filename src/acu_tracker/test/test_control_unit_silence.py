@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from acu_tracker.modes import AUTOTRACK, PROGRAM
+from acu_tracker.modes import Mode
 
 MODES = ('preset', 'program')
 
@@ -101,7 +101,7 @@ def test_motion_in_standby_is_told_within_20_ms_and_stays_so(Rig, axis, rate):
         rig.step(velocity=velocity)
     assert rig.state['unasked']['moves'][0]
     rig.run(0.1)
-    assert not rig.ask(PROGRAM) and rig.reason == 'moves unasked'
+    assert not rig.ask(Mode.PROGRAM) and rig.reason == 'moves unasked'
 
 
 def test_motion_against_the_commands_ends_the_mode(Rig):
@@ -142,7 +142,7 @@ def test_slow_drift_and_what_stands_is_no_alarm(Rig):
 def test_normal_work_is_no_alarm(Rig):
     rig = Rig(Rig.moving, initial_mode='autotrack', **Rig.QUICK)
     rig.run(3.0)
-    assert rig.ask(AUTOTRACK)
+    assert rig.ask(Mode.AUTOTRACK)
     for mode in (2, 1, 2, 0, 1):
         rig.ask(mode)
         rig.run(0.7)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from skyfield.api import EarthSatellite, load, wgs84
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import prediction, program_track, sun
 from acu_tracker.program.prediction import PredictionParameters, Predictor
 from pedestal_common.geometry import orbit
@@ -71,7 +71,7 @@ def test_the_table_interpolates_what_sgp4_says_between_its_rows():
 def test_a_table_is_made_anew_while_the_satellite_is_down():
     ours = predictor()
     made = ours.satellite(0.0)
-    assert made.reason == modes.NONE and made.since == made.track.times[0] < 0.0
+    assert made.reason == Reason.NONE and made.since == made.track.times[0] < 0.0
     assert made.track.times[len(made.track.times) // 2] <= made.until < made.track.times[-1]
     [[_, elevation]] = ours._satellite_angles(np.array([made.until]))
     assert elevation < 0.0
@@ -79,18 +79,18 @@ def test_a_table_is_made_anew_while_the_satellite_is_down():
 
 
 def test_why_there_is_no_table():
-    assert predictor(lines=('', '')).satellite(0.0).reason == modes.NO_ELEMENTS
-    assert predictor('').satellite(0.0).reason == predictor('').sun(0.0).reason == modes.NO_UTC
-    assert Predictor(predictor('').parameters, 1575969720 * 10**9).satellite(0.0).reason == modes.NONE
+    assert predictor(lines=('', '')).satellite(0.0).reason == Reason.NO_ELEMENTS
+    assert predictor('').satellite(0.0).reason == predictor('').sun(0.0).reason == Reason.NO_UTC
+    assert Predictor(predictor('').parameters, 1575969720 * 10**9).satellite(0.0).reason == Reason.NONE
     old = predictor('2019-12-30T00:00:00')
-    assert old.satellite(0.0).reason == modes.TOO_OLD
-    assert old.explained(modes.TLE, modes.TOO_OLD, 0.0) == 'they are 20.3 days off, 14 are allowed'
-    assert predictor('2019-12-30T00:00:00', oldest=30.0).satellite(0.0).reason == modes.NONE
+    assert old.satellite(0.0).reason == Reason.TOO_OLD
+    assert old.explained(Mode.TLE, Reason.TOO_OLD, 0.0) == 'they are 20.3 days off, 14 are allowed'
+    assert predictor('2019-12-30T00:00:00', oldest=30.0).satellite(0.0).reason == Reason.NONE
 
 
 def test_the_next_rise_is_where_the_elevation_passes_zero():
     ours = predictor('2019-12-10T06:00:00')
-    said = ours.explained(modes.TLE, modes.BELOW_HORIZON, 0.0)
+    said = ours.explained(Mode.TLE, Reason.BELOW_HORIZON, 0.0)
     rise = orbit.instant('rise', said.removeprefix('it rises at '))
     t = (rise - orbit.instant('start', '2019-12-10T06:00:00')).total_seconds()
     before, after = ours._satellite_angles(np.array([t - 1.0, t + 1.0]))[:, 1]
@@ -99,7 +99,7 @@ def test_the_next_rise_is_where_the_elevation_passes_zero():
 
 def test_the_polar_night_has_no_sunrise():
     ours = predictor('2019-12-21T12:00:00', station=StationParameters(latitude_deg=85.0))
-    assert ours.explained(modes.SUN, modes.BELOW_HORIZON, 0.0) == 'it does not rise within 2 days'
+    assert ours.explained(Mode.SUN, Reason.BELOW_HORIZON, 0.0) == 'it does not rise within 2 days'
 
 
 def test_orbits_of_a_day_have_fewer_rows_a_second():

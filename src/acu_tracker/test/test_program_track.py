@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from acu_tracker.geometry.motion import line_of_sight
-from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
+from acu_tracker.modes import Reason
 from acu_tracker.program import program_track
 from acu_tracker.program.program_track import ProgramTrack
 
@@ -58,12 +58,12 @@ def test_rate_is_continuous_over_rows_and_the_north_crossing():
 def test_status():
     times, angles = table()
     program = ProgramTrack(times, angles)
-    assert program_track.status(program, times[0]) == NONE
-    assert program_track.status(program, times[-1]) == NONE
-    assert program_track.status(program, times[0] - 1e-6) == BEFORE_PROGRAM
-    assert program_track.status(program, times[-1] + 1e-6) == AFTER_PROGRAM
-    assert program_track.status(ProgramTrack(times[:1], angles[:1]), times[0]) == NO_PROGRAM
-    assert program_track.status(program_track.NO_TRACK, times[0]) == NO_PROGRAM
+    assert program_track.status(program, times[0]) == Reason.NONE
+    assert program_track.status(program, times[-1]) == Reason.NONE
+    assert program_track.status(program, times[0] - 1e-6) == Reason.BEFORE_PROGRAM
+    assert program_track.status(program, times[-1] + 1e-6) == Reason.AFTER_PROGRAM
+    assert program_track.status(ProgramTrack(times[:1], angles[:1]), times[0]) == Reason.NO_PROGRAM
+    assert program_track.status(program_track.NO_TRACK, times[0]) == Reason.NO_PROGRAM
 
 
 def test_travel_until_the_end():

@@ -82,7 +82,7 @@ def test_without_a_lock_or_a_signal_it_gives_up():
     assert acquisition.failed(one.s, one.p, one.t)
     gone = Antenna((9.0, 9.0))
     gone.run(0.5)
-    gone.s['phase'] = acquisition.CHECK
+    gone.s['phase'] = acquisition.Phase.CHECK
     gone.run(1.0)
     assert acquisition.failed(gone.s, gone.p, gone.t)
 

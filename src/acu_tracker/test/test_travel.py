@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from acu_tracker.alarms import machine, table
-from acu_tracker.modes import PRESET, RATE, REASONS
+from acu_tracker.modes import REASONS, Mode
 from acu_tracker.params import AcuParameters
 from acu_tracker.servo import ends, floor
 from acu_tracker.servo.ends import Ends
@@ -51,7 +51,7 @@ def test_no_preset_beyond_the_limit_is_reached_whatever_the_controller(Rig, cont
     assert rig.mode == 'preset' and 0.98 < reached[-1] and max(reached) < 1.0 + 2e-3
     assert rig.outputs['angle_limited'][0, 0]
     alarm = rig.state['supervision'][0]['alarms']['alarm'][table.INDEX['azimuth at limit']]
-    assert alarm['state'] == machine.UNACKNOWLEDGED
+    assert alarm['state'] == machine.State.UNACKNOWLEDGED
 
 
 def test_an_axis_outside_its_limits_drives_back(Rig):
@@ -95,7 +95,7 @@ def test_a_jog_does_not_go_into_the_hill(Rig):
     rig = Rig(initial_mode='stop', at=(0.0, 0.05), floor=HILL)
     rig.run(0.1)
     rig.state['guidance']['manual']['asked'], rig.state['guidance']['manual']['until'] = (1.5, -1.0), math.inf
-    assert rig.ask(RATE)
+    assert rig.ask(Mode.RATE)
     assert heights(rig, 400).min() > -1e-3
     assert rig.angle[0] > 1.3
 
@@ -104,9 +104,9 @@ def test_a_place_below_the_floor_is_refused(Rig):
     rig = Rig(at=(0.0, 0.5), floor=HILL)
     rig.run(0.1)
     rig.state['guidance']['preset']['angle'] = 0.9, 0.3
-    assert not rig.ask(PRESET) and rig.reason == 'outside limits' and 'outside limits' in REASONS
+    assert not rig.ask(Mode.PRESET) and rig.reason == 'outside limits' and 'outside limits' in REASONS
     rig.state['guidance']['preset']['angle'] = 0.9, 0.45
-    assert rig.ask(PRESET)
+    assert rig.ask(Mode.PRESET)
 
 
 def test_the_floor_is_the_higher_end_of_a_cell_and_goes_round():

@@ -173,9 +173,9 @@ def _realised(m, k):
 @inlined
 def _mean(s, omega_1, omega_2):
     """Mean speed [rad/s] of the motors that work."""
-    if s.faults & faults.MOTOR_1_LOST:
+    if s.faults & faults.Bit.MOTOR_1_LOST:
         return omega_2
-    if s.faults & faults.MOTOR_2_LOST:
+    if s.faults & faults.Bit.MOTOR_2_LOST:
         return omega_1
     return 0.5 * (omega_1 + omega_2)
 
@@ -192,7 +192,7 @@ def _torque_control(s, c, omega, feed_forward):
     T_2 = speed_loop.torque(error_2, m2.sum, c.K_p, feed_forward)
     if alone:
         s.bias, total = 0.0, T_1 + T_2
-        T_1, T_2 = (0.0, total) if alone & faults.MOTOR_1_LOST else (total, 0.0)
+        T_1, T_2 = (0.0, total) if alone & faults.Bit.MOTOR_1_LOST else (total, 0.0)
     else:
         s.bias += c.bias_gain * (bias.scheduled(0.5 * (T_1 + T_2), c.T_b, c.out, c.per_fade) - s.bias)
         T_1, T_2 = speed_loop.shared(T_1, T_2, s.bias, m1.measured, m2.measured, c.K_d)
@@ -254,7 +254,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     if not powered or faults.drops(s.faults):
         _let_go(s, omega, free)
         return
-    m1.inhibited, m2.inhibited = s.faults & faults.MOTOR_1_LOST, s.faults & faults.MOTOR_2_LOST
+    m1.inhibited, m2.inhibited = s.faults & faults.Bit.MOTOR_1_LOST, s.faults & faults.Bit.MOTOR_2_LOST
     s.omega_hat, s.d_hat = disturbance_observer.update(
         s.omega_hat, s.d_hat, omega, 0.5 * (_realised(m1, k1) + _realised(m2, k2)), c.l_1, c.l_2, c.h_J_shaft)
 

@@ -2,13 +2,12 @@
 import numpy as np
 
 from adu_drive import axis
+from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import schedule, spoil, table
 
 MESSAGES = spoil.codes('adu')
-MOTOR_LOSS, ENCODER_JUMP, ENCODER_STUCK, BRAKE_STUCK, LOST_TOOTH, GUST, PIN_STUCK, DELAY, BIAS = (
-    table.code('adu', name) for name in ('motor_loss', 'encoder_jump', 'encoder_stuck', 'brake_stuck', 'lost_tooth',
-                                         'gust', 'pin_stuck', 'delay', 'bias'))
+Fault = codes([fault.name for fault in table.FAULTS['adu']])
 
 STUCK = axis.STUCK_ON, axis.STUCK_OFF
 """By the option of brake_stuck."""
@@ -34,23 +33,23 @@ def _break(m, fault, values):
     i = int(values[0])
     s, c = (m.state.azimuth, m.constants.azimuth) if i == 0 else (m.state.elevation, m.constants.elevation)
     spoil.apply(m.injected.said, MESSAGES, fault, values)
-    if fault == MOTOR_LOSS:
+    if fault == Fault.MOTOR_LOSS:
         s.motor_lost[int(values[1])] = 1
-    elif fault == ENCODER_JUMP:
+    elif fault == Fault.ENCODER_JUMP:
         s.jump += round(values[1] * c.per_rad)
-    elif fault == ENCODER_STUCK:
+    elif fault == Fault.ENCODER_STUCK:
         s.stuck = 1
-    elif fault == BRAKE_STUCK:
+    elif fault == Fault.BRAKE_STUCK:
         s.brake_stuck = STUCK[int(values[1])]
-    elif fault == LOST_TOOTH:
+    elif fault == Fault.LOST_TOOTH:
         s.teeth[int(values[1])], s.toothless = values[2], 1
-    elif fault == GUST:
+    elif fault == Fault.GUST:
         s.gust += values[1]
-    elif fault == PIN_STUCK:
+    elif fault == Fault.PIN_STUCK:
         m.state.pins.stuck[i] = 1
-    elif fault == DELAY:
+    elif fault == Fault.DELAY:
         m.state.late_ticks = round(values[0] / m.constants.period * m.constants.speed_ticks)
-    elif fault == BIAS:
+    elif fault == Fault.BIAS:
         m.injected.bias[i] += values[1]
 
 

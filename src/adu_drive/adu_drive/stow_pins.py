@@ -86,13 +86,13 @@ def advance(s, c, i):
     """One period of the pin of axis i, whose drive is off: its fault word."""
     end = c.travel if s.ordered == ORDERED_IN else 0
     if s.n[i] == end or s.failed[i]:
-        return faults.STOW_PIN if s.failed[i] else 0
+        return faults.Bit.STOW_PIN if s.failed[i] else 0
     if not s.stuck[i]:
         s.n[i] += 1 if end > s.n[i] else -1
     s.t[i] += 1
     if s.n[i] != end and s.t[i] >= c.timeout:
         s.failed[i] = 1
-    return faults.STOW_PIN if s.failed[i] else 0
+    return faults.Bit.STOW_PIN if s.failed[i] else 0
 
 
 @compiled

@@ -119,7 +119,7 @@ def test_a_runaway_ends_in_the_brakes(drive):
 def test_reset_only_when_it_stands_and_the_cause_has_gone(drive):
     d = made(drive, azimuth__faults__overspeed=0.4, azimuth__limits__deceleration=1.0)
     d.run(0.1, azimuth=0.5)
-    assert d.log['azimuth']['faults'][-1] == faults.OVERSPEED
+    assert d.log['azimuth']['faults'][-1] == faults.Bit.OVERSPEED
     assert request(d, 'RESET_FAULTS') == drive_state.MOVING
     assert request(d, 'ENABLE') == drive_state.FAULT_LATCHED
     d.run(0.7)

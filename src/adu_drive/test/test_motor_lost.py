@@ -9,7 +9,7 @@ from adu_drive.unit import STATE, Adu
 from pedestal_common.graph import topics
 from pedestal_common.parameters import build
 
-LOST = {0: faults.MOTOR_1_LOST, 1: faults.MOTOR_2_LOST}
+LOST = {0: faults.Bit.MOTOR_1_LOST, 1: faults.Bit.MOTOR_2_LOST}
 
 
 def lose(d, axis, motor):

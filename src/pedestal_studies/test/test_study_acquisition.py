@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode
 from acu_tracker.search.pattern import PATTERNS, SPIRAL, SQUARE
 from pedestal_analysis.results.intervals import missed
 from pedestal_studies.system import acquisition as study
@@ -30,7 +30,7 @@ def told(mode, error):
 
 
 def test_times():
-    A, P, nan = modes.AUTOTRACK, modes.PROGRAM, math.nan
+    A, P, nan = Mode.AUTOTRACK, Mode.PROGRAM, math.nan
     lost = told([P, P, A, A, A, P, A, A], [nan, 0, 0, 0, nan, 0, 0, 0])
     assert study.tracked_after(lost, False) == 3.0
     assert study.tracked_after(lost, True) == 1.0

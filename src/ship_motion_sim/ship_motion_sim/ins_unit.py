@@ -162,7 +162,7 @@ class Ins(Simulated):
             values += [(f'velocity_{axis}', f'{v:.3f}') for axis, v in zip(('east', 'north', 'up'),
                                                                            outputs['velocity'])]
         if status:
-            return Diagnosis(ERROR, ins.STATUS[status], values)
+            return Diagnosis(ERROR, ins.STATUSES[status], values)
         if stage == navigator.ALIGNING:
             heading, wanted = (math.degrees(x) for x in (sigma[2], p.alignment.aligned_sigma))
             so_far = f'heading known to {heading:.2g} deg (1 sigma)' if known else 'heading not known yet'

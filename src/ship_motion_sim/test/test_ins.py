@@ -53,7 +53,7 @@ def euler(quaternion):
 
 
 def status(out):
-    return ins.STATUS[out['status']]
+    return ins.STATUSES[out['status']]
 
 
 def test_without_errors_and_latency_it_is_the_truth():

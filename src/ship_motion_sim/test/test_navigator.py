@@ -162,7 +162,7 @@ def test_after_a_long_silence_of_the_imu_it_aligns_anew(how):
     for k in range(len(raw)):
         unit.inputs[RAW] = raw[k]
         unit.step(raw['stamp'][k:k + 1], unit.inputs, outputs[k:k + 1])
-        statuses.append(ins.STATUS[unit.parts['outputs']['status']])
+        statuses.append(ins.STATUSES[unit.parts['outputs']['status']])
     back = statuses.index('IMU was silent for too long, the attitude is lost: it aligns anew')
     assert back == (9000 if how == 'missing' else 9200)
     assert outputs[STATE][back - 1 if how == 'missing' else 8999] == navigator.NAVIGATING

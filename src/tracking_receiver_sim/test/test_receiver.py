@@ -146,7 +146,7 @@ def test_lock_has_two_levels_and_two_times(Bench):
     assert locked(100) == [0] * 100
     out = bench.run(1)[0]
     assert math.isnan(out['cross_elevation']) and math.isnan(out['elevation'])
-    assert out['status'] == receiver.NO_LOCK and out['cn0_dbhz'] == pytest.approx(47.0, abs=0.3)
+    assert out['status'] == receiver.Status.NO_LOCK and out['cn0_dbhz'] == pytest.approx(47.0, abs=0.3)
     bench.point(0.3, 0.6)
     regained = locked(40)
     assert sum(regained[:19]) == 0 and sum(regained[22:]) == 18
@@ -294,7 +294,7 @@ def test_target_below_the_horizon_gives_no_signal(Bench):
     bench.point(0.3, 0.005)
     out = bench.run(1000, rng)
     t = 1e-9 * out['stamp_ns']
-    assert np.all((out['status'] == receiver.BELOW_HORIZON) == (t > 2.0))
+    assert np.all((out['status'] == receiver.Status.BELOW_HORIZON) == (t > 2.0))
     assert np.all(out['locked'][t > 2.5] == 0) and np.all(out['locked'][(t > 0.5) & (t < 1.9)] == 1)
     assert np.all(np.isfinite(out['true_elevation'])) and np.all(np.isfinite(out['cn0_dbhz']))
 
@@ -304,7 +304,7 @@ def test_past_the_track_the_target_is_not_valid(Bench):
     out = bench.run(2000)
     inside = 1e-9 * out['stamp_ns'] <= 0.1 + target.MARGIN
     assert np.array_equal(out['target_valid'], inside)
-    assert np.all(out['status'][~inside] == receiver.NO_TARGET)
+    assert np.all(out['status'][~inside] == receiver.Status.NO_TARGET)
     assert np.all(np.isnan(out['target_position'][~inside])) and np.all(np.isnan(out['true_elevation'][~inside]))
     assert np.all(np.isfinite(out['cn0_dbhz'])) and out['locked'][-1] == 0
 
@@ -317,7 +317,7 @@ def test_bad_inputs_unlock_and_leave_no_trace(Bench, field, value):
     good = bench.inputs.copy()
     bench.inputs[field] = value
     out = bench.run(3)
-    assert np.all(out['status'] == receiver.NO_BEAM) and np.all(out['locked'] == 0)
+    assert np.all(out['status'] == receiver.Status.NO_BEAM) and np.all(out['locked'] == 0)
     assert np.all(np.isnan(out['cross_elevation'])) and np.all(np.isnan(out['true_elevation']))
     assert np.all(out['due'] == 1) and np.all(np.isfinite(out['cn0_dbhz']))
     assert np.all(out['target_valid'] == 1)
@@ -332,9 +332,9 @@ def test_stamps_that_do_not_increase_are_named_and_change_nothing(Bench):
     bench.run(200)
     before = bench.state.tobytes()
     out = bench.run(stamps=np.array([995_000_000, 0, -5_000_000]))
-    assert np.all(out['status'] == receiver.STAMP_ORDER) and np.all(out['due'] == 0)
+    assert np.all(out['status'] == receiver.Status.STAMP_ORDER) and np.all(out['due'] == 0)
     assert np.all(np.isnan(out['elevation'])) and bench.state.tobytes() == before
-    assert bench.run(stamps=np.array([1_000_000_000]))[0]['status'] == receiver.LOCKED
+    assert bench.run(stamps=np.array([1_000_000_000]))[0]['status'] == receiver.Status.LOCKED
 
 
 def test_same_normals_give_the_same_bits(Bench):
@@ -434,8 +434,8 @@ def test_the_antenna_stands_at_the_end_of_its_arm(Bench):
 def test_no_signal_through_the_superstructure(Bench):
     bench = Bench(QUIET | {'blockage': '0.2 0.4 0.7'})
     out = bench.run(200)[-1]
-    assert out['status'] == receiver.HIDDEN and not out['locked']
+    assert out['status'] == receiver.Status.HIDDEN and not out['locked']
     assert out['true_cross_elevation'] == pytest.approx(0.0, abs=1e-12)
     bench.inputs['mat_ed'] = Rotation.from_euler('Z', math.pi / 2 - 0.2).as_matrix()
     bench.point(0.1, 0.6)
-    assert bench.run(200)[-1]['status'] == receiver.LOCKED
+    assert bench.run(200)[-1]['status'] == receiver.Status.LOCKED

@@ -1,15 +1,14 @@
 """The faults that can be injected into the receiver: what each of them breaks."""
 import numpy as np
 
+from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.steps import SECOND
 from pedestal_common.injection import schedule, spoil, table
 from pedestal_common.wire.records import NEVER
 
 MESSAGES = spoil.codes('tracking_receiver')
-DELAY, BIAS, FADE, WRONG_SLOPE, PHASE_180, CLOCK_STEP = (
-    table.code('tracking_receiver', name) for name in ('delay', 'bias', 'fade', 'wrong_slope', 'phase_180',
-                                                       'clock_step'))
+Fault = codes([fault.name for fault in table.FAULTS['tracking_receiver']])
 
 BOTH, CROSS_ELEVATION, ELEVATION = range(3)
 """Options of wrong_slope."""
@@ -44,20 +43,20 @@ def _mend(c, e):
 def _break(c, e, fault, values):
     """What a fault does to constants and results of the receiver."""
     spoil.apply(e.said, MESSAGES, fault, values)
-    if fault == DELAY:
+    if fault == Fault.DELAY:
         c.latency_ns += round(values[0] * SECOND)
-    elif fault == BIAS:
+    elif fault == Fault.BIAS:
         e.bias[0] += values[0]
         e.bias[1] += values[1]
-    elif fault == FADE:
+    elif fault == Fault.FADE:
         c.power *= 10.0**(-0.1 * values[0])
-    elif fault == WRONG_SLOPE:
+    elif fault == Fault.WRONG_SLOPE:
         for i in range(2):
             if values[0] == BOTH or values[0] == CROSS_ELEVATION + i:
                 c.sign[i] = -1.0
-    elif fault == PHASE_180:
+    elif fault == Fault.PHASE_180:
         c.cos_phi, c.sin_phi = -e.cos_phi, -e.sin_phi
-    elif fault == CLOCK_STEP:
+    elif fault == Fault.CLOCK_STEP:
         e.clock_ns += round(values[0] * SECOND)
 
 

@@ -16,6 +16,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
@@ -27,9 +28,12 @@ from tracking_receiver_sim.params import BEAMS, HELD
 from tracking_receiver_sim.path import arrival, multipath, polarisation, scintillation
 from tracking_receiver_sim.smoothing import SMOOTHINGS
 
-STATUSES = ('locked', 'no lock', 'target below the horizon', 'target outside its track',
-            'direction of the beam not valid', 'stamp not after the one before', 'target hidden by the superstructure')
-LOCKED, NO_LOCK, BELOW_HORIZON, NO_TARGET, NO_BEAM, STAMP_ORDER, HIDDEN = range(7)
+STATUS_TEXTS = dict(
+    LOCKED='locked', NO_LOCK='no lock', BELOW_HORIZON='target below the horizon', NO_TARGET='target outside its track',
+    NO_BEAM='direction of the beam not valid', STAMP_ORDER='stamp not after the one before',
+    HIDDEN='target hidden by the superstructure')
+STATUSES = tuple(STATUS_TEXTS.values())
+Status = codes(STATUS_TEXTS)
 
 NORMALS_PER_SAMPLE = 6
 """Real and imaginary noise of the sum and of the two difference channels."""
@@ -343,7 +347,7 @@ def step(s, c, i, o, breaks, coefficients, normals):
     (normals_per_step,). Never raises: the status in OUTPUTS names what is missing."""
     forget(o)
     if i.stamp_ns <= s.stamp_ns:
-        o.status = STAMP_ORDER
+        o.status = Status.STAMP_ORDER
         return
     elapsed_ns = i.stamp_ns - s.stamp_ns if s.stamp_ns >= 0 else c.period_ns
     s.stamp_ns = i.stamp_ns
@@ -382,11 +386,11 @@ def step(s, c, i, o, breaks, coefficients, normals):
         s.cross_elevation, s.elevation = dX, dE
         s.error_known = true.valid
         lock(s, c, elapsed_ns)
-        o.status = (NO_TARGET if true.valid == 0 else HIDDEN if hidden else BELOW_HORIZON if amplitude == 0.0 else
-                    LOCKED if s.locked != 0 else NO_LOCK)
+        o.status = (Status.NO_TARGET if true.valid == 0 else Status.HIDDEN if hidden else
+                    Status.BELOW_HORIZON if amplitude == 0.0 else Status.LOCKED if s.locked != 0 else Status.NO_LOCK)
     else:
         s.error_known, s.locked, s.timer_ns = 0, 0, 0
-        o.status = NO_BEAM
+        o.status = Status.NO_BEAM
     if s.locked == 0:
         error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
     cn0_dbhz = 10.0 * math.log10(max(s.level_power - 1.0, POWER_FLOOR) / c.tau)

@@ -17,7 +17,7 @@ from tracking_receiver_sim import injected, receiver, target
 BEAM, SHIP, ERRORS, TARGET = 'adu/truth', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
 RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 
-FAULTS = (receiver.NO_TARGET, receiver.NO_BEAM, receiver.STAMP_ORDER)
+FAULTS = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
 """Statuses that are kept for the next diagnosis."""
 
 
@@ -101,7 +101,7 @@ class TrackingReceiver(Simulated):
         self._noise = noise.generator(parameters.seed, self.NODE.name)
         self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)
-        record = joined(RECORD, state=receiver.initial_state(), constants=constants, fault=receiver.LOCKED,
+        record = joined(RECORD, state=receiver.initial_state(), constants=constants, fault=receiver.Status.LOCKED,
                         schedule=schedule.empty(),
                         injected=injected.initial(constants))
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
@@ -123,7 +123,7 @@ class TrackingReceiver(Simulated):
     def diagnose(self):
         """ERROR with the last of FAULTS since the last diagnosis, WARN while not locked; values: C/N0, angle noise."""
         outputs, fault = self.parts['outputs'], int(self.parts['fault'])
-        self.parts['fault'] = receiver.LOCKED
+        self.parts['fault'] = receiver.Status.LOCKED
         status, p = int(outputs['status']), self.parameters
         sigma = receiver.angle_noise(p, float(outputs['cn0_dbhz']), p.period)
         values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
@@ -133,7 +133,7 @@ class TrackingReceiver(Simulated):
         values += zip(('track_log', 'track_flight'), self.target.summary)
         if fault in FAULTS:
             return Diagnosis(ERROR, receiver.STATUSES[fault], values)
-        return Diagnosis(OK if status == receiver.LOCKED else WARN, receiver.STATUSES[status], values)
+        return Diagnosis(OK if status == receiver.Status.LOCKED else WARN, receiver.STATUSES[status], values)
 
     @staticmethod
     def idle(numbers):

@@ -34,7 +34,7 @@ LONGEST_SHELVED = 86400.0
 
 def initialise(s):
     """Nothing is wrong. s: view of ALARMS, as everywhere here; nothing has been told."""
-    s['alarm']['state'] = machine.NORMAL
+    s['alarm']['state'] = machine.State.NORMAL
     s['alarm']['parent'] = NONE
     s['alarm']['since'] = s['alarm']['raised'] = s['burst'] = -np.inf
     s['revision'] = 1
@@ -80,7 +80,7 @@ def _enter(s, i, state, t):
     if machine.LISTED[a.state] or machine.LISTED[state]:
         s.revision += 1
     a.state = state
-    if state == machine.UNACKNOWLEDGED:
+    if state == machine.State.UNACKNOWLEDGED:
         _raised(s, i, t)
 
 
@@ -109,14 +109,15 @@ def update(s, t, conditions, judged):
     for i in range(COUNT):
         a = s.alarm[i]
         on, means = conditions & judged & 1 << i != 0, judged & 1 << i != 0
-        if not on and a.active == 0 and a.state == (machine.NORMAL if means else machine.SUPPRESSED):
+        usual = machine.State.NORMAL if means else machine.State.SUPPRESSED_BY_DESIGN
+        if not on and a.active == 0 and a.state == usual:
             a.since = t     # nothing is wrong, as nearly always: what follows would change no more
             continue
         _delayed(a, on, t, table.ON_DELAY[i] if on else table.OFF_DELAY[i])
-        if a.state == machine.SHELVED and t >= a.until:
-            put(s, i, machine.UNSHELVE, t)
-        put(s, i, machine.RELEASE if means else machine.SUPPRESS, t)
-        put(s, i, machine.RAISE if a.active else machine.CLEAR, t)
+        if a.state == machine.State.SHELVED and t >= a.until:
+            put(s, i, machine.Event.UNSHELVE, t)
+        put(s, i, machine.Event.RELEASE if means else machine.Event.SUPPRESS, t)
+        put(s, i, machine.Event.RAISE if a.active else machine.Event.CLEAR, t)
 
 
 @compiled
@@ -131,13 +132,13 @@ def above(s, i):
 @compiled
 def acknowledge(s, i, t):
     """Acknowledge alarm i and all that stands under it; whether there was anything to acknowledge."""
-    done = put(s, i, machine.ACKNOWLEDGE, t)
+    done = put(s, i, machine.Event.ACKNOWLEDGE, t)
     for k in range(i + 1, COUNT):
         top = k
         while top != NONE and top != i:
             top = above(s, top)
         if top == i:
-            done |= put(s, k, machine.ACKNOWLEDGE, t)
+            done |= put(s, k, machine.Event.ACKNOWLEDGE, t)
     return done
 
 
@@ -146,7 +147,7 @@ def shelve(s, i, t, seconds):
     """Put alarm i away until t + seconds, whatever its state."""
     s.alarm[i].until = t + seconds
     s.revision += 1
-    put(s, i, machine.SHELVE, t)
+    put(s, i, machine.Event.SHELVE, t)
 
 
 @compiled
@@ -162,7 +163,7 @@ def persists(s, without):
 def know(s, i, there, t):
     """Whether the condition of alarm i is there is known at t [s] without its delays."""
     s.alarm[i].active = there
-    put(s, i, machine.RAISE if there else machine.CLEAR, t)
+    put(s, i, machine.Event.RAISE if there else machine.Event.CLEAR, t)
 
 
 @compiled
@@ -171,5 +172,5 @@ def reset(s, t):
     done = False
     for i in range(COUNT):
         if machine.LATCHED[s.alarm[i].state]:
-            done |= put(s, i, machine.RESET, t)
+            done |= put(s, i, machine.Event.RESET, t)
     return done

@@ -6,7 +6,9 @@ import numpy as np
 
 from acu_tracker import modes, signals
 from acu_tracker.alarms import annunciator, detectors, table
+from acu_tracker.modes import Mode, Reason
 from acu_tracker.servo import position_loop
+from acu_tracker.signals import Flag
 from pedestal_common.compiled import compiled
 
 SUPERVISION = np.dtype([('axis', detectors.AXIS, (2,)), ('said', 'f8', (3,)), ('least', 'f8'), ('ready', 'f8'),
@@ -14,8 +16,7 @@ SUPERVISION = np.dtype([('axis', detectors.AXIS, (2,)), ('said', 'f8', (3,)), ('
 """said: errors [rad] and C/N0 [dB-Hz] of the receiver in the step before; least: lowest C/N0 that it has told; ready:
 stamp at which the drive was ready last [s]; lost: bits of the axes that had one motor when it was."""
 
-INVALID = (signals.ENCODER | signals.ERROR | signals.ERROR_STAMP | signals.PROGRAM | signals.PRESET
-           | signals.ATTITUDE_ERROR)
+INVALID = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRAM | Flag.PRESET | Flag.ATTITUDE_ERROR
 """Flags of inputs that were not believed, but of the attitude, which is lost when that goes on."""
 
 OFF_TIME = 2.5
@@ -48,17 +49,17 @@ def _of_motors(d, i, u, envelope, p, facts):
     bits, surge = 0, detectors.SURGE * p.limits.acceleration if facts.lost else 0.0
     x = detectors.parted(d, y, dy, facts.dt, surge)
     if detectors.encoder_jump(x):
-        bits |= table.ENCODER_JUMP
+        bits |= table.Bit.AZIMUTH_ENCODER_JUMP
     if detectors.encoder_stuck(d, y, dy, facts.dt):
-        bits |= table.ENCODER_STUCK
+        bits |= table.Bit.AZIMUTH_ENCODER_STUCK
     if detectors.disagreement(d, x, facts.dt):
-        bits |= table.DISAGREEMENT
+        bits |= table.Bit.AZIMUTH_ENCODER_DISAGREEMENT
     if detectors.pushes(d, u.torque[i], p.feedforward.friction, facts.dt):
-        bits |= table.BRAKE_NOT_RELEASED
+        bits |= table.Bit.AZIMUTH_BRAKE_NOT_RELEASED
     if detectors.immobile(d, dy, high, low):
-        bits |= table.IMMOBILE
+        bits |= table.Bit.AZIMUTH_IMMOBILE
     if detectors.against(dy, high, low, facts.unasked_rate):
-        bits |= table.RUNAWAY
+        bits |= table.Bit.AZIMUTH_RUNAWAY
     return bits << i
 
 
@@ -68,11 +69,11 @@ def _of_loop(d, i, e, o, facts):
     limited it cannot follow."""
     bits, limited = 0, o.rate_limited[i] or o.acceleration_limited[i]
     if o.angle_limited[i]:
-        bits |= table.AT_LIMIT
+        bits |= table.Bit.AZIMUTH_AT_LIMIT
     if detectors.following_error(d, 0.0 if limited else e, facts.beamwidth):
-        bits |= table.FOLLOWING_ERROR
+        bits |= table.Bit.AZIMUTH_FOLLOWING_ERROR
     if detectors.oscillation(d, e, facts.dt):
-        bits |= table.OSCILLATION
+        bits |= table.Bit.AZIMUTH_OSCILLATION
     return bits << i
 
 
@@ -89,8 +90,8 @@ def _of_axes(s, mode, u, o, c, envelope, facts):
         if math.isfinite(y + dy):
             bits |= _of_motors(d, i, u, envelope, p, facts)
             if detectors.moves(d, dy) and off:
-                bits |= table.BRAKE_NOT_GRIPPING << i
-            if mode != modes.STANDBY:
+                bits |= table.Bit.AZIMUTH_BRAKE_NOT_GRIPPING << i
+            if mode != Mode.STANDBY:
                 bits |= _of_loop(d, i, o.reference[i, 0] - y, o, facts)
         d.y, d.dy = y, dy
     return bits
@@ -101,11 +102,11 @@ def _of_drive(s, u):
     """Bits of the alarms that the drive tells itself, by u.drive, a code of adu/state."""
     if u.drive_ready:
         s.ready, s.lost = u.stamp, max(u.drive, 0)
-    bits = s.lost * table.MOTOR_LOST
+    bits = s.lost * table.Bit.AZIMUTH_MOTOR_LOST
     if u.drive == signals.EMERGENCY_STOP:
-        bits |= table.EMERGENCY_STOP
+        bits |= table.Bit.EMERGENCY_STOP
     elif u.drive >= signals.DRIVE_FAULT:
-        bits |= table.DRIVE_FAULT
+        bits |= table.Bit.DRIVE_FAULT
     return bits
 
 
@@ -127,38 +128,38 @@ def _of_unit(s, u, o, facts):
     """Bits of the alarms of the inputs, and of what the control unit has found elsewhere."""
     bits = facts.latched
     if 0.0 < facts.gap < math.inf:
-        bits |= table.TIME_JUMP | (table.DRIVE_SILENT if facts.gap > SILENCE else 0)
+        bits |= table.Bit.TIME_JUMP | (table.Bit.DRIVE_SILENT if facts.gap > SILENCE else 0)
     if not u.error_came or _repeated(s, u):
-        bits |= table.RECEIVER_SILENT
+        bits |= table.Bit.RECEIVER_SILENT
     if facts.attitude_lost:
-        bits |= table.INS_LOST
+        bits |= table.Bit.INS_LOST
     if facts.attitude_jumped:
-        bits |= table.INS_JUMP
+        bits |= table.Bit.INS_JUMP
     if facts.signal_lost:
-        bits |= table.SIGNAL_LOST
-    if o.invalid_input & signals.ERROR_NOISY:
-        bits |= table.RECEIVER_NOISY
+        bits |= table.Bit.SIGNAL_LOST
+    if o.invalid_input & Flag.ERROR_NOISY:
+        bits |= table.Bit.RECEIVER_NOISY
     if o.invalid_input & INVALID:
-        bits |= table.INVALID_INPUT
-    return bits | o.pins_wrong * table.STOW_PIN | _of_program(u, o)
+        bits |= table.Bit.INVALID_INPUT
+    return bits | o.pins_wrong * table.Bit.AZIMUTH_STOW_PIN | _of_program(u, o)
 
 
 @compiled
 def _of_program(u, o):
     """Bits of the alarms of the program track, by the reason that it is not followed."""
-    bits = table.PROGRAM_TURNAROUND if u.turnaround else 0
-    if o.reason == modes.BEFORE_PROGRAM:
-        return bits | table.PROGRAM_EARLY
-    if o.reason == modes.PROGRAM_GAP:
-        return bits | table.PROGRAM_GAP
-    return bits | (table.PROGRAM_ENDED if o.reason == modes.AFTER_PROGRAM else 0)
+    bits = table.Bit.PROGRAM_TURNAROUND if u.turnaround else 0
+    if o.reason == Reason.BEFORE_PROGRAM:
+        return bits | table.Bit.PROGRAM_TOO_EARLY
+    if o.reason == Reason.PROGRAM_GAP:
+        return bits | table.Bit.PROGRAM_GAP
+    return bits | (table.Bit.PROGRAM_ENDED if o.reason == Reason.AFTER_PROGRAM else 0)
 
 
 @compiled
 def _judged(mode, c):
     """Bits of the alarms that mean something in a mode. c: records (2,) of the axes' constants."""
     motors = c[0].p.controller != position_loop.BEAM or c[1].p.controller != position_loop.BEAM
-    return (ALWAYS | (MOTORS if motors else 0) | (MOVING if mode != modes.STANDBY else 0)
+    return (ALWAYS | (MOTORS if motors else 0) | (MOVING if mode != Mode.STANDBY else 0)
             | (FOLLOWING if modes.FOLLOWS[mode] else 0))
 
 

@@ -4,15 +4,15 @@ An alarm that is not latched never is in a latched state: its row of `alarms.tab
 """
 import numpy as np
 
+from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 
 STATES = ('normal', 'unacknowledged', 'acknowledged', 'returned unacknowledged', 'latched unacknowledged',
           'latched acknowledged', 'shelved', 'suppressed by design')
-(NORMAL, UNACKNOWLEDGED, ACKNOWLEDGED, RETURNED, LATCHED_UNACKNOWLEDGED, LATCHED_ACKNOWLEDGED, SHELVED,
- SUPPRESSED) = range(len(STATES))
+State = codes(STATES)
 
 EVENTS = ('raise', 'clear', 'acknowledge', 'reset', 'shelve', 'unshelve', 'suppress', 'release')
-RAISE, CLEAR, ACKNOWLEDGE, RESET, SHELVE, UNSHELVE, SUPPRESS, RELEASE = range(len(EVENTS))
+Event = codes(EVENTS)
 """raise, clear: the condition is there, or gone, in this step; suppress, release: the alarm means nothing now, or does
 again; the others are asked for."""
 
@@ -51,9 +51,9 @@ LATCHED = (False, False, False, False, True, True, False, False)
 @compiled
 def next_state(state, event, latched):
     """The state after an event, REFUSED where the state does not take it; latched: 1 for an alarm that is reset."""
-    if latched and event == CLEAR:
-        if state == UNACKNOWLEDGED:
-            return LATCHED_UNACKNOWLEDGED
-        if state == ACKNOWLEDGED:
-            return LATCHED_ACKNOWLEDGED
+    if latched and event == Event.CLEAR:
+        if state == State.UNACKNOWLEDGED:
+            return State.LATCHED_UNACKNOWLEDGED
+        if state == State.ACKNOWLEDGED:
+            return State.LATCHED_ACKNOWLEDGED
     return NEXT[state, event]

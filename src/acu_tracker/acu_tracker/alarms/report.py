@@ -24,14 +24,14 @@ def annunciated(s):
 def listed(s):
     """Indices of all alarms that are not normal: the annunciated, their consequences, those that are shelved."""
     first = annunciated(s)
-    shelved = [i for i in range(annunciator.COUNT) if s['alarm'][i]['state'] == machine.SHELVED]
+    shelved = [i for i in range(annunciator.COUNT) if s['alarm'][i]['state'] == machine.State.SHELVED]
     return [*first, *(i for i in order(s) if i not in first), *shelved]
 
 
 def status(s, i, detail='', reason=''):
     """The DiagnosticStatus of alarm i. detail: what else is known; reason: why it is shelved."""
     alarm, row, above = s['alarm'][i], table.ALARMS[i], annunciator.above(s, i)
-    shelved = alarm['state'] == machine.SHELVED
+    shelved = alarm['state'] == machine.State.SHELVED
     values = {'state': machine.STATES[alarm['state']], 'priority': row.priority,
               'annunciated': str(int(i in annunciated(s))), 'raised_s': f'{alarm["raised"]:.3f}',
               'first_out': str(int(alarm['first'])),

@@ -1,6 +1,7 @@
 """The alarms of the control unit: one row each, every cause before its consequences."""
 import typing
 
+from pedestal_common.codes import bits
 from pedestal_common.graph.topics import AXES
 
 PRIORITIES = ('critical', 'high', 'medium', 'low')
@@ -167,14 +168,5 @@ CAUSES = tuple(sum(1 << INDEX[name] for name in alarm.cause) for alarm in ALARMS
 JUDGED_WHEN = tuple(sum(1 << i for i, alarm in enumerate(ALARMS) if alarm.judged == when) for when in JUDGED)
 """Of each of JUDGED the bits of the alarms that are judged then."""
 
-(EMERGENCY_STOP, DRIVE_SILENT, TIME_JUMP, RECEIVER_SILENT, INS_LOST, INS_JUMP, DRIVE_FAULT, SIGNAL_LOST,
- RECEIVER_NOISY, PROGRAM_EARLY, PROGRAM_GAP, PROGRAM_TURNAROUND, PROGRAM_ENDED, INVALID_INPUT) = (
-     1 << INDEX[name] for name in (
-         'emergency stop', 'drive silent', 'time jump', 'receiver silent', 'INS lost', 'INS jump', 'drive fault',
-         'signal lost', 'receiver noisy', 'program too early', 'program gap', 'program turnaround', 'program ended',
-         'invalid input'))
-(MOTOR_LOST, STOW_PIN, ENCODER_JUMP, ENCODER_STUCK, DISAGREEMENT, BRAKE_NOT_RELEASED, IMMOBILE, BRAKE_NOT_GRIPPING,
- RUNAWAY, OSCILLATION, FOLLOWING_ERROR, AT_LIMIT) = (1 << INDEX[f'{AXES[0]} {name}'] for name in (
-     'motor lost', 'stow pin', 'encoder jump', 'encoder stuck', 'encoder disagreement', 'brake not released',
-     'immobile', 'brake not gripping', 'runaway', 'oscillation', 'following error', 'at limit'))
-"""Bits of the alarms; of one of an axis that of the azimuth, with that of the elevation to its left."""
+Bit = bits(NAMES)
+"""Of each alarm; shifted to the left, that of an alarm of the azimuth is that of the elevation."""

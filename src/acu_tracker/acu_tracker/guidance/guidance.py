@@ -16,6 +16,7 @@ from acu_tracker.geometry.vector import rotation
 from acu_tracker.guidance import manual
 from acu_tracker.lookahead import planner
 from acu_tracker.mode import by_level
+from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import bridge, program_track, tables
 from acu_tracker.search import acquisition
 from acu_tracker.servo import position_loop
@@ -58,11 +59,11 @@ def start_from(g, azimuth):
 def move_by_hand(g, c, order, ends, actual, dt):
     """Move the point that is commanded by hand on by dt [s]. ends: of both axes; actual: Motion of the axes, where it
     begins."""
-    heard = order.mode == modes.RATE and manual.heard(g.manual, order.stamp)
+    heard = order.mode == Mode.RATE and manual.heard(g.manual, order.stamp)
     for i in range(2):
         if order.begins:
             manual.begin(g.manual, i, actual[i])
-        if order.mode == modes.STOP or order.mode == modes.RATE:
+        if order.mode == Mode.STOP or order.mode == Mode.RATE:
             manual.step(g.manual, i, c.axis[i].p.shaper, ends[i], heard, dt)
 
 
@@ -83,11 +84,11 @@ def _reference(g, k, c, order, way, gap, t):
     mode = order.mode
     if not modes.FOLLOWS[mode]:
         start_from(g, order.azimuth)
-    if mode == modes.STOW:
+    if mode == Mode.STOW:
         return Motion(AxisMotion(c.axis[0].p.stow, 0.0, 0.0), AxisMotion(c.axis[1].p.stow, 0.0, 0.0))
-    if mode == modes.PRESET:
+    if mode == Mode.PRESET:
         return direction.motion_at(g.preset, t)
-    if mode == modes.STOP or mode == modes.RATE:
+    if mode == Mode.STOP or mode == Mode.RATE:
         return manual.motion(g.manual, t - order.stamp)
     source = _source(g, k, c, mode, way, gap, t)
     motion = target.on_deck(k.target, c.p, k.attitude, t, source)
@@ -106,13 +107,13 @@ def _reference(g, k, c, order, way, gap, t):
 @compiled
 def _source(g, k, c, mode, way, gap, t):
     """The target.Source of the mode at t [s]; the program bridges an outage that has a reason."""
-    if mode == modes.SLAVE:
+    if mode == Mode.SLAVE:
         return target.Source(0, direction.motion_at(g.slave, t))
     if modes.BY_TABLE[mode]:
         return target.Source(0, program_track.motion_at(way.program, t))
     if modes.BY_LEVEL[mode]:
         return by_level.source(g.acquisition, mode, c, way, t)
-    if way.valid and gap.coasting and gap.permitted and program_track.status(way.program, t) == modes.NONE:
+    if way.valid and gap.coasting and gap.permitted and program_track.status(way.program, t) == Reason.NONE:
         return target.Source(0, bridge.motion_at(way, t))
     return target.outlook(k.target, c.tracker, t)
 
@@ -140,14 +141,14 @@ def bridge_to(g, k, c, program, t):
 def begin_by_level(g, k, c, before, mode, t):
     """Enter a mode that goes by the level at t [s] from the one before. Its target is where the estimate says that
     autotrack followed, or else where the antenna points."""
-    tracked = before == modes.AUTOTRACK
+    tracked = before == Mode.AUTOTRACK
     if tracked:
         sight = tracking.sight(k, c, t)
         by_level.remember(g.acquisition, t, sight.u, sight.du)
     elif not modes.BY_LEVEL[before]:
         u, du = tracking.beam(k, c, t)
         by_level.remember(g.acquisition, t, u, du)
-    by_level.begin(g.acquisition, mode, c, t, tracking.spread(k, c, t) if tracked and mode == modes.SEARCH else np.nan)
+    by_level.begin(g.acquisition, mode, c, t, tracking.spread(k, c, t) if tracked and mode == Mode.SEARCH else np.nan)
 
 
 @compiled
@@ -163,7 +164,7 @@ def look_ahead(g, k, c, mode, program, gap, t):
     """Plan ahead once in planner.INTERVAL: keyholes and hidden sectors on the path of the target; whether the mode
     begins anew, as there is another program."""
     h = g.lookahead
-    if not modes.FOLLOWS[mode] or mode == modes.SLAVE:
+    if not modes.FOLLOWS[mode] or mode == Mode.SLAVE:
         planner.forget(h)
         g.overtravel, g.pointing_offset = 0, 0.0
         return False
@@ -184,10 +185,10 @@ def _look(g, k, c, mode, program, gap, t):
         bridge.forget(g.bridge)
         planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, bridge.way(g.bridge, program))
         return
-    if mode == modes.AUTOTRACK and not gap.coasting:
+    if mode == Mode.AUTOTRACK and not gap.coasting:
         bridge_to(g, k, c, program, t)
     way = bridge.way(g.bridge, program)
-    if way.valid and program_track.status(program, t) == modes.NONE:
+    if way.valid and program_track.status(program, t) == Reason.NONE:
         planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, way)
         return
     sight = (line_of_sight(by_level.expected(g.acquisition, way, t)) if modes.BY_LEVEL[mode] else

@@ -6,6 +6,7 @@ import math
 
 from acu_tracker import modes
 from acu_tracker.estimation import target
+from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import bridge, program_track
 from acu_tracker.search import acquisition, level, pattern, place, side_lobe, step_track
 from acu_tracker.search.pattern import Point
@@ -21,7 +22,7 @@ diverges within 0.4 s."""
 def expected(a, way, t):
     """Motion in earth angles of the expected place of the target at t [s]: by the program, rotated to where the target
     was last tracked; without one, where it was last."""
-    if program_track.status(way.program, t) != modes.NONE:
+    if program_track.status(way.program, t) != Reason.NONE:
         return place.motion_at(a.place, t)
     return bridge.motion_at(way, t)
 
@@ -37,10 +38,10 @@ def source(a, mode, c, way, t):
 def _offset(a, mode, c, t, motion):
     """Point of the beam about the expected place in cross-elevation and elevation."""
     beamwidth = c.p.tracker.receiver.beamwidth
-    if mode == modes.SEARCH:
+    if mode == Mode.SEARCH:
         p, _ = acquisition.searched(a, c.p.search, c.p.acquisition.time_constant, beamwidth, t)
         return pattern.rotated(p, place.track(motion))
-    if mode == modes.ACQUIRE:
+    if mode == Mode.ACQUIRE:
         return acquisition.acquired(a, beamwidth, t)
     return Point(a.centre[0], a.centre[1], 0.0, 0.0)
 
@@ -51,27 +52,27 @@ def advance(a, mode, c, u, way):
     record of signals.INPUTS. Whether acquire finds a slope wrong."""
     p, beamwidth = c.p.acquisition, c.p.tracker.receiver.beamwidth
     new = u.error_stamp > a.level.stamp and math.isfinite(u.cn0_dbhz)
-    off_target = not modes.FOLLOWS[mode] or (mode == modes.SEARCH and acquisition.waiting(a, c.p.search, u.stamp))
+    off_target = not modes.FOLLOWS[mode] or (mode == Mode.SEARCH and acquisition.waiting(a, c.p.search, u.stamp))
     if u.error_valid:
         level.forget_noise(a.level, p)
     elif off_target:
         acquisition.learn(a, p, u.cn0_dbhz, u.error_stamp)
     acquisition.hear(a, p, u.cn0_dbhz, u.error_stamp, u.error_valid != 0)
-    if mode == modes.SEARCH and new:
+    if mode == Mode.SEARCH and new:
         t = u.error_stamp - p.time_constant
         offset = _offset(a, mode, c, t, expected(a, way, t))
         acquisition.note_peak(a, (offset.x, offset.y))
-    elif mode == modes.ACQUIRE:
+    elif mode == Mode.ACQUIRE:
         acquisition.acquire(a, p, beamwidth, u.stamp, u.range)
-    elif mode == modes.STEPTRACK:
+    elif mode == Mode.STEPTRACK:
         present = a.level.below_loss < p.loss_time
         x, e = step_track.step(a.step_track, c.p.steptrack, beamwidth, p.time_constant, u.stamp,
                                u.cn0_dbhz if new else math.nan, present)
         acquisition.stand(a, x, e)
     axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, u.range)
-    judged = mode == modes.PROGRAM or mode == modes.AUTOTRACK
+    judged = mode == Mode.PROGRAM or mode == Mode.AUTOTRACK
     acquisition.judge(a, u.stamp, not judged or not u.error_valid or not side_lobe.suspected(u.cn0_dbhz, axis))
-    return mode == modes.ACQUIRE and a.phase == acquisition.WRONG
+    return mode == Mode.ACQUIRE and a.phase == acquisition.Phase.WRONG_SLOPE
 
 
 @compiled
@@ -83,25 +84,25 @@ def in_side_lobe(a, c, t):
 @compiled
 def found(a, mode, c):
     """Whether search may hand over to acquire, or acquire to autotrack."""
-    if mode == modes.SEARCH:
+    if mode == Mode.SEARCH:
         return acquisition.passed(a, c.p.acquisition)
-    return a.phase == acquisition.CHECKED
+    return a.phase == acquisition.Phase.CHECKED
 
 
 @compiled
 def end(a, mode, c, t):
     """NONE or the reason that the mode ends at t [s], for one that goes by the level."""
     p = c.p.acquisition
-    if mode == modes.SEARCH:
+    if mode == Mode.SEARCH:
         _, over = acquisition.searched(a, c.p.search, p.time_constant, c.p.tracker.receiver.beamwidth, t)
-        return modes.NOT_FOUND if over else modes.NONE
-    if mode == modes.ACQUIRE:
-        if a.phase == acquisition.WRONG:
-            return modes.WRONG_SLOPE
-        return modes.SIGNAL_LOST if acquisition.failed(a, p, t) else modes.NONE
-    if mode == modes.STEPTRACK and a.level.below_loss >= p.loss_time:
-        return modes.SIGNAL_LOST
-    return modes.NONE
+        return Reason.NOT_FOUND if over else Reason.NONE
+    if mode == Mode.ACQUIRE:
+        if a.phase == acquisition.Phase.WRONG_SLOPE:
+            return Reason.WRONG_SLOPE
+        return Reason.SIGNAL_LOST if acquisition.failed(a, p, t) else Reason.NONE
+    if mode == Mode.STEPTRACK and a.level.below_loss >= p.loss_time:
+        return Reason.SIGNAL_LOST
+    return Reason.NONE
 
 
 @compiled
@@ -109,9 +110,9 @@ def begin(a, mode, c, t, spread):
     """Enter a mode that goes by the level at t [s]; spread: standard deviation of the expected place [rad], NaN where
     it is not known."""
     level.forget_times(a.level)
-    if mode == modes.SEARCH:
+    if mode == Mode.SEARCH:
         acquisition.begin_search(a, c.p.search, c.p.tracker.receiver.beamwidth, t, spread)
-    elif mode == modes.ACQUIRE:
+    elif mode == Mode.ACQUIRE:
         acquisition.begin_acquire(a, t)
     else:
         step_track.start(a.step_track, t, a.centre[0], a.centre[1])

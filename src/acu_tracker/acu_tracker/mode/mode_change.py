@@ -2,6 +2,7 @@
 import numpy as np
 
 from acu_tracker import modes
+from acu_tracker.modes import Mode, Reason
 from pedestal_common.compiled import compiled
 
 MODE = np.dtype([('now', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('begins', 'i8'), ('table', 'i8'),
@@ -14,7 +15,7 @@ the track."""
 def initialise(m, params):
     """Standby, the initial mode of AcuParameters pending; m: view of MODE."""
     m['pending'] = modes.MODES.index(params.initial_mode)
-    m['table'] = modes.PROGRAM
+    m['table'] = Mode.PROGRAM
     choose(m, params.fallback)
 
 
@@ -31,7 +32,7 @@ def change(m, now, request):
         m.pending = modes.NO_REQUEST
     if modes.BY_TABLE[mode]:
         m.table = mode
-    if reason != modes.NONE:
+    if reason != Reason.NONE:
         m.reason = reason
     if mode != m.now:
         m.now, m.begins = mode, 1
@@ -60,18 +61,18 @@ def wait_for(m, request):
 def go_on(m, mode):
     """Go on in a mode after a silence: the one before, or STANDBY."""
     if mode != m.now:
-        m.now, m.reason = mode, modes.SILENCE
+        m.now, m.reason = mode, Reason.SILENCE
 
 
 @compiled
 def explain(m, reason):
     """Take the reason of an outage, NONE: there is none any more."""
-    if reason != modes.NONE or m.reason == modes.BLOCKED or m.reason == modes.KEYHOLE:
+    if reason != Reason.NONE or m.reason == Reason.BLOCKED or m.reason == Reason.KEYHOLE:
         m.reason = reason
 
 
 @compiled
 def stowed(m):
     """Note that the pins are in, where that was requested."""
-    if m.reason == modes.REQUESTED:
-        m.reason = modes.PINS_IN
+    if m.reason == Reason.REQUESTED:
+        m.reason = Reason.PINS_IN

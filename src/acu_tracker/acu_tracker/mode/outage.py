@@ -4,7 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from acu_tracker import modes
+from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
 
 OUTAGE = np.dtype([('stamp', 'f8'), ('blocked', 'i8')], align=True)
@@ -38,4 +38,4 @@ def watch(s, hidden, slewing, t):
     s.blocked = hidden
     if hidden or slewing:
         s.stamp = t
-    return modes.BLOCKED if hidden else modes.KEYHOLE if slewing else modes.NONE
+    return Reason.BLOCKED if hidden else Reason.KEYHOLE if slewing else Reason.NONE

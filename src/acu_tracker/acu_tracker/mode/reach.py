@@ -4,9 +4,10 @@ c, u: records of control_unit.CONSTANTS and of signals.INPUTS.
 """
 import math
 
-from acu_tracker import modes, signals
+from acu_tracker import signals
 from acu_tracker.geometry import attitude, azimuth_wrap
 from acu_tracker.geometry.azimuth_wrap import Travel
+from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import program_track, tables
 from acu_tracker.servo import floor
 from pedestal_common.compiled import compiled
@@ -17,38 +18,38 @@ def outside(c, A, E):
     """OUTSIDE_LIMITS if deck angles [rad] cannot be pointed at, else NONE; NaN is outside."""
     a, e = c.axis[0].p.limits, c.axis[1].p.limits
     inside = a.low <= A <= a.high and e.low <= E <= e.high
-    return modes.NONE if inside and not floor.above(c.floor, A, E) else modes.OUTSIDE_LIMITS
+    return Reason.NONE if inside and not floor.above(c.floor, A, E) else Reason.OUTSIDE_LIMITS
 
 
 @compiled
 def _followed(deck, c, track, t, azimuth):
     """(NONE or why the program cannot be followed, by its times or its place when the next command is in force;
-    signals.PROGRAM if it is bad, else 0).
+    signals.Flag.PROGRAM if it is bad, else 0).
     """
     obstacle = program_track.status(track, t)
-    if obstacle != modes.NONE:
+    if obstacle != Reason.NONE:
         return obstacle, 0
     t_m = t + c.lead
     motion = attitude.on_deck(deck, c.p, t_m, program_track.motion_at(track, t_m))
     A, E, limits = motion.azimuth.angle, motion.elevation.angle, c.axis[0].p.limits
     if not math.isfinite(A + E):
-        return modes.NO_PROGRAM, signals.PROGRAM
+        return Reason.NO_PROGRAM, signals.Flag.PROGRAM
     return outside(c, azimuth_wrap.nearest(A, azimuth, limits.low, limits.high, Travel(0.0, 0.0)), E), 0
 
 
 @compiled
 def table(deck, c, u, mode, of_all, t, azimuth):
-    """(NONE or why the table of a mode cannot be followed at t [s], signals.PROGRAM if it is bad, else 0). deck:
+    """(NONE or why the table of a mode cannot be followed at t [s], signals.Flag.PROGRAM if it is bad, else 0). deck:
     ATTITUDE; azimuth: raw one of the last reference [rad]."""
     track = tables.of_mode(of_all, mode)
-    if mode != modes.PROGRAM:
+    if mode != Mode.PROGRAM:
         unpredicted = u.unpredicted[tables.PLACE[mode]]
-        if unpredicted != modes.NONE:
+        if unpredicted != Reason.NONE:
             return unpredicted, 0
-        if (program_track.status(track, t) == modes.NONE
+        if (program_track.status(track, t) == Reason.NONE
                 and program_track.motion_at(track, t).elevation.angle < 0.0):
-            return modes.BELOW_HORIZON, 0
+            return Reason.BELOW_HORIZON, 0
     obstacle, flag = _followed(deck, c, track, t, azimuth)
-    if mode == modes.PROGRAM and u.gap and obstacle == modes.BEFORE_PROGRAM:
-        return modes.PROGRAM_GAP, flag
+    if mode == Mode.PROGRAM and u.gap and obstacle == Reason.BEFORE_PROGRAM:
+        return Reason.PROGRAM_GAP, flag
     return obstacle, flag

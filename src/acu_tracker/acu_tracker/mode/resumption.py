@@ -4,6 +4,7 @@ import math
 import numpy as np
 
 from acu_tracker import modes
+from acu_tracker.modes import Mode
 from pedestal_common.compiled import compiled
 
 RESUMPTION = np.dtype([('mode', 'i8'), ('until', 'f8')], align=True)
@@ -22,7 +23,7 @@ def initialise(s):
 def mode_after(s, mode, last, stamp, resume_time):
     """The mode after a silence from the stamp `last` to `stamp` [s]: it goes on, or is STANDBY after resume_time."""
     if stamp > last + resume_time:
-        return modes.STANDBY
+        return Mode.STANDBY
     if stamp - last > DRIVE_RESTART:
         s.mode, s.until = mode, last + resume_time
     return mode
@@ -43,7 +44,7 @@ def pending(s, stamp, ended, locked, before):
         return modes.NO_REQUEST
     if not ended:
         return before
-    return modes.PROGRAM if s.mode == modes.AUTOTRACK and not locked else s.mode
+    return Mode.PROGRAM if s.mode == Mode.AUTOTRACK and not locked else s.mode
 
 
 @compiled

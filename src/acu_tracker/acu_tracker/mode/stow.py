@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode, Reason
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 
@@ -46,17 +46,17 @@ def failed(code, i):
 def obstacle(s, fitted, code):
     """NONE, or the reason why the axes must not move. fitted: 1 where there are pins; code: of adu/stow_pins."""
     if not fitted:
-        return modes.NONE
+        return Reason.NONE
     if failed(code, 0) or failed(code, 1):
-        return modes.PIN_FAILED
-    return modes.NONE if code == BOTH_OUT and s.asked != IN else modes.PINNED
+        return Reason.PIN_FAILED
+    return Reason.NONE if code == BOTH_OUT and s.asked != IN else Reason.PINNED
 
 
 @compiled
 def rests(s, fitted, code, mode):
     """Whether the mode commands no motion."""
-    return (mode == modes.STANDBY or mode == modes.UNSTOW
-            or (mode == modes.STOW and obstacle(s, fitted, code) != modes.NONE))
+    return (mode == Mode.STANDBY or mode == Mode.UNSTOW
+            or (mode == Mode.STOW and obstacle(s, fitted, code) != Reason.NONE))
 
 
 @compiled
@@ -79,16 +79,16 @@ def step(s, c, u, mode):
     """Ask of the pins what the mode needs; whether mode stow has them in. c, u: records of control_unit.CONSTANTS and
     of signals.INPUTS."""
     t = u.stamp
-    if mode == modes.UNSTOW:
+    if mode == Mode.UNSTOW:
         _ask(s, OUT, t)
-    elif mode == modes.STOW:
+    elif mode == Mode.STOW:
         if u.pins == BOTH_OUT and not _at_rest(c, u):
             s.off = t
         elif u.pins != BOTH_OUT or t - s.off >= SETTLED:
             _ask(s, IN, t)
     else:
         s.off = t
-    return mode == modes.STOW and u.pins == BOTH_IN
+    return mode == Mode.STOW and u.pins == BOTH_IN
 
 
 @compiled

@@ -1,6 +1,6 @@
 """The faults that the control unit latches itself until they are reset, and what they mean to its modes."""
-from acu_tracker import modes
 from acu_tracker.alarms import annunciator, table
+from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
 
 MOVES_UNASKED, FROZEN, DIVERGED = (table.INDEX[name] for name in ('moves unasked', 'drive frozen', 'diverged'))
@@ -26,10 +26,10 @@ def obeys(s):
 def distrust(ready, moves_unasked, frozen):
     """NONE, or why a drive, ready or not, is not trusted with a mode."""
     if moves_unasked:
-        return modes.MOVES_UNASKED
+        return Reason.MOVES_UNASKED
     if frozen:
-        return modes.DRIVE_FROZEN
-    return modes.NONE if ready else modes.DRIVE_NOT_READY
+        return Reason.DRIVE_FROZEN
+    return Reason.NONE if ready else Reason.DRIVE_NOT_READY
 
 
 @compiled

@@ -50,7 +50,7 @@ class Desk:
     def unshelve(self, name):
         """The Reply to taking the alarm of a name back."""
         i = _index(name)
-        if annunciator.put(self.alarms, i, machine.UNSHELVE, self._state['stamp']):
+        if annunciator.put(self.alarms, i, machine.Event.UNSHELVE, self._state['stamp']):
             return Reply(True, f'{table.NAMES[i]} is back')
         return Reply(False, f'refused: {table.NAMES[i]} is not shelved')
 

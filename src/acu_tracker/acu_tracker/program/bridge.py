@@ -10,6 +10,7 @@ import numpy as np
 
 from acu_tracker.geometry.motion import LineOfSight, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Vector, cross, dot, vector
+from acu_tracker.modes import Reason
 from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
 
@@ -27,7 +28,7 @@ LIKE_PROGRAM = math.cos(math.radians(3.0))
 def begin(b, program, t, u):
     """Find the rotation that puts the program at the ENU unit vector u at t [s]; not valid beyond LIKE_PROGRAM."""
     b.valid = 0
-    if program_track.status(program, t) == program_track.NONE:
+    if program_track.status(program, t) == Reason.NONE:
         v = program_track.direction(program, t)
         b.cos = dot(v, u)
         b.valid = b.cos > LIKE_PROGRAM

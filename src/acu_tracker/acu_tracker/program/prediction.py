@@ -10,7 +10,7 @@ import typing
 
 import numpy as np
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import sun
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from pedestal_common.geometry import orbit
@@ -93,16 +93,16 @@ class Predictor:
     def satellite(self, stamp) -> Predicted:
         """The Predicted of the satellite for a stamp [s]."""
         if self._satellite is None or not self._known:
-            return Predicted(NO_TRACK, modes.NO_ELEMENTS if self._known else modes.NO_UTC)
+            return Predicted(NO_TRACK, Reason.NO_ELEMENTS if self._known else Reason.NO_UTC)
         interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / PER_ORBIT, 1), 1.0)
         if abs(self._age(stamp)) > self.parameters.oldest:
-            return Predicted(NO_TRACK, modes.TOO_OLD, stamp, stamp + ROWS * interval)
+            return Predicted(NO_TRACK, Reason.TOO_OLD, stamp, stamp + ROWS * interval)
         return _table(self._satellite_angles, stamp, interval)
 
     def sun(self, stamp) -> Predicted:
         """The Predicted of the sun for a stamp [s]."""
         if not self._known:
-            return Predicted(NO_TRACK, modes.NO_UTC)
+            return Predicted(NO_TRACK, Reason.NO_UTC)
         return _table(self._sun_angles, stamp, SUN_INTERVAL)
 
     def told(self, stamp):
@@ -114,12 +114,12 @@ class Predictor:
 
     def explained(self, mode, reason, stamp):
         """What a refusal of a mode for a reason at a stamp [s] should say beside it; '' for nothing."""
-        if reason == modes.NO_UTC:
+        if reason == Reason.NO_UTC:
             return 'say `prediction.start_time`'
-        if reason == modes.TOO_OLD:
+        if reason == Reason.TOO_OLD:
             return f'they are {abs(self._age(stamp)):.1f} days off, {self.parameters.oldest:g} are allowed'
-        if reason == modes.BELOW_HORIZON:
-            rises = _next_rise(self._satellite_angles if mode == modes.TLE else self._sun_angles, stamp)
+        if reason == Reason.BELOW_HORIZON:
+            rises = _next_rise(self._satellite_angles if mode == Mode.TLE else self._sun_angles, stamp)
             if math.isnan(rises):
                 return f'it does not rise within {SEARCHED / DAY:g} days'
             return f'it rises at {orbit.iso(*self._julian(rises))}'
@@ -165,10 +165,10 @@ def _table(angles_at, stamp, interval):
     try:
         angles = angles_at(times)
     except TargetError:
-        return Predicted(NO_TRACK, modes.NO_ELEMENTS)
+        return Predicted(NO_TRACK, Reason.NO_ELEMENTS)
     late = np.arange(ROWS // 2, ROWS * 19 // 20)
     down = late[angles[late, 1] < 0.0]
-    return Predicted(ProgramTrack(times, angles), modes.NONE, float(times[0]),
+    return Predicted(ProgramTrack(times, angles), Reason.NONE, float(times[0]),
                      float(times[down[-1] if down.size else late[-1]]))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.motion import AxisMotion, Motion, angles, normalised, north_west_up
 from acu_tracker.geometry.vector import Vector
-from acu_tracker.modes import AFTER_PROGRAM, BEFORE_PROGRAM, NO_PROGRAM, NONE
+from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_direction, wrap
@@ -55,10 +55,10 @@ def checked(times, angles):
 def status(program, t):
     """NONE if the program covers t [s], otherwise the reason (of modes.REASONS)."""
     if len(program.times) < 2:
-        return NO_PROGRAM
+        return Reason.NO_PROGRAM
     if t < program.times[0]:
-        return BEFORE_PROGRAM
-    return NONE if t <= program.times[-1] else AFTER_PROGRAM
+        return Reason.BEFORE_PROGRAM
+    return Reason.NONE if t <= program.times[-1] else Reason.AFTER_PROGRAM
 
 
 @compiled

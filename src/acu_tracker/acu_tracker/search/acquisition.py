@@ -17,10 +17,11 @@ import numpy as np
 
 from acu_tracker.search import level, pattern, place, side_lobe, slope_check, step_track
 from acu_tracker.search.pattern import Area, Point
+from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 
 PHASES = ('settle', 'look around', 'peak', 'check', 'checked', 'wrong slope')
-SETTLE, LOOK, PEAK, CHECK, CHECKED, WRONG = range(len(PHASES))
+Phase = codes(PHASES)
 
 ACQUISITION = np.dtype([
     ('level', level.LEVEL), ('slopes', slope_check.SLOPES), ('step_track', step_track.STEP_TRACK),
@@ -154,7 +155,7 @@ def begin_acquire(s, t):
     """Acquire from t [s] on what is at the centre."""
     s.began, s.looks, s.peaks, s.doubts = t, 0, 0, 0
     s.levels[:] = -math.inf
-    _enter(s, SETTLE, t)
+    _enter(s, Phase.SETTLE, t)
 
 
 @compiled
@@ -167,23 +168,23 @@ def acquire(s, p, beamwidth, t, distance):
     """Bring acquire to t [s]; distance: measured range of the target [m], NaN where there is none. p: record of
     AcquisitionParameters."""
     settled = t - s.since >= LAGS * p.time_constant
-    if s.phase == SETTLE and settled:
+    if s.phase == Phase.SETTLE and settled:
         s.levels[0] = s.level.z
         axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, distance)
         main = p.expected_dbhz > 0.0 and not side_lobe.suspected(s.level.z, axis)
         if main or s.looks >= MOST_LOOKS:
             _peak(s, t)
         else:
-            _enter(s, LOOK, t)
+            _enter(s, Phase.LOOK_AROUND, t)
             s.look, s.looks = 1, s.looks + 1
-    elif (s.phase == LOOK or s.phase == PEAK) and settled:
+    elif (s.phase == Phase.LOOK_AROUND or s.phase == Phase.PEAK) and settled:
         s.levels[s.look] = s.level.z
         s.look, s.since = s.look + 1, t
-        if s.phase == LOOK and s.look > side_lobe.PLACES:
+        if s.phase == Phase.LOOK_AROUND and s.look > side_lobe.PLACES:
             _go_to_best(s, beamwidth, t)
-        elif s.phase == PEAK and s.look >= len(SIDES):
+        elif s.phase == Phase.PEAK and s.look >= len(SIDES):
             _go_to_peak(s, beamwidth, t)
-    elif s.phase == CHECK and t - s.since >= TURNS * PERIOD:
+    elif s.phase == Phase.CHECK and t - s.since >= TURNS * PERIOD:
         _judge(s, t)
 
 
@@ -195,14 +196,14 @@ def _go_to_best(s, beamwidth, t):
     s.centre[0] += x
     s.centre[1] += e
     if chosen != 0:
-        _enter(s, SETTLE, t)
+        _enter(s, Phase.SETTLE, t)
     else:
         _peak(s, t)
 
 
 @compiled
 def _peak(s, t):
-    _enter(s, PEAK, t)
+    _enter(s, Phase.PEAK, t)
     s.look, s.peaks = 1, s.peaks + 1
 
 
@@ -217,7 +218,7 @@ def _go_to_peak(s, beamwidth, t):
     if far and s.peaks < MOST_PEAKS:
         _peak(s, t)
     else:
-        _enter(s, CHECK, t)
+        _enter(s, Phase.CHECK, t)
         slope_check.restart(s.slopes)
 
 
@@ -230,11 +231,11 @@ def _judge(s, t):
         # curve, and fit together for the filter.
         s.centre[0] += s.slopes.e[0]
         s.centre[1] += s.slopes.e[1]
-        s.phase = CHECKED
+        s.phase = Phase.CHECKED
     elif verdict == slope_check.WRONG:
         s.doubts += 1
         if s.doubts > 1:
-            s.phase = WRONG
+            s.phase = Phase.WRONG_SLOPE
         else:
             s.peaks = 0
             _peak(s, t)
@@ -244,13 +245,13 @@ def _judge(s, t):
 def acquired(s, beamwidth, t):
     """Point of the beam at t [s] in cross-elevation and elevation."""
     x, e = s.centre[0], s.centre[1]
-    if s.phase == LOOK:
+    if s.phase == Phase.LOOK_AROUND:
         aside, up = side_lobe.place(s.look, beamwidth)
         return Point(x + aside, e + up, 0.0, 0.0)
-    if s.phase == PEAK:
+    if s.phase == Phase.PEAK:
         aside, up = SIDES[s.look]
         return Point(x + aside * beamwidth, e + up * beamwidth, 0.0, 0.0)
-    if s.phase != CHECK:
+    if s.phase != Phase.CHECK:
         return Point(x, e, 0.0, 0.0)
     c = pattern.circle(CIRCLE * beamwidth, PERIOD, t - s.since)
     return Point(x + c.x, e + c.y, c.dx, c.dy)
@@ -260,7 +261,7 @@ def acquired(s, beamwidth, t):
 def take_error(s, expected, error):
     """Take an error of the receiver while the slopes are checked; expected: offset of the target's expected place from
     the beam when it was measured, both (cross-elevation, elevation) [rad]."""
-    if s.phase == CHECK:
+    if s.phase == Phase.CHECK:
         slope_check.take(s.slopes, expected, error)
 
 
@@ -268,5 +269,5 @@ def take_error(s, expected, error):
 def failed(s, p, t):
     """Whether acquire gives up at t [s]: no signal at the centre any more, or no end within the timeout. p: record of
     AcquisitionParameters."""
-    settled = s.phase != LOOK and s.phase != PEAK and t - s.since > LAGS * p.time_constant
+    settled = s.phase != Phase.LOOK_AROUND and s.phase != Phase.PEAK and t - s.since > LAGS * p.time_constant
     return t - s.began > p.timeout or (settled and s.level.below_loss >= p.loss_time)

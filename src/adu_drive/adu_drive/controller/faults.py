@@ -2,6 +2,7 @@
 import typing
 
 from adu_drive.plant import thermal
+from pedestal_common.codes import bits
 from pedestal_common.compiled import inlined
 
 
@@ -32,11 +33,10 @@ FAULTS = (
     Fault('stow pin', 'a stow pin is not where it was sent within `pins.timeout`', ('pins.timeout',)),
 )
 """Bit i of a fault word stands for FAULTS[i]."""
-(OVERCURRENT, OVERSPEED, DISAGREEMENT, FOLLOWING, OVERTEMPERATURE, MOTOR_1_LOST, MOTOR_2_LOST, FINAL_LIMIT,
- EMERGENCY_LIMIT, STOW_PIN) = (1 << i for i in range(len(FAULTS)))
-MOTORS_LOST = MOTOR_1_LOST | MOTOR_2_LOST
+Bit = bits([fault.name for fault in FAULTS])
+MOTORS_LOST = Bit.MOTOR_1_LOST | Bit.MOTOR_2_LOST
 ALL = (1 << len(FAULTS)) - 1
-_DROPS = OVERCURRENT | FINAL_LIMIT | EMERGENCY_LIMIT
+_DROPS = Bit.OVERCURRENT | Bit.FINAL_LIMIT | Bit.EMERGENCY_LIMIT
 _STOPS = sum(1 << i for i, fault in enumerate(FAULTS) if fault.stops)
 
 
@@ -70,7 +70,7 @@ def late(periods, error, limit):
 @inlined
 def lost(motors):
     """Fault word of the motors (2,) whose amplifiers are off."""
-    return (MOTOR_1_LOST if motors[0] else 0) | (MOTOR_2_LOST if motors[1] else 0)
+    return (Bit.MOTOR_1_LOST if motors[0] else 0) | (Bit.MOTOR_2_LOST if motors[1] else 0)
 
 
 @inlined
@@ -78,9 +78,9 @@ def at_end(theta, omega, c):
     """Fault word of the switches behind the ends of travel, with the load at theta [rad] at a rate omega [rad/s]."""
     bits = 0
     if theta > c.final_high and omega > OUTWARDS or theta < c.final_low and omega < -OUTWARDS:
-        bits |= FINAL_LIMIT
+        bits |= Bit.FINAL_LIMIT
     if theta > c.emergency_high or theta < c.emergency_low:
-        bits |= EMERGENCY_LIMIT
+        bits |= Bit.EMERGENCY_LIMIT
     return bits
 
 
@@ -94,13 +94,13 @@ def detected(current_2, omega, disagreement, late_periods, heat, latched, c):
     """
     bits = 0
     if current_2 > c.current_2:
-        bits |= OVERCURRENT
+        bits |= Bit.OVERCURRENT
     if omega > c.omega:
-        bits |= OVERSPEED
+        bits |= Bit.OVERSPEED
     if abs(disagreement) > c.disagreement:
-        bits |= DISAGREEMENT
+        bits |= Bit.ENCODER_DISAGREEMENT
     if late_periods >= c.late_periods:
-        bits |= FOLLOWING
-    if heat > (min(thermal.WARM, c.heat) if latched & OVERTEMPERATURE else c.heat):
-        bits |= OVERTEMPERATURE
+        bits |= Bit.FOLLOWING_ERROR
+    if heat > (min(thermal.WARM, c.heat) if latched & Bit.OVERTEMPERATURE else c.heat):
+        bits |= Bit.OVERTEMPERATURE
     return bits

@@ -18,7 +18,7 @@ import pathlib
 import numpy as np
 
 from acu_tracker.estimation.filters.kinds import KINDS
-from acu_tracker.modes import AUTOTRACK, STANDBY
+from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import RANGE
 from pedestal_analysis.reprocess import recompute, what_if
@@ -148,7 +148,7 @@ class Simulated:
         parts = []
         for seed in seeds:
             run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
-            on = run['acu/mode'] != STANDBY if self.any_mode else run['acu/mode'] == AUTOTRACK
+            on = run['acu/mode'] != Mode.STANDBY if self.any_mode else run['acu/mode'] == Mode.AUTOTRACK
             start = run.t[on][0] + SETTLING if on.any() else math.inf
             settled = on & (run.t >= start)
             parts.append((run.steps[settled], run.truth[settled]))

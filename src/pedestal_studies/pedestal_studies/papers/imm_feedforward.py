@@ -15,7 +15,7 @@ import numpy as np
 
 from acu_tracker.estimation.filters.motion_models import MODELS
 from acu_tracker.estimation.params import FilterParameters
-from acu_tracker.modes import AUTOTRACK
+from acu_tracker.modes import Mode
 from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
@@ -91,7 +91,7 @@ def driven(item):
     record = DRIVE_CASES[name].with_seed(seed).run()
     record = record.where(record.t >= DRIVE_START)
     error = record.truth['error'][:, list(REVERSALS).index(name.partition('/')[0])]
-    return record.t, error if np.all(record['acu/mode'] == AUTOTRACK) else np.full_like(error, math.nan)
+    return record.t, error if np.all(record['acu/mode'] == Mode.AUTOTRACK) else np.full_like(error, math.nan)
 
 
 def driven_measures(item):

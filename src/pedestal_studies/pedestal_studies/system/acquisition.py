@@ -11,7 +11,7 @@ import math
 import numpy as np
 from scipy.stats import beta
 
-from acu_tracker import modes
+from acu_tracker.modes import Mode
 from acu_tracker.search.params import SearchParameters
 from acu_tracker.search.pattern import PATTERNS, SPIRAL, SQUARE
 from pedestal_analysis.report.figures import FILTERED
@@ -81,7 +81,7 @@ def offset(pattern, rng, beamwidth=0.0175):
 def tracked_after(run, from_loss):
     """Time [s] from the start, or from the first loss of the signal in autotrack, until the target is tracked for
     good; NaN where it is not at the end."""
-    tracked = (run[MODE] == modes.AUTOTRACK) & np.isfinite(run[ERRORS]['vector'][:, 0])
+    tracked = (run[MODE] == Mode.AUTOTRACK) & np.isfinite(run[ERRORS]['vector'][:, 0])
     if not tracked[-1]:
         return math.nan
     bad = np.flatnonzero(~tracked)

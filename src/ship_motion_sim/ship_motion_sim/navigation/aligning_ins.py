@@ -128,21 +128,21 @@ def measure(c, s, stamp_ns, rate, force):
 @compiled
 def step(s, c, i, out, normals):
     """Take one IMU message, as ins.step does; the first three of the normals (NORMALS,) are the aid's noise."""
-    out.status, out.due = ins.OK, 0
+    out.status, out.due = ins.Status.OK, 0
     if i.stamp_ns <= s.last_stamp_ns:
-        out.status = ins.BAD_STAMP
+        out.status = ins.Status.BAD_STAMP
         return
     s.last_stamp_ns = i.stamp_ns
     for n in range(3):
         if not (math.isfinite(i.angular_velocity[n]) and math.isfinite(i.linear_acceleration[n])):
-            out.status = ins.BAD_IMU
-    if out.status == ins.OK:
+            out.status = ins.Status.BAD_IMU
+    if out.status == ins.Status.OK:
         if s.measured - s.released == RING:
             s.released += 1
-            out.status = ins.BUFFER_FULL
+            out.status = ins.Status.BUFFER_FULL
         measure_aid(c, s, i.stamp_ns, normals)
         if not integrate(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration):
-            out.status = ins.ATTITUDE_LOST
+            out.status = ins.Status.ATTITUDE_LOST
         measure(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration)
     if s.released == 0:
         out.stage = navigator.ALIGNING

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import quaternion
 from ship_motion_sim import earth, imu
@@ -16,10 +17,13 @@ from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
 
 NORMALS = 9     # standard normals a step takes: three wander, three attitude, three rate
-STATUS = ('ok', 'stamp does not advance', 'IMU data are not finite',
-          'IMU disagrees with the ship parameters of the INS', 'more samples than the latency buffer holds',
-          'IMU was silent for too long, the attitude is lost: it aligns anew')
-OK, BAD_STAMP, BAD_IMU, IMU_DISAGREES, BUFFER_FULL, ATTITUDE_LOST = range(len(STATUS))
+STATUS_TEXTS = dict(
+    OK='ok', BAD_STAMP='stamp does not advance', BAD_IMU='IMU data are not finite',
+    IMU_DISAGREES='IMU disagrees with the ship parameters of the INS',
+    BUFFER_FULL='more samples than the latency buffer holds',
+    ATTITUDE_LOST='IMU was silent for too long, the attitude is lost: it aligns anew')
+STATUSES = tuple(STATUS_TEXTS.values())
+Status = codes(STATUS_TEXTS)
 
 RING = 256      # samples under way: latency / step, the largest latency at 1 kHz
 NEVER = -2 ** 63
@@ -63,7 +67,7 @@ INPUTS = np.dtype([
 ], align=True)
 
 OUTPUTS = np.dtype([
-    ('status', 'i8'),                       # index into STATUS
+    ('status', 'i8'),                       # of Status
     ('due', 'i8'),                          # 1: the result below is new; 0: nothing to publish
     ('stamp_ns', 'i8'),                     # of the measurement
     ('quaternion', 'f8', (4,)),             # x, y, z, w, deck -> earth, with error
@@ -172,21 +176,21 @@ def step(s, c, i, out, normals):
     A stamp that does not advance changes nothing, and a message that is not finite is not measured; the status names
     either.
     """
-    out.status, out.due, out.stage = OK, 0, NO_STAGE
+    out.status, out.due, out.stage = Status.OK, 0, NO_STAGE
     if i.stamp_ns <= s.last_stamp_ns:
-        out.status = BAD_STAMP
+        out.status = Status.BAD_STAMP
         return
     wander(c, s, i.stamp_ns, normals)
     motion.truth(c.ship, 1e-9 * i.stamp_ns, s.truth)
     for n in range(3):
         if not (math.isfinite(i.angular_velocity[n]) and math.isfinite(i.linear_acceleration[n])):
-            out.status = BAD_IMU
-    if out.status == OK:
+            out.status = Status.BAD_IMU
+    if out.status == Status.OK:
         if disagrees(s.truth, c, i.angular_velocity):
-            out.status = IMU_DISAGREES
+            out.status = Status.IMU_DISAGREES
         if s.measured - s.released == RING:
             s.released += 1
-            out.status = BUFFER_FULL
+            out.status = Status.BUFFER_FULL
         measure(c, s, i.stamp_ns, i.linear_acceleration, normals)
     for n in range(3):
         out.noise[n], out.walk[n] = c.noise[n], c.walk[n]

@@ -1,0 +1,17 @@
+"""Codes of names: what is one of several, as a number that laws compare and topics carry."""
+import re
+from collections import namedtuple
+
+
+def codes(names):
+    """Return the place of each name among all, under that name in capitals: codes(('a b', 'c')).A_B is 0."""
+    return _named(names, range(len(names)))
+
+
+def bits(names):
+    """Return the bit of each name among all, named as in `codes`: bits(('a b', 'c')).C is 2."""
+    return _named(names, (1 << i for i in range(len(names))))
+
+
+def _named(names, numbers):
+    return namedtuple('Codes', [re.sub(r'\W', '_', name).upper() for name in names])(*numbers)
