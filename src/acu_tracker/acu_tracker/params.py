@@ -5,7 +5,7 @@ import math
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
 from acu_tracker.geometry.history import LENGTH
 from acu_tracker.lookahead.params import KeyholeParameters
-from acu_tracker.modes import FALLBACKS, MODES
+from acu_tracker.modes import FALLBACKS
 from acu_tracker.operating.verbs import POINTS_DOC, VERBS, points
 from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.search.params import AcquisitionParameters, SearchParameters, StepTrackParameters
@@ -25,6 +25,7 @@ from pedestal_common.geometry.blockage import sectors
 from pedestal_common.geometry.lever_arm import LeverArm
 from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import topic_flags
+from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
 from pedestal_common.wire.commands import SCHEDULE_DOC, schedule
 

@@ -4,10 +4,10 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.filters.motion_models import MODELS
-from acu_tracker.modes import TABLE
 from pedestal_common.codes import bits
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.modes import TABLE
 from pedestal_common.wire import inputs
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',

@@ -6,12 +6,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acu_tracker import control_unit, signals
-from acu_tracker.modes import MODES, REASONS
+from acu_tracker.modes import REASONS
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from acu_tracker.program.tables import Tables
 from acu_tracker.signals import INVALID_INPUTS
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import as_dict, build
 
 ASHORE = Rotation.from_quat(line_of_sight.ASHORE)

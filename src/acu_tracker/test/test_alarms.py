@@ -6,9 +6,10 @@ import pytest
 
 from acu_tracker import control_unit, signals
 from acu_tracker.alarms import annunciator, conditions, detectors, machine, report, table
-from acu_tracker.modes import MODES, Mode
+from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import ALARMS, DRIVE, JOINTS, Acu
+from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import build
 from pedestal_common.wire.commands import Command
 

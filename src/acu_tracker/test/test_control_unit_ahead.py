@@ -6,10 +6,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acu_tracker.lookahead import levelled_deck, planner
-from acu_tracker.modes import MODES, Mode
+from acu_tracker.modes import Mode
 from acu_tracker.operating import announcement
 from acu_tracker.program.program_track import NO_TRACK
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph.modes import MODES
 
 BEAMWIDTH = 0.0175
 SLOW = {'azimuth.shaper.rate': 0.1745, 'azimuth.limits.rate': 0.2, 'azimuth.shaper.acceleration': 0.35}

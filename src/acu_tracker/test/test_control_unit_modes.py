@@ -4,7 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.modes import MODES, REASONS, Mode, Reason
+from acu_tracker.modes import REASONS, Mode, Reason
+from pedestal_common.graph.modes import MODES
 
 
 def test_request_between_two_steps(Rig):

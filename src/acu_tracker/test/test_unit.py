@@ -2,11 +2,11 @@
 import numpy as np
 import pytest
 
-from acu_tracker.modes import MODES
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.unit import COMMAND, DRIVE, JOINTS, MODE, Acu
 from pedestal_common.graph import topics
+from pedestal_common.graph.modes import MODES
 from pedestal_common.wire import messages, records
 from pedestal_common.wire.commands import Command
 

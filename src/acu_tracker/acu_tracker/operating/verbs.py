@@ -6,8 +6,9 @@ import numpy as np
 from acu_tracker.alarms.annunciator import LONGEST_SHELVED
 from acu_tracker.geometry import direction
 from acu_tracker.guidance import manual
-from acu_tracker.modes import FALLBACKS, MODES, TABLE
+from acu_tracker.modes import FALLBACKS
 from acu_tracker.operating.authority import ROLES
+from pedestal_common.graph.modes import MODES, TABLE
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError
 from pedestal_common.wire.commands import Argument, Verb

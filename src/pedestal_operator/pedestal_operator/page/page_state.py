@@ -8,8 +8,8 @@ None).
 import json
 import math
 
-from acu_tracker.modes import TABLE
 from pedestal_common.graph import topics
+from pedestal_common.graph.modes import TABLE
 from pedestal_operator.page import page_sky
 
 RECEIVER, MOTORS, ATTITUDE = 'tracking_receiver/angle_error', 'adu/motor_states', 'ship/imu/data'

@@ -11,7 +11,7 @@ for that holds for them; only the receiver matters to them as it does to autotra
 """
 import typing
 
-from acu_tracker.modes import TABLE
+from pedestal_common.graph.modes import TABLE
 
 TENTH, HALF = 0.1, 0.5
 """Of the beamwidth of the antenna of the study [deg]."""

@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from acu_tracker.alarms import report
 from acu_tracker.alarms.table import NAMES
-from acu_tracker.modes import MODES
 from acu_tracker.program.prediction import Predictor
 from pedestal_analysis.report.figures import FILTERED, INK, RAW
 from pedestal_analysis.results.intervals import missed, row
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_common.graph.modes import MODES
 from pedestal_common.injection import table
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.fault_expectations import EXPECTED
