@@ -8,10 +8,11 @@ class Row(typing.NamedTuple):
 
     doc: what the axes do; entry: when it can be entered; exit: when it ends by itself. needs, ends: of the Conditions
     in acu_tracker.modes, the one without which it cannot be entered and the one without which it ends, '' for none.
-    follows: it follows a target through the sky, for which the deck's attitude must be known; by_level: it goes by the level of the signal about
-    the expected place of the target; fallback: the mode it falls back on when its target ends, of `program` the mode
-    whose table was followed last; handover: the mode it hands over to by itself, once that can be entered. Both are
-    names, '' for none. table: it follows a table of directions; pinned: the stow pins may be in.
+    follows: it follows a target through the sky, for which the deck's attitude must be known; by_level: it goes by the
+    level of the signal about the expected place of the target; fallback: the mode it falls back on when its target
+    ends, of `program` the mode whose table was followed last; handover: the mode it hands over to by itself, once that
+    can be entered. Both are names, '' for none. table: it follows a table of directions; pinned: the stow pins may be
+    in.
     predicted: the method of prediction.Predictor that makes its table; button: the page has one among the modes.
     """
     name: str
