@@ -19,9 +19,10 @@ PIP := -m pip --disable-pip-version-check install --quiet --use-pep517 --constra
 # Needs setuptools first; otherwise pip makes an environment for each package that it builds.
 BUILT_HERE := --no-build-isolation
 DEMO := bags/runs/demo
-# Graphs in realtime that are killed, frozen and cut, not beside other tests; the files that take longest come first.
-REALTIME := test/test_operating.py test/test_page.py test/test_supervision.py test/test_realtime.py \
-	test/test_field.py test/test_rotctld.py test/test_network.py test/test_live.py
+# Graphs in realtime that are killed, frozen and cut, not beside other tests; the files that take longest come first,
+# and before them those that share one (conftest.py).
+REALTIME := test/test_live.py test/test_rotctld.py test/test_page.py test/test_operating.py test/test_supervision.py \
+	test/test_realtime.py test/test_field.py test/test_network.py
 # Tests of laws, which lie beside their packages and start no graph. That of the compiler starts processes by the
 # dozen, and compiles.
 LAWS := $(foreach package,ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_common,src/$(package)) \

@@ -12,6 +12,10 @@ for number in (signal.SIGINT, signal.SIGHUP):
 
 STDERR = pytest.StashKey()
 
+STATION = ('test/test_live.py', 'test/test_rotctld.py', 'test/test_page.py')
+"""The files whose tests share the graph of the fixture station, in their order: the first finds it in standby, and the
+last kills a server of it, and ends it."""
+
 
 def pytest_addoption(parser):
     """The limit of pyproject.toml."""
@@ -21,6 +25,24 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     """Keep the standard error that is not captured."""
     config.stash[STDERR] = os.dup(2)
+
+
+def pytest_collection_modifyitems(items):
+    """The files of STATION come first, in their order."""
+    ranks = {file: rank - len(STATION) for rank, file in enumerate(STATION)}
+    items.sort(key=lambda item: ranks.get(item.nodeid.partition('::')[0], 0))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """A worker takes whole files, and those of STATION as one."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            return STATION if file in STATION else file
+    return Scheduling(config, log) if config.getvalue('dist') == 'loadfile' else None
 
 
 def _within_its_limit(item):

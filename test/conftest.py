@@ -7,6 +7,7 @@ import fcntl
 import os
 import pathlib
 import random
+import shutil
 import signal
 import socket
 import subprocess
@@ -16,7 +17,7 @@ import time
 import limited
 import numpy as np
 import pytest
-from shared import PEDESTAL
+from shared import PEDESTAL, begins_with, free_port
 
 FIRST_PORT = 22119
 """Port of domain id 0 in the scheme of ROS's domain_coordinator; binding it reserves the id for this session."""
@@ -375,9 +376,9 @@ class Client:
         self.context.try_shutdown()
 
 
-@pytest.fixture(scope='module')
-def connect():
-    """connect(domain_id, name='client') -> Client; by its name it can stand for a node of the graph."""
+@contextlib.contextmanager
+def _clients():
+    """Give what opens clients, and close them."""
     clients = []
     before = dict(os.environ)
     from pedestal_common.node import middleware
@@ -387,11 +388,86 @@ def connect():
         clients.append(Client(domain_id, name))
         return clients[-1]
 
-    yield open_client
-    for client in clients:
-        client.close()
-    os.environ.clear()
-    os.environ.update(before)
+    try:
+        yield open_client
+    finally:
+        for client in clients:
+            client.close()
+        os.environ.clear()
+        os.environ.update(before)
+
+
+@pytest.fixture(scope='module')
+def connect():
+    """connect(domain_id, name='client') -> Client; by its name it can stand for a node of the graph."""
+    with _clients() as open_client:
+        yield open_client
+
+
+@dataclasses.dataclass
+class Station:
+    """An antenna in realtime with a server for every other program. client: of its graph, and hears its mode and
+    joint states; ports: {server: number}; said: what was printed when it started."""
+    run: Run
+    client: Client
+    ports: dict
+    said: str
+
+    def recorded(self, topic):
+        """The messages of a topic in the file so far, once that holds what was said until now."""
+        from pedestal_common.graph import topics
+        from pedestal_common.wire import messages
+        from pedestal_recording import bag as bags
+        heard, copy = self.client.heard['joint_states'], self.run.bag.with_name('copy')
+        heard.clear()
+        self.client.until(lambda: heard)
+        now = messages.nanoseconds(heard[0].header.stamp)
+
+        def so_far():
+            shutil.copytree(self.run.bag, copy, dirs_exist_ok=True)
+            bag = bags.load(copy)
+            *_, (_, log_time, _, _) = bag.raw('joint_states')
+            return bag if log_time > now else None
+        raw = self.client.until(so_far).raw(topic)
+        return [messages.deserialize(data, topics.BY_NAME[topic].type) for *_, data in raw]
+
+    def asked(self):
+        """The commands that were replied to, as they are recorded."""
+        from pedestal_common.wire import commands
+        return [commands.of_reply(reply)[0] for reply in self.recorded('acu/command_result')]
+
+    def end(self):
+        """Ctrl-C; the servers have nothing to complain of."""
+        self.run.interrupt()
+        for name in ('foxglove', 'frames'):
+            assert _complaints((self.run.log / f'{name}.out').read_text()) == ''
+
+
+@pytest.fixture(scope='session')
+def station(reserve_domain, tmp_path_factory, patient):
+    """The Station of the files of conftest.STATION, which come in that order. It moves softly: where a busy machine
+    loses steps, a hard start looks like an encoder that jumps."""
+    ports = {server: free_port() for server in ('rotctld', 'page', 'foxglove')}
+    soft = (f'acu.{axis}.shaper.{limit}' for axis in ('azimuth', 'elevation')
+            for limit in ('rate=0.6', 'acceleration=2', 'jerk=100'))
+    changes = ('acu.initial_mode=standby', 'acu.tracker.handover=false', *soft)
+    run = _run('uav_flyby', ('--duration', '900', '--pacing', 'realtime', '--frames', *patient,
+                             *(word for server, port in ports.items() for word in (f'--{server}', port)),
+                             *(word for change in changes for word in ('--param', change))),
+               reserve_domain(), tmp_path_factory.mktemp('station'))
+    try:
+        with _clients() as connect:
+            said = begins_with(run.process, 6)
+            client = connect(run.domain_id)
+            for name in ('acu/mode', 'joint_states'):
+                client.read(name)
+            client.until(lambda: client.heard['joint_states'] and client.heard['acu/mode'])
+            made = Station(run, client, ports, said)
+            yield made
+            if run.process.poll() is None:
+                made.end()
+    finally:
+        run.kill()
 
 
 @pytest.fixture

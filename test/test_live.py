@@ -88,17 +88,9 @@ class Viewer:
 
 
 @pytest.fixture(scope='module')
-def graph(start_run, connect):
-    """(Run, Client, port of its WebSocket) of an antenna in standby."""
-    port = free_port()
-    run = start_run('uav_flyby', '--duration', '600', '--pacing', 'realtime', '--foxglove', str(port), '--frames',
-                    '--param', 'acu.initial_mode=standby', '--param', 'acu.tracker.handover=false')
-    client = connect(run.domain_id)
-    for name in ('acu/mode', 'joint_states'):
-        client.read(name)
-    client.until(lambda: client.heard['joint_states'] and client.heard['acu/mode'])
-    yield run, client, port
-    run.interrupt()
+def graph(station):
+    """(Run, Client, port of its WebSocket)."""
+    return station.run, station.client, station.ports['foxglove']
 
 
 @pytest.fixture
@@ -201,7 +193,7 @@ def test_a_program_track_is_taken_once_whether_its_writer_latches_or_not(graph):
     kind = middleware.message_class('trajectory_msgs/msg/JointTrajectory')
     writers = [client.node.create_publisher(kind, TRACK, profile) for profile in (10, middleware.qos('once'))]
     for count, writer in enumerate(writers, 1):
-        client.until(lambda writer=writer: writer.get_subscription_count() >= 3)        # ACU, recorder, live
+        client.until(lambda writer=writer: writer.get_subscription_count() >= 4)  # ACU, recorder, page, live
         time.sleep(0.3)                                                # the readers' side of the discovery
         writer.publish(messages.serialize(track((9.0, 9.0), (float('nan'), 9.0))))
         client.until(lambda count=count: refusals(run) >= count)
@@ -224,15 +216,9 @@ def test_a_viewer_of_its_own_ends_when_told_to(graph, start_process):
     assert (process.returncode, errors) == (0, '') and f'ws://127.0.0.1:{own}' in output
 
 
-def test_the_recording_has_every_track_once(graph, complaints):
+def test_the_recording_has_every_track_once(station):
     """That of the scenario, and two that were refused."""
-    run, _, _ = graph
-    run.interrupt()
-    tracks = [messages.deserialize(data, 'trajectory_msgs/msg/JointTrajectory')
-              for _, _, _, data in bags.read(run.bag).raw(TRACK)]
-    assert [len(one.points) for one in tracks][1:] == [2, 2]
-    for name in ('foxglove', 'frames'):
-        assert complaints((run.log / f'{name}.out').read_text()) == ''
+    assert [len(track.points) for track in station.recorded(TRACK)][1:] == [2, 2]
 
 
 @pytest.mark.parametrize(('options', 'said'), (

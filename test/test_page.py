@@ -12,40 +12,26 @@ import socket
 import statistics
 import subprocess
 import sys
-import threading
 import time
 import urllib.parse
 
 import limited
 import pytest
-from shared import PEDESTAL, free_port
+from shared import PATIENCE, PEDESTAL, begins_with, free_port
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect as connect_web_socket
 
-from pedestal_common.wire import commands, messages
+from pedestal_common.wire import commands
 from pedestal_recording import bag as bags
 
 CHROMIUM = shutil.which('chromium')
 REFERENCE = pathlib.Path(__file__).parents[1] / 'bags' / 'reference' / 'uav_flyby'
-PATIENCE = 120.0
-"""Seconds for what takes one or two on a quiet machine."""
-
 CHEAP = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-software-rasterizer', '--disable-dev-shm-usage',
          '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-default-apps',
          '--disable-extensions', '--disable-sync', '--disable-quic', '--mute-audio')
 """Options of a Chromium that does nothing but show pages."""
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason='chromium is not installed')
-
-
-def begins_with(process, count):
-    """The first lines that a process writes; one that does not is killed, which ends them."""
-    timer = threading.Timer(PATIENCE, limited.kill_tree, (process,))
-    timer.start()
-    try:
-        return ''.join(process.stdout.readline() for _ in range(count))
-    finally:
-        timer.cancel()
 
 
 class Site:
@@ -262,17 +248,16 @@ def test_a_recording_on_the_page(browser, start_process):
 
 
 @pytest.fixture(scope='module')
-def station(start_run, connect, patient):
-    """(Run, Client of its graph, Site of its page) of an antenna in standby."""
-    run = start_run('uav_flyby', '--duration', '900', '--pacing', 'realtime', '--page', str(free_port()),
-                    '--param', 'acu.initial_mode=standby', '--param', 'acu.tracker.handover=false', *patient)
-    site = Site(begins_with(run.process, 3))
-    client = connect(run.domain_id)
-    for name in ('acu/mode', 'joint_states', 'acu/command_result'):
-        client.read(name)
-    client.until(lambda: client.heard['joint_states'] and client.heard['acu/mode'])
-    yield run, client, site
-    run.interrupt()
+def antenna(station):
+    """(Run, Client of its graph, Site of its page); not even a serial line, which nobody closes, is in control."""
+    station.client.read('acu/command_result')
+    site = Site(station.said)
+    with site.open('supervisor', 'dora') as page:
+        for verb, arguments in (('take', {'role': 'supervisor'}), ('release', {})):
+            page.send(json.dumps({'ask': verb, 'arguments': arguments}))
+            assert hear(page, reply(verb))[0]['granted']
+    yield station.run, station.client, site
+    station.end()
 
 
 def mode(client):
@@ -310,9 +295,9 @@ def rates(client):
 
 
 @needs_chromium
-def test_an_operator_at_the_page(station, browser):
+def test_an_operator_at_the_page(antenna, browser):
     """Modes, preset, control, a greyed button's reason, an alarm acknowledged; nothing is asked of elsewhere."""
-    run, client, site = station
+    run, client, site = antenna
     requests = []
     page = opened(browser[1], site.urls['operator'], requests)
     reads(page, '#link', 'live')
@@ -346,10 +331,10 @@ def test_an_operator_at_the_page(station, browser):
     page.context.close()
 
 
-def test_ten_pages_that_never_read_cost_the_control_unit_no_step(station):
+def test_ten_pages_that_never_read_cost_the_control_unit_no_step(antenna):
     """Steps for which the drive had no command, in spans without and with such pages by turns, once these have what
     they are sent unread: the difference of the shares is not above its own scatter, which is the machine's."""
-    _, client, site = station
+    _, client, site = antenna
     client.read('diagnostics')
 
     def drive():
@@ -388,9 +373,9 @@ def last_rate(client):
     return commands.of_reply(heard[-1])[0] if heard else None
 
 
-def test_a_jog_ends_with_its_page_or_its_silence(station):
+def test_a_jog_ends_with_its_page_or_its_silence(antenna):
     """Held on a web socket: while it is repeated the axis moves; silent but open, late, or gone, it stands."""
-    _, client, site = station
+    _, client, site = antenna
 
     def hold(page):
         hear(page, lambda message: message.get('now'))
@@ -412,9 +397,9 @@ def test_a_jog_ends_with_its_page_or_its_silence(station):
 
 
 @needs_chromium
-def test_a_jog_ends_with_its_browser(station, browser):
+def test_a_jog_ends_with_its_browser(antenna, browser):
     """Chromium is killed while the button is held: the page can no longer do anything about it."""
-    _, client, site = station
+    _, client, site = antenna
     page = opened(browser[1], site.urls['operator'])
     reads(page, '#link', 'live')
     holds(page, '() => document.querySelector("[data-jog=\\"1 0\\"]").ariaDisabled === "false"')
@@ -429,8 +414,8 @@ def test_a_jog_ends_with_its_browser(station, browser):
     assert mode(client) == 'rate'
 
 
-def test_the_antenna_tracks_on_when_the_server_is_killed(station):
-    run, client, site = station
+def test_the_antenna_tracks_on_when_the_server_is_killed(antenna):
+    run, client, site = antenna
     with site.open(name='carla') as page:
         hear(page, lambda message: message.get('told', {}).get('present'))
         page.send(json.dumps({'ask': 'program', 'id': 3}))
@@ -453,9 +438,4 @@ def _arguments(process):
 
 
 def test_the_recording_says_who_asked_at_which_page(station):
-    run, _, _ = station
-    run.interrupt()
-    told = {command.who: command.verb for command in (
-        commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus'))[0]
-        for *_, data in bags.read(run.bag).raw('acu/command_result'))}
-    assert {'bert@page 127.0.0.1', 'carla@page 127.0.0.1'} <= set(told)
+    assert {'bert@page 127.0.0.1', 'carla@page 127.0.0.1'} <= {command.who for command in station.asked()}

@@ -15,10 +15,6 @@ import time
 import pytest
 from shared import free_port
 
-from pedestal_common.graph import topics
-from pedestal_common.wire import commands, messages
-from pedestal_recording import bag as bags
-
 ROTCTL = shutil.which('rotctl')
 _SPEC = importlib.util.spec_from_file_location('rotator_gpredict',
                                                pathlib.Path(__file__).parents[1] / 'docs' / 'rotator' / 'gpredict.py')
@@ -27,22 +23,12 @@ _SPEC.loader.exec_module(gpredict)
 
 
 @pytest.fixture(scope='module')
-def station(start_run, connect, patient):
-    """(Run, Client of its graph, port of its rotctld) of an antenna in standby, which moves softly: where a busy
-    machine loses steps, a hard start looks like an encoder that jumps."""
-    port = free_port()
-    soft = (f'acu.{axis}.shaper.{name}' for axis in topics.AXES for name in ('rate=0.6', 'acceleration=2', 'jerk=100'))
-    changes = ('acu.initial_mode=standby', 'acu.tracker.handover=false', *soft)
-    run = start_run('uav_flyby', '--duration', '600', '--pacing', 'realtime', '--rotctld', str(port), *patient,
-                    *(word for change in changes for word in ('--param', change)))
-    client = connect(run.domain_id)
-    for name in ('acu/mode', 'joint_states'):
-        client.read(name)
-    client.until(lambda: client.heard['joint_states'] and client.heard['acu/mode'])
+def antenna(station):
+    """(Run, Client of its graph, port of its rotctld)."""
+    client, port = station.client, station.ports['rotctld']
     with connected(port) as probe:
         client.until(lambda: b'no control unit' not in ask(probe, '_') and b'-' not in ask(probe, 'p'), 60.0)
-    yield run, client, port
-    run.interrupt()
+    return station.run, client, port
 
 
 def connected(port):
@@ -73,9 +59,9 @@ def granted(connection, line):
 @pytest.mark.parametrize(('command', 'code', 'said'), (
     (('P', '20', '40'), 0, ''), (('p',), 0, None), (('P', '20', '200'), 2, 'Invalid parameter'), (('S',), 0, ''),
     (('M', 'CW', '50'), 0, ''), (('S',), 0, ''), (('K',), 0, ''), (('R', '1'), 0, ''), (('_',), 0, 'pedestal')))
-def test_hamlibs_client_is_served(station, command, code, said):
+def test_hamlibs_client_is_served(antenna, command, code, said):
     """Asked again where a busy machine keeps the control unit from replying in time."""
-    _, _, port = station
+    _, _, port = antenna
     for _ in range(5):
         done = subprocess.run([ROTCTL, '-m', '2', '-r', f'127.0.0.1:{port}', *command], capture_output=True, text=True,
                               timeout=60.0)
@@ -88,8 +74,8 @@ def test_hamlibs_client_is_served(station, command, code, said):
         assert said in done.stdout + done.stderr
 
 
-def test_a_set_point_moves_the_antenna_from_standby(station):
-    _, client, port = station
+def test_a_set_point_moves_the_antenna_from_standby(antenna):
+    _, client, port = antenna
     with connected(port) as gpredict:
         assert granted(gpredict, 'P 30.00 45.00')
         client.until(lambda: client.heard['acu/mode'][-1].data == 'preset', 20.0)
@@ -104,9 +90,9 @@ def test_a_set_point_moves_the_antenna_from_standby(station):
         assert gpredict.recv(10) == b''
 
 
-def test_a_pass_through_north_in_set_points_is_met_without_unwinding(station):
+def test_a_pass_through_north_in_set_points_is_met_without_unwinding(antenna):
     """One each 0.8 s, azimuth 0 to 360, 1 deg/s through north; test_set_points says how evenly."""
-    _, client, port = station
+    _, client, port = antenna
     with connected(port) as gpredict:
         assert granted(gpredict, 'P 353.00 45.00')
         client.until(lambda: abs(client.heard['joint_states'][-1].position[0] + math.radians(7.0)) < 1e-3, 60.0)
@@ -121,9 +107,9 @@ def test_a_pass_through_north_in_set_points_is_met_without_unwinding(station):
 
 
 @pytest.mark.skipif(bool(gpredict.MISSING), reason=f'not installed: {", ".join(gpredict.MISSING)}')
-def test_gpredict_itself_points_at_a_satellite_that_passes(station, tmp_path):
+def test_gpredict_itself_points_at_a_satellite_that_passes(antenna, tmp_path):
     """Debian's, on a screen of its own; against sgp4."""
-    _, client, port = station
+    _, client, port = antenna
     with connected(port) as probe, contextlib.closing(gpredict.Gpredict(tmp_path, port)) as program:
         def away():
             azimuth, elevation = map(float, ask(probe, 'p').split())
@@ -136,8 +122,8 @@ def test_gpredict_itself_points_at_a_satellite_that_passes(station, tmp_path):
         assert client.heard['acu/mode'][-1].data == 'preset'
 
 
-def test_one_client_is_in_control_and_the_others_are_told_so(station):
-    _, _, port = station
+def test_one_client_is_in_control_and_the_others_are_told_so(antenna):
+    _, _, port = antenna
     with connected(port) as first, connected(port) as second:
         assert granted(first, 'P 10 40')
         assert ask(second, 'P 50 40') == b'RPRT -14\n' and b'\n' in ask(second, 'p')
@@ -148,8 +134,8 @@ def test_one_client_is_in_control_and_the_others_are_told_so(station):
         assert granted(second, 'P 12 40')
 
 
-def test_clients_that_misbehave_disturb_nobody(station):
-    _, _, port = station
+def test_clients_that_misbehave_disturb_nobody(antenna):
+    _, _, port = antenna
     mute = [connected(port) for _ in range(3)]
     for connection in mute:                                                 # Look4Sat never reads
         connection.sendall(b'p\n' * 20_000)
@@ -170,9 +156,9 @@ def test_clients_that_misbehave_disturb_nobody(station):
 
 
 @pytest.mark.skipif(ROTCTL is None, reason='rotctl is not installed (libhamlib-utils)')
-def test_easycomm_over_tcp_and_a_serial_device(station, start_process):
+def test_easycomm_over_tcp_and_a_serial_device(antenna, start_process):
     """Hamlib's models 201, 202 and 204, and a pair of pseudo terminals in the place of a serial line."""
-    run, client, _ = station
+    run, client, _ = antenna
     port, (end, device) = free_port(), pty.openpty()
     node = start_process([sys.executable, '-m', 'pedestal_operator.easycomm_node', '--ros-args', '-p', f'port:={port}',
                           '-p', f'device:={os.ttyname(device)}'], ROS_DOMAIN_ID=str(run.domain_id))
@@ -209,9 +195,6 @@ def _serial(end, line):
 
 
 def test_the_recording_says_who_moved_the_antenna(station):
-    run, _, _ = station
-    run.interrupt()
-    told = [commands.of_reply(messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticStatus'))[0]
-            for *_, data in bags.read(run.bag).raw('acu/command_result')]
+    told = station.asked()
     assert told and {command.who.split()[0] for command in told} <= {'rotctld', 'easycomm'}
     assert {'take', 'preset', 'stop', 'stow', 'rate', 'release'} <= {command.verb for command in told}

@@ -46,7 +46,7 @@ if __name__ == '__main__':
     print(sum(module.law.stats.cache_misses.values()))
 """
 
-TYPES = ('f8', 'f4', 'i8')
+TYPES = ('f8', 'f4')
 
 
 def environment(folder, cache):
@@ -71,8 +71,7 @@ def folder(tmp_path):
 
 
 def test_one_of_many_compiles(folder):
-    assert sorted(compilations(folder, folder / 'cache', [()] * 4)) == [0, 0, 0, 1]
-    assert compilations(folder, folder / 'cache', [()]) == [0]
+    assert sorted(compilations(folder, folder / 'cache', [()] * 3)) == [0, 0, 1]
 
 
 def test_what_is_in_the_cache_is_loaded_without_what_compiles(tmp_path):
@@ -87,21 +86,16 @@ def test_what_is_in_the_cache_is_loaded_without_what_compiles(tmp_path):
 
 
 def test_a_checkout_finds_what_another_of_the_same_sources_compiled(folder):
-    """And not what was compiled of others."""
+    """Of the same but for docstrings and comments, and not what was compiled of others."""
     law = folder / 'one_law' / 'law.py'
     assert compilations(folder, folder / 'cache', [()]) == [1]
     shutil.copytree(folder / 'one_law', folder / 'elsewhere' / 'one_law')
     assert compilations(folder / 'elsewhere', folder / 'cache', [()]) == [0]
-    law.write_text(law.read_text().replace('x.mean()', 'x.min()'))
-    assert compilations(folder, folder / 'cache', [()]) == [1]
-
-
-def test_docstrings_and_comments_compile_nothing(folder):
-    law = folder / 'one_law' / 'law.py'
-    assert compilations(folder, folder / 'cache', [()]) == [1]
     law.write_text('"""A module."""\n# It holds one law.\n' + law.read_text().replace(
         'def law(x):', 'def law(x):\n    """Return the sum and the mean."""'))
     assert compilations(folder, folder / 'cache', [()]) == [0]
+    law.write_text(law.read_text().replace('x.mean()', 'x.min()'))
+    assert compilations(folder, folder / 'cache', [()]) == [1]
 
 
 def test_laws_saved_at_once_are_all_kept(folder):

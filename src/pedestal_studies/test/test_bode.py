@@ -7,8 +7,6 @@ which turns the phase by what 50 us are at a frequency (semi-implicit Euler: a r
 import dataclasses
 import json
 import math
-import subprocess
-import sys
 
 import control
 import numpy as np
@@ -270,10 +268,9 @@ def test_response_of_a_known_filter_and_its_deviation():
     assert error.max() < 0.02 and 0.5 < tracking.rms(error) / tracking.rms(measured.deviation) < 2.0
 
 
-def test_study_through_the_command_line(tmp_path):
-    result = subprocess.run([sys.executable, '-m', 'pedestal.cli', 'study', 'bode', '--json', 'rows.json'],
-                            cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=200)
-    assert result.returncode == 0, result.stderr
+def test_study_through_the_command_line(pedestal, tmp_path):
+    code, output, errors = pedestal('study', 'bode', '--json', 'rows.json')
+    assert code == 0, errors
     content = json.loads((tmp_path / 'rows.json').read_text())
     assert content['name'] == 'bode'
     values = {(row['case'], row['metric']): row['value'] for row in content['rows']}
@@ -284,4 +281,4 @@ def test_study_through_the_command_line(tmp_path):
         assert values[case, 'crossover_hz'] > 1.0 and values[case, 'phase_margin_deg'] > 10.0
     figures = {path.stem: path.stat().st_size for path in (tmp_path / 'studies' / 'bode').glob('*.png')}
     assert {'current', 'speed', 'position', 'paper', 'structure'} <= set(figures) and min(figures.values()) > 10000
-    assert 'Linear: half the excitation' in result.stdout
+    assert 'Linear: half the excitation' in output

@@ -2,8 +2,6 @@
 import dataclasses
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ from scipy.interpolate import CubicSpline
 
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
-from pedestal import cli
 from pedestal_analysis.tuning import tuning
 from pedestal_common.parameters import as_dict
 from pedestal_studies.papers import manoeuvre, pareto
@@ -213,11 +210,9 @@ def test_at_equal_rate_noise_the_imm_misses_less():
     assert 0.005 < values['imm-predicted', 'miss_rms_deg'] < 0.05
 
 
-def test_the_command_takes_runs_and_workers(tmp_path):
-    done = subprocess.run([sys.executable, '-m', 'pedestal.cli', 'study', 'manoeuvre', '--runs', '3',
-                           '--workers', '1', '--json', 'rows.json'], cwd=tmp_path, stdin=subprocess.DEVNULL,
-                          capture_output=True, text=True, timeout=100)
-    assert (done.returncode, done.stderr) == (0, '')
+def test_the_command_takes_runs_and_workers(pedestal, tmp_path):
+    code, _, errors = pedestal('study', 'manoeuvre', '--runs', 3, '--workers', 1, '--json', 'rows.json')
+    assert (code, errors) == (0, '')
     rows = json.loads((tmp_path / 'rows.json').read_text())['rows']
     assert rows == manoeuvre.run(quiet, 3).rows
     assert len(list((tmp_path / 'studies' / 'manoeuvre').glob('*.png'))) == 3
@@ -228,10 +223,8 @@ def test_the_command_takes_runs_and_workers(tmp_path):
     (('manoeuvre', '--workers', '-1'), '--workers -1: must be at least 1'),
     (('servo', '--runs', '3'), '--runs 3: study servo has one run of each case'),
     (('manoeuvre', '--scheduler', 'x'), '--scheduler x: must be an address')])
-def test_runs_and_workers_that_cannot_be_are_refused(arguments, message, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli.signal, 'signal', lambda number, handler: None)
-    assert cli.main(['study', *arguments]) == 1
-    stdout, stderr = capsys.readouterr()
-    assert stdout == '' and stderr.startswith(f'pedestal: error: {message}') and len(stderr.splitlines()) == 1
+def test_runs_and_workers_that_cannot_be_are_refused(arguments, message, tmp_path, pedestal):
+    code, output, errors = pedestal('study', *arguments)
+    assert (code, output) == (1, '')
+    assert errors.startswith(f'pedestal: error: {message}') and len(errors.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []

@@ -3,18 +3,13 @@ import functools
 import json
 import math
 import subprocess
-import sys
 
 import pytest
+from shared import PEDESTAL
 
 import pedestal_studies
 
 PNG = b'\x89PNG\r\n\x1a\n'
-
-
-def pedestal(*arguments, folder):
-    return subprocess.run([sys.executable, '-m', 'pedestal.cli', *map(str, arguments)], cwd=folder,
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=200)
 
 
 @pytest.fixture(scope='module')
@@ -23,7 +18,8 @@ def studied(tmp_path_factory):
     @functools.cache
     def study(name):
         folder = tmp_path_factory.mktemp(name)
-        result = pedestal('study', name, '--json', 'rows.json', folder=folder)
+        result = subprocess.run([*PEDESTAL, 'study', name, '--json', 'rows.json'], cwd=folder,
+                                stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=200)
         assert result.returncode == 0, result.stderr
         return folder, result
     return study
@@ -112,27 +108,24 @@ def test_a_pipe_gets_no_progress(done):
     assert done[2].stderr == ''
 
 
-def test_without_a_name_the_studies_are_listed(tmp_path):
-    result = pedestal('study', folder=tmp_path)
-    assert (result.returncode, result.stderr) == (0, '')
+def test_without_a_name_the_studies_are_listed(pedestal, tmp_path):
+    code, output, errors = pedestal('study')
+    assert (code, errors) == (0, '')
     for name, line in pedestal_studies.descriptions().items():
-        assert name in result.stdout and line in result.stdout
+        assert name in output and line in output
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_misspelt_study_is_guessed(tmp_path):
-    result = pedestal('study', 'serov', folder=tmp_path)
-    assert (result.returncode, result.stdout) == (2, '')
-    assert result.stderr == ("pedestal: error: unknown study 'serov'; did you mean 'servo'? there are "
-                             f'{", ".join(pedestal_studies.NAMES)}\n')
+def test_a_misspelt_study_is_guessed(pedestal, tmp_path):
+    assert pedestal('study', 'serov') == (2, '', "pedestal: error: unknown study 'serov'; did you mean 'servo'? "
+                                          f'there are {", ".join(pedestal_studies.NAMES)}\n')
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize('option, place', [('--output', 'file/figures'), ('--json', 'nowhere/rows.json'),
                                            ('--json', '.')])
-def test_a_place_that_cannot_be_written_is_refused_before_the_work(option, place, tmp_path):
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(option, place, pedestal, tmp_path):
     (tmp_path / 'file').write_text('')
-    result = pedestal('study', 'servo', option, tmp_path / place, folder=tmp_path)
-    assert result.returncode == 1
-    assert len(result.stderr.strip().splitlines()) == 1 and place.strip('.') in result.stderr
-    assert result.stdout == ''
+    code, output, errors = pedestal('study', 'servo', option, tmp_path / place)
+    assert (code, output) == (1, '')
+    assert len(errors.strip().splitlines()) == 1 and place.strip('.') in errors
