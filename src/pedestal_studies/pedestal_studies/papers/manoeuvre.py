@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH, new_panels
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.rigs import drawing, ensemble, feedforward_loop, profiles
@@ -118,7 +118,7 @@ def remarks(values):
 def _panels(sums_of, what, label, names):
     """Truth and mean estimates above, mean errors +-1 sigma below; sums_of: {filter: MOMENTS (n,)}."""
     t, truth, _ = motion()
-    figure, axes = drawing.panels(2, size=(7.4, 5.4), sharex=True)
+    figure, axes = new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
     of = truth[('angle', 'rate', 'acceleration').index(what)]
     axes[0, 0].plot(t, np.degrees(of), color=INK, linestyle='--', linewidth=0.8, label='truth')
     for name in names:
@@ -129,9 +129,6 @@ def _panels(sums_of, what, label, names):
         axes[1, 0].plot(t, np.degrees(mean), color=COLOURS[name])
         axes[1, 0].fill_between(t, np.degrees(mean - sigma), np.degrees(mean + sigma), color=COLOURS[name], alpha=0.25,
                                 linewidth=0.0)
-    axes[0, 0].set_ylabel(label)
-    axes[1, 0].set_ylabel(f'error of the {label}')
-    axes[1, 0].set_xlabel('time [s]')
     axes[1, 0].set_xlim(LEAD - 1.0, t[-1])
     return drawing.legend(figure)
 
@@ -148,14 +145,13 @@ def acceleration_figure(sums_of):
 
 def sharpness_figure(values):
     """Errors of rate and acceleration against the sharpness of the reversal."""
-    figure, axes = drawing.panels(1, 2, size=(7.4, 3.6), sharex=True)
+    figure, axes = new_panels(1, 2, height=3.6, x='peak acceleration of the reversal [deg/s2]', sharex=True)
     x = [peak_acceleration(reversal) for reversal in REVERSALS]
     for i, (panel, label) in enumerate(zip(axes[0], ('rate rms [deg/s]', 'acceleration rms [deg/s2]'))):
         for name, colour in COLOURS.items():
             y = [values[reversal, name][i].mean() for reversal in REVERSALS]
             panel.loglog(x, y, 'o-', ms=3.5, color=colour, label=name)
         panel.set_ylabel(label)
-        panel.set_xlabel('peak acceleration of the reversal [deg/s2]')
         panel.set_xticks(x, [f'{value:.2g}' for value in x])
         panel.set_xticks([], minor=True)
     return drawing.legend(figure)

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.filters import axis_filter, motion_models
-from pedestal_analysis.report.figures import FILTERED, INK, RAW
+from pedestal_analysis.report.figures import FILTERED, INK, RAW, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
@@ -167,7 +167,7 @@ def figures():
 def axis_figure(axis, first):
     """Angle, a part of it, rate and acceleration of one flight, measured, filtered and true; first: the number of the
     first of the paper's four figures."""
-    figure, axes = drawing.panels(4, size=(7.4, 9.0))
+    figure, axes = new_panels(4, height=9.0)
     t, target = flight()
     measured, filtered = flown(axis, 0)
     for i, (panel, column) in enumerate(zip(axes[:, 0], (0, 0, 1, 2))):
@@ -181,7 +181,6 @@ def axis_figure(axis, first):
         panel.set_ylabel(f'{name} [{unit}]')
         panel.set_title(f'{axis}: {name} (figure {first + i} of the paper)')
     axes[3, 0].set_ylim(*np.degrees(2.0 * np.abs(target[axis][:, 2]).max() * np.array((-1.0, 1.0))))
-    axes[-1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 
