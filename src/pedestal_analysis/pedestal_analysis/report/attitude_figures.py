@@ -21,8 +21,7 @@ def attitude(data):
             axes.axvline(known.aligned, color=INK, linewidth=0.8, linestyle='--', label='aligned')
         axes.set_yscale('log')
         axes.set_title(name)
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 FIGURES = (

@@ -85,9 +85,10 @@ def draw_line(axes, t, y, window=None, **options):
         axes.set_xlim(t[0], t[-1])
 
 
-def outside_legend(figure, axes, **options):
-    """The legend of some axes above the figure, options of Figure.legend."""
-    figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4, **options)
+def outside_legend(figure, axes):
+    """Return the figure with the legend of some axes above it."""
+    figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4)
+    return figure
 
 
 METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},

@@ -29,8 +29,7 @@ def estimate(data):
             axes.set_ylabel(f'error [{unit}]')
         row[0].set_title(f'{axis}: angle')
         row[1].set_title(f'{axis}: rate')
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 def innovations(data):
@@ -48,8 +47,7 @@ def innovations(data):
         draw_line(row[1], t, nis, color=FILTERED, label=f'mean NIS of {SPAN:g} s')
         row[1].set_title(f'{axis}: NIS')
         row[1].set_ylim(0.0, None)
-    outside_legend(figure, panels[0, 1])
-    return figure
+    return outside_legend(figure, panels[0, 1])
 
 
 def _averaged(t, nis, freedoms):
@@ -76,8 +74,7 @@ def probabilities(data):
                 draw_line(axes, known.t, values, color=MODELS[model], label=model.replace('_', ' '))
         axes.set_ylim(-0.02, 1.02)
         axes.set_title(axis)
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 FIGURES = (

@@ -1,4 +1,5 @@
 """The figures of a report about the run: pointing, errors, angles, torques, signal, sky, modes. Angles in degrees."""
+import functools
 import itertools
 
 import numpy as np
@@ -92,25 +93,23 @@ def draw_errors(axes, data, i, window=None):
     axes.set_title(AXES[i][0])
 
 
-def _errors(data, window=None):
+def error(data, window=None):
+    """What the receiver put out and what the filter made of it, cross-elevation and elevation [deg]; window as of
+    `draw_errors`."""
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
         draw_errors(panels[i, 0], data, i, window)
-    outside_legend(figure, panels[0, 0])
-    return figure
-
-
-def error(data):
-    """What the receiver put out and what the filter made of it, cross-elevation and elevation [deg]."""
-    return _errors(data)
+    return outside_legend(figure, panels[0, 0])
 
 
 def error_zoom(data):
     """The middle ZOOM seconds of `error`, with the truth."""
-    return _errors(data, _middle(data.run))
+    return error(data, _middle(data.run))
 
 
-def _angles(data, zoomed):
+def angle(data, zoomed=False):
+    """Line of sight in earth angles [deg], as measured and as filtered; zoomed: the ZOOM seconds in which the target
+    moved least, with the truth."""
     run = data.run
     figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXES], sharex=True)
     truth = np.column_stack([_continuous(run.target_earth[:, i]) for i in range(2)])
@@ -124,18 +123,7 @@ def _angles(data, zoomed):
         if zoomed:
             draw_line(axes, run.t, truth[:, i], window, color=TRUTH, label='truth')
         draw_line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
-    outside_legend(figure, panels[0, 0])
-    return figure
-
-
-def angle(data):
-    """Line of sight in earth angles [deg], as measured and as filtered."""
-    return _angles(data, False)
-
-
-def angle_zoom(data):
-    """The ZOOM seconds of `angle` in which the target moved least, with the truth."""
-    return _angles(data, True)
+    return outside_legend(figure, panels[0, 0])
 
 
 def draw_azimuth(axes, data):
@@ -152,8 +140,7 @@ def azimuth(data):
     """Azimuth of antenna and target in earth angles [deg]."""
     figure, panels = new_panels(1, height=2.9)
     draw_azimuth(panels[0, 0], data)
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 def _shade_modes(axes, data):
@@ -228,8 +215,7 @@ def torques(data):
         draw_torques(row[1], data, axis, window)
         row[1].set_title(f'{axis}, first {ZOOM:g} s')
         row[1].set_ylabel('')
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 def draw_carrier(axes, data):
@@ -364,7 +350,7 @@ FIGURES = (
          ('truth', 'lock'), angle),
     Spec('angle_zoom', 'Angle, zoomed (figure 10 of the paper)', f'The {ZOOM:g} s in which the target moved least, '
          'where the noise stands out best: filtered (blue) against measured (grey) and true (orange).',
-         ('truth', 'lock'), angle_zoom),
+         ('truth', 'lock'), functools.partial(angle, zoomed=True)),
     Spec('azimuth', 'Azimuth trajectory (figure 11 of the paper)', "The antenna's azimuth (blue) comes to the "
          "target's (orange) and stays on it.", ('truth',), azimuth),
     Spec('torques', 'Motor torques', 'Both motors of an axis share the load and pull against each other by the bias '

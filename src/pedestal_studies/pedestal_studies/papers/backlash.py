@@ -50,11 +50,6 @@ TARGETS = {
     ('hold-fade', 'sine_residual_rad'): '<= 1e-4', ('hold-fade', 'step_overshoot_percent'): '<= 2.5'}
 
 
-def standstill_case(name):
-    """The Case of a step and the standstill after it."""
-    return Case(name, 'servo_step', PAPER_CASES[name], SETTLED + 1.0)
-
-
 def reversal_case(kind, name):
     """The Case of three periods of a sine of REVERSALS."""
     return cases.sine_case(Case(name, 'servo_sine', {
@@ -62,23 +57,11 @@ def reversal_case(kind, name):
         REVERSALS[kind], 3)
 
 
-def fast_case(name):
-    """The Case of a step at 40 rad/s2, which needs all torque."""
-    return Case(name, 'servo_step', {**servo.FULL_TORQUE, 'acu.azimuth.shaper.acceleration': 40.0, **SCHEDULES[name]})
-
-
-def sine_case(name):
-    """The Case of the sine of 0.4 Hz."""
-    return Case(name, 'servo_sine', {**servo.BEST, **SCHEDULES[name]})
-
+FAST = {**servo.FULL_TORQUE, 'acu.azimuth.shaper.acceleration': 40.0}
+"""The controller of a step at 40 rad/s2, which needs all torque."""
 
 MOVED = 0.5
 """The step of the two structures is over by then [s]."""
-
-
-def structure_case(name):
-    """The Case of a step with one speed loop, or one for each motor."""
-    return Case(name, 'servo_step', STRUCTURES[name], SETTLED)
 
 
 def standstill(record):
@@ -106,11 +89,14 @@ def synchronism_error(record):
     return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
 
-CASES = {('standstill', name): standstill_case(name) for name in PAPER_CASES}
+CASES = {('standstill', name): Case(name, 'servo_step', changed, SETTLED + 1.0)
+         for name, changed in PAPER_CASES.items()}
 CASES |= {(kind, name): reversal_case(kind, name) for kind in REVERSALS for name in PAPER_CASES}
-CASES |= {('sine', name): sine_case(name) for name in SCHEDULES}
-CASES |= {('step', name): fast_case(name) for name in SCHEDULES}
-CASES |= {('structure', name): structure_case(name) for name in STRUCTURES}
+CASES |= {('sine', name): Case(name, 'servo_sine', {**servo.BEST, **changed}) for name, changed in SCHEDULES.items()}
+CASES |= {('step', name): Case(name, 'servo_step', {**FAST, **changed}) for name, changed in SCHEDULES.items()}
+CASES |= {('structure', name): Case(name, 'servo_step', changed, SETTLED) for name, changed in STRUCTURES.items()}
+"""{(kind, case): a step and the standstill after it; reversals; the sine of 0.4 Hz and the fast step with every
+schedule; a step with one speed loop, or one for each motor}."""
 
 
 def measured(kind, name, record):

@@ -73,7 +73,8 @@ def run(progress, runs=RUNS, pool=None) -> Result:
         sums_of[name] = ensemble.added(sums_of[name], sums) if name in sums_of else sums
         errors.setdefault(name, []).append(rms)
     values = measured({name: np.concatenate(rms) for name, rms in errors.items()})
-    figures = {'figure-3': lambda: rate_figure(sums_of), 'figure-4': lambda: acceleration_figure(sums_of),
+    figures = {'figure-3': lambda: moments_figure(sums_of, 'rate', 'rate [deg/s]'),
+               'figure-4': lambda: moments_figure(sums_of, 'acceleration', 'acceleration [deg/s2]'),
                'sharpness': lambda: sharpness_figure(values)}
     return Result(rows(values), figures, remarks(values))
 
@@ -115,13 +116,14 @@ def remarks(values):
     return lines
 
 
-def _panels(sums_of, what, label, names):
-    """Truth and mean estimates above, mean errors +-1 sigma below; sums_of: {filter: MOMENTS (n,)}."""
+def moments_figure(sums_of, what, label):
+    """Truth and mean estimates through the reversals above, mean errors +-1 sigma below (paper 003, figures 3 and 4);
+    sums_of: {filter: MOMENTS (n,)}; what: 'rate' or 'acceleration'."""
     t, truth, _ = motion()
     figure, axes = new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
     of = truth[('angle', 'rate', 'acceleration').index(what)]
     axes[0, 0].plot(t, np.degrees(of), color=INK, linestyle='--', linewidth=0.8, label='truth')
-    for name in names:
+    for name in ('cv', 'imm-b'):
         sums = sums_of[name]
         mean = sums[what] / sums['runs']
         sigma = np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - mean * mean, 0.0))
@@ -131,16 +133,6 @@ def _panels(sums_of, what, label, names):
                                 linewidth=0.0)
     axes[1, 0].set_xlim(LEAD - 1.0, t[-1])
     return drawing.legend(figure)
-
-
-def rate_figure(sums_of):
-    """Rate through the reversals and its error, mean of the runs and +-1 sigma (paper 003, figure 3)."""
-    return _panels(sums_of, 'rate', 'rate [deg/s]', ('cv', 'imm-b'))
-
-
-def acceleration_figure(sums_of):
-    """Acceleration through the reversals and its error (paper 003, figure 4)."""
-    return _panels(sums_of, 'acceleration', 'acceleration [deg/s2]', ('cv', 'imm-b'))
 
 
 def sharpness_figure(values):
