@@ -36,6 +36,7 @@ class PageParameters(parameters.Parameters):
 
 class PageNode(Remote):
     """Hears the graph for all pages, and asks for each of them under the name of its user."""
+    awaits = 'pages'
 
     def __init__(self):
         super().__init__('operator_page', 'page', parameters_type=PageParameters)
@@ -64,11 +65,6 @@ class PageNode(Remote):
         self.every(FRAME, self._show)
         self.every(page_state.PERIOD, self._remember)
         self.every(SLOW, self._look_slowly)
-
-    @property
-    def awaits(self):
-        """What it waits for, as a person calls it."""
-        return 'pages'
 
     @property
     def now(self):

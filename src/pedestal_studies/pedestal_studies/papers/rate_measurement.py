@@ -56,7 +56,7 @@ SETTLING = 20000
 PROFILE = 'flyby-60m'
 
 PEAK_SHARE, FLOOR = 1.2, 0.3
-"""Of the flyby's filter: a_max over the largest acceleration, and the least sigma_a over that."""
+"""Of the filter of a flight: a_max over its largest acceleration, and the least sigma_a over that."""
 
 SKIPPED = 5.0
 """Of the flyby, for the filter to settle [s]."""
@@ -149,6 +149,16 @@ def differenced(y, steps):
     return rate, 2.0 * (SIGMA / (steps * T)) ** 2
 
 
+def filtered(t, target, y, y_rate, R_rate):
+    """ESTIMATE (n,) of the filter for a target (n, 3) of angles and rates (n,) measured at times (n,) [s]; R_rate: the
+    variance of the rates [rad2/s2]."""
+    c = axis_filter.constants(filter_of(PEAK_SHARE * np.abs(target[:, 2]).max(), FLOOR))
+    out = np.zeros(len(t), axis_filter.ESTIMATE)
+    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), R_rate),
+                          ensemble.INITIAL_RATE, out)
+    return out
+
+
 def flyby():
     """(times (n,) [s], angle, rate and acceleration (n, 3)) of PROFILE."""
     t = T * np.arange(round(profiles.DURATION / T))
@@ -166,11 +176,7 @@ def flown(name, run):
     else:
         sigma = math.radians(RATE_SIGMA[name])
         y_rate, R_rate = target[:, 1] + sigma * normals[1], sigma * sigma
-    c = axis_filter.constants(filter_of(PEAK_SHARE * np.abs(target[:, 2]).max(), FLOOR))
-    out = np.zeros(len(t), axis_filter.ESTIMATE)
-    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), R_rate),
-                          ensemble.INITIAL_RATE, out)
-    return y, y_rate, out
+    return y, y_rate, filtered(t, target, y, y_rate, R_rate)
 
 
 def batch(item):
