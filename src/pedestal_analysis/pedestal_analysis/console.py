@@ -1,5 +1,6 @@
 """Output of the verbs: progress and tables of results on a terminal, rows as JSON."""
 import contextlib
+import functools
 import json
 import math
 import pathlib
@@ -22,63 +23,52 @@ TABLE_WIDTH = 150
 
 
 @contextlib.contextmanager
+def _bar(columns, advance, description, total=None, **fields):
+    """Context with a function that calls advance(bar, task, ...) on a terminal, and does nothing in a pipe.
+
+    columns(rich.progress) -> those of the bar; description, total, fields: of its one task.
+    """
+    if not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    from rich import console, progress
+    with progress.Progress(*columns(progress), console=console.Console(stderr=True)) as bar:
+        yield functools.partial(advance, bar, bar.add_task(description, total=total, **fields))
+
+
 def progress_of_run(duration):
     """Context with a function progress(seconds of the run): a bar on a terminal, nothing in a pipe. duration [s]."""
-    if not sys.stderr.isatty():
-        yield lambda seconds: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-    columns = (TextColumn('{task.description}'), BarColumn(), TextColumn('{task.completed:.0f} / {task.total:.0f} s'),
-               TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task('starting nodes (the first start compiles the laws)', total=duration)
+    def columns(rich):
+        return (rich.TextColumn('{task.description}'), rich.BarColumn(),
+                rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
 
-        def advance(seconds):
-            bar.update(task, completed=seconds, description='running' if seconds > 0.0 else None)
-        yield advance
+    def advance(bar, task, seconds):
+        bar.update(task, completed=seconds, description='running' if seconds > 0.0 else None)
+    return _bar(columns, advance, 'starting nodes (the first start compiles the laws)', duration)
 
 
-@contextlib.contextmanager
 def progress_of_share():
     """Context with a function progress(fraction done, what comes next): a bar on a terminal, nothing in a pipe."""
-    if not sys.stderr.isatty():
-        yield lambda share, text: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-    with Progress(BarColumn(), TextColumn('{task.description}'), TimeElapsedColumn(),
-                  console=Console(stderr=True)) as bar:
-        task = bar.add_task('compiling the laws (the first time)', total=1.0)
-        yield lambda share, text: bar.update(task, completed=share, description=text)
+    def columns(rich):
+        return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
+
+    def advance(bar, task, share, text):
+        bar.update(task, completed=share, description=text)
+    return _bar(columns, advance, 'compiling the laws (the first time)', 1.0)
 
 
-@contextlib.contextmanager
 def progress_of_trials():
     """Context with a function progress(trials done, in all): a bar with rate and time left on a terminal, nothing in a
     pipe."""
-    if not sys.stderr.isatty():
-        yield lambda done, total: None
-        return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn('trials, {task.fields[rate]}'), TimeElapsedColumn(),
-               TextColumn('left'), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task('', total=None, rate='compiling the laws (the first time)')
+    def columns(rich):
+        return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
+                rich.TimeElapsedColumn(), rich.TextColumn('left'), rich.TimeRemainingColumn())
 
-        def advance(done, total):
-            speed = bar.tasks[0].speed
-            rate = {'rate': f'{speed:.1f} a second'} if speed else {}
-            bar.update(task, completed=done, total=total, **rate)
-        yield advance
+    def advance(bar, task, done, total):
+        speed = bar.tasks[0].speed
+        rate = {'rate': f'{speed:.1f} a second'} if speed else {}
+        bar.update(task, completed=done, total=total, **rate)
+    return _bar(columns, advance, '', rate='compiling the laws (the first time)')
 
 
 def add_json(parser):

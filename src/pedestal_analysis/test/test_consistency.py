@@ -47,7 +47,7 @@ def test_a_filter_is_what_it_was_made(factor, words, freedoms):
     found = made(np.random.default_rng(1), factor, freedoms=freedoms)
     low, high = stats.chi2.ppf((0.025, 0.975), freedoms)
     for i in range(2):
-        judged = consistency.axis(found, i)
+        judged = found.axes[i]
         assert judged.verdict.startswith(words)
         assert judged.nis == pytest.approx(freedoms * factor**2, rel=0.05)
         assert judged.nis_expected == freedoms
@@ -55,8 +55,8 @@ def test_a_filter_is_what_it_was_made(factor, words, freedoms):
             np.diff(stats.chi2.cdf(np.array([low, high]) / factor**2, freedoms))[0], abs=0.01)
         assert judged.nees == pytest.approx(2.0 * factor**2, rel=0.35)
     values = results.measured({'filter': found})
-    assert values['azimuth_nis_mean'] == (consistency.axis(found, 0).nis, '-')
-    assert values['elevation_nees_mean'] == (consistency.axis(found, 1).nees, '-')
+    assert values['azimuth_nis_mean'] == (found.axes[0].nis, '-')
+    assert values['elevation_nees_mean'] == (found.axes[1].nees, '-')
     said = {1.0: None, 2.0: 'too sure', 0.5: 'too careful'}[factor]
     assert {results.marks({'filter': found}).get(f'{axis}_{name}_mean') for axis in ('azimuth', 'elevation')
             for name in ('nis', 'nees')} == {said}
@@ -89,7 +89,7 @@ def test_independent_samples_of_a_series_with_known_memory():
 def test_nothing_evaluated():
     found = made(np.random.default_rng(1), 1.0, n=200)
     found.tracking[:] = False
-    judged = consistency.axis(found, 0)
+    judged = found.axes[0]
     assert judged.verdict == 'nothing was evaluated'
     assert math.isnan(judged.nis) and math.isnan(judged.nees)
     assert results.measured({'filter': None}) == {}

@@ -221,13 +221,13 @@ def test_the_page_says_when_where_what_and_through_which_beam(page, tmp_path):
 def test_the_filter_is_judged(page, whole):
     found = consistency.read(bags.read(whole), tracking.read(bags.read(whole)))
     for axis, i in (('azimuth', 0), ('elevation', 1)):
-        judged = consistency.axis(found, i)
+        judged = found.axes[i]
         assert f'{axis.capitalize()}: {judged.verdict}.' in page[0].text
         assert judged.nis == pytest.approx(1.0, rel=0.2)
         assert [float(page[0].rows['mean NIS'][i]), float(page[0].rows['mean NEES (angle and rate)'][i])] == \
             pytest.approx([judged.nis, judged.nees], rel=1e-3)
     # Angle and rate are made one tenth and one hundredth of the same noise; the filter states half of the latter.
-    assert consistency.axis(found, 1).nees == pytest.approx(1.0 + 0.25, rel=0.2)
+    assert found.axes[1].nees == pytest.approx(1.0 + 0.25, rel=0.2)
 
 
 def test_text_of_the_bag_is_escaped_and_repeats_are_one_row(page):

@@ -20,14 +20,14 @@ class Antenna(abc.ABC):
 
     def angles(self, topic):
         """(azimuth, elevation) [deg] of joint_states or acu/reference; NaN where it is silent."""
-        if not self.present(topic):
-            return math.nan, math.nan
-        numbers = self.numbers[topic]
-        return math.degrees(numbers[0]), math.degrees(numbers[1])
+        return self._degrees(topic, 0)
 
     def rates(self):
         """(azimuth, elevation) rates [deg/s] of the axes; NaN where they are silent."""
-        if not self.present('joint_states'):
+        return self._degrees('joint_states', 2)
+
+    def _degrees(self, topic, first):
+        if not self.present(topic):
             return math.nan, math.nan
-        numbers = self.numbers['joint_states']
-        return math.degrees(numbers[2]), math.degrees(numbers[3])
+        azimuth, elevation = self.numbers[topic][first:first + 2]
+        return math.degrees(azimuth), math.degrees(elevation)

@@ -21,6 +21,7 @@ TF_DEPTH = 100
 
 class FramesNode(shell.Shell):
     """Latches the model at its start; where tf2_msgs is installed it tells the frames while somebody listens."""
+    awaits = 'its end'
 
     def __init__(self):
         super().__init__('frames', parameters.Parameters)
@@ -36,11 +37,6 @@ class FramesNode(shell.Shell):
         self._frames, self._told = FrameSource(self), 0
         self._tf = self.create_publisher(TFMessage, 'tf', QoSProfile(depth=TF_DEPTH))
         self.every(PERIOD, self._look)
-
-    @property
-    def awaits(self):
-        """What it waits for, as a person calls it."""
-        return 'its end'
 
     def _look(self):
         self._frames.want(self._tf.get_subscription_count() > 0)

@@ -102,6 +102,7 @@ class Newcomers:
 
 class LiveNode(shell.Shell):
     """Serves the topics of the graph, its frames and the model of the pedestal, read only."""
+    awaits = 'clients'
 
     def __init__(self):
         super().__init__('live', LiveParameters)
@@ -121,11 +122,6 @@ class LiveNode(shell.Shell):
         self.get_logger().info(f'listens on {p.address}:{self._server.port}')
         self.every(LOOK, self._look)
         self.every(FRAMES, self._say_frames)
-
-    @property
-    def awaits(self):
-        """What it waits for, as a person calls it."""
-        return 'clients'
 
     def _look(self):
         for outlet in self._topics:

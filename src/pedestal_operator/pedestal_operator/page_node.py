@@ -36,6 +36,7 @@ class PageParameters(parameters.Parameters):
 
 class PageNode(Remote):
     """Hears the graph for all pages, and asks for each of them under the name of its user."""
+    awaits = 'pages'
 
     def __init__(self):
         super().__init__('operator_page', 'page', parameters_type=PageParameters)
@@ -44,14 +45,14 @@ class PageNode(Remote):
         self._past, self._coming = page_sky.Past(page_state.SPAN), Coming()
         self._pages = Asks(self._ask_for, self.replied, lambda client, message: self._server.reply(client, message),
                            lambda: self.texts.get('acu/mode') == 'rate')
-        self._sheets, self._published = {}, {}
+        self._sheets, self._logged = {}, None
         p = self.parameters
         names = [name.strip() for name in p.names.split(',') if name.strip()]
         if not page_security.is_loopback(p.address):
             names.append(socket.gethostname())
             self.get_logger().warning(f'listens on {p.address}: whoever reaches this address and has a token operates '
                                       'the antenna, and the connection is not encrypted')
-        self._server = PageServer(p.address, p.port, names, p.clients, self._past_of_charts)
+        self._server = PageServer(p.address, p.port, names, p.clients, self._history.copy)
         for topic in page_state.NUMBERS:
             self.hear(topic)
         self.message_reader('ins/state', self._text_taker('ins/state'))
@@ -64,11 +65,6 @@ class PageNode(Remote):
         self.every(FRAME, self._show)
         self.every(page_state.PERIOD, self._remember)
         self.every(SLOW, self._look_slowly)
-
-    @property
-    def awaits(self):
-        """What it waits for, as a person calls it."""
-        return 'pages'
 
     @property
     def now(self):
@@ -113,25 +109,14 @@ class PageNode(Remote):
         if not self._server.pages:
             return
         sections = {'now': page_state.now(self), 'told': page_state.told(self), 'alarms': page_state.alarms(self)}
-        if self._published.get('log') != self.log.revision:
-            sections['log'] = list(self.log.lines)
-            self._published['log'] = self.log.revision
-        self._publish(sections)
-
-    def _publish(self, sections):
-        """Publish those sections that say something else than before."""
-        texts = {name: page_state.encoded(section) for name, section in sections.items()}
-        fresh = {name: text for name, text in texts.items() if self._published.get('of ' + name) != text}
-        self._published |= {'of ' + name: text for name, text in fresh.items()}
-        self._server.publish(fresh)
+        if self._logged != self.log.revision:
+            sections['log'], self._logged = list(self.log.lines), self.log.revision
+        self._server.publish(sections)
 
     def _remember(self):
         """A point of the strip charts, for pages that come later."""
         if self.present('joint_states'):
             self._history.append(page_state.history_row(page_state.now(self)))
-
-    def _past_of_charts(self):
-        return page_state.encoded(list(self._history.copy()))
 
     def _look_slowly(self):
         """What changes slowly: where the beam was, what the nodes' parameters are."""
@@ -139,8 +124,8 @@ class PageNode(Remote):
             self._ask_parameters(node, names)
         if self.present('joint_states'):
             self._past.add(self.now, page_state.now(self)['beam'])
-        self._publish({'fixed': page_state.fixed(self), 'past': self._past.places,
-                       'sky': page_state.sky(self, self._coming.look(self))})
+        self._server.publish({'fixed': page_state.fixed(self), 'past': self._past.places,
+                              'sky': page_state.sky(self, self._coming.look(self))})
 
     def _ask_parameters(self, node, names):
         """Ask a node for its parameters when it comes, or comes again."""

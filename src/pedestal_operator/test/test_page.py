@@ -8,7 +8,7 @@ import pytest
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_operator.page import page_log, page_passes, page_security, page_sky, page_state
+from pedestal_operator.page import page_log, page_passes, page_security, page_server, page_sky, page_state
 from pedestal_operator.page.page_asks import BEHIND, PATIENCE, SILENT, Asks
 from pedestal_operator.page.page_security import Access, Refused, Request
 from pedestal_operator.requests import Requests
@@ -142,7 +142,7 @@ def test_the_log_says_a_jog_once_and_what_changes():
 
 
 def test_what_is_no_number_is_null():
-    assert page_state.encoded({'a': math.nan, 'b': [math.inf, 1.5], 'c': (None, 'x')}) == (
+    assert page_server.encoded({'a': math.nan, 'b': [math.inf, 1.5], 'c': (None, 'x')}) == (
         '{"a":null,"b":[null,1.5],"c":[null,"x"]}')
 
 

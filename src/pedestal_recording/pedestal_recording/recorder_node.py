@@ -74,7 +74,7 @@ class RecorderNode(shell.Shell):
         self._last = [(index, topic) for index, topic in enumerate(recorded) if topic.name == LAST]
         self._opening = self.every(0.0, self._record_last)
         if not self.graph.lockstep:
-            self.every(1.0, self._flush)
+            self.every(1.0, lambda: self._write(self._bag.flush))
 
     def _record(self, index, topic):
         """Subscribe with a history that drops nothing in lockstep, whatever the writer keeps, and holds seconds in
@@ -235,9 +235,10 @@ class RecorderNode(shell.Shell):
         if self._end is not None and stamp - self.epoch(stamp) >= self._end:
             self.finished = True
 
-    def _flush(self):
+    def _write(self, write):
+        """Call what writes to the disk, and end where that cannot be."""
         try:
-            self._bag.flush()
+            write()
         except BagError as error:
             self._fail(str(error))
 
@@ -272,14 +273,8 @@ class RecorderNode(shell.Shell):
 
     def close(self):
         """Write what waits and finish the bag; messages, losses and SHA-256 are its result."""
-        try:
-            self._order.finish()
-        except BagError as error:
-            self._fail(str(error))
-        try:
-            self._bag.close()
-        except BagError as error:
-            self._fail(str(error))
+        self._write(self._order.finish)
+        self._write(self._bag.close)
         self.result = {'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),
                        'sha256': files.sha256(self._bag.file), 'bytes': self._bag.file.stat().st_size}
         if self._error is None and self._lost and self.graph.lockstep:

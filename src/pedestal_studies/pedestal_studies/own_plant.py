@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, TRUTH, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials.cases import Case
@@ -117,14 +117,13 @@ def _reversals(run, i):
 
 def _bias_figure(kind, cut, flown):
     """What is left of both axes, with the scenario's bias and without one."""
-    figure, axes = drawing.panels(2, size=(7.4, 4.6), sharex=True)
+    figure, axes = new_panels(2, height=4.6, sharex=True,
+                              y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         for end, colour, label in (('/bias-off', TRUTH, 'without bias'), ('', FILTERED, 'as the scenario is')):
             t, left = cut(flown[kind, end], i)
             panel.plot(t, 1e6 * left, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
-        panel.set_ylabel('error [\N{MICRO SIGN}rad]' if kind == 'sine' else 'angle [\N{MICRO SIGN}rad]')
-    axes[1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 
@@ -150,15 +149,13 @@ def _metrics(flown, i, torque):
 
 def _figure(kind, run):
     """Both axes over time, of the sine its error [mrad]."""
-    figure, axes = drawing.panels(2, size=(7.4, 4.6), sharex=True)
+    figure, axes = new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         values = _sine_error(run, i) if kind == 'sine' else _angle(run, i)
         panel.plot(run.t, 1e3 * values, color=FILTERED)
         if kind == 'step':
             panel.axhline(1e3 * STEP, color=INK, lw=0.8, ls='--')
         panel.set_title(f'{kind}, {name}')
-        panel.set_ylabel('error [mrad]' if kind == 'sine' else 'angle [mrad]')
-    axes[1, 0].set_xlabel('time [s]')
     return figure
 
 

@@ -11,7 +11,7 @@ T = np.linspace(0.1, 1.0, 50)
 
 
 def sheet():
-    figure, axes = drawing.panels(2)
+    figure, axes = figures.new_panels(2, height=4.6)
     for panel in axes[:, 0]:
         for colour, label in ((figures.FILTERED, 'a'), (figures.TRUTH, 'b'), (figures.MOTOR_2, 'a much longer name')):
             panel.loglog(T, 3.0 * T, color=colour, label=label)

@@ -10,7 +10,7 @@ LEAST = 1e-4
 def attitude(data):
     """Heading and level error of the INS [deg] and their standard deviations as it states them."""
     known = data.attitude
-    figure, panels = new_panels(2, sharex=True)
+    figure, panels = new_panels(2, y='error [deg]', sharex=True)
     for axes, name, error, sigma in zip(panels[:, 0], ('heading', 'level, both axes'),
                                         (np.abs(known.heading), known.level),
                                         (known.sigma[:, 1], np.sqrt(2.0) * known.sigma[:, 0])):
@@ -21,10 +21,7 @@ def attitude(data):
             axes.axvline(known.aligned, color=INK, linewidth=0.8, linestyle='--', label='aligned')
         axes.set_yscale('log')
         axes.set_title(name)
-        axes.set_ylabel('error [deg]')
-    panels[1, 0].set_xlabel('time [s]')
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 FIGURES = (

@@ -60,10 +60,19 @@ def spans(flags):
     return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist()))
 
 
-def new_panels(rows, columns=1, height=1.75, **options):
-    """(Figure, axes (rows, columns)); height of a row [inch], options of Figure.subplots."""
-    figure = Figure(figsize=(WIDTH, 0.5 + height * rows), layout='constrained')
-    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+def new_panels(rows, columns=1, height=None, width=WIDTH, x='time [s]', y='', **options):
+    """Return (Figure, axes (rows, columns)).
+
+    height, width: of the figure [inch], by default so high that a row has 1.75; x, y: labels below the last row and
+    left of the first column, one for all or one for each; options of Figure.subplots.
+    """
+    figure = Figure(figsize=(width, height or 0.5 + 1.75 * rows), layout='constrained')
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    for panel, label in zip(axes[-1], np.broadcast_to(x, columns)):
+        panel.set_xlabel(label)
+    for panel, label in zip(axes[:, 0], np.broadcast_to(y, rows)):
+        panel.set_ylabel(label)
+    return figure, axes
 
 
 def draw_line(axes, t, y, window=None, **options):
@@ -76,9 +85,10 @@ def draw_line(axes, t, y, window=None, **options):
         axes.set_xlim(t[0], t[-1])
 
 
-def outside_legend(figure, axes, **options):
-    """The legend of some axes above the figure, options of Figure.legend."""
-    figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4, **options)
+def outside_legend(figure, axes):
+    """Return the figure with the legend of some axes above it."""
+    figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4)
+    return figure
 
 
 METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},

@@ -29,19 +29,15 @@ def estimate(data):
             axes.set_ylabel(f'error [{unit}]')
         row[0].set_title(f'{axis}: angle')
         row[1].set_title(f'{axis}: rate')
-    for axes in panels[1]:
-        axes.set_xlabel('time [s]')
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 def innovations(data):
     """Innovations [deg] and the mean NIS of SPAN seconds in its band."""
     known = data.filter
-    figure, panels = new_panels(2, 2, sharex=True)
+    figure, panels = new_panels(2, 2, y='innovation [deg]', sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
         draw_line(row[0], known.t, np.degrees(known.innovation[:, i]), color=RAW, linewidth=0.7)
-        row[0].set_ylabel('innovation [deg]')
         row[1].set_ylabel('mean NIS')
         row[0].set_title(f'{axis}: innovation')
         t, nis, expected, low, high = _averaged(known.t, known.nis[:, i], known.freedoms[:, i])
@@ -51,10 +47,7 @@ def innovations(data):
         draw_line(row[1], t, nis, color=FILTERED, label=f'mean NIS of {SPAN:g} s')
         row[1].set_title(f'{axis}: NIS')
         row[1].set_ylim(0.0, None)
-    for axes in panels[1]:
-        axes.set_xlabel('time [s]')
-    outside_legend(figure, panels[0, 1])
-    return figure
+    return outside_legend(figure, panels[0, 1])
 
 
 def _averaged(t, nis, freedoms):
@@ -73,18 +66,15 @@ def _averaged(t, nis, freedoms):
 def probabilities(data):
     """Probability of each motion model."""
     known = data.filter
-    figure, panels = new_panels(2, sharex=True)
+    figure, panels = new_panels(2, y='probability', sharex=True)
     for axes, axis, i in zip(panels[:, 0], topics.AXES, range(2)):
         for number, model in enumerate(topics.MOTION_MODELS):
             values = known.probability[:, i, number]
             if np.isfinite(values).any():
                 draw_line(axes, known.t, values, color=MODELS[model], label=model.replace('_', ' '))
         axes.set_ylim(-0.02, 1.02)
-        axes.set_ylabel('probability')
         axes.set_title(axis)
-    panels[1, 0].set_xlabel('time [s]')
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 FIGURES = (

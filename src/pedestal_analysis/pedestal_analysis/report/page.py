@@ -164,14 +164,13 @@ def _figures(module, data):
 
 def _honesty(known):
     """The table of a consistency.Consistency, and a sentence for each axis."""
-    judged = [consistency.axis(known, i) for i in range(2)]
+    judged = known.axes
 
     def row(name, field, marks=(), unit='', scale=1.0):
         return _of_axes(name, [(scale * getattr(axis, field), unit) for axis in judged], ', '.join(marks))
 
-    marks = [[f'{name}: {consistency.mark(*of)}' for name, of in zip(AXES, means) if consistency.mark(*of)]
-             for means in ([(axis.nis, axis.nis_expected, axis.nis_band) for axis in judged],
-                           [(axis.nees, consistency.FREEDOMS, axis.nees_band) for axis in judged])]
+    marks = [[f'{name}: {mark}' for name, mark in zip(AXES, of_axes) if mark]
+             for of_axes in zip(*((axis.nis_mark, axis.nees_mark) for axis in judged))]
     rows = [row('mean NIS', 'nis', marks[0]), row('expected of an honest filter', 'nis_expected'),
             row(f'NIS inside their {100.0 * consistency.PART:g} % band', 'nis_inside', unit='%', scale=100.0),
             row('mean NEES (angle and rate)', 'nees', marks[1]),

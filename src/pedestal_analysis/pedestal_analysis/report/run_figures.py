@@ -1,4 +1,5 @@
 """The figures of a report about the run: pointing, errors, angles, torques, signal, sky, modes. Angles in degrees."""
+import functools
 import itertools
 
 import numpy as np
@@ -92,28 +93,25 @@ def draw_errors(axes, data, i, window=None):
     axes.set_title(AXES[i][0])
 
 
-def _errors(data, window=None):
+def error(data, window=None):
+    """What the receiver put out and what the filter made of it, cross-elevation and elevation [deg]; window as of
+    `draw_errors`."""
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
         draw_errors(panels[i, 0], data, i, window)
-    panels[1, 0].set_xlabel('time [s]')
-    outside_legend(figure, panels[0, 0])
-    return figure
-
-
-def error(data):
-    """What the receiver put out and what the filter made of it, cross-elevation and elevation [deg]."""
-    return _errors(data)
+    return outside_legend(figure, panels[0, 0])
 
 
 def error_zoom(data):
     """The middle ZOOM seconds of `error`, with the truth."""
-    return _errors(data, _middle(data.run))
+    return error(data, _middle(data.run))
 
 
-def _angles(data, zoomed):
+def angle(data, zoomed=False):
+    """Line of sight in earth angles [deg], as measured and as filtered; zoomed: the ZOOM seconds in which the target
+    moved least, with the truth."""
     run = data.run
-    figure, panels = new_panels(2, sharex=True)
+    figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXES], sharex=True)
     truth = np.column_stack([_continuous(run.target_earth[:, i]) for i in range(2)])
     window = _slowest(run, truth) if zoomed else None
     for i, axes in enumerate(panels[:, 0]):
@@ -125,20 +123,7 @@ def _angles(data, zoomed):
         if zoomed:
             draw_line(axes, run.t, truth[:, i], window, color=TRUTH, label='truth')
         draw_line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
-        axes.set_ylabel(f'{AXES[i][1]} [deg]')
-    axes.set_xlabel('time [s]')
-    outside_legend(figure, panels[0, 0])
-    return figure
-
-
-def angle(data):
-    """Line of sight in earth angles [deg], as measured and as filtered."""
-    return _angles(data, False)
-
-
-def angle_zoom(data):
-    """The ZOOM seconds of `angle` in which the target moved least, with the truth."""
-    return _angles(data, True)
+    return outside_legend(figure, panels[0, 0])
 
 
 def draw_azimuth(axes, data):
@@ -153,10 +138,9 @@ def draw_azimuth(axes, data):
 
 def azimuth(data):
     """Azimuth of antenna and target in earth angles [deg]."""
-    figure, panels = new_panels(1, height=2.4)
+    figure, panels = new_panels(1, height=2.9)
     draw_azimuth(panels[0, 0], data)
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 def _shade_modes(axes, data):
@@ -191,7 +175,6 @@ def pointing(data):
     axes.set_yscale('log' if np.any(distance > 0.0) else 'linear')
     axes.set_title('angle between beam and target, whole run')
     axes.set_ylabel('off axis [deg]')
-    axes.set_xlabel('time [s]')
     for axes in panels[:, 0]:
         _shade_modes(axes, data)
     _mode_legend(figure, data)
@@ -226,16 +209,13 @@ def _start(data):
 def torques(data):
     """Torques of both motors of each axis [Nm], whole and the first ZOOM seconds."""
     window = _start(data)
-    figure, panels = new_panels(2, 2, height=2.0, sharex='col', sharey='row', width_ratios=(3, 2))
+    figure, panels = new_panels(2, 2, height=4.5, sharex='col', sharey='row', width_ratios=(3, 2))
     for row, axis in zip(panels, ('azimuth', 'elevation')):
         draw_torques(row[0], data, axis)
         draw_torques(row[1], data, axis, window)
         row[1].set_title(f'{axis}, first {ZOOM:g} s')
         row[1].set_ylabel('')
-    for axes in panels[1]:
-        axes.set_xlabel('time [s]')
-    outside_legend(figure, panels[0, 0])
-    return figure
+    return outside_legend(figure, panels[0, 0])
 
 
 def draw_carrier(axes, data):
@@ -250,7 +230,7 @@ def draw_carrier(axes, data):
 
 def carrier(data):
     """C/N0 [dB-Hz] and where the receiver was locked."""
-    figure, panels = new_panels(1, height=2.2)
+    figure, panels = new_panels(1, height=2.7)
     draw_carrier(panels[0, 0], data)
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend([*handles, Patch(color=LOCKED, alpha=0.3, linewidth=0.0)], [*labels, 'locked'],
@@ -302,7 +282,7 @@ def timeline(data):
         stops = [stamp for stamp, _ in own[1:]] + [end]
         rows.append((f'{node} diagnostics', [(start, stop - start, LEVELS[min(level, 3)][1])
                                              for (start, level), stop in zip(own, stops)]))
-    figure, panels = new_panels(1, height=0.35 + 0.3 * len(rows))
+    figure, panels = new_panels(1, height=0.85 + 0.3 * len(rows))
     axes = panels[0, 0]
     for i, (_, bars) in enumerate(rows):
         for colour in dict.fromkeys(colour for *_, colour in bars):
@@ -311,7 +291,6 @@ def timeline(data):
     axes.set_yticks(range(len(rows)), [name for name, _ in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.grid(axis='y', visible=False)
-    axes.set_xlabel('time [s]')
     keys = [(mode, MODES.get(mode, RAW)) for mode in dict.fromkeys(mode for _, _, mode in data.modes)]
     keys += [LEVELS[level] for level in sorted({min(level, 3) for _, _, level, _ in data.statuses})]
     figure.legend([Patch(color=colour, linewidth=0.0) for _, colour in keys], [name for name, _ in keys],
@@ -371,7 +350,7 @@ FIGURES = (
          ('truth', 'lock'), angle),
     Spec('angle_zoom', 'Angle, zoomed (figure 10 of the paper)', f'The {ZOOM:g} s in which the target moved least, '
          'where the noise stands out best: filtered (blue) against measured (grey) and true (orange).',
-         ('truth', 'lock'), angle_zoom),
+         ('truth', 'lock'), functools.partial(angle, zoomed=True)),
     Spec('azimuth', 'Azimuth trajectory (figure 11 of the paper)', "The antenna's azimuth (blue) comes to the "
          "target's (orange) and stays on it.", ('truth',), azimuth),
     Spec('torques', 'Motor torques', 'Both motors of an axis share the load and pull against each other by the bias '

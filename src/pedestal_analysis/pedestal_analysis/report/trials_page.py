@@ -58,7 +58,8 @@ def _varying(table, names):
 def histograms(trials):
     """How the results are spread over the trials, two a row; the median dashed."""
     shown = _varying(trials.table, [name for name in trials.table.there if nodes.plain(name) in SHOWN])
-    figure, panels = new_panels(max(1, -(-len(shown) // 2)), 2, height=1.7)
+    rows = max(1, -(-len(shown) // 2))
+    figure, panels = new_panels(rows, 2, height=0.5 + 1.7 * rows, x='')
     for axes, (name, values) in zip(panels.flat, shown):
         values = values[np.isfinite(values)]
         axes.hist(values, bins='auto' if len(values) < 5000 else 80, color=FILTERED, alpha=0.7)
@@ -73,7 +74,8 @@ def histograms(trials):
 def scatter(trials):
     """The ranking result over every varied parameter; the worst trials orange."""
     varied = _varying(trials.table, trials.table.varied)
-    figure, panels = new_panels(max(1, -(-len(varied) // 2)), 2, height=2.0)
+    rows = max(1, -(-len(varied) // 2))
+    figure, panels = new_panels(rows, 2, height=0.5 + 2.0 * rows, x='')
     values = trials.table.column(trials.by)
     for axes, (name, given) in zip(panels.flat, varied):
         axes.plot(given, values, '.', color=RAW, markersize=3)
@@ -89,7 +91,8 @@ def scatter(trials):
 def worst_and_median(trials):
     """Pointing error over time of the worst trial and of the median one, else the following error, on one scale."""
     pointing = any(run.tracking.any() for _, run in trials.flown)
-    figure, panels = new_panels(2, 2, sharex=True, sharey='row')
+    figure, panels = new_panels(2, 2, y='pointing error [deg]' if pointing else 'following error [deg]', sharex=True,
+                                sharey='row')
     for column, (title, run) in zip(panels.T, trials.flown):
         errors = (np.degrees(np.column_stack((run.cross_elevation, run.elevation_error))) if pointing
                   else run.following)
@@ -98,15 +101,12 @@ def worst_and_median(trials):
         for axes, values, axis in zip(column, errors.T, ('cross-elevation' if pointing else 'azimuth', 'elevation')):
             draw_line(axes, run.t, values, color=TRUTH, linewidth=0.8)
             axes.set_title(f'{title}, {axis}')
-        column[1].set_xlabel('time [s]')
-    for row in panels:
-        row[0].set_ylabel('pointing error [deg]' if pointing else 'following error [deg]')
     return figure
 
 
 def pairs(trials):
     """The ranking result of both sides pair by pair, and the histogram of the difference."""
-    figure, panels = new_panels(1, 2, height=2.8)
+    figure, panels = new_panels(1, 2, height=3.3, x=('', 'difference of a pair'))
     a, b = trials.sides.pairs(trials.by)
     left, right = panels[0]
     left.plot(b, a, '.', color=FILTERED, markersize=4)
@@ -117,7 +117,6 @@ def pairs(trials):
     left.set_title(_label(trials.by))
     right.hist(a - b, bins='auto', color=FILTERED, alpha=0.7)
     right.axvline(0.0, color=INK, linewidth=0.8)
-    right.set_xlabel('difference of a pair')
     return figure
 
 

@@ -137,7 +137,7 @@ class Player:
     def __init__(self, recording, port, options):
         self._recording, self._lock = recording, threading.Lock()
         self._playing, self._rate = not options.paused, options.rate
-        self._shown, self._coming = {}, Coming()
+        self._coming = Coming()
         recording.move(options.start)
         self._server = PageServer('127.0.0.1', port, (), 32, self._past)
         self.url = self._server.access.url(ROLES[0])
@@ -197,15 +197,11 @@ class Player:
                 past.add(frame['t'], frame['beam'])
             sections |= {'fixed': page_state.fixed(recording), 'past': past.places,
                          'sky': page_state.sky(recording, self._coming.look(recording))}
-        texts = {name: page_state.encoded(section) for name, section in sections.items()}
-        fresh = {name: text for name, text in texts.items() if self._shown.get(name) != text}
-        self._shown |= fresh
-        self._server.publish(fresh)
+        self._server.publish(sections)
 
     def _past(self):
         with self._lock:
-            rows = [page_state.history_row(frame) for frame in self._frames(page_state.PERIOD)]
-        return page_state.encoded(rows)
+            return [page_state.history_row(frame) for frame in self._frames(page_state.PERIOD)]
 
     def _frames(self, period):
         """[page_state.now] of the time of the strip charts before this moment."""

@@ -171,6 +171,16 @@ class Axis:
         return band(FREEDOMS, self.count) if self._nees.size else (math.nan, math.nan)
 
     @property
+    def nis_mark(self):
+        """The `mark` of its NIS."""
+        return mark(self.nis, self.nis_expected, self.nis_band)
+
+    @property
+    def nees_mark(self):
+        """The `mark` of its NEES."""
+        return mark(self.nees, FREEDOMS, self.nees_band)
+
+    @property
     def verdict(self):
         """A plain sentence."""
         if not math.isfinite(self.nees):
@@ -191,11 +201,6 @@ def mark(mean, expected, band):
     if mean > max(band[1], (1.0 + NOTABLE) * expected):
         return 'too sure'
     return 'too careful' if mean < min(band[0], (1.0 - NOTABLE) * expected) else ''
-
-
-def axis(known, i) -> Axis:
-    """The Axis i (0 azimuth, 1 elevation) of a Consistency."""
-    return known.axes[i]
 
 
 def _mean(values):

@@ -31,20 +31,6 @@ class Result(typing.NamedTuple):
     mark: typing.Callable = lambda part: ''
 
 
-def _nis_mark(i):
-    def mark(known):
-        axis = consistency.axis(known, i)
-        return consistency.mark(axis.nis, axis.nis_expected, axis.nis_band)
-    return mark
-
-
-def _nees_mark(i):
-    def mark(known):
-        axis = consistency.axis(known, i)
-        return consistency.mark(axis.nees, consistency.FREEDOMS, axis.nees_band)
-    return mark
-
-
 RESULTS = (
     Result('azimuth_following_rms_deg', 'deg', 'motors', lambda run: known_rms(run.following[:, 0]),
            'Rms of reference less encoder in azimuth, over every step outside standby.'),
@@ -102,18 +88,18 @@ RESULTS = (
            'time further than half a beamwidth off, once tracking'),
     Result('evaluated_time_s', 's', 'tracking', lambda run: float(np.sum(run.tracking) * run.period),
            f'How long the run was in autotrack, from {tracking.SETTLING:g} s after its start.', 'time evaluated'),
-    Result('azimuth_nis_mean', '-', 'filter', lambda known: consistency.axis(known, 0).nis,
+    Result('azimuth_nis_mean', '-', 'filter', lambda known: known.axes[0].nis,
            "Mean squared innovation of azimuth in units of the filter's variance; 1 for each number measured.",
-           mark=_nis_mark(0)),
-    Result('azimuth_nees_mean', '-', 'filter', lambda known: consistency.axis(known, 0).nees,
+           mark=lambda known: known.axes[0].nis_mark),
+    Result('azimuth_nees_mean', '-', 'filter', lambda known: known.axes[0].nees,
            "Mean squared error of azimuth and its rate in units of the filter's covariance; 2 where that is true.",
-           mark=_nees_mark(0)),
-    Result('elevation_nis_mean', '-', 'filter', lambda known: consistency.axis(known, 1).nis,
+           mark=lambda known: known.axes[0].nees_mark),
+    Result('elevation_nis_mean', '-', 'filter', lambda known: known.axes[1].nis,
            "Mean squared innovation of elevation in units of the filter's variance; 1 for each number measured.",
-           mark=_nis_mark(1)),
-    Result('elevation_nees_mean', '-', 'filter', lambda known: consistency.axis(known, 1).nees,
+           mark=lambda known: known.axes[1].nis_mark),
+    Result('elevation_nees_mean', '-', 'filter', lambda known: known.axes[1].nees,
            "Mean squared error of elevation and its rate in units of the filter's covariance; 2 where that is true.",
-           mark=_nees_mark(1)),
+           mark=lambda known: known.axes[1].nees_mark),
     Result('keyhole_loss_predicted_s', 's', 'keyholes', lambda slews: sum(loss for _, _, loss in slews),
            'How long the ACU announced that it would lose the target in keyholes.'),
     Result('ship_line_of_sight_rms_deg', 'deg', 'isolation', lambda ship: ship.motion * DEGREES,

@@ -109,24 +109,13 @@ def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
                 axis.plant_step(s, c, 0.0)
 
 
-@compiled
-def _azimuth(state, constants, rate, current, speed, wanted, made):
-    _inner_loops(state[0].azimuth, constants[0].azimuth, constants[0].substeps, rate, current, speed, wanted, made)
-
-
-@compiled
-def _elevation(state, constants, rate, current, speed, wanted, made):
-    _inner_loops(state[0].elevation, constants[0].elevation, constants[0].substeps, rate, current, speed, wanted, made)
-
-
 def _run_inner(drive, index, rate, current):
     """(speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of axis `index` of a drive (AduParameters), with signals added to
     its rate command (n,) [rad/s] and current references (5 n,) [A]."""
     drive = dataclasses.replace(drive, initial_azimuth=START[0], initial_elevation=START[1])
     speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
-    steps = (_azimuth, _elevation)[index]
-    steps(drive_unit.initial_state(drive), drive_unit.constants(drive), RATE[index] + rate, current, speed, wanted,
-          made)
+    [s], [c] = drive_unit.initial_state(drive), drive_unit.constants(drive)
+    _inner_loops(s[AXES[index]], c[AXES[index]], c['substeps'], RATE[index] + rate, current, speed, wanted, made)
     return speed, wanted, made
 
 

@@ -9,6 +9,7 @@ import asyncio
 import collections
 import contextlib
 import json
+import math
 import pathlib
 import queue
 import socket
@@ -110,7 +111,7 @@ class Client:
 class PageServer:
     """Serves from when it is made until `close`. asked: a queue of Asked, for the node; pages: how many there are.
 
-    history() -> JSON of what a new page draws of the past; called in a thread of the server. Raises OSError where the
+    history() -> what a new page draws of the past; called in a thread of the server. Raises OSError where the
     address and port cannot be had.
     """
 
@@ -121,6 +122,7 @@ class PageServer:
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
         self._most, self._history = most, history
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0
+        self._published = {}
         app = Starlette(routes=[Route('/', self._index), Route('/history', self._past),
                                 WebSocketRoute('/socket', self._talk), Mount('/', StaticFiles(directory=STATIC))])
         self._server = uvicorn.Server(uvicorn.Config(
@@ -137,8 +139,11 @@ class PageServer:
             self._loop.run_until_complete(self._server.serve([self._socket]))
 
     def publish(self, sections):
-        """Take {name: JSON text} of what has changed and tell every page; from the node's thread."""
-        self._call(self._take, sections)
+        """Tell every page those of {name: content} that are not as they were; from the node's thread."""
+        texts = {name: encoded(content) for name, content in sections.items()}
+        fresh = {name: text for name, text in texts.items() if self._published.get(name) != text}
+        self._published |= fresh
+        self._call(self._take, fresh)
 
     def reply(self, client, message):
         """Tell one page; from the node's thread."""
@@ -187,7 +192,7 @@ class PageServer:
         return answer
 
     async def _past(self, _):
-        return Response(await asyncio.to_thread(self._history), media_type='application/json')
+        return Response(await asyncio.to_thread(lambda: encoded(list(self._history()))), media_type='application/json')
 
     async def _talk(self, websocket):
         """A page as long as it is there."""
@@ -242,6 +247,19 @@ class PageServer:
         except queue.Full:
             return False
         return True
+
+
+def encoded(value):
+    """JSON of a value; a number that is none is null, which JSON has and browsers read."""
+    return json.dumps(_plain(value), separators=(',', ':'), allow_nan=False)
+
+
+def _plain(value):
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
 def _judged(scope):

@@ -5,7 +5,6 @@ An antenna here is whatever tells, as remote_node.Remote does: numbers {topic: n
 and now [s UTC], alarms (list of DiagnosticStatus), configuration {name of a parameter: value}, path (page_sky.Path or
 None).
 """
-import json
 import math
 
 from pedestal_common.graph import topics
@@ -41,19 +40,6 @@ REFUSED = 'refused '
 
 HISTORY = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate', 'elevation_rate',
            *topics.MOTORS, 'level')
-
-
-def encoded(value):
-    """JSON of a value; a number that is none is null, which JSON has and browsers read."""
-    return json.dumps(_plain(value), separators=(',', ':'), allow_nan=False)
-
-
-def _plain(value):
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
 def _deck(antenna):

@@ -28,6 +28,9 @@ class ServerNode(Remote):
 
     parameters_type: its ServerParameters; longest: bytes of a line; make_client: see line_server.LineServer.
     """
+    awaits = 'clients'
+    device = ''
+    """Serial device that it serves as well, '' for none; overridden by a server that can."""
 
     def __init__(self, name, parameters_type, longest, make_client):
         super().__init__(name, name, parameters_type=parameters_type)
@@ -37,16 +40,6 @@ class ServerNode(Remote):
         self.get_logger().info(f'listens on {p.address}:{self._server.port}'
                                + (f' and {self.device}' if self.device else ''))
         self.every(LOOK, self._look)
-
-    @property
-    def device(self):
-        """Serial device that it serves as well, '' for none; overridden by a server that can."""
-        return ''
-
-    @property
-    def awaits(self):
-        """What it waits for, as a person calls it."""
-        return 'clients'
 
     def serve(self, client, now):
         """Answer what a client has said, at the time now [s]; overridden."""

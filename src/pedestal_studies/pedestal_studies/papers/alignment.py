@@ -15,7 +15,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import pseudo_values, row
 from pedestal_analysis.trials import monte_carlo
@@ -380,37 +380,36 @@ def figures(accuracy, bound):
             'swell': lambda: swell_figure(accuracy['swell'], bound)}
 
 
+RMS = 'rms of the error [arcmin]'
+
+
 def azimuth_figure(accuracy, bound):
     """Figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs, {case: Accuracy}."""
-    figure, axes = drawing.panels(3, size=(7.4, 9.0))
+    figure, axes = new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS))
     t = EVERY * np.arange(1, len(bound[0]) + 1)
     for case, a in accuracy.items():
         axes[0, 0].plot(t, np.degrees(a.whole.first[:, 2]), color=COLOURS[case], label=case)
         axes[1, 0].plot(t, a.whole.first[:, 2] / ARCMIN, color=COLOURS[case])
         axes[2, 0].plot(t, a.rms[:, 2], color=COLOURS[case], label=case)
     axes[0, 0].set_title('azimuth error of one run (figure 3 of the paper)')
-    axes[0, 0].set_ylabel('azimuth error [deg]')
     axes[1, 0].set_title('the same after 100 s (figure 4)')
     axes[1, 0].set_xlim(100.0, DURATION)
     axes[1, 0].set_ylim(-60.0, 60.0)
-    axes[1, 0].set_ylabel('azimuth error [arcmin]')
     finish(axes[2, 0], bound[0], 'azimuth: rms over the runs')
     return drawing.legend(figure)
 
 
 def finish(axes, bound, title):
-    """Add the limit, a logarithmic scale and labels to a panel of rms over time."""
+    """Add the limit, a logarithmic scale and a title to a panel of rms over time."""
     t = EVERY * np.arange(1, len(bound) + 1)
     axes.plot(t, bound / ARCMIN, color=INK, linestyle='--', linewidth=1.0, label='information limit')
     axes.set_yscale('log')
     axes.set_title(title)
-    axes.set_ylabel('rms of the error [arcmin]')
-    axes.set_xlabel('time [s]')
 
 
 def level_figure(accuracy, bound):
     """Figure 4 of the paper for level: one run after 100 s; then the rms over all."""
-    figure, axes = drawing.panels(2, size=(7.4, 6.4))
+    figure, axes = new_panels(2, height=6.4, y=('level error [arcmin]', RMS))
     t = EVERY * np.arange(1, len(bound[1]) + 1)
     for case, a in accuracy.items():
         axes[0, 0].plot(t, a.whole.first[:, 0] / ARCMIN, color=COLOURS[case], linewidth=0.8, label=case)
@@ -418,14 +417,13 @@ def level_figure(accuracy, bound):
     axes[0, 0].set_title('level error about east of one run (figure 4 of the paper)')
     axes[0, 0].set_xlim(100.0, DURATION)
     axes[0, 0].set_ylim(-4.0, 4.0)
-    axes[0, 0].set_ylabel('level error [arcmin]')
     finish(axes[1, 0], bound[1], 'level: rms over the runs')
     return drawing.legend(figure)
 
 
 def swell_figure(accuracy, bound):
     """Rms of the azimuth on swell, {case: Accuracy}, beside the limit."""
-    figure, axes = drawing.panels(1, size=(7.4, 3.8))
+    figure, axes = new_panels(1, height=3.8, y=RMS)
     for case, a in accuracy.items():
         axes[0, 0].plot(EVERY * np.arange(1, len(a.rms) + 1), a.rms[:, 2], color=COLOURS[case], label=case)
     finish(axes[0, 0], bound[0][:round(SHORT / EVERY)],

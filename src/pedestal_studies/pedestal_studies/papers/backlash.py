@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, RAW, TRUTH, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases
@@ -50,11 +50,6 @@ TARGETS = {
     ('hold-fade', 'sine_residual_rad'): '<= 1e-4', ('hold-fade', 'step_overshoot_percent'): '<= 2.5'}
 
 
-def standstill_case(name):
-    """The Case of a step and the standstill after it."""
-    return Case(name, 'servo_step', PAPER_CASES[name], SETTLED + 1.0)
-
-
 def reversal_case(kind, name):
     """The Case of three periods of a sine of REVERSALS."""
     return cases.sine_case(Case(name, 'servo_sine', {
@@ -62,23 +57,11 @@ def reversal_case(kind, name):
         REVERSALS[kind], 3)
 
 
-def fast_case(name):
-    """The Case of a step at 40 rad/s2, which needs all torque."""
-    return Case(name, 'servo_step', {**servo.FULL_TORQUE, 'acu.azimuth.shaper.acceleration': 40.0, **SCHEDULES[name]})
-
-
-def sine_case(name):
-    """The Case of the sine of 0.4 Hz."""
-    return Case(name, 'servo_sine', {**servo.BEST, **SCHEDULES[name]})
-
+FAST = {**servo.FULL_TORQUE, 'acu.azimuth.shaper.acceleration': 40.0}
+"""The controller of a step at 40 rad/s2, which needs all torque."""
 
 MOVED = 0.5
 """The step of the two structures is over by then [s]."""
-
-
-def structure_case(name):
-    """The Case of a step with one speed loop, or one for each motor."""
-    return Case(name, 'servo_step', STRUCTURES[name], SETTLED)
 
 
 def standstill(record):
@@ -106,11 +89,14 @@ def synchronism_error(record):
     return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
 
-CASES = {('standstill', name): standstill_case(name) for name in PAPER_CASES}
+CASES = {('standstill', name): Case(name, 'servo_step', changed, SETTLED + 1.0)
+         for name, changed in PAPER_CASES.items()}
 CASES |= {(kind, name): reversal_case(kind, name) for kind in REVERSALS for name in PAPER_CASES}
-CASES |= {('sine', name): sine_case(name) for name in SCHEDULES}
-CASES |= {('step', name): fast_case(name) for name in SCHEDULES}
-CASES |= {('structure', name): structure_case(name) for name in STRUCTURES}
+CASES |= {('sine', name): Case(name, 'servo_sine', {**servo.BEST, **changed}) for name, changed in SCHEDULES.items()}
+CASES |= {('step', name): Case(name, 'servo_step', {**FAST, **changed}) for name, changed in SCHEDULES.items()}
+CASES |= {('structure', name): Case(name, 'servo_step', changed, SETTLED) for name, changed in STRUCTURES.items()}
+"""{(kind, case): a step and the standstill after it; reversals; the sine of 0.4 Hz and the fast step with every
+schedule; a step with one speed loop, or one for each motor}."""
 
 
 def measured(kind, name, record):
@@ -181,35 +167,32 @@ def figures(done):
 
 def standstill_figure(done):
     """Limit cycle of the load at rest and the torque of both motors, without and with bias."""
-    figure, axes = drawing.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
+    figure, axes = new_panels(2, 2, height=4.6, y=('azimuth [\N{MICRO SIGN}rad]', 'torque [Nm]'), sharex=True,
+                              sharey='row')
     for column, name in enumerate(('bias-off', 'bias-on')):
         record = done['standstill', name]
         t, y = standstill(record)
         axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH, FILTERED)[column])
         axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
         drawing.draw_torques(axes[1, column], record)
-        axes[1, column].set_xlabel('time [s]')
     axes[0, 0].set_xlim(SETTLED, SETTLED + 0.5)
-    axes[0, 0].set_ylabel('azimuth [\N{MICRO SIGN}rad]')
     axes[1, 0].set_ylim(-20.0, 20.0)
-    axes[1, 0].set_ylabel('torque [Nm]')
     return drawing.legend(figure)
 
 
 def reversal_figure(done):
     """What lash leaves of a slow sine: reference and load, then the error without its fundamental."""
-    figure, axes = drawing.panels(3, size=(7.4, 5.6), sharex=True, height_ratios=(1, 1.2, 1.2))
+    error = 'error [\N{MICRO SIGN}rad]'
+    figure, axes = new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
+                              height_ratios=(1, 1.2, 1.2))
     t = done['reversal', 'bias-off'].t
     w = REVERSALS['reversal']
     axes[0, 0].plot(t, REVERSAL_AMPLITUDE * np.sin(w * t), color=INK)
-    axes[0, 0].set_ylabel('reference [rad]')
     for panel, name in zip(axes[1:, 0], ('bias-off', 'bias-on')):
         t, left = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE, w)
         panel.plot(t, 1e6 * left, color=TRUTH if name == 'bias-off' else FILTERED)
-        panel.set_ylabel('error [\N{MICRO SIGN}rad]')
         panel.set_title(f'{name}: error without its fundamental')
     axes[2, 0].set_xlim(*reversal_window())
-    axes[2, 0].set_xlabel('time [s]')
     return figure
 
 
@@ -221,14 +204,12 @@ def reversal_window():
 
 def torques_figure(done):
     """Torque of both motors over the reversal, without and with bias."""
-    figure, axes = drawing.panels(3, size=(7.4, 5.6), sharex=True, sharey=True)
+    figure, axes = new_panels(3, height=5.6, y='torque [Nm]', sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
         drawing.draw_torques(panel, record)
         panel.set_title(name)
-        panel.set_ylabel('torque [Nm]')
     axes[2, 0].set_xlim(*reversal_window())
-    axes[2, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 
@@ -237,7 +218,7 @@ def schedules_figure(done):
     names = list(SCHEDULES)
     sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
     step = [measured('step', name, done['step', name])['step_overshoot_percent'][0] for name in names]
-    figure, axes = drawing.panels(1, 2, size=(7.4, 3.2), sharey=True)
+    figure, axes = new_panels(1, 2, height=3.2, sharey=True)
     for panel, values, bound, label in ((axes[0, 0], sine, 100.0, 'left of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
                                         (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
         bars = panel.barh(names, values, color=[FILTERED if name == 'hold-fade' else RAW for name in names])
@@ -253,14 +234,11 @@ def schedules_figure(done):
 
 def structures_figure(done):
     """One speed loop on the mean speed against one for each motor, over the step of the paper."""
-    figure, axes = drawing.panels(2, 2, size=(7.4, 4.6), sharex=True, sharey='row')
+    figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'fight torque [Nm]'), sharex=True, sharey='row')
     for column, name in enumerate(STRUCTURES):
         record = done['structure', name]
         drawing.draw_torques(axes[0, column], record)
         axes[1, column].plot(record.t, fight(record), color=INK)
         axes[0, column].set_title(name)
-        axes[1, column].set_xlabel('time [s]')
     axes[0, 0].set_xlim(0.0, 1.0)
-    axes[0, 0].set_ylabel('torque [Nm]')
-    axes[1, 0].set_ylabel('fight torque [Nm]')
     return drawing.legend(figure)

@@ -16,7 +16,7 @@ import numpy as np
 from acu_tracker.estimation.filters.motion_models import MODELS
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.modes import Mode
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases, monte_carlo
@@ -209,7 +209,7 @@ def from_first_reversal(axis):
 def miss_figure(axis, those, misses):
     """The miss (`those` figures of the paper), one run of each and the mean over the runs."""
     names = ('kalman-cv', 'imm', 'imm-predicted')
-    figure, axes = drawing.panels(len(names), size=(7.4, 6.4), sharex=True, sharey=True)
+    figure, axes = new_panels(len(names), height=6.4, y='miss [deg]', sharex=True, sharey=True)
     t, counts, _ = from_first_reversal(axis)
     for name, panel in zip(names, axes[:, 0]):
         case = f'{axis}/{name}'
@@ -218,49 +218,43 @@ def miss_figure(axis, those, misses):
         panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=FILTERED, linewidth=1.4,
                    label='mean of the runs')
         panel.set_title(f'{name}: {misses[case].mean("miss_rms_deg"):.3f} deg rms')
-        panel.set_ylabel('miss [deg]')
     axes[0, 0].set_title(f'{axis}, {those} of the paper. {axes[0, 0].get_title(loc="left")}')
-    axes[-1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 
 def feedforward_figure():
     """Rate and acceleration fed forward through one reversal, one run, beside the truth."""
-    figure, axes = drawing.panels(2, size=(7.4, 5.4), sharex=True)
+    figure, axes = new_panels(2, height=5.4, y=('rate [deg/s]', 'acceleration [deg/s2]'), sharex=True)
     t, counts, target = from_first_reversal('azimuth')
-    for panel, field, column, label in ((axes[0, 0], 'rate', 1, 'rate [deg/s]'),
-                                        (axes[1, 0], 'acceleration', 2, 'acceleration [deg/s2]')):
+    for panel, field, column in ((axes[0, 0], 'rate', 1), (axes[1, 0], 'acceleration', 2)):
         panel.plot(t, np.degrees(target[counts, column]), color=INK, linestyle='--', label='truth')
         for name in ('kalman-cv', 'imm', 'imm-predicted'):
             one = feedforward_loop.steps_of(*CASES[f'azimuth/{name}'], 0, 1)[field][0, counts]
             panel.plot(t, np.degrees(one), color=COLOURS[name], label=name)
-        panel.set_ylabel(label)
     reversal = t[np.argmax(np.abs(target[counts, 2]))]
     axes[0, 0].set_xlim(reversal - 1.5, reversal + 2.5)
     axes[0, 0].set_title('fed forward through a reversal of the azimuth')
-    axes[1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 
 def probability_figure():
     """Model probabilities of the IMM through reversals, mean of one BATCH."""
-    figure, axes = drawing.panels(2, size=(7.4, 4.6), sharex=True, height_ratios=(1, 1.6))
+    figure, axes = new_panels(2, height=4.6, y=('acceleration\n[deg/s2]', 'probability'), sharex=True,
+                              height_ratios=(1, 1.6))
     t, counts, target = from_first_reversal('azimuth')
     mu = feedforward_loop.steps_of(*CASES['azimuth/imm'], 0, feedforward_loop.BATCH)['mu'][:, counts].mean(axis=0)
     axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=INK)
-    axes[0, 0].set_ylabel('acceleration\n[deg/s2]')
     axes[0, 0].set_title('the target, and the probability of each model of imm')
     for model, colour in (('cv', TRUTH), ('ca', MOTOR_2), ('current_statistical', FILTERED)):
         axes[1, 0].plot(t, mu[:, MODELS.index(model)], color=colour, label=model)
-    axes[1, 0].set_ylabel('probability')
     axes[1, 0].set_ylim(0.0, 1.0)
-    axes[1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 
 def tuning_figure(misses):
     """Miss against noise of the rate fed forward, over the tunings."""
-    figure, axes = drawing.panels(1, 2, size=(7.4, 3.8), sharex=True, sharey=True)
+    figure, axes = new_panels(1, 2, height=3.8, x='noise of the rate fed forward [deg/s]', y='miss rms [deg]',
+                              sharex=True, sharey=True)
     for axis, panel in zip(REVERSALS, axes[0]):
         panel.loglog(*conventional(misses, axis).mean(axis=-1), '.-', color=TRUTH, label='kalman-cv, q '
                      f'{CV[0]:g} to {CV[-1]:g}')
@@ -272,22 +266,18 @@ def tuning_figure(misses):
         panel.set_title(axis)
         panel.set_xlim(0.015, 1.0)
         panel.set_ylim(0.012, 0.3)
-        panel.set_xlabel('noise of the rate fed forward [deg/s]')
-    axes[0, 0].set_ylabel('miss rms [deg]')
     return drawing.legend(figure)
 
 
 def drive_figure():
     """Miss of the product in reversals without a pause, one run of each filter."""
-    figure, axes = drawing.panels(2, size=(7.4, 4.8), sharex=True)
+    figure, axes = new_panels(2, height=4.8, y='miss [deg]', sharex=True)
     for axis, panel in zip(REVERSALS, axes[:, 0]):
         for name, colour in (('kalman-cv', TRUTH), ('imm', MOTOR_1), ('imm-default', FILTERED)):
             t, miss = driven((f'{axis}/drive-{name}', SEED))
             panel.plot(t, np.degrees(miss), color=colour, label=name)
         panel.set_xlim(DRIVE_START, DRIVE_START + 8.0)
-        panel.set_ylabel('miss [deg]')
         panel.set_title(f'{axis}: control unit, motors and gears, target in reversals of {REVERSALS[axis]:g} s')
-    axes[1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 

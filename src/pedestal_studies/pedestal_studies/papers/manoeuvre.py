@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH, new_panels
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.rigs import drawing, ensemble, feedforward_loop, profiles
@@ -73,7 +73,8 @@ def run(progress, runs=RUNS, pool=None) -> Result:
         sums_of[name] = ensemble.added(sums_of[name], sums) if name in sums_of else sums
         errors.setdefault(name, []).append(rms)
     values = measured({name: np.concatenate(rms) for name, rms in errors.items()})
-    figures = {'figure-3': lambda: rate_figure(sums_of), 'figure-4': lambda: acceleration_figure(sums_of),
+    figures = {'figure-3': lambda: moments_figure(sums_of, 'rate', 'rate [deg/s]'),
+               'figure-4': lambda: moments_figure(sums_of, 'acceleration', 'acceleration [deg/s2]'),
                'sharpness': lambda: sharpness_figure(values)}
     return Result(rows(values), figures, remarks(values))
 
@@ -115,13 +116,14 @@ def remarks(values):
     return lines
 
 
-def _panels(sums_of, what, label, names):
-    """Truth and mean estimates above, mean errors +-1 sigma below; sums_of: {filter: MOMENTS (n,)}."""
+def moments_figure(sums_of, what, label):
+    """Truth and mean estimates through the reversals above, mean errors +-1 sigma below (paper 003, figures 3 and 4);
+    sums_of: {filter: MOMENTS (n,)}; what: 'rate' or 'acceleration'."""
     t, truth, _ = motion()
-    figure, axes = drawing.panels(2, size=(7.4, 5.4), sharex=True)
+    figure, axes = new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
     of = truth[('angle', 'rate', 'acceleration').index(what)]
     axes[0, 0].plot(t, np.degrees(of), color=INK, linestyle='--', linewidth=0.8, label='truth')
-    for name in names:
+    for name in ('cv', 'imm-b'):
         sums = sums_of[name]
         mean = sums[what] / sums['runs']
         sigma = np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - mean * mean, 0.0))
@@ -129,33 +131,19 @@ def _panels(sums_of, what, label, names):
         axes[1, 0].plot(t, np.degrees(mean), color=COLOURS[name])
         axes[1, 0].fill_between(t, np.degrees(mean - sigma), np.degrees(mean + sigma), color=COLOURS[name], alpha=0.25,
                                 linewidth=0.0)
-    axes[0, 0].set_ylabel(label)
-    axes[1, 0].set_ylabel(f'error of the {label}')
-    axes[1, 0].set_xlabel('time [s]')
     axes[1, 0].set_xlim(LEAD - 1.0, t[-1])
     return drawing.legend(figure)
 
 
-def rate_figure(sums_of):
-    """Rate through the reversals and its error, mean of the runs and +-1 sigma (paper 003, figure 3)."""
-    return _panels(sums_of, 'rate', 'rate [deg/s]', ('cv', 'imm-b'))
-
-
-def acceleration_figure(sums_of):
-    """Acceleration through the reversals and its error (paper 003, figure 4)."""
-    return _panels(sums_of, 'acceleration', 'acceleration [deg/s2]', ('cv', 'imm-b'))
-
-
 def sharpness_figure(values):
     """Errors of rate and acceleration against the sharpness of the reversal."""
-    figure, axes = drawing.panels(1, 2, size=(7.4, 3.6), sharex=True)
+    figure, axes = new_panels(1, 2, height=3.6, x='peak acceleration of the reversal [deg/s2]', sharex=True)
     x = [peak_acceleration(reversal) for reversal in REVERSALS]
     for i, (panel, label) in enumerate(zip(axes[0], ('rate rms [deg/s]', 'acceleration rms [deg/s2]'))):
         for name, colour in COLOURS.items():
             y = [values[reversal, name][i].mean() for reversal in REVERSALS]
             panel.loglog(x, y, 'o-', ms=3.5, color=colour, label=name)
         panel.set_ylabel(label)
-        panel.set_xlabel('peak acceleration of the reversal [deg/s2]')
         panel.set_xticks(x, [f'{value:.2g}' for value in x])
         panel.set_xticks([], minor=True)
     return drawing.legend(figure)

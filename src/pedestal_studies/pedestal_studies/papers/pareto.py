@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.rigs import drawing, feedforward_loop
@@ -135,7 +135,8 @@ def remarks(points):
 
 def miss_figure(points):
     """Miss against rate noise, a curve for every filter; points as of `remarks`."""
-    figure, axes = drawing.panels(1, size=(7.4, 4.8))
+    figure, axes = new_panels(1, height=4.8, x='noise of the rate fed forward, uniform part [deg/s]',
+                              y='miss rms [deg]')
     panel = axes[0, 0]
     for name, colour in COLOURS.items():
         panel.loglog(*curve(points, name), '.-', ms=5.0, color=colour, label=f'{name}, {TUNINGS[name][0]}')
@@ -144,8 +145,6 @@ def miss_figure(points):
             panel.annotate(f'{value:g}', points[name, value], xytext=(3, 3), textcoords='offset points', color=colour,
                            fontsize=8)
     panel.loglog(*points['reference', 0.0], 'o', ms=7.0, color=MOTOR_1, fillstyle='none', label='imm-predicted')
-    panel.set_xlabel('noise of the rate fed forward, uniform part [deg/s]')
-    panel.set_ylabel('miss rms [deg]')
     noise, miss = points['reference', 0.0]
     panel.axvline(noise, color=INK, linewidth=0.6, linestyle=':')
     panel.axhline(miss, color=INK, linewidth=0.6, linestyle=':')

@@ -17,7 +17,7 @@ import numpy as np
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
@@ -56,7 +56,7 @@ SETTLING = 20000
 PROFILE = 'flyby-60m'
 
 PEAK_SHARE, FLOOR = 1.2, 0.3
-"""Of the flyby's filter: a_max over the largest acceleration, and the least sigma_a over that."""
+"""Of the filter of a flight: a_max over its largest acceleration, and the least sigma_a over that."""
 
 SKIPPED = 5.0
 """Of the flyby, for the filter to settle [s]."""
@@ -149,6 +149,16 @@ def differenced(y, steps):
     return rate, 2.0 * (SIGMA / (steps * T)) ** 2
 
 
+def filtered(t, target, y, y_rate, R_rate):
+    """ESTIMATE (n,) of the filter for a target (n, 3) of angles and rates (n,) measured at times (n,) [s]; R_rate: the
+    variance of the rates [rad2/s2]."""
+    c = axis_filter.constants(filter_of(PEAK_SHARE * np.abs(target[:, 2]).max(), FLOOR))
+    out = np.zeros(len(t), axis_filter.ESTIMATE)
+    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), R_rate),
+                          ensemble.INITIAL_RATE, out)
+    return out
+
+
 def flyby():
     """(times (n,) [s], angle, rate and acceleration (n, 3)) of PROFILE."""
     t = T * np.arange(round(profiles.DURATION / T))
@@ -166,11 +176,7 @@ def flown(name, run):
     else:
         sigma = math.radians(RATE_SIGMA[name])
         y_rate, R_rate = target[:, 1] + sigma * normals[1], sigma * sigma
-    c = axis_filter.constants(filter_of(PEAK_SHARE * np.abs(target[:, 2]).max(), FLOOR))
-    out = np.zeros(len(t), axis_filter.ESTIMATE)
-    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), R_rate),
-                          ensemble.INITIAL_RATE, out)
-    return y, y_rate, out
+    return y, y_rate, filtered(t, target, y, y_rate, R_rate)
 
 
 def batch(item):
@@ -235,7 +241,8 @@ def figures():
 
 def bode_figure():
     """Responses of angle and rate with and without a measured rate, and their dynamic errors."""
-    figure, axes = drawing.panels(2, 2, size=(7.4, 5.6), sharex=True)
+    figure, axes = new_panels(2, 2, height=5.6, x='frequency [Hz]', y=('gain [dB]', 'dynamic error |1 - G|'),
+                              sharex=True)
     for name, colour in COLOURS.items():
         angle, rate = responses(*settled(MAIN, RATE_SIGMA[name]), BAND)
         for column, G in enumerate((angle, rate)):
@@ -247,33 +254,28 @@ def bode_figure():
         axes[0, column].set_ylim(-25.0, 5.0)
         axes[1, column].axvline(FREQUENCY, color=INK, linewidth=0.6, linestyle=':')
         axes[1, column].set_ylim(1e-5, 3.0)
-        axes[1, column].set_xlabel('frequency [Hz]')
-    axes[0, 0].set_ylabel('gain [dB]')
-    axes[1, 0].set_ylabel('dynamic error |1 - G|')
     return drawing.legend(figure)
 
 
 def sigma_a_figure():
     """Bandwidth of the rate and dynamic error of the angle over sigma_a, with and without a measured rate."""
-    figure, axes = drawing.panels(1, 2, size=(7.4, 3.4), sharex=True)
+    figure, axes = new_panels(1, 2, height=3.4, x='sigma_a [deg/s2]', y='bandwidth of the rate [Hz]', sharex=True)
     sigma_a = np.geomspace(SIGMA_A[0], SIGMA_A[-1], 13)
     for name, colour in COLOURS.items():
         values = [measures(s, RATE_SIGMA[name]) for s in sigma_a]
         for panel, metric in zip(axes[0], ('rate_bandwidth_hz', 'dynamic_error_0p2hz')):
             panel.loglog(sigma_a, [value[metric][0] for value in values], color=colour, label=name)
-            panel.set_xlabel('sigma_a [deg/s2]')
-    axes[0, 0].set_ylabel('bandwidth of the rate [Hz]')
     axes[0, 1].set_ylabel(f'dynamic error of the angle at {FREQUENCY:g} Hz')
     return drawing.legend(figure)
 
 
 def flyby_figure():
     """The paper's figures 1 to 8 on the flyby: rate, error of angle and rate, acceleration."""
-    figure, axes = drawing.panels(4, size=(7.4, 8.6), sharex=True)
+    labels = ('rate [deg/s]', 'error of the angle [deg]', 'error of the rate [deg/s]', 'acceleration [deg/s2]')
+    figure, axes = new_panels(4, height=8.6, y=labels, sharex=True)
     t, target = flyby()
     y, y_rate, _ = flown('position-rate', 0)
     near = np.abs(t - 0.5 * profiles.DURATION) <= 0.2 * profiles.DURATION
-    labels = ('rate [deg/s]', 'error of the angle [deg]', 'error of the rate [deg/s]', 'acceleration [deg/s2]')
     measured = (y_rate, y - target[:, 0], y_rate - target[:, 1], None)
     truth = (target[:, 1], 0.0 * t, 0.0 * t, target[:, 2])
     for panel, values in zip(axes[:, 0], measured):
@@ -284,11 +286,9 @@ def flyby_figure():
         for panel, values in zip(axes[:, 0], (out['rate'], out['angle'] - target[:, 0], out['rate'] - target[:, 1],
                                               out['acceleration'])):
             panel.plot(t[near], np.degrees(values[near]), color=COLOURS[name], label=name)
-    for panel, values, label in zip(axes[:, 0], truth, labels):
+    for panel, values in zip(axes[:, 0], truth):
         panel.plot(t[near], np.degrees(values[near]), color=INK, linestyle='--', label='truth')
-        panel.set_ylabel(label)
     axes[0, 0].set_title(f'{PROFILE}, one run')
-    axes[-1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases
@@ -238,7 +238,8 @@ def figures(done):
 def step_figure(done):
     """Figure 5: the load's angle, and the torque of both motors below."""
     names = ('paper-r1', 'paper-r2', 'best')
-    figure, axes = drawing.panels(4, size=(7.4, 8.0), sharex=True, height_ratios=(2.2, 1, 1, 1))
+    figure, axes = new_panels(4, height=8.0, y=('azimuth [rad]', *3 * ['torque [Nm]']), sharex=True,
+                              height_ratios=(2.2, 1, 1, 1))
     top = axes[0, 0]
     top.axhline(STEP, color=INK, linewidth=0.8, linestyle='--', label='reference')
     for name, below in zip(names, axes[1:, 0]):
@@ -247,18 +248,16 @@ def step_figure(done):
         top.plot(t, record['adu/truth']['position'][:, 0], color=COLOURS[name], linewidth=1.4, label=name)
         drawing.draw_torques(below, record)
         below.set_title(f'{name}: torque of the motors')
-        below.set_ylabel('torque [Nm]')
         below.set_ylim(-100.0, 100.0)
     top.set_xlim(0.0, 0.6)
-    top.set_ylabel('azimuth [rad]')
     top.set_title('step of 0.174 rad (figure 5 of the paper)')
-    axes[-1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 
 def sine_figure(done):
     """Figure 6: reference and load, errors of both readings, the error of best on its own scale."""
-    figure, axes = drawing.panels(3, size=(7.4, 7.0), sharex=True, height_ratios=(1.4, 1.2, 1))
+    figure, axes = new_panels(3, height=7.0, x='time [periods of the sine]', sharex=True, height_ratios=(1.4, 1.2, 1),
+                              y=('azimuth [rad]', 'error [mrad]', 'error [\N{MICRO SIGN}rad]'))
     period = 2.0 * math.pi / FREQUENCIES['0p4hz']
     record = done['paper-r1', '0p4hz']
     t = record.t / period
@@ -267,25 +266,21 @@ def sine_figure(done):
     axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=TRUTH, linewidth=1.4,
                     label='paper-r1, 0.4 Hz')
     axes[0, 0].set_title('sine of 0.87 rad (figure 6 of the paper)')
-    axes[0, 0].set_ylabel('azimuth [rad]')
     for name, reading, colour, style, scale, panel in (
             ('paper-r1', '0p4hz', TRUTH, '-', 1e3, 1), ('paper-r2', '0p4rads', INK, '--', 1e3, 1),
             ('best', '0p4hz', FILTERED, '-', 1e6, 2), ('best', '0p4rads', MOTOR_1, '-', 1e6, 2)):
         record, w = done[name, reading], FREQUENCIES[reading]
         axes[panel, 0].plot(record.t * w / (2.0 * math.pi), scale * sine_error(record, w), style, color=colour,
                             label=f'{name}, {READINGS[reading]}')
-    axes[1, 0].set_ylabel('error [mrad]')
     axes[2, 0].set_title('best, its start beyond the scale')
-    axes[2, 0].set_ylabel('error [\N{MICRO SIGN}rad]')
     axes[2, 0].set_ylim(-100.0, 100.0)
     axes[2, 0].set_xlim(0.0, PERIODS)
-    axes[2, 0].set_xlabel('time [periods of the sine]')
     return drawing.legend(figure)
 
 
 def gust_figure(done):
     """Deflection of the load by the gust."""
-    figure, axes = drawing.panels(1, size=(7.4, 3.4))
+    figure, axes = new_panels(1, height=3.4, y='azimuth off its place [\N{MICRO SIGN}rad]')
     axes = axes[0, 0]
     for name in ('paper-r1', 'adrc', 'best'):
         record = done[name, 'gust']
@@ -296,15 +291,13 @@ def gust_figure(done):
     axes.axhline(1e6 * GUST / stiffness, color=INK, linewidth=0.8, linestyle='--',
                  label='the gear bent by the gust')
     axes.set_xlim(GUST_START - 0.05, GUST_START + 0.5)
-    axes.set_ylabel('azimuth off its place [\N{MICRO SIGN}rad]')
-    axes.set_xlabel('time [s]')
     axes.set_title(f'gust: a step of {GUST:g} Nm at {GUST_START:g} s')
     return drawing.legend(figure)
 
 
 def inertia_figure(done):
     """The step of best with 20 % more and less load, around its end, and the torque it takes."""
-    figure, axes = drawing.panels(2, size=(7.4, 5.2), sharex=True)
+    figure, axes = new_panels(2, height=5.2, y=('azimuth less 0.174 rad [mrad]', 'torque [Nm]'), sharex=True)
     for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as known'),
                         ('best-inertia-plus', 'load 20 % heavier')):
         record = done[name, 'step']
@@ -316,11 +309,8 @@ def inertia_figure(done):
         axes[0, 0].axhline(1e3 * side * STEP, color=INK, linewidth=0.8, linestyle='--')
     axes[0, 0].set_xlim(0.0, 0.3)
     axes[0, 0].set_ylim(-8.0, 6.0)
-    axes[0, 0].set_ylabel('azimuth less 0.174 rad [mrad]')
     axes[0, 0].set_title('step of best: the end of the move, 2 % band dashed')
-    axes[1, 0].set_ylabel('torque [Nm]')
     axes[1, 0].set_title('mean torque of the two motors')
-    axes[1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 

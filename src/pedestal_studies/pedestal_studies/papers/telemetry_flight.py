@@ -17,13 +17,13 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation.filters import axis_filter, motion_models
-from pedestal_analysis.report.figures import FILTERED, INK, RAW
+from acu_tracker.estimation.filters import motion_models
+from pedestal_analysis.report.figures import FILTERED, INK, RAW, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_common.graph.topics import AXES
-from pedestal_studies.papers.rate_measurement import ALPHA, filter_of
+from pedestal_studies.papers.rate_measurement import ALPHA, SIGMA, differenced, filtered
 from pedestal_studies.rigs import drawing, ensemble
 from pedestal_studies.rigs.ensemble import PERIOD as T
 from pedestal_studies.rigs.rows import Result
@@ -46,11 +46,8 @@ SETTLED = 5.0
 ZOOM = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
 """Of figures 2 and 6 [s]."""
 
-SIGMA, RATE_SIGMA = math.radians(0.03), math.radians(0.1)
-"""Of a measured angle [rad] and rate [rad/s]."""
-
-PEAK_SHARE, FLOOR = 1.2, 0.3
-"""Of the filter: a_max over the largest acceleration of the flight, and the least sigma_a over that."""
+RATE_SIGMA = math.radians(0.1)
+"""Of a measured rate [rad/s]."""
 
 DIFFERENCED = 20
 """Steps over which the measured rate is differenced."""
@@ -84,12 +81,8 @@ def flown(axis, run):
     truth = target[axis]
     nu, nu_rate = ensemble.drawn(SEED + AXES.index(axis), run, 1, len(t))[:, 0]
     y, y_rate = truth[:, 0] + SIGMA * nu, truth[:, 1] + RATE_SIGMA * nu_rate
-    c = axis_filter.constants(filter_of(PEAK_SHARE * np.abs(truth[:, 2]).max(), FLOOR))
-    out = np.zeros(len(t), axis_filter.ESTIMATE)
-    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), RATE_SIGMA * RATE_SIGMA),
-                          ensemble.INITIAL_RATE, out)
-    difference = np.full(len(t), math.nan)
-    difference[DIFFERENCED:] = (y_rate[DIFFERENCED:] - y_rate[:-DIFFERENCED]) / (DIFFERENCED * T)
+    out = filtered(t, truth, y, y_rate, RATE_SIGMA * RATE_SIGMA)
+    difference, _ = differenced(y_rate, DIFFERENCED)
     return np.column_stack((y, y_rate, difference)), np.column_stack([out[name] for name in QUANTITIES])
 
 
@@ -167,7 +160,7 @@ def figures():
 def axis_figure(axis, first):
     """Angle, a part of it, rate and acceleration of one flight, measured, filtered and true; first: the number of the
     first of the paper's four figures."""
-    figure, axes = drawing.panels(4, size=(7.4, 9.0))
+    figure, axes = new_panels(4, height=9.0)
     t, target = flight()
     measured, filtered = flown(axis, 0)
     for i, (panel, column) in enumerate(zip(axes[:, 0], (0, 0, 1, 2))):
@@ -181,7 +174,6 @@ def axis_figure(axis, first):
         panel.set_ylabel(f'{name} [{unit}]')
         panel.set_title(f'{axis}: {name} (figure {first + i} of the paper)')
     axes[3, 0].set_ylim(*np.degrees(2.0 * np.abs(target[axis][:, 2]).max() * np.array((-1.0, 1.0))))
-    axes[-1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 

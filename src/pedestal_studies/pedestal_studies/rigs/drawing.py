@@ -1,17 +1,7 @@
 """Figures of the studies: sheets of panels in one style, saved as PNG, and as a vector file where one is asked for."""
 import matplotlib
-from matplotlib.figure import Figure
 
 from pedestal_analysis.report import figures
-
-SIZE = (7.4, 4.6)
-"""Of a figure [inch]."""
-
-
-def panels(rows, columns=1, size=SIZE, **options):
-    """(figure, axes (rows, columns)) on one sheet."""
-    figure = Figure(figsize=size, layout='constrained')
-    return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
 def legend(figure):

@@ -1,7 +1,7 @@
 """Figures of the study phased-array: those of paper 002 with S0, S1 and S2 side by side, and of the better loop."""
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.angle_loop import GRID
 
@@ -11,7 +11,7 @@ SMOOTHED = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, moving a
 
 def side_by_side(rows, **options):
     """(figure, axes (rows, 3)) with a column for each smoothing."""
-    figure, axes = drawing.panels(rows, 3, size=(9.6, 1.2 + 2.4 * rows), sharey='row', sharex=True, **options)
+    figure, axes = new_panels(rows, 3, height=1.2 + 2.4 * rows, width=9.6, sharey='row', sharex=True, **options)
     for column, title in zip(axes.T, SMOOTHED.values()):
         column[0].set_title(title, fontsize=10)
     return figure, axes
@@ -19,7 +19,7 @@ def side_by_side(rows, **options):
 
 def steps(done, label, title, seconds):
     """Step responses {Paper: y (n,)} with a column for each smoothing; label(loop) names a line."""
-    figure, axes = side_by_side(1)
+    figure, axes = side_by_side(1, y='beam over step')
     for panel, S in zip(axes[0], SMOOTHED):
         loops = [loop for loop in done if loop.smoothing == S]
         for loop, colour in zip(loops, COLOURS):
@@ -27,33 +27,28 @@ def steps(done, label, title, seconds):
                        label=label(loop))
         panel.axhline(1.0, color=INK, linewidth=0.6, linestyle='--')
         panel.set_xlim(0.0, seconds)
-        panel.set_xlabel('time [s]')
     axes[0, 0].set_ylim(-0.05, 2.3)
-    axes[0, 0].set_ylabel('beam over step')
     figure.suptitle(title)
     return drawing.legend(figure)
 
 
 def lags(done, title, seconds):
     """Errors {label: {S: (as the receiver reads it, true error (n,)) [rad]}}: above the reading, below the truth."""
-    figure, axes = side_by_side(2)
+    figure, axes = side_by_side(2, y=('receiver reads [deg]', 'true error [deg]'))
     for (label, by_smoothing), colour in zip(done.items(), COLOURS):
         for column, S in zip(axes.T, SMOOTHED):
             for panel, error in zip(column, by_smoothing[S]):
                 first = round(seconds[0] / GRID), round(seconds[1] / GRID)
                 error = np.degrees(error[slice(*first)])
                 panel.plot(GRID * np.arange(*first), error, color=colour, linewidth=0.9, label=label)
-    axes[0, 0].set_ylabel('receiver reads [deg]')
-    axes[1, 0].set_ylabel('true error [deg]')
-    for panel in axes[1]:
-        panel.set_xlabel('time [s]')
     figure.suptitle(title)
     return drawing.legend(figure)
 
 
 def stability(limits):
     """Largest stable delays {Paper: (bisected, by eigenvalues) [ms]} over alpha and over the slope."""
-    figure, axes = drawing.panels(1, 3, size=(9.6, 3.6))
+    figure, axes = new_panels(1, 3, height=3.6, width=9.6, x=('alpha', 'alpha', 'true slope over assumed'),
+                              y='largest stable delay [ms]')
     for panel, T in zip(axes[0], (10, 5)):
         for S, colour in zip(SMOOTHED, COLOURS):
             by_alpha = {loop.alpha: both for loop, both in limits.items() if loop.smoothing == S and loop.period == T
@@ -61,7 +56,6 @@ def stability(limits):
             panel.plot(list(by_alpha), [bisected for bisected, _ in by_alpha.values()], color=colour, label=S)
             panel.plot(list(by_alpha), [exact for _, exact in by_alpha.values()], 'o', color=colour, markersize=4)
         panel.set_title(f'T = {T} ms')
-        panel.set_xlabel('alpha')
         panel.set_ylim(0.0, 220.0)
     by_slope = {loop.slope: both for loop, both in limits.items() if loop.alpha == 0.1 and loop.smoothing == 'S1'
              and loop.period == 10 and loop.form == 'type_1'}
@@ -69,16 +63,14 @@ def stability(limits):
     axes[0, 2].plot(order, [by_slope[slope][0] for slope in order], color=TRUTH)
     axes[0, 2].plot(order, [by_slope[slope][1] for slope in order], 'o', color=TRUTH, markersize=4)
     axes[0, 2].set_title('alpha 0.1, T = 10 ms, S1')
-    axes[0, 2].set_xlabel('true slope over assumed')
     axes[0, 2].set_ylim(0.0, 220.0)
-    axes[0, 0].set_ylabel('largest stable delay [ms]')
     figure.suptitle('delay until the loop is unstable: bisection (lines) and eigenvalues (dots)')
     return drawing.legend(figure)
 
 
 def better(errors, seconds):
     """True errors {case: (n,) [rad]} without noise of the paper's loop and of better ones."""
-    figure, axes = drawing.panels(3, size=(7.4, 7.6), sharex=True)
+    figure, axes = new_panels(3, height=7.6, y='off by up to [deg]', sharex=True)
     lines = {'paper': RAW, 'paper-delta': INK, 'type-2': MOTOR_2, 'tracked-10ms': MOTOR_1, 'best': FILTERED}
     first = slice(*(round(t / GRID) for t in seconds))
     t = GRID * np.arange(first.start, first.stop)
@@ -89,11 +81,9 @@ def better(errors, seconds):
                 panel.semilogy(t, envelope(np.degrees(np.abs(errors[f'{loop}/{target}'][first]))), color=colour,
                                linewidth=1.1, label=loop)
         panel.set_title(title, fontsize=10)
-        panel.set_ylabel('off by up to [deg]')
         panel.set_ylim(1e-5, 1.0)
     axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][first]))), color=TRUTH, linewidth=1.1,
                         label='best with INS, 5 ms late')
-    axes[2, 0].set_xlabel('time [s]')
     figure.suptitle('true error without noise, 20 ms of delay (best on the ramp: none)')
     return drawing.legend(figure)
 
@@ -105,14 +95,12 @@ def envelope(x, width=10):
 
 def loss(records, seconds):
     """True errors {label: (n,) in beamwidths} of a loop just before and after it loses the target."""
-    figure, axes = drawing.panels(1, size=(7.4, 3.6))
+    figure, axes = new_panels(1, height=3.6, y='true error [beamwidths]')
     panel, first = axes[0, 0], slice(*(round(t / GRID) for t in seconds))
     for (label, error), colour in zip(records.items(), COLOURS):
         panel.plot(GRID * np.arange(first.start, first.stop), error[first], color=colour, linewidth=1.0, label=label)
     for half in (-0.5, 0.5):
         panel.axhline(half, color=INK, linewidth=0.8, linestyle='--')
     panel.set_ylim(-1.5, 1.5)
-    panel.set_xlabel('time [s]')
-    panel.set_ylabel('true error [beamwidths]')
     panel.set_title('no signal beyond half a beamwidth (dashed)')
     return drawing.legend(figure)

@@ -14,11 +14,10 @@ from scipy.stats import beta
 from acu_tracker.modes import Mode
 from acu_tracker.search.params import SearchParameters
 from acu_tracker.search.pattern import PATTERNS, SPIRAL, SQUARE
-from pedestal_analysis.report.figures import FILTERED
+from pedestal_analysis.report.figures import FILTERED, new_panels
 from pedestal_analysis.results.intervals import CONFIDENCE, row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
-from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
 
 RUNS, SEED = 100, 1
@@ -147,12 +146,11 @@ def run(progress, runs=RUNS, pool=None) -> Result:
 
 def time_figure(values):
     """The time of every run that found its target."""
-    figure, axes = drawing.panels(1, size=(7.4, 3.8))
+    figure, axes = new_panels(1, height=3.8, x='time until the target is tracked [s]')
     for name, of_runs in values.items():
         if name != 'steptrack_geo':
             found = of_runs[of_runs[:, 1] == 1.0, 0]
             axes[0, 0].plot(found, [name] * len(found), '|', color=FILTERED)
     axes[0, 0].invert_yaxis()
     axes[0, 0].set_xlim(left=0.0)
-    axes[0, 0].set_xlabel('time until the target is tracked [s]')
     return figure

@@ -12,7 +12,7 @@ import numpy as np
 
 from acu_tracker.params import AcuParameters
 from adu_drive.params import AduParameters
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_common.graph.topics import AXES
@@ -123,7 +123,7 @@ def bode_figure(title, curves, design):
     Crosses mark the crossover in gain and phase; the margins stand beside the name. The first of two curves that
     coincide is drawn wide, so that it shows behind the second.
     """
-    figure, axes = drawing.panels(2, 2, size=(7.4, 5.4), sharex=True)
+    figure, axes = new_panels(2, 2, height=5.4, x='frequency [Hz]', y=('gain [dB]', 'phase [deg]'), sharex=True)
     figure.suptitle(title)
     for column, loop in enumerate(('open loop', 'closed loop')):
         gain, phase = axes[:, column]
@@ -153,9 +153,6 @@ def bode_figure(title, curves, design):
             phase.axhline(-180.0, color=INK, lw=0.6, ls=':')
         phase.set_ylim(-360.0, 60.0)
         phase.set_yticks(np.arange(-360.0, 1.0, 90.0))
-        phase.set_xlabel('frequency [Hz]')
-    axes[0, 0].set_ylabel('gain [dB]')
-    axes[1, 0].set_ylabel('phase [deg]')
     return drawing.legend(figure)
 
 

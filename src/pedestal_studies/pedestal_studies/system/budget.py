@@ -16,6 +16,7 @@ import typing
 
 import numpy as np
 
+from pedestal_analysis.report.figures import new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import pseudo_values, row
 from pedestal_analysis.trials import monte_carlo
@@ -23,7 +24,6 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import topics
 from pedestal_common.parameters import defaults
-from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
 
 SCENARIO = 'station_real'
@@ -254,7 +254,7 @@ def run(progress, runs=RUNS, pool=None, duration=None) -> Result:
 
 def figure(made, place):
     """Contributions of every mode, rms, and the systematic sum over the pass beside the whole."""
-    drawn, axes = drawing.panels(len(made), 2, size=(7.4, 7.0))
+    drawn, axes = new_panels(len(made), 2, height=7.0, x='')
     for (left, right), (mode, of_mode) in zip(axes, made.items()):
         sizes = {name: np.mean(rms(e)) for name, e in (*of_mode.systematic.items(), *of_mode.random.items())}
         left.barh(list(sizes), list(sizes.values()))

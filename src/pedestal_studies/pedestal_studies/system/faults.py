@@ -13,13 +13,12 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.alarms import report
 from acu_tracker.alarms.table import NAMES
 from acu_tracker.program.prediction import Predictor
-from pedestal_analysis.report.figures import FILTERED, INK, RAW
+from pedestal_analysis.report.figures import FILTERED, INK, RAW, new_panels
 from pedestal_analysis.results.intervals import missed, row
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph.modes import MODES
 from pedestal_common.injection import table
-from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.fault_expectations import EXPECTED
 from pedestal_studies.rigs.rows import Result
 from tracking_receiver_sim.params import LeoPassParameters
@@ -204,14 +203,12 @@ DRAWN = ('adu.gust', 'adu.motor_loss', 'adu.drop', 'tracking_receiver.fade', 'tr
 
 def figure(of_cases):
     """Error over time of DRAWN in autotrack, and where half a beamwidth is."""
-    made, axes = drawing.panels(len(DRAWN), size=(7.4, 9.0), sharex=True)
+    made, axes = new_panels(len(DRAWN), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
     for panel, fault in zip(axes[:, 0], DRAWN):
         off = of_cases[f'{fault}/autotrack']
         panel.plot(np.linspace(0.0, SECONDS, len(off)) - ONSET, off, color=FILTERED)
         panel.axhline(0.5, color=RAW, linewidth=0.8)
         panel.axvspan(0.0, LASTS, color=INK, alpha=0.08)
         panel.set_title(fault)
-        panel.set_ylabel('[deg]')
     axes[-1, 0].set_xlim(-0.5, SECONDS - ONSET)
-    axes[-1, 0].set_xlabel('time from the onset [s]')
     return made

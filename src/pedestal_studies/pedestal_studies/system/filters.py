@@ -14,7 +14,7 @@ import numpy as np
 from acu_tracker.estimation.filters.kinds import KINDS
 from acu_tracker.estimation.filters.motion_models import MODELS
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH
+from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.tuning import tuning
@@ -249,8 +249,9 @@ COMPARED = {'current_statistical': RAW, 'current_statistical-rate-0.1': FILTERED
 
 def errors_figure(over_time, on, what='angle'):
     """Ensemble of the error over time, mean +-1 sigma, and dashed the filter's own sigma."""
-    figure, axes = drawing.panels(len(on), len(COMPARED), size=(7.4, 1.0 + 1.4 * len(on)), sharex=True,
-                                     sharey='row')
+    unit = 'deg' if what == 'angle' else 'deg/s'
+    figure, axes = new_panels(len(on), len(COMPARED), height=1.0 + 1.4 * len(on),
+                              y=[f'{profile}\n[{unit}]' for profile in on], sharex=True, sharey='row')
     t = times()[::THINNED]
     after = t >= SETTLED
     for line, profile in zip(axes, on):
@@ -264,18 +265,15 @@ def errors_figure(over_time, on, what='angle'):
             panel.plot(t[after], mean, color=colour, linewidth=0.8)
             for side in (-1.0, 1.0):
                 panel.plot(t[after], side * own_sigma, color=INK, linewidth=0.7, linestyle='--')
-        line[0].set_ylabel(f'{profile}\n[deg{"" if what == "angle" else "/s"}]')
     for panel, name in zip(axes[0], COMPARED):
         panel.set_title(name)
-    for panel in axes[-1]:
-        panel.set_xlabel('time [s]')
     return figure
 
 
 def profile_panels(on):
     """(figure, panels (n,)) with a panel for each profile, two in a row, and room for a line for each filter."""
     rows = (len(on) + 1) // 2
-    figure, axes = drawing.panels(rows, 2, size=(7.4, 0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS))), sharey=True)
+    figure, axes = new_panels(rows, 2, x='', height=0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS)), sharey=True)
     for panel in axes.flat[len(on):]:
         panel.set_visible(False)
     return figure, axes.flat[:len(on)]
@@ -323,7 +321,7 @@ def nis_figure(values, on):
 
 def probabilities_figure(over_time, on):
     """Mode probabilities of the imm, mean over the runs."""
-    figure, axes = drawing.panels(len(on), size=(7.4, 1.0 + 1.2 * len(on)), sharex=True, sharey=True)
+    figure, axes = new_panels(len(on), height=1.0 + 1.2 * len(on), sharex=True, sharey=True)
     for panel, profile in zip(axes[:, 0], on):
         sums = over_time[profile, 'imm', SHOWN]
         for j, (name, colour) in enumerate(zip(MODELS, (MOTOR_1, MOTOR_2, RAW, TRUTH))):
@@ -332,7 +330,6 @@ def probabilities_figure(over_time, on):
                 panel.plot(times()[::THINNED], mu, color=colour, label=name)
         panel.set_title(profile)
         panel.set_ylim(0.0, 1.0)
-    axes[-1, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, RAW
+from pedestal_analysis.report.figures import FILTERED, INK, RAW, new_panels
 from pedestal_analysis.results import results, tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
@@ -117,38 +117,34 @@ def run(progress, runs=RUNS, pool=None) -> Result:
 
 def flyby_figure():
     """Paper 000's figures 7 to 11 on uav_flyby: error and angle before and after the filter, and the azimuth flown."""
-    figure, axes = drawing.panels(3, size=(7.4, 7.2))
+    figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
     case = CASES['uav_flyby'].with_seed(SEED)
     flown = tracking.read(Recorded(case.loaded(), case.run()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
     true = np.column_stack((flown.cross_elevation, flown.elevation_error))
-    for panel, errors, title, label_y in ((axes[0, 0], (flown.measured[:, 0], flown.filtered[:, 0], true[:, 0]),
-                                  'error in cross-elevation (figures 7, 8)', 'error [deg]'),
+    for panel, errors, title in ((axes[0, 0], (flown.measured[:, 0], flown.filtered[:, 0], true[:, 0]),
+                                  'error in cross-elevation (figures 7, 8)'),
                                  (axes[1, 0], tuple(angles[:, 1] - true[:, 1] + flown.target_earth[:, 1] for angles in
                                                     (flown.measured, flown.filtered, true)),
-                                  'elevation of the target (figures 9, 10)', 'elevation [deg]')):
+                                  'elevation of the target (figures 9, 10)')):
         for values, colour, label in zip(errors, (RAW, FILTERED, INK), ('receiver', 'filtered', 'truth')):
             panel.plot(flown.t[middle], np.degrees(values[middle]), color=colour, label=label,
                        linewidth=0.6 if label == 'receiver' else 1.2)
         panel.set_title(title)
-        panel.set_ylabel(label_y)
     axes[2, 0].plot(flown.t, np.degrees(flown.azimuth), color=FILTERED)
     axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
-    axes[2, 0].set_ylabel('azimuth [deg]')
-    axes[2, 0].set_xlabel('time [s]')
     return drawing.legend(figure)
 
 
 def pointing_figure(values):
     """Pointing error of every seed, rms to the left and largest to the right; values as of `rows`."""
-    figure, axes = drawing.panels(1, 2, size=(7.4, 3.8), sharey=True)
-    for panel, metric, label in zip(axes[0], ('pointing_rms_deg', 'pointing_max_deg'),
-                                    ('pointing error, rms [deg]', 'pointing error, largest [deg]')):
+    figure, axes = new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
+                              sharey=True)
+    for panel, metric in zip(axes[0], ('pointing_rms_deg', 'pointing_max_deg')):
         shown = [name for name in values if metric in MEASURED[name]]
         for name in shown:
             column = values[name][:, MEASURED[name].index(metric)]
             panel.plot(column, [name] * len(column), '|', color=FILTERED)
         panel.set_xlim(left=0.0)
-        panel.set_xlabel(label)
     axes[0, 0].invert_yaxis()
     return figure

@@ -8,13 +8,12 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED
+from pedestal_analysis.report.figures import FILTERED, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
 from pedestal_bringup.loop import recorded
-from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system.filters import MANOEUVRE
 
@@ -99,11 +98,10 @@ def run(progress, runs=RUNS, pool=None) -> Result:
 
 def figure(values):
     """Pointing error of every seed, over the mean of the filter tuned for the target; values as of `rows`."""
-    drawn, axes = drawing.panels(1, 1, size=(7.4, 5.4))
+    drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()
         axes[0, 0].semilogx(relative, [name] * len(relative), '|', color=FILTERED)
     axes[0, 0].axvline(HONEST, linewidth=0.8)
-    axes[0, 0].set_xlabel('pointing error over that of the tuned filter')
     axes[0, 0].invert_yaxis()
     return drawn
