@@ -136,23 +136,27 @@ def step(s, c, u, o, of_all):
         # The axes stand. The mode goes on, from where they are, if the silence was short enough.
         mode_change.go_on(s.mode, resumption.mode_after(s.resumption, s.mode.now, s.stamp, u.stamp, c.p.resume_time))
     s.stamp = u.stamp
-    flags = _observe(s, c, u, o, of_all, silence)
+    flags = _observe(s, c, u, o, tables.of_mode(of_all, s.mode.table), silence)
     gap, begins = _outage(s, c), _rests(s, c, u) or dt > c.p.step_gap
-    flags |= _decide(s, c, u, o, of_all, gap)
+    waiting = s.mode.pending if s.mode.now == Mode.STANDBY else modes.NO_REQUEST
+    _, of_tables = _change(s, c, u, o, of_all, waiting, gap)
+    _wait(s, c, u, o)
     if encoders.taken(s.tracking.encoders, s.stamp):
         _start_from_actual(s, c, u, begins, silence)
-    _move(s, c, u, o, of_all, gap, begins, c.p.period if dt > c.p.step_gap else dt)
-    _tell(s, c, u, o, flags)
-    if guidance.look_ahead(s.guidance, s.tracking, c, s.mode.now, tables.of_mode(of_all, s.mode.table), gap, s.stamp):
+    program = tables.of_mode(of_all, s.mode.table)
+    _move(s, c, u, o, program, gap, begins, c.p.period if dt > c.p.step_gap else dt)
+    _tell(s, c, u, o, flags | of_tables)
+    if guidance.look_ahead(s.guidance, s.tracking, c, s.mode.now, program, gap, s.stamp):
         mode_change.begin(s.mode)
     _supervise(s, c, u, o, dt)
 
 
 @compiled
-def _observe(s, c, u, o, of_all, silence):
+def _observe(s, c, u, o, program, silence):
     """Take in what has come for the step: encoders, attitude, receiver, preset, and what watches over them. Gives the
     bits of signals.INVALID_INPUTS. silence: whether the step before is long ago."""
-    g, k, mode, way = s.guidance, s.tracking, s.mode.now, guidance.way(s.guidance, of_all, s.mode.table)
+    g, k, mode = s.guidance, s.tracking, s.mode.now
+    way = bridge.way(g.bridge, program)
     tracker.transfer(k.target.tracker, c.p.tracker, c.tracker)
     flags = signals.Flag.STEP_GAP if silence else 0
     flags |= intake.take_encoders(k.encoders, u) | _hear_attitude(s, c, u) | _hear_receiver(s, c, u, o, way)
@@ -205,20 +209,6 @@ def _rests(s, c, u):
 
 
 @compiled
-def _decide(s, c, u, o, of_all, gap):
-    """Decide on the mode, and on what waits to be one; flags of the tables."""
-    m = s.mode
-    waiting = m.pending if m.now == Mode.STANDBY else modes.NO_REQUEST
-    _, flags = _change(s, c, u, o, of_all, waiting, gap)
-    if c.p.stow_pins and stow.step(s.stow, c, u, m.now):
-        mode_change.stowed(m)
-    if resumption.waits(s.resumption):
-        ended = m.now == Mode.STANDBY and m.reason == Reason.DRIVE_NOT_READY
-        mode_change.wait_for(m, resumption.pending(s.resumption, s.stamp, ended, o.locked, m.pending))
-    return flags
-
-
-@compiled
 def _change(s, c, u, o, of_all, request, gap):
     """Run the mode machine at s.stamp with a `request` or NO_REQUEST, and what follows from it: (result, flags of the
     tables)."""
@@ -256,7 +246,7 @@ def _situation(s, c, u, of_all, request, gap):
     # There is no coasting on a filter that has begun anew.
     chosen = m.fallback if m.fallback != Mode.AUTOTRACK or k.target.tracker.running else Mode.PROGRAM
     falls_back = m.now == Mode.SEARCH or (m.now == Mode.AUTOTRACK and track != Reason.NONE)
-    wanted = (request, m.now, m.table if falls_back else m.now, chosen if falls_back else m.now)
+    wanted = request, m.now, m.table if falls_back else m.now, chosen if falls_back else m.now
     program = tle = sun = Reason.NONE
     flags = flag = 0
     if unstable == Reason.NONE:
@@ -283,6 +273,17 @@ def _situation(s, c, u, of_all, request, gap):
 
 
 @compiled
+def _wait(s, c, u, o):
+    """Wait for the stow pins, and for a drive that ended a mode, which is resumed."""
+    m = s.mode
+    if c.p.stow_pins and stow.step(s.stow, c, u, m.now):
+        mode_change.stowed(m)
+    if resumption.waits(s.resumption):
+        ended = m.now == Mode.STANDBY and m.reason == Reason.DRIVE_NOT_READY
+        mode_change.wait_for(m, resumption.pending(s.resumption, s.stamp, ended, o.locked, m.pending))
+
+
+@compiled
 def _start_from_actual(s, c, u, begins, silence):
     """Start both axes from where they are where they begin anew, and one that does not obey."""
     if begins:
@@ -292,7 +293,7 @@ def _start_from_actual(s, c, u, begins, silence):
 
 
 @compiled
-def _move(s, c, u, o, of_all, gap, begins, dt):
+def _move(s, c, u, o, program, gap, begins, dt):
     """Move the axes, or let them rest. begins: whether they stood up to now; dt [s]: for how long they move."""
     g, k, m, t = s.guidance, s.tracking, s.mode, s.stamp
     actual = axes.now(s.axis)
@@ -302,11 +303,12 @@ def _move(s, c, u, o, of_all, gap, begins, dt):
         axes.rest(s.axis, c, o, dt)
     else:
         now, order = Instants(t, t + c.lead, dt), guidance.Order(m.now, m.begins, actual.azimuth.angle, t)
-        motion = guidance.motion(g, k, c, order, guidance.way(g, of_all, m.table), gap, now)
+        motion = guidance.motion(g, k, c, order, bridge.way(g.bridge, program), gap, now)
         V = tracking.deck_rates(k, c, t, actual.azimuth.angle, actual.elevation.angle)
         axes.follow(s.axis, c, u, o, motion, now, (k.error, V, m.now == Mode.AUTOTRACK))
         mode_change.begun(m)
-        _explain_outage(s, c, of_all, gap)
+        if _explained(s, c) and m.now == Mode.AUTOTRACK and not gap.coasting:
+            guidance.bridge_to(g, k, c, program, t)
         o.blocked, o.coasting = s.outage.blocked, m.now == Mode.AUTOTRACK and gap.coasting
     for i in range(2):
         unasked.command(s.unasked, i, o.rate[i], t, min(dt, c.p.period), c.p.step_gap + c.p.command_delay)
@@ -314,14 +316,14 @@ def _move(s, c, u, o, of_all, gap, begins, dt):
 
 
 @compiled
-def _explain_outage(s, c, of_all, gap):
-    """Note why the receiver may be without signal: the target is hidden, or the beam slews through the keyhole."""
+def _explained(s, c):
+    """Note why the receiver may be without signal: the target is hidden, or the beam slews through the keyhole.
+    Whether it may."""
     g, follows = s.guidance, modes.FOLLOWS[s.mode.now]
     hidden = follows and blockage.blocked(c.lookahead.sectors, g.target_angles[0], g.target_angles[1])
     reason = outage.watch(s.outage, hidden, follows and planner.slewing(g.lookahead, s.stamp), s.stamp)
     mode_change.explain(s.mode, reason)
-    if reason != Reason.NONE and s.mode.now == Mode.AUTOTRACK and not gap.coasting:
-        guidance.bridge_to(g, s.tracking, c, tables.of_mode(of_all, s.mode.table), s.stamp)
+    return reason != Reason.NONE
 
 
 @compiled

@@ -17,7 +17,7 @@ from acu_tracker.guidance import manual
 from acu_tracker.lookahead import planner
 from acu_tracker.mode import by_level
 from acu_tracker.modes import Mode, Reason
-from acu_tracker.program import bridge, program_track, tables
+from acu_tracker.program import bridge, program_track
 from acu_tracker.search import acquisition
 from acu_tracker.servo import position_loop
 from pedestal_common.compiled import compiled
@@ -41,12 +41,6 @@ def initialise(g, preset):
     manual.initialise(g['manual'])
     acquisition.initialise(g['acquisition'])
     planner.initialise(g['lookahead'])
-
-
-@compiled
-def way(g, of_all, table):
-    """Return the bridge.Way of the table of a mode."""
-    return bridge.way(g.bridge, tables.of_mode(of_all, table))
 
 
 @compiled
