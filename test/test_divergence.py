@@ -76,7 +76,7 @@ def test_a_target_that_reverses_is_no_reversed_slope(name):
     for seed in (1, 2):
         done = imm_feedforward.DRIVE_CASES[name].with_seed(seed).run()
         state = done.units['acu'].parts['state']
-        assert done['acu/mode'][-1] == Mode.AUTOTRACK and not state['divergence']['diverged']
+        assert done['acu/mode'][-1] == Mode.AUTOTRACK and not state['tracking']['divergence']['diverged']
 
 
 @pytest.mark.parametrize('wrong', ['slope_factor=2', 'cross_coupling=0.6', 'slope_factor=0.5', 'phase_error=0.8'])
@@ -90,7 +90,7 @@ def test_a_filter_that_knows_its_errors_never_counts_as_diverged(name):
     for seed in range(1, 6):
         done = run(name=name, seed=seed)
         assert done['acu/mode'][-1] == Mode.AUTOTRACK
-        assert done.units['acu'].parts['state']['divergence']['m'] < 1.5
+        assert done.units['acu'].parts['state']['tracking']['divergence']['m'] < 1.5
 
 
 def test_a_gust_of_4000_nm_on_both_axes_is_no_end_of_autotrack():
