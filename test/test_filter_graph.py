@@ -87,7 +87,7 @@ def test_what_the_filter_tells(told):
     assert on.sum() > 200
     for i, freedoms in enumerate((2.0, 1.0)):
         assert np.all(found.freedoms[on, i] == freedoms)
-        assert consistency.axis(found, i).nis == pytest.approx(freedoms, rel=0.2)
+        assert found.axes[i].nis == pytest.approx(freedoms, rel=0.2)
     probability = found.probability[on]
     assert np.nansum(probability, axis=2) == pytest.approx(1.0)
     assert [[name for name, there in zip(topics.MOTION_MODELS, np.isfinite(probability[:, i]).all(axis=0)) if there]
@@ -103,7 +103,7 @@ def test_rows_and_report(runs, told, run_process, pedestal):
     run = runs['measured']
     values = {row['metric']: row['value'] for row in json.loads(run.json.read_text())['rows']}
     for i, axis in enumerate(topics.AXES):
-        judged = consistency.axis(told[1], i)
+        judged = told[1].axes[i]
         assert (values[f'{axis}_nis_mean'], values[f'{axis}_nees_mean']) == (judged.nis, judged.nees)
     assert pedestal('report', run.bag)[0] == 0
     page = (run.bag / 'report.html').read_text()
