@@ -1,0 +1,122 @@
+"""The rules of language that a program can check: `python -m tools.language [PATH ...]` prints what breaks them.
+
+Read are README.md, CHANGELOG.md, docs/, and in Python the docstrings, comments and texts; the rules stand in CONTRIBUTING.md.
+"""
+import ast
+import io
+import pathlib
+import re
+import sys
+import tokenize
+
+MAX_SENTENCE_WORDS = 35
+FORBIDDEN_WORD = re.compile(r'\b(told|tells|says|asked|anew|strangers?|whoever|somebody|nobody)\b', re.IGNORECASE)
+"""Words of a private language, in which machines speak and actors have no name."""
+
+CONSTANT_NAME = re.compile(r'[A-Z][A-Z0-9_]*')
+ROOT = pathlib.Path(__file__).parents[1]
+_SENTENCE_END = re.compile(r'(?<=[.!?;])["\')`*]*\s+(?=["\'(`*\[]*[A-Z0-9`])')
+_ABBREVIATION = re.compile(r'\b(e\.g|i\.e|cf|eq|Eq|fig|Fig|sec|Sec|vs|approx|No|St|resp)\.\s')
+_TABLE_ROW = re.compile(r'^\s+\S|\S {2,}\S|^\s*[|>]|^\s*$')
+
+
+def paths():
+    """Return every file whose language is checked."""
+    return [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'CHANGELOG.md', *sorted((ROOT / 'docs').glob('**/*.md')),
+            *(path for folder in ('src', 'tools') for path in sorted((ROOT / folder).glob('**/*.py'))
+              if 'test' not in path.parts and path.name != 'setup.py')]
+
+
+def markdown_texts(text):
+    """Yield (line number, paragraph or table cell, True if it consists of sentences) of a Markdown page without its code."""
+    blank = lambda match: '\n' * match[0].count('\n')  # noqa: E731  keeps line numbers
+    text = re.sub(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$', blank, text)
+    text = re.sub(r'(?s)<!--.*?-->', blank, text)
+    paragraph, start, after_blank = [], 0, True
+    for number, line in enumerate([*text.split('\n'), ''], 1):
+        item = re.match(r'\s*([-*+]|\d+\.)\s', line)
+        code = line.startswith('    ') and after_blank and not item
+        ends = not line.strip() or line.lstrip().startswith(('|', '#', '!')) or item or code
+        if ends and paragraph:
+            yield start, ' '.join(paragraph), True
+            paragraph = []
+        if line.lstrip().startswith(('|', '#')):
+            yield from ((number, cell, False) for cell in line.strip('|# ').split('|'))
+        elif line.strip() and not code and not line.lstrip().startswith('!'):
+            start = start if paragraph else number
+            paragraph.append(line[item.end():] if item else line.strip())
+        after_blank = not line.strip() or code
+
+
+def docstrings(tree):
+    """Yield (line number, docstring) of a module, its classes, functions and constants."""
+    for node in ast.walk(tree):
+        for child in getattr(node, 'body', ()) if not isinstance(node, (ast.Lambda, ast.IfExp)) else ():
+            if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant) and isinstance(child.value.value, str):
+                yield child.value.lineno, child.value.value
+
+
+def python_texts(source):
+    """Yield (line number, text, True if it consists of sentences) of the docstrings, comments and other texts of a module."""
+    tree = ast.parse(source)
+    documented = dict(docstrings(tree))
+    for start, text in documented.items():
+        paragraph, first = [], start
+        for number, line in enumerate([*text.split('\n'), ''], start):
+            indented = number > start and re.match(r' *', line).end() > _indent(text)
+            if indented or _TABLE_ROW.search(line.strip() or '') or not line.strip():
+                if paragraph:
+                    yield first, ' '.join(paragraph), True
+                    paragraph = []
+                yield number, line, False
+            else:
+                first = first if paragraph else number
+                paragraph.append(line.strip())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.lineno not in documented:
+            yield node.lineno, node.value, False
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            yield token.start[0], token.string, False
+
+
+def _indent(text):
+    """Return the indentation of a docstring below its first line."""
+    lines = [line for line in text.split('\n')[1:] if line.strip()]
+    return min((len(line) - len(line.lstrip()) for line in lines), default=0)
+
+
+def sentences(text):
+    """Return the sentences of a paragraph, inline code as one word each."""
+    text = re.sub(r'\]\([^)]*\)', ']', re.sub(r'`[^`]*`', '`x`', text))
+    return _SENTENCE_END.split(_ABBREVIATION.sub(r'\1 ', text))
+
+
+def faults(path):
+    """Yield (line number, what is wrong, text) for each rule that a file breaks."""
+    source = path.read_text(encoding='utf-8')
+    for line, text, prose in (python_texts if path.suffix == '.py' else markdown_texts)(source):
+        for word in FORBIDDEN_WORD.findall(re.sub(r'`[^`]*`', '', text)):
+            yield line, f'word {word!r}', text.strip()
+        for sentence in sentences(text) if prose else ():
+            if len(sentence.split()) > MAX_SENTENCE_WORDS:
+                yield line, f'{len(sentence.split())} words', sentence
+
+
+def public_constants(path):
+    """Return the names of the public constants of a module."""
+    targets = []
+    for node in ast.parse(path.read_text(encoding='utf-8')).body:
+        for target in node.targets if isinstance(node, ast.Assign) else [getattr(node, 'target', None)]:
+            targets += target.elts if isinstance(target, ast.Tuple) else [target]
+    return [target.id for target in targets if isinstance(target, ast.Name) and CONSTANT_NAME.fullmatch(target.id)]
+
+
+if __name__ == '__main__':
+    count = 0
+    for file in [pathlib.Path(name) for name in sys.argv[1:]] or paths():
+        for place, rule, found in faults(file):
+            print(f'{file}:{place}: {rule}: {found[:200]}')
+            count += 1
+    names = [name for file in paths() if file.suffix == '.py' for name in public_constants(file)]
+    print(f'{count} faults; {sum("_" not in name for name in names)} of {len(names)} public constants are one word')
