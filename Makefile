@@ -34,6 +34,7 @@ IN_TURN := --dist loadfile --no-loadscope-reorder
 # try its test again and again.
 LIMITED := .venv/bin/python test/limited.py
 PYTEST_IN_TURN = .venv/bin/python -m pytest $(IN_TURN) --max-worker-restart 0 $(PYTEST)
+LINT = .venv/bin/ruff check . && .venv/bin/codespell
 # Containers often set it: every process would compile the sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -49,11 +50,11 @@ demo: .venv/installed
 	@echo 'Report: $(CURDIR)/$(DEMO)/report.html'
 
 quick: install
-	.venv/bin/ruff check .
+	$(LINT)
 	$(LIMITED) 300 $(PYTEST_IN_TURN) --numprocesses 2 $(LAWS)
 
 test: install
-	.venv/bin/ruff check .
+	$(LINT)
 	$(LIMITED) 1800 $(PYTEST_IN_TURN) --numprocesses 3 $(addprefix --ignore=,$(REALTIME))
 	$(LIMITED) 1000 $(PYTEST_IN_TURN) --numprocesses 2 $(REALTIME)
 
@@ -99,7 +100,7 @@ clean:
 
 .venv/tests: .venv/installed
 	@echo 'Installing what the tests use into .venv ...'
-	.venv/bin/python $(PIP) ruff py-spy pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),'$(package)[test]')
+	.venv/bin/python $(PIP) ruff codespell py-spy pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),'$(package)[test]')
 	@touch $@
 
 .venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip
