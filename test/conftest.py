@@ -294,7 +294,7 @@ class Client:
         from pedestal_common.graph import topics
         from pedestal_common.node import middleware
         for name in names:
-            topic = topics.BY_NAME[name]
+            topic = topics.TOPIC_BY_NAME[name]
             self.publishers[name] = self.node.create_publisher(middleware.message_class(topic.type), name,
                                                                middleware.qos(topic.rate))
         self.until(lambda: all(publisher.get_subscription_count() for publisher in self.publishers.values()))
@@ -305,7 +305,7 @@ class Client:
         from pedestal_common.graph import topics
         from pedestal_common.node import middleware
         from pedestal_common.wire import messages
-        topic = topics.BY_NAME[name]
+        topic = topics.TOPIC_BY_NAME[name]
         heard = self.heard[name] = []
 
         def on_bytes(data):
@@ -429,7 +429,7 @@ class Station:
             *_, (_, log_time, _, _) = bag.raw('joint_states')
             return bag if log_time > now else None
         raw = self.client.until(so_far).raw(topic)
-        return [messages.deserialize(data, topics.BY_NAME[topic].type) for *_, data in raw]
+        return [messages.deserialize(data, topics.TOPIC_BY_NAME[topic].type) for *_, data in raw]
 
     def asked(self):
         """The commands that were replied to, as they are recorded."""

@@ -57,7 +57,7 @@ class Watcher:
         self._listen('diagnostics', self._on_diagnostics)
 
     def _listen(self, name, take):
-        topic = topics.BY_NAME[name]
+        topic = topics.TOPIC_BY_NAME[name]
         self._node.create_subscription(middleware.message_class(topic.type), name, take,
                                        middleware.qos(topic.rate, 'read'), raw=True)
 

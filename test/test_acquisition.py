@@ -68,6 +68,6 @@ def test_a_manoeuvre_while_it_coasts():
 def test_step_track_follows_the_level():
     one = run('steptrack_geo', 16)
     assert went_through(one) == ['preset', 'steptrack']
-    settled = study.off_axis(one)[one.t > study.SETTLED]
+    settled = study.off_axis(one)[one.t > study.STEPTRACK_SETTLING_TIME_S]
     assert settled.max() < 0.3
     assert np.sqrt(np.mean((12.0 * settled**2)**2)) < 0.25

@@ -76,12 +76,12 @@ def under_way(*faults, duration=9.0):
 
 
 def annunciated(acu):
-    return {table.NAMES[i] for i in report.annunciated(acu.alarms)}
+    return {table.ALARM_NAMES[i] for i in report.annunciated(acu.alarms)}
 
 
 def raised(acu):
     """Names of the alarms that were raised."""
-    return {name for name, alarm in zip(table.NAMES, acu.alarms['alarm']) if np.isfinite(alarm['raised'])}
+    return {name for name, alarm in zip(table.ALARM_NAMES, acu.alarms['alarm']) if np.isfinite(alarm['raised'])}
 
 
 @pytest.mark.parametrize(('axis', 'motor'), (('azimuth', 1), ('elevation', 2)))

@@ -33,7 +33,7 @@ FAULTS = (('adu', 'nan'), ('adu', 'drop'), ('adu', 'freeze'), ('adu', 'motor_los
           ('tracking_receiver', 'fade'), ('tracking_receiver', 'freeze'), ('tracking_receiver', 'wrong_slope'),
           ('tracking_receiver', 'phase_180'), ('tracking_receiver', 'noise'))
 
-ENABLED = tuple(range(len(topics.ENABLED)))
+ENABLED = tuple(range(len(topics.ENABLED_STATES)))
 """Codes of adu/state with which the drive follows commands."""
 
 REQUESTS = (('adu', 'adu/enable'), ('adu', 'adu/disable'), ('adu', 'adu/emergency_stop'), ('adu', 'adu/reset_faults'),
@@ -48,17 +48,17 @@ class Operated(RuleBasedStateMachine):
     @initialize()
     def begin(self):
         self.loop = closed_loop.Loop(scenario.load('uav_flyby', STOWED, duration=3600.0))
-        self.k, self.before = 0, records.empty(closed_loop.STEP, 1)
-        self.history = records.empty(closed_loop.STEP, 0)
+        self.k, self.before = 0, records.empty(closed_loop.STEP_DTYPE, 1)
+        self.history = records.empty(closed_loop.STEP_DTYPE, 0)
         self.go(0.2)
 
     def go(self, seconds):
         count = round(seconds * 1e9 / self.loop.period_ns)
         for unit in self.loop.units.values():
             unit.obey_due(self.k * self.loop.period_ns)
-        steps, truth = records.empty(closed_loop.STEP, count), np.zeros(count, closed_loop.TRUTH)
+        steps, truth = records.empty(closed_loop.STEP_DTYPE, count), np.zeros(count, closed_loop.TRUTH_DTYPE)
         memories = tuple(self.loop.units[name].block(count) if name in self.loop.units else None
-                         for name in closed_loop.ORDER)
+                         for name in closed_loop.UNIT_ORDER)
         closed_loop.loop(memories, self.k, self.loop.period_ns, self.before, np.zeros((count, 2)), steps, truth)
         self.k += count
         self.history = np.concatenate((self.history, steps))[-round(RAMP * 1e9 / self.loop.period_ns):]

@@ -101,7 +101,7 @@ def missing(path):
 
 def wrong_type(path):
     """joint_states and the truth are of the type of a point."""
-    point = topics.BY_NAME['tracking_receiver/angle_error'].type
+    point = topics.TOPIC_BY_NAME['tracking_receiver/angle_error'].type
     write(path, range(600), [topic._replace(type=point) if topic.name in ('joint_states', 'target/truth') else topic
                              for topic in RECORDED])
 

@@ -3,7 +3,7 @@ import json
 import sys
 
 SHORT = ('import json; from pedestal_studies.bench import recording; '
-         'recording.BAG_SECONDS = 2.0; recording.DISK_BYTES = 10_000_000; '
+         'recording.BAG_DURATION_S = 2.0; recording.DISK_TEST_BYTES = 10_000_000; '
          'rows = recording.run(); print(json.dumps(rows))')
 
 RING = ('from pedestal_studies.bench import lockstep; '

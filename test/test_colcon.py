@@ -51,12 +51,12 @@ def test_ros2_launch_finds_the_launch_and_scenario_files():
 def test_ros2_launch_runs_a_scenario_in_a_namespace(start_process, tmp_path):
     """Started here, its arguments known; a wrong one is refused by name."""
     # They want mcap, which the environment of colcon has none of.
-    from pedestal_bringup.graph import launched
+    from pedestal_bringup.graph import launch_arguments
     from pedestal_recording.bag import load
     from pedestal_recording.verify import verify
     command = ['ros2', 'launch', 'pedestal_bringup', 'pedestal.launch.py']
     shown = start_process([*command, '--show-args']).communicate(timeout=180.0)[0]
-    assert all(f"'{argument.name}':" in shown for argument in launched.ARGUMENTS)
+    assert all(f"'{argument.name}':" in shown for argument in launch_arguments.ARGUMENTS)
     refused = start_process([*command, 'duration:=long'])
     said = ''.join(refused.communicate(timeout=180.0))
     assert refused.returncode == 1 and 'duration:=long: must be a number of seconds' in said

@@ -5,7 +5,7 @@ import pytest
 from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
-from pedestal_common.node.unit import ERROR
+from pedestal_common.node.unit import LEVEL_ERROR
 from pedestal_studies.papers import imm_feedforward
 
 SECONDS = 8.0
@@ -35,7 +35,7 @@ def test_errors_that_lead_away_are_recognised_and_left(name, wrong):
     assert (mode[automatic[-1] + 1:] == Mode.PROGRAM).all() and off(done)[-1] < 0.25
     acu = done.units['acu']
     diagnosis = acu.diagnose()
-    assert diagnosis.level == ERROR and diagnosis.message.startswith('autotrack diverged')
+    assert diagnosis.level == LEVEL_ERROR and diagnosis.message.startswith('autotrack diverged')
     assert acu.faults == ('diverged',)
     assert dict(diagnosis.values)['faults'] == 'diverged'
     assert acu.request('acu/autotrack') == (False, 'refused: diverged; mode is program')

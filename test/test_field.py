@@ -13,7 +13,7 @@ import pytest
 
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.graph import topics
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
 from pedestal_common.wire import messages
 
@@ -60,7 +60,7 @@ class Field:
 
     def _hear(self, name):
         """Hear a topic, whatever strangers say on it."""
-        topic, heard = topics.BY_NAME[name], self.heard.setdefault(name, [])
+        topic, heard = topics.TOPIC_BY_NAME[name], self.heard.setdefault(name, [])
 
         def take(data):
             with contextlib.suppress(ValueError):
@@ -132,7 +132,7 @@ def stranger_writes(field, connect, name, stamp, seconds=1.0, until=lambda: True
     """A node `stranger` publishes on a topic for a while; stamp() gives each its stamp [ns]. Then now and then, so
     that its numbers do not come near to those of others, until until() is true."""
     client = connect(field.station.domain_id, 'stranger')
-    topic = topics.BY_NAME[name]
+    topic = topics.TOPIC_BY_NAME[name]
     publisher = client.node.create_publisher(middleware.message_class(topic.type), name,
                                              middleware.qos(topic.rate, 'written'))
     client.until(publisher.get_subscription_count)
@@ -150,7 +150,7 @@ def stranger_writes(field, connect, name, stamp, seconds=1.0, until=lambda: True
 
 def test_stamps_are_utc_on_the_grid_of_the_start(standing):
     standing.fresh('joint_states')
-    before = time.time_ns() - 30 * SECOND
+    before = time.time_ns() - 30 * NS_PER_SECOND
     heard = standing.heard['joint_states'][-100:]
     stamps = np.array([messages.nanoseconds(message.header.stamp) for message in heard])
     assert before < stamps[-1] <= time.time_ns()
@@ -173,7 +173,7 @@ def test_a_second_writer_of_the_command_moves_nothing_and_is_named(standing, con
 @pytest.mark.parametrize('name, reader', [('joint_states', 'acu'), ('adu/truth', 'tracking_receiver'),
                                           ('tracking_receiver/angle_error', 'acu')])
 def test_a_stamp_of_the_future_makes_nobody_deaf(standing, connect, name, reader):
-    stranger_writes(standing, connect, name, lambda: time.time_ns() + 3600 * SECOND, 0.3)
+    stranger_writes(standing, connect, name, lambda: time.time_ns() + 3600 * NS_PER_SECOND, 0.3)
     standing.fresh('acu/rate_command' if reader == 'acu' else 'tracking_receiver/angle_error')
     assert standing.station.alive() == set(station.NODES)
 

@@ -71,7 +71,7 @@ def test_what_the_scenario_says_stands(adsb):
 
 def test_a_scenario_says_all_that_followed_from_its_file(adsb):
     chosen = scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH])
-    assert {*track_files.OPEN} - {'duration'} <= {*chosen.given('tracking_receiver')}
+    assert {*track_files.DERIVED_PARAMETERS} - {'duration'} <= {*chosen.given('tracking_receiver')}
     text = chosen.as_yaml()
     content = adsb.read_text()
     adsb.write_text('moved away')

@@ -2,9 +2,9 @@
 import argparse
 
 import pytest
+from tools import language
 
 from pedestal import cli
-from tools import language
 
 ALLOWED = {
 }

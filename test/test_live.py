@@ -133,7 +133,7 @@ def test_who_comes_late_gets_what_is_latched(graph):
         late.watch('/acu/mode', '/robot_description')
         late.until(lambda heard=late.heard: all(heard.values()))
         assert late.decoded('/acu/mode').data == 'standby'
-        assert late.decoded('/robot_description').data == frames.DESCRIPTION
+        assert late.decoded('/robot_description').data == frames.PEDESTAL_URDF
         late.close()
 
 
@@ -175,7 +175,7 @@ def test_the_model_is_latched_for_rviz(graph):
     client.node.create_subscription(middleware.message_class('std_msgs/msg/String'), 'robot_description', heard.append,
                                     middleware.qos('change'))
     client.until(lambda: heard)
-    assert heard[0].data == frames.DESCRIPTION
+    assert heard[0].data == frames.PEDESTAL_URDF
 
 
 def track(*points):
@@ -232,7 +232,7 @@ def test_what_cannot_be_is_refused_before_anything_runs(options, said, pedestal,
 def test_the_files_for_viewers_are_written(pedestal, tmp_path):
     code, said, _ = pedestal('live', '--layouts', tmp_path / 'viewers')
     assert code == 0 and str(tmp_path / 'viewers' / 'tracking.json') in said.splitlines()
-    assert (tmp_path / 'viewers' / 'pedestal.urdf').read_text() == frames.DESCRIPTION
+    assert (tmp_path / 'viewers' / 'pedestal.urdf').read_text() == frames.PEDESTAL_URDF
     assert pedestal('live', '--layouts', tmp_path / 'viewers')[0] == 1
 
 
@@ -240,7 +240,7 @@ def test_the_files_for_viewers_are_written(pedestal, tmp_path):
 def test_the_model_points_where_the_recorded_antenna_does(name, tmp_path):
     """Recorded encoders through ikpy, the deck by its true attitude: the beam is on the target that it tracks."""
     file = tmp_path / 'pedestal.urdf'
-    file.write_text(frames.DESCRIPTION)
+    file.write_text(frames.PEDESTAL_URDF)
     chain = Chain.from_urdf_file(str(file), base_elements=['base_link'], active_links_mask=[False, True, True, False])
     bag = bags.read(REFERENCES / name)
     joints, target, modes = (bag.table(topic) for topic in ('joint_states', 'target/truth', 'acu/mode'))
@@ -251,7 +251,7 @@ def test_the_model_points_where_the_recorded_antenna_does(name, tmp_path):
     for t in times:
         i, j = (int(np.argmin(np.abs(table['t'] - t))) for table in (joints, target))
         beam = chain.forward_kinematics([0.0, joints['azimuth.position'][i], joints['elevation.position'][i], 0.0])
-        deck = line_of_sight.ASHORE if ship is None else [
+        deck = line_of_sight.ASHORE_ATTITUDE if ship is None else [
             ship[f'orientation.{axis}'][int(np.argmin(np.abs(ship['t'] - t)))] for axis in 'xyzw']
         seen = np.array([target[f'position.{axis}'][j] for axis in 'xyz'])
         angle = np.arccos(Rotation.from_quat(deck).apply(beam[:3, 0]) @ seen / np.linalg.norm(seen))

@@ -13,7 +13,7 @@ from shared import PEDESTAL
 from pedestal_bringup.graph import processes, supervisor
 from pedestal_bringup.graph.start import begins, parameters_of_all
 from pedestal_bringup.scenario import scenario
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_recording import bag as bags
 
 
@@ -148,7 +148,7 @@ def cut(hosts, tmp_path_factory, reserve_domain):
     time.sleep(FOLLOWED)
     times = []
     for seconds in CUTS:
-        times.append([(moment - begin) / SECOND for moment in hosts.cut(seconds)])
+        times.append([(moment - begin) / NS_PER_SECOND for moment in hosts.cut(seconds)])
         time.sleep(FOLLOWED)
     for process in started:
         process.terminate()

@@ -42,7 +42,7 @@ def test_a_pass_of_a_tle_file_is_run_from_its_rise(start_run, tmp_path):
 
 def test_a_pass_is_tracked_until_it_sets():
     """From the second in which it rises; the receiver locks as soon as the satellite is near enough."""
-    pass_of = satellite.Sky(scenario.draft('leo_pass'), NOW)
+    pass_of = satellite.PassSelection(scenario.draft('leo_pass'), NOW)
     start, duration, _ = pass_of.choose('2')
     run = closed_loop.Loop(scenario.load('leo_pass', start, duration=duration)).run()
     east, north, up = run['target/truth']['position'].T

@@ -72,7 +72,7 @@ def test_readme_runs_in_its_own_order(reserve_domain, tmp_path, capsys):
                           env={**os.environ, 'ROS_DOMAIN_ID': str(reserve_domain())})
     assert done.returncode == 0, done.stderr[-3000:]
     assert (tmp_path / 'my_flyby' / 'report.html').is_file() and (tmp_path / 'studies' / 'servo').is_dir()
-    assert all((tmp_path / name).is_file() for name in samples.FILES)
+    assert all((tmp_path / name).is_file() for name in samples.SAMPLE_FILES)
     with capsys.disabled():
         for line in README:
             if of_table(line, NOT_RUN):

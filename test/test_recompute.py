@@ -13,7 +13,7 @@ from pedestal_analysis.results import results, tracking
 from pedestal_common.graph import nodes as graph
 from pedestal_common.graph import topics
 from pedestal_common.wire import messages
-from pedestal_common.wire.commands import SERVICE, Command
+from pedestal_common.wire.commands import SERVICE_CLIENT, Command
 from pedestal_recording import bag as bags
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
@@ -65,7 +65,7 @@ def changed(topic, number, change):
     def make(rows):
         place = where(rows, topic, number)
         name, log, publish, data = rows[place]
-        message = messages.deserialize(data, topics.BY_NAME[topic].type)
+        message = messages.deserialize(data, topics.TOPIC_BY_NAME[topic].type)
         change(message)
         rows[place] = name, log, publish, messages.serialize(message)
         return rows
@@ -138,7 +138,7 @@ def test_a_wrong_frame_is_named(runs, rewrite, pedestal):
         message.header.frame_id = 'mars'
     code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(ESTIMATE, 7, change)), '--node', 'acu')
     assert code == 1
-    assert lines_of(said, ESTIMATE)[1].split() == [*difference.REST.split(), '1', '1', 'other', '0.035000']
+    assert lines_of(said, ESTIMATE)[1].split() == [*difference.REST_FIELD.split(), '1', '1', 'other', '0.035000']
 
 
 def test_a_wrong_mode_is_named(runs, rewrite, pedestal):
@@ -232,7 +232,7 @@ def test_a_recording_from_before_the_truth_is_read_by_its_encoders(runs, rewrite
     assert said.splitlines()[-1] == 'tracking_receiver: equal within tolerance'
     assert pedestal(path, '--node', 'acu', *EXACT)[0] == pedestal(path, '--node', 'adu', *EXACT)[0] == 0
     _, said, _ = pedestal(path, '--param', 'acu.azimuth.filter.kind=ca')
-    assert f'note: {tracking.BY_ENCODERS}' in said.splitlines()
+    assert f'note: {tracking.ENCODER_BEAM_NOTE}' in said.splitlines()
 
 
 @pytest.fixture
@@ -289,7 +289,7 @@ def foreign(runs, tmp_path):
     """The run ashore as another program records it: one file of ours turned into one of rosbags', arrival times."""
     bag, path = bags.read(runs['leo'].bag), tmp_path / 'foreign'
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections = {name: writer.add_connection('/' + name, kind, typestore=messages.TYPESTORE)
+        connections = {name: writer.add_connection('/' + name, kind, typestore=messages.ROS_TYPESTORE)
                        for name, kind in bag.topics.items()}
         for number, (topic, log, _, data) in enumerate(as_it_came(bag.raw())):
             writer.write(connections[topic], 1_700_000_000_000_000_000 + log + number, data)
@@ -332,8 +332,8 @@ def requested(runs, tmp_path, request):
     recording, node = recompute.Recording(runs['leo'].bag), request.param
     requests = REQUESTS[node][1]
     done = recompute.recompute(recording, node, recompute.parameters_of(recording, node),
-                               {step: [Command(service, SERVICE)] for step, service in requests.items()})
-    assert done.requests == {step: [(Command(service, SERVICE), True)] for step, service in requests.items()}
+                               {step: [Command(service, SERVICE_CLIENT)] for step, service in requests.items()})
+    assert done.requests == {step: [(Command(service, SERVICE_CLIENT), True)] for step, service in requests.items()}
     recompute_report.write(tmp_path / 'requested', recording, done.outputs, done.unit.messages, {})
     return node, tmp_path / 'requested'
 
@@ -422,7 +422,7 @@ def test_bad_input_is_one_line(case, runs, pedestal, one_line):
 
 def test_a_topic_of_another_type_is_refused(runs, pedestal, tmp_path, one_line):
     with Writer(tmp_path / 'other', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections = [writer.add_connection(name, 'std_msgs/msg/String', typestore=messages.TYPESTORE)
+        connections = [writer.add_connection(name, 'std_msgs/msg/String', typestore=messages.ROS_TYPESTORE)
                        for name in ('/joint_states', f'/{ERROR}')]
         for connection in connections:
             writer.write(connection, 0, messages.serialize(messages.String(data='well')))

@@ -222,7 +222,7 @@ def test_a_signal_ends_it_cleanly(number, run, connect, terminal, domain):
 
 def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_line, domain):
     client = connect(domain)
-    topic = topics.BY_NAME['joint_states']
+    topic = topics.TOPIC_BY_NAME['joint_states']
     client.node.create_publisher(middleware.message_class(topic.type), topic.name, middleware.qos(topic.rate))
     done = run_process([*PEDESTAL, 'replay', run.bag, '--node', 'acu'], 60.0, ROS_DOMAIN_ID=str(domain))
     assert done.returncode == 1 and done.stdout == ''

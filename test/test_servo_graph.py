@@ -11,8 +11,8 @@ from pedestal_studies.papers import servo
 ALLOWED = 1e-6
 """Largest difference between a run of the nodes and the study [rad, rad/s]."""
 
-CASES = {'r1-step': Case('paper-r1', 'servo_step', servo.R1),
-         'best-sine': Case('best', 'servo_sine', servo.BEST, 1.6)}
+CASES = {'r1-step': Case('paper-r1', 'servo_step', servo.PAPER_R1_PARAMETERS),
+         'best-sine': Case('best', 'servo_sine', servo.BEST_PARAMETERS, 1.6)}
 
 
 @pytest.fixture(scope='module')

@@ -28,7 +28,7 @@ def track(name, *overrides):
     chosen = scenario.load(name, overrides)
     run = closed_loop.Loop(chosen).run()
     automatic = run['acu/mode'] == Mode.AUTOTRACK
-    return chosen, run, automatic & (run.t >= run.t[automatic][0] + tracking.SETTLING)
+    return chosen, run, automatic & (run.t >= run.t[automatic][0] + tracking.HANDOVER_SETTLING_S)
 
 
 def pointing(name, *overrides):
@@ -41,7 +41,7 @@ def isolated(name, *overrides):
     """The isolation.Isolation of a scenario."""
     chosen, run, on = track(name, *overrides)
     constants = motion.constants(chosen.node_parameters('ship_motion').ship)
-    truth = np.zeros(on.sum(), motion.OUTPUTS)
+    truth = np.zeros(on.sum(), motion.OUTPUTS_DTYPE)
     t = run.t[on]
     for k in range(t.size):
         motion.truth(constants[0], t[k], truth[k])
@@ -117,7 +117,7 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     off = np.hypot(*run.truth['error'].T)
     t = run.t
     lost = off > 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
-    loss = np.sum(lost[first:] & (t[first:] > t[first] + tracking.SETTLING)) * 0.005
+    loss = np.sum(lost[first:] & (t[first:] > t[first] + tracking.HANDOVER_SETTLING_S)) * 0.005
     assert plan['loss'] == pytest.approx(loss, rel=0.2) and loss > 10.0
     assert math.degrees(tracking.known_rms(off[t > plan['t2'] + 3.0])) < 0.02
     rate = run['acu/rate_command']['velocity'][first:, 0]

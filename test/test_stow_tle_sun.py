@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acu_tracker import modes
-from acu_tracker.alarms.table import NAMES
+from acu_tracker.alarms.table import ALARM_NAMES
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages
@@ -99,9 +99,9 @@ def test_a_stuck_pin_is_a_fault_of_the_drive_and_an_alarm():
     run, units = looped(9.0, 'acu.commands=0.1 stow', 'adu.inject=0 pin_stuck axis=elevation')
     assert modes.MODES[run['acu/mode'][-1]] == 'standby' and units['adu'].condition == 'fault: elevation stow pin'
     alarms = units['acu'].alarms['alarm']
-    raised = {NAMES[i]: (alarms[i]['first'], alarms[i]['parent']) for i in np.flatnonzero(alarms['active'])}
+    raised = {ALARM_NAMES[i]: (alarms[i]['first'], alarms[i]['parent']) for i in np.flatnonzero(alarms['active'])}
     assert raised['elevation stow pin'][0] and 'azimuth stow pin' not in raised
-    assert NAMES[raised['drive fault'][1]] == 'elevation stow pin'
+    assert ALARM_NAMES[raised['drive fault'][1]] == 'elevation stow pin'
     assert units['acu'].command(Command('unstow')).text == 'refused: stow pin failed; mode is standby'
     assert units['adu'].command(Command('adu/reset_faults')).granted
 
@@ -110,7 +110,7 @@ def test_pins_that_never_answer_raise_the_alarm():
     """The drive's holes are not where the control unit stows."""
     run, units = looped(9.0, 'acu.commands=0.1 stow', 'adu.pins.azimuth=1', 'acu.stow_timeout=2')
     alarms = units['acu'].alarms['alarm']
-    assert {NAMES[i] for i in np.flatnonzero(alarms['active'])} == {'azimuth stow pin', 'elevation stow pin'}
+    assert {ALARM_NAMES[i] for i in np.flatnonzero(alarms['active'])} == {'azimuth stow pin', 'elevation stow pin'}
     assert (run['acu/rate_command']['velocity'][-1] == 0.0).all() and modes.MODES[run['acu/mode'][-1]] == 'stow'
 
 

@@ -86,7 +86,7 @@ def test_nobody_outlives_a_killed_run(begun):
     assert set(run.pids()) == set(NODES)
     run.signal('acu', signal.SIGSTOP)
     run.process.kill()
-    wait_until(lambda: run.pids() == {}, reaper.PATIENCE + 10.0)
+    wait_until(lambda: run.pids() == {}, reaper.GRACE_PERIOD_S + 10.0)
     assert bags.load(run.bag).damage == ''
 
 

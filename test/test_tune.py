@@ -53,7 +53,7 @@ def test_recording(tuned_bag):
     values = written(file)
     assert set(values) == {f'{axis}.filter.{name}' for axis in tune.AXES for name in ('kind', 'cv.noise')}
     assert 'made by: pedestal tune' in file.read_text().splitlines()[0]
-    source = tune.Recorded(BAG)
+    source = tune.RecordedSource(BAG)
 
     def criterion(noise):
         text = {key: noise if key.endswith('noise') else value for key, value in values.items()}
@@ -72,10 +72,11 @@ def test_criterion_is_the_innovations_of_a_recomputation(tuned_bag):
     params = recompute.parameters_of(recording, 'acu', changes=written(file))
     table = recompute.recompute(recording, 'acu', params).outputs['acu/filter'].table('acu/filter')
     t, nu, nis = table['t'], table['azimuth_innovation.position'], table['azimuth_nis.position']
-    on = np.isfinite(nis) & (np.abs(nu) > 0.0) & (t >= t[np.isfinite(nis)][0] + tune.CONVERGED)
-    on &= np.floor(t / tune.PIECE) % 2 == 0
-    density = -0.5 * (nis + np.log(nu * nu / nis))[on & (nis < tune.HUBER**2)]
-    assert -np.mean(density) == pytest.approx(told(output, f'azimuth: {tune.Recorded.criterion_name}')[1], abs=0.01)
+    on = np.isfinite(nis) & (np.abs(nu) > 0.0) & (t >= t[np.isfinite(nis)][0] + tune.CONVERGENCE_TIME_S)
+    on &= np.floor(t / tune.PIECE_LENGTH_S) % 2 == 0
+    density = -0.5 * (nis + np.log(nu * nu / nis))[on & (nis < tune.HUBER_LIMIT_SIGMAS**2)]
+    assert -np.mean(density) == pytest.approx(told(output, f'azimuth: {tune.RecordedSource.criterion_name}')[1],
+                                              abs=0.01)
 
 
 def test_an_outlier_counts_little():

@@ -15,7 +15,7 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
 
-COLUMNS = ('pedestal_common', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive', 'ship_motion_sim')
+LAW_PACKAGES = ('pedestal_common', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive', 'ship_motion_sim')
 """Packages that hold laws, in the order of the signal."""
 
 
@@ -55,7 +55,7 @@ def law_page(root):
     """Every law: the module's docstring with its equations and symbols, its compiled functions, and its tests."""
     lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. What '
              'stands here is what stands in the module: the equation, the symbols, the source.']
-    for package in COLUMNS:
+    for package in LAW_PACKAGES:
         folder = root / 'src' / package
         tests = {test.name: set(_imported(test)) for test in sorted((folder / 'test').glob('test_*.py'))}
         lines += ['', f'## {package}', '', '```text', _docstring(folder / package / '__init__.py'), '```']

@@ -1,6 +1,7 @@
 """The rules of language that a program can check: `python -m tools.language [PATH ...]` prints what breaks them.
 
-Read are README.md, CHANGELOG.md, docs/, and in Python the docstrings, comments and texts; the rules stand in CONTRIBUTING.md.
+Read are README.md, CHANGELOG.md, docs/, and in Python the docstrings, comments and texts; the rules stand in
+CONTRIBUTING.md.
 """
 import ast
 import io
@@ -28,7 +29,8 @@ def paths():
 
 
 def markdown_texts(text):
-    """Yield (line number, paragraph or table cell, True if it consists of sentences) of a Markdown page without its code."""
+    """Yield (line number, paragraph or table cell, True if it consists of sentences) of a Markdown page without its
+    code."""
     blank = lambda match: '\n' * match[0].count('\n')  # noqa: E731  keeps line numbers
     text = re.sub(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$', blank, text)
     text = re.sub(r'(?s)<!--.*?-->', blank, text)
@@ -57,7 +59,8 @@ def docstrings(tree):
 
 
 def python_texts(source):
-    """Yield (line number, text, True if it consists of sentences) of the docstrings, comments and other texts of a module."""
+    """Yield (line number, text, True if it consists of sentences) of the docstrings, comments and other texts of a
+    module."""
     tree = ast.parse(source)
     documented = dict(docstrings(tree))
     for start, text in documented.items():

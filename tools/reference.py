@@ -9,20 +9,20 @@ import sys
 import pedestal_studies
 from acu_tracker import modes
 from acu_tracker.alarms import table as alarms
-from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from adu_drive.controller import faults
 from pedestal_analysis.reprocess import what_if
 from pedestal_analysis.results import results
 from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
-from pedestal_common.injection.table import FAULTS
+from pedestal_common.injection.table import INJECTED_FAULTS
 from pedestal_studies.numbers import published
-from pedestal_studies.rigs.fault_expectations import EXPECTED
+from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS
 
-FILES = ('README.md', *(f'docs/{name}.md' for name in (
+GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (
     'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools')))
-FIRST = (
+TABLE_PARAMETERS = (
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
     'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
     'adu.azimuth.speed_loop.disturbance_observer', 'adu.azimuth.structure.inertia_share', 'adu.wind.gust.kind',
@@ -37,8 +37,8 @@ FIRST = (
     'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
 """The parameters in the table of docs/parameters.md."""
 
-RATES = {'step': 'step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
-         'reply': 'after each request', 'command': 'when somebody asks'}
+RATE_TEXTS = {'step': 'step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
+              'reply': 'after each request', 'command': 'when somebody asks'}
 
 
 def _table(head, rows):
@@ -49,7 +49,7 @@ def _table(head, rows):
 def node_table():
     """Every node: executable, what it is, what takes its place on a real antenna."""
     rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.module else '', node.doc,
-             node.stands_for) for node in (*nodes.NODES, nodes.ARRAY)]
+             node.stands_for) for node in (*nodes.NODES, nodes.ARRAY_DRIVE)]
     return _table(('node', 'executable (package)', 'what it is', 'stands for'), rows)
 
 
@@ -60,7 +60,7 @@ def topic_table():
     for topic in topics.TOPICS:
         link, kind = links[topic.name], topic.type.replace('/msg/', '/')
         writers = 'every node' if len(link.writers) > 1 else ''.join(link.writers)
-        when = RATES[topic.rate] + (f'; with `{topic.flag}`' if topic.flag else '')
+        when = RATE_TEXTS[topic.rate] + (f'; with `{topic.flag}`' if topic.flag else '')
         rows.append((f'`{topic.name}`', kind, writers, ', '.join(link.readers), when, topic.doc))
     return _table(('topic', 'type', 'from', 'to', 'rate', 'content'), rows)
 
@@ -68,21 +68,22 @@ def topic_table():
 def service_table():
     """The services of every node."""
     rows = [(f'`{node.name}` ({node.executable})', ', '.join(f'`{name}`' for name in node.unit_type().REQUESTS))
-            for node in nodes.UNITS if node.unit_type().REQUESTS]
+            for node in nodes.UNIT_NODES if node.unit_type().REQUESTS]
     return _table(('node', 'services (std_srvs/Trigger)'), rows)
 
 
 def command_table():
     """What every node can be asked for on its topic of commands."""
     rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
-            for node in nodes.UNITS if node.obeys and node.name not in FAULTS for verb in node.unit_type().VERBS]
+            for node in nodes.UNIT_NODES if node.obeys and node.name not in INJECTED_FAULTS
+            for verb in node.unit_type().VERBS]
     return _table(('topic', 'verb', 'arguments', 'what it does'), rows)
 
 
 def injection_table():
     """What every simulated node can be broken by."""
     rows = [(f'`{node}`', f'`{fault.name}`', ', '.join(map(_defaulted, fault.arguments[:-1])), fault.doc,
-             '' if fault.lockstep else 'no') for node, faults in FAULTS.items() for fault in faults]
+             '' if fault.lockstep else 'no') for node, faults in INJECTED_FAULTS.items() for fault in faults]
     return _table(('node', 'fault', 'arguments', 'what it breaks', 'in lockstep'), rows)
 
 
@@ -95,7 +96,7 @@ def _defaulted(argument):
 def expectation_table():
     """What is expected of every fault; modes of which the same is expected together."""
     rows = []
-    for fault, of_modes in EXPECTED.items():
+    for fault, of_modes in FAULT_EXPECTATIONS.items():
         alike = {}
         for mode, expected in of_modes.items():
             alike.setdefault(expected.sentence('the same mode'), []).append(mode)
@@ -112,19 +113,19 @@ def _argument(argument):
 def mode_table():
     """The modes of the control unit."""
     return _table(('mode', 'the axes follow', 'entered', 'left by itself'),
-                  [(f'`{mode.name}`', mode.doc, mode.entry, mode.exit) for mode in modes.TABLE])
+                  [(f'`{mode.name}`', mode.doc, mode.entry, mode.exit) for mode in modes.MODE_ROWS])
 
 
 def filter_table():
     """The kinds of target filter."""
-    return _table(('`filter.kind`', 'what it is'), [(f'`{name}`', kind.doc) for name, kind in KINDS.items()])
+    return _table(('`filter.kind`', 'what it is'), [(f'`{name}`', kind.doc) for name, kind in FILTER_KINDS.items()])
 
 
 def fault_table():
     """The faults on which the drive trips."""
     return _table(('fault, per axis', 'from', 'parameter'),
                   [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
-                   for fault in faults.FAULTS])
+                   for fault in faults.AXIS_FAULTS])
 
 
 def alarm_table():
@@ -152,9 +153,9 @@ def study_table():
 
 
 def parameter_table():
-    """The parameters of FIRST."""
+    """The parameters of TABLE_PARAMETERS."""
     rows = []
-    for name in FIRST:
+    for name in TABLE_PARAMETERS:
         node, _, key = name.partition('.')
         kind = scenario.parameters_of(node)
         field, value = dict(parameters.flatten(kind))[key], parameters.defaults(kind)[key]
@@ -172,21 +173,21 @@ def result_table(table=results.RESULTS):
                    results.documented(table)])
 
 
-TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
-          'services': service_table,
-          'modes': mode_table, 'commands': command_table, 'faults that can be injected': injection_table,
+REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
+                    'services': service_table,
+                    'modes': mode_table, 'commands': command_table, 'faults that can be injected': injection_table,
          'expected of faults': expectation_table,
-          'filter kinds': filter_table, 'drive faults': fault_table,
-          'alarms': alarm_table, 'results': result_table,
-          'recomputed results': lambda: result_table(what_if.NUMBERS),
-          'first parameters': parameter_table}
+                    'filter kinds': filter_table, 'drive faults': fault_table,
+                    'alarms': alarm_table, 'results': result_table,
+                    'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
+                    'first parameters': parameter_table}
 
 
-def written(text, rows):
+def with_tables(text, rows):
     """A file's text with its tables written again; rows: published.Rows. Raises KeyError for an unknown table."""
     def table(match):
         name = match[1]
-        lines = _table(*published.TABLES[name](rows)) if name in published.TABLES else TABLES[name]()
+        lines = _table(*published.TABLES[name](rows)) if name in published.TABLES else REFERENCE_TABLES[name]()
         return '\n'.join((f'<!-- table {name} -->', *lines, '<!-- end -->'))
     return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)
 
@@ -194,10 +195,10 @@ def written(text, rows):
 def main(root='.') -> int:
     """Write the tables of every file under a checkout."""
     rows = published.read(root)
-    for name in FILES:
+    for name in GENERATED_PAGES:
         file = pathlib.Path(root, name)
         old = file.read_text()
-        new = written(old, rows)
+        new = with_tables(old, rows)
         if new != old:
             file.write_text(new)
             print(f'{name}: tables written')

@@ -26,7 +26,7 @@ from station import NODES, Station, reads
 
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node import listening, middleware
+from pedestal_common.node import middleware, subscriptions
 from pedestal_common.wire import messages
 
 NUMBERS = (float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 0.0, -0.0, 0.5, -2.0, 1e6)
@@ -51,14 +51,14 @@ def read_topics():
 def all_topics(station):
     """Every topic of a station, for the recorder reads each; of several beams those of the first."""
     header = station.scenario.header
-    names = [link.name for link in nodes.recorded(station.scenario.nodes, topics.FLAGS, header.graph_beams)]
+    names = [link.name for link in nodes.recorded(station.scenario.nodes, topics.TOPIC_FLAGS, header.graph_beams)]
     return [name for name in names if nodes.beam_of(name) in ('', 'beam_1')
-            and (header.graph_beams == 0 or not topics.BY_NAME[nodes.plain(name)].flag)]
+            and (header.graph_beams == 0 or not topics.TOPIC_BY_NAME[nodes.plain(name)].flag)]
 
 
 def sane(name):
     """A good message of a topic."""
-    row = topics.BY_NAME[nodes.plain(name)]
+    row = topics.TOPIC_BY_NAME[nodes.plain(name)]
     if row.type == 'std_msgs/msg/String':
         return messages.String(data='enabled')
     if row.type == 'diagnostic_msgs/msg/DiagnosticArray':
@@ -145,13 +145,13 @@ class Stranger:
         self._read('diagnostics', self._diagnostics)
 
     def _read(self, name, take):
-        topic = topics.BY_NAME[nodes.plain(name)]
+        topic = topics.TOPIC_BY_NAME[nodes.plain(name)]
 
         def callback(data, info):
             if info['source_timestamp'] > self.sent_until.get(name, 0):     # else it may be our own
                 with contextlib.suppress(ValueError):
                     take(messages.deserialize(data, topic.type))
-        self.node.create_subscription(middleware.message_class(topic.type), name, listening.pair(callback),
+        self.node.create_subscription(middleware.message_class(topic.type), name, subscriptions.pair(callback),
                                       middleware.qos(topic.rate, 'recorded'), raw=True)
 
     def _joints(self, name, message):
@@ -188,7 +188,7 @@ class Stranger:
 
     def send(self, name, count, make):
         """Publish make() count times; how many of them left: Fast DDS sends none that is longer than its type."""
-        topic = topics.BY_NAME[nodes.plain(name)]
+        topic = topics.TOPIC_BY_NAME[nodes.plain(name)]
         publisher = self.node.create_publisher(middleware.message_class(topic.type), name,
                                                middleware.qos(topic.rate, 'written'))
         self.sent_until[name] = math.inf

@@ -14,7 +14,7 @@ import sys
 
 import numpy as np
 
-from pedestal_common.realtime.intake import Intake
+from pedestal_common.realtime.publisher_gate import PublisherGate
 
 SECOND = 1_000_000_000
 UTC = 1_790_000_000 * SECOND
@@ -63,7 +63,7 @@ def trial(machine, seed):
 
     def strangers():
         return int(len(stranger) > 0 and begin <= now < stranger[-1] + 0.1)
-    intake = Intake(lambda data: (data, data), FUTURE, strangers)
+    intake = PublisherGate(lambda data: (data, data), FUTURE, strangers)
     obeyed, of_right = [], 0
     for at_once in np.split(np.arange(len(messages)), np.flatnonzero(np.diff(heard) > 0.0) + 1):
         for place, k in enumerate(at_once[-QUEUE:]):

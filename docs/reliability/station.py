@@ -10,7 +10,7 @@ import yaml
 from pedestal_bringup.graph import processes
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import nodes, topics
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 
 NODES = ('tracking_receiver', 'acu', 'adu')
 """Of a station ashore with one antenna."""
@@ -19,7 +19,8 @@ NODES = ('tracking_receiver', 'acu', 'adu')
 def reads(chosen, node):
     """The topics that a node of a Scenario hears from others, as the graph names them."""
     told = chosen.node_parameters(node)
-    heard = nodes.reads(chosen.row(node), chosen.nodes, [flag for flag in topics.FLAGS if getattr(told, flag, False)])
+    heard = nodes.reads(chosen.row(node), chosen.nodes, [flag for flag in topics.TOPIC_FLAGS
+                                                         if getattr(told, flag, False)])
     return [link.name for link in nodes.links(chosen.header.graph_beams).values()
             if node in link.readers and nodes.plain(link.name) in heard]
 
@@ -34,14 +35,14 @@ class Station:
         self.folder, self.domain_id = pathlib.Path(folder), domain_id
         self.scenario = scenario.load(name, changes)
         self.nodes = tuple(node for node in self.scenario.nodes if node not in ('operator', 'recorder'))
-        self.start_time = time.time_ns() // SECOND * SECOND if start is None else start
+        self.start_time = time.time_ns() // NS_PER_SECOND * NS_PER_SECOND if start is None else start
         self.processes = {}
         self.file = self.folder / 'parameters.yaml'
         names = dict.fromkeys(map(nodes.plain, (*self.nodes, 'operator')))
         told = {'graph.nodes': ','.join(names), 'graph.beams': self.scenario.header.graph_beams,
                 'graph.priority': self.scenario.header.priority, 'graph.start': self.start_time}
         given = {node: {**self.scenario.given(node), **told} for node in (*self.nodes, 'recorder')}
-        given[nodes.DRIVE]['duration'] = given['recorder']['duration'] = 0.0    # until they are told to stop
+        given[nodes.DRIVE_NODE]['duration'] = given['recorder']['duration'] = 0.0    # until they are told to stop
         given['recorder']['bag'] = str(self.folder / 'bag')
         self.file.write_text(yaml.safe_dump({node: {'ros__parameters': values} for node, values in given.items()}))
         self.environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain_id), 'ROS_LOG_DIR': str(self.folder / 'ros_log')}

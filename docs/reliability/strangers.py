@@ -36,7 +36,7 @@ def node_of(domain_id):
 def read(domain_id, pause):
     """Read joint_states as `ros2 topic echo` does, reliably, and sleep for `pause` [s] at each message."""
     node = node_of(domain_id)
-    kind = middleware.message_class(topics.BY_NAME['joint_states'].type)
+    kind = middleware.message_class(topics.TOPIC_BY_NAME['joint_states'].type)
     node.create_subscription(kind, 'joint_states', lambda _: time.sleep(pause), 10)
     rclpy.spin(node)
 
@@ -44,7 +44,7 @@ def read(domain_id, pause):
 def write(domain_id, name, rate, count):
     """Publish JointStates, `rate` of them a second, on a topic; count (multiprocessing.Value): how many so far."""
     node = node_of(domain_id)
-    row = topics.BY_NAME['acu/rate_command']
+    row = topics.TOPIC_BY_NAME['acu/rate_command']
     publisher = node.create_publisher(middleware.message_class(row.type), name, middleware.qos('step', 'written'))
     message = messages.template(row.name)
     message.velocity[:] = 0.5

@@ -13,7 +13,7 @@ import sys
 
 import numpy as np
 
-from acu_tracker.servo import unasked
+from acu_tracker.servo import uncommanded_motion
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import records
@@ -37,24 +37,26 @@ def loop_of(name, torque, intensity, seed, seconds):
 def watched(t, enabled, rates):
     """Of rates (n, 2) [rad/s] at t (n,) [s] the largest that stayed for unasked.TIME while the alarm was watching."""
     ready = np.maximum.accumulate(np.where(enabled, -np.inf, t))
-    stay = round(unasked.TIME / (t[1] - t[0])) + 1
+    stay = round(uncommanded_motion.MIN_EXCESS_TIME_S / (t[1] - t[0])) + 1
     windows = np.lib.stride_tricks.sliding_window_view(np.abs(rates).max(axis=1), stay).min(axis=1)
-    settled = (t - ready >= unasked.SETTLING)[stay - 1:] & (t[stay - 1:] >= unasked.SETTLING)
+    settled = (t - ready >= uncommanded_motion.RESTART_SETTLING_TIME_S)[stay
+                                                                        - 1:] & (t[stay
+                                                                                   - 1:] >= uncommanded_motion.RESTART_SETTLING_TIME_S)
     return windows[settled].max()
 
 
 def run(loop):
     """(alarm raised, drive tripped, largest rate [rad/s]) of a run."""
     acu, adu = loop.units['acu'], loop.units['adu']
-    steps, truth = records.empty(closed_loop.STEP, loop.steps), np.zeros(loop.steps, closed_loop.TRUTH)
-    before, injected = records.empty(closed_loop.STEP, 1), np.zeros((loop.steps, 2))
+    steps, truth = records.empty(closed_loop.STEP_DTYPE, loop.steps), np.zeros(loop.steps, closed_loop.TRUTH_DTYPE)
+    before, injected = records.empty(closed_loop.STEP_DTYPE, 1), np.zeros((loop.steps, 2))
     quarter = round(0.25 * CYCLE * 1e9 / loop.period_ns)
     alarmed = tripped = False
     for number, first in enumerate(range(0, loop.steps, quarter)):
         adu.request('adu/disable' if number % 4 == 3 else 'adu/enable')
         part = slice(first, min(first + quarter, loop.steps))
         memories = tuple(loop.units[name].block(part.stop - first) if name in loop.units else None
-                         for name in closed_loop.ORDER)
+                         for name in closed_loop.UNIT_ORDER)
         closed_loop.loop(memories, first, loop.period_ns, before, injected[part], steps[part], truth[part])
         alarmed |= bool(acu.parts['state']['unasked']['moves'])
         tripped |= 'fault' in adu.condition

@@ -170,9 +170,9 @@ def server(acu):
         request = rotctld.read(line)
         control.look(t)
         if request.name == 'get_pos':
-            return rotctld.answer(request, rotctld.OK, rotctld.position(*control.pointing.angles_told()))
+            return rotctld.answer(request, rotctld.RESULT_OK, rotctld.position(*control.pointing.angles_told()))
         outcome = control.go('gpredict', *request.values, t).look(remote, t)
-        return rotctld.answer(request, rotctld.REJECTED if outcome else rotctld.OK)
+        return rotctld.answer(request, rotctld.RESULT_REJECTED if outcome else rotctld.RESULT_OK)
     return ask
 
 

@@ -3,47 +3,51 @@
 The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`. docs/architecture.md shows
 the order of a step. Each part of the state is written by its own module; here they are brought together.
 
-s, c, u, o: records of STATE, CONSTANTS, signals.INPUTS and OUTPUTS; of_all: the Tables; gap: the outage.Outage.
+s, c, u, o: records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS and OUTPUTS; of_all: the Tables; gap: the
+outage.Outage.
 """
 import math
 
 import numpy as np
 
-from acu_tracker import intake, modes, signals, tracking
+from acu_tracker import measurements, modes, signals, tracking
 from acu_tracker.alarms import annunciator, conditions
 from acu_tracker.estimation import divergence, tracker
 from acu_tracker.geometry import attitude, direction, encoders
 from acu_tracker.guidance import guidance
 from acu_tracker.lookahead import levelled_deck, planner
-from acu_tracker.mode import by_level, mode_change, outage, reach, resumption, stow, supervision
+from acu_tracker.mode import mode_change, outage, reachability, resumption, signal_level_modes, stow, supervision
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.params import AxisParameters, SharedParameters
 from acu_tracker.program import bridge, tables
-from acu_tracker.servo import axes, ends, floor, frozen, notch, position_loop, unasked
+from acu_tracker.servo import axes, ends, floor, frozen, notch, position_loop, uncommanded_motion
 from acu_tracker.servo.position_loop import Instants
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import blockage
 from pedestal_common.parameters import record, record_type
 
-STATE = np.dtype([
-    ('stamp', 'f8'), ('mode', mode_change.MODE), ('resumption', resumption.RESUMPTION), ('stow', stow.STOW),
-    ('tracking', tracking.TRACKING), ('outage', outage.OUTAGE), ('guidance', guidance.GUIDANCE),
-    ('axis', position_loop.AXIS, (2,)), ('unasked', unasked.ENVELOPE), ('frozen', frozen.FROZEN),
-    ('supervision', conditions.SUPERVISION),
+STATE_DTYPE = np.dtype([
+    ('stamp', 'f8'), ('mode', mode_change.MODE_DTYPE), ('resumption', resumption.RESUMPTION_DTYPE),
+    ('stow', stow.STOW_DTYPE),
+    ('tracking', tracking.TRACKING_DTYPE), ('outage', outage.OUTAGE_DTYPE), ('guidance', guidance.GUIDANCE_DTYPE),
+    ('axis', position_loop.AXIS_LOOP_DTYPE, (2,)), ('unasked', uncommanded_motion.ENVELOPE_DTYPE),
+    ('frozen', frozen.FROZEN_DTYPE),
+    ('supervision', conditions.SUPERVISION_DTYPE),
 ], align=True)
 
-AXIS_CONSTANTS = np.dtype([('p', record_type(AxisParameters)), ('notch', 'f8', (5,)), ('reaction', 'f8'),
-                           ('braking', 'f8')], align=True)
-CONSTANTS = np.dtype([('p', record_type(SharedParameters)), ('axis', AXIS_CONSTANTS, (2,)), ('lead', 'f8'),
-                      ('tracker', tracker.CONSTANTS), ('lookahead', planner.CONSTANTS), ('floor', floor.FLOOR)],
-                     align=True)
+AXIS_CONSTANTS_DTYPE = np.dtype([('p', record_type(AxisParameters)), ('notch', 'f8', (5,)), ('reaction', 'f8'),
+                                 ('braking', 'f8')], align=True)
+CONSTANTS_DTYPE = np.dtype([('p', record_type(SharedParameters)), ('axis', AXIS_CONSTANTS_DTYPE, (2,)), ('lead', 'f8'),
+                            ('tracker', tracker.CONSTANTS_DTYPE), ('lookahead', planner.CONSTANTS_DTYPE),
+                            ('floor', floor.FLOOR_DTYPE)],
+                           align=True)
 """p: the parameters; notch: coefficients; reaction, braking: time [s] given in
 front of a limit, deceleration there [rad/s2]; lead: t_m - t_k [s]."""
 
 
 def axis_constants(params, period, reaction) -> np.ndarray:
     """Constants (1,) of AxisParameters, for steps of period [s]; reaction [s]: see position_loop.follow."""
-    c, n = np.zeros(1, AXIS_CONSTANTS), params.notch
+    c, n = np.zeros(1, AXIS_CONSTANTS_DTYPE), params.notch
     c['p'] = record(params, AxisParameters)
     c['notch'] = notch.coefficients(n.frequency, n.width, n.depth, period)
     c['reaction'], c['braking'] = reaction, params.limits.deceleration
@@ -52,7 +56,7 @@ def axis_constants(params, period, reaction) -> np.ndarray:
 
 def constants(params) -> np.ndarray:
     """Constants (1,) of AcuParameters."""
-    c, axes = np.zeros(1, CONSTANTS), (params.azimuth, params.elevation)
+    c, axes = np.zeros(1, CONSTANTS_DTYPE), (params.azimuth, params.elevation)
     c['p'] = record(params, SharedParameters)
     c['lead'] = params.command_delay + 0.5 * params.period
     c['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period,
@@ -65,12 +69,12 @@ def constants(params) -> np.ndarray:
 
 def initial_state(params) -> np.ndarray:
     """State (1,) before the first step of AcuParameters: standby, the initial mode pending."""
-    s = np.zeros(1, STATE)
+    s = np.zeros(1, STATE_DTYPE)
     s['stamp'] = -math.inf
     mode_change.initialise(s['mode'], params)
     guidance.initialise(s['guidance'], (params.azimuth.preset, params.elevation.preset))
     for name, module in (('resumption', resumption), ('stow', stow), ('tracking', tracking), ('outage', outage),
-                         ('unasked', unasked), ('supervision', conditions)):
+                         ('unasked', uncommanded_motion), ('supervision', conditions)):
         module.initialise(s[name])
     return s
 
@@ -89,7 +93,7 @@ def request(s, c, u, o, of_all, mode):
     """
     result, _ = _change(s, c, u, o, of_all, mode, _outage(s, c))
     o.mode, o.reason = s.mode.now, s.mode.reason
-    return result == modes.ACCEPTED
+    return result == modes.REQUEST_ACCEPTED
 
 
 @compiled
@@ -105,18 +109,18 @@ def reset(s):
     """Reset what is latched, between two steps: annunciator.NONE, or the index of an alarm whose cause is still there,
     and nothing is changed. A mode that waited to be entered is forgotten: nothing moves until one is asked for."""
     alarms, t, waited = s.supervision.alarms, s.stamp, latched(s) != 0
-    if s.unasked.moves and unasked.beyond(s.unasked, t):
-        return supervision.MOVES_UNASKED
-    cause = annunciator.persists(alarms, supervision.LATCHED)
-    if cause != annunciator.NONE:
+    if s.unasked.moves and uncommanded_motion.beyond(s.unasked, t):
+        return supervision.UNCOMMANDED_MOTION_ALARM
+    cause = annunciator.persisting_alarm(alarms, supervision.LATCHED_FAULT_BITS)
+    if cause != annunciator.NO_ALARM:
         return cause
-    unasked.release(s.unasked)
+    uncommanded_motion.release(s.unasked)
     frozen.release(s.frozen, t)
     divergence.release(s.tracking.divergence)
     if supervision.reset(alarms, t) or waited:
-        mode_change.wait_for(s.mode, modes.NO_REQUEST)
-        resumption.forget(s.resumption)
-    return annunciator.NONE
+        mode_change.set_pending(s.mode, modes.NO_REQUEST)
+        resumption.cancel(s.resumption)
+    return annunciator.NO_ALARM
 
 
 @compiled
@@ -134,7 +138,8 @@ def step(s, c, u, o, of_all):
     silence = c.p.step_gap < dt < math.inf
     if silence and s.mode.now != Mode.STANDBY:
         # The axes stand. The mode goes on, from where they are, if the silence was short enough.
-        mode_change.go_on(s.mode, resumption.mode_after(s.resumption, s.mode.now, s.stamp, u.stamp, c.p.resume_time))
+        mode_change.continue_in(s.mode, resumption.mode_after(s.resumption, s.mode.now, s.stamp, u.stamp,
+                                                              c.p.resume_time))
     s.stamp = u.stamp
     flags = _observe(s, c, u, o, tables.of_mode(of_all, s.mode.table), silence)
     gap, begins = _outage(s, c), _rests(s, c, u) or dt > c.p.step_gap
@@ -145,9 +150,9 @@ def step(s, c, u, o, of_all):
         _start_from_actual(s, c, u, begins, silence)
     program = tables.of_mode(of_all, s.mode.table)
     _move(s, c, u, o, program, gap, begins, c.p.period if dt > c.p.step_gap else dt)
-    _tell(s, c, u, o, flags | of_tables)
+    _write_outputs(s, c, u, o, flags | of_tables)
     if guidance.look_ahead(s.guidance, s.tracking, c, s.mode.now, program, gap, s.stamp):
-        mode_change.begin(s.mode)
+        mode_change.restart(s.mode)
     _supervise(s, c, u, o, dt)
 
 
@@ -159,23 +164,23 @@ def _observe(s, c, u, o, program, silence):
     way = bridge.way(g.bridge, program)
     tracker.transfer(k.target.tracker, c.p.tracker, c.tracker)
     flags = signals.Flag.STEP_GAP if silence else 0
-    flags |= intake.take_encoders(k.encoders, u) | _hear_attitude(s, c, u) | _hear_receiver(s, c, u, o, way)
-    flags |= intake.take_preset(g.preset, u)
-    unasked.watch(s.unasked, s.stamp, u.velocity, c.p.unasked_rate, silence or not u.drive_ready)
-    if c.axis[0].p.controller != position_loop.BEAM:
+    flags |= measurements.take_encoders(k.encoders, u) | _take_attitude(s, c, u) | _take_receiver(s, c, u, o, way)
+    flags |= measurements.take_preset(g.preset, u)
+    uncommanded_motion.watch(s.unasked, s.stamp, u.velocity, c.p.unasked_rate, silence or not u.drive_ready)
+    if c.axis[0].p.controller != position_loop.CONTROLLER_BEAM:
         frozen.watch(s.frozen, u, c.p.step_gap + c.p.command_delay, silence)
-    if by_level.advance(g.acquisition, mode, c, u, way):
+    if signal_level_modes.advance(g.acquisition, mode, c, u, way):
         divergence.latch(k.divergence)
     return flags
 
 
 @compiled
-def _hear_attitude(s, c, u):
+def _take_attitude(s, c, u):
     """Take the attitude of this step, also into the mean of the look-ahead; flags of what is not valid."""
     h = s.guidance.lookahead
     if tracking.take_place(s.tracking, u):
-        planner.forget(h)
-    flags, new = intake.take_attitude(s.tracking.attitude, c.p, u)
+        planner.clear_plan(h)
+    flags, new = measurements.take_attitude(s.tracking.attitude, c.p, u)
     if new:
         # While the INS aligns its heading is not known: the mean begins with the first one after that.
         levelled_deck.take(h.deck, u.attitude_stamp, attitude.newest(s.tracking.attitude), c.p.keyhole.mean_time,
@@ -184,16 +189,17 @@ def _hear_attitude(s, c, u):
 
 
 @compiled
-def _hear_receiver(s, c, u, o, way):
+def _take_receiver(s, c, u, o, way):
     """Take the error of the receiver of this step; a flag where it is not accepted, else 0."""
     g, k, mode = s.guidance, s.tracking, s.mode.now
-    flags, used, at = tracking.used(k, c, u, modes.BY_LEVEL[mode], g.pointing_offset)
+    flags, used, at = tracking.used_error(k, c, u, modes.USES_SIGNAL_LEVEL[mode], g.pointing_offset)
     if not used:
         return flags
     if mode == Mode.ACQUIRE:
         guidance.check_slope(g, k, c, u, at, way)
     restart_gap = math.inf if _outage(s, c).permitted else c.p.tracker.restart_gap
-    return tracking.take_error(k, c, u, o, at, restart_gap, mode == Mode.AUTOTRACK, supervision.obeys(s.supervision))
+    return tracking.take_error(k, c, u, o, at, restart_gap, mode == Mode.AUTOTRACK,
+                               supervision.axes_obey_commands(s.supervision))
 
 
 @compiled
@@ -205,7 +211,7 @@ def _outage(s, c):
 @compiled
 def _rests(s, c, u):
     """Whether the mode commands no motion."""
-    return stow.rests(s.stow, c.p.stow_pins, u.pins, s.mode.now)
+    return stow.commands_no_motion(s.stow, c.p.stow_pins, u.pins, s.mode.now)
 
 
 @compiled
@@ -219,12 +225,12 @@ def _change(s, c, u, o, of_all, request, gap):
     o.locked = now.conditions.lock == Reason.NONE
     result = mode_change.change(s.mode, now, request)
     mode = s.mode.now
-    if result == modes.ACCEPTED and modes.BY_TABLE[mode]:
+    if result == modes.REQUEST_ACCEPTED and modes.FOLLOWS_TABLE[mode]:
         tracker.recount(k.target.tracker)
     if s.mode.table != table:
-        bridge.forget(g.bridge)
+        bridge.clear(g.bridge)
     if mode != before:
-        if modes.BY_LEVEL[mode]:
+        if modes.USES_SIGNAL_LEVEL[mode]:
             if before == Mode.AUTOTRACK and not gap.coasting:
                 guidance.bridge_to(g, k, c, tables.of_mode(of_all, s.mode.table), s.stamp)
             guidance.begin_by_level(g, k, c, before, mode, s.stamp)
@@ -240,8 +246,8 @@ def _situation(s, c, u, of_all, request, gap):
     m, g, k, t = s.mode, s.guidance, s.tracking, s.stamp
     unstable, pins = tracking.unstable(k, c, u, t), stow.obstacle(s.stow, c.p.stow_pins, u.pins)
     lock, slope, track = tracking.conditions(k, c, t, gap,
-                                             m.now == Mode.AUTOTRACK and supervision.obeys(s.supervision))
-    if track == Reason.NONE and by_level.in_side_lobe(g.acquisition, c, t):
+                                             m.now == Mode.AUTOTRACK and supervision.axes_obey_commands(s.supervision))
+    if track == Reason.NONE and signal_level_modes.in_side_lobe(g.acquisition, c, t):
         track = Reason.SIDE_LOBE
     # There is no coasting on a filter that has begun anew.
     chosen = m.fallback if m.fallback != Mode.AUTOTRACK or k.target.tracker.running else Mode.PROGRAM
@@ -251,24 +257,25 @@ def _situation(s, c, u, of_all, request, gap):
     flags = flag = 0
     if unstable == Reason.NONE:
         if Mode.PROGRAM in wanted:
-            program, flags = reach.table(k.attitude, c, u, Mode.PROGRAM, of_all, t, g.azimuth)
+            program, flags = reachability.table(k.attitude, c, u, Mode.PROGRAM, of_all, t, g.azimuth)
         if Mode.TLE in wanted:
-            tle, flag = reach.table(k.attitude, c, u, Mode.TLE, of_all, t, g.azimuth)
+            tle, flag = reachability.table(k.attitude, c, u, Mode.TLE, of_all, t, g.azimuth)
             flags |= flag
         if Mode.SUN in wanted:
-            sun, flag = reach.table(k.attitude, c, u, Mode.SUN, of_all, t, g.azimuth)
+            sun, flag = reachability.table(k.attitude, c, u, Mode.SUN, of_all, t, g.azimuth)
             flags |= flag
     why = modes.Conditions(
-        nothing=Reason.NONE, stow=reach.outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
+        nothing=Reason.NONE, stow=reachability.outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
         pin=Reason.PINS_OUT if pins == Reason.NONE else Reason.NONE,
-        preset=reach.outside(c, g.preset.angle[0], g.preset.angle[1]),
-        direction=Reason.NONE if direction.there(g.slave, t) else Reason.NO_DIRECTION,
+        preset=reachability.outside(c, g.preset.angle[0], g.preset.angle[1]),
+        direction=Reason.NONE if direction.valid_at(g.slave, t) else Reason.NO_DIRECTION,
         program=program, tle=tle, sun=sun, lock=lock, slope=slope, track=track,
-        level=by_level.end(g.acquisition, m.now, c, t))
+        level=signal_level_modes.end(g.acquisition, m.now, c, t))
     return modes.Situation(
         encoder_valid=encoders.taken(k.encoders, t), attitude=unstable, pins=pins, table=m.table, chosen=chosen,
-        drive=supervision.distrust(u.drive_ready, s.unasked.moves, s.frozen.frozen), conditions=why,
-        handover=by_level.found(g.acquisition, m.now, c) if modes.BY_LEVEL[m.now] else c.p.tracker.handover != 0
+        drive=supervision.drive_refusal(u.drive_ready, s.unasked.moves, s.frozen.frozen), conditions=why,
+        handover=signal_level_modes.found(g.acquisition, m.now,
+                                          c) if modes.USES_SIGNAL_LEVEL[m.now] else c.p.tracker.handover != 0
     ), flags
 
 
@@ -277,10 +284,10 @@ def _wait(s, c, u, o):
     """Wait for the stow pins, and for a drive that ended a mode, which is resumed."""
     m = s.mode
     if c.p.stow_pins and stow.step(s.stow, c, u, m.now):
-        mode_change.stowed(m)
-    if resumption.waits(s.resumption):
+        mode_change.mark_stowed(m)
+    if resumption.is_pending(s.resumption):
         ended = m.now == Mode.STANDBY and m.reason == Reason.DRIVE_NOT_READY
-        mode_change.wait_for(m, resumption.pending(s.resumption, s.stamp, ended, o.locked, m.pending))
+        mode_change.set_pending(m, resumption.pending(s.resumption, s.stamp, ended, o.locked, m.pending))
 
 
 @compiled
@@ -306,12 +313,12 @@ def _move(s, c, u, o, program, gap, begins, dt):
         motion = guidance.motion(g, k, c, order, bridge.way(g.bridge, program), gap, now)
         V = tracking.deck_rates(k, c, t, actual.azimuth.angle, actual.elevation.angle)
         axes.follow(s.axis, c, u, o, motion, now, (k.error, V, m.now == Mode.AUTOTRACK))
-        mode_change.begun(m)
+        mode_change.mark_started(m)
         if _explained(s, c) and m.now == Mode.AUTOTRACK and not gap.coasting:
             guidance.bridge_to(g, k, c, program, t)
         o.blocked, o.coasting = s.outage.blocked, m.now == Mode.AUTOTRACK and gap.coasting
     for i in range(2):
-        unasked.command(s.unasked, i, o.rate[i], t, min(dt, c.p.period), c.p.step_gap + c.p.command_delay)
+        uncommanded_motion.command(s.unasked, i, o.rate[i], t, min(dt, c.p.period), c.p.step_gap + c.p.command_delay)
         frozen.command(s.frozen, i, o.rate[i], c.p.period)
 
 
@@ -319,22 +326,22 @@ def _move(s, c, u, o, program, gap, begins, dt):
 def _explained(s, c):
     """Note why the receiver may be without signal: the target is hidden, or the beam slews through the keyhole.
     Whether it may."""
-    g, follows = s.guidance, modes.FOLLOWS[s.mode.now]
+    g, follows = s.guidance, modes.FOLLOWS_TARGET[s.mode.now]
     hidden = follows and blockage.blocked(c.lookahead.sectors, g.target_angles[0], g.target_angles[1])
     reason = outage.watch(s.outage, hidden, follows and planner.slewing(g.lookahead, s.stamp), s.stamp)
-    mode_change.explain(s.mode, reason)
+    mode_change.set_outage_reason(s.mode, reason)
     return reason != Reason.NONE
 
 
 @compiled
-def _tell(s, c, u, o, flags):
+def _write_outputs(s, c, u, o, flags):
     """Put mode, flags, pins, times and the estimate into the outputs."""
     of_axes = floor.ends(c, u, u.position[0])
     for i in range(2):
         o.time_to_limit[i] = ends.time_to(u.position[i], u.velocity[i], of_axes[i])
     o.mode, o.reason, o.invalid_input = s.mode.now, s.mode.reason, flags
-    o.pins, o.pins_wrong = s.stow.asked, stow.wrong(s.stow, c, u) if c.p.stow_pins else 0
-    tracking.tell(s.tracking, c, s.stamp, o)
+    o.pins, o.pins_wrong = s.stow.asked, stow.misplaced_pins(s.stow, c, u) if c.p.stow_pins else 0
+    tracking.write_outputs(s.tracking, c, s.stamp, o)
 
 
 @compiled

@@ -3,24 +3,24 @@ from collections import namedtuple
 
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
-from pedestal_common.graph.modes import MODES, TABLE
+from pedestal_common.graph.modes import MODE_ROWS, MODES
 
 Mode = codes(MODES)
-FOLLOWS = tuple(row.follows for row in TABLE)
-BY_LEVEL = tuple(row.by_level for row in TABLE)
-BY_TABLE = tuple(row.table for row in TABLE)
-_PINNED = tuple(row.pinned for row in TABLE)
-NEVER = -1
-_FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else Mode.STANDBY for row in TABLE)
+FOLLOWS_TARGET = tuple(row.follows for row in MODE_ROWS)
+USES_SIGNAL_LEVEL = tuple(row.by_level for row in MODE_ROWS)
+FOLLOWS_TABLE = tuple(row.table for row in MODE_ROWS)
+_ALLOWED_WHEN_PINNED = tuple(row.pinned for row in MODE_ROWS)
+NO_HANDOVER = -1
+_FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else Mode.STANDBY for row in MODE_ROWS)
 
-FALLBACKS = {'coast': Mode.AUTOTRACK, 'memory': Mode.STOP, 'program': Mode.PROGRAM, 'tle': Mode.TLE,
-             'search': Mode.SEARCH, 'preset': Mode.PRESET, 'standby': Mode.STANDBY}
+FALLBACK_MODES = {'coast': Mode.AUTOTRACK, 'memory': Mode.STOP, 'program': Mode.PROGRAM, 'tle': Mode.TLE,
+                  'search': Mode.SEARCH, 'preset': Mode.PRESET, 'standby': Mode.STANDBY}
 """{what can be chosen for the loss of the track: the mode it is}; coast is to stay in autotrack on the filter alone,
 memory to stand where the target was seen last, program to go back to the table that was followed last."""
 
-FALLBACK_OF = {mode: name for name, mode in FALLBACKS.items()}
+FALLBACK_NAMES = {mode: name for name, mode in FALLBACK_MODES.items()}
 
-_HANDOVER = tuple(MODES.index(row.handover) if row.handover else NEVER for row in TABLE)
+_HANDOVER = tuple(MODES.index(row.handover) if row.handover else NO_HANDOVER for row in MODE_ROWS)
 
 REASON_TEXTS = dict(
     NONE='none', REQUESTED='requested', LOCKED='locked', SIGNAL_LOST='signal lost',
@@ -38,7 +38,7 @@ REASON_TEXTS = dict(
 REASONS = tuple(REASON_TEXTS.values())
 Reason = codes(REASON_TEXTS)
 
-NO_REQUEST, REFUSED, ACCEPTED = -1, 0, 1
+NO_REQUEST, REQUEST_REFUSED, REQUEST_ACCEPTED = -1, 0, 1
 
 
 Conditions = namedtuple('Conditions', 'nothing stow pin preset direction program tle sun lock slope track level')
@@ -49,7 +49,7 @@ holds; program, tle, sun: the table can be followed; lock: autotrack can begin; 
 autotrack has its target; level: so has a mode that goes by the level."""
 
 _NEEDS, _ENDS = (tuple(Conditions._fields.index(name or 'nothing') for name in names)
-                 for names in zip(*((row.needs, row.ends) for row in TABLE)))
+                 for names in zip(*((row.needs, row.ends) for row in MODE_ROWS)))
 
 Situation = namedtuple('Situation', 'encoder_valid drive attitude pins handover table chosen conditions')
 """What a change of mode is decided by.
@@ -61,7 +61,8 @@ conditions: the Conditions."""
 
 
 Decision = namedtuple('Decision', 'mode reason result')
-"""The mode from now on; reason: NONE where nothing happened; result: NO_REQUEST, REFUSED or ACCEPTED."""
+"""The mode from now on; reason: NONE where nothing happened; result: NO_REQUEST, REQUEST_REFUSED or
+REQUEST_ACCEPTED."""
 
 
 @compiled
@@ -69,15 +70,15 @@ def obstacle(request, now):
     """Why a mode cannot be entered in a Situation, NONE if it can."""
     if request == Mode.STANDBY:
         return Reason.NONE
-    if request < Mode.STANDBY or request >= len(FOLLOWS):
+    if request < Mode.STANDBY or request >= len(FOLLOWS_TARGET):
         return Reason.UNKNOWN_MODE
     if not now.encoder_valid:
         return Reason.ENCODER_INVALID
     if now.pins != Reason.NONE:
-        return Reason.NONE if _PINNED[request] and now.pins == Reason.PINNED else now.pins
+        return Reason.NONE if _ALLOWED_WHEN_PINNED[request] and now.pins == Reason.PINNED else now.pins
     if now.drive != Reason.NONE:
         return now.drive
-    if FOLLOWS[request] and now.attitude != Reason.NONE:
+    if FOLLOWS_TARGET[request] and now.attitude != Reason.NONE:
         return now.attitude
     return now.conditions[_NEEDS[request]]
 
@@ -87,7 +88,7 @@ def _end(mode, now):
     """Why a mode ends in a Situation, NONE if it goes on. A table that leads outside the limits cannot be entered, but
     is not ended by that."""
     why = now.conditions[_ENDS[mode]]
-    return Reason.NONE if BY_TABLE[mode] and why == Reason.OUTSIDE_LIMITS else why
+    return Reason.NONE if FOLLOWS_TABLE[mode] and why == Reason.OUTSIDE_LIMITS else why
 
 
 @compiled
@@ -97,21 +98,21 @@ def next_mode(mode, request, now):
     if request != NO_REQUEST:
         why = obstacle(request, now)
         if why == Reason.NONE:
-            return Decision(request, Reason.REQUESTED, ACCEPTED)
-        result = REFUSED
+            return Decision(request, Reason.REQUESTED, REQUEST_ACCEPTED)
+        result = REQUEST_REFUSED
     if mode == Mode.STANDBY:
         return Decision(mode, why, result)
     if not now.encoder_valid:
         return Decision(Mode.STANDBY, Reason.ENCODER_INVALID, result)
     if now.pins != Reason.NONE:
-        stays = _PINNED[mode] and now.pins == Reason.PINNED
+        stays = _ALLOWED_WHEN_PINNED[mode] and now.pins == Reason.PINNED
         return Decision(mode, why, result) if stays else Decision(Mode.STANDBY, now.pins, result)
     if now.drive != Reason.NONE and mode != Mode.UNSTOW:
         return Decision(Mode.STANDBY, now.drive, result)
-    if FOLLOWS[mode] and now.attitude != Reason.NONE:
+    if FOLLOWS_TARGET[mode] and now.attitude != Reason.NONE:
         return Decision(Mode.STANDBY, now.attitude, result)
     handover, end = _HANDOVER[mode], _end(mode, now)
-    if now.handover and handover != NEVER and now.conditions[_NEEDS[handover]] == Reason.NONE:
+    if now.handover and handover != NO_HANDOVER and now.conditions[_NEEDS[handover]] == Reason.NONE:
         return Decision(handover, Reason.LOCKED if handover == Mode.AUTOTRACK else Reason.FOUND, result)
     if end == Reason.NONE:
         return Decision(mode, why, result)

@@ -3,10 +3,10 @@ import dataclasses
 import math
 
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
-from acu_tracker.geometry.history import LENGTH
+from acu_tracker.geometry.history import HISTORY_LENGTH
 from acu_tracker.lookahead.params import KeyholeParameters
-from acu_tracker.modes import FALLBACKS
-from acu_tracker.operating.verbs import POINTS_DOC, VERBS, points
+from acu_tracker.modes import FALLBACK_MODES
+from acu_tracker.operating.command_table import ACU_COMMANDS, POINTS_DOC, points
 from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.search.params import AcquisitionParameters, SearchParameters, StepTrackParameters
 from acu_tracker.servo import ends, floor
@@ -20,7 +20,7 @@ from acu_tracker.servo.params import (
     ShaperParameters,
 )
 from acu_tracker.servo.position_loop import CONTROLLERS
-from pedestal_common.geometry.blockage import DOC as SECTORS_DOC
+from pedestal_common.geometry.blockage import BLOCKAGE_DOC as SECTORS_DOC
 from pedestal_common.geometry.blockage import sectors
 from pedestal_common.geometry.lever_arm import LeverArm
 from pedestal_common.graph import nodes
@@ -89,14 +89,15 @@ class SharedParameters(topic_flags(nodes.row('acu').reads)):
     stow_timeout: float = parameter(20.0, 0.1, 3600.0, 's', 'time within which the pins must be where they were '
                                     'asked to be')
     prediction: PredictionParameters = group(PredictionParameters)
-    fallback: str = choice('program', FALLBACKS, 'what follows the loss of the track, until another one is chosen')
+    fallback: str = choice('program', FALLBACK_MODES,
+                           'what follows the loss of the track, until another one is chosen')
     points: str = text('', POINTS_DOC)
     commands: str = text('', SCHEDULE_DOC)
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
     attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')
     lever_arm: LeverArm = group(LeverArm)
     blockage: str = text('', SECTORS_DOC)
-    floor: str = text('', floor.DOC)
+    floor: str = text('', floor.FLOOR_DOC)
     keyhole: KeyholeParameters = group(KeyholeParameters)
     tracker: TrackerParameters = group(TrackerParameters)
     acquisition: AcquisitionParameters = group(AcquisitionParameters)
@@ -153,24 +154,24 @@ class AcuParameters(SharedParameters):
         """Raise ParameterError for a delay longer than the histories, a notch beyond half the step rate, an attitude
         that times out before it is used, or a step_gap that every step would exceed."""
         sectors(self.blockage)
-        schedule('commands', self.commands, VERBS)
+        schedule('commands', self.commands, ACU_COMMANDS)
         points(self.points)
         kept = ['receiver_latency', 'attitude_latency']
         if {self.azimuth.controller, self.elevation.controller} != {'beam'}:  # which keeps no reference so long
             kept.append('command_delay')
         for name in kept:
-            if getattr(self, name) > (LENGTH - 4) * self.period:
-                raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {LENGTH - 4} periods, '
-                                     f'{(LENGTH - 4) * self.period:g} s')
+            if getattr(self, name) > (HISTORY_LENGTH - 4) * self.period:
+                raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {HISTORY_LENGTH - 4} periods, '
+                                     f'{(HISTORY_LENGTH - 4) * self.period:g} s')
         for name in ('azimuth', 'elevation'):
             if getattr(self, name).notch.frequency * self.period >= 0.5:
                 raise ParameterError(f'{name}.notch.frequency = {getattr(self, name).notch.frequency:g} Hz: must be '
                                      f'below half the step rate, {0.5 / self.period:g} Hz')
         for name in ('age', 'beam_age'):
             age = getattr(self.tracker.receiver, name)
-            if self.receiver_latency + age > (LENGTH - 4) * self.period:
+            if self.receiver_latency + age > (HISTORY_LENGTH - 4) * self.period:
                 raise ParameterError(f'tracker.receiver.{name} = {age:g} s: with receiver_latency must be 0 to '
-                                     f'{LENGTH - 4} periods, {(LENGTH - 4) * self.period:g} s')
+                                     f'{HISTORY_LENGTH - 4} periods, {(HISTORY_LENGTH - 4) * self.period:g} s')
         longest = self.attitude_timeout - self.command_delay - 0.5 * self.period
         if self.attitude_latency >= longest:
             raise ParameterError(f'attitude_latency = {self.attitude_latency:g} s: must be below attitude_timeout - '

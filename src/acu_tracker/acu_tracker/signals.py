@@ -3,11 +3,11 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation.filters.motion_models import MODELS
+from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from pedestal_common.codes import bits
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
-from pedestal_common.graph.modes import TABLE
+from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.wire import inputs
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
@@ -15,35 +15,36 @@ INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'at
 """Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
 Flag = bits(INVALID_INPUTS)
 
-DRIVE_STATES = topics.BY_NAME['adu/state'].texts
-READY = len(topics.ENABLED) - 1
-EMERGENCY_STOP, DRIVE_FAULT = DRIVE_STATES.index('emergency stop'), len(DRIVE_STATES)
-"""Codes of adu/state: up to READY the drive follows commands, from DRIVE_FAULT on it tells a fault. A drive that has
+DRIVE_STATES = topics.TOPIC_BY_NAME['adu/state'].texts
+DRIVE_READY = len(topics.ENABLED_STATES) - 1
+DRIVE_EMERGENCY_STOP, FIRST_DRIVE_FAULT = DRIVE_STATES.index('emergency stop'), len(DRIVE_STATES)
+"""Codes of adu/state: up to DRIVE_READY the drive follows commands, from FIRST_DRIVE_FAULT on it tells a fault. A
+drive that has
 sent none, topics.SILENT, counts as ready."""
 
-TOPICS = nodes.row('acu').reads
+INPUT_TOPICS = nodes.row('acu').reads
 
-INPUTS = np.dtype([
-    *inputs.fields(TOPICS),                             # see the rows of topics.TOPICS
+INPUTS_DTYPE = np.dtype([
+    *inputs.fields(INPUT_TOPICS),                             # see the rows of topics.TOPICS
     ('stamp', 'f8'), ('encoder_valid', 'i8'),                                   # t_k [s]
     ('error_valid', 'i8'),                                                      # 0: none came, or unlocked
     ('stabilised', 'i8'), ('attitude_valid', 'i8'),                             # 1: the pedestal stands on a ship
     ('aligning', 'i8'), ('drive_ready', 'i8'),          # 1: the INS is still aligning; the drive follows the commands
-    ('unpredicted', 'i8', (sum(row.table for row in TABLE),)),    # of the modes that follow a table: NONE or why
+    ('unpredicted', 'i8', (sum(row.table for row in MODE_ROWS),)),    # of the modes that follow a table: NONE or why
                                                         # there is none
     ('gap', 'i8'), ('turnaround', 'i8'),                # 1: rows of the program are missing here; the last segment
                                                         # was refused because it asked for too fast a turnaround
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
 ], align=True)
 
-OUTPUTS = np.dtype([
+OUTPUTS_DTYPE = np.dtype([
     ('mode', 'i8'), ('reason', 'i8'),                                            # codes of MODES and REASONS
     ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
     ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
                                                                                 # of a beam at t_m: the command
     ('covariance', 'f8', (2, 3)),                                              # p11, p12, p22 at t_k
-    ('probability', 'f8', (2, len(MODELS))),                                   # of MODELS
+    ('probability', 'f8', (2, len(MODEL_NAMES))),                                   # of MODELS
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far

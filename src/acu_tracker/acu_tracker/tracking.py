@@ -1,12 +1,12 @@
 """What is known of the target by the receiver: beam and deck in the last steps, the filter, what watches over it.
 
-k: record of TRACKING; c, u, o: of control_unit.CONSTANTS, of signals.INPUTS and OUTPUTS; gap: the outage.Outage.
+k: record of TRACKING_DTYPE; c, u, o: of control_unit.CONSTANTS, of signals.INPUTS and OUTPUTS; gap: the outage.Outage.
 """
 import math
 
 import numpy as np
 
-from acu_tracker import intake
+from acu_tracker import measurements
 from acu_tracker.estimation import divergence, repetition, slope_sign, target, tracker
 from acu_tracker.estimation.filters import measurement, target_filter
 from acu_tracker.geometry import attitude, deck_reference, encoders
@@ -16,15 +16,16 @@ from acu_tracker.search import coast, place
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
-TRACKING = np.dtype([
-    ('encoders', encoders.ENCODERS), ('attitude', attitude.ATTITUDE), ('target', target.TARGET), ('error', 'f8', (2,)),
-    ('repetition', repetition.REPETITION), ('divergence', divergence.DIVERGENCE),
-    ('slope_sign', slope_sign.SLOPE_SIGN)], align=True)
+TRACKING_DTYPE = np.dtype([
+    ('encoders', encoders.ENCODERS_DTYPE), ('attitude', attitude.ATTITUDE_DTYPE), ('target', target.TARGET_DTYPE),
+    ('error', 'f8', (2,)),
+    ('repetition', repetition.REPETITION_DTYPE), ('divergence', divergence.DIVERGENCE_DTYPE),
+    ('slope_sign', slope_sign.SLOPE_SIGN_DTYPE)], align=True)
 """error: of this step, in deck angles [rad], NaN: none came."""
 
 
 def initialise(k):
-    """No estimate; k: view of TRACKING."""
+    """No estimate; k: view of TRACKING_DTYPE."""
     target.initialise(k['target'])
 
 
@@ -38,11 +39,11 @@ def take_place(k, u):
 
 
 @compiled
-def used(k, c, u, by_level, offset):
+def used_error(k, c, u, by_level, offset):
     """(flags of what the receiver says, whether its error is used, the Pointing of the beam that it belongs to);
     by_level, offset: as of intake.error_at."""
     k.error[0] = k.error[1] = math.nan
-    flags, believed, at = intake.error_at(k.encoders, c.p.tracker.receiver, u, by_level, offset)
+    flags, believed, at = measurements.error_at(k.encoders, c.p.tracker.receiver, u, by_level, offset)
     return flags, believed and not repetition.take(k.repetition, u, at), at
 
 
@@ -58,11 +59,11 @@ def take_error(k, c, u, o, at, restart_gap, closed, obeys):
     measured = pointing.displaced(at.A, at.E, u.cross_elevation, u.elevation)
     k.error[0], k.error[1] = measured[0] - at.A, measured[1] - at.E
     outcome, innovation = target.take(k.target, c.p, c.tracker, k.attitude, u, at, measured, restart_gap)
-    if outcome != target.NOISY and obeys:
+    if outcome != target.OUTCOME_NOISY and obeys:
         divergence.take(k.divergence, innovation)
-    if closed and outcome != target.NO_ATTITUDE and slope_sign.near(u, receiver.beamwidth):
+    if closed and outcome != target.OUTCOME_NO_ATTITUDE and slope_sign.near(u, receiver.beamwidth):
         _watch_slope(k, c, u, at)
-    return intake.tell_error(o, outcome, innovation)
+    return measurements.write_innovation(o, outcome, innovation)
 
 
 @compiled
@@ -126,7 +127,7 @@ def beam(k, c, t):
     """(ENU unit vector along the beam at t [s], no rate)."""
     _, at = encoders.at(k.encoders, t)
     _, deck = attitude.at(k.attitude, c.p, t)
-    return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.STILL
+    return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.ZERO_VECTOR
 
 
 @compiled
@@ -142,7 +143,7 @@ def deck_rates(k, c, t, A, E):
 
 
 @compiled
-def tell(k, c, t, o):
+def write_outputs(k, c, t, o):
     """Put counts, and the estimate of the target at t [s] in earth angles of the antenna, into the outputs."""
     filtered = k.target.tracker
     o.gated, o.rates_gated, o.ranges_gated = filtered.gated, filtered.rates_gated, filtered.ranges_gated

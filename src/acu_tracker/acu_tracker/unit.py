@@ -10,39 +10,42 @@ from acu_tracker.alarms import annunciator, report, table
 from acu_tracker.mode import mode_change
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.operating import announcement, diagnosis
+from acu_tracker.operating.alarm_desk import AlarmDesk
 from acu_tracker.operating.authority import Authority
-from acu_tracker.operating.desk import Desk
-from acu_tracker.operating.verbs import ALARM_VERBS, TAKEN, VERBS
+from acu_tracker.operating.command_table import ACU_COMMANDS, ALARM_COMMAND_NAMES, ARGUMENT_SETTERS
 from acu_tracker.program import segments, tables
 from acu_tracker.program.prediction import Predictor
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import NEVER_DUE, Unit, joined
+from pedestal_common.node.unit import NEVER_DUE_NS, Unit, joined
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Reply, schedule
 from pedestal_common.wire.inputs import taking
-from pedestal_common.wire.records import NEVER
+from pedestal_common.wire.records import NO_STAMP
 
-JOINTS, ERRORS, ATTITUDE = 'joint_states', 'tracking_receiver/angle_error', 'ship/imu/data'
-RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
-COMMAND, ESTIMATE, REFERENCE, FILTER = 'acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/filter'
-MODE, KEYHOLE, BLOCKAGE, ALARMS = 'acu/mode', 'acu/keyhole', 'acu/blockage', 'acu/alarms'
-DRIVE, INS, PINS_ASKED = 'adu/state', 'ins/state', 'acu/stow_pins'
+(JOINT_STATES_TOPIC, ANGLE_ERROR_TOPIC, ATTITUDE_TOPIC) = ('joint_states', 'tracking_receiver/angle_error',
+                                                           'ship/imu/data')
+ANGLE_RATE_TOPIC, RANGE_TOPIC = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
+(RATE_COMMAND_TOPIC, ESTIMATE_TOPIC, REFERENCE_TOPIC, FILTER_TOPIC) = ('acu/rate_command', 'acu/estimate',
+                                                                       'acu/reference', 'acu/filter')
+MODE_TOPIC, KEYHOLE_TOPIC, BLOCKAGE_TOPIC, ALARMS_TOPIC = 'acu/mode', 'acu/keyhole', 'acu/blockage', 'acu/alarms'
+DRIVE_STATE_TOPIC, INS_STATE_TOPIC, STOW_PINS_TOPIC = 'adu/state', 'ins/state', 'acu/stow_pins'
 
-FILTER_SIZE, MODELS = len(topics.FILTER), len(topics.MOTION_MODELS)
+FILTER_COLUMN_COUNT, MODEL_COUNT = len(topics.FILTER_UNITS), len(topics.MOTION_MODELS)
 """Numbers of an axis on acu/filter; the last of them are the probabilities of the motion models."""
 
-ALIGNING = topics.BY_NAME[INS].texts.index('aligning')
+INS_ALIGNING = topics.TOPIC_BY_NAME[INS_STATE_TOPIC].texts.index('aligning')
 """Code of this state; an INS that has not sent one, topics.SILENT, counts as aligned."""
 
 
-RECORD = np.dtype([('state', control_unit.STATE), ('constants', control_unit.CONSTANTS),
-                   ('inputs', signals.INPUTS), ('outputs', signals.OUTPUTS), ('invalid', 'i8')], align=True)
+RECORD_DTYPE = np.dtype([('state', control_unit.STATE_DTYPE), ('constants', control_unit.CONSTANTS_DTYPE),
+                         ('inputs', signals.INPUTS_DTYPE), ('outputs', signals.OUTPUTS_DTYPE), ('invalid', 'i8')],
+                        align=True)
 """invalid: the bits of signals.INVALID_INPUTS that were set since the last diagnosis."""
 
 
-DRIVE_SILENT, DRIVE_FAULT = table.INDEX['drive silent'], table.INDEX['drive fault']
-MOTORS_LOST = tuple(table.INDEX[f'{axis} motor lost'] for axis in topics.AXES)
+DRIVE_SILENT_ALARM, DRIVE_FAULT_ALARM = table.ALARM_INDEX['drive silent'], table.ALARM_INDEX['drive fault']
+MOTOR_LOST_ALARMS = tuple(table.ALARM_INDEX[f'{axis} motor lost'] for axis in topics.AXES)
 """Alarms of which adu/state, or its silence, tells more."""
 
 
@@ -52,7 +55,7 @@ class Memory(typing.NamedTuple):
     tables: tables.Tables
 
 
-_take = taking(signals.TOPICS)
+_take = taking(signals.INPUT_TOPICS)
 
 
 @compiled
@@ -60,38 +63,39 @@ def decode(u, stamp, inputs):
     """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next. A rate or a
     range is used only with the error of its own stamp."""
     _take(u, inputs)
-    error, rate, distance = inputs[ERRORS], inputs[RATE], inputs[RANGE]
+    error, rate, distance = inputs[ANGLE_ERROR_TOPIC], inputs[ANGLE_RATE_TOPIC], inputs[RANGE_TOPIC]
     u.stamp, u.encoder_valid = stamp * 1e-9, 1
     u.error_valid = 1 if u.error_came and u.cross_elevation == u.cross_elevation else 0
-    if rate.stamp == NEVER or rate.stamp != error.stamp:
+    if rate.stamp == NO_STAMP or rate.stamp != error.stamp:
         u.error_rate[0] = u.error_rate[1] = math.nan
-    if distance.stamp == NEVER or distance.stamp != error.stamp:
+    if distance.stamp == NO_STAMP or distance.stamp != error.stamp:
         u.range = math.nan
-    if inputs[ATTITUDE].stamp != NEVER:
+    if inputs[ATTITUDE_TOPIC].stamp != NO_STAMP:
         u.attitude_valid = 1
-    u.aligning, u.drive_ready = inputs[INS] == ALIGNING, u.drive <= signals.READY
+    u.aligning, u.drive_ready = inputs[INS_STATE_TOPIC] == INS_ALIGNING, u.drive <= signals.DRIVE_READY
 
 
 @compiled
 def encode(o, lookahead, stamp, outputs):
     """Outputs of the control unit and counts of the look-ahead -> records of its messages."""
-    command, estimate, reference = outputs[COMMAND], outputs[ESTIMATE], outputs[REFERENCE]
-    command.stamp = estimate.stamp = reference.stamp = outputs[FILTER].stamp = stamp
+    command, estimate, reference = outputs[RATE_COMMAND_TOPIC], outputs[ESTIMATE_TOPIC], outputs[REFERENCE_TOPIC]
+    command.stamp = estimate.stamp = reference.stamp = outputs[FILTER_TOPIC].stamp = stamp
     for i in range(2):
         command.velocity[i], command.effort[i] = o.rate[i], o.torque[i]
         estimate.position[i], reference.position[i] = o.estimate[i, 0], o.reference[i, 0]
         estimate.velocity[i], reference.velocity[i] = o.estimate[i, 1], o.reference[i, 1]
         estimate.acceleration[i], reference.acceleration[i] = o.estimate[i, 2], o.reference[i, 2]
         # In the order of topics.FILTER.
-        numbers = outputs[FILTER].position[i * FILTER_SIZE:]
+        numbers = outputs[FILTER_TOPIC].position[i * FILTER_COLUMN_COUNT:]
         numbers[0], numbers[1], numbers[2] = o.innovation[i], o.rate_innovation[i], o.nis[i]
         numbers[3], numbers[4] = math.sqrt(o.covariance[i, 0]), math.sqrt(o.covariance[i, 2])
         numbers[5] = o.covariance[i, 1] / (numbers[3] * numbers[4])
         numbers[6] = o.innovation_sigma[i]
-        for model in range(MODELS):
-            numbers[FILTER_SIZE - MODELS + model] = o.probability[i, model]
-    outputs[MODE], outputs[KEYHOLE], outputs[BLOCKAGE] = o.mode, lookahead.forecasts - 1, lookahead.blockages - 1
-    outputs[ALARMS], outputs[PINS_ASKED] = o.alarms, o.pins
+        for model in range(MODEL_COUNT):
+            numbers[FILTER_COLUMN_COUNT - MODEL_COUNT + model] = o.probability[i, model]
+    (outputs[MODE_TOPIC], outputs[KEYHOLE_TOPIC], outputs[BLOCKAGE_TOPIC]) = (o.mode, lookahead.forecasts - 1,
+                                                                              lookahead.blockages - 1)
+    outputs[ALARMS_TOPIC], outputs[STOW_PINS_TOPIC] = o.alarms, o.pins
 
 
 @compiled
@@ -116,7 +120,8 @@ def laws(memory, stamps, inputs, outputs):
 def _initial(parameters):
     """The record (1,) of a control unit before its first step, made once for trials in a row that differ in no
     parameter of it."""
-    return joined(RECORD, state=control_unit.initial_state(parameters), constants=control_unit.constants(parameters))
+    return joined(RECORD_DTYPE, state=control_unit.initial_state(parameters),
+                  constants=control_unit.constants(parameters))
 
 
 class Acu(Unit):
@@ -124,23 +129,23 @@ class Acu(Unit):
     NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
     LIVE = ('tracker', 'azimuth', 'elevation')
     REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/acknowledge', 'acu/reset_faults')
-    VERBS = VERBS
+    VERBS = ACU_COMMANDS
     CALLS = ('adu/emergency_stop',)
-    MOMENTARY = (KEYHOLE, BLOCKAGE, ALARMS)
+    MOMENTARY = (KEYHOLE_TOPIC, BLOCKAGE_TOPIC, ALARMS_TOPIC)
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         self.memory = Memory(_initial(parameters).copy(), tables.NO_TABLES)
-        self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE in self.reads, 1
-        self.parts['outputs']['mode'], self.parts['outputs']['pins'] = Mode.STANDBY, topics.SILENT
+        self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE_TOPIC in self.reads, 1
+        self.parts['outputs']['mode'], self.parts['outputs']['pins'] = Mode.STANDBY, topics.NO_TEXT_CODE
         signals.clear(self.parts['outputs'])
         self.drive_state = 'unknown'
         self.authority = Authority()
         self.segments = segments.Segments([(axis.limits.rate, axis.limits.acceleration) for axis in (
             parameters.azimuth, parameters.elevation)])
         self.predictor, self.predicted = Predictor(parameters.prediction), {}
-        self.offset, self._laid = (0.0, 0.0, 0.0), (NEVER_DUE, NEVER)
-        self.desk = Desk(self.parts['state'], control_unit.reset)
+        self.offset, self._laid = (0.0, 0.0, 0.0), (NEVER_DUE_NS, NO_STAMP)
+        self.desk = AlarmDesk(self.parts['state'], control_unit.reset)
         self._silent = False
 
     @property
@@ -153,16 +158,16 @@ class Acu(Unit):
         self._silent = silent
         if silent:
             stamp = self.parts['state']['stamp']
-            annunciator.know(self.alarms, DRIVE_SILENT, True, stamp if math.isfinite(stamp) else 0.0)
-            self.outputs[ALARMS] = self.alarms['revision']
+            annunciator.set_condition(self.alarms, DRIVE_SILENT_ALARM, True, stamp if math.isfinite(stamp) else 0.0)
+            self.outputs[ALARMS_TOPIC] = self.alarms['revision']
 
     def prepare(self):
         """Compile what the commands of the alarms and the diagnosis call as well."""
         super().prepare()
         before = self.memory.record.copy()
         self.desk.prepare()
-        self.encode(ALARMS, 0)
-        annunciator.know(self.alarms, DRIVE_SILENT, True, 0.0)
+        self.encode(ALARMS_TOPIC, 0)
+        annunciator.set_condition(self.alarms, DRIVE_SILENT_ALARM, True, 0.0)
         self.diagnose()
         self.memory.record[...] = before
 
@@ -176,7 +181,7 @@ class Acu(Unit):
         """Take other values of LIVE parameters into the constants; the state stays."""
         super().configure(parameters)
         self.memory.record['constants'] = control_unit.constants(parameters)
-        self._laid = NEVER_DUE, NEVER
+        self._laid = NEVER_DUE_NS, NO_STAMP
 
     def decode(self, topic, message):
         """A program track: two or more points in earth angles; or a preset: one point in deck angles. Raises
@@ -222,51 +227,51 @@ class Acu(Unit):
 
     def _predict_by(self, predictor):
         """Predict by another Predictor."""
-        self.predictor, self.predicted, self._laid = predictor, {}, (NEVER_DUE, NEVER)
+        self.predictor, self.predicted, self._laid = predictor, {}, (NEVER_DUE_NS, NO_STAMP)
 
     def lay_tables(self, stamp=None):
         """Bring the tables of the law to a stamp [ns], or now: the piece of the program that is due, what is
         predicted, all of them shifted by the offset."""
         stamp = self.now if stamp is None else int(stamp)
         inputs, t = self.parts['inputs'], stamp * 1e-9
-        for place, row in enumerate(tables.FOLLOWED):
+        for place, row in enumerate(tables.TABLE_MODES):
             known = self.predicted.get(row.name)
             if row.predicted and (known is None or not known.since <= t < known.until):
                 known = self.predicted[row.name] = getattr(self.predictor, row.predicted)(t)
             inputs['unpredicted'][place] = known.reason if known else Reason.NONE
         piece, inputs['gap'], ends = self.segments.at(t - self.offset[0])
         until = min(ends + self.offset[0], *(known.until for known in self.predicted.values()))
-        self._laid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE
+        self._laid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE_NS
         self.memory = self.memory._replace(tables=tables.Tables(*(
             tables.shifted(self.predicted[row.name].track if row.predicted else piece, self.offset)
-            for row in tables.FOLLOWED)))
+            for row in tables.TABLE_MODES)))
 
     def take_text(self, topic, text):
         """Take a text topic; the drive's state is kept for the diagnosis."""
         super().take_text(topic, text)
-        if topic == DRIVE:
+        if topic == DRIVE_STATE_TOPIC:
             self.drive_state = text
 
     def encode(self, topic, code):
         """The text of a code on a text topic; the message on acu/alarms."""
         lookahead = self.parts['state']['guidance']['lookahead']
-        if topic == KEYHOLE:
+        if topic == KEYHOLE_TOPIC:
             return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
-        if topic == ALARMS:
-            tripped = dict.fromkeys((DRIVE_FAULT, *MOTORS_LOST), self.drive_state)
+        if topic == ALARMS_TOPIC:
+            tripped = dict.fromkeys((DRIVE_FAULT_ALARM, *MOTOR_LOST_ALARMS), self.drive_state)
             return report.message(self.alarms, tripped, self.desk.reasons)
-        if topic == BLOCKAGE:
+        if topic == BLOCKAGE_TOPIC:
             return announcement.hidden(lookahead)
-        return modes.MODES[code] if topic == MODE else super().encode(topic, code)
+        return modes.MODES[code] if topic == MODE_TOPIC else super().encode(topic, code)
 
     def schedule(self):
         """[(at [ns], Command)] of the parameter `commands`."""
-        return schedule('commands', self.parameters.commands, VERBS)
+        return schedule('commands', self.parameters.commands, ACU_COMMANDS)
 
     def obey(self, command, arguments):
         """The Reply to one of VERBS; a refusal names the reason and changes nothing."""
         verb, state = command.verb, self.parts['state']
-        if verb in ALARM_VERBS:
+        if verb in ALARM_COMMAND_NAMES:
             return getattr(self.desk, verb)(*arguments.values())
         if verb == 'take':
             return self.authority.take(command.who, arguments['role'])
@@ -284,8 +289,8 @@ class Acu(Unit):
             return Reply(True, f'elements of satellite {self.predictor.number}')
         asked, predictor = state['guidance'], self.predictor
         before = {name: asked[name].copy() for name in ('preset', 'manual', 'slave')}
-        if verb in TAKEN:
-            TAKEN[verb](self, arguments)
+        if verb in ARGUMENT_SETTERS:
+            ARGUMENT_SETTERS[verb](self, arguments)
         reply = self.request(f'acu/{verb}')
         if not reply.granted:
             for name, value in before.items():
@@ -313,8 +318,9 @@ class Acu(Unit):
         if mode == 'acknowledge':
             return self.desk.acknowledge()
         if self.silent and mode != 'standby':
-            return Reply(False, f'refused: no {JOINTS}, the drive is silent; mode is {modes.MODES[outputs["mode"]]}')
-        m['inputs']['drive_ready'] = self.inputs[0][DRIVE] <= signals.READY
+            return Reply(False,
+                         f'refused: no {JOINT_STATES_TOPIC}, the drive is silent; mode is {modes.MODES[outputs["mode"]]}')
+        m['inputs']['drive_ready'] = self.inputs[0][DRIVE_STATE_TOPIC] <= signals.DRIVE_READY
         code = modes.MODES.index(mode)
         granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, self.memory.tables, code)
         refusal = '' if granted else f'refused: {self._refusal(code, outputs["reason"])}; '
@@ -341,7 +347,7 @@ class Acu(Unit):
 
     def requests_for(self, topic, text):
         """[the mode's service] for a text on acu/mode, else []."""
-        return [f'acu/{text}'] if topic == MODE and text in modes.MODES else []
+        return [f'acu/{text}'] if topic == MODE_TOPIC and text in modes.MODES else []
 
     def diagnose(self):
         """ERROR for invalid inputs since the last diagnosis, WARN for gated errors, overtravel or coasting."""
@@ -363,7 +369,7 @@ class Acu(Unit):
     def faults(self):
         """Names of the faults that wait for acu/reset_faults."""
         bits = control_unit.latched(self.parts['state'])
-        return tuple(fault for fault in diagnosis.FAULTS if bits >> table.INDEX[fault] & 1)
+        return tuple(fault for fault in diagnosis.FAULT_TEXTS if bits >> table.ALARM_INDEX[fault] & 1)
 
     @property
     def urgent(self):
@@ -375,9 +381,9 @@ class Acu(Unit):
     @staticmethod
     def idle(numbers):
         """Not exercised where the receiver never locked or the mode was never autotrack."""
-        if not np.isfinite(numbers[ERRORS][:, 0]).any():
+        if not np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any():
             return 'the receiver never locked'
-        return '' if 'autotrack' in numbers[MODE] else 'the ACU was never in autotrack'
+        return '' if 'autotrack' in numbers[MODE_TOPIC] else 'the ACU was never in autotrack'
 
 
 def rows(message):

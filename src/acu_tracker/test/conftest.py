@@ -15,7 +15,7 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import as_dict, build
 
-ASHORE = Rotation.from_quat(line_of_sight.ASHORE)
+ASHORE = Rotation.from_quat(line_of_sight.ASHORE_ATTITUDE)
 
 
 class Rig:
@@ -49,7 +49,7 @@ class Rig:
         self.params, self.target, self.attitude = params, target, attitude or self.level
         self.delay, self.latency = delay, error_latency
         self.constants, self.state = control_unit.constants(params), control_unit.initial_state(params)
-        self.inputs, self.outputs = np.zeros(1, signals.INPUTS), np.zeros(1, signals.OUTPUTS)
+        self.inputs, self.outputs = np.zeros(1, signals.INPUTS_DTYPE), np.zeros(1, signals.OUTPUTS_DTYPE)
         self.track = NO_TRACK
         self.angle, self.velocity = np.array(at, float), np.zeros(2)
         self.commands, self.passed, self.k = [(0.0, 0.0)] * (round(delay / self.T) + 1), [], 0

@@ -8,7 +8,7 @@ from acu_tracker import control_unit, signals
 from acu_tracker.alarms import annunciator, conditions, detectors, machine, report, table
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
-from acu_tracker.unit import ALARMS, DRIVE, JOINTS, Acu
+from acu_tracker.unit import ALARMS_TOPIC, DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, Acu
 from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import build
 from pedestal_common.wire.commands import Command
@@ -17,7 +17,7 @@ T = 0.005
 
 
 def detector():
-    d = np.zeros(1, detectors.AXIS)
+    d = np.zeros(1, detectors.AXIS_DETECTORS_DTYPE)
     return d[0]
 
 
@@ -26,7 +26,7 @@ def encoders(d, y, dy):
     found = []
     detectors.initialise(d, y[0], dy[0])
     for angle, rate in zip(y[1:], dy[1:]):
-        x = detectors.parted(d, angle, rate, T, 0.0)
+        x = detectors.encoder_motor_mismatch(d, angle, rate, T, 0.0)
         found.append((detectors.encoder_jump(x), detectors.encoder_stuck(d, angle, rate, T)))
         d['y'], d['dy'] = angle, rate
     return np.array(found).T
@@ -57,10 +57,10 @@ def test_steps_that_are_lost_while_the_axis_is_at_its_acceleration_are_no_jump(l
     detectors.initialise(d, 0.0, 0.0)
     worst, dt = 0.0, (left_out + 1) * T
     for angle, rate in zip(y[left_out::left_out + 1], dy[left_out::left_out + 1]):
-        worst = max(worst, abs(detectors.parted(d, angle, rate, dt, 0.0)))
-        x = detectors.parted(d, angle, rate, dt, 40.0)
+        worst = max(worst, abs(detectors.encoder_motor_mismatch(d, angle, rate, dt, 0.0)))
+        x = detectors.encoder_motor_mismatch(d, angle, rate, dt, 40.0)
         assert not detectors.encoder_jump(x) and not detectors.disagreement(d, x, dt)
-        x = detectors.parted(d, angle + 40.0 * dt * dt + 0.004, rate, dt, 40.0)
+        x = detectors.encoder_motor_mismatch(d, angle + 40.0 * dt * dt + 0.004, rate, dt, 40.0)
         assert detectors.encoder_jump(x)                                   # what no acceleration explains is seen
         d['y'], d['dy'] = angle, rate
     assert worst > 1e-4                                                    # which the trapezoid does not know
@@ -73,7 +73,7 @@ def test_encoder_and_motors_that_go_different_ways_disagree(share, lash, expecte
     detectors.initialise(d, y[0], dy[0])
     found = []
     for angle, rate in zip(y[1:], dy[1:]):
-        found.append(detectors.disagreement(d, detectors.parted(d, angle, rate, T, 0.0), T))
+        found.append(detectors.disagreement(d, detectors.encoder_motor_mismatch(d, angle, rate, T, 0.0), T))
         d['y'], d['dy'] = angle, rate
     assert any(found) == expected
 
@@ -84,7 +84,7 @@ def test_an_encoder_that_stands_while_the_motors_turn_is_stuck(rate):
     y = rate * np.minimum(t, 2.0)
     _, stuck = encoders(detector(), y, np.full(1000, rate))
     found = np.flatnonzero(stuck)[0] * T
-    assert 2.0 < found < 2.0 + 2.1 * detectors.LOOK / abs(rate) + 0.01
+    assert 2.0 < found < 2.0 + 2.1 * detectors.STUCK_TEST_TRAVEL_RAD / abs(rate) + 0.01
     assert not encoders(detector(), 1e-5 * np.sin(t), np.zeros(1000)).any()
 
 
@@ -110,7 +110,7 @@ def test_who_does_not_obey_is_told_from_then_on_by_smaller_commands():
     (0.1, 0.0, -0.1, True), (-0.1, 0.1, 0.0, True), (0.1, 0.1, 0.0, False), (0.1, 0.0, 0.0, False),
     (0.01, 0.0, -0.1, False), (-0.1, 0.1, -0.1, False)))
 def test_against_the_commands(dy, high, low, expected):
-    assert detectors.against(dy, high, low, 0.05) == expected
+    assert detectors.opposes_command(dy, high, low, 0.05) == expected
 
 
 @pytest.mark.parametrize(('frequency', 'amplitude', 'expected'), (
@@ -134,11 +134,11 @@ def alarms(rig):
 
 def told(rig):
     """Names of the alarms that are there."""
-    return {table.NAMES[i] for i in report.order(alarms(rig)) if alarms(rig)['alarm'][i]['active']}
+    return {table.ALARM_NAMES[i] for i in report.order(alarms(rig)) if alarms(rig)['alarm'][i]['active']}
 
 
 def annunciated(rig):
-    return [table.NAMES[i] for i in report.annunciated(alarms(rig))]
+    return [table.ALARM_NAMES[i] for i in report.annunciated(alarms(rig))]
 
 
 @pytest.fixture(name='moving')
@@ -164,9 +164,9 @@ def test_a_jump_of_the_encoder_is_latched_and_its_error_stands_under_it(moving):
     moving.run(0.1)
     assert annunciated(moving) == ['azimuth encoder jump'] and 'azimuth encoder disagreement' in told(moving)
     moving.run(20.0)
-    i = table.INDEX['azimuth encoder jump']
+    i = table.ALARM_INDEX['azimuth encoder jump']
     assert alarms(moving)['alarm'][i]['state'] == machine.State.LATCHED_UNACKNOWLEDGED
-    assert control_unit.reset(moving.state[0]) == annunciator.NONE
+    assert control_unit.reset(moving.state[0]) == annunciator.NO_ALARM
     assert alarms(moving)['alarm'][i]['state'] == machine.State.RETURNED_UNACKNOWLEDGED and moving.mode == 'preset'
 
 
@@ -184,10 +184,10 @@ def test_an_axis_whose_brakes_drag_pushes_on_where_it_turns_back():
     d = detector()
     for k in range(400):
         torque = 5800.0 * min(max(30.0 * np.sin(2.0 * np.pi * k * T / 0.8), -1.0), 1.0)
-        assert detectors.pushes(d, torque, 60.0, T) or k < 20
+        assert detectors.excess_torque(d, torque, 60.0, T) or k < 20
     for _ in range(60):
-        pushes = detectors.pushes(d, 0.0, 60.0, T)
-    assert not pushes and not detectors.pushes(d, np.nan, 60.0, T)
+        pushes = detectors.excess_torque(d, 0.0, 60.0, T)
+    assert not pushes and not detectors.excess_torque(d, np.nan, 60.0, T)
 
 
 def test_brakes_that_do_not_hold(Rig):
@@ -208,12 +208,13 @@ def test_a_runaway_is_the_first_and_what_it_leads_to_stands_under_it(moving):
         moving.step()
     assert annunciated(moving) == ['azimuth runaway'] and 'moves unasked' in told(moving)
     assert (moving.mode, moving.reason) == ('standby', 'moves unasked')
-    assert table.NAMES[control_unit.reset(moving.state[0])] == 'moves unasked'
+    assert table.ALARM_NAMES[control_unit.reset(moving.state[0])] == 'moves unasked'
     moving.velocity[:] = 0.0
     moving.run(0.5)
-    assert table.NAMES[control_unit.reset(moving.state[0])] == 'azimuth runaway'        # its time off is not over
+    # its time off is not over
+    assert table.ALARM_NAMES[control_unit.reset(moving.state[0])] == 'azimuth runaway'
     moving.run(1.0)
-    assert control_unit.reset(moving.state[0]) == annunciator.NONE and not moving.state['unasked']['moves']
+    assert control_unit.reset(moving.state[0]) == annunciator.NO_ALARM and not moving.state['unasked']['moves']
     moving.run(1.0)
     assert moving.mode == 'standby' and np.abs(moving.velocity).max() == 0.0
     assert moving.ask(Mode.PRESET)
@@ -226,7 +227,7 @@ def test_reset_forgets_a_mode_that_waited(Rig):
     rig.angle = rig.angle + (0.05, 0.0)
     rig.run(8.0)
     rig.ask(Mode.STANDBY)
-    assert control_unit.reset(rig.state[0]) == annunciator.NONE
+    assert control_unit.reset(rig.state[0]) == annunciator.NO_ALARM
     rig.receiver_on = True
     rows = rig.run(3.0)
     assert rig.mode == 'standby' and not rows[:, :2].any()
@@ -271,8 +272,8 @@ def test_a_gap_between_steps_is_a_time_jump(moving):
     ('emergency stop', {'emergency stop'}), ('fault: azimuth overspeed', {'drive fault'}), ('stopping', set()),
     ('enabled', set())))
 def test_what_the_drive_says_itself(text, expected):
-    acu = Acu(build(AcuParameters, {}), (JOINTS, DRIVE))
-    acu.take_text(DRIVE, text)
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC, DRIVE_STATE_TOPIC))
+    acu.take_text(DRIVE_STATE_TOPIC, text)
     step(acu, 3)
     assert names(acu) == expected
     details = {status.name: value.value for status in list_of(acu).status for value in status.values
@@ -282,13 +283,14 @@ def test_what_the_drive_says_itself(text, expected):
 
 def step(acu, count):
     for _ in range(count):
-        stamp = int(acu.inputs[0][JOINTS]['stamp']) + 5_000_000 if acu.inputs[0][JOINTS]['stamp'] >= 0 else 0
-        acu.inputs[0][JOINTS]['stamp'] = stamp
+        stamp = (int(acu.inputs[0][JOINT_STATES_TOPIC]['stamp'])
+                 + 5_000_000 if acu.inputs[0][JOINT_STATES_TOPIC]['stamp'] >= 0 else 0)
+        acu.inputs[0][JOINT_STATES_TOPIC]['stamp'] = stamp
         acu.step(np.array([stamp]), acu.inputs, acu.outputs)
 
 
 def list_of(acu):
-    return acu.encode(ALARMS, int(acu.outputs[0][ALARMS]))
+    return acu.encode(ALARMS_TOPIC, int(acu.outputs[0][ALARMS_TOPIC]))
 
 
 def names(acu):
@@ -296,8 +298,8 @@ def names(acu):
 
 
 def test_commands_and_services():
-    acu = Acu(build(AcuParameters, {}), (JOINTS, DRIVE))
-    acu.take_text(DRIVE, 'fault: azimuth overspeed')
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC, DRIVE_STATE_TOPIC))
+    acu.take_text(DRIVE_STATE_TOPIC, 'fault: azimuth overspeed')
     step(acu, 3)
     assert not acu.command(Command('acknowledge', 'page', '1', {'alarm': 'drive falt'})).granted
     assert "did you mean 'drive fault'" in acu.answered[-1][1].text
@@ -314,20 +316,20 @@ def test_commands_and_services():
     assert not acu.command(Command('unshelve', 'page', '7', {'alarm': 'drive fault'})).granted
     step(acu, 1)
     assert names(acu) == {'drive fault'} and acu.request('acu/acknowledge').granted
-    acu.take_text(DRIVE, 'enabled')
+    acu.take_text(DRIVE_STATE_TOPIC, 'enabled')
     step(acu, 1)
     assert names(acu) == set() and acu.command(Command('reset', 'page', '8')) == (True, 'cleared')
 
 
 def test_a_schedule_obeys_alarm_verbs():
     schedule = '0.01 shelve alarm=INS_lost seconds=5 reason=tests; 0.02 reset'
-    acu = Acu(build(AcuParameters, {'commands': schedule}), (JOINTS,))
+    acu = Acu(build(AcuParameters, {'commands': schedule}), (JOINT_STATES_TOPIC,))
     step(acu, 6)
     assert names(acu) == {'INS lost'} and [reply.granted for _, reply in acu.answered] == [True, True]
 
 
 def test_the_silence_of_the_drive_is_told_without_a_step():
-    acu = Acu(build(AcuParameters, {}), (JOINTS,))
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC,))
     acu.silent = True
     assert names(acu) == {'drive silent'}
     acu.silent = False
@@ -348,6 +350,6 @@ def test_an_array_has_no_motors(Rig):
     rig.angle = rig.angle + 0.05
     rig.run(2.0)
     assert not told(rig)
-    state = alarms(rig)['alarm'][table.INDEX['azimuth encoder jump']]['state']
+    state = alarms(rig)['alarm'][table.ALARM_INDEX['azimuth encoder jump']]['state']
     assert state == machine.State.SUPPRESSED_BY_DESIGN
-    assert conditions.OFF_TIME > 0.0
+    assert conditions.BRAKE_GRIP_DEADLINE_S > 0.0

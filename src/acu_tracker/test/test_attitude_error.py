@@ -17,7 +17,7 @@ PARAMETERS = record(AttitudeModelParameters(tilt_noise=1e-3, heading_noise=2e-3,
 
 @pytest.fixture
 def error():
-    return np.zeros(1, attitude_error.ERROR)[0]
+    return np.zeros(1, attitude_error.ATTITUDE_ERROR_DTYPE)[0]
 
 
 def expected(error):
@@ -51,7 +51,7 @@ def test_the_control_unit_names_what_it_does_not_believe(noise, refused):
         unit.inputs[topic]['stamp'] = 0
     unit.inputs['ship/imu/data']['orientation'][0, 3] = 1.0
     unit.inputs['ins/error']['position'] = noise
-    assert unit.inputs['tracking_receiver/angle_error']['stamp'] == records.NEVER
+    assert unit.inputs['tracking_receiver/angle_error']['stamp'] == records.NO_STAMP
     unit.step(np.zeros(1, np.int64), unit.inputs, unit.outputs)
     assert unit.parts['state']['tracking']['attitude']['error']['told'] == (not refused)
     assert ('attitude_error' in unit.diagnose().message) == refused

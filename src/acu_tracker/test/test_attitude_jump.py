@@ -26,7 +26,7 @@ class Deck:
     """A rolling deck, told with a rotation in the earth's frame before it; `error`: of what is believed [rad]."""
 
     def __init__(self):
-        self.s, self.k = np.zeros(1, attitude.ATTITUDE)[0], 0
+        self.s, self.k = np.zeros(1, attitude.ATTITUDE_DTYPE)[0], 0
         self.s['stabilised'] = 1
 
     def take(self, turned=STILL, aligning=0, told=None):
@@ -44,7 +44,7 @@ class Deck:
 def deck():
     made = Deck()
     for _ in range(100):
-        assert made.take() == attitude.NEW and made.error < 1e-12
+        assert made.take() == attitude.SAMPLE_NEW and made.error < 1e-12
     return made
 
 
@@ -53,12 +53,12 @@ def test_a_jump_is_let_in_slowly_and_so_is_its_end(deck, jump):
     jump = Rotation.from_rotvec(jump)
     for k in range(400):
         deck.take(jump)
-        assert deck.error == pytest.approx(attitude_jump.RATE * T * k, abs=2e-5)
+        assert deck.error == pytest.approx(attitude_jump.JUMP_DECAY_RATE_RAD_S * T * k, abs=2e-5)
     assert deck.s['jump']['apart']
     let_in = deck.error
     for k in range(600):
         deck.take()
-        assert deck.error == pytest.approx(max(let_in - attitude_jump.RATE * T * k, 0.0), abs=4e-5)
+        assert deck.error == pytest.approx(max(let_in - attitude_jump.JUMP_DECAY_RATE_RAD_S * T * k, 0.0), abs=4e-5)
     assert not deck.s['jump']['apart']
 
 
@@ -72,8 +72,8 @@ def test_an_attitude_of_noise_is_carried_by_its_rates(deck):
 
 
 def test_below_the_angle_and_while_it_aligns_an_attitude_is_what_it_is_told(deck):
-    deck.take(Rotation.from_rotvec([0.0, 0.9 * attitude_jump.ANGLE, 0.0]))
-    assert deck.error == pytest.approx(0.9 * attitude_jump.ANGLE)
+    deck.take(Rotation.from_rotvec([0.0, 0.9 * attitude_jump.MAX_UNEXPLAINED_ANGLE_RAD, 0.0]))
+    assert deck.error == pytest.approx(0.9 * attitude_jump.MAX_UNEXPLAINED_ANGLE_RAD)
     for turned in (0.3, -0.3):
         deck.take(Rotation.from_rotvec([0.0, 0.0, turned]), aligning=1)
         assert deck.error == pytest.approx(0.3)
@@ -89,8 +89,8 @@ def test_after_a_gap_nothing_predicts(deck):
 
 def test_numbers_that_repeat_are_none_but_of_a_deck_that_stands(deck):
     frozen = rolling(deck.k * T).as_quat(), rate(deck.k * T)
-    assert deck.take(told=frozen) == attitude.INVALID
+    assert deck.take(told=frozen) == attitude.SAMPLE_INVALID
     still = rolling(0.0).as_quat(), np.zeros(3)
-    assert [Deck().take(told=still) for _ in range(2)] == [attitude.NEW] * 2
+    assert [Deck().take(told=still) for _ in range(2)] == [attitude.SAMPLE_NEW] * 2
     standing = Deck()
-    assert [standing.take(told=still) for _ in range(3)] == [attitude.NEW] * 3
+    assert [standing.take(told=still) for _ in range(3)] == [attitude.SAMPLE_NEW] * 3

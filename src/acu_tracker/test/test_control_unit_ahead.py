@@ -97,7 +97,7 @@ def test_another_program_ends_what_was_planned_for_the_last(Rig):
     rig.target = lambda t: (A, 0.5)
     rig.program(start=-2.0, rows=90)
     rig.run(0.02)
-    assert planner.FORECASTS[rig.state['guidance']['lookahead']['forecast'][0]] == 'none'
+    assert planner.FORECAST_TEXTS[rig.state['guidance']['lookahead']['forecast'][0]] == 'none'
     rig.run(6.0)
     np.testing.assert_allclose(rig.angle, [A, 0.5], atol=1e-4)
 
@@ -166,7 +166,8 @@ def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     rig.run(0.1, aligning=0)
     rig.run(0.1, aligning=1)
     assert (rig.mode, rig.reason) == ('standby', 'INS aligning')
-    np.testing.assert_allclose(rig.state['guidance']['lookahead']['deck']['mean'][0], line_of_sight.ASHORE, atol=1e-9)
+    np.testing.assert_allclose(rig.state['guidance']['lookahead']['deck']['mean'][0], line_of_sight.ASHORE_ATTITUDE,
+                               atol=1e-9)
     ashore = Rig()
     ashore.program()
     ashore.step(aligning=1)
@@ -205,7 +206,7 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
 
 def test_the_levelled_deck_is_the_mean_of_its_attitudes():
     """Roll and pitch average out, the heading stays; the spread is the mean square of the tilt."""
-    h = np.zeros(1, levelled_deck.LEVELLED_DECK)
+    h = np.zeros(1, levelled_deck.LEVELLED_DECK_DTYPE)
     levelled_deck.initialise(h)
     times = 0.05 * np.arange(2400)
     tilts = []

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.geometry import attitude as attitudes
 from acu_tracker.geometry import deck_reference, lever_arm
 from acu_tracker.geometry.azimuth_wrap import Travel, nearest
-from acu_tracker.geometry.deck_reference import STILL, Attitude
+from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
 from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, line_of_sight, north_west_up
 from acu_tracker.geometry.vector import Vector, rotation, turn
 from acu_tracker.lookahead.slew import best_elevation
@@ -58,7 +58,7 @@ def test_deck_angles_rates_and_accelerations(t):
 
 
 def test_the_zenith_gives_finite_numbers():
-    deck = Attitude(turn(0.0, 0.0, 0.0, 1.0), Vector(0.1, 0.1, 0.1), STILL)
+    deck = Attitude(turn(0.0, 0.0, 0.0, 1.0), Vector(0.1, 0.1, 0.1), ZERO_VECTOR)
     zenith = Motion(AxisMotion(0.0, 0.01, 0.0), AxisMotion(0.5 * math.pi, 0.01, 0.0))
     assert np.isfinite(angles(deck_reference.on_deck(deck, line_of_sight(zenith)))).all()
     up = LineOfSight(Vector(0.0, 0.0, 1.0), Vector(0.1, 0.0, 0.0), Vector(0.0, 0.0, -0.01))
@@ -75,7 +75,7 @@ def test_turned_is_the_rotation_by_a_vector():
 
 def test_every_instant_has_its_own_attitude():
     """Between two samples and ahead of them against scipy; NaN where nothing is known; ashore always the same."""
-    p, s = record(AcuParameters(), SharedParameters)[0], np.zeros(1, attitudes.ATTITUDE)
+    p, s = record(AcuParameters(), SharedParameters)[0], np.zeros(1, attitudes.ATTITUDE_DTYPE)
     s['stabilised'] = 1
     assert not attitudes.at(s[0], p, 0.0)[0] and np.isnan(np.array(attitudes.at(s[0], p, 0.0)[1].mat)).all()
     for k in range(20):
@@ -108,7 +108,7 @@ def test_a_deck_rate_comes_back_to_earth(t):
     before, after = (attitude(t + d).inv().apply([math.cos(E) * math.sin(A), math.cos(E) * math.cos(A), math.sin(E)])
                      for d in (-h, h) for A, E in [earth(t + d)])
     here = 0.5 * (before + after)
-    deck = Attitude(rotation(attitude(t).as_matrix()), Vector(*body_rate(t)), STILL)
+    deck = Attitude(rotation(attitude(t).as_matrix()), Vector(*body_rate(t)), ZERO_VECTOR)
     got = deck_reference.earth_rates(deck, Vector(*here), Vector(*(after - before) / (2.0 * h)))
     assert got == pytest.approx((0.03 + 0.004 * t, 0.02 - 0.002 * t), abs=1e-7)
 
@@ -124,7 +124,7 @@ def test_the_end_of_a_lever_arm_sees_the_target_from_there(t):
         return u, (u - arm) / np.linalg.norm(u - arm)
     h = 1e-3
     (u0, n0), (u1, n1), (u2, n2) = (direction_at(t + d) for d in (-h, 0.0, h))
-    state = np.zeros(1, lever_arm.LEVER_ARM)
+    state = np.zeros(1, lever_arm.LEVER_ARM_DTYPE)
     state['arm'] = arm
     sight = LineOfSight(Vector(*u1), Vector(*(u2 - u0) / (2 * h)), Vector(*(u2 - 2 * u1 + u0) / h**2))
     got = lever_arm.to_antenna(state[0], sight)

@@ -16,15 +16,15 @@ def innovation(chi_square):
 
 @pytest.fixture
 def state():
-    record = np.zeros(1, divergence.DIVERGENCE)[0]
+    record = np.zeros(1, divergence.DIVERGENCE_DTYPE)[0]
     divergence.restart(record)
     return record
 
 
 def test_mean(state):
     x = np.random.default_rng(1).chisquare(2, 500) * np.linspace(0.5, 4.0, 500)
-    a = 1.0 / divergence.ERRORS
-    expected, _ = lfilter([a], [1.0, a - 1.0], np.minimum(x, divergence.LARGEST), zi=[1.0 - a])
+    a = 1.0 / divergence.DIVERGENCE_ERROR_COUNT
+    expected, _ = lfilter([a], [1.0, a - 1.0], np.minimum(x, divergence.MAX_COUNTED_ERROR), zi=[1.0 - a])
     for value, mean in zip(x, expected):
         divergence.take(state, innovation(value))
         divergence.take(state, NO_INNOVATION)

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acu_tracker.geometry import estimate_frame
-from acu_tracker.geometry.deck_reference import STILL
+from acu_tracker.geometry.deck_reference import ZERO_VECTOR
 from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
 from acu_tracker.geometry.vector import Vector
 from acu_tracker.program import bridge, program_track
@@ -16,7 +16,7 @@ from acu_tracker.program.program_track import ProgramTrack
 def tilted():
     """A frame on the way of a target near the zenith, and the LineOfSight of that target."""
     sight = line_of_sight(Motion(AxisMotion(0.4, 0.05, 0.0), AxisMotion(1.35, 0.01, 0.0)))
-    frame = np.zeros(1, estimate_frame.FRAME)
+    frame = np.zeros(1, estimate_frame.FRAME_DTYPE)
     estimate_frame.tilt(frame[0], sight.u, sight.du)
     return frame[0], sight
 
@@ -40,9 +40,9 @@ def test_there_and_back():
     motion = Motion(AxisMotion(0.3, 0.02, 0.001), AxisMotion(-0.2, 0.01, -0.002))
     np.testing.assert_allclose(estimate_frame.to_frame(frame, estimate_frame.to_earth(frame, motion)), motion,
                                atol=1e-15)
-    still = np.zeros(1, estimate_frame.FRAME)
+    still = np.zeros(1, estimate_frame.FRAME_DTYPE)
     for e, n, u in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.1, 0.2, 0.974)):
-        estimate_frame.tilt(still[0], Vector(e, n, u), STILL)
+        estimate_frame.tilt(still[0], Vector(e, n, u), ZERO_VECTOR)
         assert np.isfinite(still['mat']).all()
     np.testing.assert_allclose(estimate_frame.to_frame(frame, sight).azimuth.angle, 0.0, atol=1e-15)
 
@@ -64,7 +64,7 @@ def test_the_bridge_is_the_program_turned_to_the_target():
     times = np.arange(0.0, 40.0)
     program = ProgramTrack(times, np.column_stack((0.5 + 0.03 * times, 0.4 + 0.01 * times)))
     estimated = np.array([math.cos(0.515) * math.sin(0.83), math.cos(0.515) * math.cos(0.83), math.sin(0.515)])
-    b = np.zeros(1, bridge.BRIDGE)
+    b = np.zeros(1, bridge.BRIDGE_DTYPE)
     bridge.begin(b[0], program, 10.0, Vector(*estimated))
     assert b['valid'][0] == 1
     was = np.array(program_track.direction(program, 10.0))
@@ -78,7 +78,7 @@ def test_the_bridge_is_the_program_turned_to_the_target():
         assert angle == pytest.approx(x[1], abs=1e-12)
         assert rate == pytest.approx((x[2] - x[0]) / (2 * h), abs=1e-8)
         assert acceleration == pytest.approx((x[2] - 2 * x[1] + x[0]) / h**2, abs=1e-6)
-    bridge.forget(b[0])
+    bridge.clear(b[0])
     assert bridge.motion_at(bridge.way(b[0], program), 17.5) == program_track.motion_at(program, 17.5)
     bridge.begin(b[0], program, 10.0, Vector(0.0, 0.0, 1.0))
     assert b['valid'][0] == 0

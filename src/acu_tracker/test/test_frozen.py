@@ -12,7 +12,7 @@ class Watch:
     """The law on a drive that tells what it is given, commanded at a rate on the azimuth."""
 
     def __init__(self):
-        self.s, self.u, self.k = np.zeros(1, frozen.FROZEN)[0], np.zeros(1, signals.INPUTS)[0], 0
+        self.s, self.u, self.k = np.zeros(1, frozen.FROZEN_DTYPE)[0], np.zeros(1, signals.INPUTS_DTYPE)[0], 0
 
     def step(self, rate, **told):
         self.k += 1
@@ -34,7 +34,7 @@ def watch():
 @pytest.mark.parametrize('rate', (0.02, -0.02, 2.0))
 def test_numbers_that_stand_while_it_is_sent_on_a_way(watch, rate):
     steps = next(k for k in range(1, 1000) if watch.step(rate))
-    assert steps * T == pytest.approx(HOLD + frozen.LOOK / abs(rate), abs=2.1 * T)
+    assert steps * T == pytest.approx(HOLD + frozen.FROZEN_TEST_TRAVEL_RAD / abs(rate), abs=2.1 * T)
     assert watch.step(0.0, position=0.5)                # until it is reset
     frozen.release(watch.s, watch.k * T)
     assert not any(watch.step(0.0, position=0.5) for _ in range(1000))

@@ -28,7 +28,7 @@ class Pass:
         self.rates = np.gradient(self.truth, T, axis=0)
         self.range = np.sqrt(east**2 + north**2 + up**2)
         self.params = TrackerParameters(**params)
-        self.p, self.state = record(self.params)[0], np.zeros(1, tracker.TRACKER)
+        self.p, self.state = record(self.params)[0], np.zeros(1, tracker.TRACKER_DTYPE)
         self.noise = np.random.default_rng(seed).normal(size=(len(t), 3))
         self.t, self.k, self.estimates = t, 0, np.full((len(t), 6), math.nan)
         self.put(kinds)
@@ -72,7 +72,7 @@ def test_the_range_takes_the_geometry_out_of_the_rate():
     rms = {}
     for kinds in (BOTH, ('imm', 'imm')):
         tracked = Pass(kinds)
-        assert set(tracked.take(49.0)[1:]) == {tracker.ACCEPTED}
+        assert set(tracked.take(49.0)[1:]) == {tracker.OUTCOME_ACCEPTED}
         assert tracked.filter('running') == (kinds == BOTH)
         rms[kinds] = tracked.rate_rms()
     print({kinds[0]: value.round(4).tolist() for kinds, value in rms.items()}, 'deg/s')
@@ -166,7 +166,7 @@ def test_a_cartesian_filter_that_is_nowhere_does_not_take_the_axes_along(ranged)
     assert tracked.filter('used').all() == ranged
     error = tracked.now()[[0, 3]] - tracked.truth[tracked.k - 1]
     assert np.abs((error + math.pi) % (2.0 * math.pi) - math.pi).max() < 3.0 * SIGMA
-    assert set(tracked.take(1.0, ranged)) == {tracker.ACCEPTED}
+    assert set(tracked.take(1.0, ranged)) == {tracker.OUTCOME_ACCEPTED}
 
 
 def test_it_ends_when_both_leave_before_it_is_used():
@@ -183,11 +183,11 @@ def test_bad_ranges_and_directions_are_not_believed():
     tracked.take(10.0)
     before = tracked.state['filter']['cartesian']['x'].copy()
     for wrong in (30.0, -1e9, math.inf, math.nan):
-        assert tracked.take(T, range_offset=wrong) == [tracker.ACCEPTED]
+        assert tracked.take(T, range_offset=wrong) == [tracker.OUTCOME_ACCEPTED]
     # The negative one and NaN are none.
     assert tracked.state['ranges_gated'] == 2
     assert np.abs(tracked.state['filter']['cartesian']['x'] - before)[0, :, :3].max() < 3.0
-    assert tracked.take(T, offset=1.0 * DEG) == [tracker.GATED]
+    assert tracked.take(T, offset=1.0 * DEG) == [tracker.OUTCOME_GATED]
     outcomes = tracked.take(21 * T, offset=3.0 * DEG)
-    assert tracker.STARTED in outcomes and np.isfinite(tracked.now()).all()
+    assert tracker.OUTCOME_STARTED in outcomes and np.isfinite(tracked.now()).all()
     assert abs(tracked.now()[3] - tracked.truth[tracked.k - 1, 1] - 3.0 * DEG) < 0.1 * DEG

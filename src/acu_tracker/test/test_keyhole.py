@@ -31,8 +31,8 @@ def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.
     path = Path(np.zeros((ROWS, 6)), start, H)
     path.rows[:, :3] = target(start + H * np.arange(ROWS), E0)
     complete(path, Travel(0.0, above))
-    limits = np.array([(rate, ACCELERATION, low, high, HIGHEST, HALF_BEAM)], keyhole.LIMITS)[0]
-    slews = np.zeros(2, slew.SLEW)
+    limits = np.array([(rate, ACCELERATION, low, high, HIGHEST, HALF_BEAM)], keyhole.SLEW_LIMITS_DTYPE)[0]
+    slews = np.zeros(2, slew.SLEW_DTYPE)
     return keyhole.plan(slews, path, path.rows[0, 3] + turn, limits, tilt), slews[0]
 
 
@@ -40,7 +40,7 @@ def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.
 def test_a_keyhole_is_where_W_over_cos_E0_is_too_fast(E0_deg, keyhole_ahead):
     E0 = math.radians(E0_deg)
     outcome, plan = planned(E0)
-    assert (W / math.cos(E0) > RATE) == keyhole_ahead == (outcome == keyhole.PLANNED)
+    assert (W / math.cos(E0) > RATE) == keyhole_ahead == (outcome == keyhole.PLAN_SLEW)
     if keyhole_ahead:
         assert plan['needed'] == pytest.approx(W / math.cos(E0), rel=0.02)
         assert plan['highest'] == pytest.approx(E0, abs=1e-4)
@@ -51,7 +51,7 @@ def test_a_keyhole_is_where_W_over_cos_E0_is_too_fast(E0_deg, keyhole_ahead):
 def test_the_slew_leaves_and_meets_the_target_within_its_limits(E0_deg):
     E0 = math.radians(E0_deg)
     outcome, plan = planned(E0)
-    assert outcome == keyhole.PLANNED and plan['long_way'] == 0
+    assert outcome == keyhole.PLAN_SLEW and plan['long_way'] == 0
     for end in ('1', '2'):
         difference = plan['azimuth' + end] - azimuth(plan['t' + end], E0)
         assert abs(difference - 2.0 * math.pi * round(difference / (2.0 * math.pi))) < 2e-4
@@ -112,13 +112,13 @@ def test_the_limits_choose_the_side_and_the_other_way_costs_more():
     E0 = math.radians(89.0)
     _, free = planned(E0, low=-5.5)
     outcome, forced = planned(E0, low=-5.5, high=0.5)
-    assert outcome == keyhole.PLANNED
+    assert outcome == keyhole.PLAN_SLEW
     assert free['peak'] > 0.0 > forced['peak'] and forced['long_way'] == 1 and forced['other_cost'] == math.inf
     assert forced['cost'] == pytest.approx(free['other_cost'], rel=1e-2) and forced['loss'] > 1.2 * free['loss']
     assert forced['loss'] == pytest.approx(loss(forced['t1'], E0, -1.0), rel=0.02)
     # What the pass still travels once the path has ended needs its room too.
     assert planned(E0, low=-5.5, above=LIMIT)[1]['long_way'] == 1
-    assert planned(E0, low=-1.5, high=0.5)[0] == keyhole.NO_WRAP
+    assert planned(E0, low=-1.5, high=0.5)[0] == keyhole.PLAN_NO_WRAP
 
 
 def test_over_the_top_either_way_is_as_good():
@@ -138,6 +138,6 @@ def test_a_deck_that_tilts_by_more_than_the_beam_loses_all_of_the_slew():
 def test_begun_late_or_not_seen_to_its_end():
     E0 = math.radians(89.0)
     outcome, plan = planned(E0, start=CENTRE - 1.0)
-    assert outcome == keyhole.PLANNED and plan['t1'] >= CENTRE - 1.0
-    assert planned(E0, start=CENTRE - SPAN + 3.0)[0] == keyhole.BEYOND
-    assert planned(E0, start=CENTRE + 20.0)[0] == keyhole.NOTHING
+    assert outcome == keyhole.PLAN_SLEW and plan['t1'] >= CENTRE - 1.0
+    assert planned(E0, start=CENTRE - SPAN + 3.0)[0] == keyhole.PLAN_BEYOND_PATH
+    assert planned(E0, start=CENTRE + 20.0)[0] == keyhole.PLAN_NO_KEYHOLE

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acu_tracker import modes
-from acu_tracker.alarms.table import NAMES
+from acu_tracker.alarms.table import ALARM_NAMES
 from acu_tracker.guidance import manual
 from acu_tracker.operating.authority import Authority
 from acu_tracker.params import AcuParameters
@@ -57,7 +57,7 @@ def test_a_jog_goes_at_its_rate_and_stands_when_nobody_asks_again(axes):
         assert axes.ask('rate', azimuth=0.2, elevation=-0.1).granted
         axes.run(0.2)
     assert axes.mode == 'rate' and axes.rate == pytest.approx([0.2, -0.1], abs=1e-3)
-    axes.run(manual.DEAD_MAN - 0.2)
+    axes.run(manual.RATE_REQUEST_TIMEOUT_S - 0.2)
     assert axes.rate == pytest.approx([0.2, -0.1], abs=1e-3)
     ended = len(axes.rates)
     axes.run(1.0)
@@ -175,7 +175,7 @@ def segment(begin, rows, azimuth, rate=0.01):
 
 def raised(axes):
     """Names of the alarms of the program whose condition is there."""
-    names = {NAMES[i] for i in np.flatnonzero(axes.unit.alarms['alarm']['active'])}
+    names = {ALARM_NAMES[i] for i in np.flatnonzero(axes.unit.alarms['alarm']['active'])}
     return {name for name in names if name.startswith('program')}
 
 

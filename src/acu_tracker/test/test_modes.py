@@ -1,7 +1,7 @@
 import pytest
 
 from acu_tracker import modes
-from acu_tracker.modes import ACCEPTED, NO_REQUEST, REFUSED, Mode, Reason
+from acu_tracker.modes import NO_REQUEST, REQUEST_ACCEPTED, REQUEST_REFUSED, Mode, Reason
 
 M, R = Mode, Reason
 
@@ -27,7 +27,7 @@ CONDITIONS = {
 
 
 def test_each_mode_has_its_own_conditions():
-    assert {row.name: (row.needs, row.ends) for row in modes.TABLE if row.needs or row.ends} == CONDITIONS
+    assert {row.name: (row.needs, row.ends) for row in modes.MODE_ROWS if row.needs or row.ends} == CONDITIONS
 
 
 @pytest.mark.parametrize('condition', modes.Conditions._fields[1:])
@@ -40,7 +40,7 @@ def test_a_condition_that_does_not_hold_bars_and_ends_the_modes_of_its_own_and_n
     assert (modes.next_mode(mode, NO_REQUEST, now).reason == R.DIVERGED) == (ends == condition)
 
 
-MOVING = tuple(mode for mode, row in enumerate(modes.TABLE) if not row.pinned and mode != M.STANDBY)
+MOVING = tuple(mode for mode, row in enumerate(modes.MODE_ROWS) if not row.pinned and mode != M.STANDBY)
 """Modes in which the axes move, or may."""
 
 
@@ -48,9 +48,9 @@ MOVING = tuple(mode for mode, row in enumerate(modes.TABLE) if not row.pinned an
 @pytest.mark.parametrize('request_', range(len(modes.MODES)))
 def test_every_mode_is_reached_from_every_mode(mode, request_):
     if request_ == M.UNSTOW:                              # what is not stowed cannot be unstowed
-        assert next_mode(M.STANDBY, M.UNSTOW) == (M.STANDBY, R.PINS_OUT, REFUSED)
+        assert next_mode(M.STANDBY, M.UNSTOW) == (M.STANDBY, R.PINS_OUT, REQUEST_REFUSED)
     else:
-        assert next_mode(mode, request_) == (request_, R.REQUESTED, ACCEPTED)
+        assert next_mode(mode, request_) == (request_, R.REQUESTED, REQUEST_ACCEPTED)
 
 
 @pytest.mark.parametrize('mode', range(len(modes.MODES)))
@@ -59,10 +59,10 @@ def test_with_a_pin_not_out_only_stow_and_unstow_are_entered(mode, request_):
     able, stays = request_ in (M.STANDBY, M.STOW, M.UNSTOW), mode if mode not in MOVING else M.STANDBY
     for ready in (False, True):
         got = next_mode(mode, request_, drive_ready=ready, pins=R.PINNED)
-        assert got == ((request_, R.REQUESTED, ACCEPTED) if able else (stays, R.PINNED, REFUSED))
+        assert got == ((request_, R.REQUESTED, REQUEST_ACCEPTED) if able else (stays, R.PINNED, REQUEST_REFUSED))
         failed = next_mode(mode, request_, drive_ready=ready, pins=R.PIN_FAILED)
-        assert failed == (M.STANDBY, *((R.REQUESTED, ACCEPTED) if request_ == M.STANDBY else
-                                       (R.PIN_FAILED, REFUSED)))
+        assert failed == (M.STANDBY, *((R.REQUESTED, REQUEST_ACCEPTED) if request_ == M.STANDBY else
+                                       (R.PIN_FAILED, REQUEST_REFUSED)))
 
 
 @pytest.mark.parametrize('request_, changes, reason', [
@@ -98,12 +98,12 @@ def test_with_a_pin_not_out_only_stow_and_unstow_are_entered(mode, request_):
 def test_refusals_name_the_reason_and_change_nothing(request_, changes, reason):
     for mode in (M.STANDBY, M.STOW):
         if mode == M.STANDBY or changes.get('encoder_ok', True) and changes.get('drive_ready', True):
-            assert next_mode(mode, request_, **changes) == (mode, reason, REFUSED)
+            assert next_mode(mode, request_, **changes) == (mode, reason, REQUEST_REFUSED)
 
 
 def test_standby_is_never_refused():
     everything = dict(encoder_ok=False, drive_ready=False, attitude=R.ATTITUDE_INVALID)
-    assert next_mode(M.AUTOTRACK, M.STANDBY, **everything) == (M.STANDBY, R.REQUESTED, ACCEPTED)
+    assert next_mode(M.AUTOTRACK, M.STANDBY, **everything) == (M.STANDBY, R.REQUESTED, REQUEST_ACCEPTED)
 
 
 @pytest.mark.parametrize('mode, changes, expected', [
@@ -174,4 +174,4 @@ def test_what_happens_by_the_level(mode, changes, expected):
 
 
 def test_a_refused_request_does_not_stop_a_fault():
-    assert next_mode(M.AUTOTRACK, 99, encoder_ok=False) == (M.STANDBY, R.ENCODER_INVALID, REFUSED)
+    assert next_mode(M.AUTOTRACK, 99, encoder_ok=False) == (M.STANDBY, R.ENCODER_INVALID, REQUEST_REFUSED)

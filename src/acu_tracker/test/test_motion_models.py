@@ -22,8 +22,8 @@ def singer(alpha, T):
 
 
 def model(kind, **values):
-    m = np.zeros(1, motion_models.MODEL)
-    m['kind'] = motion_models.MODELS.index(kind)
+    m = np.zeros(1, motion_models.MOTION_MODEL_DTYPE)
+    m['kind'] = motion_models.MODEL_NAMES.index(kind)
     for name, value in values.items():
         m[name] = value
     return m[0]
@@ -119,4 +119,4 @@ def test_floor_holds_beyond_a_max():
 
 
 def test_every_model_has_its_column_in_the_filter_topic():
-    assert motion_models.MODELS == topics.MOTION_MODELS
+    assert motion_models.MODEL_NAMES == topics.MOTION_MODELS

@@ -119,4 +119,4 @@ def test_what_is_no_tle_or_time_is_refused(values, text):
 
 
 def test_rows_are_as_many_as_are_said():
-    assert len(predictor().satellite(0.0).track.times) == prediction.ROWS
+    assert len(predictor().satellite(0.0).track.times) == prediction.TABLE_ROW_COUNT

@@ -20,7 +20,7 @@ def take(state, x, e):
 
 @pytest.fixture
 def state():
-    record = np.zeros(1, roughness.ROUGHNESS)[0]
+    record = np.zeros(1, roughness.ROUGHNESS_DTYPE)[0]
     roughness.restart(record)
     return record
 
@@ -28,7 +28,7 @@ def state():
 def test_the_mean_square_successive_difference(state):
     nu = np.random.default_rng(1).normal(0.0, SIGMA, (400, 2))
     q = [take(state, *one) for one in nu]
-    a = 1.0 / roughness.ERRORS
+    a = 1.0 / roughness.ROUGHNESS_ERROR_COUNT
     x = np.minimum(np.diff(nu, axis=0)**2 / (2.0 * SIGMA**2), np.inf).mean(axis=1)
     expected, _ = lfilter([a], [1.0, a - 1.0], x, zi=[1.0 - a])
     assert q[0] == 1.0 and q[1:] == pytest.approx(expected, rel=1e-12)

@@ -25,11 +25,11 @@ class Antenna:
     def __init__(self, target, slope=1.0, lock=40.0, **parameters):
         self.p = record(AcquisitionParameters(**parameters))[0]
         self.target, self.slope, self.lock = target, slope, lock
-        s = np.zeros(1, acquisition.ACQUISITION)
+        s = np.zeros(1, acquisition.ACQUISITION_DTYPE)
         acquisition.initialise(s)
         self.s, self.z, self.t = s[0], dish(*target) + AXIS, 0.0
         for k in range(450):
-            acquisition.hear(self.s, self.p, NOISE + (-1.0)**k, self.t, False)
+            acquisition.take_level(self.s, self.p, NOISE + (-1.0)**k, self.t, False)
             acquisition.learn(self.s, self.p, NOISE + (-1.0)**k, self.t + T)
             self.t += T
         acquisition.begin_acquire(self.s, self.t)
@@ -40,7 +40,7 @@ class Antenna:
         power = 10.0**(0.1 * self.z)
         power += T / TAU * (10.0**(0.1 * max(AXIS + dish(*off), NOISE)) - power)
         self.z = 10.0 * math.log10(power)
-        acquisition.hear(self.s, self.p, self.z, self.t, self.z > self.lock)
+        acquisition.take_level(self.s, self.p, self.z, self.t, self.z > self.lock)
         if self.z > self.lock:
             acquisition.take_error(self.s, (-x, -e), tuple(self.slope * off * B))
         acquisition.acquire(self.s, self.p, B, self.t, math.nan)
@@ -53,7 +53,7 @@ class Antenna:
             self.step()
             if self.s['phase'] != phases[-1]:
                 phases.append(self.s['phase'])
-        return [acquisition.PHASES[phase] for phase in phases]
+        return [acquisition.ACQUISITION_PHASES[phase] for phase in phases]
 
 
 @pytest.mark.parametrize('target', [(0.0, 0.0), (0.35, -0.3), (-0.7, 0.1), (1.68, 0.0), (0.0, -1.68)])
@@ -88,7 +88,7 @@ def test_without_a_lock_or_a_signal_it_gives_up():
 
 
 def test_stages_of_a_search():
-    p, s = record(SearchParameters(rounds=2))[0], np.zeros(1, acquisition.ACQUISITION)[0]
+    p, s = record(SearchParameters(rounds=2))[0], np.zeros(1, acquisition.ACQUISITION_DTYPE)[0]
     acquisition.begin_search(s, p, B, 100.0, math.nan)
     small, full = (pattern.duration(acquisition.area(s, p, TAU, B, stage)) for stage in (False, True))
 
@@ -105,6 +105,6 @@ def test_stages_of_a_search():
 
 @pytest.mark.parametrize('sigma, radius', [(math.nan, 1.5), (0.5, 1.5), (1.5, 3.0), (9.0, 5.0)])
 def test_the_small_area_is_two_sigma(sigma, radius):
-    s = np.zeros(1, acquisition.ACQUISITION)[0]
+    s = np.zeros(1, acquisition.ACQUISITION_DTYPE)[0]
     acquisition.begin_search(s, record(SearchParameters())[0], B, 0.0, sigma * B)
     assert s['radius'] == pytest.approx(radius * B)

@@ -15,7 +15,7 @@ def checked(K, moved=0.15, noise=0.01, seed=1, n=200):
     angle = np.linspace(0.0, 2.0 * math.pi * 0.9, n)
     d = moved * B * np.column_stack((np.cos(angle), np.sin(angle)))
     e = d @ np.asarray(K, float).T + [0.3 * B, -0.2 * B] + noise * B * rng.standard_normal((n, 2))
-    s = np.zeros(1, slope_check.SLOPES)[0]
+    s = np.zeros(1, slope_check.SLOPES_DTYPE)[0]
     slope_check.restart(s)
     for one, error in zip(d, e):
         slope_check.take(s, one, error)
@@ -33,20 +33,21 @@ def test_slopes_are_those_of_least_squares():
 
 
 @pytest.mark.parametrize('K, verdict', [
-    (np.eye(2), slope_check.RIGHT), (turned(0.5), slope_check.RIGHT), (turned(1.2), slope_check.WRONG),
-    (np.diag([-1.0, 1.0]), slope_check.WRONG), (np.diag([1.0, -1.0]), slope_check.WRONG),
-    (-np.eye(2), slope_check.WRONG), ([[0.0, 1.0], [1.0, 0.0]], slope_check.WRONG), (np.zeros((2, 2)),
-                                                                                    slope_check.WRONG)])
+    (np.eye(2), slope_check.VERDICT_RIGHT), (turned(0.5), slope_check.VERDICT_RIGHT),
+    (turned(1.2), slope_check.VERDICT_WRONG),
+    (np.diag([-1.0, 1.0]), slope_check.VERDICT_WRONG), (np.diag([1.0, -1.0]), slope_check.VERDICT_WRONG),
+    (-np.eye(2), slope_check.VERDICT_WRONG), ([[0.0, 1.0], [1.0, 0.0]], slope_check.VERDICT_WRONG), (np.zeros((2, 2)),
+                                                                                    slope_check.VERDICT_WRONG)])
 def test_verdict(K, verdict):
     s, *_ = checked(K)
     assert slope_check.verdict(s, 200) == verdict
-    assert slope_check.verdict(s, 201) == slope_check.UNKNOWN
+    assert slope_check.verdict(s, 201) == slope_check.VERDICT_UNKNOWN
 
 
 def test_a_beam_that_does_not_move_shows_no_slope():
     s, *_ = checked(np.eye(2), moved=0.0, noise=0.0)
     assert all(math.isnan(k) for k in slope_check.slopes(s))
-    assert slope_check.verdict(s, 10) == slope_check.WRONG
+    assert slope_check.verdict(s, 10) == slope_check.VERDICT_WRONG
 
 
 def dish(x, e):
@@ -61,7 +62,7 @@ def dish(x, e):
 def test_the_main_lobe_is_found_from_the_false_null_of_a_side_lobe(direction):
     place = np.array([1.68 * math.cos(direction), 1.68 * math.sin(direction)])
     for _ in range(4):
-        around = [place + np.array(side_lobe.place(i, 1.0)) for i in range(1 + side_lobe.PLACES)]
+        around = [place + np.array(side_lobe.place(i, 1.0)) for i in range(1 + side_lobe.LOOK_AROUND_PLACES)]
         chosen = side_lobe.best(np.array([dish(*one) for one in around]))
         place = around[chosen]
     assert chosen == 0 and dish(*place) > -6.0

@@ -15,7 +15,7 @@ P = record(AcquisitionParameters())[0]
 
 @pytest.fixture
 def state():
-    one = np.zeros(1, level.LEVEL)[0]
+    one = np.zeros(1, level.LEVEL_DTYPE)[0]
     one['stamp'] = -math.inf
     return one
 
@@ -112,5 +112,5 @@ def test_stamps_that_stand_still_and_levels_that_are_none_change_nothing(state):
 def test_another_place_begins_anew(state):
     learnt(state, noise(2.1))
     assert feed(state, np.full(60, 50.0))[-1].all()
-    level.forget_times(state)
+    level.restart_times(state)
     assert not level.detected(state, P) and not state['present']

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
 
 from acu_tracker.search import pattern
-from acu_tracker.search.pattern import PATTERNS, SECTOR, SPIRAL, SQUARE, Area, Point
+from acu_tracker.search.pattern import PATTERN_SECTOR, PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS, Area, Point
 
 PITCH, SPEED = 0.7, 2.5
 """In beamwidths, as the radii here."""
@@ -25,7 +25,7 @@ def flown(of, step=STEP):
     return t, np.array([pattern.point(of, instant) for instant in t])
 
 
-@pytest.mark.parametrize('kind', range(len(PATTERNS)))
+@pytest.mark.parametrize('kind', range(len(SEARCH_PATTERNS)))
 @pytest.mark.parametrize('radius', [0.5, 1.5, 5.0])
 def test_the_path_has_no_jump_and_its_rate_is_its_derivative(kind, radius):
     t, path = flown(area(kind, radius))
@@ -35,10 +35,10 @@ def test_the_path_has_no_jump_and_its_rate_is_its_derivative(kind, radius):
     assert np.abs(np.diff(path[:, :2], axis=0) - STEP * middle)[inside].max() < 1e-3 * SPEED * STEP + 4e-5
     speed = np.hypot(path[:, 2], path[:, 3])
     assert speed.max() <= SPEED * (1 + 1e-9)
-    assert np.abs(np.diff(speed))[inside].max() <= SPEED / pattern.RISE * STEP * (1 + 1e-6)
+    assert np.abs(np.diff(speed))[inside].max() <= SPEED / pattern.SPEED_RISE_TIME_S * STEP * (1 + 1e-6)
 
 
-@pytest.mark.parametrize('kind', range(len(PATTERNS)))
+@pytest.mark.parametrize('kind', range(len(SEARCH_PATTERNS)))
 @pytest.mark.parametrize('radius', [0.3, 1.5, 5.0])
 def test_every_place_of_the_area_is_within_the_beam_for_four_time_constants(kind, radius):
     """speed = b / (4 tau): within half a beamwidth for as long as it takes to fly the chord; in the first corner of
@@ -46,16 +46,16 @@ def test_every_place_of_the_area_is_within_the_beam_for_four_time_constants(kind
     of = area(kind, radius)
     rng = np.random.default_rng(kind)
     places = rng.uniform(-1.0, 1.0, (4000, 2)) * radius
-    if kind in (SPIRAL, SQUARE):
+    if kind in (PATTERN_SPIRAL, PATTERN_SQUARE):
         places = places[np.hypot(*places.T) <= radius]
     else:
         places[:, 1] *= 1.4 / radius
     _, path = flown(of)
     distance, _ = cKDTree(path[:, :2]).query(places)
-    reach = (0.57 if kind == SQUARE else 0.5) * PITCH * 1.01
+    reach = (0.57 if kind == PATTERN_SQUARE else 0.5) * PITCH * 1.01
     assert distance.max() <= reach
     seen = np.array([np.hypot(*(path[:, :2] - place).T) < 0.5 for place in places[:200]]).sum(axis=1) * STEP
-    assert seen.min() >= (0.2 if kind == SQUARE else 2.0 * math.sqrt(0.25 - reach**2) / SPEED - STEP)
+    assert seen.min() >= (0.2 if kind == PATTERN_SQUARE else 2.0 * math.sqrt(0.25 - reach**2) / SPEED - STEP)
 
 
 def test_the_spiral_is_the_one_that_is_integrated():
@@ -64,14 +64,14 @@ def test_the_spiral_is_the_one_that_is_integrated():
     begun = pattern.spiral_length(0.1, PITCH)
     out = solve_ivp(lambda t, theta: SPEED / (k * np.sqrt(1.0 + theta * theta)), (0.0, 20.0), [0.1], rtol=1e-10,
                     atol=1e-12, dense_output=True).sol
-    of = area(SPIRAL, 20.0)
+    of = area(PATTERN_SPIRAL, 20.0)
     for t in (1.0, 3.0, 10.0, 20.0):
         theta = out(t)[0]
-        x, y, *_ = pattern.point(of, 0.5 * pattern.RISE + (begun + SPEED * t) / SPEED)
+        x, y, *_ = pattern.point(of, 0.5 * pattern.SPEED_RISE_TIME_S + (begun + SPEED * t) / SPEED)
         assert (x, y) == pytest.approx((k * theta * math.cos(theta), k * theta * math.sin(theta)), abs=1e-7)
 
 
-@pytest.mark.parametrize('kind', [SPIRAL, SECTOR])
+@pytest.mark.parametrize('kind', [PATTERN_SPIRAL, PATTERN_SECTOR])
 def test_it_rests_where_it_has_ended(kind):
     of = area(kind)
     T = pattern.duration(of)
@@ -80,12 +80,12 @@ def test_it_rests_where_it_has_ended(kind):
 
 
 def test_corners():
-    expanding = [pattern.vertex(area(SQUARE), i) for i in range(8)]
+    expanding = [pattern.vertex(area(PATTERN_SQUARE), i) for i in range(8)]
     assert np.allclose(np.array(expanding) / PITCH, [(0, 0), (1, 0), (1, 1), (-1, 1), (-1, -1), (2, -1), (2, 2),
                                                      (-2, 2)])
-    raster = [pattern.vertex(area(pattern.RASTER, 5.0, 0.7), i) for i in range(7)]
+    raster = [pattern.vertex(area(pattern.PATTERN_RASTER, 5.0, 0.7), i) for i in range(7)]
     assert np.allclose(raster, [(0, 0), (5, 0), (-5, 0), (-5, 0.7), (5, 0.7), (5, -0.7), (-5, -0.7)])
-    sector = [pattern.vertex(area(SECTOR, 5.0, 0.7), i) for i in range(7)]
+    sector = [pattern.vertex(area(PATTERN_SECTOR, 5.0, 0.7), i) for i in range(7)]
     assert np.allclose(sector, [(0, 0), (5, -0.7), (-5, -0.7), (-5, 0), (5, 0), (5, 0.7), (-5, 0.7)])
 
 

@@ -13,7 +13,7 @@ from pedestal_common.geometry import line_of_sight
 
 @pytest.fixture
 def remembered():
-    s = np.zeros(1, place.PLACE)[0]
+    s = np.zeros(1, place.PLACE_DTYPE)[0]
     u = np.array(line_of_sight.earth_direction(0.7, 0.5))
     du = 0.004 * np.cross(u, [0.0, 0.6, 0.8])
     place.remember(s, 10.0, Vector(*u), Vector(*du))
@@ -30,7 +30,7 @@ def test_it_begins_where_the_target_was_and_ends_where_its_rate_has_faded(rememb
     assert angles(s, 10.0) == pytest.approx(line_of_sight.earth_angles(*u), abs=1e-12)
     end = np.array(line_of_sight.earth_direction(*angles(s, 1e4)))
     W = np.linalg.norm(du)
-    assert math.acos(end @ u) == pytest.approx(W * place.TAU, rel=1e-9)
+    assert math.acos(end @ u) == pytest.approx(W * place.RATE_FADE_TIME_S, rel=1e-9)
     assert end @ np.cross(u, du) == pytest.approx(0.0, abs=1e-12)
 
 
@@ -46,7 +46,7 @@ def test_rates_and_accelerations_are_the_derivatives(remembered, t):
 
 def test_what_was_at_rest_stays(remembered):
     s, u, _ = remembered
-    place.remember(s, 10.0, Vector(*u), place.STILL)
+    place.remember(s, 10.0, Vector(*u), place.ZERO_VECTOR)
     assert angles(s, 500.0) == pytest.approx(line_of_sight.earth_angles(*u), abs=1e-12)
 
 

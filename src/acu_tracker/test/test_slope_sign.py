@@ -7,7 +7,7 @@ import pytest
 from acu_tracker import signals
 from acu_tracker.estimation import slope_sign
 from acu_tracker.geometry.vector import Vector, turn
-from pedestal_common.geometry.line_of_sight import ASHORE as BOW_NORTH
+from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE as BOW_NORTH
 
 T, SIGMA, GAP = 0.005, 5e-4, 0.1
 ASHORE = turn(*BOW_NORTH)
@@ -15,7 +15,7 @@ ASHORE = turn(*BOW_NORTH)
 
 @pytest.fixture
 def state():
-    record = np.zeros(1, slope_sign.SLOPE_SIGN)[0]
+    record = np.zeros(1, slope_sign.SLOPE_SIGN_DTYPE)[0]
     slope_sign.restart(record)
     return record
 
@@ -28,7 +28,7 @@ def first(state, angles, errors, t=None, sigma=SIGMA):
         state, t[k], slope_sign.beam(ASHORE, *at), tuple(e), sigma**2, GAP)), None)
 
 
-TURNED = 2 * slope_sign.FEWEST
+TURNED = 2 * slope_sign.MIN_ERROR_COUNT
 """Error from which on a slope is reversed."""
 
 
@@ -81,8 +81,8 @@ def test_of_the_first_errors_nothing_is_said_and_of_those_off_the_straight_part_
     """Errors that lead away from the first on: what they are is seen, and said from FEWEST on."""
     way = 0.01 * np.exp(0.05 * np.arange(200))
     angles, errors = np.column_stack((np.zeros(200), 0.5 - way)), np.column_stack((np.zeros(200), -way))
-    assert first(state, angles, errors) == slope_sign.FEWEST - 1
-    u = np.zeros(1, signals.INPUTS)[0]
+    assert first(state, angles, errors) == slope_sign.MIN_ERROR_COUNT - 1
+    u = np.zeros(1, signals.INPUTS_DTYPE)[0]
     for x, near in ((0.0, True), (0.4, True), (-0.6, False), (math.nan, False)):
         u['cross_elevation'] = 0.02 * x
         assert slope_sign.near(u, 0.02) == near
@@ -113,7 +113,7 @@ def test_lines_are_least_squares_and_what_a_straight_line_does_is_none_of_it(sta
     k = np.arange(300)
     first(state, np.column_stack((np.zeros(300), np.full(300, 0.5))), np.column_stack((1e-5 * k, -2e-5 * k)))
     assert np.abs(state['J']).max() < 1e-12
-    restarted = np.zeros(1, slope_sign.SLOPE_SIGN)[0]
+    restarted = np.zeros(1, slope_sign.SLOPE_SIGN_DTYPE)[0]
     slope_sign.restart(restarted)
     e = np.random.default_rng(1).normal(0.0, SIGMA, (100, 2))
     first(restarted, np.zeros((100, 2)), e)

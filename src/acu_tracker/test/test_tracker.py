@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from acu_tracker.estimation import tracker
 from acu_tracker.estimation.filters import target_filter
-from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import (
     AxisMeasurement,
     Measurement,
@@ -33,7 +33,7 @@ class Target:
 
     def __init__(self, tracker_params=None, **filter_params):
         self.params = TrackerParameters(**(tracker_params or {}))
-        self.p, self.state = record(self.params)[0], np.zeros(1, tracker.TRACKER)
+        self.p, self.state = record(self.params)[0], np.zeros(1, tracker.TRACKER_DTYPE)
         self.put(**filter_params)
 
     def put(self, **filter_params):
@@ -67,7 +67,7 @@ def test_azimuth_is_unwrapped_against_the_estimate():
     t = np.arange(0.0, 20.0, T)
     angle = 3.0 + 0.05 * t
     outcomes = [target.observe(stamp, (y + math.pi) % (2 * math.pi) - math.pi)[0] for stamp, y in zip(t, angle)]
-    assert outcomes == [tracker.STARTED] + [tracker.ACCEPTED] * (len(t) - 1)
+    assert outcomes == [tracker.OUTCOME_STARTED] + [tracker.OUTCOME_ACCEPTED] * (len(t) - 1)
     assert target.outlook(t[-1])[0] == pytest.approx(angle[-1], abs=1e-6)
 
 
@@ -76,23 +76,24 @@ def test_stale_gated_counted_and_restarted_measurements():
     for k in range(300):
         target.observe(k * T, 0.1)
     before = target.state.copy()
-    assert target.observe(299 * T, 0.1)[0] == tracker.STALE
-    assert target.observe(1.0, 0.1)[0] == tracker.STALE
+    assert target.observe(299 * T, 0.1)[0] == tracker.OUTCOME_STALE
+    assert target.observe(1.0, 0.1)[0] == tracker.OUTCOME_STALE
     np.testing.assert_array_equal(target.state, before)
 
     outcome, azimuth = target.observe(300 * T, 0.2)
-    assert outcome == tracker.GATED and azimuth.nu == pytest.approx(0.1, abs=1e-9) and azimuth.chi_square > 25.0
+    assert outcome == tracker.OUTCOME_GATED and azimuth.nu == pytest.approx(0.1,
+                                                                            abs=1e-9) and azimuth.chi_square > 25.0
     for name in ('x', 'p', 'mu'):
         np.testing.assert_array_equal(target.state['filter']['axis'][name], before['filter']['axis'][name])
     assert target.state['accepted_in_a_row'] == 0 and target.state['gated'] == 1
 
     for k in range(301, 301 + 18):
-        assert target.observe(k * T, 0.2)[0] == tracker.GATED
-    assert target.observe(320 * T, 0.2)[0] == tracker.STARTED
+        assert target.observe(k * T, 0.2)[0] == tracker.OUTCOME_GATED
+    assert target.observe(320 * T, 0.2)[0] == tracker.OUTCOME_STARTED
     assert target.outlook(320 * T)[0] == 0.2 and target.state['gated'] == 20
 
-    assert target.observe(320 * T + 0.9, 0.2)[0] == tracker.ACCEPTED
-    assert target.observe(320 * T + 2.0, 0.7)[0] == tracker.STARTED
+    assert target.observe(320 * T + 0.9, 0.2)[0] == tracker.OUTCOME_ACCEPTED
+    assert target.observe(320 * T + 2.0, 0.7)[0] == tracker.OUTCOME_STARTED
     assert target.outlook(320 * T + 2.0)[0] == pytest.approx(0.7)
     assert target.state['gated'] == 20
 
@@ -100,8 +101,8 @@ def test_stale_gated_counted_and_restarted_measurements():
 def test_only_refusals_in_a_row_restart():
     target = Target()
     outcomes = [target.observe(k * T, 0.1 if k < 300 or k % 15 == 0 else 0.2)[0] for k in range(400)]
-    assert outcomes[0] == tracker.STARTED and tracker.STARTED not in outcomes[1:]
-    assert outcomes[301:315] == [tracker.GATED] * 14 and outcomes[315] == tracker.ACCEPTED
+    assert outcomes[0] == tracker.OUTCOME_STARTED and tracker.OUTCOME_STARTED not in outcomes[1:]
+    assert outcomes[301:315] == [tracker.OUTCOME_GATED] * 14 and outcomes[315] == tracker.OUTCOME_ACCEPTED
 
 
 @pytest.mark.parametrize('gate', [1.0, 9.0, 25.0, 600.0, 1e6])
@@ -116,15 +117,15 @@ def test_a_rate_is_believed_by_itself():
     target, alone = (Target({'lock_count': 50}, rate_measurement=used) for used in (True, False))
     for k in range(300):
         for one in (target, alone):
-            assert one.observe(k * T, 0.1 + 0.01 * k * T, 0.0, 0.01, 0.0)[0] != tracker.GATED
+            assert one.observe(k * T, 0.1 + 0.01 * k * T, 0.0, 0.01, 0.0)[0] != tracker.OUTCOME_GATED
         # Fifty of them have to agree with the angles first.
         assert (target.variances() == alone.variances()) == (k <= 50)
     assert target.variances()[2] < 0.7 * alone.variances()[2] and target.state['rates_gated'] == 0
     # Without a rate (the sensor is late) the angles alone are believed, and with one that is off.
-    assert target.observe(3.0, 0.13, 0.0)[0] == tracker.ACCEPTED
+    assert target.observe(3.0, 0.13, 0.0)[0] == tracker.OUTCOME_ACCEPTED
     rate = target.outlook(3.0)[1]
     outcome, azimuth = target.observe(3.01, 0.1301, 0.0, 0.01 + 8 * RATE_SIGMA, 0.0)
-    assert outcome == tracker.ACCEPTED and azimuth.rate == pytest.approx(8 * RATE_SIGMA, rel=1e-2)
+    assert outcome == tracker.OUTCOME_ACCEPTED and azimuth.rate == pytest.approx(8 * RATE_SIGMA, rel=1e-2)
     assert nis(azimuth) > 50.0
     assert target.outlook(3.01)[1] == pytest.approx(rate, abs=1e-6)
     assert target.state['rates_gated'] == 1 and target.state['gated'] == 0
@@ -132,7 +133,7 @@ def test_a_rate_is_believed_by_itself():
     assert target.state['rates_in_a_row'].tolist() == [[0, 300]]
     # A filter that is not to use the rate does not look at it.
     target.put(rate_measurement=False)
-    assert target.observe(3.02, 0.1302, 0.0, 1.0, 0.0)[0] == tracker.ACCEPTED
+    assert target.observe(3.02, 0.1302, 0.0, 1.0, 0.0)[0] == tracker.OUTCOME_ACCEPTED
     assert target.state['rates_gated'] == 1
 
 
@@ -150,12 +151,12 @@ def test_a_rate_sensor_that_is_off_or_stuck_does_not_cost_the_lock(kind, share, 
                                        share * (speed + RATE_SIGMA * nu[2]) + bias, RATE_SIGMA * nu[3])[0])
         locks += target.locked()
         errors.append(target.outlook(t)[0] - 0.1 - speed * t)
-    assert outcomes.count(tracker.STARTED) == 1 and np.abs(errors).max() < 5.0 * SIGMA
+    assert outcomes.count(tracker.OUTCOME_STARTED) == 1 and np.abs(errors).max() < 5.0 * SIGMA
     assert locks > (1000 if bias == 3.0 * RATE_SIGMA else 1800)
     assert target.state['rates_gated'] > 0
 
 
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('kind', FILTER_KINDS)
 def test_lock_needs_a_row_of_fresh_errors_and_convergence(kind):
     target = Target({'lock_count': 50}, kind=kind)
     locks = []
@@ -177,14 +178,14 @@ def test_a_filter_no_better_than_its_measurements_locks_too(lively):
     assert target.locked()
 
 
-@pytest.mark.parametrize('before', KINDS)
+@pytest.mark.parametrize('before', FILTER_KINDS)
 def test_filter_changes_without_a_bump(before):
     """Into every other kind and back, on a target that accelerates by as much as a constant rate still stands: angle,
     rate and their covariance go on as they were, no error is gated, and angle and rate stay within five of the
     standard deviations the filter claims."""
     rng, acceleration = np.random.default_rng(4), 0.5 * DEG
     target, worst = Target(kind=before), np.zeros(2)
-    others = [kind for after in KINDS for kind in (after, before)]
+    others = [kind for after in FILTER_KINDS for kind in (after, before)]
     for k in range(1, 200 * len(others)):
         t = k * T
         truth = 0.3 + 0.5 * acceleration * t * t, acceleration * t
@@ -201,7 +202,7 @@ def test_filter_changes_without_a_bump(before):
     assert target.state['gated'] == 0
 
 
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('kind', FILTER_KINDS)
 def test_covariance_grows_in_a_coast(kind):
     target = Target(kind=kind)
     for k in range(500):
@@ -212,7 +213,7 @@ def test_covariance_grows_in_a_coast(kind):
 
 
 @pytest.mark.parametrize('gap', [0.1, 0.5, 0.9])
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('kind', FILTER_KINDS)
 def test_an_error_is_compared_with_what_was_told_in_the_coast(kind, gap):
     """Out of a turn, the innovation after a gap is measured from the estimate of that time, in sigmas of its
     covariance: the antenna points where the gate is."""
@@ -222,7 +223,7 @@ def test_an_error_is_compared_with_what_was_told_in_the_coast(kind, gap):
     stamp = 299 * T + gap
     angle, variance = target.outlook(stamp)[0], target.variances(gap)[0]
     outcome, azimuth = target.observe(stamp, 0.3)
-    assert outcome == tracker.ACCEPTED and azimuth.nu == pytest.approx(0.3 - angle, abs=1e-12)
+    assert outcome == tracker.OUTCOME_ACCEPTED and azimuth.nu == pytest.approx(0.3 - angle, abs=1e-12)
     assert azimuth.S == pytest.approx(variance + SIGMA**2, rel=1e-12)
     assert nis(azimuth) == pytest.approx(azimuth.nu**2 / (variance + SIGMA**2), rel=1e-12)
 
@@ -243,7 +244,7 @@ def test_receiver_law():
 def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation, tilted):
     """Oracle: scipy turns the direction by 20,000 small rotations about deck axes and the vertical; in the frame of a
     target that climbs to the north-east it moves along the axes of that."""
-    azimuth, f = 0.3, np.zeros(1, estimate_frame.FRAME)[0]
+    azimuth, f = 0.3, np.zeros(1, estimate_frame.FRAME_DTYPE)[0]
     estimate_frame.level(f)
     u = Vector(*line_of_sight.earth_direction(azimuth, elevation))
     if tilted:

@@ -50,7 +50,7 @@ def test_no_preset_beyond_the_limit_is_reached_whatever_the_controller(Rig, cont
         reached.append(rig.angle[0])
     assert rig.mode == 'preset' and 0.98 < reached[-1] and max(reached) < 1.0 + 2e-3
     assert rig.outputs['angle_limited'][0, 0]
-    alarm = rig.state['supervision'][0]['alarms']['alarm'][table.INDEX['azimuth at limit']]
+    alarm = rig.state['supervision'][0]['alarms']['alarm'][table.ALARM_INDEX['azimuth at limit']]
     assert alarm['state'] == machine.State.UNACKNOWLEDGED
 
 
@@ -113,7 +113,7 @@ def test_the_floor_is_the_higher_end_of_a_cell_and_goes_round():
     cells = floor.table(HILL)[0]
     for A in np.linspace(-7.0, 7.0, 1001):
         assert floor.highest(cells, A, A) >= floor.at(HILL, A) - 1e-12
-        assert floor.highest(cells, A, A) <= floor.at(HILL, A) + 1.6 * floor.CELL
+        assert floor.highest(cells, A, A) <= floor.at(HILL, A) + 1.6 * floor.CELL_WIDTH_RAD
     assert floor.highest(cells, 0.0, 0.9) == floor.highest(cells, 2.0 * math.pi, 2.0 * math.pi + 0.9) == 0.4
     assert not floor.table('')[0]['given']
 

@@ -4,7 +4,7 @@ import pytest
 
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.prediction import PredictionParameters
-from acu_tracker.unit import COMMAND, DRIVE, JOINTS, MODE, Acu
+from acu_tracker.unit import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, MODE_TOPIC, RATE_COMMAND_TOPIC, Acu
 from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODES
 from pedestal_common.wire import messages, records
@@ -28,11 +28,12 @@ def test_diagnostics_show_whether_the_filter_is_honest():
 
 def test_a_request_is_judged_by_what_the_drive_says_now():
     unit = Acu(AcuParameters(), ())
-    unit.inputs[JOINTS]['stamp'] = 0
+    unit.inputs[JOINT_STATES_TOPIC]['stamp'] = 0
     unit.step(np.zeros(1, np.int64), unit.inputs, unit.outputs)
-    assert unit.encode(MODE, int(unit.outputs[0][MODE])) == 'standby' and unit.outputs[COMMAND]['stamp'] == 0
+    assert unit.encode(MODE_TOPIC,
+                       int(unit.outputs[0][MODE_TOPIC])) == 'standby' and unit.outputs[RATE_COMMAND_TOPIC]['stamp'] == 0
     assert unit.request('acu/stow') == (True, 'mode is stow')
-    unit.take_text(DRIVE, 'stopping')
+    unit.take_text(DRIVE_STATE_TOPIC, 'stopping')
     assert unit.request('acu/preset') == (False, 'refused: drive not ready; mode is standby')
     assert dict(unit.diagnose().values)['drive'] == 'stopping'
 
@@ -43,8 +44,8 @@ def test_the_diagnosis_says_what_a_request_would_be_refused_for(drive):
     def unit():
         made = Acu(AcuParameters(initial_mode='stop', prediction=PredictionParameters(
             line_1=LINES[0], line_2=LINES[1], start_time='2019-12-10T09:00:00')), ())
-        made.inputs[JOINTS]['stamp'] = 0
-        made.take_text(DRIVE, drive)
+        made.inputs[JOINT_STATES_TOPIC]['stamp'] = 0
+        made.take_text(DRIVE_STATE_TOPIC, drive)
         made.step(np.zeros(1, np.int64), made.inputs, made.outputs)
         return made
     asked = unit()
@@ -68,11 +69,11 @@ def test_the_diagnosis_says_by_which_elements_it_predicts():
 
 def test_what_an_operator_waits_for_is_urgent():
     unit = Acu(AcuParameters(), ())
-    unit.inputs[JOINTS]['stamp'] = 0
+    unit.inputs[JOINT_STATES_TOPIC]['stamp'] = 0
     unit.step(np.zeros(1, np.int64), unit.inputs, unit.outputs)
     before = unit.urgent
     assert unit.urgent == before
-    unit.inputs[DRIVE] = topics.BY_NAME[DRIVE].texts.index('emergency stop')
+    unit.inputs[DRIVE_STATE_TOPIC] = topics.TOPIC_BY_NAME[DRIVE_STATE_TOPIC].texts.index('emergency stop')
     unit.step(np.ones(1, np.int64), unit.inputs, unit.outputs)
     assert unit.urgent != before
 
@@ -82,4 +83,4 @@ def test_a_program_track_without_the_axes_is_refused():
     message.joint_names = ['azimuth', 'polarisation']
     with pytest.raises(ValueError, match='must hold azimuth and elevation'):
         Acu(AcuParameters(), ()).decode('acu/program_track', message)
-    assert records.is_text(MODE)
+    assert records.is_text(MODE_TOPIC)

@@ -4,10 +4,10 @@ import pedestal_common.entry  # noqa: F401
 # isort: split
 import sys
 
-from adu_drive import resting
+from adu_drive import state_file
 from adu_drive.timekeeper_node import Timekeeper
 from pedestal_common.node import shell
-from pedestal_common.node.unit import WARN
+from pedestal_common.node.unit import LEVEL_WARN
 
 
 class AduNode(Timekeeper):
@@ -21,7 +21,7 @@ class AduNode(Timekeeper):
     def prepare(self, unit):
         """Compile the laws; then go on where the state file, if there is one, left the plant."""
         super().prepare(unit)
-        left = resting.read(self.parameters.state_file) if self.parameters.state_file else None
+        left = state_file.read(self.parameters.state_file) if self.parameters.state_file else None
         if left is not None:
             unit.resume(left)
             self.get_logger().info(f'goes on at azimuth {left.azimuth:.6f}, elevation {left.elevation:.6f} rad, where '
@@ -40,7 +40,7 @@ class AduNode(Timekeeper):
             left = left._replace(enabled=self.saved.enabled if self.saved else False)
         self.saved = left
         try:
-            resting.write(self.parameters.state_file, left)
+            state_file.write(self.parameters.state_file, left)
             self.unsaved = ''
         except OSError as error:
             self.unsaved = f'{self.parameters.state_file}: {error.strerror}'
@@ -60,8 +60,8 @@ class AduNode(Timekeeper):
     def diagnosed(self):
         """The Diagnosis of the drive, a WARN where its state could not be written."""
         diagnosis = super().diagnosed()
-        if self.unsaved and diagnosis.level < WARN:
-            return diagnosis._replace(level=WARN, message=self.unsaved)
+        if self.unsaved and diagnosis.level < LEVEL_WARN:
+            return diagnosis._replace(level=LEVEL_WARN, message=self.unsaved)
         return diagnosis
 
 

@@ -8,19 +8,19 @@ import math
 import numpy as np
 
 from adu_drive.controller import bias, current_loop, disturbance_observer, encoder, faults, pi, speed_loop, travel
-from adu_drive.params import SPEED_PERIOD
+from adu_drive.params import SPEED_LOOP_PERIOD_S
 from adu_drive.plant import brake, friction, gear_train, motor, structure, thermal
 from pedestal_common.compiled import compiled, inlined
 
-CURRENT_TICKS = 5
+CURRENT_LOOP_STEP_COUNT = 5
 """Current-loop periods in one speed-loop period."""
 
-BRAKES = WORKS, STUCK_ON, STUCK_OFF = range(3)
+BRAKE_CONDITIONS = BRAKE_WORKING, BRAKE_STUCK_ON, BRAKE_STUCK_OFF = range(3)
 """What a brake does: what it is told, or whatever that is."""
 
-CURRENT_PERIOD = SPEED_PERIOD / CURRENT_TICKS
+CURRENT_LOOP_PERIOD_S = SPEED_LOOP_PERIOD_S / CURRENT_LOOP_STEP_COUNT
 
-QUARTER_TURN = 0.5 * math.pi
+SECOND_PINION_OFFSET_RAD = 0.5 * math.pi
 """By which the second pinion is mounted further than the first: their runouts do not add."""
 
 
@@ -29,15 +29,18 @@ def _motor_constants(m, loop, heat, per_rad, h):
     w = 2.0 * math.pi * loop.bandwidth
     R, psi = m.resistance * (1.0 + m.drift.resistance), m.flux_linkage * (1.0 + m.drift.flux_linkage)
     return {'p': float(m.pole_pairs), 'psi': psi, 'L': m.inductance, 'K_t': 1.5 * m.pole_pairs * psi,
-            'h_L': h / m.inductance, 'h_R_L': h * R / m.inductance, 'rise': thermal.COPPER * heat.rise,
-            'per_rated': 1.0 / heat.rated_torque, 'heat_gain': 1.0 - math.exp(-SPEED_PERIOD / heat.time_constant),
+            'h_L': h / m.inductance, 'h_R_L': h * R / m.inductance, 'rise': thermal.COPPER_COEFFICIENT_PER_K
+            * heat.rise,
+            'per_rated': 1.0 / heat.rated_torque, 'heat_gain': 1.0 - math.exp(-SPEED_LOOP_PERIOD_S
+                                                                              / heat.time_constant),
             'h_brake_J': h * m.brake / m.inertia, 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
             'h_J': h / m.inertia, 'q_B': 1.0 / (1.0 + h * m.viscous / m.inertia),
             'T_cog': m.cogging, 'cogs': float(m.cogging_per_turn),
             'psi_hat': m.flux_linkage, 'K_t_hat': m.torque_constant, 'per_K_t_hat': 1.0 / m.torque_constant,
             'gain': 1.0 + m.drift.current_gain, 'offset': m.drift.current_offset,
-            'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_PERIOD, 'v_max': m.voltage,
-            'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad, 'speed': 1.0 / per_rad / SPEED_PERIOD}
+            'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_LOOP_PERIOD_S, 'v_max': m.voltage,
+            'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad, 'speed': 1.0 / per_rad
+            / SPEED_LOOP_PERIOD_S}
 
 
 def _dish(p):
@@ -66,16 +69,16 @@ def constants(p, h, varying=False):
     J_dish, k_dish, c_dish = _dish(p)
     J_base = p.load.inertia - J_dish
     final, emergency, buffer = p.limits.switches
-    l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_PERIOD)
+    l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_LOOP_PERIOD_S)
     return {
         'motor_1': _motor_constants(p.motor_1, p.current_loop, p.thermal, motor_per_rad, h),
         'motor_2': _motor_constants(p.motor_2, p.current_loop, p.thermal, motor_per_rad, h),
         'N': N, 'per_N': 1.0 / N, 'per_2N': 0.5 / N, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
-        'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * SPEED_PERIOD,
+        'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * SPEED_LOOP_PERIOD_S,
         'K_d': p.speed_loop.differential_damping, 'independent': int(p.speed_loop.structure == 'independent'),
-        'l_1': l_1, 'l_2': l_2, 'h_J_shaft': SPEED_PERIOD / J_shaft,
+        'l_1': l_1, 'l_2': l_2, 'h_J_shaft': SPEED_LOOP_PERIOD_S / J_shaft,
         'T_b': T_b, 'out': out, 'per_fade': per_fade,
-        'bias_gain': 1.0 - math.exp(-SPEED_PERIOD / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
+        'bias_gain': 1.0 - math.exp(-SPEED_LOOP_PERIOD_S / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
         'k': p.gear_train.stiffness, 'c': p.gear_train.damping, 'half_lash': 0.5 * p.gear_train.lash,
         'pinion_ratio': p.gear_train.pinion_ratio, **_uneven(p),
         'flexible': int(J_dish > 0.0), 'k_dish': k_dish, 'c_dish': c_dish,
@@ -86,13 +89,13 @@ def constants(p, h, varying=False):
         'per_v2': p.friction.stribeck_rate ** -2, 'sigma_0': p.friction.stiffness,
         'h_sigma_0': h * p.friction.stiffness, 'sigma_1_h': p.friction.damping / h,
         'encoder': encoder.errors(p.encoder.error),
-        'rate_max': p.limits.rate, 'a': p.limits.deceleration, 'ramp': p.limits.deceleration * SPEED_PERIOD,
+        'rate_max': p.limits.rate, 'a': p.limits.deceleration, 'ramp': p.limits.deceleration * SPEED_LOOP_PERIOD_S,
         'lower': p.limits.lower, 'upper': p.limits.upper, 'K': p.limits.approach,
         'stop_lower': p.limits.lower - buffer, 'stop_upper': p.limits.upper + buffer,
         'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping,
         'faults': {'current_2': p.faults.overcurrent ** 2, 'omega': N * p.faults.overspeed,
                    'disagreement': p.faults.encoder_disagreement, 'error': N * p.faults.following_error,
-                   'late_periods': math.ceil(p.faults.following_time / SPEED_PERIOD - 1e-6),
+                   'late_periods': math.ceil(p.faults.following_time / SPEED_LOOP_PERIOD_S - 1e-6),
                    'heat': p.faults.overtemperature, 'final_low': p.limits.lower - final,
                    'final_high': p.limits.upper + final, 'emergency_low': p.limits.lower - emergency,
                    'emergency_high': p.limits.upper + emergency}}
@@ -118,7 +121,8 @@ def initial_state(p, theta, external):
     reading: counts of the load encoder at t_k; external: torque [Nm] on the load, constant over a control period;
     asked_rate, asked_torque: command obeyed in a speed-loop period [rad/s, Nm]. What is broken: motor_lost: 1 of a
     motor whose amplifier is off, and says so; jump: counts that the load encoder reads too many, stuck: 1 when it
-    stays at its reading; brake_stuck: of BRAKES; toothless: 1 where a pinion has lost one of its `teeth`, of which a
+    stays at its reading; brake_stuck: of BRAKE_CONDITIONS; toothless: 1 where a pinion has lost one of its `teeth`,
+    of which a
     whole one has 0 here; gust: torque [Nm] on the load beside the wind.
     """
     per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
@@ -135,14 +139,14 @@ def initial_state(p, theta, external):
             'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0,
             'faults': 0, 'present': 0, 'late': 0, 'slewing': 0, 'braked': 0, 'reading': 0.0,
-            'motor_lost': np.zeros(2, np.int64), 'jump': 0.0, 'stuck': 0, 'brake_stuck': WORKS, 'toothless': 0,
+            'motor_lost': np.zeros(2, np.int64), 'jump': 0.0, 'stuck': 0, 'brake_stuck': BRAKE_WORKING, 'toothless': 0,
             'teeth': np.zeros(2), 'gust': 0.0}
 
 
 @inlined
 def _load_counts(s, c):
     """What the load encoder reads [counts]."""
-    return s.reading if s.stuck else encoder.counts(encoder.told(s.theta, c.encoder), c.per_rad) + s.jump
+    return s.reading if s.stuck else encoder.counts(encoder.reading(s.theta, c.encoder), c.per_rad) + s.jump
 
 
 @inlined
@@ -152,7 +156,7 @@ def _measured_speed(m, k):
 
 
 @inlined
-def _sense(m, k):
+def _read_motor_sensors(m, k):
     m.measured = _measured_speed(m, k)
     m.heat = thermal.load(m.heat, k.K_t * m.i_q, k.per_rated, k.heat_gain)
     m.count = encoder.counts(m.theta, k.per_rad)
@@ -165,13 +169,13 @@ def _measured_torque(m, k):
 
 
 @inlined
-def _realised(m, k):
+def _realised_torque(m, k):
     """Torque [Nm] the motor made of what was asked: the current's own once the voltage circle has cut it."""
     return _measured_torque(m, k) if m.limited else m.torque_ref
 
 
 @inlined
-def _mean(s, omega_1, omega_2):
+def _mean_motor_speed(s, omega_1, omega_2):
     """Mean speed [rad/s] of the motors that work."""
     if s.faults & faults.Bit.MOTOR_1_LOST:
         return omega_2
@@ -185,7 +189,7 @@ def _torque_control(s, c, omega, feed_forward):
     """Torque references of both motors from the rate s.rate, the mean speed and a torque [Nm] added to each; whether
     one is at its limit. A motor that is alone makes the torque of both, as far as it can."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    alone = s.faults & faults.MOTORS_LOST
+    alone = s.faults & faults.MOTORS_LOST_BITS
     omega_1, omega_2 = (m1.measured, m2.measured) if c.independent and not alone else (omega, omega)
     error_1, error_2 = c.N * s.rate - omega_1, c.N * s.rate - omega_2
     T_1 = speed_loop.torque(error_1, m1.sum, c.K_p, feed_forward)
@@ -201,7 +205,7 @@ def _torque_control(s, c, omega, feed_forward):
     limited = m1.torque_ref != T_1 or m2.torque_ref != T_2
     excess_1 = excess_2 = 0.0
     if limited or m1.limited or m2.limited:
-        excess_1, excess_2 = T_1 - _realised(m1, k1), T_2 - _realised(m2, k2)
+        excess_1, excess_2 = T_1 - _realised_torque(m1, k1), T_2 - _realised_torque(m2, k2)
         if alone or not c.independent:
             excess_1 = excess_2 = 0.5 * (excess_1 + excess_2)
     m1.sum = pi.integral(m1.sum, error_1, c.K_iT, excess_1)
@@ -210,7 +214,7 @@ def _torque_control(s, c, omega, feed_forward):
 
 
 @inlined
-def _current_2(m, k):
+def _squared_current(m, k):
     """Square of the measured current [A2]."""
     i_d, i_q = k.gain * m.i_d, k.gain * m.i_q + k.offset
     return i_d * i_d + i_q * i_q
@@ -221,17 +225,17 @@ def _supervise(s, c, omega, free):
     """Trip on what the drive measures; `free`: the motors may turn, so they must follow."""
     m1, m2, k = s.motor_1, s.motor_2, c.faults
     s.late = faults.late(s.late, c.N * s.rate - omega, k.error) if free else 0
-    s.present |= faults.detected(
-        max(_current_2(m1, c.motor_1), _current_2(m2, c.motor_2)),
+    s.present |= faults.measured_faults(
+        max(_squared_current(m1, c.motor_1), _squared_current(m2, c.motor_2)),
         max(abs(m1.measured), abs(m2.measured)),
         c.rad * _load_counts(s, c) - c.encoder.zero - c.per_2N * (c.motor_1.rad * m1.count + c.motor_2.rad * m2.count),
         s.late, max(m1.heat, m2.heat), s.faults, k)
-    s.present |= faults.lost(s.motor_lost) | faults.at_end(s.theta, c.per_N * omega, k)
+    s.present |= faults.lost_motor_faults(s.motor_lost) | faults.end_switch_faults(s.theta, c.per_N * omega, k)
     s.faults |= s.present
 
 
 @inlined
-def _let_go(s, omega, free):
+def _remove_torque(s, omega, free):
     """No torque. Once the brakes hold, what the motors held before is kept: they need it when the brakes open."""
     s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
     s.motor_1.inhibited = s.motor_2.inhibited = s.stopping = s.slewing = 1
@@ -247,16 +251,17 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     enable: follow, else stop and hold; powered: the motors may make torque; free: no brake holds them.
     """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    _sense(m1, k1)
-    _sense(m2, k2)
-    omega = _mean(s, m1.measured, m2.measured)
+    _read_motor_sensors(m1, k1)
+    _read_motor_sensors(m2, k2)
+    omega = _mean_motor_speed(s, m1.measured, m2.measured)
     _supervise(s, c, omega, powered and free)
-    if not powered or faults.drops(s.faults):
-        _let_go(s, omega, free)
+    if not powered or faults.removes_torque(s.faults):
+        _remove_torque(s, omega, free)
         return
     m1.inhibited, m2.inhibited = s.faults & faults.Bit.MOTOR_1_LOST, s.faults & faults.Bit.MOTOR_2_LOST
     s.omega_hat, s.d_hat = disturbance_observer.update(
-        s.omega_hat, s.d_hat, omega, 0.5 * (_realised(m1, k1) + _realised(m2, k2)), c.l_1, c.l_2, c.h_J_shaft)
+        s.omega_hat, s.d_hat, omega, 0.5 * (_realised_torque(m1, k1) + _realised_torque(m2, k2)), c.l_1, c.l_2,
+        c.h_J_shaft)
 
     feed_forward = 0.0
     if enable:
@@ -294,7 +299,7 @@ def begin_period(s, c, grip):
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     if not c.varying:
         s.h_J, s.q_B, s.h_J_dish = c.h_J, c.q_B, c.h_J_dish
-    s.braked = (1 if grip else 0) if s.brake_stuck == WORKS else 1 if s.brake_stuck == STUCK_ON else 0
+    s.braked = (1 if grip else 0) if s.brake_stuck == BRAKE_WORKING else 1 if s.brake_stuck == BRAKE_STUCK_ON else 0
     m1.q_R = thermal.damping(k1.h_R_L, k1.rise, m1.heat)
     m2.q_R = thermal.damping(k2.h_R_L, k2.rise, m2.heat)
     s.torque_limited = s.voltage_limited = s.end_stop = s.stopping = s.present = 0
@@ -341,7 +346,7 @@ def plant_step(s, c, external):
     delta_1, delta_2 = m1.theta * c.per_N - s.theta, m2.theta * c.per_N - s.theta
     if c.uneven:
         delta_1 += gear_train.transmission_error(m1.theta * c.per_reducer, c)
-        delta_2 += gear_train.transmission_error(m2.theta * c.per_reducer + QUARTER_TURN, c)
+        delta_2 += gear_train.transmission_error(m2.theta * c.per_reducer + SECOND_PINION_OFFSET_RAD, c)
     half_1 = half_2 = c.half_lash
     if s.toothless:
         half_1 += gear_train.gap(m1.theta * c.per_reducer, s.teeth[0], c.pinion_ratio)
@@ -382,7 +387,7 @@ def read(s, c, y):
     y.motor_position[1] = k2.rad * encoder.counts(m2.theta, k2.per_rad)
     y.motor_velocity[0] = _measured_speed(m1, k1)
     y.motor_velocity[1] = _measured_speed(m2, k2)
-    y.velocity = c.per_N * _mean(s, y.motor_velocity[0], y.motor_velocity[1])
+    y.velocity = c.per_N * _mean_motor_speed(s, y.motor_velocity[0], y.motor_velocity[1])
     y.motor_torque[0] = _measured_torque(m1, k1)
     y.motor_torque[1] = _measured_torque(m2, k2)
     y.torque = c.N * (y.motor_torque[0] + y.motor_torque[1])

@@ -15,32 +15,34 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 
 PHASES = ('enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brakes')
-ENABLED, STOPPING, ENGAGING, DISABLED, RELEASING = range(len(PHASES))
+PHASE_ENABLED, PHASE_STOPPING, PHASE_ENGAGING_BRAKES, PHASE_DISABLED, PHASE_RELEASING_BRAKES = range(len(PHASES))
 
-ENABLE, DISABLE, EMERGENCY_STOP, RESET_FAULTS = range(4)
-REQUESTS = {'adu/enable': ENABLE, 'adu/disable': DISABLE, 'adu/emergency_stop': EMERGENCY_STOP,
-            'adu/reset_faults': RESET_FAULTS}
+REQUEST_ENABLE, REQUEST_DISABLE, REQUEST_EMERGENCY_STOP, REQUEST_RESET_FAULTS = range(4)
+REQUEST_CODES = {'adu/enable': REQUEST_ENABLE, 'adu/disable': REQUEST_DISABLE,
+                 'adu/emergency_stop': REQUEST_EMERGENCY_STOP,
+                 'adu/reset_faults': REQUEST_RESET_FAULTS}
 """What can be asked for, by the name of its service."""
 
-GRANTED, FAULT_LATCHED, EMERGENCY_LATCHED, MOVING, CAUSE_PERSISTS = range(5)
-REFUSALS = {
-    FAULT_LATCHED: 'a fault is latched (adu/reset_faults)',
-    EMERGENCY_LATCHED: 'an emergency stop is latched (adu/reset_faults)',
-    MOVING: 'the axes still move',
-    CAUSE_PERSISTS: 'the cause is still there'}
+REPLY_ACCEPTED, REPLY_FAULT_LATCHED, REPLY_EMERGENCY_LATCHED, REPLY_AXES_MOVING, REPLY_CAUSE_PERSISTS = range(5)
+REFUSAL_REASONS = {
+    REPLY_FAULT_LATCHED: 'a fault is latched (adu/reset_faults)',
+    REPLY_EMERGENCY_LATCHED: 'an emergency stop is latched (adu/reset_faults)',
+    REPLY_AXES_MOVING: 'the axes still move',
+    REPLY_CAUSE_PERSISTS: 'the cause is still there'}
 """Answers to a request, and why it is not granted."""
 
-TOLD = topics.BY_NAME['adu/state'].texts
-STOPPED = TOLD.index('emergency stop')
-FIRST_PHASE = TOLD.index(PHASES[STOPPING]) - STOPPING
-"""Codes of adu/state below len(TOLD) are places in it: which motors are lost while it is enabled, then the phases."""
+STATE_TEXTS = topics.TOPIC_BY_NAME['adu/state'].texts
+STATE_CODE_EMERGENCY_STOP = STATE_TEXTS.index('emergency stop')
+PHASE_CODE_OFFSET = STATE_TEXTS.index(PHASES[PHASE_STOPPING]) - PHASE_STOPPING
+"""Codes of adu/state below len(STATE_TEXTS) are places in it: which motors are lost while it is enabled, then the
+phases."""
 
-FAULTY, EMERGENCY = 16, 32
-AZIMUTH_FAULTS = 6
-ELEVATION_FAULTS = AZIMUTH_FAULTS + len(faults.FAULTS)
+FAULT_BIT, EMERGENCY_STOP_BIT = 16, 32
+AZIMUTH_FAULTS_SHIFT = 6
+ELEVATION_FAULTS_SHIFT = AZIMUTH_FAULTS_SHIFT + len(faults.AXIS_FAULTS)
 """Bits of the other codes: that there are faults, emergency stop, fault words."""
 
-STANDSTILL = 1e-3
+STANDSTILL_RATE_RAD_S = 1e-3
 """Load rate [rad/s] below which an axis stands."""
 
 
@@ -53,7 +55,7 @@ def tripped(s):
 @compiled
 def permitted(s):
     """Whether the drive may follow commands."""
-    return s.wanted and not s.emergency and not tripped(s) and stow_pins.clear(s.pins)
+    return s.wanted and not s.emergency and not tripped(s) and stow_pins.pins_out(s.pins)
 
 
 @compiled
@@ -61,62 +63,63 @@ def condition(s):
     """Code of adu/state, 0 for 'enabled': all that `described` tells, in one number, so that it changes when something
     of it does."""
     if tripped(s):
-        return (FAULTY | (EMERGENCY if s.emergency else 0)
-                | s.azimuth.faults << AZIMUTH_FAULTS | s.elevation.faults << ELEVATION_FAULTS)
+        return (FAULT_BIT | (EMERGENCY_STOP_BIT if s.emergency else 0)
+                | s.azimuth.faults << AZIMUTH_FAULTS_SHIFT | s.elevation.faults << ELEVATION_FAULTS_SHIFT)
     if s.emergency:
-        return STOPPED
-    if s.phase == ENABLED and permitted(s):
-        return ((1 if s.azimuth.faults & faults.MOTORS_LOST else 0)
-                | (2 if s.elevation.faults & faults.MOTORS_LOST else 0))
+        return STATE_CODE_EMERGENCY_STOP
+    if s.phase == PHASE_ENABLED and permitted(s):
+        return ((1 if s.azimuth.faults & faults.MOTORS_LOST_BITS else 0)
+                | (2 if s.elevation.faults & faults.MOTORS_LOST_BITS else 0))
     if permitted(s):
-        return FIRST_PHASE + (RELEASING if s.phase == DISABLED else s.phase)
-    return FIRST_PHASE + (STOPPING if s.phase == ENABLED else s.phase)
+        return PHASE_CODE_OFFSET + (PHASE_RELEASING_BRAKES if s.phase == PHASE_DISABLED else s.phase)
+    return PHASE_CODE_OFFSET + (PHASE_STOPPING if s.phase == PHASE_ENABLED else s.phase)
 
 
-def described(condition):
+def state_text(condition):
     """'enabled' when the drive follows commands, with what it lacks; otherwise why it does not."""
-    if condition < len(TOLD):
-        return TOLD[condition]
-    tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', AZIMUTH_FAULTS), ('elevation', ELEVATION_FAULTS))
-               for kind in faults.names(condition >> shift & faults.ALL)]
-    return ('emergency stop; ' if condition & EMERGENCY else '') + 'fault: ' + ', '.join(tripped)
+    if condition < len(STATE_TEXTS):
+        return STATE_TEXTS[condition]
+    tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', AZIMUTH_FAULTS_SHIFT),
+                                                    ('elevation', ELEVATION_FAULTS_SHIFT))
+               for kind in faults.names(condition >> shift & faults.ALL_FAULT_BITS)]
+    return ('emergency stop; ' if condition & EMERGENCY_STOP_BIT else '') + 'fault: ' + ', '.join(tripped)
 
 
 @compiled
-def moves(axis, c):
+def is_moving(axis, c):
     """Whether an axis turns, by its motor encoders."""
-    return abs(axis.motor_1.measured + axis.motor_2.measured) * c.per_2N > STANDSTILL
+    return abs(axis.motor_1.measured + axis.motor_2.measured) * c.per_2N > STANDSTILL_RATE_RAD_S
 
 
 @compiled
 def _next(s, c):
     allowed = permitted(s)
-    if faults.drops(s.azimuth.faults) or faults.drops(s.elevation.faults):
-        return DISABLED
-    if s.phase == ENABLED:
-        return ENABLED if allowed else STOPPING
-    if s.phase == STOPPING:
+    if faults.removes_torque(s.azimuth.faults) or faults.removes_torque(s.elevation.faults):
+        return PHASE_DISABLED
+    if s.phase == PHASE_ENABLED:
+        return PHASE_ENABLED if allowed else PHASE_STOPPING
+    if s.phase == PHASE_STOPPING:
         if s.age >= c.stop_periods:
-            return DISABLED
+            return PHASE_DISABLED
         turning = s.azimuth.rate != 0.0 or s.elevation.rate != 0.0
-        turning |= moves(s.azimuth, c.azimuth) or moves(s.elevation, c.elevation)
-        return STOPPING if turning else ENGAGING
-    if s.phase == ENGAGING:
-        return DISABLED if s.brake_age >= c.engage_periods else ENGAGING
-    if s.phase == DISABLED:
-        return RELEASING if allowed else DISABLED
+        turning |= is_moving(s.azimuth, c.azimuth) or is_moving(s.elevation, c.elevation)
+        return PHASE_STOPPING if turning else PHASE_ENGAGING_BRAKES
+    if s.phase == PHASE_ENGAGING_BRAKES:
+        return PHASE_DISABLED if s.brake_age >= c.engage_periods else PHASE_ENGAGING_BRAKES
+    if s.phase == PHASE_DISABLED:
+        return PHASE_RELEASING_BRAKES if allowed else PHASE_DISABLED
     if not allowed:
-        return ENGAGING
-    return ENABLED if s.brake_age >= c.release_periods else RELEASING
+        return PHASE_ENGAGING_BRAKES
+    return PHASE_ENABLED if s.brake_age >= c.release_periods else PHASE_RELEASING_BRAKES
 
 
 @compiled
 def _advance_pins(s, c, wanted):
     """One control period of the stow pins, which move while the drive is off; wanted: code of acu/stow_pins."""
     az, el, k = s.azimuth, s.elevation, c.pins
-    stow_pins.order(s.pins, k, wanted, math.nan if moves(az, c.azimuth) else c.azimuth.rad * az.reading,
-                    math.nan if moves(el, c.elevation) else c.elevation.rad * el.reading)
-    if s.phase == DISABLED and not s.emergency:
+    stow_pins.command_pins(s.pins, k, wanted, math.nan if is_moving(az, c.azimuth) else c.azimuth.rad * az.reading,
+                           math.nan if is_moving(el, c.elevation) else c.elevation.rad * el.reading)
+    if s.phase == PHASE_DISABLED and not s.emergency:
         az.faults |= stow_pins.advance(s.pins, k, 0)
         el.faults |= stow_pins.advance(s.pins, k, 1)
 
@@ -129,7 +132,7 @@ def advance(s, c, pins):
     phase = _next(s, c)
     s.age = s.age + 1 if phase == s.phase else 0
     s.phase = phase
-    applied = phase == DISABLED or phase == ENGAGING
+    applied = phase == PHASE_DISABLED or phase == PHASE_ENGAGING_BRAKES
     s.brake_age = s.brake_age + 1 if applied == s.applied else 0
     s.applied = applied
     return s.brake_age >= c.engage_periods if applied else s.brake_age < c.release_periods
@@ -137,26 +140,26 @@ def advance(s, c, pins):
 
 @compiled
 def request(s, c, what):
-    """Ask something of the drive between two periods: GRANTED, or why not. It acts in the next period.
+    """Ask something of the drive between two periods: REPLY_ACCEPTED, or why not. It acts in the next period.
 
     Faults and emergency stop can be reset when both axes stand and no cause is present; the drive is then enabled
     again by itself if it was before.
     """
-    if what == DISABLE:
+    if what == REQUEST_DISABLE:
         s.wanted = 0
-    elif what == EMERGENCY_STOP:
+    elif what == REQUEST_EMERGENCY_STOP:
         s.emergency = 1
-    elif what == ENABLE:
+    elif what == REQUEST_ENABLE:
         if tripped(s):
-            return FAULT_LATCHED
+            return REPLY_FAULT_LATCHED
         if s.emergency:
-            return EMERGENCY_LATCHED
+            return REPLY_EMERGENCY_LATCHED
         s.wanted = 1
     else:
-        if moves(s.azimuth, c.azimuth) or moves(s.elevation, c.elevation):
-            return MOVING
+        if is_moving(s.azimuth, c.azimuth) or is_moving(s.elevation, c.elevation):
+            return REPLY_AXES_MOVING
         if s.azimuth.present | s.elevation.present:
-            return CAUSE_PERSISTS
+            return REPLY_CAUSE_PERSISTS
         s.azimuth.faults = s.elevation.faults = s.emergency = 0
         stow_pins.retry(s.pins)
-    return GRANTED
+    return REPLY_ACCEPTED

@@ -12,35 +12,38 @@ from adu_drive.params import AduParameters, whole_speed_periods
 from adu_drive.plant import gimbal, mount, wind, wind_field
 from pedestal_common.compiled import compiled, inlined
 
-RING = 256
+COMMAND_RING_SIZE = 256
 """Commands kept for the transport delay: more than twice MAX_DELAY over the shortest period, once of its own and once
 injected."""
 
-LONG_AGO = 1 << 40
+INITIAL_AGE_PERIODS = 1 << 40
 """Periods since the brakes were last moved, at the start."""
 
-LARGEST = 1e6
+MAX_PLAUSIBLE_INPUT = 1e6
 """Inputs beyond this (rad/s, Nm, rad/s2), infinite or NaN are not believed."""
 
-_AXIS_INPUTS = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
+_AXIS_INPUTS_DTYPE = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
 
-INPUTS = np.dtype([('azimuth', _AXIS_INPUTS), ('elevation', _AXIS_INPUTS),
-                   ('base_acceleration', 'f8', (3,)), ('enable', 'i8'), ('base_rate', 'f8', (3,)), ('pins', 'i8')],
-                  align=True)
+INPUTS_DTYPE = np.dtype([('azimuth', _AXIS_INPUTS_DTYPE), ('elevation', _AXIS_INPUTS_DTYPE),
+                         ('base_acceleration', 'f8', (3,)), ('enable', 'i8'), ('base_rate', 'f8', (3,)),
+                         ('pins', 'i8')],
+                        align=True)
 """Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm].
 base_acceleration, base_rate: angular acceleration [rad/s2] and rate [rad/s] of the deck, FLU.
 enable 1: follow, 0: controlled stop, at once whatever the delay. pins: code of acu/stow_pins."""
 
-_AXIS_OUTPUTS = np.dtype([
+_AXIS_OUTPUTS_DTYPE = np.dtype([
     ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
     ('motor_position', 'f8', (2,)), ('motor_velocity', 'f8', (2,)), ('motor_torque', 'f8', (2,)), ('bias', 'f8'),
     ('torque_limited', 'i8'), ('voltage_limited', 'i8'), ('end_stop', 'i8'), ('stopping', 'i8'),
     ('faults', 'i8'), ('thermal_load', 'f8', (2,)),
     ('load_position', 'f8'), ('load_velocity', 'f8'), ('true_torque', 'f8', (2,))], align=True)
 
-OUTPUTS = np.dtype([('azimuth', _AXIS_OUTPUTS), ('elevation', _AXIS_OUTPUTS), ('invalid_command', 'i8'),
-                    ('phase', 'i8'), ('following', 'i8'), ('wanted', 'i8'), ('emergency', 'i8'), ('braked', 'i8'),
-                    ('condition', 'i8'), ('pins', 'i8')], align=True)
+OUTPUTS_DTYPE = np.dtype([('azimuth', _AXIS_OUTPUTS_DTYPE), ('elevation', _AXIS_OUTPUTS_DTYPE),
+                          ('invalid_command', 'i8'),
+                          ('phase', 'i8'), ('following', 'i8'), ('wanted', 'i8'), ('emergency', 'i8'),
+                          ('braked', 'i8'),
+                          ('condition', 'i8'), ('pins', 'i8')], align=True)
 """At t_k+1, per axis:
 
 position          load encoder [rad]
@@ -58,7 +61,8 @@ load_position, load_velocity                    the truth: where the beam points
                   flexible) [rad] and how fast it turns [rad/s]; no controller knows it
 true_torque       K_t i_q of motor 1 and 2, for tests; never published
 
-invalid_command   1 when an input of this call was not finite (or beyond LARGEST): the command counts as enable 0,
+invalid_command   1 when an input of this call was not finite (or beyond MAX_PLAUSIBLE_INPUT): the command counts as
+enable 0,
                   a disturbance as 0
 phase             of drive_state.PHASES; following: 1 when enabled and nothing stands against it at t_k+1
 wanted            1 unless the drive was asked to be disabled
@@ -80,7 +84,7 @@ def _record(values):
 
 
 def _constants(params, substeps):
-    h = axis.CURRENT_PERIOD / substeps
+    h = axis.CURRENT_LOOP_PERIOD_S / substeps
     bodies = gimbal.constants(params)
     return _record({'azimuth': axis.constants(params.azimuth, h, bodies['rigid']),
                     'elevation': axis.constants(params.elevation, h), 'bodies': bodies,
@@ -101,32 +105,34 @@ def _initial_state(params):
         p, theta = getattr(params, name), getattr(params, f'initial_{name}')
         external = torque + field - p.load.unbalance * math.cos(theta)
         axes[name] = axis.initial_state(p, theta, external)
-    return _record({**axes, 'rate': np.zeros((RING, 2)), 'torque': np.zeros((RING, 2)),
-                    'enable': np.ones(RING, np.int64), 'k': 0, 'last_rate': np.zeros(2),
-                    'phase': drive_state.ENABLED if enabled else drive_state.DISABLED, 'age': 0,
-                     'wanted': int(params.initially_enabled), 'emergency': 0, 'tick': -LONG_AGO, 'late_ticks': 0,
-                     'applied': int(not enabled), 'brake_age': LONG_AGO, 'braked': int(not enabled), 'following': 0,
+    return _record({**axes, 'rate': np.zeros((COMMAND_RING_SIZE, 2)), 'torque': np.zeros((COMMAND_RING_SIZE, 2)),
+                    'enable': np.ones(COMMAND_RING_SIZE, np.int64), 'k': 0, 'last_rate': np.zeros(2),
+                    'phase': drive_state.PHASE_ENABLED if enabled else drive_state.PHASE_DISABLED, 'age': 0,
+                     'wanted': int(params.initially_enabled), 'emergency': 0, 'tick': -INITIAL_AGE_PERIODS,
+                    'late_ticks': 0,
+                     'applied': int(not enabled), 'brake_age': INITIAL_AGE_PERIODS, 'braked': int(not enabled),
+                    'following': 0,
                      'pins': stow_pins.initial_state(params)})
 
 
-CONSTANTS = _constants(AduParameters(), 2).dtype
-STATE = _initial_state(AduParameters()).dtype
+CONSTANTS_DTYPE = _constants(AduParameters(), 2).dtype
+STATE_DTYPE = _initial_state(AduParameters()).dtype
 """One dtype object for all records: numba knows it again at once, an equal one it compares anew (3 us a call)."""
 
 
 def constants(params: AduParameters, substeps: int = 2) -> np.ndarray:
     """Hoisted constants, (1,) record; `substeps` plant sub-steps in a current-loop period (2: h = 50 us)."""
-    return _constants(params, substeps).view(CONSTANTS)
+    return _constants(params, substeps).view(CONSTANTS_DTYPE)
 
 
 def initial_state(params: AduParameters) -> np.ndarray:
     """At rest at the initial angles, in balance with wind (t = 0) and unbalance, bias in place: (1,) record."""
-    return _initial_state(params).view(STATE)
+    return _initial_state(params).view(STATE_DTYPE)
 
 
 @compiled
-def _believed(x):
-    return abs(x) <= LARGEST
+def _plausible(x):
+    return abs(x) <= MAX_PLAUSIBLE_INPUT
 
 
 @compiled
@@ -140,7 +146,7 @@ def inertial_torques(azimuth, J_azimuth, J_elevation, x, y, z):
 
 
 @compiled
-def _turn(s, c, w, w_dot):
+def _apply_rigid_body_torques(s, c, w, w_dot):
     """Set the inertia of azimuth and the torques that turning bodies put on both axes, constant over the period.
 
     An axis feels the other's acceleration of the period before: M_AE^2 < M_AA M_EE, so that dies out.
@@ -166,11 +172,11 @@ def _external(s, c, u):
         T_azimuth, T_elevation = T_azimuth + of_field[0], T_elevation + of_field[1]
     T_azimuth += s.azimuth.gust - c.azimuth.unbalance * math.cos(azimuth)
     T_elevation += s.elevation.gust - c.elevation.unbalance * math.cos(elevation)
-    believed = _believed(x) and _believed(y) and _believed(z)
+    believed = _plausible(x) and _plausible(y) and _plausible(z)
     if not believed:
         x = y = z = 0.0
     if c.bodies.rigid:
-        _turn(s, c, u.base_rate, (x, y, z))
+        _apply_rigid_body_torques(s, c, u.base_rate, (x, y, z))
     else:
         s.azimuth.deck, s.elevation.deck = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
     return T_azimuth + s.azimuth.deck, T_elevation + s.elevation.deck, believed
@@ -179,9 +185,9 @@ def _external(s, c, u):
 @compiled
 def _receive(s, u, disturbance_believed):
     """Put the command of step k into the ring; returns whether it was believable."""
-    slot = s.k % RING
-    believed = (disturbance_believed and _believed(u.azimuth.rate) and _believed(u.azimuth.torque)
-                and _believed(u.elevation.rate) and _believed(u.elevation.torque))
+    slot = s.k % COMMAND_RING_SIZE
+    believed = (disturbance_believed and _plausible(u.azimuth.rate) and _plausible(u.azimuth.torque)
+                and _plausible(u.elevation.rate) and _plausible(u.elevation.torque))
     s.enable[slot] = 1 if believed and u.enable == 1 else 0
     if believed:
         s.rate[slot, 0], s.rate[slot, 1] = u.azimuth.rate, u.elevation.rate
@@ -190,7 +196,7 @@ def _receive(s, u, disturbance_believed):
 
 
 @compiled
-def _point(c, azimuth, elevation):
+def _beam_from_axes(c, azimuth, elevation):
     """Turn the angles and rates of the axes into those of the beam, in the outputs of both."""
     angles, rates = mount.beam(c.mount, azimuth.load_position, elevation.load_position, azimuth.load_velocity,
                                elevation.load_velocity)
@@ -204,10 +210,10 @@ def read(s, c, y):
     axis.read(s.azimuth, c.azimuth, y.azimuth)
     axis.read(s.elevation, c.elevation, y.elevation)
     if not c.mount.true:
-        _point(c, y.azimuth, y.elevation)
+        _beam_from_axes(c, y.azimuth, y.elevation)
     y.phase, y.wanted, y.emergency, y.braked = s.phase, s.wanted, s.emergency, s.braked
-    y.following = s.phase == drive_state.ENABLED and drive_state.permitted(s)
-    y.condition, y.pins = drive_state.condition(s), stow_pins.told(s.pins, c.pins)
+    y.following = s.phase == drive_state.PHASE_ENABLED and drive_state.permitted(s)
+    y.condition, y.pins = drive_state.condition(s), stow_pins.state_code(s.pins, c.pins)
 
 
 @compiled
@@ -219,7 +225,7 @@ def request(s, c, y, what):
 
 
 @compiled
-def _begin(s, c, u, y):
+def _begin_period(s, c, u, y):
     """What happens once in a period, at its beginning: external torques, the command, brakes and windings."""
     s.azimuth.external, s.elevation.external, believed = _external(s, c, u)
     y.invalid_command = 0 if _receive(s, u, believed) else 1
@@ -231,11 +237,11 @@ def _begin(s, c, u, y):
 
 
 @compiled
-def _obey(s, c, u, j):
+def _apply_command(s, c, u, j):
     """Take the command that is obeyed in speed-loop period j out of the ring; 1 where that enables the drive."""
     s.tick = max(s.tick, s.k * c.speed_ticks + j - c.delay_ticks - s.late_ticks)    # late: the last one stays
-    slot = (s.tick // c.speed_ticks) % RING     # before the first command: a slot still empty, rate 0
-    s.following = s.enable[slot] if s.phase == drive_state.ENABLED and u.enable == 1 else 0
+    slot = (s.tick // c.speed_ticks) % COMMAND_RING_SIZE     # before the first command: a slot still empty, rate 0
+    s.following = s.enable[slot] if s.phase == drive_state.PHASE_ENABLED and u.enable == 1 else 0
     az, el = s.azimuth, s.elevation
     az.asked_rate, az.asked_torque = s.rate[slot, 0], s.torque[slot, 0]
     el.asked_rate, el.asked_torque = s.rate[slot, 1], s.torque[slot, 1]
@@ -244,7 +250,7 @@ def _obey(s, c, u, j):
 @inlined
 def _speed_control(s, a, c):
     """One speed-loop period of axis a of a drive s."""
-    axis.speed_control(a, c, a.asked_rate, a.asked_torque, s.following, s.phase != drive_state.DISABLED,
+    axis.speed_control(a, c, a.asked_rate, a.asked_torque, s.following, s.phase != drive_state.PHASE_DISABLED,
                        not s.braked)
 
 
@@ -252,7 +258,7 @@ def _speed_control(s, a, c):
 def between_speed_periods(s, c, substeps):
     """Current loops and plant of one axis, or of lanes of them, from one speed-loop period to the next."""
     axes = range(count(s))
-    for _ in range(axis.CURRENT_TICKS):
+    for _ in range(axis.CURRENT_LOOP_STEP_COUNT):
         for i in axes:
             axis.current_control(at(s, i).motor_1, at(c, i).motor_1)
             axis.current_control(at(s, i).motor_2, at(c, i).motor_2)
@@ -263,14 +269,15 @@ def between_speed_periods(s, c, substeps):
 
 @compiled
 def step(s, c, u, y):
-    """One control period from t_k to t_k+1. Records STATE, CONSTANTS, INPUTS, OUTPUTS, or lanes.Lanes of them, whose
+    """One control period from t_k to t_k+1. Records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE, or
+    lanes.Lanes of them, whose
     periods and sub-steps are those of the first; s and y are written."""
     drives = range(count(s))
     for i in drives:
-        _begin(at(s, i), at(c, i), at(u, i), at(y, i))
+        _begin_period(at(s, i), at(c, i), at(u, i), at(y, i))
     for j in range(at(c, 0).speed_ticks):
         for i in drives:
-            _obey(at(s, i), at(c, i), at(u, i), j)
+            _apply_command(at(s, i), at(c, i), at(u, i), j)
         for i in drives:
             _speed_control(at(s, i), at(s, i).azimuth, at(c, i).azimuth)
         for i in drives:

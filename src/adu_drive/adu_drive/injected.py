@@ -4,35 +4,35 @@ import numpy as np
 from adu_drive import axis
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
-from pedestal_common.injection import schedule, spoil, table
+from pedestal_common.injection import message_faults, schedule, table
 
-MESSAGES = spoil.codes('adu')
-Fault = codes([fault.name for fault in table.FAULTS['adu']])
+DRIVE_MESSAGE_FAULT_CODES = message_faults.codes('adu')
+Fault = codes([fault.name for fault in table.INJECTED_FAULTS['adu']])
 
-STUCK = axis.STUCK_ON, axis.STUCK_OFF
+STUCK_BRAKE_CONDITIONS = axis.BRAKE_STUCK_ON, axis.BRAKE_STUCK_OFF
 """By the option of brake_stuck."""
 
-INJECTED = np.dtype([('bias', 'f8', (2,)), ('said', spoil.SPOILT)], align=True)
+DRIVE_INJECTED_DTYPE = np.dtype([('bias', 'f8', (2,)), ('said', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
 """bias: of the rates on joint_states [rad/s]; said: what spoils joint_states and, frozen, adu/motor_states; said.drop
 is 1 while no command is heard."""
 
-JOINTS, MOTORS = 'joint_states', 'adu/motor_states'
+JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC = 'joint_states', 'adu/motor_states'
 
 
 @compiled
-def _mend(s):
+def _clear_faults(s):
     """Nothing of an axis is broken."""
     s.motor_lost[0] = s.motor_lost[1] = s.stuck = s.toothless = 0
     s.jump = s.gust = s.teeth[0] = s.teeth[1] = 0.0
-    s.brake_stuck = axis.WORKS
+    s.brake_stuck = axis.BRAKE_WORKING
 
 
 @compiled
-def _break(m, fault, values):
+def _apply_fault(m, fault, values):
     """What a fault does to the records of the drive (unit.RECORD)."""
     i = int(values[0])
     s, c = (m.state.azimuth, m.constants.azimuth) if i == 0 else (m.state.elevation, m.constants.elevation)
-    spoil.apply(m.injected.said, MESSAGES, fault, values)
+    message_faults.apply(m.injected.said, DRIVE_MESSAGE_FAULT_CODES, fault, values)
     if fault == Fault.MOTOR_LOSS:
         s.motor_lost[int(values[1])] = 1
     elif fault == Fault.ENCODER_JUMP:
@@ -40,7 +40,7 @@ def _break(m, fault, values):
     elif fault == Fault.ENCODER_STUCK:
         s.stuck = 1
     elif fault == Fault.BRAKE_STUCK:
-        s.brake_stuck = STUCK[int(values[1])]
+        s.brake_stuck = STUCK_BRAKE_CONDITIONS[int(values[1])]
     elif fault == Fault.LOST_TOOTH:
         s.teeth[int(values[1])], s.toothless = values[2], 1
     elif fault == Fault.GUST:
@@ -54,33 +54,33 @@ def _break(m, fault, values):
 
 
 @compiled
-def take(m, stamp):
+def apply_due_faults(m, stamp):
     """Mend everything, then break what is broken in the step of a stamp [ns]."""
     e = m.injected
-    _mend(m.state.azimuth)
-    _mend(m.state.elevation)
-    spoil.restore(e.said)
+    _clear_faults(m.state.azimuth)
+    _clear_faults(m.state.elevation)
+    message_faults.clear(e.said)
     m.state.late_ticks = m.state.pins.stuck[0] = m.state.pins.stuck[1] = 0
     e.bias[0] = e.bias[1] = 0.0
     schedule.begin(m.schedule)
-    for i in range(schedule.SLOTS):
+    for i in range(schedule.MAX_ACTIVE_FAULTS):
         row = m.schedule.row[i]
         if schedule.in_force(m.schedule, row, stamp):
-            _break(m, row.fault, row.values)
+            _apply_fault(m, row.fault, row.values)
 
 
 @compiled
-def spoil_messages(e, stamp, outputs):
+def corrupt_messages(e, stamp, outputs):
     """What the drive says of a step, spoilt."""
-    joints, motors = outputs[JOINTS], outputs[MOTORS]
+    joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     for i in range(2):
         joints.velocity[i] += e.bias[i]
         if e.said.sigma > 0.0:
-            joints.position[i] += spoil.noise(e.said, stamp, i)
-    spoil.numbers(e.said, joints.position, 0)
-    spoil.numbers(e.said, joints.velocity, 2)
-    spoil.numbers(e.said, joints.effort, 4)
+            joints.position[i] += message_faults.noise(e.said, stamp, i)
+    message_faults.numbers(e.said, joints.position, 0)
+    message_faults.numbers(e.said, joints.velocity, 2)
+    message_faults.numbers(e.said, joints.effort, 4)
     if e.said.freeze != 0:
-        spoil.numbers(e.said, motors.position, 6)
-        spoil.numbers(e.said, motors.velocity, 10)
-        spoil.numbers(e.said, motors.effort, 14)
+        message_faults.numbers(e.said, motors.position, 6)
+        message_faults.numbers(e.said, motors.velocity, 10)
+        message_faults.numbers(e.said, motors.effort, 14)

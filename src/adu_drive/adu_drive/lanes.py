@@ -1,6 +1,7 @@
 """The laws of the drive on many drives at once, from the same source: records beside each other on lanes.
 
-A record of 8-byte numbers becomes rows of one flat array, row r of lane i at r WIDTH + i (a structure of arrays). A
+A record of 8-byte numbers becomes rows of one flat array, row r of lane i at r LANE_COUNT + i (a structure of
+arrays). A
 law that works on the attributes of a record, `s.omega += c.h * a`, compiles for one Lane as it stands; inlined into a
 loop over the lanes, LLVM turns it into vector instructions, which have the bits of the scalar ones. What works on
 records and on Lanes alike goes over them by
@@ -29,14 +30,14 @@ from numba.extending import (
     type_callable,
 )
 
-WIDTH = 32
+LANE_COUNT = 32
 """Lanes of an array. With 16 LLVM does not vectorise, 64 need more of the nearest cache than there is."""
 
-WORD = 8
+WORD_BYTES = 8
 """Bytes of every number."""
 
 
-class _Place(types.Type):
+class _LanePointer(types.Type):
     """A pointer to the first word of something in one lane. known: ((attribute, number), ...) that are the same in all
     lanes and constants of the compiled code."""
     dtype = types.float64
@@ -47,15 +48,15 @@ class _Place(types.Type):
         super().__init__(f'{type(self).__name__}_{digest}')
 
 
-class Lane(_Place):
+class Lane(_LanePointer):
     """One lane of a record; what: its types.Record."""
 
 
-class Lanes(_Place):
+class Lanes(_LanePointer):
     """All lanes of a record; what: its types.Record."""
 
 
-class LaneArray(_Place):
+class LaneArray(_LanePointer):
     """One lane of an array; what: its types.NestedArray."""
 
 
@@ -64,7 +65,7 @@ for place in (Lane, Lanes, LaneArray):
 
 
 def count(records):
-    """How many records there are: 1 of a record, WIDTH of Lanes; constant in compiled code."""
+    """How many records there are: 1 of a record, LANE_COUNT of Lanes; constant in compiled code."""
     return 1
 
 
@@ -81,7 +82,7 @@ def _type_count(context):
 @lower_builtin(count, types.Record)
 @lower_builtin(count, Lanes)
 def _count(context, builder, signature, args):
-    return context.get_constant(types.intp, WIDTH if isinstance(signature.args[0], Lanes) else 1)
+    return context.get_constant(types.intp, LANE_COUNT if isinstance(signature.args[0], Lanes) else 1)
 
 
 @type_callable(at)
@@ -108,16 +109,16 @@ def _member(place, attribute):
     if isinstance(field, types.Record):
         return type(place)(field, place.known)
     number = field.dtype if isinstance(field, types.NestedArray) else field
-    if not isinstance(number, types.Record) and number.bitwidth != 8 * WORD:
-        raise NumbaTypeError(f'{attribute} is {number}: numbers on lanes have {WORD} bytes')
+    if not isinstance(number, types.Record) and number.bitwidth != 8 * WORD_BYTES:
+        raise NumbaTypeError(f'{attribute} is {number}: numbers on lanes have {WORD_BYTES} bytes')
     return LaneArray(field, place.known) if isinstance(field, types.NestedArray) else field
 
 
-def _further(context, builder, pointer, words):
+def _offset_pointer(context, builder, pointer, words):
     """A pointer some words, a constant or a value, further down its lane."""
     if isinstance(words, int):
-        return builder.gep(pointer, [context.get_constant(types.intp, words * WIDTH)], inbounds=True)
-    rows = builder.mul(words, context.get_constant(types.intp, WIDTH))
+        return builder.gep(pointer, [context.get_constant(types.intp, words * LANE_COUNT)], inbounds=True)
+    rows = builder.mul(words, context.get_constant(types.intp, LANE_COUNT))
     return builder.gep(pointer, [rows], inbounds=True)
 
 
@@ -142,17 +143,17 @@ for place in (Lane, Lanes):
 @lower_getattr_generic(Lanes)
 def _get(context, builder, place, value, attribute):
     member, known = _member(place, attribute), dict(place.known)
-    if attribute in known and not isinstance(member, _Place):
+    if attribute in known and not isinstance(member, _LanePointer):
         return context.get_constant(member, known[attribute])
-    pointer = _further(context, builder, value, place.what.offset(attribute) // WORD)
-    return pointer if isinstance(member, _Place) else builder.load(_word(context, builder, pointer, member))
+    pointer = _offset_pointer(context, builder, value, place.what.offset(attribute) // WORD_BYTES)
+    return pointer if isinstance(member, _LanePointer) else builder.load(_word(context, builder, pointer, member))
 
 
 @lower_setattr_generic(Lane)
 def _set(context, builder, signature, args, attribute):
     place, given = signature.args
     member = _member(place, attribute)
-    pointer = _further(context, builder, args[0], place.what.offset(attribute) // WORD)
+    pointer = _offset_pointer(context, builder, args[0], place.what.offset(attribute) // WORD_BYTES)
     builder.store(context.cast(builder, args[1], given, member), _word(context, builder, pointer, member))
 
 
@@ -186,7 +187,7 @@ class _SetItem(AbstractTemplate):
     def generic(self, args, keywords):
         array, index, _ = args
         found = _item(array, index) if isinstance(array, LaneArray) else None
-        if found and not isinstance(found[0], _Place):
+        if found and not isinstance(found[0], _LanePointer):
             return signature(types.none, array, found[1], found[0])
 
 
@@ -195,11 +196,11 @@ def _item_pointer(context, builder, array, index_type, pointer, index):
     many = isinstance(index_type, types.BaseTuple)
     indices = tuple(builder.extract_value(index, i) for i in range(len(index_type))) if many else (index,)
     shape, words = array.what.shape, context.get_constant(types.intp, 0)
-    size = array.what.dtype.size // WORD if isinstance(array.what.dtype, types.Record) else 1
+    size = array.what.dtype.size // WORD_BYTES if isinstance(array.what.dtype, types.Record) else 1
     for i, n in zip((*indices, *(None,) * (len(shape) - len(indices))), shape):
         words = builder.mul(words, context.get_constant(types.intp, n))
         words = words if i is None else builder.add(words, i)
-    return _further(context, builder, pointer, builder.mul(words, context.get_constant(types.intp, size)))
+    return _offset_pointer(context, builder, pointer, builder.mul(words, context.get_constant(types.intp, size)))
 
 
 @lower_builtin(operator.getitem, LaneArray, types.Any)
@@ -207,7 +208,7 @@ def _get_item(context, builder, signature, args):
     array, index = signature.args
     pointer = _item_pointer(context, builder, array, index, *args)
     item = signature.return_type
-    return pointer if isinstance(item, _Place) else builder.load(_word(context, builder, pointer, item))
+    return pointer if isinstance(item, _LanePointer) else builder.load(_word(context, builder, pointer, item))
 
 
 @lower_builtin(operator.setitem, LaneArray, types.Any, types.Any)
@@ -234,16 +235,17 @@ def view(dtype, known=()):
     return of
 
 
-def beside(records):
-    """Records (n,), n <= WIDTH, as the flat array (words WIDTH,) of their Lanes; lanes beyond n hold the last one."""
+def to_lanes(records):
+    """Records (n,), n <= LANE_COUNT, as the flat array (words LANE_COUNT,) of their Lanes; lanes beyond n hold the
+    last one."""
     words = _words(records)
-    lane = np.minimum(np.arange(WIDTH), len(records) - 1)
+    lane = np.minimum(np.arange(LANE_COUNT), len(records) - 1)
     return np.ascontiguousarray(words[lane].T).reshape(-1)
 
 
-def take_back(flat, records):
+def from_lanes(flat, records):
     """Put the first lanes of a flat array into records (n,)."""
-    _words(records)[...] = flat.reshape(-1, WIDTH).T[:len(records)]
+    _words(records)[...] = flat.reshape(-1, LANE_COUNT).T[:len(records)]
 
 
 def _words(records):

@@ -8,25 +8,25 @@ import numpy as np
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
-SPEED_PERIOD = 0.5e-3
+SPEED_LOOP_PERIOD_S = 0.5e-3
 """Period of the speed loop [s]; five current-loop periods."""
 
-MAX_DELAY = 0.1
+MAX_TRANSPORT_DELAY_S = 0.1
 """Longest transport delay [s]."""
 
 
-REACTION = 0.01
+BRAKING_REACTION_TIME_S = 0.01
 """Time of the speed loop until an axis brakes [s]."""
 
-BEHIND_EMERGENCY = math.radians(2.0)
+DEFAULT_BUFFER_MARGIN_RAD = math.radians(2.0)
 """Of the buffer, where its place is not given [rad]."""
 
 
 def whole_speed_periods(name, value):
     """How many speed-loop periods `value` [s] is; ParameterError when not a whole number."""
-    periods = round(value / SPEED_PERIOD)
-    if abs(value / SPEED_PERIOD - periods) > 1e-6:
-        raise ParameterError(f'{name} = {value:g} s: must be a multiple of {SPEED_PERIOD:g} s (the speed loop)')
+    periods = round(value / SPEED_LOOP_PERIOD_S)
+    if abs(value / SPEED_LOOP_PERIOD_S - periods) > 1e-6:
+        raise ParameterError(f'{name} = {value:g} s: must be a multiple of {SPEED_LOOP_PERIOD_S:g} s (the speed loop)')
     return periods
 
 
@@ -164,14 +164,14 @@ class LimitParameters(Parameters):
     @property
     def stopping_distance(self):
         """Way [rad] in which the axis stops from `rate`: v^2 / (2 a) + v t, t the time that the speed loop takes."""
-        return self.rate * self.rate / (2.0 * self.deceleration) + self.rate * REACTION
+        return self.rate * self.rate / (2.0 * self.deceleration) + self.rate * BRAKING_REACTION_TIME_S
 
     @property
     def switches(self):
         """Way [rad] from the ends of travel to the final switch, the emergency switch and the buffer."""
         final = self.final or self.stopping_distance
         emergency = self.emergency or 1.5 * final
-        return final, emergency, self.buffer or emergency + BEHIND_EMERGENCY
+        return final, emergency, self.buffer or emergency + DEFAULT_BUFFER_MARGIN_RAD
 
     def check(self):
         """Raises ParameterError for an empty travel, or a switch in front of which the axis does not stop."""
@@ -345,7 +345,7 @@ class ElevatingParameters(Parameters):
 class AduParameters(Parameters):
     """Parameters of the antenna drive unit."""
     period: float = parameter(5e-3, 1e-3, 0.02, 's', 'control period T, one command each')
-    transport_delay: float = parameter(0.0, 0.0, MAX_DELAY, 's', 'a command takes effect this much later')
+    transport_delay: float = parameter(0.0, 0.0, MAX_TRANSPORT_DELAY_S, 's', 'a command takes effect this much later')
     initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'at t = 0')
     initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'at t = 0')
     initially_enabled: bool = flag(True, 'false: brakes on until adu/enable')
@@ -422,7 +422,7 @@ class RunParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class AduNodeParameters(RunParameters, AduParameters):
     """Parameters of adu_node: the drive and its run."""
-    inject: str = text('', table.DOC)
+    inject: str = text('', table.INJECT_DOC)
     state_file: str = text('', 'where the simulated plant notes its angles, to go on there after a restart; empty: it '
                            'begins at the initial angles')
 

@@ -13,12 +13,12 @@ from adu_drive.controller import faults
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 
-STATES = topics.PINS
-OUT, MOVING, IN, FAILED = range(len(STATES))
+PIN_STATES = topics.PIN_STATE_TEXTS
+PIN_OUT, PIN_MOVING, PIN_IN, PIN_FAILED = range(len(PIN_STATES))
 """Of a pin, in the order in which adu/stow_pins tells them."""
 
-PLACES = topics.BY_NAME['acu/stow_pins'].texts
-ORDERED_OUT, ORDERED_IN = (PLACES.index(place) for place in ('out', 'in'))
+PIN_COMMAND_TEXTS = topics.TOPIC_BY_NAME['acu/stow_pins'].texts
+PIN_COMMAND_OUT, PIN_COMMAND_IN = (PIN_COMMAND_TEXTS.index(place) for place in ('out', 'in'))
 """Codes of acu/stow_pins."""
 
 
@@ -35,28 +35,28 @@ def initial_state(params):
     has; stuck: 1 of a pin that is broken so that it stays where it is."""
     pin_in = int(params.stow_pins and params.pins.initially_in)
     n = pin_in * constants(params)['travel']
-    return {'ordered': ORDERED_IN if pin_in else ORDERED_OUT, 'n': [n, n], 't': [0, 0], 'failed': [0, 0],
+    return {'ordered': PIN_COMMAND_IN if pin_in else PIN_COMMAND_OUT, 'n': [n, n], 't': [0, 0], 'failed': [0, 0],
             'stuck': [0, 0]}
 
 
 @compiled
 def state(s, c, i):
-    """Of the pin of axis i, of STATES."""
+    """Of the pin of axis i, of PIN_STATES."""
     if s.failed[i]:
-        return FAILED
-    return OUT if s.n[i] == 0 else IN if s.n[i] == c.travel else MOVING
+        return PIN_FAILED
+    return PIN_OUT if s.n[i] == 0 else PIN_IN if s.n[i] == c.travel else PIN_MOVING
 
 
 @compiled
-def told(s, c):
+def state_code(s, c):
     """Code of adu/stow_pins."""
-    return len(STATES) * state(s, c, 0) + state(s, c, 1) if c.fitted else topics.SILENT
+    return len(PIN_STATES) * state(s, c, 0) + state(s, c, 1) if c.fitted else topics.NO_TEXT_CODE
 
 
 @compiled
-def clear(s):
+def pins_out(s):
     """Whether the axes may move: both pins are out and stay there."""
-    return s.ordered == ORDERED_OUT and s.n[0] == 0 and s.n[1] == 0
+    return s.ordered == PIN_COMMAND_OUT and s.n[0] == 0 and s.n[1] == 0
 
 
 @compiled
@@ -66,17 +66,18 @@ def holds(s, c, i):
 
 
 @compiled
-def order(s, c, wanted, azimuth, elevation):
+def command_pins(s, c, wanted, azimuth, elevation):
     """Take an order of acu/stow_pins; azimuth, elevation: encoder angles [rad] of axes that stand, NaN of one that
     moves. An order to go in waits until both are in the window."""
-    if wanted == ORDERED_OUT:
-        _send(s, ORDERED_OUT)
-    elif wanted == ORDERED_IN and (abs(azimuth - c.hole[0]) <= c.window and abs(elevation - c.hole[1]) <= c.window):
-        _send(s, ORDERED_IN)
+    if wanted == PIN_COMMAND_OUT:
+        _set_command(s, PIN_COMMAND_OUT)
+    elif wanted == PIN_COMMAND_IN and (abs(azimuth - c.hole[0]) <= c.window
+                                       and abs(elevation - c.hole[1]) <= c.window):
+        _set_command(s, PIN_COMMAND_IN)
 
 
 @compiled
-def _send(s, place):
+def _set_command(s, place):
     if place != s.ordered:
         s.ordered, s.t[0], s.t[1] = place, 0, 0
 
@@ -84,7 +85,7 @@ def _send(s, place):
 @compiled
 def advance(s, c, i):
     """One period of the pin of axis i, whose drive is off: its fault word."""
-    end = c.travel if s.ordered == ORDERED_IN else 0
+    end = c.travel if s.ordered == PIN_COMMAND_IN else 0
     if s.n[i] == end or s.failed[i]:
         return faults.Bit.STOW_PIN if s.failed[i] else 0
     if not s.stuck[i]:

@@ -4,17 +4,17 @@ What moves is its unit: one drive, or one for each beam of an array.
 """
 import time
 
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import unit_node
 
-ACKNOWLEDGED_STEPS = 1000
+ACKNOWLEDGE_INTERVAL_STEPS = 1000
 """Lockstep: the drive waits this often until every reader has all; a reader's queue holds 5000 messages (Fast DDS), so
 a slow recorder slows the run and loses nothing."""
 
-LONGEST_WAIT = 0.1
+MAX_WAIT_S = 0.1
 """Seconds after which the clock is looked at again, however far away the next step is: it may be stepped."""
 
-SHARE = 0.25
+MIN_RECEIVE_FRACTION = 0.25
 """Realtime: the part of a period for which what arrives is heard, also by a drive that is late for its next step."""
 
 
@@ -34,7 +34,7 @@ class Timekeeper(unit_node.UnitNode):
     def begin(self):
         """Begin to count the steps, and with them the graph's time."""
         p = self.parameters
-        self.period_ns = round(p.period * SECOND)
+        self.period_ns = round(p.period * NS_PER_SECOND)
         self.last_step = round(p.duration / p.period) if p.duration > 0.0 else None
         self.k, self.made = -1, 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
@@ -60,7 +60,7 @@ class Timekeeper(unit_node.UnitNode):
         if self.graph.lockstep:
             return 'the readers of what it writes'
         _, now = self.clock()
-        return f'its time to begin, in {max(self.epoch(now) - now, 0) / SECOND:.1f} s'
+        return f'its time to begin, in {max(self.epoch(now) - now, 0) / NS_PER_SECOND:.1f} s'
 
     def start(self):
         """Lockstep: step 0, once the graph is complete."""
@@ -84,7 +84,7 @@ class Timekeeper(unit_node.UnitNode):
             port.step(stamp, values)
         self.begin_step(stamp)
         self.made += 1
-        if self.graph.lockstep and self.k % ACKNOWLEDGED_STEPS == 0:
+        if self.graph.lockstep and self.k % ACKNOWLEDGE_INTERVAL_STEPS == 0:
             self.await_acknowledged()
         for port in self.ports:
             port.publish()
@@ -113,10 +113,10 @@ class Timekeeper(unit_node.UnitNode):
         k, least = (utc - start) // self.period_ns, 0.0
         if k >= 0 and k > self.k:
             self._tick(k, start + k * self.period_ns, now)
-            least = SHARE * self.parameters.period
+            least = MIN_RECEIVE_FRACTION * self.parameters.period
         _, utc = self.clock()
-        wait = (start + (max(k, self.k) + 1) * self.period_ns - utc) / SECOND
-        self.wait = min(max(wait, least), LONGEST_WAIT)
+        wait = (start + (max(k, self.k) + 1) * self.period_ns - utc) / NS_PER_SECOND
+        self.wait = min(max(wait, least), MAX_WAIT_S)
 
     def _tick(self, k, stamp, now):
         """Make step k of a stamp [ns] at the time now of the steady clock [ns]. Of steps whose time has passed nothing

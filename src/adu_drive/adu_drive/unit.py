@@ -6,35 +6,43 @@ import typing
 
 import numpy as np
 
-from adu_drive import drive_state, drive_unit, injected, lanes, resting, stow_pins
+from adu_drive import drive_state, drive_unit, injected, lanes, state_file, stow_pins
 from adu_drive.controller import faults
 from adu_drive.plant import thermal
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
-from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
 from pedestal_common.wire.commands import Reply
-from pedestal_common.wire.records import NEVER
+from pedestal_common.wire.records import NO_STAMP
 
-CLOCK, COMMAND, SHIP, JOINTS, MOTORS = 'clock', 'acu/rate_command', 'ship/truth', 'joint_states', 'adu/motor_states'
-TRUTH, STATE, PINS, PINS_ASKED = 'adu/truth', 'adu/state', 'adu/stow_pins', 'acu/stow_pins'
+(CLOCK_TOPIC, RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC, JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC) = ('clock',
+                                                                                               'acu/rate_command',
+                                                                                               'ship/truth',
+                                                                                               'joint_states',
+                                                                                               'adu/motor_states')
+(DRIVE_TRUTH_TOPIC, DRIVE_STATE_TOPIC, PIN_STATES_TOPIC, PIN_COMMAND_TOPIC) = ('adu/truth', 'adu/state',
+                                                                               'adu/stow_pins', 'acu/stow_pins')
 
-INVALID = ('', COMMAND, SHIP)
+INVALID_INPUT_TOPICS = ('', RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC)
 """Topics that can hold what the drive does not believe."""
 
-LINK = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
-                 ('timeout', 'i8'), ('period', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
+LINK_DTYPE = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
+                       ('timeout', 'i8'), ('period', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
 """Stamps [ns] of the last step, of the last command and of the last truth with a finite rate (FLU, rad/s); age [ns] at
-which a command is stale; period T [ns]; stale: 1 while it is; invalid: of INVALID, since the last diagnosis."""
+which a command is stale; period T [ns]; stale: 1 while it is; invalid: of INVALID_INPUT_TOPICS, since the last
+diagnosis."""
 
 
-MADE_UP = 2_000_000_000
+MAX_CATCH_UP_NS = 2_000_000_000
 """Time [ns] in which axes that are told nothing have stopped."""
 
-RECORD = np.dtype([('state', drive_unit.STATE), ('constants', drive_unit.CONSTANTS), ('inputs', drive_unit.INPUTS),
-                   ('outputs', drive_unit.OUTPUTS), ('link', LINK), ('schedule', schedule.SCHEDULE),
-                   ('injected', injected.INJECTED)], align=True)
+RECORD_DTYPE = np.dtype([('state', drive_unit.STATE_DTYPE), ('constants', drive_unit.CONSTANTS_DTYPE),
+                         ('inputs', drive_unit.INPUTS_DTYPE),
+                         ('outputs', drive_unit.OUTPUTS_DTYPE), ('link', LINK_DTYPE),
+                         ('schedule', schedule.SCHEDULE_DTYPE),
+                         ('injected', injected.DRIVE_INJECTED_DTYPE)], align=True)
 
 
 class Memory(typing.NamedTuple):
@@ -46,7 +54,7 @@ class Memory(typing.NamedTuple):
 def deck_acceleration(u, m, ship):
     """Angular acceleration of the deck [rad/s2, FLU] from two successive truths and their stamps."""
     w, last = ship.twist_angular, m.truth_stamp
-    if last != NEVER and ship.stamp > last:
+    if last != NO_STAMP and ship.stamp > last:
         for i in range(3):
             u.base_acceleration[i] = (w[i] - m.deck_rate[i]) / ((ship.stamp - last) * 1e-9)
     if math.isfinite(w[0]) and math.isfinite(w[1]) and math.isfinite(w[2]) and ship.stamp != last:
@@ -58,7 +66,7 @@ def deck_acceleration(u, m, ship):
 @compiled
 def supervise(u, m):
     """Commands that stay away, at the stamp of the last step, stop the axes."""
-    m.stale = m.command_stamp == NEVER or m.stamp - m.command_stamp > m.timeout
+    m.stale = m.command_stamp == NO_STAMP or m.stamp - m.command_stamp > m.timeout
     u.enable = 0 if m.stale else 1
 
 
@@ -66,28 +74,28 @@ def supervise(u, m):
 def decode(u, m, dropped, command, ship):
     """Records of the messages -> inputs of the drive, which is at the stamp of the last step; dropped: the command
     does not reach it."""
-    if command.stamp != NEVER and dropped == 0:
+    if command.stamp != NO_STAMP and dropped == 0:
         m.command_stamp = command.stamp
         u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
         u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
     supervise(u, m)
-    if ship.stamp != NEVER:
+    if ship.stamp != NO_STAMP:
         deck_acceleration(u, m, ship)
 
 
 @compiled
-def note_invalid(u, m):
+def record_invalid_topic(u, m):
     """Remember which topic held no number."""
     deck = u.base_acceleration
-    believed = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.LARGEST
+    believed = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.MAX_PLAUSIBLE_INPUT
     m.invalid = 1 if believed else 2
 
 
 @compiled
 def encode(y, stamp, outputs):
     """Outputs of the drive -> records of its messages."""
-    joints, truth, motors = outputs[JOINTS], outputs[TRUTH], outputs[MOTORS]
-    joints.stamp = truth.stamp = motors.stamp = outputs[CLOCK].stamp = stamp
+    joints, truth, motors = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC], outputs[MOTOR_STATES_TOPIC]
+    joints.stamp = truth.stamp = motors.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
         axis = y.azimuth if i == 0 else y.elevation
         joints.position[i], joints.velocity[i], joints.effort[i] = axis.position, axis.velocity, axis.torque
@@ -96,34 +104,35 @@ def encode(y, stamp, outputs):
             motors.position[2 * i + j] = axis.motor_position[j]
             motors.velocity[2 * i + j] = axis.motor_velocity[j]
             motors.effort[2 * i + j] = axis.motor_torque[j]
-    outputs[STATE], outputs[PINS] = y.condition, y.pins
+    outputs[DRIVE_STATE_TOPIC], outputs[PIN_STATES_TOPIC] = y.condition, y.pins
 
 
 @compiled
-def listen(m, stamp, inputs):
+def receive(m, stamp, inputs):
     """Take what was said of step k - 1; False in the first step, where nothing was."""
-    if m.link.stamp == NEVER:
+    if m.link.stamp == NO_STAMP:
         m.state.k = stamp // m.link.period
         return False
-    decode(m.inputs, m.link, m.injected.said.drop, inputs[COMMAND], inputs[SHIP])
-    m.inputs.pins = inputs[PINS_ASKED]
+    decode(m.inputs, m.link, m.injected.said.drop, inputs[RATE_COMMAND_TOPIC], inputs[SHIP_TRUTH_TOPIC])
+    m.inputs.pins = inputs[PIN_COMMAND_TOPIC]
     return True
 
 
 @compiled
-def tell(m, stamp, moved, outputs):
+def report(m, stamp, moved, outputs):
     """Say how the drive is at t_k, to which it moved or at which it began."""
     if moved and m.outputs.invalid_command:
-        note_invalid(m.inputs, m.link)
+        record_invalid_topic(m.inputs, m.link)
     m.link.stamp = stamp
     encode(m.outputs, stamp, outputs)
 
 
 @compiled
-def make_up(m, stamp):
+def advance_missed_steps(m, stamp):
     """Make the steps before that of a stamp [ns] for which the node was too late, as in realtime it may be: an antenna
-    goes on meanwhile, by the last command until that is stale. Of a long time MADE_UP, after which it stands."""
-    missed = (min(stamp - m.link.stamp, MADE_UP) // m.link.period - 1) if m.link.stamp != NEVER else 0
+    goes on meanwhile, by the last command until that is stale. Of a long time MAX_CATCH_UP_NS, after which it
+    stands."""
+    missed = (min(stamp - m.link.stamp, MAX_CATCH_UP_NS) // m.link.period - 1) if m.link.stamp != NO_STAMP else 0
     for _ in range(missed):
         supervise(m.inputs, m.link)
         drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
@@ -134,15 +143,15 @@ def make_up(m, stamp):
 def law(memory, stamp, inputs, outputs):
     """Step k: from t_k-1 to t_k, obeying what was said of step k - 1."""
     m = memory.record[0]
-    make_up(m, stamp)
+    advance_missed_steps(m, stamp)
     if schedule.pending(m.schedule, stamp):
-        injected.take(m, stamp)
-    moved = listen(m, stamp, inputs)
+        injected.apply_due_faults(m, stamp)
+    moved = receive(m, stamp, inputs)
     if moved:
         drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
-    tell(m, stamp, moved, outputs)
+    report(m, stamp, moved, outputs)
     if m.schedule.pending != 0:
-        injected.spoil_messages(m.injected, stamp, outputs)
+        injected.corrupt_messages(m.injected, stamp, outputs)
 
 
 @compiled
@@ -152,37 +161,39 @@ def laws(memory, stamps, inputs, outputs):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
-ON_LANES = {'uneven': 0, 'toothless': 0, 'stuck': 0, 'exact': 1}
-"""Flags of RECORD that drives on lanes have so: even gears and motors, whole pinions, encoders without errors. Their
+LANE_FLAGS = {'uneven': 0, 'toothless': 0, 'stuck': 0, 'exact': 1}
+"""Flags of RECORD_DTYPE that drives on lanes have so: even gears and motors, whole pinions, encoders without errors.
+Their
 other values bring in sines, of which there are none for vectors."""
 
-LANES = lanes.view(RECORD, ON_LANES)
-"""Drives in a flat array of lanes.beside(RECORD), for compiled code."""
+DRIVE_LANES = lanes.view(RECORD_DTYPE, LANE_FLAGS)
+"""Drives in a flat array of lanes.beside(RECORD_DTYPE), for compiled code."""
 
 
 @compiled
 def law_of_lanes(drives, stamp, inputs, outputs):
-    """`law` of the first len(inputs) of LANES, which are at the same step and fit them (Adu.fits_lanes)."""
+    """`law` of the first len(inputs) of DRIVE_LANES, which are at the same step and fit them (Adu.fits_lanes)."""
     moved = False
     for i in range(len(inputs)):
         m = lanes.at(drives, i)
         m.schedule.stamp = stamp
-        moved = listen(m, stamp, inputs[i])
+        moved = receive(m, stamp, inputs[i])
     if moved:
         drive_unit.step(drives.state, drives.constants, drives.inputs, drives.outputs)
     for i in range(len(inputs)):
-        tell(lanes.at(drives, i), stamp, moved, outputs[i])
+        report(lanes.at(drives, i), stamp, moved, outputs[i])
 
 
 @functools.lru_cache(1)
 def _initial(parameters):
     """The record (1,) of a drive before its first step, made once for trials in a row that differ in no parameter of
     it."""
-    link = np.zeros(1, LINK)
-    link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NEVER
+    link = np.zeros(1, LINK_DTYPE)
+    link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NO_STAMP
     link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
     link['period'] = round(parameters.period * 1e9)
-    record = joined(RECORD, state=drive_unit.initial_state(parameters), constants=drive_unit.constants(parameters),
+    record = joined(RECORD_DTYPE, state=drive_unit.initial_state(parameters),
+                    constants=drive_unit.constants(parameters),
                     link=link, schedule=schedule.empty())
     drive_unit.read(*(record[0][name] for name in ('state', 'constants', 'outputs')))
     return record
@@ -190,8 +201,8 @@ def _initial(parameters):
 
 class Adu(Simulated):
     """The drive of an AduNodeParameters."""
-    NODE, COMMAND, LAWS = nodes.row(nodes.DRIVE), COMMAND, {Memory: (law, laws)}
-    REQUESTS, VERBS = tuple(drive_state.REQUESTS), table.VERBS[NODE.name]
+    NODE, COMMAND, LAWS = nodes.row(nodes.DRIVE_NODE), RATE_COMMAND_TOPIC, {Memory: (law, laws)}
+    REQUESTS, VERBS = tuple(drive_state.REQUEST_CODES), table.INJECT_COMMANDS[NODE.name]
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
@@ -203,16 +214,16 @@ class Adu(Simulated):
 
     @property
     def fits_lanes(self):
-        """Whether it can run on lanes: its flags are those of ON_LANES, and no fault will be injected."""
+        """Whether it can run on lanes: its flags are those of LANE_FLAGS, and no fault will be injected."""
         axes = [self.parts[part][axis] for part in ('state', 'constants') for axis in topics.AXES]
-        flags = [flags[name] == value for name, value in ON_LANES.items()
+        flags = [flags[name] == value for name, value in LANE_FLAGS.items()
                  for flags in (*axes, *(c['encoder'] for c in axes[2:])) if name in flags.dtype.names]
         return all(flags) and not self.parameters.inject
 
     @property
     def rests(self):
         """Whether it stands on its brakes, without torque."""
-        return bool(self.parts['outputs']['phase'] == drive_state.DISABLED)
+        return bool(self.parts['outputs']['phase'] == drive_state.PHASE_DISABLED)
 
     def resume(self, left):
         """Stand on the brakes where a plant was left (resting.Left), before the first step; enabled from there if it
@@ -229,12 +240,12 @@ class Adu(Simulated):
         """Where it is and whether it is enabled, as `resume` takes it."""
         o = self.parts['outputs']
         enabled = o['wanted'] and not (o['emergency'] or self.tripped)
-        pinned = not stow_pins.clear(self.parts['state']['pins'])
-        return resting.Left(*(float(o[axis]['position']) for axis in topics.AXES), bool(enabled), pinned)
+        pinned = not stow_pins.pins_out(self.parts['state']['pins'])
+        return state_file.PlantState(*(float(o[axis]['position']) for axis in topics.AXES), bool(enabled), pinned)
 
     def encode(self, topic, code):
         """The text of a code of adu/state, else as any unit."""
-        return drive_state.described(code) if topic == STATE else super().encode(topic, code)
+        return drive_state.state_text(code) if topic == DRIVE_STATE_TOPIC else super().encode(topic, code)
 
     @property
     def tripped(self):
@@ -244,14 +255,14 @@ class Adu(Simulated):
     @property
     def condition(self):
         """The text of adu/state as it is now, also between two steps."""
-        return drive_state.described(int(self.parts['outputs']['condition']))
+        return drive_state.state_text(int(self.parts['outputs']['condition']))
 
     def request(self, name):
         """Do one of REQUESTS; the Reply names the state that follows, and why it is refused."""
         m = self.parts
-        answer = drive_unit.request(m['state'], m['constants'], m['outputs'], drive_state.REQUESTS[name])
-        granted = answer == drive_state.GRANTED
-        refusal = '' if granted else f'refused: {drive_state.REFUSALS[answer]}; '
+        answer = drive_unit.request(m['state'], m['constants'], m['outputs'], drive_state.REQUEST_CODES[name])
+        granted = answer == drive_state.REPLY_ACCEPTED
+        refusal = '' if granted else f'refused: {drive_state.REFUSAL_REASONS[answer]}; '
         return Reply(granted, f'{refusal}drive is {self.condition}')
 
     def requests_for(self, topic, text):
@@ -262,13 +273,13 @@ class Adu(Simulated):
         wanted = {'adu/emergency_stop': stopped and not o['emergency'],
                   'adu/reset_faults': latched and not tripped and not stopped,
                   'adu/disable': text in ('stopping', 'disabled') and o['wanted'],
-                  'adu/enable': text in ('releasing brakes', *topics.ENABLED) and not o['wanted']}
+                  'adu/enable': text in ('releasing brakes', *topics.ENABLED_STATES) and not o['wanted']}
         return [service for service, due in wanted.items() if due]
 
     def diagnose(self):
         """How it is, with limits, faults and thermal load of both axes; what was refused is told once."""
         outputs, link = self.parts['outputs'], self.parts['link']
-        invalid, link['invalid'] = INVALID[link['invalid']], 0
+        invalid, link['invalid'] = INVALID_INPUT_TOPICS[link['invalid']], 0
         axes = {axis: outputs[axis] for axis in topics.AXES}
         values = [(f'{name} {mark}', '1' if axis[mark] else '0') for name, axis in axes.items()
                   for mark in ('torque_limited', 'voltage_limited', 'end_stop', 'stopping')]
@@ -278,22 +289,24 @@ class Adu(Simulated):
         values += [('state', self.condition), ('phase', drive_state.PHASES[outputs['phase']]),
                    ('brakes', 'on' if outputs['braked'] else 'off')]
         if self.parameters.stow_pins:
-            values.append(('stow_pins', self.encode(PINS, int(outputs['pins']))))
+            values.append(('stow_pins', self.encode(PIN_STATES_TOPIC, int(outputs['pins']))))
         if outputs['emergency'] or self.tripped:
-            return Diagnosis(ERROR, self.condition, values)
+            return Diagnosis(LEVEL_ERROR, self.condition, values)
         if invalid:
-            largest = f'{drive_unit.LARGEST:g}'
-            return Diagnosis(ERROR, f'{invalid} holds NaN or infinity, or goes beyond {largest}: stopping', values)
+            largest = f'{drive_unit.MAX_PLAUSIBLE_INPUT:g}'
+            return Diagnosis(LEVEL_ERROR, f'{invalid} holds NaN or infinity, or goes beyond {largest}: stopping',
+                             values)
         if link['stale']:
-            return Diagnosis(ERROR, f'no new {COMMAND} for {link["timeout"] / 1e9:g} s: stopping', values)
+            return Diagnosis(LEVEL_ERROR, f'no new {RATE_COMMAND_TOPIC} for {link["timeout"] / 1e9:g} s: stopping',
+                             values)
         if self.condition != 'enabled':
-            return Diagnosis(WARN, self.condition, values)
+            return Diagnosis(LEVEL_WARN, self.condition, values)
         if any(axis['end_stop'] for axis in axes.values()):
-            return Diagnosis(WARN, 'at an end stop', values)
+            return Diagnosis(LEVEL_WARN, 'at an end stop', values)
         hottest = max(axis['thermal_load'].max() for axis in axes.values())
-        if hottest > thermal.WARM:
-            return Diagnosis(WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values)
-        return Diagnosis(OK, 'following', values)
+        if hottest > thermal.WARNING_THERMAL_LOAD:
+            return Diagnosis(LEVEL_WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values)
+        return Diagnosis(LEVEL_OK, 'following', values)
 
     @property
     def urgent(self):
@@ -305,4 +318,4 @@ class Adu(Simulated):
     @staticmethod
     def idle(numbers):
         """Why a recording did not exercise it: no rate was ever commanded."""
-        return '' if (numbers[COMMAND][:, 2:4] != 0.0).any() else 'the drive was never told to move'
+        return '' if (numbers[RATE_COMMAND_TOPIC][:, 2:4] != 0.0).any() else 'the drive was never told to move'

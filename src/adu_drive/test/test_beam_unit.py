@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive.array.beam_unit import CLOCK, COMMAND, JOINTS, STATE, Beam
+from adu_drive.array.beam_unit import CLOCK_TOPIC, DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, REFERENCE_TOPIC, Beam
 from adu_drive.params import BeamParameters
 from pedestal_common.wire import records
 
@@ -16,17 +16,18 @@ class Rig:
     """A Beam fed step by step."""
 
     def __init__(self, params=P):
-        self.unit, self.k = Beam(params, (CLOCK, COMMAND)), 0
+        self.unit, self.k = Beam(params, (CLOCK_TOPIC, REFERENCE_TOPIC)), 0
 
     def step(self, azimuth=None, elevation=0.5, late=0):
         """The beam at t_k and adu/state; then t_k is answered with a command `late` steps old, None: with none."""
-        unit, command = self.unit, self.unit.inputs[COMMAND]
+        unit, command = self.unit, self.unit.inputs[REFERENCE_TOPIC]
         unit.step(np.full(1, self.k * T), unit.inputs, unit.outputs)
-        command['stamp'] = records.NEVER if azimuth is None else (self.k - late) * T
+        command['stamp'] = records.NO_STAMP if azimuth is None else (self.k - late) * T
         if azimuth is not None:
             command['position'] = azimuth, elevation
         self.k += 1
-        return unit.outputs[0][JOINTS]['position'].copy(), unit.encode(STATE, int(unit.outputs[0][STATE]))
+        return unit.outputs[0][JOINT_STATES_TOPIC]['position'].copy(), unit.encode(DRIVE_STATE_TOPIC,
+                                                                                   int(unit.outputs[0][DRIVE_STATE_TOPIC]))
 
     @property
     def outputs(self):
@@ -43,14 +44,14 @@ def test_the_beam_is_the_command_of_one_delay_and_one_step_before():
 
 def test_many_steps_at_once_are_the_same():
     commands = np.random.default_rng(2).uniform(-1.0, 1.0, 40)
-    one, unit = Rig(), Beam(P, (CLOCK, COMMAND))
+    one, unit = Rig(), Beam(P, (CLOCK_TOPIC, REFERENCE_TOPIC))
     beams = np.array([one.step(command)[0] for command in commands])
     inputs, outputs = records.empty(unit.inputs_type(), 40), records.empty(unit.outputs_type(), 40)
-    inputs[COMMAND]['stamp'][1:] = np.arange(39) * T
-    inputs[COMMAND]['position'][1:, 0], inputs[COMMAND]['position'][:, 1] = commands[:-1], 0.5
+    inputs[REFERENCE_TOPIC]['stamp'][1:] = np.arange(39) * T
+    inputs[REFERENCE_TOPIC]['position'][1:, 0], inputs[REFERENCE_TOPIC]['position'][:, 1] = commands[:-1], 0.5
     unit.step(np.arange(40) * T, inputs, outputs)
-    assert np.array_equal(outputs[JOINTS]['position'], beams)
-    assert not outputs[JOINTS]['velocity'].any() and not outputs[JOINTS]['effort'].any()
+    assert np.array_equal(outputs[JOINT_STATES_TOPIC]['position'], beams)
+    assert not outputs[JOINT_STATES_TOPIC]['velocity'].any() and not outputs[JOINT_STATES_TOPIC]['effort'].any()
 
 
 @pytest.mark.parametrize('wrong', [math.nan, math.inf, -1e9])
@@ -83,7 +84,7 @@ def test_a_beam_that_is_stopped_stays_and_forgets_what_is_on_its_way(stop, go, t
     assert rig.unit.request(stop).granted and rig.unit.condition == text
     where = {tuple(rig.step(5.0)[0]) for _ in range(10)}
     assert len(where) == 1 and where.pop()[0] == before[0]
-    assert rig.unit.requests_for(STATE, 'enabled')[-1] == 'adu/enable'
+    assert rig.unit.requests_for(DRIVE_STATE_TOPIC, 'enabled')[-1] == 'adu/enable'
     if text == 'emergency stop':
         assert not rig.unit.request('adu/enable').granted
     rig.step()

@@ -50,9 +50,9 @@ def move(state, constants, volts, path):
     m1, m2, rate = s.motor_1, s.motor_2, 0.0
     axis.begin_period(s, c, False)        # brakes off, windings cold
     for n in range(len(path)):
-        if n % (4 * axis.CURRENT_TICKS) == 0:
+        if n % (4 * axis.CURRENT_LOOP_STEP_COUNT) == 0:
             rate = K_p * (STEP - s.theta)
-        if n % axis.CURRENT_TICKS == 0:
+        if n % axis.CURRENT_LOOP_STEP_COUNT == 0:
             axis.speed_control(s, c, rate, 0.0, 1, True, True)
         axis.current_control(m1, c.motor_1)
         axis.current_control(m2, c.motor_2)

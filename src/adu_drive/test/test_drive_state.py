@@ -24,7 +24,7 @@ def phases(d):
 
 
 def request(d, what):
-    return drive_state.request(d.state[0], d.constants[0], getattr(drive_state, what))
+    return drive_state.request(d.state[0], d.constants[0], getattr(drive_state, f'REQUEST_{what}'))
 
 
 CAUSES = {
@@ -43,7 +43,7 @@ CAUSES = {
 
 def test_every_fault_is_caused():
     assert {*CAUSES, 'final limit', 'emergency limit', 'stow pin'} == {
-        fault.name for fault in faults.FAULTS if fault.stops}
+        fault.name for fault in faults.AXIS_FAULTS if fault.stops}
 
 
 @pytest.mark.parametrize('kind', CAUSES)
@@ -55,11 +55,11 @@ def test_each_fault_trips_latches_and_stops_both_axes(drive, kind):
     assert faults.names(y['azimuth']['faults'][tripped]) == (kind,)
     assert kind in faults.names(y['azimuth']['faults'][-1]) and not y['elevation']['faults'].any()
     assert not y['following'][tripped:].any() and y['following'][:tripped].all()
-    assert (y['phase'][-1], y['braked'][-1]) == (drive_state.DISABLED, 1)
+    assert (y['phase'][-1], y['braked'][-1]) == (drive_state.PHASE_DISABLED, 1)
     assert np.abs(y['elevation']['load_velocity'][-50:]).max() < 1e-4          # the healthy axis stands as well
     assert np.abs(y['elevation']['true_torque'][-1]).max() < 0.01
     d.run(0.5, azimuth=0.0, elevation=0.0)
-    assert d.log['azimuth']['faults'][-1] and d.log['phase'][-1] == drive_state.DISABLED
+    assert d.log['azimuth']['faults'][-1] and d.log['phase'][-1] == drive_state.PHASE_DISABLED
 
 
 def test_overcurrent_takes_the_torque_away_at_once_and_the_brakes_fall_in(drive):
@@ -90,7 +90,7 @@ def test_the_final_switch_takes_the_torque_away_whatever_the_encoder_says_and_th
     assert np.abs(y['azimuth']['true_torque'][tripped + 3:]).max() < 0.5 and y['braked'][-1]
     assert y['azimuth']['load_position'][-1] < limits.upper + emergency
     d.state['azimuth']['jump'] = 0.0
-    assert request(d, 'RESET_FAULTS') == drive_state.GRANTED
+    assert request(d, 'RESET_FAULTS') == drive_state.REPLY_ACCEPTED
     d.run(3.5)
     led = d.log['azimuth'][-700:]
     assert not led['faults'][-1] and led['load_velocity'].min() > -0.3        # 0.1 rad/s at once: it overshoots
@@ -102,7 +102,7 @@ def test_the_emergency_switch_is_not_reset_while_it_is_pressed(drive):
     assert faults.names(d.log['azimuth']['faults'][-1]) == ('final limit', 'emergency limit')
     assert d.log['azimuth']['load_position'].max() < limits.upper + 1.2 * limits.switches[2]
     assert np.abs(d.log['azimuth']['load_velocity'][-20:]).max() < 1e-3
-    assert request(d, 'RESET_FAULTS') == drive_state.CAUSE_PERSISTS
+    assert request(d, 'RESET_FAULTS') == drive_state.REPLY_CAUSE_PERSISTS
 
 
 def test_a_runaway_ends_in_the_brakes(drive):
@@ -111,7 +111,8 @@ def test_a_runaway_ends_in_the_brakes(drive):
     values, command = CAUSES['following error']
     d = made(drive, **values).run(4.0, **command)
     assert phases(d) == ['enabled', 'stopping', 'disabled']
-    stopping, disabled = (np.flatnonzero(d.log['phase'] == p)[0] for p in (drive_state.STOPPING, drive_state.DISABLED))
+    (stopping, disabled) = (np.flatnonzero(d.log['phase'] == p)[0] for p in (drive_state.PHASE_STOPPING,
+                                                                             drive_state.PHASE_DISABLED))
     assert disabled - stopping == pytest.approx(200, abs=2)
     assert np.abs(d.log['azimuth']['load_velocity'][-50:]).max() < 1e-6
 
@@ -120,10 +121,10 @@ def test_reset_only_when_it_stands_and_the_cause_has_gone(drive):
     d = made(drive, azimuth__faults__overspeed=0.4, azimuth__limits__deceleration=1.0)
     d.run(0.1, azimuth=0.5)
     assert d.log['azimuth']['faults'][-1] == faults.Bit.OVERSPEED
-    assert request(d, 'RESET_FAULTS') == drive_state.MOVING
-    assert request(d, 'ENABLE') == drive_state.FAULT_LATCHED
+    assert request(d, 'RESET_FAULTS') == drive_state.REPLY_AXES_MOVING
+    assert request(d, 'ENABLE') == drive_state.REPLY_FAULT_LATCHED
     d.run(0.7)
-    assert request(d, 'RESET_FAULTS') == drive_state.GRANTED
+    assert request(d, 'RESET_FAULTS') == drive_state.REPLY_ACCEPTED
     d.run(0.5, azimuth=0.3)
     assert d.log['following'][-1] and not d.log['azimuth']['faults'][-1]
 
@@ -131,22 +132,22 @@ def test_reset_only_when_it_stands_and_the_cause_has_gone(drive):
 def test_an_overtemperature_must_cool_down(drive):
     values, command = CAUSES['overtemperature']
     d = made(drive, **values).run(1.0, **command)
-    while d.log['phase'][-1] != drive_state.DISABLED:
+    while d.log['phase'][-1] != drive_state.PHASE_DISABLED:
         d.run(0.1)
     assert d.log['azimuth']['thermal_load'][-1].max() > 0.8
-    assert request(d, 'RESET_FAULTS') == drive_state.CAUSE_PERSISTS
+    assert request(d, 'RESET_FAULTS') == drive_state.REPLY_CAUSE_PERSISTS
     d.run(5.0)
     assert d.log['azimuth']['thermal_load'][-1].max() < 0.8
-    assert request(d, 'RESET_FAULTS') == drive_state.GRANTED
+    assert request(d, 'RESET_FAULTS') == drive_state.REPLY_ACCEPTED
 
 
 def test_motion_resumes_from_where_it_stands_within_the_ramp(drive):
     """After a reset whoever commands has gone on: the drive neither jumps nor makes up for what it missed."""
     d = made(drive).run(0.3, azimuth=1.0)
-    assert request(d, 'EMERGENCY_STOP') == drive_state.GRANTED
+    assert request(d, 'EMERGENCY_STOP') == drive_state.REPLY_ACCEPTED
     d.run(0.5)
     stood = d.log['azimuth']['load_position'][-1]
-    assert request(d, 'RESET_FAULTS') == drive_state.GRANTED
+    assert request(d, 'RESET_FAULTS') == drive_state.REPLY_ACCEPTED
     d.run(0.5, azimuth=1.0)
     a = d.log[-100:]['azimuth']
     free = np.flatnonzero(d.log[-100:]['following'])[0]
@@ -158,13 +159,13 @@ def test_motion_resumes_from_where_it_stands_within_the_ramp(drive):
 
 def test_disable_and_enable(drive):
     d = made(drive).run(0.2, azimuth=0.5, elevation=0.1)
-    assert request(d, 'DISABLE') == drive_state.GRANTED
+    assert request(d, 'DISABLE') == drive_state.REPLY_ACCEPTED
     d.run(1.0)
-    assert request(d, 'ENABLE') == drive_state.GRANTED
+    assert request(d, 'ENABLE') == drive_state.REPLY_ACCEPTED
     d.run(0.5, azimuth=0.2)
     assert phases(d) == ['enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brakes', 'enabled']
     assert d.log['azimuth']['load_velocity'][-1] == pytest.approx(0.2, abs=2e-3)
-    off = d.log[d.log['phase'] == drive_state.DISABLED]
+    off = d.log[d.log['phase'] == drive_state.PHASE_DISABLED]
     assert np.abs(off['azimuth']['true_torque'][2:]).max() < 0.01 and off['braked'].all()
 
 
@@ -234,7 +235,7 @@ def test_the_same_faults_give_the_same_bytes(drive):
 
 def test_a_drive_that_starts_disabled_can_be_enabled(drive):
     d = drive(dataclasses.replace(AduParameters(initial_elevation=0.7), initially_enabled=False)).run(0.2, azimuth=0.3)
-    assert request(d, 'ENABLE') == drive_state.GRANTED
+    assert request(d, 'ENABLE') == drive_state.REPLY_ACCEPTED
     d.run(0.5)
     assert phases(d) == ['disabled', 'releasing brakes', 'enabled']
     assert d.log['azimuth']['load_velocity'][-1] == pytest.approx(0.3, abs=2e-3)
@@ -245,10 +246,10 @@ def test_without_torque_the_inverter_is_off_whatever_a_current_sensor_says(drive
     """With the loops on, an offset of the sensors would be a torque that nobody asked for."""
     d = made(drive, azimuth__motor_1__drift__current_offset=offset, azimuth__motor_2__drift__current_offset=offset,
              azimuth__bias__schedule='off').run(0.2, azimuth=0.0)
-    assert request(d, 'DISABLE') == drive_state.GRANTED
+    assert request(d, 'DISABLE') == drive_state.REPLY_ACCEPTED
     d.run(2.0)
     a = d.log['azimuth'][-300:]
-    assert d.log['phase'][-1] == drive_state.DISABLED
+    assert d.log['phase'][-1] == drive_state.PHASE_DISABLED
     assert np.abs(a['true_torque']).max() == 0.0 and (a['bias'] == 0.0).all()
     assert np.ptp(a['load_position']) < 2e-4 and np.ptp(a['motor_position']) < 0.2      # it swings inside its lash
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from adu_drive.array import electronic_beam
-from adu_drive.array.electronic_beam import RING
+from adu_drive.array.electronic_beam import BEAM_RING_SIZE
 from pedestal_common.parameters import ParameterError
 
 MS = 1_000_000
@@ -18,7 +18,8 @@ class Beam:
         self.period_ns, self.k = round(period * 1e9), 0
         self.constants = electronic_beam.constants(period, delay, timeout)
         self.state = electronic_beam.initial_state(0.1, 0.2)
-        self.inputs, self.outputs = np.zeros(1, electronic_beam.INPUTS), np.zeros(1, electronic_beam.OUTPUTS)
+        (self.inputs, self.outputs) = (np.zeros(1, electronic_beam.INPUTS_DTYPE),
+                                       np.zeros(1, electronic_beam.OUTPUTS_DTYPE))
         electronic_beam.read(self.state[0], self.outputs[0])
 
     def step(self, command=None, stamp_ns=None):
@@ -77,5 +78,6 @@ def test_silence_is_named_after_the_timeout_and_the_beam_stays():
 
 
 def test_delay_that_does_not_fit_the_ring_is_refused():
-    with pytest.raises(ParameterError, match=f'transport_delay = 0.6 s: must be below {RING - 1} periods of 0.001 s'):
+    with pytest.raises(ParameterError,
+                       match=f'transport_delay = 0.6 s: must be below {BEAM_RING_SIZE - 1} periods of 0.001 s'):
         electronic_beam.constants(1e-3, 0.6, 1.0)

@@ -87,7 +87,7 @@ def account(state, constants, external, motors, gear, load, log):
         if n % 4 == 0:
             rate = K_p * (STEP - s.theta)
         axis.speed_control(s, c, rate, 0.0, 1, True, True)
-        for _ in range(axis.CURRENT_TICKS):
+        for _ in range(axis.CURRENT_LOOP_STEP_COUNT):
             axis.current_control(s.motor_1, c.motor_1)
             axis.current_control(s.motor_2, c.motor_2)
             for _ in range(constants[0].substeps):

@@ -5,7 +5,7 @@ import pytest
 from adu_drive import unit
 from adu_drive.params import AduNodeParameters
 from pedestal_common.parameters import build
-from pedestal_common.wire.records import NEVER
+from pedestal_common.wire.records import NO_STAMP
 
 PERIOD_NS = 5_000_000
 RATE = (1.0, -0.2)
@@ -16,8 +16,8 @@ def made(steps, heard):
     p = build(AduNodeParameters, {'initial_elevation': 0.7})
     drive = unit.Adu(p, unit.Adu.NODE.reads)
     for k in steps:
-        command = drive.inputs[unit.COMMAND]
-        command['stamp'], command['velocity'] = (k - 1) * PERIOD_NS if k in heard else NEVER, RATE
+        command = drive.inputs[unit.RATE_COMMAND_TOPIC]
+        command['stamp'], command['velocity'] = (k - 1) * PERIOD_NS if k in heard else NO_STAMP, RATE
         drive.step(np.array([k * PERIOD_NS]), drive.inputs, drive.outputs)
     return drive
 
@@ -28,8 +28,9 @@ def test_a_drive_that_was_held_up_is_where_one_is_that_heard_nothing(last):
     heard = {*range(1, 101), last}
     slow, steady = made((*range(101), last), heard), made(range(last + 1), heard)
     assert slow.memory.record.tobytes() == steady.memory.record.tobytes()
-    assert slow.outputs[unit.TRUTH].tobytes() == steady.outputs[unit.TRUTH].tobytes()
-    moved = slow.outputs[unit.TRUTH]['position'][0, 0] - made(range(101), heard).outputs[unit.TRUTH]['position'][0, 0]
+    assert slow.outputs[unit.DRIVE_TRUTH_TOPIC].tobytes() == steady.outputs[unit.DRIVE_TRUTH_TOPIC].tobytes()
+    moved = (slow.outputs[unit.DRIVE_TRUTH_TOPIC]['position'][0, 0]
+             - made(range(101), heard).outputs[unit.DRIVE_TRUTH_TOPIC]['position'][0, 0])
     assert moved > 0.9 * RATE[0] * 0.005 * min(last - 100, 10)
 
 
@@ -38,5 +39,5 @@ def test_after_a_long_silence_the_axes_stand(hours):
     last = 100 + hours * 720_000
     drive = made((*range(101), last), set(range(1, 101)))
     assert 'no new acu/rate_command' in drive.diagnose().message
-    assert np.abs(drive.outputs[unit.TRUTH]['velocity']).max() < 1e-4
-    assert drive.outputs[unit.CLOCK]['stamp'] == last * PERIOD_NS
+    assert np.abs(drive.outputs[unit.DRIVE_TRUTH_TOPIC]['velocity']).max() < 1e-4
+    assert drive.outputs[unit.CLOCK_TOPIC]['stamp'] == last * PERIOD_NS

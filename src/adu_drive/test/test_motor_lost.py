@@ -5,7 +5,7 @@ import pytest
 from adu_drive import drive_state
 from adu_drive.controller import faults
 from adu_drive.params import AduNodeParameters, AduParameters
-from adu_drive.unit import STATE, Adu
+from adu_drive.unit import DRIVE_STATE_TOPIC, Adu
 from pedestal_common.graph import topics
 from pedestal_common.parameters import build
 
@@ -52,8 +52,8 @@ def test_without_either_motor_the_brakes_fall_in_at_once(drive):
     d.run(0.1)
     lose(d, 'azimuth', 1)
     d.run(1.0)
-    lost = np.flatnonzero(d.log['azimuth']['faults'] == faults.MOTORS_LOST)[0]
-    assert d.log['phase'][lost + 1] == drive_state.DISABLED and d.log['braked'][-1]
+    lost = np.flatnonzero(d.log['azimuth']['faults'] == faults.MOTORS_LOST_BITS)[0]
+    assert d.log['phase'][lost + 1] == drive_state.PHASE_DISABLED and d.log['braked'][-1]
     assert np.abs(d.log['azimuth']['load_velocity'][-10:]).max() < 5e-3         # the load still swings in the lash
 
 
@@ -69,8 +69,8 @@ def test_a_lost_motor_is_told_until_it_is_back_and_reset():
             adu.step(np.array([stamp]), adu.inputs, adu.outputs)
 
     run(20, 0.1)
-    text = adu.encode(STATE, int(adu.outputs[0][STATE]))
-    assert text == adu.condition == 'enabled: azimuth motor lost' and text in topics.ENABLED
+    text = adu.encode(DRIVE_STATE_TOPIC, int(adu.outputs[0][DRIVE_STATE_TOPIC]))
+    assert text == adu.condition == 'enabled: azimuth motor lost' and text in topics.ENABLED_STATES
     assert adu.left().enabled
     diagnosis = adu.diagnose()
     assert diagnosis.level == 1 and diagnosis.message == text

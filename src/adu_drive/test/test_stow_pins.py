@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import drive_state, resting, stow_pins
+from adu_drive import drive_state, state_file, stow_pins
 from adu_drive.controller import faults
 from adu_drive.params import AduNodeParameters, AduParameters
 from adu_drive.unit import Adu
@@ -20,24 +20,24 @@ def made(drive, **values):
 
 
 def order(d, place):
-    d.inputs['pins'] = topics.BY_NAME['acu/stow_pins'].texts.index(place)
+    d.inputs['pins'] = topics.TOPIC_BY_NAME['acu/stow_pins'].texts.index(place)
     return d
 
 
 def said(d):
     """What the drive says of its pins, in order."""
     codes = d.log['pins']
-    return [topics.BY_NAME['adu/stow_pins'].texts[code] for code in codes[np.flatnonzero(np.diff(codes, prepend=-9))]]
+    return [topics.TOPIC_BY_NAME['adu/stow_pins'].texts[code] for code in codes[np.flatnonzero(np.diff(codes, prepend=-9))]]
 
 
 def test_the_pins_go_in_on_the_brakes_and_the_drive_stays_off_until_they_are_out(drive):
     d = order(made(drive).run(0.1), 'in').run(1.0)
     assert said(d) == ['azimuth out, elevation out', 'azimuth moving, elevation moving', 'azimuth in, elevation in']
     moving = d.log['pins'] != 0
-    assert (d.log['phase'][moving] == drive_state.DISABLED).all() and d.log['braked'][moving].all()
+    assert (d.log['phase'][moving] == drive_state.PHASE_DISABLED).all() and d.log['braked'][moving].all()
     d.run(0.3, azimuth=0.2, elevation=0.1)
     assert not d.log['following'][-1] and np.abs(d.log['azimuth']['load_velocity'][-1]) < 1e-6
-    assert drive_state.request(d.state[0], d.constants[0], drive_state.ENABLE) == drive_state.GRANTED
+    assert drive_state.request(d.state[0], d.constants[0], drive_state.REQUEST_ENABLE) == drive_state.REPLY_ACCEPTED
     assert not d.run(0.3).log['following'][-1]                         # being asked does not help: the pins are in
     order(d, 'out').run(0.25)
     assert not d.log['following'][-1]
@@ -57,18 +57,19 @@ def test_a_pin_that_is_stuck_is_a_fault_and_tried_again_after_the_reset(drive):
     d.run(1.0)
     assert said(d)[-1] == 'azimuth in, elevation failed'
     assert faults.names(d.log['elevation']['faults'][-1]) == ('stow pin',) and not d.log['azimuth']['faults'].any()
-    assert drive_state.described(int(d.log['condition'][-1])) == 'fault: elevation stow pin'
+    assert drive_state.state_text(int(d.log['condition'][-1])) == 'fault: elevation stow pin'
     order(d, 'out').run(0.5)
     assert said(d)[-1] == 'azimuth out, elevation failed' and not d.log['following'][-1]
     d.state['pins']['stuck'][0, 1] = 0
     order(d, 'in')
-    assert drive_state.request(d.state[0], d.constants[0], drive_state.RESET_FAULTS) == drive_state.GRANTED
+    assert drive_state.request(d.state[0], d.constants[0],
+                               drive_state.REQUEST_RESET_FAULTS) == drive_state.REPLY_ACCEPTED
     assert said(d.run(0.5))[-1] == 'azimuth in, elevation in' and not d.log['elevation']['faults'][-1]
 
 
 def test_an_emergency_stop_stops_the_pins_too(drive):
     d = order(made(drive).run(0.05), 'in').run(0.3)
-    drive_state.request(d.state[0], d.constants[0], drive_state.EMERGENCY_STOP)
+    drive_state.request(d.state[0], d.constants[0], drive_state.REQUEST_EMERGENCY_STOP)
     assert said(d.run(1.0))[-1] == 'azimuth moving, elevation moving'
 
 
@@ -82,18 +83,18 @@ def test_a_pin_holds_an_axis_whose_brakes_do_not(drive):
 
 def test_a_drive_without_pins_does_not_hear_of_them(drive):
     d = order(drive(), 'in').run(0.2)
-    assert (d.log['pins'] == topics.SILENT).all() and d.log['following'].all()
+    assert (d.log['pins'] == topics.NO_TEXT_CODE).all() and d.log['following'].all()
 
 
 def test_a_stowed_antenna_is_still_stowed_after_a_restart(tmp_path):
     p = build(AduNodeParameters, {**STOWED, 'pins.initially_in': True})
     unit = Adu(p, Adu.NODE.reads[:3])
-    resting.write(tmp_path / 'left', unit.left())
+    state_file.write(tmp_path / 'left', unit.left())
     again = Adu(build(AduNodeParameters, STOWED), Adu.NODE.reads[:3])
     assert again.parts['outputs']['pins'] == 0
-    again.resume(resting.read(tmp_path / 'left'))
-    assert topics.BY_NAME['adu/stow_pins'].texts[again.parts['outputs']['pins']] == 'azimuth in, elevation in'
-    assert again.rests and not stow_pins.clear(again.parts['state']['pins'])
+    again.resume(state_file.read(tmp_path / 'left'))
+    assert topics.TOPIC_BY_NAME['adu/stow_pins'].texts[again.parts['outputs']['pins']] == 'azimuth in, elevation in'
+    assert again.rests and not stow_pins.pins_out(again.parts['state']['pins'])
 
 
 @pytest.mark.parametrize('values, text', [

@@ -30,16 +30,17 @@ def record(kind, seed, t):
 @pytest.mark.parametrize('kind', ['davenport', 'von_karman'])
 def test_spectrum_and_variance(kind):
     """scipy's Welch estimate over half decades and seeds, and the variance of long records."""
-    rate, count = 2.0 * wind.HIGHEST, 60000
+    rate, count = 2.0 * wind.MAX_GUST_FREQUENCY_HZ, 60000
     t = np.arange(count) / rate
     paths = [record(kind, seed, t) for seed in range(8)]
     f, density = np.mean([signal.welch(v, rate, nperseg=20000) for v in paths], axis=0)
-    edges = np.geomspace(wind.LOWEST, wind.HIGHEST, wind.LINES + 1)[50:110:12]      # 0.012 to 1.2 Hz
+    edges = np.geomspace(wind.MIN_GUST_FREQUENCY_HZ, wind.MAX_GUST_FREQUENCY_HZ, wind.SPECTRAL_LINE_COUNT
+                         + 1)[50:110:12]      # 0.012 to 1.2 Hz
     for low, high in zip(edges, edges[1:]):
         power = np.trapezoid(density[(f >= low) & (f <= high)], dx=f[1])
         assert power == pytest.approx(integrate.quad(lambda x: formula(kind, x), low, high)[0], rel=0.1)
-    covered = integrate.quad(lambda u: math.exp(u) * formula(kind, math.exp(u)), math.log(wind.LOWEST),
-                             math.log(wind.HIGHEST), limit=200)[0]
+    covered = integrate.quad(lambda u: math.exp(u) * formula(kind, math.exp(u)), math.log(wind.MIN_GUST_FREQUENCY_HZ),
+                             math.log(wind.MAX_GUST_FREQUENCY_HZ), limit=200)[0]
     amplitude = V * wind.constants(WindParameters(azimuth=1.0, gust=GustParameters(
         kind=kind, speed=V, intensity=0.2, length=L)))['amplitude']
     assert np.sum(amplitude ** 2) / 2.0 == pytest.approx(covered, rel=1e-3)

@@ -46,7 +46,8 @@ def test_turbulence_has_its_shares_and_is_averaged_over_the_dish():
         f = math.exp(x)
         side = math.sqrt(math.pi) * 3.5
         return f * wind.von_karman(f, 12.0, 80.0) / (1.0 + (2.0 * f * side / 12.0) ** (4.0 / 3.0)) ** 2
-    expected = 0.2 * math.sqrt(integrate.quad(density, math.log(wind.LOWEST), math.log(wind.HIGHEST), limit=200)[0])
+    expected = (0.2 * math.sqrt(integrate.quad(density, math.log(wind.MIN_GUST_FREQUENCY_HZ),
+                                               math.log(wind.MAX_GUST_FREQUENCY_HZ), limit=200)[0]))
     assert sigma == pytest.approx(expected * np.array([1.0, 0.78, 0.55]), rel=0.03)
     assert 0.1 < expected < 0.19
 

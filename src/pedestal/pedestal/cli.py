@@ -14,7 +14,7 @@ import shlex
 import signal
 import sys
 
-from pedestal_analysis.console import STDOUT
+from pedestal_analysis.console import STDOUT_PATH
 from pedestal_common.parameters import ParameterError
 
 VERBS = {'run': 'antenna', 'scenarios': 'design', 'samples': 'design', 'new': 'design', 'parameters': 'design',
@@ -35,7 +35,7 @@ def main(args=None) -> int:
     options = _parser().parse_args(args)
     options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     stop.on_stop(signal.default_int_handler)
-    alone = getattr(options, 'json', None) == STDOUT
+    alone = getattr(options, 'json', None) == STDOUT_PATH
     try:
         with contextlib.redirect_stdout(sys.stderr) if alone else contextlib.nullcontext():
             code = options.main(options)
@@ -49,8 +49,8 @@ def main(args=None) -> int:
         print(f'pedestal: error: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print(stop.SAID, file=sys.stderr)
-        return stop.EXIT_CODE
+        print(stop.STOP_MESSAGE, file=sys.stderr)
+        return stop.STOP_EXIT_CODE
 
 
 def _parser():

@@ -12,15 +12,16 @@ from pedestal.panels import draw
 from pedestal.scenario import Scenario
 from pedestal_analysis.report import run_data
 from pedestal_analysis.results import results, tracking
-from pedestal_bringup.loop import recorded
+from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import layouts
 from pedestal_recording import bag as bags
 
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ERRORS = {'t': ('t', 's'), 'cross_elevation': ('cross_elevation', 'rad'), 'elevation': ('elevation_error', 'rad'),
-          'range': ('range', 'm')}
+POINTING_COLUMNS = {'t': ('t', 's'), 'cross_elevation': ('cross_elevation', 'rad'), 'elevation': ('elevation_error',
+                                                                                                  'rad'),
+                    'range': ('range', 'm')}
 """{column: (field of tracking.Tracking, unit)} of Run.pointing."""
 
 
@@ -53,7 +54,7 @@ class Run:
     name: of the scenario or the recording; beam: of several, else ''.
     """
 
-    def __init__(self, source: recorded.Recorded | bags.Bag, name: str, beam: str = '') -> None:
+    def __init__(self, source: memory_recording.MemoryRecording | bags.Bag, name: str, beam: str = '') -> None:
         self._source, self.name, self.beam = source, name, beam
 
     @property
@@ -85,8 +86,9 @@ class Run:
         >>> pedestal.run(pedestal.load('leo_pass', duration=1.0)).pointing
         Table(t [s], cross_elevation [rad], elevation [rad], range [m])
         """
-        return Table({name: np.asarray(getattr(self.tracking, field)) for name, (field, _) in ERRORS.items()},
-                     {name: unit for name, (_, unit) in ERRORS.items()})
+        return Table({name: np.asarray(getattr(self.tracking, field)) for name,
+                      (field, _) in POINTING_COLUMNS.items()},
+                     {name: unit for name, (_, unit) in POINTING_COLUMNS.items()})
 
     @functools.cached_property
     def results(self) -> dict[str, float]:
@@ -127,7 +129,7 @@ def run(scenario: Scenario, beam: str = '') -> Run:
     chosen = beam or scenario.beams[0]
     if chosen not in scenario.beams:
         raise ValueError(f'beam {beam!r}: must be one of {", ".join(scenario.beams)}')
-    return Run(recorded.record(scenario.checked, chosen), scenario.name, chosen)
+    return Run(memory_recording.record(scenario.checked, chosen), scenario.name, chosen)
 
 
 def read_bag(path: str | pathlib.Path, beam: str = '') -> Run:

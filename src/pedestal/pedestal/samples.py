@@ -6,20 +6,20 @@ import math
 
 from tracking_receiver_sim.params import LeoPassParameters
 
-FEET = 0.3048
-TIMES = range(91)
+METRES_PER_FOOT = 0.3048
+FLIGHT_TIMES_S = range(91)
 """Of the flight [s]."""
-ADSB = 'timestamp,icao24,callsign,latitude,longitude,geoaltitude'
+ADSB_HEADER = 'timestamp,icao24,callsign,latitude,longitude,geoaltitude'
 
 
 def flight():
     """ADS-B of a helicopter as CSV, one row a second: a turn of 2 km radius at 45 m/s that climbs at 2 m/s; rounded as
     ADS-B is, to 1e-5 deg and 25 ft."""
-    rows = [ADSB]
-    for t in TIMES:
+    rows = [ADSB_HEADER]
+    for t in FLIGHT_TIMES_S:
         phase = 0.0225 * t
         latitude, longitude = 47.40 + 0.018 * math.sin(phase), 8.50 + 0.0266 * math.cos(phase)
-        altitude = 25 * round((700.0 + 2.0 * t) / (25 * FEET))
+        altitude = 25 * round((700.0 + 2.0 * t) / (25 * METRES_PER_FOOT))
         rows.append(f'2026-05-04 10:{t // 60:02}:{t % 60:02}+00:00,4b1812,RGA3,'
                     f'{latitude:.5f},{longitude:.5f},{altitude}')
     return '\n'.join(rows) + '\n'
@@ -42,7 +42,7 @@ def tle():
     return f'ISS (ZARYA)\n{LeoPassParameters().line_1}\n{LeoPassParameters().line_2}\n'
 
 
-ANTENNA = """\
+ANTENNA_FILE_TEXT = """\
 # An antenna of your own: what is not said here has its default; `pedestal parameters NODE` lists what there is.
 scenario:
   ros__parameters:
@@ -77,8 +77,8 @@ scenario:
         acceleration: 15.0    # [rad/s2]
 """
 
-FILES = {'flight.csv': flight, 'ship.csv': ship, 'iss.tle': tle, 'my_antenna.yaml': lambda: ANTENNA}
+SAMPLE_FILES = {'flight.csv': flight, 'ship.csv': ship, 'iss.tle': tle, 'my_antenna.yaml': lambda: ANTENNA_FILE_TEXT}
 """{name: function that gives its text}."""
-WHAT = {'flight.csv': flight.__doc__, 'ship.csv': ship.__doc__, 'iss.tle': tle.__doc__,
-        'my_antenna.yaml': 'A scenario: another antenna on the flight of uav_flyby.'}
+FILE_DESCRIPTIONS = {'flight.csv': flight.__doc__, 'ship.csv': ship.__doc__, 'iss.tle': tle.__doc__,
+                     'my_antenna.yaml': 'A scenario: another antenna on the flight of uav_flyby.'}
 """{name: sentence}."""

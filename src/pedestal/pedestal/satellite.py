@@ -7,7 +7,7 @@ from pedestal_analysis.report.subject import place
 from pedestal_common.geometry import orbit, passes
 from tracking_receiver_sim import elements
 
-STATION = ('latitude_deg', 'longitude_deg', 'height')
+STATION_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height')
 
 
 def tle_changes(path, name):
@@ -25,13 +25,13 @@ def station_changes(text):
         numbers = [float(part) for part in text.split(',')]
     except ValueError:
         numbers = []
-    if len(numbers) != len(STATION):
+    if len(numbers) != len(STATION_PARAMETERS):
         raise ValueError(f'--station {text!r}: must be LATITUDE,LONGITUDE,HEIGHT in degrees and metres, for example '
                          '47.4,8.5,500; a negative latitude needs an equals sign: --station=-33.9,18.4,10')
-    return [f'tracking_receiver.target.station.{name}={number!r}' for name, number in zip(STATION, numbers)]
+    return [f'tracking_receiver.target.station.{name}={number!r}' for name, number in zip(STATION_PARAMETERS, numbers)]
 
 
-class Sky:
+class PassSelection:
     """The satellite and the station of a scenario.Draft, seen at `now` (datetime, UTC). Raises ValueError where its
     target is no satellite."""
 
@@ -45,12 +45,12 @@ class Sky:
 
     def list(self):
         """Print the passes that --pass takes by number."""
-        begin, old = passes.first_look(self.satellite, self.now)
+        begin, old = passes.search_start(self.satellite, self.now)
         if old:
             print(f'{old}: these are the passes of its own time')
-        found = passes.after(self.satellite, self.station, begin)
-        print(f'satellite {self.satellite.satnum_str} over {place(self.station)}, {passes.AHEAD:g} days from '
-              f'{begin:%Y-%m-%d %H:%M:%S} UTC, passes above {passes.LOWEST:g} deg')
+        found = passes.passes_after(self.satellite, self.station, begin)
+        print(f'satellite {self.satellite.satnum_str} over {place(self.station)}, {passes.SEARCH_DAYS:g} days from '
+              f'{begin:%Y-%m-%d %H:%M:%S} UTC, passes above {passes.MIN_CULMINATION_DEG:g} deg')
         console.show_list([('N', 'rises (UTC)', 'azimuth', 'highest', 'at', 'sets', 'azimuth and duration')] + [
             (str(n), f'{p.rise:%Y-%m-%d %H:%M:%S}', f'{p.rise_azimuth:.0f} deg', f'{p.elevation:.1f} deg',
              f'{p.top:%H:%M:%S}', f'{p.set:%H:%M:%S}', f'{p.set_azimuth:.0f} deg, {p.duration:.0f} s')
@@ -59,7 +59,7 @@ class Sky:
     def choose(self, which):
         """(texts 'node.key=value', duration [s], line) of the pass that `which` names, from rise to set. Raises
         TargetError."""
-        p = passes.chosen(self.satellite, self.station, which, self.now)
+        p = passes.chosen_pass(self.satellite, self.station, which, self.now)
         start = p.rise.replace(microsecond=0)
         line = (f'satellite {self.satellite.satnum_str} over {place(self.station)}: rises {p.rise:%Y-%m-%d %H:%M:%S} '
                 f'UTC in azimuth {p.rise_azimuth:.0f} deg, highest {p.elevation:.1f} deg at {p.top:%H:%M:%S}, sets '

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 
-SAID, EXIT_CODE = 'pedestal: stopped', 130
+STOP_MESSAGE, STOP_EXIT_CODE = 'pedestal: stopped', 130
 
 
 def on_stop(handler):
@@ -18,8 +18,8 @@ def on_stop(handler):
 
 
 def _end_at_once(*_):
-    os.write(2, f'{SAID}\n'.encode())
-    os._exit(EXIT_CODE)
+    os.write(2, f'{STOP_MESSAGE}\n'.encode())
+    os._exit(STOP_EXIT_CODE)
 
 
 if os.path.basename(sys.argv[0]) in ('pedestal', 'cli.py'):

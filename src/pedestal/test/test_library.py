@@ -48,8 +48,8 @@ def test_a_run_has_the_arrays_of_its_recording(name, tmp_path):
     file = tmp_path / f'{name}.yaml'
     file.write_text(bag.read(REFERENCES / name).configuration['scenario'])
     again = pedestal.run(pedestal.load(file))
-    stepped = {name for name in again.topics if topics.BY_NAME[name].rate == 'step'}
-    assert stepped == {name for name in recording.topics if topics.BY_NAME[name].rate == 'step'}
+    stepped = {name for name in again.topics if topics.TOPIC_BY_NAME[name].rate == 'step'}
+    assert stepped == {name for name in recording.topics if topics.TOPIC_BY_NAME[name].rate == 'step'}
     for topic in set(again.topics) & set(recording.topics):  # commands and their results are not in memory
         ours, theirs = again[topic], recording[topic]
         assert ours.keys() <= theirs.keys() and ours.units.items() <= theirs.units.items()

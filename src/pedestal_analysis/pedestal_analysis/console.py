@@ -11,14 +11,14 @@ import textwrap
 EXIT_WRONG_COMMAND = 2
 EXIT_DISTURBED = 3
 
-STDOUT = pathlib.Path('/dev/stdout')
+STDOUT_PATH = pathlib.Path('/dev/stdout')
 """What --json - stands for."""
 
-WIDEST_NAME, WIDEST, SENTENCE = 44, 24, 40
+MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
 """Columns that the name of a list and its other cells have to themselves, a longer one moves what follows; and the
 least that a sentence beside them has, which stands below them otherwise."""
 
-TABLE_WIDTH = 150
+MIN_TABLE_COLUMNS = 150
 """Columns that a table of results may take on any terminal, so that a row stays one line."""
 
 
@@ -73,7 +73,7 @@ def progress_of_trials():
 
 def add_json(parser):
     """The option --json FILE of a verb that measures."""
-    parser.add_argument('--json', type=lambda text: STDOUT if text == '-' else pathlib.Path(text), metavar='FILE',
+    parser.add_argument('--json', type=lambda text: STDOUT_PATH if text == '-' else pathlib.Path(text), metavar='FILE',
                         help='write the result rows; -: to the standard output, and all else to the standard error')
 
 
@@ -92,14 +92,15 @@ def write_json(path, content):
 def show_list(rows):
     """Print rows of texts in columns; on a terminal the last is wrapped to its width, in a pipe a row is a line."""
     rows = list(rows)
-    widths = [min(max(len(row[i]) for row in rows), WIDEST if i else WIDEST_NAME) for i in range(len(rows[0]) - 1)]
+    widths = [min(max(len(row[i]) for row in rows), MAX_CELL_COLUMNS if i
+                  else MAX_NAME_COLUMNS) for i in range(len(rows[0]) - 1)]
     indent = sum(widths) + 2 * len(widths)
     terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for *cells, sentence in rows:
         head = '  '.join(f'{cell:{width}}' for cell, width in zip(cells, widths))
         if terminal is None:
             print(f'{head}  {sentence}')
-        elif terminal < indent + SENTENCE:
+        elif terminal < indent + MIN_SENTENCE_COLUMNS:
             # Too narrow for a column of sentences: they go below.
             fits = len(head.rstrip()) <= terminal
             below = (sentence,) if fits else ('  '.join(filter(None, cells[1:])), sentence)
@@ -132,7 +133,7 @@ def show_results(title, columns, results, whole, marks=()):
                       *([', '.join(marked.get(metric, ()))] if marked else ()))
     for metric, (value, unit) in whole.items():
         table.add_row(metric, measured(value), *[''] * (len(columns) - 1), unit)
-    Console(width=max(Console().width, TABLE_WIDTH) if len(columns) > 1 else None).print(table)
+    Console(width=max(Console().width, MIN_TABLE_COLUMNS) if len(columns) > 1 else None).print(table)
 
 
 def measured(value):
@@ -174,7 +175,7 @@ def show_study(title, rows, missed):
     for row in rows:
         table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), interval(row),
                       row['target'] or '', row['unit'], 'MISSED' if missed(row) else '')
-    Console(width=max(Console().width, TABLE_WIDTH)).print(table)
+    Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)
 
 
 def show_trials(title, rows):
@@ -201,4 +202,4 @@ def show_trials(title, rows):
         table.add_row(row['case'], row['metric'], number(row['value']), interval(row), '', '', '', '',
                       str(row['runs']), row['unit'])
     longest = max((len(row['case']) for row in rows), default=0)
-    Console(width=max(Console().width, TABLE_WIDTH + longest)).print(table)
+    Console(width=max(Console().width, MIN_TABLE_COLUMNS + longest)).print(table)

@@ -14,7 +14,7 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 from pedestal_common.parameters import build, record
 from tracking_receiver_sim import receiver, target
-from tracking_receiver_sim.params import SMOOTHINGS, TrackingReceiverParameters
+from tracking_receiver_sim.params import SMOOTHING_KINDS, TrackingReceiverParameters
 
 
 def correlated(rng, n, size, memory):
@@ -115,12 +115,12 @@ def test_true_rates_seen_from_a_sailing_ship():
 
 
 def test_names_are_those_of_the_models_and_axes():
-    assert topics.MOTION_MODELS == motion_models.MODELS
-    told = {f'{axis}_{name}' for axis in topics.AXES for name in (*consistency.NAMES, *topics.MOTION_MODELS)}
-    assert told | {f'{axis}_innovation_sigma' for axis in topics.AXES} == set(topics.BY_NAME['acu/filter'].names)
+    assert topics.MOTION_MODELS == motion_models.MODEL_NAMES
+    told = {f'{axis}_{name}' for axis in topics.AXES for name in (*consistency.FILTER_NUMBERS, *topics.MOTION_MODELS)}
+    assert told | {f'{axis}_innovation_sigma' for axis in topics.AXES} == set(topics.TOPIC_BY_NAME['acu/filter'].names)
 
 
-@pytest.mark.parametrize('smoothing', SMOOTHINGS)
+@pytest.mark.parametrize('smoothing', SMOOTHING_KINDS)
 @pytest.mark.parametrize('cn0_dbhz', [42.0, 55.0])
 def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_dbhz):
     """A filter averages many errors: what counts is the variance of their mean. A smoothed error itself has less, and
@@ -130,7 +130,7 @@ def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_d
         'receiver.range_exponent': 0.0, 'receiver.cn0_dbhz': cn0_dbhz, 'receiver.smoothing': smoothing})
     built = target.build(params.target, 1000.0)
     constants, state = receiver.constants(params, 0.005, built), receiver.initial_state()
-    inputs, outputs = np.zeros(1, receiver.INPUTS), np.zeros(1, receiver.OUTPUTS)
+    inputs, outputs = np.zeros(1, receiver.INPUTS_DTYPE), np.zeros(1, receiver.OUTPUTS_DTYPE)
     inputs['mat_ed'], inputs['valid'] = line_of_sight.ashore_matrix(), 1
     inputs['azimuth'], inputs['elevation'] = 0.3, 0.6
     normals = np.random.default_rng(2).standard_normal((40_400, receiver.normals_per_step(params)))

@@ -9,13 +9,13 @@ from pedestal_analysis.results import identification
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 
-W = 2.0 * math.pi * identification.FREQUENCIES
+W = 2.0 * math.pi * identification.SINE_FREQUENCIES_HZ
 
 
 def simulated(numerator, denominator, T, delay):
     """(commands held for T, angle) of the rate loop numerator / denominator and an integrator, by exact discretisation
     (scipy) at T / 10."""
-    t = T * np.arange(round(2 * identification.PERIOD / T))
+    t = T * np.arange(round(2 * identification.COMMON_PERIOD_S / T))
     commands = 0.1 + np.cos(W * t[:, np.newaxis] + np.arange(len(W))).sum(axis=1) * 0.01
     system = signal.cont2discrete((numerator, np.append(denominator, 0.0)), 0.1 * T)
     held = np.concatenate((np.full(round(10 * delay / T), commands[0]), np.repeat(commands, 10)))[:10 * len(t)]

@@ -31,13 +31,13 @@ def test_the_plant_that_comes_with_the_product_gets_the_gains_it_has(pedestal, t
 
 
 def test_a_soft_gear_makes_the_loop_slower_until_it_holds_its_margins():
-    asked = loops.Asked()
+    asked = loops.LoopRequirements()
     stiff, soft = (loops.Loops('leo_pass', changes) for changes in ((), SOFT))
     key = 'acu.azimuth.feedforward.bandwidth'
     for each in (stiff, soft):
         rows = {(loop, axis): margins for loop, axis, _, margins in
                 loops.design(each, ('azimuth',), asked, lambda share, text: None)}
-        assert all(loops.holds(rows[loop, 'azimuth'], asked) for loop in ('speed', 'position'))
+        assert all(loops.meets_margins(rows[loop, 'azimuth'], asked) for loop in ('speed', 'position'))
     assert soft.gains[key] < 0.75 * stiff.gains[key]
 
 
@@ -45,7 +45,7 @@ def test_what_is_asked_is_the_crossover_of_the_position_loop():
     for asked in (1.5, 3.0):
         each = loops.Loops('leo_pass')
         rows = {loop: margins for loop, _, _, margins in loops.design(
-            each, ('azimuth',), loops.Asked(28.0, asked), lambda share, text: None)}
+            each, ('azimuth',), loops.LoopRequirements(28.0, asked), lambda share, text: None)}
         assert rows['position']['crossover_hz'][0] == pytest.approx(asked, rel=0.12)
 
 

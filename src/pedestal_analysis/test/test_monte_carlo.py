@@ -45,7 +45,7 @@ def test_a_failing_batch_says_what_failed():
 
 
 def test_a_study_gives_the_same_numbers_whoever_works():
-    runs = manoeuvre.BATCH + 3
+    runs = manoeuvre.BATCH_RUNS + 3
     expected = manoeuvre.run(lambda share, text: None, runs).rows
     with monte_carlo.Pool(2) as pool:
         assert manoeuvre.run(lambda share, text: None, runs, pool).rows == expected
@@ -88,7 +88,7 @@ def test_ctrl_c_ends_a_study_and_its_workers(whom, tmp_path):
     ({'scheduler': 'nobody'}, '--scheduler nobody: must be an address'),
     ({'scheduler': 'tcp://127.0.0.1:9'}, '--scheduler tcp://127.0.0.1:9: nobody answers as a Dask scheduler')])
 def test_a_pool_that_cannot_work_says_why(monkeypatch, options, message):
-    monkeypatch.setattr(monte_carlo, 'TIMEOUT', 0.5)
+    monkeypatch.setattr(monte_carlo, 'SCHEDULER_TIMEOUT_S', 0.5)
     with pytest.raises((ValueError, RuntimeError), match=message), monte_carlo.Pool(**options):
         pass
 

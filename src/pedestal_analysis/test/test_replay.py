@@ -12,7 +12,7 @@ from pedestal_recording import bag
 from pedestal_recording.writer import Writer
 
 T = 5_000_000
-OTHER = topics.BY_NAME['joint_states']._replace(name='camera/angle')
+OTHER = topics.TOPIC_BY_NAME['joint_states']._replace(name='camera/angle')
 
 
 def stamped(message, stamp):
@@ -63,7 +63,7 @@ ALL = ['acu/mode', 'joint_states', OTHER.name, ERROR, 'acu/rate_command', 'acu/p
 def marks(steps):
     """The same with what `write` put into each message."""
     def mark(name, data):
-        message = messages.deserialize(data, OTHER.type if name == OTHER.name else topics.BY_NAME[name].type)
+        message = messages.deserialize(data, OTHER.type if name == OTHER.name else topics.TOPIC_BY_NAME[name].type)
         return message.data if name == 'acu/mode' else message.header.frame_id
     return [(stamp, [mark(name, data) for name, data in group]) for stamp, group in steps]
 
@@ -128,7 +128,7 @@ def test_refused_in_one_line(case, tmp_path, capsys, monkeypatch):
 
 def test_a_node_whose_topics_are_not_there(tmp_path, capsys):
     path = tmp_path / 'bag'
-    writer = Writer(path, [topics.BY_NAME['clock']], {})
+    writer = Writer(path, [topics.TOPIC_BY_NAME['clock']], {})
     writer.write(0, 0, 0, messages.serialize(messages.Clock(clock=messages.Time(sec=0, nanosec=0))))
     writer.close()
     assert cli.main(['replay', str(path), '--node', 'adu']) == 1
@@ -137,7 +137,7 @@ def test_a_node_whose_topics_are_not_there(tmp_path, capsys):
 
 def test_a_type_that_is_not_the_topics(tmp_path, capsys):
     path = tmp_path / 'bag'
-    writer = Writer(path, [topics.BY_NAME['clock']._replace(type='std_msgs/msg/String')], {})
+    writer = Writer(path, [topics.TOPIC_BY_NAME['clock']._replace(type='std_msgs/msg/String')], {})
     writer.write(0, 0, 0, messages.serialize(messages.String(data='noon')))
     writer.close()
     assert cli.main(['replay', str(path)]) == 1

@@ -71,7 +71,7 @@ def status(k, node, level, text):
 
 def make_bag(path, names=ASHORE, steps=STEPS, locked=True, skip=(), effort=True, **metadata):
     """A bag of a short run with some of the topics."""
-    kept = [topics.BY_NAME[name] for name in names]
+    kept = [topics.TOPIC_BY_NAME[name] for name in names]
     writer = Writer(path, kept, {'scenario': 'short <run>', 'pacing': 'lockstep', 'seed': 3, **metadata})
     rng = np.random.default_rng(1)
 
@@ -264,7 +264,7 @@ def test_missing_topics(tmp_path, names, drawn, said):
 
 def test_a_recording_from_before_the_truth_says_that_its_errors_are_those_of_the_encoders(page, tmp_path):
     old = page_of(make_bag(tmp_path / 'old', [name for name in ASHORE if name != 'adu/truth']))
-    assert f'Pointing errors by the encoders: {tracking.BY_ENCODERS}.' in old.text
+    assert f'Pointing errors by the encoders: {tracking.ENCODER_BEAM_NOTE}.' in old.text
     assert 'the same by the encoders, rms' not in old.rows
     for name in ('rms', 'largest'):
         assert old.rows[f'pointing error, {name}'] == page[0].rows[f'the same by the encoders, {name}']
@@ -319,7 +319,7 @@ def test_wall_jitter_of_realtime(tmp_path):
 def test_beamwidth_lines_only_when_known(whole, tmp_path):
     def dashed(path):
         recording = run_data.read(bags.read(path))
-        with figures.matplotlib.rc_context(figures.STYLE):
+        with figures.matplotlib.rc_context(figures.MATPLOTLIB_STYLE):
             panels = run_figures.pointing(recording).axes
         return [line.get_ydata()[0] for axes in panels for line in axes.lines if line.get_linestyle() == '--']
     assert dashed(whole) == []

@@ -12,7 +12,7 @@ from pedestal_recording import bag
 REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
 
 
-@pytest.mark.parametrize('table', [results.RESULTS, what_if.NUMBERS], ids=['results', 'old against new'])
+@pytest.mark.parametrize('table', [results.RESULTS, what_if.COMPARISON_RESULTS], ids=['results', 'old against new'])
 def test_a_name_stands_once_with_a_sentence(table):
     documented = results.documented(table)
     assert len({name for name, *_ in documented}) == len(table) == len(documented)
@@ -23,7 +23,7 @@ def test_the_parts_of_a_recording_decide_its_rows():
     """Ashore there is neither isolation nor an INS; a row's unit and target are those of the table."""
     ashore, ship = (results.measured(results.of_bag(bag.read(REFERENCES / name)))
                     for name in ('leo_pass', 'ship_pass'))
-    kinds = {name: results.BY_NAME[name].part for name in ship}
+    kinds = {name: results.RESULT_BY_NAME[name].part for name in ship}
     assert set(kinds.values()) == {'motors', 'encoders', 'tracking', 'filter', 'attitude'}    # no isolation: too short
     assert list(ashore) == [name for name in ship if kinds[name] != 'attitude']
     rows = results.rows('leo_pass', {**ashore, 'loss_s': (math.nan, 's')})
@@ -51,7 +51,7 @@ def test_a_number_has_four_digits(capsys):
 
 
 def test_every_result_has_a_unit_and_a_sentence(capsys):
-    assert all(result.unit for table in (results.RESULTS, what_if.NUMBERS) for result in table)
+    assert all(result.unit for table in (results.RESULTS, what_if.COMPARISON_RESULTS) for result in table)
     console.explain(results.RESULTS, {'loss_s', 'lost_steps'})
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ['loss_s', 'lost_steps']
 
@@ -73,4 +73,4 @@ def test_a_filter_that_is_off_is_marked_in_the_table(capsys):
     leo = results.of_bag(bag.read(REFERENCES / 'leo_pass'))
     judged = leo['filter'].axes
     assert ('azimuth_nees_mean' in results.marks(leo)) == bool(
-        consistency.mark(judged[0].nees, consistency.FREEDOMS, judged[0].nees_band))
+        consistency.mark(judged[0].nees, consistency.NEES_FREEDOMS, judged[0].nees_band))

@@ -100,7 +100,7 @@ def test_two_readers_read_what_the_truth_says(name, tmp_path):
 
 
 def test_steps_without_lock_or_autotrack_are_left_out_and_segments_are_short(tmp_path, monkeypatch):
-    monkeypatch.setattr(tdm, 'SEGMENT', 7)
+    monkeypatch.setattr(tdm, 'SEGMENT_STEPS', 7)
     [(file, records)] = tdm.export(made(tmp_path / 'a'), CREATED, tmp_path / 'b.tdm', 1000.0, ('ZURICH', 'X-1'))
     message, rows = by_rust(file)
     assert len(message.body.segments) == 6 and records == 40 - 5 - 4

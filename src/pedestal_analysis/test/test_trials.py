@@ -20,7 +20,7 @@ from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statisti
 from pedestal_analysis.trials.distributions import parse
 from pedestal_analysis.trials.plan import plan
 from pedestal_analysis.trials.table import Table, TableError
-from pedestal_bringup.loop import recorded
+from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 
 INERTIA, BANDWIDTH = 'adu.azimuth.load.inertia', 'acu.azimuth.feedforward.bandwidth'
@@ -149,7 +149,7 @@ def test_the_same_numbers_whoever_works_and_a_plan_that_goes_on(tmp_path):
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with monte_carlo.Pool(scheduler=cluster.scheduler_address) as pool:
             assert make(made, tmp_path / 'dask', pool).file.read_bytes() == expected.file.read_bytes()
-    values = results.measured(results.of_bag(recorded.record(made.scenario(5))))
+    values = results.measured(results.of_bag(memory_recording.record(made.scenario(5))))
     assert {name: expected.column(name)[5] for name in expected.there} == {name: value
                                                                          for name, (value, _) in values.items()}
 

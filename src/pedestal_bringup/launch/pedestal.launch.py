@@ -19,7 +19,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, PushRosNamespace
 
 from launch import LaunchDescription
-from pedestal_bringup.graph import launched
+from pedestal_bringup.graph import launch_arguments
 from pedestal_common.graph import nodes
 
 
@@ -33,11 +33,11 @@ def operator(context, scenario):
 
 def start(context):
     """The nodes of the scenario with the parameters `pedestal run` would give them."""
-    given = {argument.name: LaunchConfiguration(argument.name).perform(context) for argument in launched.ARGUMENTS}
-    chosen = launched.asked(given)
-    servers = launched.servers(given, chosen)
-    file, whole = launched.prepare(given, chosen)
-    actions = [LogInfo(msg=line) for line in launched.mistaken(context.launch_configurations)]
+    given = {argument.name: LaunchConfiguration(argument.name).perform(context) for argument in launch_arguments.ARGUMENTS}
+    chosen = launch_arguments.load_scenario(given)
+    servers = launch_arguments.servers(given, chosen)
+    file, whole = launch_arguments.prepare(given, chosen)
+    actions = [LogInfo(msg=line) for line in launch_arguments.misspelt_arguments(context.launch_configurations)]
     actions += [PushRosNamespace(given['namespace'])] if given['namespace'] else []
     for name in chosen.nodes:
         if name == 'operator':
@@ -47,7 +47,7 @@ def start(context):
         node = Node(package=row.package, executable=row.executable, name=nodes.plain(name),
                     namespace=nodes.beam_of(name), parameters=[str(file)], output='screen')
         actions.append(node)
-        if name == nodes.DRIVE or chosen.header.pacing == 'lockstep':
+        if name == nodes.DRIVE_NODE or chosen.header.pacing == 'lockstep':
             end = EmitEvent(event=Shutdown(reason=f'{name} has ended'))
             actions.append(RegisterEventHandler(OnProcessExit(target_action=node, on_exit=[end])))
     for server, parameters in servers:
@@ -60,5 +60,5 @@ def generate_launch_description():
     """The launch description of a scenario, as ros2 launch asks for it."""
     return LaunchDescription([
         *(DeclareLaunchArgument(argument.name, default_value=argument.default, description=argument.doc,
-                                choices=argument.choices or None) for argument in launched.ARGUMENTS),
+                                choices=argument.choices or None) for argument in launch_arguments.ARGUMENTS),
         OpaqueFunction(function=start)])

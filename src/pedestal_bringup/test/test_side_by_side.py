@@ -38,12 +38,12 @@ def fitting():
 def test_every_trial_is_what_it_is_alone():
     """All that the topics tell, and the whole memory of drive, receiver and control unit at the end."""
     together = loops()
-    assert side_by_side.fit(together)
+    assert side_by_side.can_run_parallel(together)
     alone = loops()
-    for found, loop in zip(side_by_side.runs(together, ensemble.TOPICS), alone, strict=True):
+    for found, loop in zip(side_by_side.runs(together, ensemble.MEASURED_TOPICS), alone, strict=True):
         expected = loop.run()
         assert found.forecasts == expected.forecasts
-        for topic in ensemble.TOPICS:
+        for topic in ensemble.MEASURED_TOPICS:
             assert found[topic].tobytes() == expected[topic].tobytes(), topic
         for name, unit in expected.units.items():
             theirs = found.units[name].memory.record
@@ -56,18 +56,18 @@ def test_every_trial_is_what_it_is_alone():
                                     'adu.inject=1 gust torque=100', 'scenario.ship=true', 'adu.period=0.01'])
 def test_what_does_not_fit_runs_alone(fitting, change):
     """One trial that is of another kind is enough."""
-    assert side_by_side.fit(fitting) and not side_by_side.fit(fitting[:side_by_side.FEWEST - 1])
+    assert side_by_side.can_run_parallel(fitting) and not side_by_side.can_run_parallel(fitting[:side_by_side.MIN_PARALLEL_LOOPS - 1])
     other = closed_loop.Loop(scenario.load('leo_pass', [change], duration=3.0))
-    assert not side_by_side.fit([*fitting[1:], other])
+    assert not side_by_side.can_run_parallel([*fitting[1:], other])
 
 
 def test_the_plant_is_compiled_to_vectors():
     """The divides of friction, of every lane, are packed: of eight or of four numbers at once."""
     @numba.njit(error_model='numpy')
     def period(flat):
-        drives = adu_unit.LANES(flat)
+        drives = adu_unit.DRIVE_LANES(flat)
         drive_unit.between_speed_periods(drives.state.azimuth, drives.constants.azimuth, 2)
 
-    period(lanes.beside(np.zeros(1, adu_unit.RECORD)))
+    period(lanes.to_lanes(np.zeros(1, adu_unit.RECORD_DTYPE)))
     assembly, = period.inspect_asm().values()
     assert len(re.findall(r'vdivpd\s.*%[yz]mm', assembly)) >= 3

@@ -32,7 +32,7 @@ def compiled_once(unit):
     if mark is None or mark.exists():
         yield
         return
-    with law_cache.alone(mark.with_suffix('.lock')):
+    with law_cache.locked_file(mark.with_suffix('.lock')):
         yield
         mark.touch()
 

@@ -20,11 +20,11 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvid
 from numba.core.runtime import rtsys
 from numba.misc.appdirs import user_cache_dir
 
-COLUMNS = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
-ROOF = ('pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
+COLUMN_PACKAGES = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
+UPPER_PACKAGES = ('pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
 """Packages with laws above the columns; a law may call those of the packages before its own."""
 
-KEPT_DAYS = 7.0
+MAX_CACHE_AGE_DAYS = 7.0
 _ROOT = pathlib.Path(numba.config.CACHE_DIR or user_cache_dir()) / 'pedestal'
 if not _ROOT.is_absolute():
     # A user without a home, as in a container: '~' stays as it is.
@@ -84,14 +84,15 @@ def _is_text(statement):
 @functools.cache
 def _folder_of(package) -> str | None:
     """The cache of one package's laws: named after its own sources and all it may call."""
-    below = () if package == 'pedestal_common' or package in COLUMNS else (
-        *COLUMNS, *(ROOF[:ROOF.index(package)] if package in ROOF else ROOF))
+    below = () if package == 'pedestal_common' or package in COLUMN_PACKAGES else (
+        *COLUMN_PACKAGES, *(UPPER_PACKAGES[:UPPER_PACKAGES.index(package)] if package in UPPER_PACKAGES
+                            else UPPER_PACKAGES))
     folder = _ROOT / f'{package}-{digest(("pedestal_common", *below, package))}'
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)
         for other in _ROOT.iterdir():
-            if time.time() - other.stat().st_mtime > KEPT_DAYS * 86400:
+            if time.time() - other.stat().st_mtime > MAX_CACHE_AGE_DAYS * 86400:
                 shutil.rmtree(other) if other.is_dir() else other.unlink()
     except OSError:
         return None
@@ -104,7 +105,7 @@ def folder(thing) -> str | None:
 
 
 @contextlib.contextmanager
-def alone(path):
+def locked_file(path):
     """Hold the lock of a file, which other processes wait for."""
     with path.open('w') as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -157,5 +158,5 @@ class Cache(FunctionCache):
             return self._load_overload(sig, target_context)
 
     def _save_overload(self, sig, data):
-        with alone(pathlib.Path(self.cache_path).with_name('index.lock')):
+        with locked_file(pathlib.Path(self.cache_path).with_name('index.lock')):
             super()._save_overload(sig, data)

@@ -3,13 +3,13 @@ import pytest
 
 from pedestal_common.parameters import ParameterError
 from pedestal_common.wire import commands, messages
-from pedestal_common.wire.commands import Argument, Command, Reply, Verb
+from pedestal_common.wire.commands import Argument, Command, CommandDefinition, Reply
 
-VERBS = (Verb('point', 'go there', (Argument('azimuth', 'where', -3.0, 3.0, 'rad'),
-                                    Argument('speed', 'how', 0.0, 1.0, 'rad/s', default=0.5))),
-         Verb('choose', 'one', (Argument('what', 'which', options=('this', 'that')),
-                                Argument('why', 'text', default=''))),
-         Verb('halt', 'stop'))
+VERBS = (CommandDefinition('point', 'go there', (Argument('azimuth', 'where', -3.0, 3.0, 'rad'),
+                                                 Argument('speed', 'how', 0.0, 1.0, 'rad/s', default=0.5))),
+         CommandDefinition('choose', 'one', (Argument('what', 'which', options=('this', 'that')),
+                                             Argument('why', 'text', default=''))),
+         CommandDefinition('halt', 'stop'))
 ASKED = Command('point', 'page', '17', {'azimuth': '1.5'})
 
 

@@ -26,12 +26,12 @@ def test_what_comes_is_taken_and_stays():
     taken = dict(error_stamp=2.0, cross_elevation=1.0, elevation=2.0, cn0_dbhz=3.0, error_rate=[1.0, 2.0],
                  error_rate_sigma=3.0)
     assert vars(u) == taken | dict(error_came=True, drive=7)
-    take(u, dict.fromkeys(NAMES, message(records.NEVER)) | {'adu/state': 8})
+    take(u, dict.fromkeys(NAMES, message(records.NO_STAMP)) | {'adu/state': 8})
     assert vars(u) == taken | dict(error_came=False, drive=8)
 
 
 @pytest.mark.parametrize('name', [topic.name for topic in topics.TOPICS if topic.inputs])
 def test_inputs_are_of_fields_that_a_topic_has(name):
-    row = topics.BY_NAME[name]
+    row = topics.TOPIC_BY_NAME[name]
     known = {'code'} if records.is_text(name) else {'came', 'stamp', *(field.name for field in layouts.fields(name))}
     assert set(row.inputs) <= known and name in nodes.row('acu').reads

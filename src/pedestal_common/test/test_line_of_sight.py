@@ -35,7 +35,7 @@ def test_azimuth_turns_clockwise():
 
 def test_ashore_deck_and_earth_angles_are_the_same():
     mat_ed = los.ashore_matrix()
-    assert Rotation.from_quat(los.ASHORE).as_matrix() == pytest.approx(mat_ed)
+    assert Rotation.from_quat(los.ASHORE_ATTITUDE).as_matrix() == pytest.approx(mat_ed)
     assert los.earth_angles(*los.to_earth(mat_ed, *los.direction(0.7, 0.3))) == pytest.approx((0.7, 0.3))
 
 

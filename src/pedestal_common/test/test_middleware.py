@@ -16,7 +16,7 @@ from pedestal_common.node import middleware  # noqa: E402
 ROLES = ('written', 'read', 'recorded')
 
 
-@pytest.mark.parametrize('rate', topics.QOS)
+@pytest.mark.parametrize('rate', topics.QOS_BY_RATE)
 def test_lockstep_loses_nothing(rate):
     profile = middleware.qos(rate)
     assert profile.reliability == ReliabilityPolicy.RELIABLE
@@ -24,7 +24,7 @@ def test_lockstep_loses_nothing(rate):
         assert profile.history == HistoryPolicy.KEEP_ALL
 
 
-@pytest.mark.parametrize('rate', topics.QOS)
+@pytest.mark.parametrize('rate', topics.QOS_BY_RATE)
 @pytest.mark.parametrize('role', ROLES)
 def test_realtime_keeps_a_bounded_history(rate, role):
     """A writer that keeps all waits for a reader that is stopped: 100 ms for each message after 5000, then an
@@ -33,7 +33,7 @@ def test_realtime_keeps_a_bounded_history(rate, role):
     assert profile.history == HistoryPolicy.KEEP_LAST and 0 < profile.depth < 5000
 
 
-@pytest.mark.parametrize('rate', topics.QOS)
+@pytest.mark.parametrize('rate', topics.QOS_BY_RATE)
 @pytest.mark.parametrize('reader', ['read', 'recorded', 'lockstep'])
 @pytest.mark.parametrize('writer', ['written', 'lockstep'])
 def test_every_reader_hears_every_writer(rate, reader, writer):
@@ -42,7 +42,7 @@ def test_every_reader_hears_every_writer(rate, reader, writer):
 
 
 def test_a_writer_that_does_not_latch_is_heard_where_a_person_writes():
-    assert [rate for rate, row in topics.QOS.items() if row.unlatched] == ['once']
+    assert [rate for rate, row in topics.QOS_BY_RATE.items() if row.unlatched] == ['once']
 
 
 @pytest.mark.parametrize('rate', ['once', 'change'])

@@ -14,12 +14,13 @@ def test_every_topic_is_written_by_one_node_and_every_name_is_in_the_table_of_to
     for topic in topics.TOPICS:
         writers = [node.name for node in nodes.NODES if topic.name in (*node.writes, node.replies)]
         assert len(writers) == (0 if topic.name == 'diagnostics' or topic.rate == 'command' else 1), topic.name
-    for node in (*nodes.NODES, nodes.ARRAY):
-        assert set(node.reads) | set(node.writes) <= set(topics.BY_NAME), node.name
+    for node in (*nodes.NODES, nodes.ARRAY_DRIVE):
+        assert set(node.reads) | set(node.writes) <= set(topics.TOPIC_BY_NAME), node.name
         assert node.answer in ('', *node.writes)
 
 
-@pytest.mark.parametrize('node', [node for node in (*nodes.NODES, nodes.ARRAY) if node.module], ids=lambda n: n.module)
+@pytest.mark.parametrize('node', [node for node in (*nodes.NODES, nodes.ARRAY_DRIVE) if node.module],
+                         ids=lambda n: n.module)
 def test_what_a_row_names_exists(node):
     pytest.importorskip('rclpy')
     pytest.importorskip(node.package)
@@ -31,16 +32,17 @@ def test_what_a_row_names_exists(node):
 
 def test_a_graph_with_a_drive_holds_every_topic():
     graph = nodes.links()
-    assert list(graph) == list(topics.BY_NAME)
+    assert list(graph) == list(topics.TOPIC_BY_NAME)
     assert graph['joint_states'].readers == ('acu',) and graph['clock'].readers == ('ship_motion',)
     assert graph['adu/truth'].readers == ('tracking_receiver',)
     assert graph['diagnostics'].writers == ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu')
-    assert nodes.members(nodes.NAMES, 0) == nodes.members(nodes.NAMES, 1) == nodes.NAMES
+    assert nodes.members(nodes.NODE_NAMES, 0) == nodes.members(nodes.NODE_NAMES, 1) == nodes.NODE_NAMES
 
 
 def test_one_beam_keeps_every_name_and_obeys_the_reference():
     graph = nodes.links(1)
-    assert set(topics.BY_NAME) - set(graph) == {'adu/motor_states', 'adu/stow_pins', 'adu/inject', 'adu/injected'}
+    assert set(topics.TOPIC_BY_NAME) - set(graph) == {'adu/motor_states', 'adu/stow_pins', 'adu/inject',
+                                                      'adu/injected'}
     assert {name for name, link in graph.items() if 'adu' in link.readers} == {'acu/reference'}
     assert all(graph[name].writers == link.writers for name, link in nodes.links().items() if name in graph)
 

@@ -20,7 +20,7 @@ def numbers_of(message, topic):
         head, _, rest = path.partition('points')
         holder = operator.attrgetter(rest.lstrip('.'))(message.points[0]) if rest else (
             operator.attrgetter(head)(message) if head else message)
-        for part in field.components or range(len(topics.BY_NAME[topic].names)):
+        for part in field.components or range(len(topics.TOPIC_BY_NAME[topic].names)):
             numbers.append(float(holder[int(part)] if isinstance(holder, np.ndarray) else getattr(holder, part)))
     return numbers
 
@@ -38,7 +38,7 @@ def filled(topic):
 def test_an_encoded_message_is_what_rosbags_makes_of_it(topic):
     record, numbers = filled(topic)
     data = records.Encoder(topic, messages.template(topic), record).encoded()
-    message = messages.deserialize(data, topics.BY_NAME[topic].type)
+    message = messages.deserialize(data, topics.TOPIC_BY_NAME[topic].type)
     assert messages.serialize(message) == data
     assert messages.nanoseconds(message.clock if topic == 'clock' else message.header.stamp) == STAMP
     assert numbers_of(message, topic) == numbers
@@ -51,13 +51,13 @@ def test_what_was_encoded_is_decoded(topic, padding):
     data = records.Encoder(topic, messages.template(topic), record).encoded()
     other = records.empty(record.dtype, 1)
     decoder = records.Decoder(topic, other)
-    assert (other[topic]['stamp'] == records.NEVER).all()
+    assert (other[topic]['stamp'] == records.NO_STAMP).all()
     stamp, values = decoder.decoded(data + padding)
     assert (stamp, list(values)) == (STAMP, numbers)
     decoder.put(stamp, values)
     assert other[topic] == record[topic]
-    decoder.put(records.NEVER, None)
-    assert other[topic]['stamp'] == records.NEVER and records.numbers(other, topic)[0].tolist() == numbers
+    decoder.put(records.NO_STAMP, None)
+    assert other[topic]['stamp'] == records.NO_STAMP and records.numbers(other, topic)[0].tolist() == numbers
 
 
 def test_joints_are_taken_by_name_whatever_came_before():
@@ -96,4 +96,4 @@ def test_a_stamp_that_is_none_is_refused():
 
 def test_a_text_has_the_code_of_its_row():
     assert [records.code_of('ins/state', text) for text in ('aligning', 'aligned', 'lost')] == [0, 1, 2]
-    assert records.empty(records.of('ins/state'), 1)['ins/state'] == topics.SILENT
+    assert records.empty(records.of('ins/state'), 1)['ins/state'] == topics.NO_TEXT_CODE

@@ -28,7 +28,7 @@ def test_jitter_is_not_followed_and_no_step():
     clock, jitter = utc.Utc(0, BEGIN), np.random.default_rng(1).integers(-900_000, 900_000, 4000)
     off = readings(clock, jitter.tolist())
     assert clock.steps == 0
-    assert np.abs(np.diff(off)).max() <= round(utc.SLEW * 5 * MS)
+    assert np.abs(np.diff(off)).max() <= round(utc.MAX_SLEW_RATE * 5 * MS)
 
 
 @pytest.mark.parametrize('step', [50 * MS, 3600 * S])

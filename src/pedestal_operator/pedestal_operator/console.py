@@ -17,25 +17,25 @@ from rich.text import Text
 
 from pedestal_common.graph import topics
 from pedestal_operator import state
-from pedestal_operator.rotator.controller import JOG_AGAIN
+from pedestal_operator.rotator.controller import JOG_REPEAT_PERIOD_S
 
-HELD = 0.35
+KEY_HOLD_S = 0.35
 """Time [s] after the last press of a key for which it counts as held; keyboards repeat about 30 times a second after a
 pause."""
 
-RATES = (0.1, 0.5, 1.0, 2.0, 5.0)
+JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)
 """Jog rates [deg/s]."""
 
-KEYS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
-        'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
-        'r': ('release', 'release it'), 'c': ('acu/reset_faults', 'reset faults')}
+KEY_VERBS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
+             'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
+             'r': ('release', 'release it'), 'c': ('acu/reset_faults', 'reset faults')}
 """{key: (verb, what it does)}."""
 
-JOGS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}
+ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}
 """{escape sequence of an arrow: direction (azimuth, elevation)}."""
 
-QUIT = ('q', '\x03', '\x04')
-ESCAPE_LENGTH = 3
+QUIT_KEYS = ('q', '\x03', '\x04')
+ESCAPE_SEQUENCE_CHARS = 3
 
 
 @contextlib.contextmanager
@@ -51,7 +51,7 @@ def keyboard():
             text += data.decode(errors='replace')
         keys = []
         while text:
-            size = ESCAPE_LENGTH if text[:ESCAPE_LENGTH] in JOGS else 1
+            size = ESCAPE_SEQUENCE_CHARS if text[:ESCAPE_SEQUENCE_CHARS] in ARROW_DIRECTIONS else 1
             keys.append(text[:size])
             text = text[size:]
         return keys
@@ -68,27 +68,27 @@ class Console:
         self._spun, self._remote = spun, spun.remote
         self._asked = {}
         self._jog, self._pressed, self._told = None, 0.0, 0.0
-        self.rate = RATES[1]
+        self.rate = JOG_RATES_DEG_S[1]
         self.said = ''
         self.over = False
 
     def press(self, key, now):
         """A key was pressed at the time now [s]."""
-        if key in QUIT:
+        if key in QUIT_KEYS:
             self.over = True
-        elif key in KEYS:
-            self._ask(KEYS[key][0])
-        elif key in JOGS:
-            again = JOGS[key] == self._jog and now - self._pressed < HELD
-            self._jog, self._pressed = JOGS[key], now
+        elif key in KEY_VERBS:
+            self._ask(KEY_VERBS[key][0])
+        elif key in ARROW_DIRECTIONS:
+            again = ARROW_DIRECTIONS[key] == self._jog and now - self._pressed < KEY_HOLD_S
+            self._jog, self._pressed = ARROW_DIRECTIONS[key], now
             self._told = self._told if again else 0.0
         elif key in ('+', '-'):
-            place = RATES.index(self.rate) + (1 if key == '+' else -1)
-            self.rate = RATES[min(max(place, 0), len(RATES) - 1)]
+            place = JOG_RATES_DEG_S.index(self.rate) + (1 if key == '+' else -1)
+            self.rate = JOG_RATES_DEG_S[min(max(place, 0), len(JOG_RATES_DEG_S) - 1)]
 
     def look(self, now):
         """Ask for a jog again while its key is held; hear the replies."""
-        if self._jog and now - self._pressed < HELD and now - self._told >= JOG_AGAIN:
+        if self._jog and now - self._pressed < KEY_HOLD_S and now - self._told >= JOG_REPEAT_PERIOD_S:
             self._told = now
             self._ask('rate', {axis: math.radians(self.rate * way) for axis, way in zip(topics.AXES, self._jog)})
         for number, verb in list(self._asked.items()):
@@ -113,7 +113,7 @@ class Console:
                 table.add_row(row.name, Text(row.text, justify='right'), row.unit)
             panels.append(Panel(table, title=group, padding=(0, 1)))
         alarms = [Text(f'{node}: {text}', style='bold red') for node, text in state.alarms(self._remote)]
-        keys = '  '.join(f'[{key}] {doc}' for key, (_, doc) in KEYS.items())
+        keys = '  '.join(f'[{key}] {doc}' for key, (_, doc) in KEY_VERBS.items())
         return Group(Columns(panels), *alarms, Text(self.said, style='bold'),
                      Text(f'{keys}  [arrows] jog at {self.rate:g} deg/s  [+-] rate  [q] quit', style='dim'))
 

@@ -8,11 +8,11 @@ import sys
 from pedestal_common import parameters
 from pedestal_common.node import shell
 from pedestal_operator.rotator import easycomm
-from pedestal_operator.rotator.controller import DONE
+from pedestal_operator.rotator.controller import OUTCOME_DONE
 from pedestal_operator.rotator.line_server import Client
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
-VERSION = 'pedestal'
+SERVER_VERSION = 'pedestal'
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,7 +33,7 @@ class EasycommNode(ServerNode):
     """What sets something has no answer in this protocol, so a refusal stands in the log and in the status, GS."""
 
     def __init__(self):
-        super().__init__('easycomm', EasycommParameters, easycomm.LONGEST, EasycommClient)
+        super().__init__('easycomm', EasycommParameters, easycomm.MAX_LINE_BYTES, EasycommClient)
         self._refused = False
 
     @property
@@ -48,7 +48,7 @@ class EasycommNode(ServerNode):
             if line is not None:
                 self._do(client, easycomm.read(line), now)
         if client.ask and (outcome := client.ask.look(self, now)) is not None:
-            client.ask, self._refused = None, outcome != DONE
+            client.ask, self._refused = None, outcome != OUTCOME_DONE
             if self._refused:
                 self.get_logger().warning(f'{client.name}: refused')
 
@@ -64,13 +64,13 @@ class EasycommNode(ServerNode):
             client.ask = ask.jog(name, [scale * rate for rate in asked.rates], now)
         if asked.verb:
             client.ask = ask.stop(name, now) if asked.verb == 'stop' else ask.do(name, asked.verb, now)
-        client.say(easycomm.told(asked, self.controller.pointing.angles_told(), self._status(), 0, VERSION))
+        client.say(easycomm.answer(asked, self.controller.pointing.angles_told(), self._status(), 0, SERVER_VERSION))
 
     def _status(self):
         if self._refused or not self.present('joint_states'):
-            return easycomm.ERROR
+            return easycomm.STATUS_ERROR
         moving = any(abs(rate) > 0.01 for rate in self.rates())
-        return easycomm.MOVING if moving else easycomm.IDLE
+        return easycomm.STATUS_MOVING if moving else easycomm.STATUS_IDLE
 
 
 def main(args=None) -> int:

@@ -12,10 +12,10 @@ from pedestal_common.wire import messages
 from pedestal_operator.viewers import frames
 from pedestal_operator.viewers.frame_source import FrameSource
 
-PERIOD = 1.0 / 30.0
+FRAME_PERIOD_S = 1.0 / 30.0
 """Time [s] between two messages on tf."""
 
-TF_DEPTH = 100
+TF_QUEUE_DEPTH = 100
 """Messages that tf2 itself keeps for its readers."""
 
 
@@ -25,7 +25,7 @@ class FramesNode(shell.Shell):
 
     def __init__(self):
         super().__init__('frames', parameters.Parameters)
-        text = messages.String(data=frames.DESCRIPTION)
+        text = messages.String(data=frames.PEDESTAL_URDF)
         description = self.create_publisher(middleware.message_class(text.__msgtype__), 'robot_description',
                                             middleware.qos('change', 'written'))
         description.publish(messages.serialize(text))
@@ -35,8 +35,8 @@ class FramesNode(shell.Shell):
             self.get_logger().info('tells no frames: tf2_msgs is not installed, robot_state_publisher does it as well')
             return
         self._frames, self._told = FrameSource(self), 0
-        self._tf = self.create_publisher(TFMessage, 'tf', QoSProfile(depth=TF_DEPTH))
-        self.every(PERIOD, self._look)
+        self._tf = self.create_publisher(TFMessage, 'tf', QoSProfile(depth=TF_QUEUE_DEPTH))
+        self.every(FRAME_PERIOD_S, self._look)
 
     def _look(self):
         self._frames.want(self._tf.get_subscription_count() > 0)

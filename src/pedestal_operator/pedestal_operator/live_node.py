@@ -14,13 +14,13 @@ from pedestal_operator.viewers import frames
 from pedestal_operator.viewers.frame_source import FrameSource
 from pedestal_operator.viewers.on_demand import OnDemand
 
-LOOK = 0.05
+POLL_PERIOD_S = 0.05
 """Time [s] between two looks at who watches what."""
 
-FRAMES = 1.0 / 30.0
+FRAME_PERIOD_S = 1.0 / 30.0
 """Time [s] between two messages of the frames."""
 
-TRANSFORMS, DESCRIPTION = '/transforms', '/robot_description'
+TRANSFORMS_CHANNEL, DESCRIPTION_CHANNEL = '/transforms', '/robot_description'
 """Channels that are no topics of the graph: the frames, and the model of the pedestal."""
 
 
@@ -69,7 +69,7 @@ class TopicOutlet(Outlet):
     def __init__(self, node, link):
         super().__init__(f'/{link.name}', link.type)
         self._topic = OnDemand(node, link, self._take)
-        self.latched = topics.QOS[link.rate].latched
+        self.latched = topics.QOS_BY_RATE[link.rate].latched
 
     def look(self):
         """Begin or cease to hear the topic."""
@@ -79,7 +79,7 @@ class TopicOutlet(Outlet):
         self.say(data, info['source_timestamp'])
 
 
-class Newcomers:
+class NewSubscriptions:
     """The topics that somebody has begun to watch, as the server tells in a thread of its own."""
 
     def __init__(self):
@@ -109,19 +109,19 @@ class LiveNode(shell.Shell):
         self._foxglove, p = sdk(), self.parameters
         self._topics = [TopicOutlet(self, link) for link in self.links.values()]
         self._latched = {outlet.channel.topic(): outlet for outlet in self._topics if outlet.latched}
-        self._latched[DESCRIPTION] = description = Outlet(DESCRIPTION, 'std_msgs/msg/String')
-        description.say(messages.serialize(messages.String(data=frames.DESCRIPTION)), self.clock()[1])
+        self._latched[DESCRIPTION_CHANNEL] = description = Outlet(DESCRIPTION_CHANNEL, 'std_msgs/msg/String')
+        description.say(messages.serialize(messages.String(data=frames.PEDESTAL_URDF)), self.clock()[1])
         self._frames, self._told = FrameSource(self), 0
-        self._transforms = self._foxglove.channels.FrameTransformsChannel(TRANSFORMS)
-        self._newcomers = Newcomers()
+        self._transforms = self._foxglove.channels.FrameTransformsChannel(TRANSFORMS_CHANNEL)
+        self._newcomers = NewSubscriptions()
         try:
             self._server = self._foxglove.start_server(name='pedestal', host=p.address, port=p.port,
                                                        server_listener=self._newcomers)
         except RuntimeError as error:
             raise ValueError(f'{p.address}:{p.port}: {error}') from None
         self.get_logger().info(f'listens on {p.address}:{self._server.port}')
-        self.every(LOOK, self._look)
-        self.every(FRAMES, self._say_frames)
+        self.every(POLL_PERIOD_S, self._look)
+        self.every(FRAME_PERIOD_S, self._say_frames)
 
     def _look(self):
         for outlet in self._topics:

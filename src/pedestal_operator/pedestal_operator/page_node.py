@@ -15,13 +15,13 @@ from pedestal_common import parameters
 from pedestal_common.node import shell
 from pedestal_common.wire import commands
 from pedestal_operator.page import page_security, page_sky, page_state
-from pedestal_operator.page.page_asks import Asks
 from pedestal_operator.page.page_log import Log
-from pedestal_operator.page.page_passes import Coming
+from pedestal_operator.page.page_passes import UpcomingPasses
+from pedestal_operator.page.page_requests import PageRequests
 from pedestal_operator.page.page_server import PageServer
 from pedestal_operator.remote_node import Remote
 
-FRAME, LOOK, SLOW = 0.05, 0.01, 1.0
+STATE_PERIOD_S, POLL_PERIOD_S, SLOW_STATE_PERIOD_S = 0.05, 0.01, 1.0
 """Time [s] between two states that pages are sent, two looks at what they ask, two of what changes slowly."""
 
 
@@ -41,10 +41,10 @@ class PageNode(Remote):
     def __init__(self):
         super().__init__('operator_page', 'page', parameters_type=PageParameters)
         self.alarms, self.path, self.configuration, self.log = [], None, {}, Log()
-        self._history = collections.deque(maxlen=round(page_state.SPAN / page_state.PERIOD))
-        self._past, self._coming = page_sky.Past(page_state.SPAN), Coming()
-        self._pages = Asks(self._ask_for, self.replied, lambda client, message: self._server.reply(client, message),
-                           lambda: self.texts.get('acu/mode') == 'rate')
+        self._history = collections.deque(maxlen=round(page_state.CHART_SPAN_S / page_state.CHART_PERIOD_S))
+        self._past, self._coming = page_sky.BeamHistory(page_state.CHART_SPAN_S), UpcomingPasses()
+        self._pages = PageRequests(self._ask_for, self.replied, lambda client, message: self._server.reply(client, message),
+                                   lambda: self.texts.get('acu/mode') == 'rate')
         self._sheets, self._logged = {}, None
         p = self.parameters
         names = [name.strip() for name in p.names.split(',') if name.strip()]
@@ -53,18 +53,18 @@ class PageNode(Remote):
             self.get_logger().warning(f'listens on {p.address}: whoever reaches this address and has a token operates '
                                       'the antenna, and the connection is not encrypted')
         self._server = PageServer(p.address, p.port, names, p.clients, self._history.copy)
-        for topic in page_state.NUMBERS:
+        for topic in page_state.EXTRA_NUMBER_TOPICS:
             self.hear(topic)
         self.message_reader('ins/state', self._text_taker('ins/state'))
         self.message_reader('acu/blockage', self._text_taker('acu/blockage'))
         self.message_reader('acu/alarms', self._take_alarms)
         self.message_reader('acu/program_track', self._take_program)
-        for role in page_security.ROLES:
+        for role in page_security.PAGE_ROLES:
             print(f'page, {role}: {self._server.access.url(role)}', flush=True)
-        self.every(LOOK, self._look)
-        self.every(FRAME, self._show)
-        self.every(page_state.PERIOD, self._remember)
-        self.every(SLOW, self._look_slowly)
+        self.every(POLL_PERIOD_S, self._look)
+        self.every(STATE_PERIOD_S, self._show)
+        self.every(page_state.CHART_PERIOD_S, self._remember)
+        self.every(SLOW_STATE_PERIOD_S, self._look_slowly)
 
     @property
     def now(self):
@@ -108,7 +108,8 @@ class PageNode(Remote):
         """Send the newest state, while anybody looks."""
         if not self._server.pages:
             return
-        sections = {'now': page_state.now(self), 'told': page_state.told(self), 'alarms': page_state.alarms(self)}
+        sections = {'now': page_state.now(self), 'told': page_state.status_section(self),
+                    'alarms': page_state.alarms(self)}
         if self._logged != self.log.revision:
             sections['log'], self._logged = list(self.log.lines), self.log.revision
         self._server.publish(sections)
@@ -120,7 +121,7 @@ class PageNode(Remote):
 
     def _look_slowly(self):
         """What changes slowly: where the beam was, what the nodes' parameters are."""
-        for node, names in page_state.WANTED.items():
+        for node, names in page_state.SHOWN_PARAMETERS.items():
             self._ask_parameters(node, names)
         if self.present('joint_states'):
             self._past.add(self.now, page_state.now(self)['beam'])

@@ -17,16 +17,16 @@ from pedestal_common.wire.commands import Reply
 from pedestal_operator.antenna import Antenna
 from pedestal_operator.requests import Requests
 
-NUMBERS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
-TEXTS = ('acu/mode', 'adu/state', 'acu/keyhole')
+NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
+TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole')
 
-FRESH = 2.5
+MAX_MESSAGE_AGE_S = 2.5
 """Time [s] after which what was heard last is no longer told as the present state."""
 
-ANSWER = 5.0
+REPLY_TIMEOUT_S = 5.0
 """Time [s] within which a node replies to a command, or is silent."""
 
-AGAIN = 1.0
+RETRY_PERIOD_S = 1.0
 """Time [s] without a reply after which a command is said again: the node may not have discovered us before."""
 
 
@@ -53,9 +53,9 @@ class Remote(Shell, Antenna):
         self.who, self.node = who, nodes.row(node)
         self.numbers, self.texts, self.status, self.heard = {}, {}, {}, {}
         self._requests = Requests(f'{os.getpid()}.{time.time_ns()}')
-        for topic in NUMBERS:
+        for topic in NUMBER_TOPICS:
             self.hear(topic)
-        for topic in TEXTS:
+        for topic in TEXT_TOPICS:
             self.message_reader(topic, self._text_taker(topic))
         self.message_reader('diagnostics', self._take_status)
         self.message_reader(self.node.replies, self._take_reply)
@@ -101,7 +101,7 @@ class Remote(Shell, Antenna):
 
     def present(self, name):
         """Whether a topic or node was heard lately."""
-        return name in self.heard and time.monotonic() - self.heard[name] < FRESH
+        return name in self.heard and time.monotonic() - self.heard[name] < MAX_MESSAGE_AGE_S
 
     def query(self, names):
         """The Query for parameters of the node that is asked."""
@@ -121,11 +121,11 @@ class Query:
         now = time.monotonic()
         if self.values is None and self._future and self._future.done():
             self.values = [value.double_value for value in self._future.result().values] or None
-        elif self.values is None and now - self._asked > ANSWER and self._client.service_is_ready():
+        elif self.values is None and now - self._asked > REPLY_TIMEOUT_S and self._client.service_is_ready():
             self._asked, self._future = now, self._client.call_async(self._request)
 
 
-class Spun:
+class RemoteSession:
     """A Remote with its executor, as a context. Raises GraphError where no node of the graph is heard. arguments: of
     ROS 2, for the Remote."""
 
@@ -155,7 +155,7 @@ class Spun:
             self.spin(0.05)
         return value
 
-    def find(self, seconds=ANSWER):
+    def find(self, seconds=REPLY_TIMEOUT_S):
         """Wait until the node that is asked hears us and we hear its replies. Raises GraphError."""
         row, remote = self.remote.node, self.remote
         _, asked = remote._link(row.obeys)
@@ -166,11 +166,11 @@ class Spun:
                              f'{seconds:g} s: is a graph running?')
         self.until(lambda: False, 0.2)  # the other side of the discovery
 
-    def ask(self, verb, arguments=None, seconds=ANSWER) -> Reply:
+    def ask(self, verb, arguments=None, seconds=REPLY_TIMEOUT_S) -> Reply:
         """Ask and wait for the Reply. Raises GraphError."""
         number, deadline = self.remote.ask(verb, arguments), time.monotonic() + seconds
         while (reply := self.until(lambda: self.remote.replied(number),
-                                   min(AGAIN, deadline - time.monotonic()))) is None:
+                                   min(RETRY_PERIOD_S, deadline - time.monotonic()))) is None:
             if time.monotonic() > deadline:
                 raise GraphError(f'{self.remote.node.name} did not reply to {verb} within {seconds:g} s')
             self.remote.ask_again(number)

@@ -3,7 +3,7 @@ import itertools
 
 from pedestal_common.wire.commands import Command
 
-MOST = 1000
+MAX_KEPT_REQUESTS = 1000
 """Requests that are remembered, the latest: not everybody waits for a reply."""
 
 
@@ -23,7 +23,7 @@ class Requests:
             name: f'{value:.9g}' if isinstance(value, float) else str(value)
             for name, value in (arguments or {}).items()})
         self._asked[command.number] = command
-        if len(self._asked) > MOST:
+        if len(self._asked) > MAX_KEPT_REQUESTS:
             self._forget(next(iter(self._asked)))
         return command
 

@@ -9,13 +9,14 @@ from pedestal_common import parameters
 from pedestal_common.node import shell
 from pedestal_operator.rotator import controller, rotctld
 from pedestal_operator.rotator.line_server import Client
-from pedestal_operator.rotator.rotctld import BUSY, INVALID, OK, REJECTED, TIMEOUT
+from pedestal_operator.rotator.rotctld import RESULT_BUSY, RESULT_INVALID, RESULT_OK, RESULT_REJECTED, RESULT_TIMEOUT
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
-RESULTS = {controller.DONE: OK, controller.REFUSED: REJECTED, controller.OUT_OF_REACH: INVALID,
-           controller.BUSY: BUSY, controller.SILENT: TIMEOUT}
+RESULT_BY_OUTCOME = {controller.OUTCOME_DONE: RESULT_OK, controller.OUTCOME_REFUSED: RESULT_REJECTED,
+                     controller.OUTCOME_OUT_OF_REACH: RESULT_INVALID,
+                     controller.OUTCOME_BUSY: RESULT_BUSY, controller.OUTCOME_NO_REPLY: RESULT_TIMEOUT}
 
-VERBS = {'park': 'stow', 'reset': 'acu/reset_faults'}
+VERB_BY_COMMAND = {'park': 'stow', 'reset': 'acu/reset_faults'}
 """{command: verb of the control unit}."""
 
 
@@ -37,7 +38,7 @@ class RotctldNode(ServerNode):
     """Answers its clients in order."""
 
     def __init__(self):
-        super().__init__('rotctld', RotctldParameters, rotctld.LONGEST, RotctldClient)
+        super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
     def serve(self, client, now):
         """Answer what waits, in order; a request that asks the antenna waits for its reply first."""
@@ -47,25 +48,25 @@ class RotctldNode(ServerNode):
                 if outcome is None:
                     return
                 client.ask = None
-                client.say(rotctld.answer(client.request, RESULTS[outcome]))
+                client.say(rotctld.answer(client.request, RESULT_BY_OUTCOME[outcome]))
                 continue
             line = client.lines.popleft()
-            request = rotctld.read(line) if line is not None else rotctld.Request('', error=INVALID)
+            request = rotctld.read(line) if line is not None else rotctld.Request('', error=RESULT_INVALID)
             if request is None:
                 continue
-            if request.error == OK and request.name == 'quit':
+            if request.error == RESULT_OK and request.name == 'quit':
                 client.gone = ''
                 client.lines.clear()
-            elif request.error != OK:
+            elif request.error != RESULT_OK:
                 client.say(rotctld.answer(request, request.error))
-            elif request.name in rotctld.SETS:
+            elif request.name in rotctld.SET_COMMANDS:
                 self._move(client, request, now)
             else:
-                client.say(rotctld.answer(request, OK, self._lines(request)))
+                client.say(rotctld.answer(request, RESULT_OK, self._lines(request)))
 
     def _move(self, client, request, now):
         if self.parameters.read_only:
-            client.say(rotctld.answer(request, REJECTED))
+            client.say(rotctld.answer(request, RESULT_REJECTED))
             return
         ask, name = self.controller, client.name
         client.request = request
@@ -74,11 +75,11 @@ class RotctldNode(ServerNode):
         elif request.name == 'move':
             way, percent = request.values
             rate = self.parameters.jog_rate * (50 if percent == -1 else percent) / 100.0
-            client.ask = ask.jog(name, [rate * part for part in rotctld.DIRECTIONS[way]], now)
+            client.ask = ask.jog(name, [rate * part for part in rotctld.MOVE_DIRECTIONS[way]], now)
         elif request.name == 'stop':
             client.ask = ask.stop(name, now)
         else:
-            client.ask = ask.do(name, VERBS[request.name], now)
+            client.ask = ask.do(name, VERB_BY_COMMAND[request.name], now)
 
     def _lines(self, request):
         """What a request without motion is answered with: [(name, text)]."""

@@ -3,7 +3,7 @@ import math
 import typing
 
 from pedestal_common.graph import topics
-from pedestal_common.node.unit import OK
+from pedestal_common.node.unit import LEVEL_OK
 
 
 class Row(typing.NamedTuple):
@@ -21,7 +21,7 @@ class Row(typing.NamedTuple):
         return f'{self.value:.4f}' if isinstance(self.value, float) else str(self.value)
 
 
-TOLD = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole')
+ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole')
 """Keys of the control unit's diagnostics."""
 
 
@@ -34,7 +34,7 @@ def rows(remote) -> list:
     found += [Row('deviation', axis, a - b, 'deg') for axis, a, b in zip(topics.AXES, wanted, actual)]
     found += [Row('rate', axis, rate, 'deg/s') for axis, rate in zip(topics.AXES, remote.rates())]
     found += [Row('receiver', name, value, unit) for name, value, unit in _receiver(remote)]
-    found += [Row('acu', key, told.get(key)) for key in TOLD]
+    found += [Row('acu', key, told.get(key)) for key in ACU_STATUS_KEYS]
     found.append(Row('adu', 'state', remote.texts.get('adu/state')))
     return found
 
@@ -42,7 +42,7 @@ def rows(remote) -> list:
 def alarms(remote) -> list:
     """[(node, text)] of the nodes whose diagnostics say that something is not well, and of those that are silent."""
     found = [(name, status.message) for name, status in remote.status.items()
-             if status.level != OK and remote.present(name)]
+             if status.level != LEVEL_OK and remote.present(name)]
     return found + [(name, 'silent') for name in remote.status if not remote.present(name)]
 
 

@@ -9,7 +9,7 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Command, Reply
 from pedestal_operator.page import page_log, page_passes, page_security, page_server, page_sky, page_state
-from pedestal_operator.page.page_asks import BEHIND, PATIENCE, SILENT, Asks
+from pedestal_operator.page.page_requests import JOG_TIMEOUT_S, MAX_STATE_AGE_S, PAGE_REPLY_TIMEOUT_S, PageRequests
 from pedestal_operator.page.page_security import Access, Refused, Request
 from pedestal_operator.requests import Requests
 
@@ -51,19 +51,21 @@ def test_who_is_served(access):
 def test_each_server_and_role_has_a_token_of_its_own(access):
     tokens = [*access.tokens.values(), *Access('127.0.0.1', 8080).tokens.values()]
     assert len(set(tokens)) == 6 and min(map(len, tokens)) >= 32
-    assert [access.role(GOOD._replace(token=access.tokens[role])) for role in page_security.ROLES] == [
-        *page_security.ROLES]
+    assert [access.role(GOOD._replace(token=access.tokens[role])) for role in page_security.PAGE_ROLES] == [
+        *page_security.PAGE_ROLES]
     assert Access('192.0.2.1', 1).cookie != access.cookie                       # browsers share them between ports
     with pytest.raises(Refused):
         Access('192.0.2.1', 8080).role(GOOD)                                    # not served as 127.0.0.1
 
 
 def test_roles():
-    assert page_security.may('monitor', 'stop', {}) == ''
-    assert page_security.may('monitor', 'standby', {}) and page_security.may('monitor', 'rate', {})
-    assert page_security.may('operator', 'take', {}) == page_security.may('operator', 'stow', {}) == ''
-    assert page_security.may('operator', 'take', {'role': 'supervisor'})
-    assert page_security.may('supervisor', 'take', {'role': 'supervisor'}) == ''
+    assert page_security.refusal_reason('monitor', 'stop', {}) == ''
+    assert page_security.refusal_reason('monitor', 'standby', {}) and page_security.refusal_reason('monitor', 'rate',
+                                                                                                   {})
+    assert page_security.refusal_reason('operator', 'take', {}) == page_security.refusal_reason('operator', 'stow',
+                                                                                                {}) == ''
+    assert page_security.refusal_reason('operator', 'take', {'role': 'supervisor'})
+    assert page_security.refusal_reason('supervisor', 'take', {'role': 'supervisor'}) == ''
 
 
 class Desk:
@@ -78,8 +80,8 @@ class Desk:
     def __init__(self, *grants):
         self.requests, self.asked, self.told = Requests('test'), [], []
         self.grants, self.mode, self.client = list(grants), 'rate', self.Client()
-        self.asks = Asks(self._ask, self.requests.replied, lambda client, message: self.told.append(message),
-                         lambda: self.mode == 'rate')
+        self.asks = PageRequests(self._ask, self.requests.replied, lambda client, message: self.told.append(message),
+                                 lambda: self.mode == 'rate')
 
     def _ask(self, who, verb, arguments):
         command = self.requests.add(verb, who, arguments)
@@ -95,13 +97,13 @@ class Desk:
 
 
 def test_a_jog_ends_in_silence_too_late_and_with_its_page():
-    for end in (lambda desk: desk.asks.look(10.0 + SILENT + 0.01), lambda desk: desk.take(None, 10.1),
-                lambda desk: desk.take({'jog': [1.0, 0]}, 10.1, BEHIND + 0.01),
+    for end in (lambda desk: desk.asks.look(10.0 + JOG_TIMEOUT_S + 0.01), lambda desk: desk.take(None, 10.1),
+                lambda desk: desk.take({'jog': [1.0, 0]}, 10.1, MAX_STATE_AGE_S + 0.01),
                 lambda desk: desk.take({'jog': [0, 0]}, 10.1)):
         desk = Desk()
         desk.take({'jog': [1.0, -2.0]}, 10.0)
         assert desk.asked == [('anna@page', 'rate', {'azimuth': math.radians(1.0), 'elevation': math.radians(-2.0)})]
-        desk.asks.look(10.0 + 0.9 * SILENT)
+        desk.asks.look(10.0 + 0.9 * JOG_TIMEOUT_S)
         assert len(desk.asked) == 1
         end(desk)
         assert desk.asked[1:] == [('anna@page', 'rate', {'azimuth': 0.0, 'elevation': 0.0})]
@@ -118,7 +120,7 @@ def test_the_end_of_a_jog_disturbs_no_other_mode():
 
 
 def test_a_stop_that_is_refused_or_not_answered_becomes_standby():
-    for grant, later in ((False, 0.0), (None, PATIENCE + 0.1)):
+    for grant, later in ((False, 0.0), (None, PAGE_REPLY_TIMEOUT_S + 0.1)):
         desk = Desk(grant, True)
         desk.take({'ask': 'stop', 'id': 1}, 10.0)
         desk.asks.look(10.0 + later)
@@ -172,7 +174,7 @@ def test_a_pass_of_a_program_track():
 
 
 def test_the_past_of_the_beam_is_where_it_moved():
-    past = page_sky.Past(600.0)
+    past = page_sky.BeamHistory(600.0)
     for t in range(100):
         past.add(float(t), [0.2 * t, 20.0])
     past.add(100.0, [math.nan, math.nan])
@@ -191,7 +193,7 @@ class Station:
     LINES = {'line_1': '1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
              'line_2': '2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482'}
     TOLD = {'acu': LINES, 'tracking_receiver': {}}
-    PLACE = dict(zip((f'prediction.station.{name}' for name in page_state.STATION), (47.4, 8.5, 500.0)))
+    PLACE = dict(zip((f'prediction.station.{name}' for name in page_state.STATION_PARAMETERS), (47.4, 8.5, 500.0)))
 
     def __init__(self, now, told=TOLD, **configuration):
         self.now, self._told, self.configuration = now, told, {**self.PLACE, **configuration}
@@ -207,7 +209,7 @@ UT1 = UTC."""
 
 def coming(antenna):
     """What page_passes.Coming knows, once it knows it."""
-    looked = page_passes.Coming()
+    looked = page_passes.UpcomingPasses()
     deadline = monotonic() + 60.0
     while not looked.look(antenna) and monotonic() < deadline:
         sleep(0.01)
@@ -225,14 +227,15 @@ def test_the_next_passes_are_those_of_skyfield_in_the_time_of_the_graph():
         found, ahead = coming(antenna), 2e9 - begin if antenna.now > 2e9 else 0.0
         times = [each[name] for each in found[:2] for name in ('aos', 'los')]
         assert times == pytest.approx([t + ahead for t in SKYFIELD], abs=0.5)
-        assert len(found) == page_passes.MOST and all(each['highest'] >= 10.0 for each in found)
+        assert len(found) == page_passes.MAX_PASSES and all(each['highest'] >= 10.0 for each in found)
 
 
 def test_without_elements_station_or_utc_no_pass_is_looked_for():
-    assert page_passes.question(Station(1575909000.0, {'acu': {}})) is None
-    assert page_passes.question(Station(100.0)) is None
+    assert page_passes.pass_query(Station(1575909000.0, {'acu': {}})) is None
+    assert page_passes.pass_query(Station(100.0)) is None
     antenna = Station(1575909000.0)
     del antenna.configuration['prediction.station.height']
-    assert page_passes.question(antenna) is None
-    old = page_passes.question(Station(1575909000.0 + 40.0 * 86400.0))
-    assert page_passes.found(old) == []                                                   # elements of 40 days ago
+    assert page_passes.pass_query(antenna) is None
+    old = page_passes.pass_query(Station(1575909000.0 + 40.0 * 86400.0))
+    # elements of 40 days ago
+    assert page_passes.upcoming_passes(old) == []

@@ -1,6 +1,6 @@
 """Which reply belongs to which request."""
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_operator.requests import MOST, Requests
+from pedestal_operator.requests import MAX_KEPT_REQUESTS, Requests
 
 GRANTED = Reply(True, 'mode is stop')
 
@@ -24,9 +24,9 @@ def test_replies_to_others_are_not_taken():
 
 def test_replies_that_nobody_reads_do_not_pile_up():
     requests = Requests('7')
-    for _ in range(3 * MOST):
+    for _ in range(3 * MAX_KEPT_REQUESTS):
         requests.take(requests.add('rate', 'anna'), GRANTED)
-    assert len(requests) == len(requests._replies) == MOST
+    assert len(requests) == len(requests._replies) == MAX_KEPT_REQUESTS
     last = requests.add('stop', 'anna')
     requests.take(last, GRANTED)
     assert requests.replied(last.number) == GRANTED

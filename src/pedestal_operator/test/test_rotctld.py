@@ -8,7 +8,15 @@ import pytest
 
 from pedestal_operator.rotator import rotctld
 from pedestal_operator.rotator.line_server import Lines
-from pedestal_operator.rotator.rotctld import INVALID, NOT_AVAILABLE, NOT_IMPLEMENTED, OK, Limits, answer, read
+from pedestal_operator.rotator.rotctld import (
+    RESULT_INVALID,
+    RESULT_NOT_AVAILABLE,
+    RESULT_NOT_IMPLEMENTED,
+    RESULT_OK,
+    Limits,
+    answer,
+    read,
+)
 
 
 @pytest.mark.parametrize(('line', 'name', 'values', 'separator'), (
@@ -21,15 +29,19 @@ from pedestal_operator.rotator.rotctld import INVALID, NOT_AVAILABLE, NOT_IMPLEM
     ('P 171.41234567890123 35.4', 'set_pos', (171.41234567890123, 35.4), '')))
 def test_a_line_is_read(line, name, values, separator):
     request = read(line)
-    assert (request.name, request.values, request.separator, request.error) == (name, values, separator, OK)
+    assert (request.name, request.values, request.separator, request.error) == (name, values, separator, RESULT_OK)
 
 
 @pytest.mark.parametrize(('line', 'error'), (
-    ('P', INVALID), ('P 10', INVALID), ('P 1 2 3', INVALID), ('P nan 10', INVALID), ('P 10 inf', INVALID),
-    ('P 1e400 0', INVALID), ('P 0x10 0', INVALID), ('P ' + '9' * 100 + ' 0', INVALID), ('P a b', INVALID),
-    ('M 3 50', INVALID), ('M 2 0', INVALID), ('M 2 101', INVALID), ('M sideways 5', INVALID), ('S now', INVALID),
-    ('Z', NOT_IMPLEMENTED), ('dance', NOT_IMPLEMENTED), ('\\p', NOT_IMPLEMENTED), ('w abc', NOT_AVAILABLE),
-    ('\\get_level SPEED', NOT_AVAILABLE), ('get_pos', NOT_IMPLEMENTED)))
+    ('P', RESULT_INVALID), ('P 10', RESULT_INVALID), ('P 1 2 3', RESULT_INVALID), ('P nan 10', RESULT_INVALID),
+    ('P 10 inf', RESULT_INVALID),
+    ('P 1e400 0', RESULT_INVALID), ('P 0x10 0', RESULT_INVALID), ('P ' + '9' * 100 + ' 0', RESULT_INVALID),
+    ('P a b', RESULT_INVALID),
+    ('M 3 50', RESULT_INVALID), ('M 2 0', RESULT_INVALID), ('M 2 101', RESULT_INVALID),
+    ('M sideways 5', RESULT_INVALID), ('S now', RESULT_INVALID),
+    ('Z', RESULT_NOT_IMPLEMENTED), ('dance', RESULT_NOT_IMPLEMENTED), ('\\p', RESULT_NOT_IMPLEMENTED),
+    ('w abc', RESULT_NOT_AVAILABLE),
+    ('\\get_level SPEED', RESULT_NOT_AVAILABLE), ('get_pos', RESULT_NOT_IMPLEMENTED)))
 def test_what_cannot_be_done_is_refused(line, error):
     request = read(line)
     assert request.error == error and answer(request, request.error) == f'RPRT {error}\n'.encode()
@@ -41,14 +53,14 @@ def test_nothing_is_answered_to_what_asks_nothing():
 
 def test_answers_are_the_references_to_the_byte():
     at = rotctld.position(1.0, 2.0)
-    assert answer(read('p'), OK, at) == b'1.00\n2.00\n'
-    assert answer(read('+p'), OK, at) == b'get_pos:\nAzimuth: 1.00\nElevation: 2.00\nRPRT 0\n'
-    assert answer(read(';p'), OK, at) == b'get_pos:;Azimuth: 1.00;Elevation: 2.00;RPRT 0\n'
-    assert answer(read('+P 1 2'), OK) == b'set_pos: 1 2\nRPRT 0\n'
-    assert answer(read('+S'), OK) == b'stop:\nRPRT 0\n'
-    assert answer(read('P 1 2'), OK) == b'RPRT 0\n'
-    assert answer(read('+P 1 2'), INVALID) == b'set_pos: 1 2\nRPRT -1\n'
-    assert answer(read('\\dump_state'), OK, rotctld.state(Limits((-270.0, 270.0), (-2.0, 92.0)), False)) == (
+    assert answer(read('p'), RESULT_OK, at) == b'1.00\n2.00\n'
+    assert answer(read('+p'), RESULT_OK, at) == b'get_pos:\nAzimuth: 1.00\nElevation: 2.00\nRPRT 0\n'
+    assert answer(read(';p'), RESULT_OK, at) == b'get_pos:;Azimuth: 1.00;Elevation: 2.00;RPRT 0\n'
+    assert answer(read('+P 1 2'), RESULT_OK) == b'set_pos: 1 2\nRPRT 0\n'
+    assert answer(read('+S'), RESULT_OK) == b'stop:\nRPRT 0\n'
+    assert answer(read('P 1 2'), RESULT_OK) == b'RPRT 0\n'
+    assert answer(read('+P 1 2'), RESULT_INVALID) == b'set_pos: 1 2\nRPRT -1\n'
+    assert answer(read('\\dump_state'), RESULT_OK, rotctld.state(Limits((-270.0, 270.0), (-2.0, 92.0)), False)) == (
         b'1\n2\nmin_az=-270.000000\nmax_az=270.000000\nmin_el=-2.000000\nmax_el=92.000000\nsouth_zero=0\n'
         b'rot_type=AzEl\ndone\n')
 
@@ -73,11 +85,11 @@ def test_a_pass_through_north_never_unwinds():
 
 
 def test_lines_are_cut_and_long_ones_kept_out_of_memory():
-    lines = Lines(rotctld.LONGEST)
+    lines = Lines(rotctld.MAX_LINE_BYTES)
     assert lines.take(b'p\nP 1 2\nS') == ['p', 'P 1 2'] and lines.take(b'\n') == ['S']
     for _ in range(100):
         assert lines.take(b'x' * 10_000) == []
-    assert len(lines._rest) <= rotctld.LONGEST
+    assert len(lines._rest) <= rotctld.MAX_LINE_BYTES
     assert lines.take(b'x\np\n') == [None, 'p']
 
 

@@ -17,7 +17,7 @@ from pedestal_operator import live_node
 from pedestal_operator.viewers import frames
 
 LAYOUTS = ('commissioning.json', 'tracking.json')
-FRAMES = {'earth', 'base_link', *(joint.child for joint in frames.JOINTS)}
+FRAMES = {'earth', 'base_link', *(joint.child for joint in frames.PEDESTAL_JOINTS)}
 PANELS = {'Plot': foxglove.layouts.PlotConfig, 'StateTransitions': foxglove.layouts.StateTransitionsConfig,
           'RawMessages': foxglove.layouts.RawMessagesConfig, '3D': foxglove.layouts.ThreeDeeConfig,
           'DiagnosticSummary': foxglove.layouts.DiagnosticsSummaryConfig}
@@ -27,7 +27,7 @@ TITLES = {'foxglovePanelTitle', 'lichtblickPanelTitle'}
 
 
 def layout(name):
-    return json.loads((frames.VIEWERS / name).read_text())
+    return json.loads((frames.VIEWER_FOLDER / name).read_text())
 
 
 def panels(name):
@@ -43,14 +43,14 @@ def leaves(tree):
 def numbers(topic):
     """The places of the numbers in a message of a topic, as its writer begins it."""
     return {path for path, _, _ in cdr.Places(messages.serialize(messages.template(topic)),
-                                              topics.BY_NAME[topic].type).numbers}
+                                              topics.TOPIC_BY_NAME[topic].type).numbers}
 
 
 def field(type_name, path):
     """The type of what a path of fields, 'status[:]' for example, leads to in a message type. Raises KeyError."""
     for part in path.split('.') if path else ():
         name, index, _ = part.partition('[')
-        kind, what = dict(messages.TYPESTORE.fielddefs[type_name][1])[name]
+        kind, what = dict(messages.ROS_TYPESTORE.fielddefs[type_name][1])[name]
         if index:
             kind, what = what[0]
         type_name = what if isinstance(what, str) else what[0]
@@ -60,7 +60,7 @@ def field(type_name, path):
 def topic_of(path):
     """(row of topics, path of fields, function) of a message path. Raises KeyError where there is no such topic."""
     match = re.fullmatch(r'/([\w/]+)((?:\.\w+(?:\[[\d:]+\])?)*)(?:\.@(\w+))?', path)
-    return topics.BY_NAME[match[1]], match[2].removeprefix('.'), match[3]
+    return topics.TOPIC_BY_NAME[match[1]], match[2].removeprefix('.'), match[3]
 
 
 @pytest.mark.parametrize('name', LAYOUTS)
@@ -86,7 +86,7 @@ def test_every_other_path_is_in_the_definition_of_its_topic(name):
         elif kind == 'DiagnosticSummary':
             assert topic_of(config['topicToRender'])[0].type == 'diagnostic_msgs/msg/DiagnosticArray'
         elif kind == '3D':
-            assert set(config['topics']) == {live_node.DESCRIPTION}
+            assert set(config['topics']) == {live_node.DESCRIPTION_CHANNEL}
             assert {key.removeprefix('frame:') for key in config['transforms']} == FRAMES
             assert config['followTf'] in FRAMES
 
@@ -105,20 +105,20 @@ def of_plotjuggler(topic):
     found = set()
     for path in numbers(topic):
         match = re.fullmatch(r'(position|velocity|effort)\[(\d+)\]', path)
-        place = f'{topics.BY_NAME[topic].names[int(match[2])]}/{match[1]}' if match else path.replace('.', '/')
+        place = f'{topics.TOPIC_BY_NAME[topic].names[int(match[2])]}/{match[1]}' if match else path.replace('.', '/')
         found.add(f'/{topic}/{place}')
     return found
 
 
 def test_every_curve_for_plotjuggler_is_a_number_of_a_topic():
-    curves = [curve.get('name') for curve in ElementTree.parse(frames.VIEWERS / 'plotjuggler.xml').iter('curve')]
+    curves = [curve.get('name') for curve in ElementTree.parse(frames.VIEWER_FOLDER / 'plotjuggler.xml').iter('curve')]
     stamped = [row.name for row in topics.TOPICS if row.rate == 'step']
     assert len(curves) >= 15
     assert set(curves) <= set().union(*map(of_plotjuggler, stamped))
 
 
 def test_rviz_shows_our_frames_and_asks_for_a_latched_model():
-    config = yaml.safe_load((frames.VIEWERS / 'pedestal.rviz').read_text())['Visualization Manager']
+    config = yaml.safe_load((frames.VIEWER_FOLDER / 'pedestal.rviz').read_text())['Visualization Manager']
     displays = {display['Name']: display for display in config['Displays']}
     assert config['Global Options']['Fixed Frame'] == 'earth'
     assert set(displays['Frames']['Frames']) - {'All Enabled'} == FRAMES
@@ -130,7 +130,7 @@ def test_rviz_shows_our_frames_and_asks_for_a_latched_model():
 def chain(tmp_path_factory):
     """ikpy's forward kinematics of the model, from the deck to the beam."""
     file = tmp_path_factory.mktemp('model') / 'pedestal.urdf'
-    file.write_text(frames.DESCRIPTION)
+    file.write_text(frames.PEDESTAL_URDF)
     return Chain.from_urdf_file(str(file), base_elements=['base_link'],
                                 active_links_mask=[False, True, True, False])
 

@@ -13,23 +13,23 @@ from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
-from pedestal_common.wire.cdr import STAMPED
+from pedestal_common.wire.cdr import STAMPED_TYPES
 from pedestal_recording import columns, mcap_file
-from pedestal_recording.mcap_file import MESSAGE, BagError, McapFile
+from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile
 
-CACHE = 64_000_000
+MAX_CACHE_BYTES = 64_000_000
 """Bytes of unpacked chunks that are kept."""
 
-LOOKED_AT = 100
+MAX_SEARCHED_DIAGNOSTICS = 100
 """Diagnostics at the end of a bag among which the last of a node is looked for."""
 
-CHANNELS = 2000
+MAX_CHANNELS = 2000
 """Channels of a file at the most."""
 
-BLOCK = 65_536
+INDEX_BLOCK_ROWS = 65_536
 """Rows of the index that are made at once."""
 
-INDEX = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'chunk', 'start', 'stop')]
+INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'chunk', 'start', 'stop')]
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
 _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')
 
@@ -136,7 +136,7 @@ class Bag:
         self.breaks, self.damage = [], ''
         self._opened, self._cache, self._chunks = opened, {}, []
         self._schemas, self._channels, self._stamped = {}, {}, []
-        blocks, ended = [np.zeros(0, INDEX)], True
+        blocks, ended = [np.zeros(0, INDEX_FIELDS)], True
         for number, file in enumerate(opened):
             try:
                 self._scan(number, file, blocks)
@@ -169,13 +169,13 @@ class Bag:
 
     def _walk(self, number, data, offset, chunk):
         """Iterator of blocks of the index: the messages in the records `data`, which begin at this offset."""
-        unpack, base, at, rows = MESSAGE.unpack_from, number << 16, 0, []
+        unpack, base, at, rows = MESSAGE_HEAD.unpack_from, number << 16, 0, []
         add, file = rows.append, self._opened[number]
         while at < len(data):
             if data[at] == Opcode.MESSAGE:
                 length, channel, sequence, log, publish = unpack(data, at)
-                add((base | channel, sequence, log, publish, log, chunk, at + MESSAGE.size, at + 9 + length))
-                if len(rows) == BLOCK:
+                add((base | channel, sequence, log, publish, log, chunk, at + MESSAGE_HEAD.size, at + 9 + length))
+                if len(rows) == INDEX_BLOCK_ROWS:
                     yield self._block(file, rows, data, offset)
                     rows.clear()
                 at += 9 + length
@@ -191,7 +191,7 @@ class Bag:
     def _block(self, file, rows, data, offset):
         """Rows as a block of the index, each stamped where its header says when."""
         file.count(len(rows))
-        block = np.array(rows, INDEX)
+        block = np.array(rows, INDEX_FIELDS)
         unknown = set(np.unique(block['channel']).tolist()) - set(self._channels)
         if unknown:
             raise ValueError(f'channel {min(unknown) & 0xffff} is declared nowhere')
@@ -215,11 +215,11 @@ class Bag:
             name = record.topic.lstrip('/')
             if not name.isprintable() or not name:
                 raise ValueError(f'a topic of the name {record.topic!r}')
-            if len(self._channels) >= CHANNELS * len(self.files):
-                raise ValueError(f'more than {CHANNELS} channels')
+            if len(self._channels) >= MAX_CHANNELS * len(self.files):
+                raise ValueError(f'more than {MAX_CHANNELS} channels')
             self._channels[base | record.id] = name
             self.topics[name] = self._schemas[base | record.schema_id]
-            if self.topics[name] in STAMPED:
+            if self.topics[name] in STAMPED_TYPES:
                 self._stamped.append(base | record.id)
         elif opcode == Opcode.METADATA:
             self.metadata_records.setdefault(record.name, record.metadata)
@@ -236,7 +236,7 @@ class Bag:
         if chunk not in self._cache:
             file, *place = self._chunks[chunk]
             data = file.chunk(*place, again=True)
-            while self._cache and sum(map(len, self._cache.values())) + len(data) > CACHE:
+            while self._cache and sum(map(len, self._cache.values())) + len(data) > MAX_CACHE_BYTES:
                 del self._cache[next(iter(self._cache))]
             self._cache[chunk] = data
         return self._cache[chunk][start:stop]
@@ -336,7 +336,7 @@ class Bag:
     def last_values(self, node):
         """{key: value} of the last diagnostics of a node; {} where there is none that can be read."""
         rows = self.rows('diagnostics') if 'diagnostics' in self.topics else self.index[:0]
-        for _, _, _, data in self.take(rows[:-LOOKED_AT - 1:-1]):
+        for _, _, _, data in self.take(rows[:-MAX_SEARCHED_DIAGNOSTICS - 1:-1]):
             with contextlib.suppress(ValueError):
                 for status in messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticArray').status:
                     if status.name == node:
@@ -350,8 +350,8 @@ class Bag:
     def take(self, rows):
         """Iterator of (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
         names, take = self._channels, self._bytes
-        for begin in range(0, len(rows), BLOCK):
-            for channel, _, log, publish, _, *place in rows[begin:begin + BLOCK].tolist():
+        for begin in range(0, len(rows), INDEX_BLOCK_ROWS):
+            for channel, _, log, publish, _, *place in rows[begin:begin + INDEX_BLOCK_ROWS].tolist():
                 yield names[channel], log, publish, take(*place)
 
     def messages(self, topic=None):

@@ -8,12 +8,12 @@ import numpy as np
 
 from pedestal_common.graph import layouts
 from pedestal_common.wire import cdr
-from pedestal_common.wire.cdr import STAMPED
+from pedestal_common.wire.cdr import STAMPED_TYPES
 
-SHAPES = 100
+MAX_MESSAGE_SHAPES = 100
 """Kinds of messages of one length that are read all at once; what is left is read one by one."""
 
-CELLS = 4_000_000, 4
+CELL_LIMITS = 4_000_000, 4
 """Numbers in the columns at the most: so many, and one more for so many bytes of the messages. Messages that name
 other columns each time would fill a table as wide as it is long."""
 
@@ -21,7 +21,7 @@ other columns each time would fill a table as wide as it is long."""
 def stamps(data, type_name, log):
     """Header stamps [ns] (n,) of messages; the log times where the type has none or a message is too short."""
     log = np.asarray(log, np.int64)
-    if type_name not in STAMPED or not len(data) or min(map(len, data)) < 12:
+    if type_name not in STAMPED_TYPES or not len(data) or min(map(len, data)) < 12:
         return log.copy()
     pairs = np.frombuffer(b''.join([message[4:12] for message in data]), '<u4').reshape(-1, 2)
     return pairs[:, 0].astype(np.int32).astype(np.int64) * 1_000_000_000 + pairs[:, 1]
@@ -45,7 +45,7 @@ def table(data, type_name, log, start=0):
         out['data'] = [cdr.Places(message, type_name).texts['data'] for message in data]
     elif type_name not in ('diagnostic_msgs/msg/DiagnosticArray', 'rosgraph_msgs/msg/Clock'):
         lengths = np.array([len(message) for message in data], np.int64)
-        most = CELLS[0] + int(lengths.sum()) // CELLS[1]
+        most = CELL_LIMITS[0] + int(lengths.sum()) // CELL_LIMITS[1]
         for length in np.unique(lengths):
             rows = np.flatnonzero(lengths == length)
             block = np.frombuffer(b''.join([data[row] for row in rows]), np.uint8).reshape(rows.size, length)
@@ -60,7 +60,7 @@ def _fill(out, block, rows, type_name, count, most):
         walk = cdr.Places(block[0].tobytes(), type_name)
         fixed = np.concatenate([np.arange(start, stop) for start, stop in walk.fixed])
         shapes += 1
-        tried = len(block) if shapes < SHAPES else 1
+        tried = len(block) if shapes < MAX_MESSAGE_SHAPES else 1
         alike = (block[:tried, fixed] == block[0, fixed]).all(axis=1)
         same, where = block[:tried][alike], rows[:tried][alike]
         for path, start, dtype in walk.numbers:
@@ -88,7 +88,7 @@ def alike(data, type_name, template, names):
     fixed = np.concatenate(fixed)
     wanted = np.frombuffer(template, np.uint8)[fixed]
     size = len(template)
-    same = np.array([0 <= len(message) - size < cdr.PADDING for message in data], bool)
+    same = np.array([0 <= len(message) - size < cdr.PADDING_LIMIT_BYTES for message in data], bool)
     block = np.frombuffer(b''.join([message[:size] for message, fits in zip(data, same) if fits]), np.uint8)
     same[same] = (block.reshape(-1, size)[:, fixed] == wanted).all(axis=1)
     return same

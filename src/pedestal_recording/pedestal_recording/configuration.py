@@ -13,10 +13,10 @@ import yaml
 from pedestal_common import parameters
 from pedestal_common.text_files import plain_yaml
 
-PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
-            'pedestal_bringup', 'numpy', 'numba', 'rclpy')
-GIT_TIME = 5.0
-OWN = ('bag', 'scenario_yaml', 'parameters_yaml')
+VERSIONED_PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
+                      'pedestal_bringup', 'numpy', 'numba', 'rclpy')
+GIT_TIMEOUT_S = 5.0
+OMITTED_PARAMETERS = ('bag', 'scenario_yaml', 'parameters_yaml')
 """Parameters of the recorder that are no part of how a run was made: where to, and the configuration itself."""
 
 
@@ -24,7 +24,7 @@ def _git(*arguments):
     """What a git command on this source tree prints; '' when it fails, or there is no git."""
     try:
         done = subprocess.run(['git', '--no-optional-locks', *arguments], cwd=pathlib.Path(__file__).parent,
-                              capture_output=True, text=True, timeout=GIT_TIME, check=True)
+                              capture_output=True, text=True, timeout=GIT_TIMEOUT_S, check=True)
     except (OSError, subprocess.SubprocessError):
         return ''
     return done.stdout.strip()
@@ -43,7 +43,7 @@ def git_revision():
 def versions():
     """{'version.NAME': version} of Python, of our packages and of those that make the numbers."""
     versions = {'version.python': platform.python_version()}
-    for package in PACKAGES:
+    for package in VERSIONED_PACKAGES:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
             versions[f'version.{package}'] = importlib.metadata.version(package)
     return versions
@@ -53,7 +53,7 @@ def recorder_parameters(scenario):
     """The recorder's parameters {name: text} that describe a scenario.Scenario."""
     values = {node: parameters.as_dict(scenario.node_parameters(node))
               for node in scenario.nodes if node != 'operator'}
-    values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OWN}
+    values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OMITTED_PARAMETERS}
     return {'scenario_yaml': scenario.as_yaml(), 'parameters_yaml': yaml.safe_dump(values)}
 
 

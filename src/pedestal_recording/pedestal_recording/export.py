@@ -15,7 +15,7 @@ from pedestal_common.graph import layouts, nodes
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 
-STAMP, NANOSECONDS = 't [s]', 'stamp [ns]'
+TIME_COLUMN, STAMP_COLUMN = 't [s]', 'stamp [ns]'
 
 
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
@@ -37,7 +37,7 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
         raise FileExistsError(f'{existing[0]} exists already{more}; --overwrite replaces')
     folder.mkdir(parents=True, exist_ok=True)
     for name, file in files.items():
-        if bag.topics[name] not in messages.TYPESTORE.fielddefs:
+        if bag.topics[name] not in messages.ROS_TYPESTORE.fielddefs:
             reason = f'{name} is of type {bag.topics[name]}, which is not known here'
             if names:
                 raise bags.BagError(f'{path}: {reason}')
@@ -46,7 +46,7 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
         content = table(bag, name)
         with whole(file) as part:
             write(part, content, {'topic': name, 'type': bag.topics[name], **bag.metadata})
-        yield file, len(content[NANOSECONDS]), len(content)
+        yield file, len(content[STAMP_COLUMN]), len(content)
 
 
 @contextlib.contextmanager
@@ -75,7 +75,7 @@ def table(bag, name):
 
 
 def _times(stamps):
-    return {STAMP: stamps / 1e9, NANOSECONDS: stamps}
+    return {TIME_COLUMN: stamps / 1e9, STAMP_COLUMN: stamps}
 
 
 def _header(name, type_name, column):

@@ -1,7 +1,8 @@
 """One MCAP file, record by record: where each begins and ends, and the records of a chunk unpacked.
 
 What a file claims is held against what it is: a few bytes can stand for gigabytes of zeros in a compressed chunk, or
-for millions of empty messages. So time and memory are bounded by the length of the file (CHUNK, UNPACKED, MESSAGES).
+for millions of empty messages. So time and memory are bounded by the length of the file (MAX_CHUNK_BYTES,
+UNPACKED_LIMITS, MESSAGE_LIMITS).
 """
 import fcntl
 import io
@@ -18,19 +19,19 @@ from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from pedestal_common.text_files import files
 
-CHUNK = 32_000_000
+MAX_CHUNK_BYTES = 32_000_000
 """Bytes of a chunk, packed or unpacked, at the most."""
 
-UNPACKED = 32_000_000, 200
+UNPACKED_LIMITS = 32_000_000, 200
 """Bytes of all chunks, unpacked, at the most: so many, and so many more for each byte of the file."""
 
-MESSAGES = 500_000, 0.25
+MESSAGE_LIMITS = 500_000, 0.25
 """Messages at the most: so many, and so many more for each byte of the file."""
 
-MESSAGE = struct.Struct('<xQHIQQ')
+MESSAGE_HEAD = struct.Struct('<xQHIQQ')
 """Length, channel, sequence, log and publish time: the head of a message record after its opcode."""
 
-SQLITE = b'SQLite format 3'
+SQLITE_MAGIC = b'SQLite format 3'
 _RECORD = struct.Struct('<BQ')
 _WINDOW = 1_000_000
 _READ = {Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
@@ -66,11 +67,12 @@ def parsed(opcode, content):
 
 
 def unpacked(chunk) -> bytes:
-    """The records in a records.Chunk. Raises ValueError where it is longer than CHUNK, is not as long as it claims, or
+    """The records in a records.Chunk. Raises ValueError where it is longer than MAX_CHUNK_BYTES, is not as long as it
+    claims, or
     its checksum is wrong."""
     size = chunk.uncompressed_size
-    if max(size, len(chunk.data)) > CHUNK:
-        raise ValueError(f'a chunk of {size} bytes, must be at most {CHUNK}')
+    if max(size, len(chunk.data)) > MAX_CHUNK_BYTES:
+        raise ValueError(f'a chunk of {size} bytes, must be at most {MAX_CHUNK_BYTES}')
     try:
         data = _UNPACK[chunk.compression](chunk.data, size)
     except KeyError:
@@ -109,16 +111,16 @@ class McapFile:
             if not locked:
                 self._check_lock()
             self._start, self._window = 0, b''
-            head = self.read(0, len(SQLITE))
+            head = self.read(0, len(SQLITE_MAGIC))
         except OSError as error:
             raise BagError(f'{path}: {reason(error)}') from None
         if not head:
             raise BagError(f'{path}: empty file')
-        if head == SQLITE:
+        if head == SQLITE_MAGIC:
             raise BagError(f'{path}: an SQLite bag, not an MCAP file; `ros2 bag convert` makes one of it')
         if not head.startswith(MAGIC):
             raise BagError(f'{path}: not an MCAP file')
-        self._left = UNPACKED[0] + UNPACKED[1] * self.size
+        self._left = UNPACKED_LIMITS[0] + UNPACKED_LIMITS[1] * self.size
         self._messages = 0
 
     def _check_lock(self):
@@ -178,23 +180,25 @@ class McapFile:
     def chunk(self, start, stop, again=False) -> bytes:
         """The records in the chunk record at [start, stop); again: it was unpacked before.
 
-        Raises ValueError when it cannot be unpacked, or when the chunks of the file unpack to more than UNPACKED.
+        Raises ValueError when it cannot be unpacked, or when the chunks of the file unpack to more than
+        UNPACKED_LIMITS.
         """
-        if stop - start > 2 * CHUNK:
-            raise ValueError(f'a chunk of {stop - start} bytes, must be at most {CHUNK}')
+        if stop - start > 2 * MAX_CHUNK_BYTES:
+            raise ValueError(f'a chunk of {stop - start} bytes, must be at most {MAX_CHUNK_BYTES}')
         chunk = parsed(Opcode.CHUNK, self.read(start + 9, stop))
         if not again:
             self.spend(chunk)
         return unpacked(chunk)
 
     def spend(self, chunk):
-        """Count the bytes that a records.Chunk claims to hold. Raises ValueError when all are more than UNPACKED."""
+        """Count the bytes that a records.Chunk claims to hold. Raises ValueError when all are more than
+        UNPACKED_LIMITS."""
         self._left -= chunk.uncompressed_size
         if self._left < 0:
-            raise ValueError(f'its chunks unpack to more than {UNPACKED[1]} times its length')
+            raise ValueError(f'its chunks unpack to more than {UNPACKED_LIMITS[1]} times its length')
 
     def count(self, messages):
-        """Count messages that are read. Raises ValueError when all are more than MESSAGES."""
+        """Count messages that are read. Raises ValueError when all are more than MESSAGE_LIMITS."""
         self._messages += messages
-        if self._messages > MESSAGES[0] + MESSAGES[1] * self.size:
+        if self._messages > MESSAGE_LIMITS[0] + MESSAGE_LIMITS[1] * self.size:
             raise ValueError(f'more than {self._messages - messages} messages in {self.size} bytes')

@@ -10,31 +10,32 @@ from rclpy.qos import HistoryPolicy
 
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
-from pedestal_common.graph.steps import SECOND, GraphError
-from pedestal_common.node import listening, middleware, shell
-from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis
-from pedestal_common.realtime.intake import Intake
+from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
+from pedestal_common.node import middleware, shell, subscriptions
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.realtime.publisher_gate import PublisherGate
 from pedestal_common.realtime.streams import Streams
 from pedestal_common.text_files import files
 from pedestal_common.wire import messages
-from pedestal_common.wire.cdr import STAMPED
+from pedestal_common.wire.cdr import STAMPED_TYPES
 from pedestal_recording import configuration
 from pedestal_recording.bag import BagError
 from pedestal_recording.recorder_params import RecorderParameters
 from pedestal_recording.step_order import OrderError, StepOrder
 from pedestal_recording.writer import Writer
 
-QUIET = 0.5
-DRAIN = 4.0
-"""At the end the recorder goes on until nothing came for QUIET seconds, for DRAIN seconds at the most; all of DRAIN
+QUIET_TIME_S = 0.5
+MAX_DRAIN_S = 4.0
+"""At the end the recorder goes on until nothing came for QUIET_TIME_S seconds, for MAX_DRAIN_S seconds at the most;
+all of MAX_DRAIN_S
 when others were heard but a topic of every step was not: Fast DDS repeats what a reader missed while it was being
 discovered with the next heartbeat of the writer, by default every 3 s."""
 
-LAST = 'diagnostics'
+LAST_OPENED_TOPIC = 'diagnostics'
 """The topic that every node writes, and in lockstep waits for its reader before its first step: the recorder opens it
 when the executor hears of all others. What is there before is taken in another order than that in which it came."""
 
-FAR = 3600 * SECOND
+MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND
 """Time [ns] from the drive's beyond which no stamp is believed."""
 
 
@@ -46,11 +47,11 @@ class RecorderNode(shell.Shell):
         names = self.graph.members
         if self.graph.lockstep and not names:
             raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
-        beams, flags = self.graph.beams, [flag for flag in topics.FLAGS if getattr(self.parameters, flag)]
+        beams, flags = self.graph.beams, [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag)]
         recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
         if self.graph.lockstep:  # where commands have no place between two steps, but the replies, which repeat them
             recorded = [link for link in recorded if link.rate != 'command']
-        self._end = round(self.parameters.duration * SECOND) or None
+        self._end = round(self.parameters.duration * NS_PER_SECOND) or None
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
@@ -69,9 +70,9 @@ class RecorderNode(shell.Shell):
         self._quiet = None
         self.diagnose_with(self._diagnosis)
         for index, topic in enumerate(recorded):
-            if topic.name != LAST:
+            if topic.name != LAST_OPENED_TOPIC:
                 self._record(index, topic)
-        self._last = [(index, topic) for index, topic in enumerate(recorded) if topic.name == LAST]
+        self._last = [(index, topic) for index, topic in enumerate(recorded) if topic.name == LAST_OPENED_TOPIC]
         self._opening = self.every(0.0, self._record_last)
         if not self.graph.lockstep:
             self.every(1.0, lambda: self._write(self._bag.flush))
@@ -83,10 +84,11 @@ class RecorderNode(shell.Shell):
         if self.graph.lockstep:
             profile = middleware.qos(topic.rate)
             profile.history = HistoryPolicy.KEEP_ALL
-            self.create_subscription(middleware.message_class(topic.type), topic.name, listening.pair(take), profile,
+            self.create_subscription(middleware.message_class(topic.type), topic.name, subscriptions.pair(take),
+                                     profile,
                                      raw=True)
         else:
-            listening.subscribe(self, topic, topic.name, take, 'recorded')
+            subscriptions.subscribe(self, topic, topic.name, take, 'recorded')
 
     def _record_last(self):
         self._opening.cancel()
@@ -189,23 +191,24 @@ class RecorderNode(shell.Shell):
                 else:
                     order.take(sender_slot, stamp, data)
 
-        if topic.rate in topics.BETWEEN_STEPS:
+        if topic.rate in topics.EVENT_RATES:
             return put_change
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
     def _log_time(self, stamp):
         """Where a message of this stamp is laid: at its stamp, but at the drive's time where that is none, is of the
-        future, or is FAR from it."""
+        future, or is MAX_STAMP_DISTANCE_NS from it."""
         if stamp is not None:
             now = self._stamp or stamp
-            if abs(stamp - now) < FAR and stamp <= self.clock()[1] + self.graph.future * SECOND:
+            if abs(stamp
+                   - now) < MAX_STAMP_DISTANCE_NS and stamp <= self.clock()[1] + self.graph.future * NS_PER_SECOND:
                 return stamp
             self._broken += 1
         return self._stamp
 
     def _as_it_comes(self, index, topic):
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
-        clock = Intake(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * SECOND))
+        clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
 
         def put(data, info):
             write(index, log_time(stamp_in(data)), info['source_timestamp'], data)
@@ -221,7 +224,7 @@ class RecorderNode(shell.Shell):
             if self._sender(data) != self.name:
                 put(data, info)
 
-        if topic.type not in STAMPED:
+        if topic.type not in STAMPED_TYPES:
             return put_unstamped
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
@@ -229,7 +232,7 @@ class RecorderNode(shell.Shell):
         """The drive's time has come this far."""
         if stamp is None:
             return
-        if self.graph.lockstep and stamp // SECOND > self._stamp // SECOND:
+        if self.graph.lockstep and stamp // NS_PER_SECOND > self._stamp // NS_PER_SECOND:
             self.diagnostics.publish(self._stamp)
         self._stamp = stamp
         if self._end is not None and stamp - self.epoch(stamp) >= self._end:
@@ -243,21 +246,22 @@ class RecorderNode(shell.Shell):
             self._fail(str(error))
 
     def _diagnosis(self):
-        level, message = OK, 'recording'
+        level, message = LEVEL_OK, 'recording'
         if self._broken or self._order.odd:
-            level, message = WARN, 'recording; some messages have no valid or no proper stamp'
+            level, message = LEVEL_WARN, 'recording; some messages have no valid or no proper stamp'
         others = [name for name, writers in self._writers.items() if writers.several(time.monotonic_ns())]
         if others:
-            level, message = WARN, f'recording; {", ".join(others)}: more than one writer'
+            level, message = LEVEL_WARN, f'recording; {", ".join(others)}: more than one writer'
         if self._lost:
-            level, message = ERROR, self._losses()
+            level, message = LEVEL_ERROR, self._losses()
         return Diagnosis(level, message, [
             ('messages', str(self._bag.messages)), ('waiting steps', str(self._order.waiting)),
             ('lost', str(self._lost.total())), ('without valid stamp', str(self._broken)),
             ('out of order', str(self._order.odd))])
 
     def draining(self):
-        """Whether messages may still come: until all steps are written, nothing came for QUIET, or DRAIN is over."""
+        """Whether messages may still come: until all steps are written, nothing came for QUIET_TIME_S, or MAX_DRAIN_S
+        is over."""
         now = time.monotonic()
         if self._error is not None:
             return False
@@ -265,11 +269,11 @@ class RecorderNode(shell.Shell):
             return False
         taken = sum(self._taken)
         if self._quiet is None:
-            self._quiet, self._drain_end = (now, taken), now + DRAIN
+            self._quiet, self._drain_end = (now, taken), now + MAX_DRAIN_S
         elif taken != self._quiet[1]:
             self._quiet = now, taken
         unheard = taken and not all(self._taken[index] for index in self._of_every_step)
-        return now < self._drain_end and (unheard or now < self._quiet[0] + QUIET)
+        return now < self._drain_end and (unheard or now < self._quiet[0] + QUIET_TIME_S)
 
     def close(self):
         """Write what waits and finish the bag; messages, losses and SHA-256 are its result."""

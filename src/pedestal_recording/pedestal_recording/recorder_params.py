@@ -7,7 +7,7 @@ from pedestal_common.parameters import ParameterError, parameter, text
 
 
 @dataclasses.dataclass(frozen=True)
-class RecorderParameters(topic_flags(topics.BY_NAME)):
+class RecorderParameters(topic_flags(topics.TOPIC_BY_NAME)):
     """What is recorded where. All but `bag` and `duration` go into the bag, to say how it was made."""
     bag: str = text('recording', 'directory of the bag; must not exist, or be the unfinished one of this realtime run')
     duration: float = parameter(0.0, 0.0, 86400.0, 's', "end at this stamp of the drive's time; 0: when told to stop")

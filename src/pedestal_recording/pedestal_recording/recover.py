@@ -18,11 +18,11 @@ from mcap.opcode import Opcode
 
 from pedestal_common.graph import nodes, topics
 from pedestal_recording import bag as bags
-from pedestal_recording.mcap_file import MAGIC, MESSAGE, BagError, McapFile, frame, parsed, reason, unpacked
+from pedestal_recording.mcap_file import MAGIC, MESSAGE_HEAD, BagError, McapFile, frame, parsed, reason, unpacked
 from pedestal_recording.writer import BagFile
 
-_KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
-_END = (Opcode.DATA_END, Opcode.FOOTER)
+_COPIED_OPCODES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
+_END_OPCODES = (Opcode.DATA_END, Opcode.FOOTER)
 _COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
 _BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
 """Bytes of a chunk record before the name of its compression."""
@@ -78,8 +78,8 @@ class Recovered:
         first, last = self.first - self.start, self.last - self.start
         if self.lost:
             steps = max((count for name, count in self.lost.items()
-                         if nodes.plain(name) in topics.BY_NAME
-                         and topics.BY_NAME[nodes.plain(name)].rate == 'step'), default=0)
+                         if nodes.plain(name) in topics.TOPIC_BY_NAME
+                         and topics.TOPIC_BY_NAME[nodes.plain(name)].rate == 'step'), default=0)
             lines.append(f'lost in the middle: {steps} steps, {sum(self.lost.values())} messages: '
                          + ', '.join(f'{count} of {name}' for name, count in self.lost.items()))
         planned = self.planned_end is not None and self.last < self.planned_end
@@ -133,7 +133,7 @@ def _follows(data, at):
 
 def _read(file, opcode, data, start, stop):
     """The record at [start, stop), None of a kind that is not kept; of a chunk its records as bytes."""
-    if opcode not in _KEPT:
+    if opcode not in _COPIED_OPCODES:
         return None
     record = parsed(opcode, data[start + 9:stop])
     if opcode != Opcode.CHUNK:
@@ -177,7 +177,7 @@ def _pieces(file, data):
                 yield 0, at, stop, str(error) or type(error).__name__
         else:
             yield opcode, at, stop, record
-            if opcode in _END:
+            if opcode in _END_OPCODES:
                 return
             if record is not None:
                 good = stop
@@ -252,7 +252,7 @@ class _Salvage:
             self._bag.add_metadata(record.name, record.metadata)
         elif opcode == Opcode.ATTACHMENT:
             raise ValueError('an attachment')
-        self._ended = opcode in _END
+        self._ended = opcode in _END_OPCODES
 
     def _declare(self, record):
         """Take over a schema or channel that is new."""
@@ -289,10 +289,10 @@ class _Salvage:
         while at < len(raw):
             opcode, stop = frame(raw, at)
             if opcode == Opcode.MESSAGE:
-                _, channel, _, log, _ = MESSAGE.unpack_from(raw, at)
+                _, channel, _, log, _ = MESSAGE_HEAD.unpack_from(raw, at)
                 if channel not in self._channels:
                     raise ValueError(f'channel {channel} is declared nowhere')
-                if stop < at + MESSAGE.size or log >= 2**63:
+                if stop < at + MESSAGE_HEAD.size or log >= 2**63:
                     raise ValueError('a message with a head that cannot be')
                 first, last = (log, log) if first is None else (min(first, log), max(last, log))
                 number += 1
@@ -306,8 +306,8 @@ class _Salvage:
         while at < len(raw):
             opcode, stop = frame(raw, at)
             if opcode == Opcode.MESSAGE:
-                _, channel, sequence, log, publish = MESSAGE.unpack_from(raw, at)
-                self._add(self._channels[channel], sequence, log, publish, raw[at + MESSAGE.size:stop])
+                _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(raw, at)
+                self._add(self._channels[channel], sequence, log, publish, raw[at + MESSAGE_HEAD.size:stop])
             at = stop
         for gap in self._gaps:
             gap.after = first if gap.after is None else gap.after

@@ -4,10 +4,10 @@ Arrival depends on the machine's load, the steps do not; so equal runs give equa
 """
 import heapq
 
-from pedestal_common.graph.steps import SECOND
-from pedestal_common.graph.topics import BETWEEN_STEPS
+from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.graph.topics import EVENT_RATES
 
-MAX_WAITING = 10_000
+MAX_WAITING_STEPS = 10_000
 
 
 class OrderError(ValueError):
@@ -40,7 +40,7 @@ class StepOrder:
         self._steps = len(self._needed['step'])
         self._last_answer, self._answer_slot = {}, {}
         for index, topic in enumerate(topics):
-            if topic.rate in BETWEEN_STEPS:
+            if topic.rate in EVENT_RATES:
                 answers = [slot for slot in self._needed['step'] if self._slots[slot - 1][1].writers == topic.writers]
                 self._answer_slot[index] = answers[0] if answers else None
                 self._last_answer[self._answer_slot[index]] = -1
@@ -91,10 +91,10 @@ class StepOrder:
         self._odd.append((index, data))
 
     def _open(self, stamp):
-        if len(self._stamps) >= MAX_WAITING:
+        if len(self._stamps) >= MAX_WAITING_STEPS:
             first = self._stamps[0]
-            raise OrderError(f'step {first / SECOND:.6f} s still waits for {", ".join(self.missing(first))} after '
-                             f'{MAX_WAITING} later steps')
+            raise OrderError(f'step {first / NS_PER_SECOND:.6f} s still waits for {", ".join(self.missing(first))} after '
+                             f'{MAX_WAITING_STEPS} later steps')
         bucket = self._buckets[stamp] = [self._steps, *[None] * len(self._slots)]
         heapq.heappush(self._stamps, stamp)
         return bucket
@@ -105,7 +105,7 @@ class StepOrder:
         needed = self._needed['step'] if bucket[0] else []
         if self.written < 0:
             needed = needed + self._needed['once']
-        if stamp // SECOND > self.written // SECOND:
+        if stamp // NS_PER_SECOND > self.written // NS_PER_SECOND:
             needed = needed + self._needed['second']
         return [slot for slot in needed if bucket[slot] is None]
 
@@ -126,7 +126,7 @@ class StepOrder:
         for (index, topic, _), data in zip(self._slots, bucket[1:]):
             if data is not None:
                 write(index, stamp, stamp, data)
-            elif topic.rate in BETWEEN_STEPS:
+            elif topic.rate in EVENT_RATES:
                 changes = self._changes[index]
                 while changes and changes[0][0] < stamp:
                     write(index, stamp, stamp, changes.pop(0)[1])

@@ -10,15 +10,15 @@ import numpy as np
 import yaml
 
 from pedestal_common.graph import nodes
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_recording import configuration
 
-MAX_LATENCY = 1_000_000_000
+MAX_LATENCY_NS = 1_000_000_000
 """A topic may end this much [ns] before the last step: the next messages were still on their way (latency)."""
 
-SHOWN = 10
+MAX_SHOWN_GAPS = 10
 
 
 @dataclasses.dataclass
@@ -137,7 +137,7 @@ def verify(bag) -> Report:
     problems += _away([rows[name] for name in of_steps], bag.start, grid)
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
-    drive = bag.last_values(nodes.DRIVE)
+    drive = bag.last_values(nodes.DRIVE_NODE)
     lost = count(drive.get('lost_steps', '')), count(drive.get('step', ''))
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
@@ -220,22 +220,22 @@ def _steps(stamp, of_drive, grid):
         problems.append(f'{between} stamps are no step')
     missing = _missing((unique - grid.first) // grid.period, grid.steps)
     if not of_drive and missing and missing[-1][1] == grid.steps - 1 \
-            and (missing[-1][1] - missing[-1][0] + 1) * grid.period <= MAX_LATENCY:
+            and (missing[-1][1] - missing[-1][0] + 1) * grid.period <= MAX_LATENCY_NS:
         missing.pop()
-    for start, stop in missing[:SHOWN]:
+    for start, stop in missing[:MAX_SHOWN_GAPS]:
         at, to = (grid.first + start * grid.period) / 1e9, (grid.first + stop * grid.period) / 1e9
         problems.append(f'missing 1 step at {at:.6f} s' if start == stop else
                         f'missing {stop - start + 1} steps from {at:.6f} to {to:.6f} s')
-    if len(missing) > SHOWN:
-        steps = sum(stop - start + 1 for start, stop in missing[SHOWN:])
-        problems.append(f'and {steps} more missing steps in {len(missing) - SHOWN} gaps')
+    if len(missing) > MAX_SHOWN_GAPS:
+        steps = sum(stop - start + 1 for start, stop in missing[MAX_SHOWN_GAPS:])
+        problems.append(f'and {steps} more missing steps in {len(missing) - MAX_SHOWN_GAPS} gaps')
     return problems
 
 
 def _seconds(bag, name, stamp, grid):
     """Diagnostics that are missing: every node with a topic in the bag owes one at the first step of every second."""
-    first, last = -(-grid.first // SECOND), grid.last // SECOND
-    count = max(last - first + (grid.at(last * SECOND) <= grid.last), 0)
+    first, last = -(-grid.first // NS_PER_SECOND), grid.last // NS_PER_SECOND
+    count = max(last - first + (grid.at(last * NS_PER_SECOND) <= grid.last), 0)
     stamps_of = collections.defaultdict(list)
     for at, (_, _, _, data) in zip(stamp, bag.raw(name)):
         try:
@@ -248,11 +248,11 @@ def _seconds(bag, name, stamp, grid):
     problems = []
     for node in nodes:
         at = np.array(stamps_of[node], np.int64)
-        second = np.unique(at[at == grid.at(at // SECOND * SECOND)] // SECOND)
+        second = np.unique(at[at == grid.at(at // NS_PER_SECOND * NS_PER_SECOND)] // NS_PER_SECOND)
         missing = _missing(second - first, count)
         if missing:
             problems.append(f'{sum(stop - start + 1 for start, stop in missing)} of {count} of {node} missing, '
-                            f'the first at {grid.at((first + missing[0][0]) * SECOND) / 1e9:.6f} s')
+                            f'the first at {grid.at((first + missing[0][0]) * NS_PER_SECOND) / 1e9:.6f} s')
         if at.size > count:
             problems.append(f'{at.size - count} too many of {node}')
     return problems

@@ -28,12 +28,12 @@ from pedestal_common.wire import messages
 from pedestal_recording.bag import locate, planned_end
 from pedestal_recording.mcap_file import BagError, McapFile, parsed, reason
 
-CHUNK_SIZE = 1_000_000
-CHUNK_SPAN = 1_000_000_000
-CHUNK_MESSAGES = 100_000
+TARGET_CHUNK_BYTES = 1_000_000
+TARGET_CHUNK_SPAN_NS = 1_000_000_000
+TARGET_CHUNK_MESSAGES = 100_000
 """A chunk ends after this many bytes, ns of log time (so that a crash loses at most the last second) or messages."""
 
-RUN = ('scenario', 'pacing', 'seed', 'planned_end_ns')
+COMMON_METADATA_KEYS = ('scenario', 'pacing', 'seed', 'planned_end_ns')
 """What the metadata of all files of a bag say alike."""
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
@@ -45,7 +45,7 @@ _PAIR, _INDEX = struct.Struct('<QQ'), struct.Struct('<HI')
 
 def _qos(rate):
     """The offered_qos_profiles of a topic of a rate."""
-    depth, latched = topics.QOS[rate].lockstep, topics.QOS[rate].latched
+    depth, latched = topics.QOS_BY_RATE[rate].lockstep, topics.QOS_BY_RATE[rate].latched
     return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
              'durability': 'transient_local' if latched else 'volatile',
              'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',
@@ -142,8 +142,8 @@ class BagFile:
             return
         if not self._in_chunk:
             self._chunk_start = log_time
-        elif (log_time - self._chunk_start >= CHUNK_SPAN or self._chunk_size >= CHUNK_SIZE
-              or self._in_chunk >= CHUNK_MESSAGES):
+        elif (log_time - self._chunk_start >= TARGET_CHUNK_SPAN_NS or self._chunk_size >= TARGET_CHUNK_BYTES
+              or self._in_chunk >= TARGET_CHUNK_MESSAGES):
             self.flush()
             self._chunk_start = log_time
         self._in_chunk += 1
@@ -294,7 +294,7 @@ def _earlier_files(directory, metadata):
             return []
     McapFile(files[-1])
     earlier = _Content(files[0]).metadata.get('pedestal', {})
-    if any(earlier.get(key) != str(metadata[key]) for key in RUN if key in metadata):
+    if any(earlier.get(key) != str(metadata[key]) for key in COMMON_METADATA_KEYS if key in metadata):
         raise BagError(f'{directory} exists already, of another run; a recording is never overwritten')
     try:
         information = plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information']
@@ -323,7 +323,7 @@ class Writer(BagFile):
                    for name in dict.fromkeys(topic.type for topic in rows)}
         self._channels = [self.add_channel('/' + topic.name, schemas[topic.type], {
             'offered_qos_profiles': yaml.safe_dump(_qos(topic.rate), sort_keys=False),
-            'topic_type_hash': messages.TYPESTORE.hash_rihs01(topic.type)}) for topic in rows]
+            'topic_type_hash': messages.ROS_TYPESTORE.hash_rihs01(topic.type)}) for topic in rows]
         self._sequences = [0] * len(rows)
         for name, content in (('pedestal', metadata), *dict(more).items()):
             self.add_metadata(name, {str(key): str(value) for key, value in content.items()})

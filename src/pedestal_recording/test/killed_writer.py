@@ -34,7 +34,7 @@ def rows():
     """Endless (index of the topic, stamp, bytes) of a lockstep run; the messages repeat, their stamps go on."""
     made = [(_bag_test.NAMES.index(name), stamp, bytearray(messages.serialize(message)))
             for name, stamp, message in _bag_test.run(STEPS, latency=0)]
-    once = [index for index, topic in enumerate(_bag_test.RECORDED) if topic.rate in ('once', *topics.BETWEEN_STEPS)]
+    once = [index for index, topic in enumerate(_bag_test.RECORDED) if topic.rate in ('once', *topics.EVENT_RATES)]
     for turn in itertools.count():
         shift = turn * STEPS * _bag_test.T
         for index, stamp, data in made:

@@ -25,7 +25,7 @@ NAMES = [topic.name for topic in RECORDED]
 
 def made(name, k, rng):
     """A message of a topic with random numbers and the stamp of step k."""
-    topic = topics.BY_NAME[name]
+    topic = topics.TOPIC_BY_NAME[name]
     kind = topic.type.rpartition('/')[2]
     if kind == 'Clock':
         message = messages.Clock(clock=messages.Time(sec=0, nanosec=0))
@@ -83,7 +83,7 @@ def run(steps=450, latency=4):
             if topic.rate == 'second' and k % 200 == 0:
                 rows += [(name, k * T, diagnostics(node, k)) for node in topic.writers]
             elif topic.rate == 'step' and not (name == 'tracking_receiver/angle_error' and k >= steps - latency) \
-                    or topic.rate == 'once' and k == 0 or topic.rate in topics.BETWEEN_STEPS and k in (0, 100):
+                    or topic.rate == 'once' and k == 0 or topic.rate in topics.EVENT_RATES and k in (0, 100):
                 rows.append((name, k * T, made(name, k, rng)))
     return rows
 
@@ -220,7 +220,7 @@ def test_read_gives_topics_metadata_and_messages(recording, rows):
     assert [m.data for _, _, _, m in content.messages('/acu/mode')] == ['standby', 'autotrack']
 
 
-@pytest.mark.parametrize('name', [n for n in NAMES if topics.BY_NAME[n].rate == 'step' and n != 'clock'])
+@pytest.mark.parametrize('name', [n for n in NAMES if topics.TOPIC_BY_NAME[n].rate == 'step' and n != 'clock'])
 def test_table_equals_message_by_message(recording, name):
     content = bag.read(recording)
     table = content.table(name)

@@ -176,7 +176,7 @@ def test_a_table_that_is_there_is_not_replaced_unasked(recording, tmp_path, caps
 
 def foreign(path):
     """A bag with a topic whose type nobody here knows and one that is."""
-    known = topics.BY_NAME['acu/mode']
+    known = topics.TOPIC_BY_NAME['acu/mode']
     writer = Writer(path, [known, known._replace(name='other', type='std_msgs/msg/Header')], {})
     writer.write(0, 0, 0, messages.serialize(messages.String(data='stow')))
     writer.write(1, 0, 0, b'\0\1\0\0\0\0\0\0')

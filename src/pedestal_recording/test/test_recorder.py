@@ -24,7 +24,7 @@ from pedestal_recording import bag  # noqa: E402
 from pedestal_recording.verify import verify  # noqa: E402
 
 LIMIT = 30.0
-RECORDED = nodes.recorded(nodes.NAMES)
+RECORDED = nodes.recorded(nodes.NODE_NAMES)
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
 
 _spec = importlib.util.spec_from_file_location('bag_test_messages', pathlib.Path(__file__).with_name('test_bag.py'))
@@ -95,7 +95,7 @@ class Graph:
         self.node = rclpy.create_node('graph', context=self.context)
         self.publishers = {}
         for topic in RECORDED:
-            latched = topics.QOS[topic.rate].latched
+            latched = topics.QOS_BY_RATE[topic.rate].latched
             durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
             profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE,
                                  durability=durability)
@@ -145,7 +145,7 @@ def rows():
 
 ANSWERS = {topic.name: next(answer.name for answer in RECORDED
                             if answer.rate == 'step' and answer.writers == topic.writers)
-           for topic in RECORDED if topic.rate in topics.BETWEEN_STEPS}
+           for topic in RECORDED if topic.rate in topics.EVENT_RATES}
 """{topic that changes now and then: what its writer says in every step}."""
 
 

@@ -12,7 +12,7 @@ RECORDED = nodes.recorded(NODES)
 NAMES = [topic.name for topic in RECORDED]
 ANSWERS = {topic.name: next(other.name for other in RECORDED
                             if other.rate == 'step' and other.writers == topic.writers)
-           for topic in RECORDED if topic.rate in topics.BETWEEN_STEPS}
+           for topic in RECORDED if topic.rate in topics.EVENT_RATES}
 """The first step topic of whoever writes a topic between two steps."""
 SPEAKERS = [node for node in nodes.links()['diagnostics'].writers if node in NODES]
 
@@ -38,7 +38,7 @@ def canonical(steps, latency=3):
             if topic.rate == 'second' and k % 200 == 0:
                 rows += [(topic.name, k, f'{topic.name} {node} {k}', node) for node in SPEAKERS]
             elif topic.rate == 'step' and (topic.name != 'tracking_receiver/angle_error' or k < steps - latency) \
-                    or topic.rate == 'once' and k == 0 or topic.rate in topics.BETWEEN_STEPS and k in (0, 7):
+                    or topic.rate == 'once' and k == 0 or topic.rate in topics.EVENT_RATES and k in (0, 7):
                 rows.append((topic.name, k, f'{topic.name} {k}', None))
     return rows
 
@@ -108,7 +108,7 @@ def test_doubled_late_and_stampless_messages_are_kept_and_counted():
 
 
 def test_steps_that_pile_up_end_with_the_topic_they_wait_for(monkeypatch):
-    monkeypatch.setattr(step_order, 'MAX_WAITING', 50)
+    monkeypatch.setattr(step_order, 'MAX_WAITING_STEPS', 50)
     collected = Collected()
     with pytest.raises(OrderError, match=r'step 0.010000 s still waits for acu/estimate after 50 later steps'):
         for row in canonical(200, latency=0):

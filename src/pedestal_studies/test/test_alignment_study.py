@@ -13,21 +13,23 @@ RUNS = 30
 @pytest.fixture(scope='module')
 def on_swell():
     """[(Increments, attitude at the start)] of RUNS runs on swell."""
-    return [alignment.recorded(alignment.Batch('swell', 0, RUNS), run) for run in range(RUNS)]
+    return [alignment.simulated_run(alignment.Batch('swell', 0, RUNS), run) for run in range(RUNS)]
 
 
 @pytest.mark.parametrize('method', ['adrc', 'riccati_eso'])
 def test_the_stated_sigma_is_honest_on_swell_without_log_or_gnss(on_swell, method):
     """Rms over the runs of the error in azimuth over its 1 sigma, from 150 s on: within a factor of 1.3 of 1."""
-    constants = navigator.constants(alignment.SETTINGS, method, 'none', math.radians(alignment.SHIP.latitude_deg))
-    every, ratios = round(alignment.EVERY / alignment.PERIOD), []
+    constants = navigator.constants(alignment.INS_PARAMETERS, method, 'none',
+                                    math.radians(alignment.SHIP_PARAMETERS.latitude_deg))
+    every, ratios = round(alignment.EVALUATION_PERIOD_S / alignment.IMU_PERIOD_S), []
     for (angle, force, attitude), start in on_swell:
-        estimates = np.zeros(len(angle) // every, alignment.ESTIMATE)
-        alignment.align(navigator.initial_state(constants, start), constants, angle, force, alignment.PERIOD, every,
+        estimates = np.zeros(len(angle) // every, alignment.ALIGNMENT_ESTIMATE)
+        alignment.align(navigator.initial_state(constants, start), constants, angle, force, alignment.IMU_PERIOD_S,
+                        every,
                         estimates)
         error = alignment.errors(estimates['quaternion'], attitude[every - 1::every])[:, 2]
         ratios.append(error / estimates['azimuth_sigma'])
     ratio = np.sqrt(np.mean(np.square(ratios), axis=0))
-    shown = {t: round(float(alignment.at(ratio, t)), 2) for t in (150, 200, 250, 300)}
+    shown = {t: round(float(alignment.value_at(ratio, t)), 2) for t in (150, 200, 250, 300)}
     print(f'{method}: error over its 1 sigma {shown}')
     assert all(1.0 / 1.3 < value < 1.3 for value in shown.values())

@@ -8,7 +8,7 @@ from pedestal_analysis.results import results, tracking
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_studies.papers import phased_array
-from pedestal_studies.rigs.angle_loop import Paper
+from pedestal_studies.rigs.angle_loop import PaperLoop
 
 SWAY, FOUR = 'phased_array_sway', 'phased_array_four'
 
@@ -30,7 +30,7 @@ def test_a_ramp_is_met_in_the_middle_of_the_hold_with_every_smoothing(smoothing,
                    f'tracking_receiver.receiver.smoothing_samples={n}', duration=5.0)
     hold = 0.5 * math.pi / 6 * 0.01 * math.cos(0.6)
     error = run.truth['error'][-50:]
-    end, begin = error[1:, 0], tracking.began(run['adu/truth']['position'][-50:], error)[1:, 0]
+    end, begin = error[1:, 0], tracking.interval_start_error(run['adu/truth']['position'][-50:], error)[1:, 0]
     assert np.abs(0.5 * (end + begin)).max() < 0.01 * hold
     assert end == pytest.approx(np.full(49, hold), rel=0.02) and begin == pytest.approx(np.full(49, -hold), rel=0.02)
 
@@ -39,7 +39,7 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
     """On the target at every stamp, so early by a whole period at the beginnings."""
     t = np.arange(300) * 0.01
     beam = np.column_stack((0.3 + 0.5 * t, np.full_like(t, 0.7)))
-    begun = tracking.began(beam, np.zeros_like(beam))
+    begun = tracking.interval_start_error(beam, np.zeros_like(beam))
     assert np.isnan(begun[0]).all()
     assert begun[1:, 0] == pytest.approx(np.full(299, -0.005 * math.cos(0.7)), rel=1e-4)
     nothing, on = np.zeros_like(t), np.ones_like(t, bool)
@@ -107,6 +107,6 @@ def test_the_papers_loop_through_the_cores_reads_what_its_kernel_does(delta, rea
     run = composed(*QUIET, *of_axes, 'adu.transport_delay=0', duration=14.0)
     read = np.degrees(np.abs(run['tracking_receiver/angle_error']['vector'][run.t > 6.0, :2]).max())
     target, rate = phased_array.sway_target()
-    kernel = np.degrees(np.abs(phased_array.settled(Paper(delta=delta).run(target, rate)[1])).max())
+    kernel = np.degrees(np.abs(phased_array.settled(PaperLoop(delta=delta).run(target, rate)[1])).max())
     assert kernel == pytest.approx(reading, rel=0.005)
     assert read == pytest.approx(kernel, rel=0.01)

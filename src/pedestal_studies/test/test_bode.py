@@ -169,7 +169,7 @@ def margins_agree(measured, loop, lowest):
 def test_current_loops():
     """Around 70 Hz, where rotors swing in the meshes, their voltage is met late: up to 8 % and 3 deg, in the model."""
     p = AduParameters()
-    for name, measured in frequency.current(p, dataclasses.replace(frequency.CURRENT, kept=3)).items():
+    for name, measured in frequency.current(p, dataclasses.replace(frequency.CURRENT_SWEEP, kept=3)).items():
         m = getattr(p.azimuth, name.partition('/')[2])
         loop = open_current_loop(m, p.azimuth.current_loop.bandwidth)
         assert agrees(measured, loop, 20.0, 4000.0, 0.015, 0.7, lambda f: turning(p.azimuth, f))
@@ -180,17 +180,17 @@ def test_current_loops():
 
 def test_speed_loops():
     p = AduParameters()
-    for name, measured in frequency.speed(p, dataclasses.replace(frequency.SPEED, points=60, kept=3)).items():
+    for name, measured in frequency.speed(p, dataclasses.replace(frequency.SPEED_SWEEP, points=60, kept=3)).items():
         loop = open_speed_loop(getattr(p, name.partition('/')[2]))
         assert agrees(measured, loop, 2.0, 300.0, 0.015, 0.7)
         assert margins_agree(measured, loop, 1.0)
 
 
-QUICK = dataclasses.replace(frequency.POSITION, points=80)
+QUICK = dataclasses.replace(frequency.POSITION_SWEEP, points=80)
 
 
 def test_position_loops():
-    case, axes = bode.CASES['feedforward']
+    case, axes = bode.LOOP_CASES['feedforward']
     loaded = case.loaded()
     drive, acu, T = loaded.node_parameters('adu'), loaded.node_parameters('acu'), 5e-3
     measured = frequency.position(case, axes, QUICK)
@@ -202,7 +202,7 @@ def test_position_loops():
 
 
 def test_position_loop_of_the_paper():
-    case, axes = bode.CASES['paper-r1']
+    case, axes = bode.LOOP_CASES['paper-r1']
     loaded = case.loaded()
     c, T = loaded.node_parameters('acu').azimuth.pid, 2e-3
     assert c.integral == 0.0
@@ -217,7 +217,7 @@ def test_flexible_structure_and_the_notch_against_it():
     """The resonance takes the margins away, the notch brings them back."""
     ours = {}
     for name in ('structure', 'structure-notch'):
-        case, axes = bode.CASES[name]
+        case, axes = bode.LOOP_CASES[name]
         loaded = case.loaded()
         acu, T = loaded.node_parameters('acu').azimuth, 5e-3
         loop = open_position_loop(loaded.node_parameters('adu').azimuth, pi_controller(acu.feedforward, T), T)
@@ -275,7 +275,7 @@ def test_study_through_the_command_line(pedestal, tmp_path):
     assert content['name'] == 'bode'
     values = {(row['case'], row['metric']): row['value'] for row in content['rows']}
     cases = {'current/motor_1', 'current/motor_2', 'speed/azimuth', 'speed/elevation'}
-    cases |= {f'position/{axis}/{name}' for name, (_, axes) in bode.CASES.items() for axis in axes}
+    cases |= {f'position/{axis}/{name}' for name, (_, axes) in bode.LOOP_CASES.items() for axis in axes}
     assert {case for case, _ in values} == cases
     for case in cases:
         assert values[case, 'crossover_hz'] > 1.0 and values[case, 'phase_margin_deg'] > 10.0

@@ -13,13 +13,14 @@ T = np.linspace(0.1, 1.0, 50)
 def sheet():
     figure, axes = figures.new_panels(2, height=4.6)
     for panel in axes[:, 0]:
-        for colour, label in ((figures.FILTERED, 'a'), (figures.TRUTH, 'b'), (figures.MOTOR_2, 'a much longer name')):
+        for colour, label in ((figures.FILTERED_COLOUR, 'a'), (figures.TRUTH_COLOUR, 'b'),
+                              (figures.MOTOR_2_COLOUR, 'a much longer name')):
             panel.loglog(T, 3.0 * T, color=colour, label=label)
     return drawing.legend(figure)
 
 
 def test_the_legend_is_outside_of_every_panel_and_names_a_line_once():
-    with matplotlib.rc_context(figures.STYLE):
+    with matplotlib.rc_context(figures.MATPLOTLIB_STYLE):
         figure = sheet()
         FigureCanvasAgg(figure).draw()
     [legend] = figure.legends

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
-from pedestal_analysis.tuning import tuning
+from pedestal_analysis.tuning import parameter_search
 from pedestal_common.parameters import as_dict
 from pedestal_studies.papers import manoeuvre, pareto
 from pedestal_studies.rigs import drawing, ensemble
@@ -41,20 +41,20 @@ def flyby(filters_result):
 
 
 def test_every_filter_has_its_rows(flyby):
-    for name in set(filters.SHOWN_FILTERS) - set(filters.EXPECTING):
+    for name in set(filters.SHOWN_FILTERS) - set(filters.NOISE_AWARE_FILTERS):
         assert 1.0 < flyby(name, 'reduction') < 30.0
         assert 0.03 / flyby(name, 'angle_rms_deg') == pytest.approx(flyby(name, 'reduction'), rel=0.03)
 
 
 def test_a_measured_rate_helps_the_more_the_better_it_is(flyby):
-    names = 'current_statistical', *filters.RATES
+    names = 'current_statistical', *filters.RATE_SIGMAS_RAD_S
     for metric in ('angle_rms_deg', 'rate_rms_deg_s'):
         errors = [flyby(name, metric) for name in names]
         assert errors == sorted(errors, reverse=True) and errors[-1] < 0.5 * errors[0]
 
 
 def test_no_filter_reduces_coloured_noise_as_much(flyby):
-    for name in set(filters.FILTERS) - set(filters.EXPECTING):
+    for name in set(filters.FILTERS) - set(filters.NOISE_AWARE_FILTERS):
         assert flyby(name, 'reduction', 'coloured-0.03') < 0.7 * flyby(name, 'reduction')
 
 
@@ -95,20 +95,21 @@ def test_figures_of_filters(filters_result, tmp_path):
 
 
 def test_tuning_saw_other_noise():
-    assert filters.SEED != filters.TUNING_SEED
-    judged, tuned = (ensemble.drawn(seed, 0, 4, 50)[0].ravel() for seed in (filters.SEED, filters.TUNING_SEED))
+    assert filters.NOISE_SEED != filters.TUNING_SEED
+    (judged, tuned) = (ensemble.normal_draws(seed, 0, 4, 50)[0].ravel() for seed in (filters.NOISE_SEED,
+                                                                                     filters.TUNING_SEED))
     assert abs(np.corrcoef(judged, tuned)[0, 1]) < 0.3
 
 
 def test_the_noise_of_a_run_does_not_depend_on_its_batch():
-    together = ensemble.drawn(7, 0, 5, 20)
-    apart = np.concatenate((ensemble.drawn(7, 0, 2, 20), ensemble.drawn(7, 2, 3, 20)), axis=1)
+    together = ensemble.normal_draws(7, 0, 5, 20)
+    apart = np.concatenate((ensemble.normal_draws(7, 0, 2, 20), ensemble.normal_draws(7, 2, 3, 20)), axis=1)
     assert np.array_equal(together, apart)
-    assert np.array_equal(together, ensemble.drawn(7, 0, 5, 20, 4)[:2])
+    assert np.array_equal(together, ensemble.normal_draws(7, 0, 5, 20, 4)[:2])
 
 
 def test_coloured_noise_has_the_rms_and_the_bandwidth_asked_for():
-    noise = ensemble.coloured(ensemble.drawn(1, 0, 40, 4000)[0], 5.0)
+    noise = ensemble.coloured_noise(ensemble.normal_draws(1, 0, 40, 4000)[0], 5.0)
     assert np.std(noise) == pytest.approx(1.0, abs=0.02)
     assert np.std(noise[:, 0]) == pytest.approx(1.0, abs=0.4)
     for lag in (1, 3, 6):
@@ -117,17 +118,17 @@ def test_coloured_noise_has_the_rms_and_the_bandwidth_asked_for():
 
 
 def test_moments_are_those_of_the_estimates():
-    t = ensemble.PERIOD * np.arange(300)
+    t = ensemble.MEASUREMENT_PERIOD_S * np.arange(300)
     truth = np.sin(t), np.cos(t), -np.sin(t)
     noise, params = Noise(0.01, None, 0.02), FilterParameters(kind='imm')
     measured = ensemble.records(truth, noise, 3, 0, 4)
     of_runs = ensemble.moments(params, t, truth, noise, measured)
     sums = ensemble.over_runs(of_runs)
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=True))
-    out = np.zeros((4, 300), axis_filter.ESTIMATE)
+    out = np.zeros((4, 300), axis_filter.ESTIMATE_DTYPE)
     for i in range(4):
         axis_filter.estimates(c, t, measured[0][i], np.full(300, 1e-4), measured[1][i], np.full(300, 4e-4),
-                              ensemble.INITIAL_RATE, out[i])
+                              ensemble.INITIAL_RATE_SIGMA_RAD_S, out[i])
     assert np.allclose(ensemble.rms(sums, 'rate'), np.sqrt(np.mean((out['rate'] - truth[1])**2, axis=0)), rtol=1e-12)
     assert np.allclose(sums['mu'][:, 0], out['mu'][:, :, 0].sum(axis=0), rtol=1e-12)
     assert np.allclose(sums['nis'][1:], out['nis'][:, 1:].sum(axis=0), rtol=1e-12)
@@ -143,7 +144,7 @@ def test_tuning_finds_the_least_criterion(kind, least):
         given = as_dict(params)
         return sum((i + 1) * math.log(given[name] / value)**2 for i, (name, value) in enumerate(least.items()))
 
-    optimum, value = tuning.tuned(FilterParameters(kind=kind), criterion)
+    optimum, value = parameter_search.tuned(FilterParameters(kind=kind), criterion)
     assert value == criterion(optimum)
     for name, best in least.items():
         assert as_dict(optimum)[name] == pytest.approx(best, rel=0.05)
@@ -157,22 +158,22 @@ def test_tuning_of_many_parameters_begins_where_they_are():
         return (math.log(imm.dwell / best.dwell)**2 + math.log(imm.cv.noise / best.cv.noise)**2
                 + math.log(imm.ca.noise / best.ca.noise)**2)
 
-    optimum, value = tuning.tuned(FilterParameters(kind='imm'), criterion)
+    optimum, value = parameter_search.tuned(FilterParameters(kind='imm'), criterion)
     assert value < criterion(FilterParameters(kind='imm')) / 20.0
     assert optimum.imm.dwell == pytest.approx(3.0, rel=0.15)
 
 
 def test_a_criterion_that_never_works_is_refused():
     with pytest.raises(ValueError, match='no cv.noise gives a finite criterion'):
-        tuning.tuned(FilterParameters(kind='cv'), lambda params: math.nan)
+        parameter_search.tuned(FilterParameters(kind='cv'), lambda params: math.nan)
 
 
 def test_the_reversals_follow_each_other_smoothly():
     t, (angle, rate, acceleration), turning = manoeuvre.motion()
     assert np.max(np.abs(CubicSpline(t, angle)(t, 1) - rate)) < 0.02 * np.max(rate)
-    assert np.ptp(angle[t > manoeuvre.LEAD]) == pytest.approx(math.radians(20.0), rel=1e-3)
+    assert np.ptp(angle[t > manoeuvre.LEAD_TIME_S]) == pytest.approx(math.radians(20.0), rel=1e-3)
     for reversal, inside in turning.items():
-        assert np.sum(inside) * ensemble.PERIOD == pytest.approx(reversal, abs=0.021)
+        assert np.sum(inside) * ensemble.MEASUREMENT_PERIOD_S == pytest.approx(reversal, abs=0.021)
         assert np.max(np.abs(np.degrees(acceleration[inside]))) == pytest.approx(
             manoeuvre.peak_acceleration(reversal), rel=0.01)
     elsewhere = ~np.any(list(turning.values()), axis=0)
@@ -181,9 +182,9 @@ def test_the_reversals_follow_each_other_smoothly():
 
 def test_the_gap_grows_with_the_manoeuvre():
     values = by_case(manoeuvre.run(quiet, RUNS).rows)
-    errors = [values[f'reversal-{reversal:g}s/cv', 'rate_rms_deg_s'] for reversal in manoeuvre.REVERSALS]
+    errors = [values[f'reversal-{reversal:g}s/cv', 'rate_rms_deg_s'] for reversal in manoeuvre.REVERSAL_DURATIONS_S]
     assert errors == sorted(errors)
-    for reversal in manoeuvre.REVERSALS:
+    for reversal in manoeuvre.REVERSAL_DURATIONS_S:
         assert values[f'reversal-{reversal:g}s/imm-b', 'rate_ratio_of_cv'] > 2.0
         # A cv has no acceleration: its error is half the peak of a half-sine pulse times sqrt(2).
         assert values[f'reversal-{reversal:g}s/cv', 'acceleration_rms_deg_s2'] == pytest.approx(
@@ -192,7 +193,7 @@ def test_the_gap_grows_with_the_manoeuvre():
 
 def test_a_frontier_is_what_is_worth_having():
     name = 'cv'
-    values = pareto.TUNINGS[name][1]
+    values = pareto.FILTER_TUNINGS[name][1]
     points = {(name, value): (0.01 * (i + 1), 1.0 / (i + 1)) for i, value in enumerate(values)}
     points[name, values[4]] = 0.05, 0.9
     front = pareto.frontier(points, name)

@@ -16,7 +16,7 @@ from pedestal_studies.papers import imm_feedforward as study
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs import feedforward_loop as loop
 
-T, W, ZETA = loop.T, *loop.RATE_LOOP
+T, W, ZETA = loop.T, *loop.RATE_LOOP_CONSTANTS
 
 
 def rate_loop():
@@ -45,8 +45,8 @@ def steady_miss(angle, late):
     t = T * np.arange(800)
     target = np.column_stack([angle.deriv(i)(t) if i else angle(t) for i in range(3)])
     known = np.column_stack([angle.deriv(i)(t + 0.5 * T - late) for i in (1, 2)])
-    out = np.zeros((1, len(t)), loop.STEP)
-    loop._follow(target, known, np.zeros(1, axis_filter.FILTER), axis_filter.constants(FilterParameters()), 0.0,
+    out = np.zeros((1, len(t)), loop.STEP_RECORD)
+    loop._follow(target, known, np.zeros(1, axis_filter.FILTER_DTYPE), axis_filter.constants(FilterParameters()), 0.0,
                   loop.rate_loop_step(W, ZETA), np.zeros((1, len(t))), out)
     return out['miss'][0, -1]
 
@@ -64,12 +64,12 @@ def test_one_run_is_what_filterpy_and_scipy_make_of_it():
     q, axis = math.radians(0.3), 'elevation'
     t, target, _ = loop.motion(axis)
     ours = loop.steps_of(axis, loop.cv(0.3), 3, 1)[0]
-    normals = np.random.default_rng((loop.SEED, 3)).standard_normal(len(t))
+    normals = np.random.default_rng((loop.NOISE_SEED, 3)).standard_normal(len(t))
     kalman = filterpy.kalman.KalmanFilter(2, 1)
     kalman.F = np.array([[1.0, T], [0.0, 1.0]])
-    kalman.H, kalman.R = np.array([[1.0, 0.0]]), np.array([[loop.SIGMA**2]])
+    kalman.H, kalman.R = np.array([[1.0, 0.0]]), np.array([[loop.MISS_SIGMA_RAD**2]])
     kalman.Q = q * q * np.array([[T**3 / 3.0, T * T / 2.0], [T * T / 2.0, T]])
-    kalman.P = np.diag([loop.SIGMA**2, loop.RATE**2])
+    kalman.P = np.diag([loop.MISS_SIGMA_RAD**2, loop.S_MOTION_RATE_RAD_S**2])
     plant, x = rate_loop(), target[0].copy()
     theta, miss = [], []
     for k in range(len(t)):
@@ -77,7 +77,7 @@ def test_one_run_is_what_filterpy_and_scipy_make_of_it():
         miss.append(target[k, 0] - theta[-1])
         u, j = target[0, 1] + loop.K_A * target[0, 2], k - 4
         if j >= 0:
-            y = target[j, 0] + loop.SIGMA * normals[j]
+            y = target[j, 0] + loop.MISS_SIGMA_RAD * normals[j]
             if j == 0:
                 kalman.x = np.array([[y], [0.0]])
             else:
@@ -90,7 +90,7 @@ def test_one_run_is_what_filterpy_and_scipy_make_of_it():
 
 def test_noise_of_the_rate_is_the_steady_states():
     """Gains by Riccati; as the target has no noise, the measured one through them by Lyapunov."""
-    q, R = math.radians(0.5), loop.SIGMA**2
+    q, R = math.radians(0.5), loop.MISS_SIGMA_RAD**2
     F, H = np.array([[1.0, T], [0.0, 1.0]]), np.array([[1.0, 0.0]])
     P = solve_discrete_are(F.T, H.T, q * q * np.array([[T**3 / 3.0, T * T / 2.0], [T * T / 2.0, T]]), R)
     K = P @ H.T / (P[0, 0] + R)
@@ -101,8 +101,8 @@ def test_noise_of_the_rate_is_the_steady_states():
 
 def test_an_outcome_is_that_of_all_its_runs():
     """More than one batch, against one array of all runs."""
-    case = ('azimuth', study.SOURCES['imm-predicted'])
-    count = loop.BATCH + 3
+    case = ('azimuth', study.FEEDFORWARD_SOURCES['imm-predicted'])
+    count = loop.BATCH_RUNS + 3
     result = loop.statistics({'case': case}, count, monte_carlo.Pool(1))['case']
     miss = loop.steps_of(*case, 0, count)['miss']
     t, _, period = loop.motion('azimuth')
@@ -123,7 +123,7 @@ def test_no_row_misses_its_target_but_those_that_are_said_to(result):
     """The default bank follows a twentieth of the acceleration of these reversals: docs/filters.md."""
     named = {(row['case'], row['metric']): row for row in result.rows}
     assert len(named) == len(result.rows)
-    for axis in study.REVERSALS:
+    for axis in study.REVERSAL_S_BY_AXIS:
         for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state'):
             assert {(f'{axis}/{name}', 'miss_rms_deg'), (f'{axis}/{name}', 'rate_noise_deg_s')} <= named.keys()
     assert sum(row['target'] is not None for row in result.rows) == 15
@@ -150,9 +150,9 @@ def test_batches_are_added_as_they_come():
                 miss = np.full(3, float(k))
                 made.append(weakref.ref(miss))
                 most = max(most, sum(one() is not None for one in made))
-                yield miss, np.ones((loop.BATCH, len(loop.METRICS)))
+                yield miss, np.ones((loop.BATCH_RUNS, len(loop.METRIC_UNITS)))
 
-    runs = 12 * loop.BATCH
+    runs = 12 * loop.BATCH_RUNS
     outcome = loop.statistics({'case': ('azimuth', loop.cv(0.1))}, runs, Pool())['case']
     assert most <= 3
-    assert outcome.miss_mean == pytest.approx(66.0 / runs) and outcome.values.shape == (runs, len(loop.METRICS))
+    assert outcome.miss_mean == pytest.approx(66.0 / runs) and outcome.values.shape == (runs, len(loop.METRIC_UNITS))

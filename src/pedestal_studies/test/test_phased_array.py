@@ -11,7 +11,14 @@ from pedestal_analysis.results import intervals, tracking
 from pedestal_studies.papers import phased_array
 from pedestal_studies.papers.phased_array import instants, settled
 from pedestal_studies.rigs import drawing, metrics
-from pedestal_studies.rigs.angle_loop import GRID, LENGTH, Better, Paper, Receiver, received
+from pedestal_studies.rigs.angle_loop import (
+    GRID_STEP_S,
+    SMOOTHING_SAMPLES,
+    FilterLoop,
+    PaperLoop,
+    Receiver,
+    receiver_reading,
+)
 from tracking_receiver_sim import monopulse
 
 
@@ -27,7 +34,7 @@ def values_of(result):
 
 def test_every_target_is_met(result):
     targets = {(row['case'], row['metric']): row['target'] for row in result.rows if row['target'] is not None}
-    assert targets == phased_array.TARGETS
+    assert targets == phased_array.METRIC_TARGETS
     assert [row for row in result.rows if intervals.missed(row)] == []
 
 
@@ -62,7 +69,7 @@ def test_the_beam_is_lost_when_its_lag_passes_half_a_beamwidth(values):
 
 def test_the_graph_has_no_more_than_half_a_period_and_the_loops_own_error(values):
     """A beam that stands for T is off by half of it at either end; the paper's loop lags by more."""
-    rate = math.degrees(phased_array.SWAY) * 2.0 * math.pi / phased_array.SWAY_PERIOD
+    rate = math.degrees(phased_array.SWAY_AMPLITUDE_RAD) * 2.0 * math.pi / phased_array.SWAY_PERIOD_S
     for T in (0.01, 0.001):
         hold = 0.5 * rate * T
         assert hold * 0.99 < values[f'graph/T={T * 1e3:g}ms', 'max_error_deg'] < hold + 1e-3
@@ -82,8 +89,8 @@ def test_figures_are_drawn(result, tmp_path):
 def test_a_beam_that_is_right_in_the_middle_is_off_at_the_ends_of_its_millisecond(values):
     """By the rate of the target: 30 deg/s, and what is left of the sway's 7.85 deg/s."""
     assert values['best/ramp', 'ends_max_error_deg'] == pytest.approx(0.015, abs=1e-4)
-    rate = phased_array.SWAY * 2.0 * math.pi / phased_array.SWAY_PERIOD
-    limit = phased_array.isolation(0.5 * rate * GRID)
+    rate = phased_array.SWAY_AMPLITUDE_RAD * 2.0 * math.pi / phased_array.SWAY_PERIOD_S
+    limit = phased_array.isolation(0.5 * rate * GRID_STEP_S)
     for case in ('best/sway-ins', 'best/sway-ins/exact-stamps'):
         assert values[case, 'ends_isolation_db'] == pytest.approx(limit, abs=4.0)
         assert values[case, 'ends_isolation_db'] < limit + 0.01
@@ -93,9 +100,9 @@ def test_a_beam_that_is_right_in_the_middle_is_off_at_the_ends_of_its_millisecon
 def test_better_loop_meets_a_ramp_but_for_its_hold(hold, delay):
     """Whatever the delay; a command that stands for `hold` is off by half of it at either end."""
     target = math.radians(30.0) * instants(10.0)
-    beam, _ = Better(1e-2, 1e-3, hold=hold, delay=delay).run(target)
+    beam, _ = FilterLoop(1e-2, 1e-3, hold=hold, delay=delay).run(target)
     error = np.degrees(target - beam)[-1000:]
-    assert np.abs(error).max() == pytest.approx(30.0 * 0.5 * (hold - 1) * GRID, abs=1e-9)
+    assert np.abs(error).max() == pytest.approx(30.0 * 0.5 * (hold - 1) * GRID_STEP_S, abs=1e-9)
 
 
 def test_jitter_is_that_of_the_steady_filter():
@@ -108,19 +115,19 @@ def test_jitter_is_that_of_the_steady_filter():
     K = P @ H.T / (P[0, 0] + R)
     A = (np.eye(3) - K @ H) @ F
     covariance = linalg.solve_discrete_lyapunov(A, K @ K.T * R)
-    ahead = 0.02 + 0.5 * T + GRID * (np.arange(10) + 0.5)
+    ahead = 0.02 + 0.5 * T + GRID_STEP_S * (np.arange(10) + 0.5)
     expected = math.sqrt(np.mean([g @ covariance @ g for g in (np.array([1.0, a, a * a / 2]) for a in ahead)]))
     noise = sigma * np.random.default_rng(2).standard_normal(200_000)
-    beam, _ = Better(q, sigma).run(np.zeros(200_000), noise)
+    beam, _ = FilterLoop(q, sigma).run(np.zeros(200_000), noise)
     assert tracking.rms(beam[20_000:]) == pytest.approx(expected, rel=0.06)
 
 
 def test_with_the_ins_only_what_the_attitude_is_late_is_left():
     """A fixed target on a swaying deck: exact stamps leave almost nothing, late ones what the filter cannot follow."""
     sway, rate = phased_array.sway_target()
-    errors = {late: settled(sway - Better(1e-4, 1e-3, ins=True, late=late).run(sway, None, sway, rate)[0])
+    errors = {late: settled(sway - FilterLoop(1e-4, 1e-3, ins=True, late=late).run(sway, None, sway, rate)[0])
               for late in (0, 5, 20)}
-    assert metrics.peak(errors[0]) < 2e-5 * phased_array.SWAY
+    assert metrics.peak(errors[0]) < 2e-5 * phased_array.SWAY_AMPLITUDE_RAD
     # The attitude error is a sine of rate x late, of which the slow filter takes little away again.
     assert metrics.peak(errors[20]) / metrics.peak(errors[5]) == pytest.approx(4.0, rel=0.1)
 
@@ -128,18 +135,18 @@ def test_with_the_ins_only_what_the_attitude_is_late_is_left():
 def test_receiver_is_the_monopulse_pattern():
     width = math.radians(1.0)
     v = np.linspace(-0.7, 0.7, 29)
-    errors = np.array([received(x * width, Receiver(1.0, width, 0.4)) for x in v])
+    errors = np.array([receiver_reading(x * width, Receiver(1.0, width, 0.4)) for x in v])
     S = np.array([monopulse.sum_pattern(x) for x in v])
     expected = np.array([monopulse.difference_pattern(x, 1.0) for x in v]) / S
     np.testing.assert_allclose(errors[S * S >= 0.4], np.clip(expected, -0.7, 0.7)[S * S >= 0.4] * width, atol=1e-15)
     assert np.all(np.isnan(errors[S * S < 0.4])) and np.sum(S * S < 0.4) > 2
-    assert received(0.3, Receiver(1.5, 0.0, 0.5)) == pytest.approx(0.45)
+    assert receiver_reading(0.3, Receiver(1.5, 0.0, 0.5)) == pytest.approx(0.45)
 
 
 @pytest.mark.parametrize('smoothing', ['S0', 'S1', 'S2'])
 def test_paper_loop_against_its_equations_written_out(smoothing):
     """Eq. (1), (3), (4) sample by sample on plain lists, with a list of all beams as the delay."""
-    loop = dataclasses.replace(Paper(alpha=0.2, period=5, delay=13, slope=1.3), smoothing=smoothing)
+    loop = dataclasses.replace(PaperLoop(alpha=0.2, period=5, delay=13, slope=1.3), smoothing=smoothing)
     rng = np.random.default_rng(3)
     target, noise = np.cumsum(1e-4 * rng.standard_normal(600)), 1e-4 * rng.standard_normal(600)
     beams, errors, x, R, v = [0.0] * 14, [], 0.0, 0.0, 0.0
@@ -147,9 +154,9 @@ def test_paper_loop_against_its_equations_written_out(smoothing):
     for i in range(600):
         in_force.append(beams[-14])
         errors.append(1.3 * (target[i] - in_force[-1]) + noise[i])
-        x = (LENGTH - 1) / LENGTH * x + errors[-1] / LENGTH
+        x = (SMOOTHING_SAMPLES - 1) / SMOOTHING_SAMPLES * x + errors[-1] / SMOOTHING_SAMPLES
         if i % 5 == 0:
-            e = {'S0': errors[-1], 'S1': x, 'S2': np.mean(errors[-LENGTH:])}[smoothing]
+            e = {'S0': errors[-1], 'S1': x, 'S2': np.mean(errors[-SMOOTHING_SAMPLES:])}[smoothing]
             predicted = R + v * 0.005
             nu = R + e - predicted
             R, v = predicted + 0.2 * nu, v + 0.04 / 1.8 / 0.005 * nu

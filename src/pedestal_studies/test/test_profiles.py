@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 from pedestal_studies.rigs import profiles
 
-T = np.arange(0.0, profiles.DURATION, 1e-3)
+T = np.arange(0.0, profiles.RECORD_DURATION_S, 1e-3)
 
 
 @pytest.mark.parametrize('name', profiles.PROFILES)

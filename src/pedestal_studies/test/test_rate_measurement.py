@@ -10,8 +10,9 @@ from pedestal_analysis.results import intervals
 from pedestal_studies.papers import rate_measurement as study
 from pedestal_studies.rigs import drawing, metrics
 
-T, ALPHA, SIGMA = study.T, study.ALPHA, study.SIGMA
-CASES = [(sigma_a, rate_sigma) for sigma_a in study.SIGMA_A for rate_sigma in study.RATE_SIGMA.values()]
+T, ALPHA, SIGMA = study.T, study.ALPHA, study.ANGLE_SIGMA_RAD
+CASES = [(sigma_a, rate_sigma) for sigma_a in study.ACCELERATION_SIGMAS_DEG_S2
+         for rate_sigma in study.RATE_SIGMAS_DEG_S.values()]
 
 
 def riccati(sigma_a, rate_sigma):
@@ -31,41 +32,42 @@ def riccati(sigma_a, rate_sigma):
 
 @pytest.mark.parametrize('sigma_a, rate_sigma', CASES)
 def test_the_settled_filter_is_that_of_the_riccati_equation(sigma_a, rate_sigma):
-    A, B = study.settled(sigma_a, rate_sigma)
+    A, B = study.steady_state_matrices(sigma_a, rate_sigma)
     expected_A, expected_B = riccati(sigma_a, rate_sigma)
     assert A == pytest.approx(expected_A, rel=1e-6, abs=1e-9)
     assert B == pytest.approx(expected_B, rel=1e-6, abs=1e-9)
 
 
-@pytest.mark.parametrize('rate_sigma', study.RATE_SIGMA.values())
+@pytest.mark.parametrize('rate_sigma', study.RATE_SIGMAS_DEG_S.values())
 @pytest.mark.parametrize('frequency', [0.2, 2.0])
 def test_a_sine_through_the_filter(frequency, rate_sigma):
     """Amplitude and phase of the last 20 s of 120 s, without noise."""
     t = T * np.arange(12000)
     w = 2.0 * math.pi * frequency
-    c = axis_filter.constants(study.filter_of(math.radians(study.MAIN), 1.0))
-    out = np.zeros(len(t), axis_filter.ESTIMATE)
+    c = axis_filter.constants(study.filter_of(math.radians(study.MAIN_SIGMA_DEG_S2), 1.0))
+    out = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE)
     axis_filter.estimates(c, t, np.sin(w * t), np.full(len(t), SIGMA**2),
                           w * np.cos(w * t) + (0.0 if math.isfinite(rate_sigma) else math.nan),
                           np.full(len(t), math.radians(rate_sigma)**2), 1.0, out)
     late = t >= 100.0
-    angle, rate = study.responses(*study.settled(study.MAIN, rate_sigma), np.array([frequency]))
+    (angle, rate) = study.responses(*study.steady_state_matrices(study.MAIN_SIGMA_DEG_S2, rate_sigma),
+                                    np.array([frequency]))
     for field, turn, G in (('angle', 1.0, angle[0]), ('rate', 1j * w, rate[0])):
         _, a, b = metrics.harmonic_fit(t[late], out[field][late], w)
         assert (a + 1j * b) / turn == pytest.approx(G, abs=1e-5)
 
 
 def test_bandwidth_of_a_lag_and_of_what_never_falls():
-    assert study.bandwidth(1.0 / (1.0 + 1j * study.BAND / 3.0)) == pytest.approx(3.0, rel=1e-4)
-    assert math.isnan(study.bandwidth(np.full(len(study.BAND), 0.8)))
+    assert study.bandwidth(1.0 / (1.0 + 1j * study.RESPONSE_FREQUENCIES_HZ / 3.0)) == pytest.approx(3.0, rel=1e-4)
+    assert math.isnan(study.bandwidth(np.full(len(study.RESPONSE_FREQUENCIES_HZ), 0.8)))
 
 
-@pytest.mark.parametrize('steps', study.DIFFERENCED.values())
+@pytest.mark.parametrize('steps', study.DIFFERENCED_RATES.values())
 def test_a_differenced_rate_and_its_variance(steps):
     t = T * np.arange(50000)
-    rate, variance = study.differenced(0.3 * t, steps)
+    rate, variance = study.differenced_rate(0.3 * t, steps)
     assert np.isnan(rate[:steps]).all() and np.abs(rate[steps:] - 0.3).max() < 1e-9
-    noisy, _ = study.differenced(SIGMA * np.random.default_rng(1).standard_normal(len(t)), steps)
+    noisy, _ = study.differenced_rate(SIGMA * np.random.default_rng(1).standard_normal(len(t)), steps)
     assert np.var(noisy[steps:]) == pytest.approx(variance, rel=0.05)
 
 

@@ -118,7 +118,7 @@ def test_without_a_name_the_studies_are_listed(pedestal, tmp_path):
 
 def test_a_misspelt_study_is_guessed(pedestal, tmp_path):
     assert pedestal('study', 'serov') == (2, '', "pedestal: error: unknown study 'serov'; did you mean 'servo'? "
-                                          f'there are {", ".join(pedestal_studies.NAMES)}\n')
+                                          f'there are {", ".join(pedestal_studies.STUDY_NAMES)}\n')
     assert list(tmp_path.iterdir()) == []
 
 

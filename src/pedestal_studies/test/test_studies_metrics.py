@@ -134,7 +134,7 @@ def test_off_is_a_word():
 def test_alignment_in_a_quick_form():
     """Four runs: an rms is known to a third, so the bounds are three of those."""
     rows = {(row['case'], row['metric']): row['value'] for row in alignment.run(lambda share, text: None, runs=4).rows}
-    assert {case for case, _ in rows if '/' not in case} == {*alignment.CASES, 'limit'}
+    assert {case for case, _ in rows if '/' not in case} == {*alignment.CASE_METHODS, 'limit'}
     assert rows['limit', 'azimuth_rms_arcmin_600s'] == pytest.approx(4.5, abs=0.05)
     assert rows['limit', 'time_to_12arcmin_rms_s'] == pytest.approx(118, abs=2)
     for case in ('riccati-eso', 'oba', 'adrc-scheduled'):

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binomtest
 
 from acu_tracker.modes import Mode
-from acu_tracker.search.pattern import PATTERNS, SPIRAL, SQUARE
+from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
 from pedestal_analysis.results.intervals import missed
 from pedestal_studies.system import acquisition as study
 
@@ -26,7 +26,7 @@ def told(mode, error):
     n = len(mode)
     errors = np.zeros(n, [('vector', 'f8', 3)])
     errors['vector'][:, 0] = error
-    return Told({study.MODE: np.array(mode), study.ERRORS: errors}, 0.5 * np.arange(n))
+    return Told({study.MODE_TOPIC: np.array(mode), study.ERROR_TOPIC: errors}, 0.5 * np.arange(n))
 
 
 def test_times():
@@ -39,12 +39,12 @@ def test_times():
     assert study.tracked_after(told([A, A], [0, 0]), False) == 0.0
 
 
-@pytest.mark.parametrize('pattern', range(len(PATTERNS)))
+@pytest.mark.parametrize('pattern', range(len(SEARCH_PATTERNS)))
 def test_targets_are_strewn_over_the_whole_area(pattern):
     rng = np.random.default_rng(1)
     places = np.array([study.offset(pattern, rng, 1.0) for _ in range(4000)])
     x, e = places.T
-    if pattern in (SPIRAL, SQUARE):
+    if pattern in (PATTERN_SPIRAL, PATTERN_SQUARE):
         r = np.hypot(x, e)
         assert r.max() <= 5.0 and np.median(r) == pytest.approx(5.0 / math.sqrt(2.0), rel=0.03)
     else:
@@ -58,7 +58,7 @@ def test_the_share_is_that_of_clopper_and_pearson(found):
 
 
 def test_rows():
-    values = {name: np.column_stack((np.full(100, 7.0), np.ones(100))) for name in study.CASES}
+    values = {name: np.column_stack((np.full(100, 7.0), np.ones(100))) for name in study.CASE_NAMES}
     values['late_tle'][0] = math.nan, 0.0
     values['fade'][:2] = math.nan, 0.0
     table = {(row['case'], row['metric']): row for row in study.rows(values)}

@@ -12,7 +12,7 @@ from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.parameters import as_dict, build
 from pedestal_studies.system import budget as study
-from pedestal_studies.system.scenarios import Recorded
+from pedestal_studies.system.scenarios import MemoryRecording
 from tracking_receiver_sim import target
 from tracking_receiver_sim.path import arrival
 
@@ -27,15 +27,15 @@ def quiet(share, text):
 def made():
     """{mode: Budget} of the first seconds of the pass."""
     pool = monte_carlo.Pool(1)
-    return {mode: study.budget(mode, RUNS, DURATION, pool, quiet) for mode in study.MODES}
+    return {mode: study.budget(mode, RUNS, DURATION, pool, quiet) for mode in study.MODE_OVERRIDES}
 
 
 @pytest.fixture(scope='module')
 def place():
-    return study.flown(DURATION)
+    return study.pass_angles(DURATION)
 
 
-@pytest.mark.parametrize('mode', study.MODES)
+@pytest.mark.parametrize('mode', study.MODE_OVERRIDES)
 def test_the_budget_is_the_whole_run_within_ten_percent(made, place, mode):
     table = study.rows(mode, made[mode], place)
     named = {(row['case'], row['metric']): row for row in table}
@@ -48,9 +48,9 @@ def test_the_budget_is_the_whole_run_within_ten_percent(made, place, mode):
 
 def test_all_of_the_station_is_in_the_budget():
     """Every parameter of a term differs from its default in the scenario, and with none on nothing is left of them."""
-    whole, none = (scenario.load(study.SCENARIO, study.overrides('autotrack', on)) for on in (study.WHOLE, study.NONE))
+    (whole, none) = (scenario.load(study.SCENARIO_NAME, study.overrides('autotrack', on)) for on in (study.ALL_TERMS, study.NO_TERMS))
     off = build(type(none.header), {})
-    for term in study.TERMS:
+    for term in study.ERROR_TERMS:
         for key in study.parameters_of(term):
             node, _, name = key.partition('.')
             of_whole, of_none, default = (
@@ -61,7 +61,7 @@ def test_all_of_the_station_is_in_the_budget():
 
 def test_zero_and_collimation_in_program_track_are_their_closed_forms(made, place):
     """The loop holds the encoders: the beam is off by the whole zero, and by the collimation in cross-elevation."""
-    values = scenario.load(study.SCENARIO).node_parameters('adu')
+    values = scenario.load(study.SCENARIO_NAME).node_parameters('adu')
     once, cos_E = made['program'].once, np.cos(np.radians(place.elevation))
     zeros = (math.degrees(getattr(values, axis).encoder.error.zero) for axis in ('azimuth', 'elevation'))
     azimuth, elevation = zeros
@@ -85,7 +85,7 @@ def test_autotrack_nulls_what_program_track_keeps(made, name):
 
 
 def test_autotrack_keeps_the_null_of_its_receiver(made):
-    antenna = scenario.load(study.SCENARIO).node_parameters('tracking_receiver').antenna
+    antenna = scenario.load(study.SCENARIO_NAME).node_parameters('tracking_receiver').antenna
     expected = np.degrees([antenna.boresight_cross_elevation, antenna.boresight_elevation])
     assert made['autotrack'].once['boresight'].mean(axis=0) == pytest.approx(expected, rel=0.05)
 
@@ -95,7 +95,7 @@ def test_a_recording_is_measured_against_where_the_target_is_seen():
     chosen = scenario.load('leo_pass', ['tracking_receiver.path.refractivity=320',
                                         'tracking_receiver.path.light_time=true'], duration=4.0)
     run = closed_loop.Loop(chosen).run()
-    recorded = Recorded(chosen, run)
+    recorded = MemoryRecording(chosen, run)
     recorded.configuration['parameters']['tracking_receiver'] = as_dict(chosen.node_parameters('tracking_receiver'))
     read = tracking.read(recorded)
     assert np.abs(read.cross_elevation - run.truth['error'][:, 0]).max() < 1e-9

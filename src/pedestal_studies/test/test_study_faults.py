@@ -6,29 +6,31 @@ import pytest
 
 from acu_tracker import modes
 from pedestal_common.injection import table
-from pedestal_studies.rigs.fault_expectations import EXPECTED, REACH, Expected
+from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS, LEVEL_MODE_ERRORS_DEG, Expectation
 from pedestal_studies.system import faults as study
 
 
 def test_something_is_expected_of_every_fault_in_every_mode_of_the_study():
-    assert set(EXPECTED) == {f'{node}.{fault.name}' for node, faults in table.FAULTS.items() for fault in faults}
-    assert all(list(of_modes) and set(of_modes) == set(study.OUTSET) for of_modes in EXPECTED.values())
-    assert len({case for case, *_ in study.cases()}) == len(study.cases()) == len(EXPECTED) * len(study.OUTSET)
+    assert set(FAULT_EXPECTATIONS) == {f'{node}.{fault.name}' for node,
+                                       faults in table.INJECTED_FAULTS.items() for fault in faults}
+    assert all(list(of_modes) and set(of_modes) == set(study.MODE_PARAMETERS) for of_modes in FAULT_EXPECTATIONS.values())
+    assert len({case for case,
+                *_ in study.cases()}) == len(study.cases()) == len(FAULT_EXPECTATIONS) * len(study.MODE_PARAMETERS)
 
 
-@pytest.mark.parametrize('mode', study.OUTSET)
+@pytest.mark.parametrize('mode', study.MODE_PARAMETERS)
 def test_without_a_fault_a_mode_is_kept_on_its_place(mode):
     run, said = study.run_of(mode)
     off = study.errors(run, mode)
-    first = round(study.ONSET / 0.005)
+    first = round(study.FAULT_ONSET_S / 0.005)
     assert np.isnan(off[:first]).all() and np.isfinite(off[first:]).all()
-    assert np.nanmax(off) < REACH.get(mode, 0.05)
+    assert np.nanmax(off) < LEVEL_MODE_ERRORS_DEG.get(mode, 0.05)
     assert mode == modes.MODES[run['acu/mode'][first]]
-    assert not [what for what in said if what[1] == study.ALARM and what[0] > first]
+    assert not [what for what in said if what[1] == study.ALARM_SOURCE and what[0] > first]
 
 
 def test_a_trip_is_seen_in_its_step_with_its_text_and_the_mode_it_ends_in():
-    found = study.seen('program', 'adu.inject=10 encoder_jump duration=5', study.usual('program'))
+    found = study.fault_outcome('program', 'adu.inject=10 encoder_jump duration=5', study.baseline_reports('program'))
     assert (found.told, found.end) == (0, 'standby') and 'azimuth encoder jump' in found.alarms
     assert found.error < 0.1
 
@@ -36,8 +38,9 @@ def test_a_trip_is_seen_in_its_step_with_its_text_and_the_mode_it_ends_in():
 @pytest.mark.parametrize(('heading', 'let_in', 'rel'), ((0.002, 0.002, 0.3), (0.01, 0.005, 0.1)))
 def test_what_a_fault_of_the_heading_costs_is_the_angle_that_is_let_in(heading, let_in, rel):
     """One beyond 3 mrad comes in at 1 mrad/s."""
-    found = study.seen('slave', f'ins.inject=10 ins_jump heading={heading} duration=5', study.usual('slave'))
-    assert found.error == pytest.approx(math.degrees(let_in) * math.cos(study.DIRECTION[1]), rel=rel)
+    found = study.fault_outcome('slave', f'ins.inject=10 ins_jump heading={heading} duration=5',
+                                study.baseline_reports('slave'))
+    assert found.error == pytest.approx(math.degrees(let_in) * math.cos(study.SLAVE_DIRECTION_RAD[1]), rel=rel)
 
 
 @pytest.mark.parametrize('case', (
@@ -47,7 +50,7 @@ def test_what_a_fault_of_the_heading_costs_is_the_angle_that_is_let_in(heading, 
     'ins.ins_jump/acquire'))
 def test_what_an_input_that_lies_leads_to_is_what_an_operator_needs(case):
     [(mode, inject, expected)] = [rest for name, *rest in study.cases() if name == case]
-    found = study.seen(mode, inject, frozenset())
+    found = study.fault_outcome(mode, inject, frozenset())
     end = [row for row in study.rows(case, found, mode, expected) if row['metric'] != 'told_after_steps']
     assert not any(map(study.missed, end)), found
 
@@ -56,15 +59,16 @@ def test_what_an_input_that_lies_leads_to_is_what_an_operator_needs(case):
     (4, 'standby', 0.1, []), (5, 'standby', 0.1, ['told_after_steps']), (None, 'standby', 0.1, ['told_after_steps']),
     (4, 'program', 0.1, ['ends_as_expected']), (4, 'standby', 0.6, ['largest_error_deg'])))
 def test_verdicts(told, end, error, short):
-    expected = Expected(4, ('standby',), 0.5)
-    found = study.Seen(told, 'adu: fault', (), end, error, np.zeros(1))
+    expected = Expectation(4, ('standby',), 0.5)
+    found = study.FaultOutcome(told, 'adu: fault', (), end, error, np.zeros(1))
     rows = study.rows('adu.nan/program', found, 'program', expected)
     assert [row['metric'] for row in rows if study.missed(row)] == short
     assert ('MISSED' in study.line('adu.nan/program', found, 'program', expected, rows)) == bool(short)
 
 
 def test_what_need_not_be_told_may_be():
-    expected = Expected(None, (), None)
+    expected = Expectation(None, (), None)
     for told in (None, 7):
-        rows = study.rows('adu.gust/stow', study.Seen(told, '', (), 'stow', 9.0, np.zeros(1)), 'stow', expected)
+        rows = study.rows('adu.gust/stow', study.FaultOutcome(told, '', (), 'stow', 9.0, np.zeros(1)), 'stow',
+                          expected)
         assert not any(map(study.missed, rows))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pedestal_analysis.results import results
-from pedestal_bringup.loop import recorded
+from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag
 from pedestal_studies.system import scenarios as study
@@ -16,7 +16,7 @@ REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
 @pytest.mark.parametrize('name', ['leo_pass', 'ship_pass', 'uav_flyby'])
 def test_a_run_in_memory_has_the_results_of_its_recording(name):
     from_file = bag.read(REFERENCES / name)
-    again = recorded.record(scenario.parse(name, from_file.configuration['scenario']))
+    again = memory_recording.record(scenario.parse(name, from_file.configuration['scenario']))
     expected, found = (results.measured(results.of_bag(run)) for run in (from_file, again))
     assert list(found) == list(expected)
     for metric, (value, unit) in found.items():
@@ -31,9 +31,9 @@ def test_the_runs_do_not_depend_on_their_batch():
 
 def test_rows_of_every_case():
     values = {name: np.arange(3.0)[:, None] + 1.0 + np.arange(len(metrics))
-              for name, metrics in study.MEASURED.items()}
+              for name, metrics in study.CASE_METRICS.items()}
     table = study.rows(values)
     named = {(row['case'], row['metric']): row for row in table}
-    assert len(named) == len(table) and study.TARGETS.keys() <= named.keys()
+    assert len(named) == len(table) and study.METRIC_TARGETS.keys() <= named.keys()
     assert all(row['runs'] == 3 for row in table)
     assert named['ship_pass', 'pointing_to_leo_pass']['value'] == 1.0

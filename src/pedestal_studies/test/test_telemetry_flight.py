@@ -42,8 +42,8 @@ def test_the_filter_is_better_than_what_is_measured_and_both_pairs_have_full_ran
     assert len({(row['case'], row['metric']) for row in result.rows}) == len(result.rows)
     assert [row for row in result.rows if intervals.missed(row)] == []
     values = {(row['case'], row['metric']): row['value'] for row in result.rows}
-    assert values['azimuth/measured', 'angle_rms'] == pytest.approx(math.degrees(study.SIGMA), rel=0.02)
-    assert values['elevation/measured', 'rate_rms'] == pytest.approx(math.degrees(study.RATE_SIGMA), rel=0.02)
+    assert values['azimuth/measured', 'angle_rms'] == pytest.approx(math.degrees(study.ANGLE_SIGMA_RAD), rel=0.02)
+    assert values['elevation/measured', 'rate_rms'] == pytest.approx(math.degrees(study.RATE_SIGMA_RAD_S), rel=0.02)
 
 
 def test_every_figure_is_drawn(result, tmp_path):

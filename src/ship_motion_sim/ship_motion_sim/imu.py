@@ -16,13 +16,14 @@ from ship_motion_sim import earth
 from ship_motion_sim.params import ShipMotionParameters
 from ship_motion_sim.sea import motion
 
-NORMALS = 6     # standard normals a step takes: three gyros, three accelerometers
-STATUS = ('ok', 'step is not positive', 'truth is not valid')
-OK, BAD_STEP, BAD_TRUTH = range(len(STATUS))
+IMU_NORMALS_PER_STEP = 6     # standard normals a step takes: three gyros, three accelerometers
+IMU_STATUS_TEXTS = ('ok', 'step is not positive', 'truth is not valid')
+IMU_OK, IMU_BAD_STEP, IMU_BAD_TRUTH = range(len(IMU_STATUS_TEXTS))
 
-_GAUSS = math.sqrt(0.15)    # the outer nodes of the three-point rule, from the middle, for an interval of 1
+# the outer nodes of the three-point rule, from the middle, for an interval of 1
+_GAUSS_NODE_OFFSET = math.sqrt(0.15)
 
-ERRORS = np.dtype([                             # of three gyros or three accelerometers
+SENSOR_ERRORS_DTYPE = np.dtype([                             # of three gyros or three accelerometers
     ('bias', 'f8', (3,)),                       # [rad/s] or [m/s2]
     ('noise', 'f8'),                            # density of the white noise [rad/sqrt(s)] or [m/s/sqrt(s)]
     ('scale', 'f8'),                            # error of the scale factor [-]
@@ -30,34 +31,34 @@ ERRORS = np.dtype([                             # of three gyros or three accele
     ('quantum', 'f8'),                          # of an increment [rad] or [m/s]; 0: none
 ], align=True)
 
-CONSTANTS = np.dtype([
+CONSTANTS_DTYPE = np.dtype([
     ('earth_rate', 'f8', (3,)),                 # ENU [rad/s]
     ('gravity', 'f8'),                          # [m/s2]
     ('increment', 'i8'),                        # 1: mean rates since the last sample, 0: rates at the stamp
-    ('gyro', ERRORS), ('accelerometer', ERRORS),
+    ('gyro', SENSOR_ERRORS_DTYPE), ('accelerometer', SENSOR_ERRORS_DTYPE),
 ], align=True)
 
-STATE = np.dtype([
-    ('truth', motion.OUTPUTS),                  # at a node of the quadrature
+STATE_DTYPE = np.dtype([
+    ('truth', motion.OUTPUTS_DTYPE),                  # at a node of the quadrature
     ('angle_left', 'f8', (3,)), ('force_left', 'f8', (3,)),     # what quantisation kept back [rad, m/s]
 ], align=True)
 
-INPUTS = np.dtype([
+INPUTS_DTYPE = np.dtype([
     ('t', 'f8'),                                # of the sample [s]
     ('dt', 'f8'),                               # since the last sample; in the first step, the period [s]
 ], align=True)
 
-OUTPUTS = np.dtype([
-    ('status', 'i8'),                           # index into STATUS; not OK: the rest is NaN
+OUTPUTS_DTYPE = np.dtype([
+    ('status', 'i8'),                           # index into IMU_STATUS_TEXTS; not OK: the rest is NaN
     ('angular_velocity', 'f8', (3,)),           # against inertial space, FLU [rad/s]
     ('linear_acceleration', 'f8', (3,)),        # specific force, FLU [m/s2]: at rest +g along z
 ], align=True)
 
 
 def constants(params: ShipMotionParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS."""
+    """The record (1,) of CONSTANTS_DTYPE."""
     imu, latitude = params.imu, math.radians(params.ship.latitude_deg)
-    record = np.zeros(1, CONSTANTS)
+    record = np.zeros(1, CONSTANTS_DTYPE)
     record['earth_rate'] = earth.rate(latitude)
     record['gravity'] = earth.gravity(latitude)
     record['increment'] = imu.output == 'increment'
@@ -70,8 +71,8 @@ def constants(params: ShipMotionParameters) -> np.ndarray:
 
 
 def initial_state() -> np.ndarray:
-    """The record (1,) of STATE before the first sample."""
-    return np.zeros(1, STATE)
+    """The record (1,) of STATE_DTYPE before the first sample."""
+    return np.zeros(1, STATE_DTYPE)
 
 
 @compiled
@@ -103,7 +104,7 @@ def mean_rates(s, c, ship, t, dt, rate, force):
     for i in range(3):
         rate[i] = force[i] = 0.0
     for node in range(3):
-        motion.truth(ship, t - 0.5 * dt + (node - 1) * _GAUSS * dt, s.truth)
+        motion.truth(ship, t - 0.5 * dt + (node - 1) * _GAUSS_NODE_OFFSET * dt, s.truth)
         weight = 8.0 / 18.0 if node == 1 else 5.0 / 18.0
         wx, wy, wz = inertial_rate(s.truth, c.earth_rate)
         fx, fy, fz = specific_force(s.truth, c.earth_rate, c.gravity)
@@ -116,7 +117,7 @@ def mean_rates(s, c, ship, t, dt, rate, force):
 
 
 @compiled
-def spoil(errors, dt, values, normals, first, left):
+def add_sensor_errors(errors, dt, values, normals, first, left):
     """Add the errors of three gyros or accelerometers to their true rates (3,), measured over dt [s].
 
     White noise is given as a density, so a sample carries density / sqrt(dt). left (3,): the part of the increment
@@ -137,16 +138,17 @@ def spoil(errors, dt, values, normals, first, left):
 
 @compiled
 def step(s, c, ship, u, truth, out, normals):
-    """Take one sample. Records STATE, CONSTANTS, motion.CONSTANTS, INPUTS, motion.OUTPUTS at its instant, OUTPUTS;
-    normals (NORMALS,) standard normals."""
+    """Take one sample. Records STATE_DTYPE, CONSTANTS_DTYPE, motion.CONSTANTS, INPUTS_DTYPE, motion.OUTPUTS at its
+    instant, OUTPUTS_DTYPE;
+    normals (IMU_NORMALS_PER_STEP,) standard normals."""
     rate, force = out.angular_velocity, out.linear_acceleration
-    if truth.status != motion.OK:
-        out.status = BAD_TRUTH
+    if truth.status != motion.MOTION_OK:
+        out.status = IMU_BAD_TRUTH
     elif not 0.0 < u.dt < math.inf:
-        out.status = BAD_STEP
+        out.status = IMU_BAD_STEP
     else:
-        out.status = OK
-    if out.status != OK:
+        out.status = IMU_OK
+    if out.status != IMU_OK:
         for i in range(3):
             rate[i] = force[i] = math.nan
         return
@@ -155,5 +157,5 @@ def step(s, c, ship, u, truth, out, normals):
     else:
         rate[0], rate[1], rate[2] = inertial_rate(truth, c.earth_rate)
         force[0], force[1], force[2] = specific_force(truth, c.earth_rate, c.gravity)
-    spoil(c.gyro, u.dt, rate, normals, 0, s.angle_left)
-    spoil(c.accelerometer, u.dt, force, normals, 3, s.force_left)
+    add_sensor_errors(c.gyro, u.dt, rate, normals, 0, s.angle_left)
+    add_sensor_errors(c.accelerometer, u.dt, force, normals, 3, s.force_left)

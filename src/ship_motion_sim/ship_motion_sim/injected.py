@@ -4,28 +4,30 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import quaternion
 from pedestal_common.geometry.quaternion import product
-from pedestal_common.graph.steps import SECOND
-from pedestal_common.injection import schedule, spoil, table
-from pedestal_common.wire.records import NEVER
+from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.injection import message_faults, schedule, table
+from pedestal_common.wire.records import NO_STAMP
 
-IMU_MESSAGES, INS_MESSAGES = spoil.codes('ship_motion'), spoil.codes('ins')
-IMU_BIAS = table.code('ship_motion', 'bias')
-DELAY, BIAS, JUMP, CLOCK_STEP = (table.code('ins', name) for name in ('delay', 'bias', 'ins_jump', 'clock_step'))
+IMU_MESSAGE_FAULT_CODES, INS_MESSAGE_FAULT_CODES = message_faults.codes('ship_motion'), message_faults.codes('ins')
+IMU_BIAS_CODE = table.code('ship_motion', 'bias')
+(INS_DELAY_CODE, INS_BIAS_CODE, INS_JUMP_CODE, INS_CLOCK_STEP_CODE) = (table.code('ins', name) for name in ('delay', 'bias', 'ins_jump', 'clock_step'))
 
-IMU = np.dtype([('rate', 'f8', (3,)), ('force', 'f8', (3,)), ('said', spoil.SPOILT)], align=True)
+IMU_INJECTED_DTYPE = np.dtype([('rate', 'f8', (3,)), ('force', 'f8', (3,)),
+                               ('said', message_faults.MESSAGE_FAULT_DTYPE)],
+                              align=True)
 """rate [rad/s], force [m/s2]: added to what it feels, FLU; said: what spoils it."""
 
-INS = np.dtype([('latency_ns', 'i8'), ('clock_ns', 'i8'), ('rate', 'f8', (3,)), ('turn', 'f8', (3,)),
-                ('said', spoil.SPOILT)], align=True)
+INS_INJECTED_DTYPE = np.dtype([('latency_ns', 'i8'), ('clock_ns', 'i8'), ('rate', 'f8', (3,)), ('turn', 'f8', (3,)),
+                               ('said', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
 """latency_ns: of the INS when nothing is broken; clock_ns: added to its stamps; rate:
 added to the deck rate, FLU [rad/s]; turn: roll, pitch and yaw added to its attitude [rad]; said: what spoils it."""
 
-RAW, DATA, CHANGES = 'ship/imu/data_raw', 'ship/imu/data', 'ins/error'
+IMU_RAW_TOPIC, ATTITUDE_TOPIC, INS_ERROR_TOPIC = 'ship/imu/data_raw', 'ship/imu/data', 'ins/error'
 
 
 def initial(latency_ns) -> np.ndarray:
     """INS (1,) of a latency [ns]: nothing is broken."""
-    e = np.zeros(1, INS)
+    e = np.zeros(1, INS_INJECTED_DTYPE)
     e['latency_ns'] = latency_ns
     return e
 
@@ -38,90 +40,90 @@ def turned(q, roll, pitch, yaw):
 
 
 @compiled
-def take_imu(m, stamp):
+def apply_due_imu_faults(m, stamp):
     """Mend the IMU, then break what is broken in the step of a stamp [ns]; m: ship_unit.RECORD."""
     e = m.injected
     for i in range(3):
         e.rate[i] = e.force[i] = 0.0
-    spoil.restore(e.said)
+    message_faults.clear(e.said)
     schedule.begin(m.schedule)
-    for i in range(schedule.SLOTS):
+    for i in range(schedule.MAX_ACTIVE_FAULTS):
         row = m.schedule.row[i]
         if schedule.in_force(m.schedule, row, stamp):
-            _break_imu(e, row.fault, row.values)
+            _apply_imu_fault(e, row.fault, row.values)
 
 
 @compiled
-def _break_imu(e, fault, values):
-    spoil.apply(e.said, IMU_MESSAGES, fault, values)
-    if fault == IMU_BIAS:
+def _apply_imu_fault(e, fault, values):
+    message_faults.apply(e.said, IMU_MESSAGE_FAULT_CODES, fault, values)
+    if fault == IMU_BIAS_CODE:
         e.rate[int(values[0])] += values[1]
         e.force[int(values[0])] += values[2]
 
 
 @compiled
-def spoil_imu(e, stamp, outputs):
+def corrupt_imu(e, stamp, outputs):
     """What the IMU says of a step, spoilt."""
-    raw = outputs[RAW]
+    raw = outputs[IMU_RAW_TOPIC]
     for i in range(3):
         raw.angular_velocity[i] += e.rate[i]
         raw.linear_acceleration[i] += e.force[i]
         if e.said.sigma > 0.0:
-            raw.angular_velocity[i] += spoil.noise(e.said, stamp, i)
-    spoil.numbers(e.said, raw.angular_velocity, 0)
-    spoil.numbers(e.said, raw.linear_acceleration, 3)
+            raw.angular_velocity[i] += message_faults.noise(e.said, stamp, i)
+    message_faults.numbers(e.said, raw.angular_velocity, 0)
+    message_faults.numbers(e.said, raw.linear_acceleration, 3)
     if e.said.drop != 0:
-        raw.stamp = NEVER
+        raw.stamp = NO_STAMP
 
 
 @compiled
-def take_ins(m, stamp):
+def apply_due_ins_faults(m, stamp):
     """Mend the INS, then break what is broken in the step of a stamp [ns]; m: record of ins_unit."""
     e = m.injected
     m.constants.latency_ns = e.latency_ns
     e.clock_ns = 0
     for i in range(3):
         e.rate[i] = e.turn[i] = 0.0
-    spoil.restore(e.said)
+    message_faults.clear(e.said)
     schedule.begin(m.schedule)
-    for i in range(schedule.SLOTS):
+    for i in range(schedule.MAX_ACTIVE_FAULTS):
         row = m.schedule.row[i]
         if schedule.in_force(m.schedule, row, stamp):
-            _break_ins(m.constants, e, row.fault, row.values)
+            _apply_ins_fault(m.constants, e, row.fault, row.values)
 
 
 @compiled
-def _break_ins(c, e, fault, values):
-    spoil.apply(e.said, INS_MESSAGES, fault, values)
-    if fault == DELAY:
-        c.latency_ns += round(values[0] * SECOND)
-    elif fault == BIAS:
+def _apply_ins_fault(c, e, fault, values):
+    message_faults.apply(e.said, INS_MESSAGE_FAULT_CODES, fault, values)
+    if fault == INS_DELAY_CODE:
+        c.latency_ns += round(values[0] * NS_PER_SECOND)
+    elif fault == INS_BIAS_CODE:
         e.rate[int(values[0])] += values[1]
-    elif fault == JUMP:
+    elif fault == INS_JUMP_CODE:
         e.turn[0] += values[0]
         e.turn[1] += values[1]
         e.turn[2] -= values[2]      # heading grows clockwise
-    elif fault == CLOCK_STEP:
-        e.clock_ns += round(values[0] * SECOND)
+    elif fault == INS_CLOCK_STEP_CODE:
+        e.clock_ns += round(values[0] * NS_PER_SECOND)
 
 
 @compiled
-def spoil_ins(e, stamp, outputs):
+def corrupt_ins(e, stamp, outputs):
     """What the INS says of a step, spoilt."""
-    data = outputs[DATA]
+    data = outputs[ATTITUDE_TOPIC]
     roll, pitch, yaw = e.turn[0], e.turn[1], e.turn[2]
     if e.said.sigma > 0.0:
-        roll += spoil.noise(e.said, stamp, 0)
-        pitch += spoil.noise(e.said, stamp, 1)
-        yaw += spoil.noise(e.said, stamp, 2)
+        roll += message_faults.noise(e.said, stamp, 0)
+        pitch += message_faults.noise(e.said, stamp, 1)
+        yaw += message_faults.noise(e.said, stamp, 2)
     q = turned(data.orientation, roll, pitch, yaw)
     for i in range(4):
         data.orientation[i] = q[i]
     for i in range(3):
         data.angular_velocity[i] += e.rate[i]
-    spoil.numbers(e.said, data.orientation, 0)
-    spoil.numbers(e.said, data.angular_velocity, 4)
-    if data.stamp != NEVER:
-        data.stamp = NEVER if e.said.drop != 0 else data.stamp + e.clock_ns
-    if outputs[CHANGES].stamp != NEVER:
-        outputs[CHANGES].stamp = data.stamp
+    message_faults.numbers(e.said, data.orientation, 0)
+    message_faults.numbers(e.said, data.angular_velocity, 4)
+    if data.stamp != NO_STAMP:
+        data.stamp = NO_STAMP if e.said.drop != 0 else data.stamp + e.clock_ns
+    if outputs[INS_ERROR_TOPIC].stamp != NO_STAMP:
+        outputs[INS_ERROR_TOPIC].stamp = data.stamp

@@ -5,7 +5,7 @@ positive pitch has the bow down, so it changes its sign.
 """
 import math
 
-from pedestal_common.graph.steps import DAY
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 
 
 def sentence(body):
@@ -18,7 +18,7 @@ def sentence(body):
 
 def time_of_day(stamp):
     """hhmmss.sss of a stamp [ns]: whole numbers, for 0.57 s as a float is 569.99 ms."""
-    seconds, milliseconds = divmod(stamp // 1_000_000 % (1000 * DAY), 1000)
+    seconds, milliseconds = divmod(stamp // 1_000_000 % (1000 * SECONDS_PER_DAY), 1000)
     return f'{seconds // 3600:02d}{seconds // 60 % 60:02d}{seconds % 60:02d}.{milliseconds:03d}'
 
 

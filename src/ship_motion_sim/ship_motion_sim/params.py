@@ -5,10 +5,10 @@ import dataclasses
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
-SEED_MAX = 2 ** 31 - 1
+MAX_SEED = 2 ** 31 - 1
 IMU_OUTPUTS = ('sample', 'increment')
-METHODS = ('model', 'classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba')
-AIDS = ('none', 'log', 'gnss')
+INS_METHODS = ('model', 'classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba')
+VELOCITY_AIDS = ('none', 'log', 'gnss')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +67,7 @@ class ShipParameters(Parameters):
                                    "the record's")
     speed: float = parameter(7.0, 0.0, 25.0, 'm/s', 'along the mean heading')
     latitude_deg: float = parameter(47.0, -89.0, 89.0, 'deg', 'geodetic latitude: gravity and earth rate')
-    seed: int = parameter(1, 0, SEED_MAX, '-', 'seed of the seaway')
+    seed: int = parameter(1, 0, MAX_SEED, '-', 'seed of the seaway')
     hull: HullParameters = group(HullParameters)
     plain: PlainParameters = group(PlainParameters)
     recorded: RecordedParameters = group(RecordedParameters)
@@ -113,7 +113,7 @@ class ImuParameters(Parameters):
     accelerometer_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each axis is turned towards the next')
     accelerometer_quantum: float = parameter(0.0, 0.0, 0.1, 'm/s', 'smallest velocity increment; 0: no quantisation')
     output: str = choice('sample', IMU_OUTPUTS, 'rates at the stamp, or their means since the last sample')
-    seed: int = parameter(2, 0, SEED_MAX, '-', 'seed of the noise')
+    seed: int = parameter(2, 0, MAX_SEED, '-', 'seed of the noise')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,7 +130,7 @@ class ShipMotionParameters(Parameters):
     ship: ShipParameters = group(ShipParameters)
     imu: ImuParameters = group(ImuParameters)
     nmea: NmeaParameters = group(NmeaParameters)
-    inject: str = text('', table.DOC)
+    inject: str = text('', table.INJECT_DOC)
 
     def check(self):
         """Raise ParameterError for faults that cannot be injected."""
@@ -174,7 +174,8 @@ class AlignmentParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class AidParameters(Parameters):
     """A velocity from outside, so that neither swell nor speed is taken for an error of the INS."""
-    source: str = choice('none', AIDS, 'log: in deck axes; gnss: in ENU, before alignment only with method oba')
+    source: str = choice('none', VELOCITY_AIDS,
+                         'log: in deck axes; gnss: in ENU, before alignment only with method oba')
     noise: float = parameter(0.02, 0.0, 10.0, 'm/s', 'rms white noise of it, per axis and IMU sample')
 
 
@@ -183,7 +184,7 @@ class InsParameters(Parameters):
     """ins_node. Method `model`: the truth with parametrised errors (roll_bias ... imu_tolerance). The others integrate
     the IMU and align by themselves. `ship` is the ship_motion node's: of it they take the latitude, and the velocity
     that an aid measures."""
-    method: str = choice('model', METHODS, 'parametrised errors, or how it aligns')
+    method: str = choice('model', INS_METHODS, 'parametrised errors, or how it aligns')
     roll_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of roll')
     pitch_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of pitch')
     heading_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of heading, clockwise')
@@ -197,12 +198,12 @@ class InsParameters(Parameters):
     imu_tolerance: float = parameter(0.005, 1e-6, 1.0, 'rad/s',
                                      'largest difference between the IMU and the ship as the INS knows it')
     error_told: bool = flag(True, 'it tells how its error changes: ins/error')
-    seed: int = parameter(3, 0, SEED_MAX, '-', 'seed of the errors')
+    seed: int = parameter(3, 0, MAX_SEED, '-', 'seed of the errors')
     imu_output: str = choice('sample', IMU_OUTPUTS, "the IMU's `output`")
     alignment: AlignmentParameters = group(AlignmentParameters)
     aid: AidParameters = group(AidParameters)
     ship: ShipParameters = group(ShipParameters)
-    inject: str = text('', table.DOC)
+    inject: str = text('', table.INJECT_DOC)
 
     def check(self):
         """Raise ParameterError for a GNSS velocity with a method that needs the heading before it can use one, and for

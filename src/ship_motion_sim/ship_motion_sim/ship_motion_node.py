@@ -6,7 +6,7 @@ import socket
 import sys
 
 from pedestal_common.node import shell, unit_node
-from pedestal_common.node.unit import OK, WARN
+from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN
 from pedestal_common.parameters import ParameterError
 from ship_motion_sim import nmea
 
@@ -55,7 +55,8 @@ class ShipMotionNode(unit_node.UnitNode):
         """The unit's diagnosis; WARN instead of OK where a datagram could not be sent."""
         diagnosis = super().diagnose()
         unsent, self.unsent = self.unsent, ''
-        return diagnosis._replace(level=WARN, message=unsent) if unsent and diagnosis.level == OK else diagnosis
+        return diagnosis._replace(level=LEVEL_WARN,
+                                  message=unsent) if unsent and diagnosis.level == LEVEL_OK else diagnosis
 
 
 def main(args=None):

@@ -15,7 +15,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross, rotation, to_earth
 from pedestal_common.geometry.quaternion import product
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('quaternion', 'f8', (4,)),         # x, y, z, w, deck -> n'
     ('mat', 'f8', (3, 3)),              # the same as a matrix
     ('velocity', 'f8', (3,)),           # in n' [m/s]
@@ -35,7 +35,7 @@ def from_rotvec(x, y, z):
 
 @compiled
 def set_attitude(s, qx, qy, qz, qw):
-    """Set the attitude of a STATE record to a quaternion, scaled to length 1."""
+    """Set the attitude of a STATE_DTYPE record to a quaternion, scaled to length 1."""
     scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
     q = s.quaternion
     q[0], q[1], q[2], q[3] = scale * qx, scale * qy, scale * qz, scale * qw
@@ -66,7 +66,7 @@ def sculling(a, f, b, e):
 
 @compiled
 def step(s, angle, force, dt, earth_rate, command, gravity):
-    """Integrate one IMU interval of dt [s]; s: record of STATE.
+    """Integrate one IMU interval of dt [s]; s: record of STATE_DTYPE.
 
     angle, force (3,): integrals of w_ib and f over it, FLU [rad, m/s]; earth_rate, command (3,): w_ie, w_c in n'.
     """

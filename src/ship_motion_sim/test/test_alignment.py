@@ -39,7 +39,7 @@ def test_riccati_limit_is_the_posterior_of_all_measurements_at_once():
     n, r, h = 20, 0.05**2, 0.2
     q = (float(K['gravity']) * float(K['gyro_noise']))**2 * h
     F = np.array([[1.0, h, 0.5 * h * h], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
-    state = np.zeros(1, extended_observer.STATE)
+    state = np.zeros(1, extended_observer.STATE_DTYPE)
     extended_observer.start(state[0], K, math.radians(5.0), 2.0)
     p = state[0]['p']
     P0 = np.diag([p[0], p[3], p[5]])
@@ -64,7 +64,7 @@ def test_the_scheduled_covariance_is_what_its_gains_leave():
     """Monte Carlo of the observer's error with the gains of adrc_scheduled."""
     runs, seconds = 4000, 20.0
     random = np.random.default_rng(1)
-    state = np.zeros(1, extended_observer.STATE)
+    state = np.zeros(1, extended_observer.STATE_DTYPE)
     extended_observer.start(state[0], K, math.radians(5.0), 2.0)
     p, r = state[0]['p'], float(K['velocity_density']) / H
     e = random.standard_normal((3, runs)) * np.sqrt([[p[0]], [p[3]], [p[5]]])
@@ -97,15 +97,15 @@ def test_steady_covariance_against_scipy():
 
 def test_both_channels_push_their_tilt_out():
     """The paper's equation (11) as printed makes the east channel run away: signs of both, one linear step."""
-    o, command = np.zeros(1, extended_observer.STATE), np.zeros(3)
+    o, command = np.zeros(1, extended_observer.STATE_DTYPE), np.zeros(3)
     o[0]['z'][:, 1] = 0.1       # both accelerate upwards of zero
     levelling.level(o[0], K, np.zeros(2), np.zeros(2), 1.0, command)
     assert (o[0]['push'] < 0.0).all() and command[0] < 0.0 < command[1]
     np.testing.assert_allclose(o[0]['push'], [-9.795 * command[1], 9.795 * command[0]], rtol=1e-3)
     o[0]['z'][:, 1] = 100.0
     levelling.level(o[0], K, np.zeros(2), np.zeros(2), 1.0, command)
-    np.testing.assert_allclose(np.abs(command[:2]), levelling.RATE_LIMIT)
-    np.testing.assert_allclose(np.abs(o[0]['push']), float(K['gravity']) * levelling.RATE_LIMIT)
+    np.testing.assert_allclose(np.abs(command[:2]), levelling.MAX_LEVELLING_RATE_RAD_S)
+    np.testing.assert_allclose(np.abs(o[0]['push']), float(K['gravity']) * levelling.MAX_LEVELLING_RATE_RAD_S)
 
 
 def test_the_differentiator_is_at_its_reference_after_two_steps():
@@ -142,7 +142,8 @@ def test_classical_from_180_deg_against_its_equations():
     def slope_of(_, y):
         turned, east, north, turning = Rotation.from_quat(y[:4]), y[4], y[5], y[6]
         command = np.array([-c['k2'] * north, c['k2'] * east,
-                            np.clip(c['K3'] / earth_rate[1] * turning, -classical.RATE_LIMIT, classical.RATE_LIMIT)])
+                            np.clip(c['K3'] / earth_rate[1] * turning, -classical.MAX_AZIMUTH_RATE_RAD_S,
+                                    classical.MAX_AZIMUTH_RATE_RAD_S)])
         rate = turned.apply(earth_rate) - earth_rate - command      # of n' against n, in n'
         x, y_, z, w = y[:4]
         wx, wy, wz = rate
@@ -169,7 +170,7 @@ def test_gravity_in_the_frame_of_the_start_against_a_sum():
 def test_the_solution_is_the_rotation_and_agrees_with_kabsch():
     random = np.random.default_rng(3)
     turn = Rotation.from_euler('xyz', [0.1, -0.2, 2.9])
-    s = np.zeros(1, oba.STATE)
+    s = np.zeros(1, oba.STATE_DTYPE)
     k, start = K.copy(), np.array([0.3, -0.2, 0.1])
     a, b = [], []
     for n in range(1, 400):

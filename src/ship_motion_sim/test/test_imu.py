@@ -13,7 +13,7 @@ from ship_motion_sim.sea import motion
 IDEAL = ImuParameters(gyro_bias_x=0.0, gyro_bias_y=0.0, gyro_bias_z=0.0, gyro_noise=0.0, accelerometer_bias_x=0.0,
                       accelerometer_bias_y=0.0, accelerometer_bias_z=0.0, accelerometer_noise=0.0)
 STILL = dict(motion='plain', plain=PlainParameters(roll_amplitude_deg=0.0), speed=0.0)
-NO_NOISE = np.zeros(imu.NORMALS)
+NO_NOISE = np.zeros(imu.IMU_NORMALS_PER_STEP)
 
 
 constants_of = functools.cache(motion.constants)
@@ -21,13 +21,13 @@ constants_of = functools.cache(motion.constants)
 
 
 def truth_at(params, t):
-    truth = np.zeros(1, motion.OUTPUTS)
+    truth = np.zeros(1, motion.OUTPUTS_DTYPE)
     motion.truth(constants_of(params.ship)[0], t, truth[0])
     return truth
 
 
 def sample(params, t, dt=0.005, normals=NO_NOISE):
-    inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
+    inputs, outputs = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)
     inputs['t'], inputs['dt'] = t, dt
     imu.step(imu.initial_state()[0], imu.constants(params)[0], constants_of(params.ship)[0], inputs[0],
              truth_at(params, t)[0], outputs[0], normals)
@@ -83,10 +83,10 @@ def test_specific_force_integrates_to_the_velocity():
 def test_noise_is_a_density_and_bias_is_added(dt):
     errors = ImuParameters(gyro_bias_y=0.01, gyro_noise=1e-4, accelerometer_bias_x=0.2, accelerometer_noise=3e-3)
     params, ideal = (ShipMotionParameters(ShipParameters(**STILL), e) for e in (errors, IDEAL))
-    normals = np.random.default_rng(4).standard_normal((3000, imu.NORMALS))
+    normals = np.random.default_rng(4).standard_normal((3000, imu.IMU_NORMALS_PER_STEP))
     state, constants, truth = imu.initial_state(), imu.constants(params), truth_at(params, 0.0)
     ship = motion.constants(params.ship)
-    inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
+    inputs, outputs = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)
     inputs['dt'] = dt
     rates, forces = [], []
     for row in normals:
@@ -105,13 +105,13 @@ def test_noise_is_a_density_and_bias_is_added(dt):
 @pytest.mark.parametrize('dt', [0.0, -0.005, math.nan, math.inf])
 def test_a_step_that_is_not_positive_is_said(dt):
     out = sample(ShipMotionParameters(), 1.0, dt=dt)
-    assert imu.STATUS[out['status']] == 'step is not positive'
+    assert imu.IMU_STATUS_TEXTS[out['status']] == 'step is not positive'
     assert np.isnan(out['angular_velocity']).all() and np.isnan(out['linear_acceleration']).all()
 
 
 def test_truth_that_is_not_valid_is_said():
     out = sample(ShipMotionParameters(), math.nan)
-    assert imu.STATUS[out['status']] == 'truth is not valid'
+    assert imu.IMU_STATUS_TEXTS[out['status']] == 'truth is not valid'
     assert np.isnan(out['angular_velocity']).all() and np.isnan(out['linear_acceleration']).all()
 
 
@@ -146,7 +146,7 @@ def test_quantised_increments_are_whole_and_lose_nothing():
     total = np.zeros((2, 6))
     for k in range(300):
         for i in range(2):
-            inputs, outputs = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
+            inputs, outputs = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)
             inputs['t'], inputs['dt'] = k * dt, dt
             imu.step(states[i][0], imu.constants(params[i])[0], ship[0], inputs[0],
                      truth_at(params[i], k * dt)[0], outputs[0], NO_NOISE)

@@ -9,7 +9,7 @@ from ship_motion_sim import ins_unit, ship_unit
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
 
 PERIOD_NS = 5_000_000
-RAW, DATA = ship_unit.RAW, ins_unit.DATA
+RAW, DATA = ship_unit.IMU_RAW_TOPIC, ins_unit.ATTITUDE_TOPIC
 
 
 def run(imu='', ins='', seconds=2.0, **values):
@@ -63,7 +63,7 @@ def test_dropped_attitudes_do_not_come_and_a_stepped_clock_moves_the_stamps():
     said = [run('', inject)[1] for inject in ('', '1 drop duration=0.5', '1 clock_step time=0.1')]
     assert all((one['ins/error']['stamp'] == one[DATA]['stamp']).all() for one in said)
     plain, dropped, stepped = (one[DATA] for one in said)
-    assert np.flatnonzero((dropped['stamp'] == records.NEVER) & (plain['stamp'] != records.NEVER)).tolist() == list(
+    assert np.flatnonzero((dropped['stamp'] == records.NO_STAMP) & (plain['stamp'] != records.NO_STAMP)).tolist() == list(
         range(200, 300))
     assert (stepped['stamp'][200:] - plain['stamp'][200:] == 100_000_000).all()
     assert np.array_equal(stepped['orientation'], plain['orientation'])
@@ -89,8 +89,8 @@ def test_faults_of_the_imu_reach_the_ins_which_says_so():
     assert np.isnan(gone['angular_velocity'][200:]).all() and np.isnan(gone['linear_acceleration'][200:]).all()
     assert (biased['angular_velocity'] - plain['angular_velocity'])[200:, 2] == pytest.approx(0.1)
     assert (biased['linear_acceleration'] - plain['linear_acceleration'])[200:, 2] == pytest.approx(2.0)
-    assert (silent['stamp'][200:] == records.NEVER).all()
+    assert (silent['stamp'][200:] == records.NO_STAMP).all()
     noisy = run('1 noise sigma=0.1')[0][RAW]['angular_velocity'] - plain['angular_velocity']
     assert noisy[200:].std() == pytest.approx(0.1, rel=0.15) and (noisy[:200] == 0.0).all()
     for inject in ('1 nan', '1 drop'):
-        assert (run(inject)[1][DATA]['stamp'][205:] == records.NEVER).all()
+        assert (run(inject)[1][DATA]['stamp'][205:] == records.NO_STAMP).all()

@@ -26,14 +26,14 @@ class Bench:
         self.imu = imu.constants(ShipMotionParameters(ship))
         self.constants, self.state = ins.constants(params), ins.initial_state()
         self.random = np.random.default_rng(seed)
-        self.inputs, self.truth = np.zeros(1, ins.INPUTS), np.zeros(1, motion.OUTPUTS)
+        self.inputs, self.truth = np.zeros(1, ins.INPUTS_DTYPE), np.zeros(1, motion.OUTPUTS_DTYPE)
 
     def step(self, stamp, spoil=None):
-        dt, raw = np.zeros(1, imu.INPUTS), np.zeros(1, imu.OUTPUTS)
+        dt, raw = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)
         dt['dt'] = 0.005
         motion.truth(self.ship[0], 1e-9 * stamp, self.truth[0])
         imu.step(imu.initial_state()[0], self.imu[0], self.ship[0], dt[0], self.truth[0], raw[0],
-                 np.zeros(imu.NORMALS))
+                 np.zeros(imu.IMU_NORMALS_PER_STEP))
         self.inputs['stamp_ns'] = stamp
         for field in ('angular_velocity', 'linear_acceleration'):
             self.inputs[field] = raw[field]
@@ -42,9 +42,9 @@ class Bench:
         return self.run()
 
     def run(self):
-        outputs = np.zeros(1, ins.OUTPUTS)
+        outputs = np.zeros(1, ins.OUTPUTS_DTYPE)
         ins.step(self.state[0], self.constants[0], self.inputs[0], outputs[0],
-                 self.random.standard_normal(ins.NORMALS))
+                 self.random.standard_normal(ins.INS_NORMALS_PER_STEP))
         return outputs[0]
 
 
@@ -53,7 +53,7 @@ def euler(quaternion):
 
 
 def status(out):
-    return ins.STATUSES[out['status']]
+    return ins.INS_STATUS_TEXTS[out['status']]
 
 
 def test_without_errors_and_latency_it_is_the_truth():
@@ -187,7 +187,7 @@ def test_another_ship_than_the_imu_is_on_is_said(change):
 def test_more_samples_than_the_buffer_holds_are_said():
     bench = Bench(dataclasses.replace(PERFECT, latency=0.25))
     statuses = [status(bench.step(k * 500_000)) for k in range(600)]
-    assert statuses[:ins.RING] == ['ok'] * ins.RING
+    assert statuses[:ins.LATENCY_RING_SIZE] == ['ok'] * ins.LATENCY_RING_SIZE
     assert 'more samples than the latency buffer holds' in statuses
 
 
@@ -199,6 +199,6 @@ def test_compiled_callers_get_the_same_result():
     one, other = Bench(InsParameters()), Bench(InsParameters())
     for k in range(3):
         expected = one.step(k * STEP)
-        outputs = np.zeros(1, ins.OUTPUTS)
-        call(other.state, other.constants, one.inputs, outputs, other.random.standard_normal(ins.NORMALS))
+        outputs = np.zeros(1, ins.OUTPUTS_DTYPE)
+        call(other.state, other.constants, one.inputs, outputs, other.random.standard_normal(ins.INS_NORMALS_PER_STEP))
         assert outputs[0].tobytes() == expected.tobytes()

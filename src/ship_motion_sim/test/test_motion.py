@@ -19,7 +19,7 @@ def ship(**values):
     constants = motion.constants(ShipParameters(**values))
 
     def at(t):
-        outputs = np.zeros(1, motion.OUTPUTS)
+        outputs = np.zeros(1, motion.OUTPUTS_DTYPE)
         motion.truth(constants[0], t, outputs[0])
         return outputs[0]
     return at
@@ -117,7 +117,7 @@ def test_seeds_are_different_seas():
 def test_the_sea_does_not_repeat():
     """Equally spaced frequencies repeat after 2 pi / dw: the correlation of the motion with itself would be 1."""
     low, high = waves.band(waves.SEA_STATES[5][1])
-    period = 2.0 * math.pi * waves.COMPONENTS / (high - low)
+    period = 2.0 * math.pi * waves.WAVE_COMPONENT_COUNT / (high - low)
     at, times = ship(speed=0.0), np.arange(0.0, 2000.0, 1.0)
     for periods in (1, 2):
         later = series(at, times + periods * period, 'position')[:, 2]
@@ -152,8 +152,8 @@ def test_sine_and_cosine_to_a_million_radians():
 @pytest.mark.parametrize('t', [math.nan, math.inf, -math.inf])
 def test_time_that_is_not_finite_is_said_and_nothing_looks_valid(t):
     now = ship()(t)
-    assert motion.STATUS[now['status']] == 'time is not finite'
-    for field in motion.OUTPUTS.names:
+    assert motion.MOTION_STATUS_TEXTS[now['status']] == 'time is not finite'
+    for field in motion.OUTPUTS_DTYPE.names:
         if field != 'status':
             assert np.isnan(now[field]).all(), field
 
@@ -163,6 +163,6 @@ def test_compiled_callers_get_the_same_truth():
     def call(constants, t, outputs):
         motion.truth(constants[0], t, outputs[0])
 
-    outputs = np.zeros(1, motion.OUTPUTS)
+    outputs = np.zeros(1, motion.OUTPUTS_DTYPE)
     call(motion.constants(ShipParameters()), 77.7, outputs)
     assert outputs.tobytes() == ship()(77.7).tobytes()

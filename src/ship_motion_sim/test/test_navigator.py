@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from pedestal_common import parameters
 from pedestal_common.wire import records
-from ship_motion_sim.ins_unit import DATA, RAW, STATE, Ins
+from ship_motion_sim.ins_unit import ATTITUDE_TOPIC, IMU_RAW_TOPIC, INS_STATE_TOPIC, Ins
 from ship_motion_sim.navigation import ins, navigator
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
-from ship_motion_sim.ship_unit import TRUTH, ShipMotion
+from ship_motion_sim.ship_unit import SHIP_TRUTH_TOPIC, ShipMotion
 
 STEP = 20_000_000
 SEA = {'ship.sea_state': 4, 'ship.heading_deg': 60.0}
@@ -22,7 +22,7 @@ def answers(unit, stamps, raw=None):
     """What a unit writes in the steps of these stamps [ns]."""
     inputs, outputs = (records.empty(kind, len(stamps)) for kind in (unit.inputs_type(), unit.outputs_type()))
     if raw is not None:
-        inputs[RAW] = raw
+        inputs[IMU_RAW_TOPIC] = raw
     unit.step(np.ascontiguousarray(stamps), inputs, outputs)    # a column of records would compile the laws anew
     return outputs
 
@@ -31,7 +31,7 @@ def sailed(seconds, sea=SEA, **imu):
     """(IMU messages, true attitude (n, 4), true deck rate (n, 3)) of a ship on sea state 4."""
     unit = ShipMotion(parameters.build(ShipMotionParameters, {**sea, **{f'imu.{k}': v for k, v in imu.items()}}), ())
     outputs = answers(unit, STEP * np.arange(round(seconds * 1e9 / STEP)))
-    return outputs[RAW], outputs[TRUTH]['orientation'], outputs[TRUTH]['twist_angular']
+    return outputs[IMU_RAW_TOPIC], outputs[SHIP_TRUTH_TOPIC]['orientation'], outputs[SHIP_TRUTH_TOPIC]['twist_angular']
 
 
 @functools.cache
@@ -41,17 +41,18 @@ def ordinary(output):
 
 def answered(raw, **values):
     """What an INS says to IMU messages."""
-    return answers(Ins(parameters.build(InsParameters, {**SEA, 'latency': 0.0, **values}), (RAW,)), raw['stamp'], raw)
+    return answers(Ins(parameters.build(InsParameters, {**SEA, 'latency': 0.0, **values}), (IMU_RAW_TOPIC,)),
+                   raw['stamp'], raw)
 
 
 def errors(outputs, truth):
     """(n, 3) about east, north, up [rad]."""
-    return (Rotation.from_quat(outputs[DATA]['orientation']) * Rotation.from_quat(truth).inv()).as_rotvec()
+    return (Rotation.from_quat(outputs[ATTITUDE_TOPIC]['orientation']) * Rotation.from_quat(truth).inv()).as_rotvec()
 
 
 def aligned_at(outputs):
     """Step at which `aligned` is first said."""
-    return int(np.argmax(outputs[STATE] == navigator.NAVIGATING))
+    return int(np.argmax(outputs[INS_STATE_TOPIC] == navigator.STAGE_NAVIGATING))
 
 
 @pytest.mark.parametrize('method, aid, output', [
@@ -60,14 +61,15 @@ def aligned_at(outputs):
 def test_it_aligns_under_way_from_180_deg_wrong_and_knows_how_well(method, aid, output):
     raw, truth, rate = ordinary(output)
     outputs = answered(raw, method=method, imu_output=output, **WRONG, **{'aid.source': aid})
-    e, sigma, aligned = errors(outputs, truth), np.sqrt(outputs[DATA]['orientation_variance']), aligned_at(outputs)
+    (e, sigma, aligned) = (errors(outputs, truth), np.sqrt(outputs[ATTITUDE_TOPIC]['orientation_variance']),
+                           aligned_at(outputs))
     assert abs(e[2, 2]) > 2.0 or method == 'oba'
-    assert 100.0 < aligned * STEP * 1e-9 < 250.0 and (outputs[STATE][:aligned] == navigator.ALIGNING).all()
-    assert (outputs[STATE][aligned:] == navigator.NAVIGATING).all()
+    assert 100.0 < aligned * STEP * 1e-9 < 250.0 and (outputs[INS_STATE_TOPIC][:aligned] == navigator.STAGE_ALIGNING).all()
+    assert (outputs[INS_STATE_TOPIC][aligned:] == navigator.STAGE_NAVIGATING).all()
     assert (sigma[aligned:, 2] < 0.0036).all() and (sigma[:aligned - 1, 2] > 0.0035).all()
     assert (np.abs(e[aligned:, 2]) < 3.0 * sigma[aligned:, 2]).all()
     assert (np.abs(e[aligned:, :2]) < 4.0 * sigma[aligned:, :2] + 1e-4).all()
-    np.testing.assert_allclose(outputs[DATA]['angular_velocity'][aligned:], rate[aligned:], atol=2e-4)
+    np.testing.assert_allclose(outputs[ATTITUDE_TOPIC]['angular_velocity'][aligned:], rate[aligned:], atol=2e-4)
 
 
 @pytest.mark.parametrize('method', ['adrc', 'adrc_scheduled', 'riccati_eso', 'oba'])
@@ -75,7 +77,7 @@ def test_the_level_is_as_good_as_it_says_while_it_is_still_being_levelled(method
     """Power-up on a deck that is taken for level; 1 s later and until the end."""
     raw, truth, _ = ordinary('increment')
     outputs = answered(raw, method=method, imu_output='increment', **WRONG, **{'aid.source': 'log'})
-    e, sigma = errors(outputs, truth), np.sqrt(outputs[DATA]['orientation_variance'])
+    e, sigma = errors(outputs, truth), np.sqrt(outputs[ATTITUDE_TOPIC]['orientation_variance'])
     assert np.abs(e[0, :2]).max() > 2e-3 or method == 'oba'
     for first, last in ((1.0, 5.0), (5.0, 20.0), (20.0, 60.0), (60.0, 260.0)):
         part = slice(round(first * 1e9 / STEP), round(last * 1e9 / STEP))
@@ -89,7 +91,7 @@ def test_a_ship_that_swell_moves_calls_itself_aligned_later():
     outputs = answered(raw, method='riccati_eso', imu_output='increment', **WRONG, **{'ship.sea_state': 6})
     aided = answered(raw, method='riccati_eso', imu_output='increment', **WRONG,
                      **{'ship.sea_state': 6, 'aid.source': 'log'})
-    assert (outputs[STATE] == navigator.ALIGNING).all() and 0 < aligned_at(aided) < 8000
+    assert (outputs[INS_STATE_TOPIC] == navigator.STAGE_ALIGNING).all() and 0 < aligned_at(aided) < 8000
 
 
 def test_a_gyrocompass_that_dwells_at_180_deg_is_not_aligned():
@@ -101,8 +103,8 @@ def test_a_gyrocompass_that_dwells_at_180_deg_is_not_aligned():
     for heading, dwells in ((179.84, True), (2.0, False)):
         outputs = answered(raw, **still, method='classical', imu_output='increment',
                         **{'alignment.initial_heading_deg': heading, 'alignment.aligned_sigma': 0.006})
-        error, stage = abs(errors(outputs, truth)[-1, 2]), outputs[STATE][-1]
-        assert stage == (navigator.ALIGNING if dwells else navigator.NAVIGATING)
+        error, stage = abs(errors(outputs, truth)[-1, 2]), outputs[INS_STATE_TOPIC][-1]
+        assert stage == (navigator.STAGE_ALIGNING if dwells else navigator.STAGE_NAVIGATING)
         assert error > 3.1 if dwells else error < 1e-3
 
 
@@ -123,7 +125,7 @@ def test_with_a_gnss_it_navigates_on_any_course(heading):
     raw, truth, _ = sailed(400.0, sea, output='increment')
     outputs = answered(raw, method='oba', imu_output='increment', **sea, **WRONG, **{'aid.source': 'gnss'})
     aligned = aligned_at(outputs)
-    e, sigma = errors(outputs, truth), np.sqrt(outputs[DATA]['orientation_variance'])
+    e, sigma = errors(outputs, truth), np.sqrt(outputs[ATTITUDE_TOPIC]['orientation_variance'])
     assert aligned > 0 and (np.abs(e[aligned:, 2]) < 3.0 * sigma[aligned:, 2]).all()
 
 
@@ -131,9 +133,9 @@ def test_the_attitude_is_late_by_the_latency_and_the_state_goes_with_it():
     raw, _, _ = ordinary('increment')
     prompt, late = (answered(raw, method='riccati_eso', imu_output='increment', latency=latency, **WRONG,
                              **{'aid.source': 'log'}) for latency in (0.0, 0.04))
-    assert (late[DATA]['stamp'][:2] == records.NEVER).all()
-    np.testing.assert_array_equal(late[DATA]['orientation'][2:], prompt[DATA]['orientation'][:-2])
-    assert aligned_at(late) == aligned_at(prompt) + 2 and late[STATE][0] == navigator.ALIGNING
+    assert (late[ATTITUDE_TOPIC]['stamp'][:2] == records.NO_STAMP).all()
+    np.testing.assert_array_equal(late[ATTITUDE_TOPIC]['orientation'][2:], prompt[ATTITUDE_TOPIC]['orientation'][:-2])
+    assert aligned_at(late) == aligned_at(prompt) + 2 and late[INS_STATE_TOPIC][0] == navigator.STAGE_ALIGNING
 
 
 def test_a_message_that_is_not_finite_is_bridged():
@@ -141,9 +143,9 @@ def test_a_message_that_is_not_finite_is_bridged():
     broken = raw.copy()
     broken['angular_velocity'][3000] = math.nan
     outputs = answered(broken, method='riccati_eso', imu_output='increment', **WRONG, **{'aid.source': 'log'})
-    assert outputs[DATA]['stamp'][3000] == records.NEVER
-    assert np.isfinite(outputs[DATA]['orientation']).all()
-    assert abs(errors(outputs, truth)[-1, 2]) < 3.0 * math.sqrt(outputs[DATA]['orientation_variance'][-1, 2])
+    assert outputs[ATTITUDE_TOPIC]['stamp'][3000] == records.NO_STAMP
+    assert np.isfinite(outputs[ATTITUDE_TOPIC]['orientation']).all()
+    assert abs(errors(outputs, truth)[-1, 2]) < 3.0 * math.sqrt(outputs[ATTITUDE_TOPIC]['orientation_variance'][-1, 2])
 
 
 @pytest.mark.parametrize('how', ['missing', 'not finite'])
@@ -157,24 +159,24 @@ def test_after_a_long_silence_of_the_imu_it_aligns_anew(how):
     else:
         raw['linear_acceleration'][~there] = math.nan
     unit = Ins(parameters.build(InsParameters, {**SEA, **WRONG, 'latency': 0.0, 'method': 'riccati_eso',
-                                                'imu_output': 'increment', 'aid.source': 'log'}), (RAW,))
+                                                'imu_output': 'increment', 'aid.source': 'log'}), (IMU_RAW_TOPIC,))
     outputs, statuses = records.empty(unit.outputs_type(), len(raw)), []
     for k in range(len(raw)):
-        unit.inputs[RAW] = raw[k]
+        unit.inputs[IMU_RAW_TOPIC] = raw[k]
         unit.step(raw['stamp'][k:k + 1], unit.inputs, outputs[k:k + 1])
-        statuses.append(ins.STATUSES[unit.parts['outputs']['status']])
+        statuses.append(ins.INS_STATUS_TEXTS[unit.parts['outputs']['status']])
     back = statuses.index('IMU was silent for too long, the attitude is lost: it aligns anew')
     assert back == (9000 if how == 'missing' else 9200)
-    assert outputs[STATE][back - 1 if how == 'missing' else 8999] == navigator.NAVIGATING
-    assert (outputs[STATE][back:back + 5000] == navigator.ALIGNING).all()
-    e, sigma = errors(outputs, truth), np.sqrt(outputs[DATA]['orientation_variance'])
-    assert sigma[back, 2] > 1.0 and outputs[STATE][-1] == navigator.NAVIGATING
+    assert outputs[INS_STATE_TOPIC][back - 1 if how == 'missing' else 8999] == navigator.STAGE_NAVIGATING
+    assert (outputs[INS_STATE_TOPIC][back:back + 5000] == navigator.STAGE_ALIGNING).all()
+    e, sigma = errors(outputs, truth), np.sqrt(outputs[ATTITUDE_TOPIC]['orientation_variance'])
+    assert sigma[back, 2] > 1.0 and outputs[INS_STATE_TOPIC][-1] == navigator.STAGE_NAVIGATING
     assert abs(e[-1, 2]) < 3.0 * sigma[-1, 2] < 0.01
 
 
 def test_the_model_says_nothing_of_alignment():
     raw, _, _ = ordinary('sample')
-    assert (answered(raw[:100])[STATE] == -1).all()
+    assert (answered(raw[:100])[INS_STATE_TOPIC] == -1).all()
 
 
 def test_a_gnss_is_of_no_use_before_the_heading_is_known():

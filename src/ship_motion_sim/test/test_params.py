@@ -5,7 +5,13 @@ import pytest
 from pedestal_common import parameters
 from ship_motion_sim.ins_unit import Ins
 from ship_motion_sim.navigation import navigator
-from ship_motion_sim.params import METHODS, AdrcParameters, AlignmentParameters, InsParameters, ShipMotionParameters
+from ship_motion_sim.params import (
+    INS_METHODS,
+    AdrcParameters,
+    AlignmentParameters,
+    InsParameters,
+    ShipMotionParameters,
+)
 
 
 @pytest.mark.parametrize('values, message', [
@@ -41,7 +47,7 @@ def test_what_is_allowed_is_stable(step):
     for observer, control, s0 in itertools.product((0.01, 0.3, 20.0), (0.01, 20.0), (0.005, 0.2)):
         p = AlignmentParameters(step=step, adrc=AdrcParameters(observer, min(control, 1.0 / step)),
                                 classical_bandwidth=s0)
-        for method in METHODS[1:]:
+        for method in INS_METHODS[1:]:
             c = navigator.constants(p, method, 'none', 0.8)[0]
             sigmas = [float(c[name][field]) for name, field in (
                 ('adrc', 'level'), ('adrc', 'velocity_variance'), ('classical', 'level'), ('classical', 'azimuth'))]

@@ -14,7 +14,7 @@ PERIOD, LENGTH = 0.1, 60.0
 
 
 def truth(constants, t):
-    outputs = np.zeros(1, motion.OUTPUTS)
+    outputs = np.zeros(1, motion.OUTPUTS_DTYPE)
     motion.truth(constants[0], t, outputs[0])
     return outputs[0]
 
@@ -76,7 +76,8 @@ def test_rates_and_accelerations_are_derivatives_of_what_is_published(path, t):
     np.testing.assert_allclose(difference(1), now[2], atol=1e-7)
 
 
-@pytest.mark.parametrize('t', [0.0, 12.3, LENGTH, -recording.HOLD, LENGTH + recording.HOLD])
+@pytest.mark.parametrize('t', [0.0, 12.3, LENGTH, -recording.COME_TO_REST_TIME_S, LENGTH
+                               + recording.COME_TO_REST_TIME_S])
 def test_the_second_derivative_has_no_jumps(path, t):
     constants = recorded(path)
     before, after = (truth(constants, t + e)['freedoms'].copy() for e in (-1e-7, 1e-7))
@@ -85,7 +86,8 @@ def test_the_second_derivative_has_no_jumps(path, t):
 
 def test_the_ship_rests_where_the_record_ends(path):
     constants = recorded(path, start=10.0)
-    for t, end in ((-10.0 - recording.HOLD, -10.0), (-1e4, -10.0), (LENGTH - 10.0 + recording.HOLD, LENGTH - 10.0),
+    for t, end in ((-10.0 - recording.COME_TO_REST_TIME_S, -10.0), (-1e4, -10.0),
+                   (LENGTH - 10.0 + recording.COME_TO_REST_TIME_S, LENGTH - 10.0),
                    (1e6, LENGTH - 10.0)):
         now = truth(constants, t)
         np.testing.assert_allclose(now['freedoms'][0], truth(constants, end)['freedoms'][0], atol=1e-12)
@@ -116,7 +118,8 @@ HEAD = 'time_s,roll_deg,pitch_deg,heading_deg\n'
     (HEAD + '0,1,1,1\n1,1,1,1\n', {}, '2 rows, must be at least 4'),
     (HEAD + ''.join(f'{t},1,1,1\n' for t in range(6)), {'start': 5.0},
      'ship.recorded.start = 5 s: must be below the length of the record, 5 s'),
-    (HEAD + ''.join(f'{t},1,1,1\n' for t in range(recording.ROWS + 1)), {}, f'must be at most {recording.ROWS}'),
+    (HEAD + ''.join(f'{t},1,1,1\n' for t in range(recording.MAX_ROWS + 1)), {},
+     f'must be at most {recording.MAX_ROWS}'),
 ])
 def test_what_is_no_recording_is_named(tmp_path, content, changes, message):
     path = tmp_path / 'ship.csv'

@@ -29,7 +29,7 @@ def measured(state, constants, ship, inputs, truth, outputs, count, angle, force
     for k in range(count):
         inputs[0].t = (k + 1) * inputs[0].dt
         motion.truth(ship[0], inputs[0].t, truth[0])
-        imu.step(state[0], constants[0], ship[0], inputs[0], truth[0], outputs[0], np.zeros(imu.NORMALS))
+        imu.step(state[0], constants[0], ship[0], inputs[0], truth[0], outputs[0], np.zeros(imu.IMU_NORMALS_PER_STEP))
         for i in range(3):
             angle[k, i] = outputs[0].angular_velocity[i] * inputs[0].dt
             force[k, i] = outputs[0].linear_acceleration[i] * inputs[0].dt
@@ -38,16 +38,16 @@ def measured(state, constants, ship, inputs, truth, outputs, count, angle, force
 def increments(ship, seconds):
     """(angle, force) (n, 3) of an errorless IMU from 0 s on."""
     params, count = ShipMotionParameters(ship, EXACT), round(seconds / DT)
-    inputs = np.zeros(1, imu.INPUTS)
+    inputs = np.zeros(1, imu.INPUTS_DTYPE)
     inputs['dt'] = DT
     angle, force = np.zeros((count, 3)), np.zeros((count, 3))
     measured(imu.initial_state(), imu.constants(params), motion.constants(ship), inputs,
-             np.zeros(1, motion.OUTPUTS), np.zeros(1, imu.OUTPUTS), count, angle, force)
+             np.zeros(1, motion.OUTPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE), count, angle, force)
     return angle, force
 
 
 def truth_at(ship, t):
-    truth = np.zeros(1, motion.OUTPUTS)
+    truth = np.zeros(1, motion.OUTPUTS_DTYPE)
     motion.truth(motion.constants(ship)[0], t, truth[0])
     return truth[0]
 
@@ -60,7 +60,7 @@ def integrate(state, angle, force, dt, earth_rate, command, gravity):
 
 def navigated(ship, angle, force, command=(0.0, 0.0, 0.0)):
     """The STATE record after these increments from the true attitude and velocity at 0 s."""
-    state, start = np.zeros(1, strapdown.STATE), truth_at(ship, 0.0)
+    state, start = np.zeros(1, strapdown.STATE_DTYPE), truth_at(ship, 0.0)
     strapdown.set_attitude(state[0], *start['quaternion'])
     state['velocity'] = start['velocity']
     integrate(state, angle, force, DT, np.array(earth.rate(LATITUDE)), np.array(command), earth.gravity(LATITUDE))
@@ -83,10 +83,11 @@ def test_without_errors_it_stays_on_the_truth(ship, seconds, angle_limit, veloci
 
 def test_a_wrong_earth_rate_would_be_seen():
     angle, force = increments(SWAY, 60.0)
-    state, start = np.zeros(1, strapdown.STATE), truth_at(SWAY, 0.0)
+    state, start = np.zeros(1, strapdown.STATE_DTYPE), truth_at(SWAY, 0.0)
     strapdown.set_attitude(state[0], *start['quaternion'])
     integrate(state, angle, force, DT, np.zeros(3), np.zeros(3), earth.gravity(LATITUDE))
-    assert apart(state['quaternion'], truth_at(SWAY, 60.0)['quaternion']) == pytest.approx(60.0 * earth.RATE, rel=0.01)
+    assert apart(state['quaternion'], truth_at(SWAY, 60.0)['quaternion']) == pytest.approx(60.0
+                                                                                           * earth.WGS84_EARTH_RATE_RAD_S, rel=0.01)
 
 
 def test_a_command_turns_the_computed_frame():
@@ -95,7 +96,7 @@ def test_a_command_turns_the_computed_frame():
     turned = Rotation.from_rotvec([0.0, 0.0, -0.2]) * Rotation.from_quat(end['quaternion'])
     # n' turns away from north, so that the earth's rate there is wrong by up to 0.2 of its north part
     assert apart(state['quaternion'], turned.as_quat()) == pytest.approx(
-        0.5 * 0.2 * 10.0 * earth.RATE * math.cos(LATITUDE), rel=0.01)
+        0.5 * 0.2 * 10.0 * earth.WGS84_EARTH_RATE_RAD_S * math.cos(LATITUDE), rel=0.01)
 
 
 def test_against_python_ins():

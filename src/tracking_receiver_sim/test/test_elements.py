@@ -52,7 +52,7 @@ def table(objects):
 
 FORMS = {'kvn': kvn, 'xml': xml, 'csv': table, 'json': lambda objects: json.dumps(objects, indent=1),
          'numbers.json': lambda objects: json.dumps([
-             {key: json.loads(value) if key in elements.NUMBERS else value for key, value in fields.items()}
+             {key: json.loads(value) if key in elements.NUMBER_LIMITS else value for key, value in fields.items()}
              for fields in objects])}
 
 

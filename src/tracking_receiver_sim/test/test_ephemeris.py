@@ -174,7 +174,7 @@ def test_what_a_scenario_leaves_open_is_the_first_pass(tmp_path):
     path = tmp_path / 'iss.oem'
     path.write_text(oem_text('TEME', count=120))
     of = TargetParameters(kind='track_file', track_file=TrackFileParameters(path=str(path)))
-    found = track_files.left_open(of, set())
+    found = track_files.derived_parameters(of, set())
     zero = found['target.track_file.start']
     t = SCALE.utc(2019, 12, 9, 16, 30, 0), SCALE.utc(2019, 12, 9, 18, 0, 0)
     when, events = ISS.find_events(wgs84.latlon(47.4, 8.5, 500.0), *t, altitude_degrees=0.0)
@@ -182,11 +182,12 @@ def test_what_a_scenario_leaves_open_is_the_first_pass(tmp_path):
     assert list(events[:3]) == [0, 1, 2] and 0.0 <= zero - rise < 1.1 and zero == round(zero, 6)
     assert 0.0 <= down - zero - found['duration'] < 0.2
     assert 2.2e6 < found['receiver.reference_range'] < 2.8e6 and found['target.station.latitude_deg'] == 47.4
-    later = track_files.left_open(TargetParameters(kind='track_file', track_file=TrackFileParameters(
+    later = track_files.derived_parameters(TargetParameters(kind='track_file', track_file=TrackFileParameters(
         path=str(path), start=zero + 100.0)), {'target.track_file.start'})
     assert later['duration'] == pytest.approx(found['duration'] - 100.0, abs=0.11)
     with pytest.raises(csv_table.TableError, match='the orbit does not climb above 10 deg over latitude -80'):
-        track_files.left_open(TargetParameters(kind='track_file', station=StationParameters(latitude_deg=-80.0),
+        track_files.derived_parameters(TargetParameters(kind='track_file',
+                                                        station=StationParameters(latitude_deg=-80.0),
                                          track_file=TrackFileParameters(path=str(path))), set())
 
 
@@ -231,7 +232,7 @@ def test_a_table_of_directions_is_followed(name, tmp_path):
     assert off.max() < 0.01 and r == pytest.approx(7e5, rel=2e-4)
     dated = 'seconds' not in name and name != 'bare.csv'
     assert built.start_time == ('2019-12-09T16:35:00.000Z' if dated else '')
-    found = track_files.left_open(of, set())
+    found = track_files.derived_parameters(of, set())
     assert found['duration'] == pytest.approx(599.95, abs=0.06) and found['receiver.reference_range'] == 7e5
 
 

@@ -25,18 +25,18 @@ def run(inject='', seconds=2.0, **values):
     receiver = unit.TrackingReceiver(p, unit.TrackingReceiver.NODE.reads)
     stamps = PERIOD_NS * np.arange(round(seconds / 0.005))
     inputs = records.empty(receiver.inputs_type(), len(stamps))
-    inputs[unit.BEAM]['stamp'], inputs[unit.BEAM]['position'] = stamps, BEAM
+    inputs[unit.DRIVE_TRUTH_TOPIC]['stamp'], inputs[unit.DRIVE_TRUTH_TOPIC]['position'] = stamps, BEAM
     outputs = records.empty(receiver.outputs_type(), len(stamps))
     receiver.step(stamps, inputs, outputs)
     return outputs
 
 
 def errors(outputs):
-    return outputs[unit.ERRORS]['vector'][:, :2]
+    return outputs[unit.ANGLE_ERROR_TOPIC]['vector'][:, :2]
 
 
 def came(outputs):
-    return outputs[unit.ERRORS]['stamp'] != records.NEVER
+    return outputs[unit.ANGLE_ERROR_TOPIC]['stamp'] != records.NO_STAMP
 
 
 def test_after_its_faults_the_receiver_is_what_it_was():
@@ -62,7 +62,7 @@ def test_a_phase_of_180_degrees_is_that_of_the_parameter():
 
 
 def test_a_fade_is_as_deep_as_it_says_and_without_carrier_there_is_no_lock():
-    level = run('1 fade depth=20')[unit.ERRORS]['vector'][:, 2]
+    level = run('1 fade depth=20')[unit.ANGLE_ERROR_TOPIC]['vector'][:, 2]
     assert level[150:200].mean() - level[-50:].mean() == pytest.approx(20.0, abs=0.3)
     outputs = run('1 fade depth=60 duration=2', seconds=4.0)
     assert np.isnan(errors(outputs)[595:600]).all() and np.isfinite(errors(outputs)[-100:]).all()
@@ -73,27 +73,28 @@ def test_a_delay_is_the_latency_with_right_stamps():
     assert plain.tobytes() == late.tobytes()
     outputs = run('1 delay time=0.05 duration=0.5')
     assert not came(outputs)[200:210].any() and came(outputs)[:200].all() and came(outputs)[210:].all()
-    assert outputs[unit.ERRORS]['stamp'][[250, 300]].tolist() == [240 * PERIOD_NS, 300 * PERIOD_NS]
+    assert outputs[unit.ANGLE_ERROR_TOPIC]['stamp'][[250, 300]].tolist() == [240 * PERIOD_NS, 300 * PERIOD_NS]
 
 
 def test_dropped_results_do_not_come_but_the_truth_does():
     outputs = run('1 drop duration=0.5', receiver__rate__measured=True, receiver__ranging__measured=True)
-    for topic in (unit.ERRORS, unit.RATE, unit.RANGE):
-        assert np.flatnonzero(outputs[topic]['stamp'] == records.NEVER).tolist() == list(range(200, 300))
-    assert (outputs[unit.TARGET]['stamp'] != records.NEVER).all()
+    for topic in (unit.ANGLE_ERROR_TOPIC, unit.ANGLE_RATE_TOPIC, unit.RANGE_TOPIC):
+        assert np.flatnonzero(outputs[topic]['stamp'] == records.NO_STAMP).tolist() == list(range(200, 300))
+    assert (outputs[unit.TARGET_TRUTH_TOPIC]['stamp'] != records.NO_STAMP).all()
 
 
 def test_a_stepped_clock_moves_the_stamps_only():
     plain, stepped = run(), run('1 clock_step time=-0.1')
-    assert (stepped[unit.ERRORS]['stamp'][200:] - plain[unit.ERRORS]['stamp'][200:] == -100_000_000).all()
+    assert (stepped[unit.ANGLE_ERROR_TOPIC]['stamp'][200:]
+            - plain[unit.ANGLE_ERROR_TOPIC]['stamp'][200:] == -100_000_000).all()
     assert np.array_equal(errors(plain), errors(stepped), equal_nan=True)
 
 
 def test_freeze_nan_bias_and_noise():
     plain = errors(run())
     frozen = run('1 freeze')
-    assert (errors(frozen)[200:] == plain[200]).all() and np.diff(frozen[unit.ERRORS]['stamp']).min() == PERIOD_NS
-    assert np.isnan(run('1 nan')[unit.ERRORS]['vector'][200:]).all()
+    assert (errors(frozen)[200:] == plain[200]).all() and np.diff(frozen[unit.ANGLE_ERROR_TOPIC]['stamp']).min() == PERIOD_NS
+    assert np.isnan(run('1 nan')[unit.ANGLE_ERROR_TOPIC]['vector'][200:]).all()
     assert errors(run('1 bias cross_elevation=0.003 elevation=-0.001'))[200:] - plain[200:] == pytest.approx(
         np.tile((0.003, -0.001), (200, 1)))
     assert (errors(run('1 noise sigma=0.02'))[200:] - plain[200:]).std() == pytest.approx(0.02, rel=0.15)

@@ -9,19 +9,20 @@ from scipy.signal import argrelmax
 
 from tracking_receiver_sim import monopulse
 
-POINTS = [0.0, 0.2, 0.5 * math.pi / monopulse.SCALE, 0.5, -0.7, math.pi / monopulse.SCALE, -1.0, 1.3, 2.6, 6.0]
+POINTS = [0.0, 0.2, 0.5 * math.pi / monopulse.U_PER_BEAMWIDTH, 0.5, -0.7, math.pi / monopulse.U_PER_BEAMWIDTH, -1.0,
+          1.3, 2.6, 6.0]
 """Offsets in beamwidths; the third and sixth are the removable singularities u = pi/2 and u = pi."""
 
 
 @pytest.mark.parametrize('v', POINTS)
 def test_patterns_are_the_transforms_of_their_illuminations(v):
-    u = monopulse.SCALE * v
+    u = monopulse.U_PER_BEAMWIDTH * v
     total = quad(lambda x: math.cos(0.5 * math.pi * x), -1.0, 1.0)[0]
     even = quad(lambda x: math.cos(0.5 * math.pi * x) * math.cos(u * x), -1.0, 1.0)[0]
     odd = quad(lambda x: math.sin(math.pi * x) * math.sin(u * x), -1.0, 1.0)[0]
     assert monopulse.sum_pattern(v) == pytest.approx(even / total, abs=1e-9)
     # Both illuminations have the same power over the aperture: that is the lossless comparator.
-    assert monopulse.difference_pattern(v, 0.5 * monopulse.SCALE) == pytest.approx(odd / total, abs=1e-9)
+    assert monopulse.difference_pattern(v, 0.5 * monopulse.U_PER_BEAMWIDTH) == pytest.approx(odd / total, abs=1e-9)
 
 
 def test_half_power_and_slope():

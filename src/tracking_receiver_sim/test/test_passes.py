@@ -36,8 +36,8 @@ def skyfield_passes(station, days):
 
 @pytest.mark.parametrize('station', [STATION, StationParameters(latitude_deg=-33.9, longitude_deg=18.4, height=10.0)])
 def test_passes_agree_with_skyfield(station):
-    ours = passes.after(SATELLITE, station, EPOCH, 3.0)
-    theirs = [known for known in skyfield_passes(station, 3.0) if known[3] >= passes.LOWEST]
+    ours = passes.passes_after(SATELLITE, station, EPOCH, 3.0)
+    theirs = [known for known in skyfield_passes(station, 3.0) if known[3] >= passes.MIN_CULMINATION_DEG]
     assert len(ours) == len(theirs) >= 8
     for own, (rise, top, down, elevation) in zip(ours, theirs):
         assert abs((own.rise - rise).total_seconds()) < 0.2 and abs((own.set - down).total_seconds()) < 0.2
@@ -46,17 +46,17 @@ def test_passes_agree_with_skyfield(station):
 
 
 def test_a_pass_is_named_by_number_by_utc_or_as_next():
-    listed = passes.after(SATELLITE, STATION, EPOCH)
+    listed = passes.passes_after(SATELLITE, STATION, EPOCH)
     old = EPOCH + datetime.timedelta(days=2000)
-    assert passes.chosen(SATELLITE, STATION, '3', old) == listed[2]
+    assert passes.chosen_pass(SATELLITE, STATION, '3', old) == listed[2]
     inside = listed[2].top.isoformat()
     for now in (EPOCH, old):
-        named = passes.chosen(SATELLITE, STATION, inside, now)
+        named = passes.chosen_pass(SATELLITE, STATION, inside, now)
         assert abs((named.rise - listed[2].rise).total_seconds()) < 0.01
     before = (listed[2].rise - datetime.timedelta(minutes=5)).isoformat() + 'Z'
-    assert abs((passes.chosen(SATELLITE, STATION, before, old).rise - listed[2].rise).total_seconds()) < 0.01
+    assert abs((passes.chosen_pass(SATELLITE, STATION, before, old).rise - listed[2].rise).total_seconds()) < 0.01
     fresh = listed[0].rise + datetime.timedelta(seconds=1.0)
-    assert abs((passes.chosen(SATELLITE, STATION, 'next', fresh).rise - listed[1].rise).total_seconds()) < 0.01
+    assert abs((passes.chosen_pass(SATELLITE, STATION, 'next', fresh).rise - listed[1].rise).total_seconds()) < 0.01
 
 
 @pytest.mark.parametrize('which, days, message', [
@@ -68,7 +68,7 @@ def test_a_pass_is_named_by_number_by_utc_or_as_next():
     ('2026-01-01', 0, '--pass 2026-01-01: 2214.3 days from the TLE epoch')])
 def test_a_pass_that_is_not_there(which, days, message):
     with pytest.raises(orbit.TargetError, match=message):
-        passes.chosen(SATELLITE, STATION, which, EPOCH + datetime.timedelta(days=days))
+        passes.chosen_pass(SATELLITE, STATION, which, EPOCH + datetime.timedelta(days=days))
 
 
 def test_a_satellite_that_stands_or_never_rises():
@@ -78,7 +78,8 @@ def test_a_satellite_that_stands_or_never_rises():
     under = float(np.degrees(np.arctan2(x, -y)))     # at the pole east is y of the earth, north is -x
     for longitude, said in ((under, 'never sets'), ((under + 360.0) % 360.0 - 180.0, 'does not rise')):
         with pytest.raises(orbit.TargetError, match=f'28884 {said} within'):
-            passes.after(geostationary, StationParameters(latitude_deg=0.0, longitude_deg=longitude), EPOCH, 1.0)
+            passes.passes_after(geostationary, StationParameters(latitude_deg=0.0, longitude_deg=longitude), EPOCH,
+                                1.0)
 
 
 @pytest.mark.parametrize('text, name, title', [

@@ -42,7 +42,7 @@ def test_refraction_against_erfa(elevation):
 
 
 def test_refraction_stays_below_one_degree():
-    assert arrival.refraction(N, -0.1) == (arrival.refraction(N, arrival.LOWEST)[0], 0.0)
+    assert arrival.refraction(N, -0.1) == (arrival.refraction(N, arrival.MIN_ELEVATION_RAD)[0], 0.0)
 
 
 def errors(out):

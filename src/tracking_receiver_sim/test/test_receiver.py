@@ -252,12 +252,12 @@ def test_age_of_an_error(values, age):
 @pytest.mark.parametrize('beam', ['held', 'moving'])
 def test_age_of_the_beam_is_that_of_the_steps_its_samples_were_taken_in(kind, n, beam):
     """What the smoothing makes of samples that are the number of their step."""
-    samples, steps, state = 5, 300, np.zeros(1, smoothing.SMOOTHER).view(np.recarray)[0]
+    samples, steps, state = 5, 300, np.zeros(1, smoothing.SMOOTHER_DTYPE).view(np.recarray)[0]
     for step in range(steps):
         smoothing.begin(state)
         for _ in range(samples):
             smoothing.put(state, float(step), 1.0 / n)
-    smoothed = smoothing.smoothed(state, smoothing.SMOOTHINGS.index(kind), samples, n)
+    smoothed = smoothing.smoothed(state, smoothing.SMOOTHING_KINDS.index(kind), samples, n)
     expected = (steps - 1 - smoothed) * PERIOD if beam == 'held' else 0.0
     params = build(TrackingReceiverParameters, {'receiver.beam': beam, 'receiver.smoothing': kind,
                                                 'receiver.smoothing_samples': n, 'receiver.samples_per_step': samples})
@@ -302,7 +302,7 @@ def test_target_below_the_horizon_gives_no_signal(Bench):
 def test_past_the_track_the_target_is_not_valid(Bench):
     bench = Bench({'target.kind': 'flyby', 'receiver.reference_range': 1000.0}, duration=0.1)
     out = bench.run(2000)
-    inside = 1e-9 * out['stamp_ns'] <= 0.1 + target.MARGIN
+    inside = 1e-9 * out['stamp_ns'] <= 0.1 + target.RUN_MARGIN_S
     assert np.array_equal(out['target_valid'], inside)
     assert np.all(out['status'][~inside] == receiver.Status.NO_TARGET)
     assert np.all(np.isnan(out['target_position'][~inside])) and np.all(np.isnan(out['true_elevation'][~inside]))

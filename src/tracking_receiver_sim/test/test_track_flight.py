@@ -16,7 +16,7 @@ from tracking_receiver_sim.track import fixes as logs
 from tracking_receiver_sim.track import flight, place
 
 STATION = StationParameters()
-DEGREE = math.radians(1.0) * geodesy.EARTH_RADIUS
+DEGREE = math.radians(1.0) * geodesy.EARTH_RADIUS_M
 
 
 def log(time, east, north, up, latitude=47.4, longitude=8.5):
@@ -198,16 +198,16 @@ SHAPES = {'circle': circle(), 'line': log(np.arange(100), 60.0 * np.arange(100),
 def test_the_station_sees_the_whole_flight_and_can_follow_it(shape):
     fixes = SHAPES[shape]
     fixes = fixes._replace(longitude=(fixes.longitude + 180.0) % 360.0 - 180.0)
-    station = place.beside(fixes, track())
+    station = place.station_for(fixes, track())
     there = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height).itrs_xyz.m
     flown = wgs84.latlon(fixes.latitude, fixes.longitude, fixes.altitude).itrs_xyz.m.T - there
     e, n, u = (flown @ geodesy.station_frame(station)[1].T).T
     assert (u > 0.0).all()
     turned = np.abs(np.diff(np.unwrap(np.arctan2(e, n)))) / np.diff(fixes.time)
-    assert turned.max() < 1.02 * place.AZIMUTH_RATE
+    assert turned.max() < 1.02 * place.MAX_AZIMUTH_RATE_RAD_S
     least = np.hypot(e, n).min()
     speed = flight.lay_out(fixes, track(), station).speed
-    assert least == pytest.approx(max(place.LEAST_RANGE, speed / place.AZIMUTH_RATE), rel=0.02)
+    assert least == pytest.approx(max(place.MIN_RANGE_M, speed / place.MAX_AZIMUTH_RATE_RAD_S), rel=0.02)
 
 
 def test_what_is_open_follows_from_the_file(tmp_path):
@@ -217,13 +217,13 @@ def test_what_is_open_follows_from_the_file(tmp_path):
         fixes.time, fixes.latitude, fixes.longitude, fixes.altitude))
     path.write_text('time_s,latitude_deg,longitude_deg,altitude_m\n' + '\n'.join(rows))
     target = TargetParameters(kind='track_file', track_file=TrackFileParameters(path=str(path), start=9.5))
-    found = track_files.left_open(target, set())
-    assert tuple(found) == track_files.OPEN and found['duration'] == 109.4
-    station = StationParameters(*(found[name] for name in place.STATION))
-    assert station == place.beside(track_files.read(target.track_file)[1], target.track_file)
+    found = track_files.derived_parameters(target, set())
+    assert tuple(found) == track_files.DERIVED_PARAMETERS and found['duration'] == 109.4
+    station = StationParameters(*(found[name] for name in place.STATION_FIELDS))
+    assert station == place.station_for(track_files.read(target.track_file)[1], target.track_file)
     there = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height).itrs_xyz.m
     flown = wgs84.latlon(fixes.latitude, fixes.longitude, fixes.altitude).itrs_xyz.m.T - there
     assert 0.0 <= found['receiver.reference_range'] - np.linalg.norm(flown, axis=1).max() < 10.0
-    given = track_files.left_open(target, {'target.station.latitude_deg', 'target.station.longitude_deg'})
+    given = track_files.derived_parameters(target, {'target.station.latitude_deg', 'target.station.longitude_deg'})
     assert given['target.station.latitude_deg'] == 47.4 and given['target.station.longitude_deg'] == 8.5
     assert given['target.station.height'] == station.height

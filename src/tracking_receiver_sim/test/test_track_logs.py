@@ -238,13 +238,13 @@ def test_a_damaged_log_is_read_or_refused_by_one_line(tmp_path, name):
 
 
 def test_too_many_rows(tmp_path, monkeypatch):
-    monkeypatch.setattr(csv_table, 'MOST_ROWS', 5)
+    monkeypatch.setattr(csv_table, 'MAX_CSV_ROWS', 5)
     for name, log in LOGS.items():
         assert 'must be at most 5 rows' in refused(tmp_path, log()), name
 
 
 def test_too_many_aircraft(tmp_path, monkeypatch):
-    monkeypatch.setattr(fixes, 'MOST_AIRCRAFT', 3)
+    monkeypatch.setattr(fixes, 'MAX_AIRCRAFT', 3)
     message = refused(tmp_path, traffic(tuple(f'{k:06x},' for k in range(50))), aircraft='000001')
     assert 'must be at most 3 aircraft' in message
 

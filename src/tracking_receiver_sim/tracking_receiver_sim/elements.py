@@ -17,27 +17,28 @@ from pedestal_common.parameters import did_you_mean
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines
 
-BEGINNING = 4096
-NUMBERS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 'INCLINATION': (0.0, 180.0),
-           'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0), 'MEAN_ANOMALY': (-360.0, 360.0),
-           'BSTAR': (-9.0, 9.0), 'MEAN_MOTION_DOT': (-9.0, 9.0), 'MEAN_MOTION_DDOT': (-9.0, 9.0),
-           'NORAD_CAT_ID': (0, 339_999), 'ELEMENT_SET_NO': (0, 9999), 'REV_AT_EPOCH': (0, 99_999)}
+FORMAT_PROBE_BYTES = 4096
+NUMBER_LIMITS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 'INCLINATION': (0.0, 180.0),
+                 'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0),
+                 'MEAN_ANOMALY': (-360.0, 360.0),
+                 'BSTAR': (-9.0, 9.0), 'MEAN_MOTION_DOT': (-9.0, 9.0), 'MEAN_MOTION_DDOT': (-9.0, 9.0),
+                 'NORAD_CAT_ID': (0, 339_999), 'ELEMENT_SET_NO': (0, 9999), 'REV_AT_EPOCH': (0, 99_999)}
 """{keyword: its limits} [rev/day], [deg], [1/earth radii], [rev/day^2 / 2], [rev/day^3 / 6]."""
-ANGLES = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
-INTEGERS = ('NORAD_CAT_ID', 'ELEMENT_SET_NO', 'REV_AT_EPOCH')
-USUAL = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0', 'ELEMENT_SET_NO': '999', 'REV_AT_EPOCH': '0'}
+ANGLE_KEYWORDS = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
+INTEGER_KEYWORDS = ('NORAD_CAT_ID', 'ELEMENT_SET_NO', 'REV_AT_EPOCH')
+DEFAULT_FIELDS = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0', 'ELEMENT_SET_NO': '999', 'REV_AT_EPOCH': '0'}
 """Of keywords that an OMM may leave out."""
-MUST_BE = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
-           'MEAN_ELEMENT_THEORY': ('SGP4', 'SGP/SGP4')}
-KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', *MUST_BE, *NUMBERS)
-MOST = 300_000
+ALLOWED_VALUES = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
+                  'MEAN_ELEMENT_THEORY': ('SGP4', 'SGP/SGP4')}
+OMM_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', *ALLOWED_VALUES, *NUMBER_LIMITS)
+MAX_SATELLITES = 300_000
 """Satellites in a file: all that are catalogued, some times over."""
-COMPARED = 40_000
+MAX_COMPARED_NAMES = 40_000
 """Names that are compared with one that is not there: more than are catalogued."""
-DEEPEST, LONGEST = 100, 200
+MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200
 """Elements of XML within each other, and characters of a value."""
-PIECE = 1 << 20
-CATALOGUED = re.compile(r'\d{4}-\d{3}[A-Z]{1,3}')
+PARSE_CHUNK_BYTES = 1 << 20
+DESIGNATOR_PATTERN = re.compile(r'\d{4}-\d{3}[A-Z]{1,3}')
 
 
 class Satellite(typing.NamedTuple):
@@ -64,12 +65,12 @@ def read(path, name=''):
     """
     try:
         with csv_table.stream(path) as stream:
-            beginning = stream.read(BEGINNING).removeprefix(b'\xef\xbb\xbf').lstrip()
+            beginning = stream.read(FORMAT_PROBE_BYTES).removeprefix(b'\xef\xbb\xbf').lstrip()
         names, found = [], []
         for satellite in _reader(beginning)(path):
             names.append(satellite.name)
-            if len(names) > MOST:
-                raise csv_table.TableError(f'{path}: line {satellite.line}: must be at most {MOST} satellites')
+            if len(names) > MAX_SATELLITES:
+                raise csv_table.TableError(f'{path}: line {satellite.line}: must be at most {MAX_SATELLITES} satellites')
             if not name or satellite.is_called(name):
                 found.append(satellite if not found else None)
     except csv_table.TableError as error:
@@ -82,7 +83,7 @@ def read(path, name=''):
         said = 'name one with --satellite'
         if name:
             said = f'satellite {name!r:.60} is in it {len(found)} times;'
-            near = did_you_mean(name.upper(), list(dict.fromkeys(names))[:COMPARED])
+            near = did_you_mean(name.upper(), list(dict.fromkeys(names))[:MAX_COMPARED_NAMES])
             said = f'{said}{near}' if not found else f'{said} name it by its number'
         raise TargetError(f'TLE file {path}: satellites: {len(names)} found, {listed}: {said.removesuffix(";")}')
     satellite = found[0]
@@ -141,8 +142,8 @@ def _kvn(path):
             if begun:
                 yield _omm(begun, fields)
             fields, begun = {}, number
-        elif equals and keyword in KEYWORDS:
-            fields[keyword] = value.partition('[')[0].strip()[:LONGEST]
+        elif equals and keyword in OMM_KEYWORDS:
+            fields[keyword] = value.partition('[')[0].strip()[:MAX_VALUE_CHARS]
         elif not equals and keyword.split(None, 1)[0] not in ('COMMENT', 'META_START', 'META_STOP'):
             raise lines.wrong(path, number, 1, f'{text.strip()!r:.60}: must be KEYWORD = value')
     if begun:
@@ -153,14 +154,14 @@ def _csv(path):
     with csv_table.opened(path) as reader:
         csv_table.require(path, reader, ('EPOCH', 'NORAD_CAT_ID'))
         for row in reader:
-            yield _omm(reader.line_num, {keyword: row[keyword].strip()[:LONGEST] for keyword in KEYWORDS
+            yield _omm(reader.line_num, {keyword: row[keyword].strip()[:MAX_VALUE_CHARS] for keyword in OMM_KEYWORDS
                                          if isinstance(row.get(keyword), str)})
 
 
 def _json(path):
     """Satellites of a JSON array of objects, or of one object, decoded one by one."""
     with csv_table.stream(path) as stream:
-        content = stream.read(csv_table.LARGEST)
+        content = stream.read(csv_table.MAX_CSV_BYTES)
     try:
         text = content.decode('utf-8-sig')
     except UnicodeDecodeError as error:
@@ -178,7 +179,7 @@ def _json(path):
             raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'JSON too deep') from None
         if not isinstance(value, dict):
             raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'must be an object of an OMM')
-        yield _omm(line, {keyword: str(value[keyword]).strip()[:LONGEST] for keyword in KEYWORDS
+        yield _omm(line, {keyword: str(value[keyword]).strip()[:MAX_VALUE_CHARS] for keyword in OMM_KEYWORDS
                           if value.get(keyword) is not None})
         at = between.match(text, at).end()
 
@@ -194,18 +195,18 @@ def _xml(path):
                           'a document type declaration: an OMM has none')
 
     def start(name, _attributes):
-        if len(open_elements) >= DEEPEST:
-            raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: more than {DEEPEST} elements within '
+        if len(open_elements) >= MAX_XML_DEPTH:
+            raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: more than {MAX_XML_DEPTH} elements within '
                                        'each other')
-        name = name.rpartition(':')[2][:LONGEST]
+        name = name.rpartition(':')[2][:MAX_VALUE_CHARS]
         open_elements.append(name)
         if name == 'segment':
             texts.clear()
             texts['line'] = parser.CurrentLineNumber
 
     def text(data):
-        if open_elements and open_elements[-1] in KEYWORDS:
-            texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:LONGEST]
+        if open_elements and open_elements[-1] in OMM_KEYWORDS:
+            texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:MAX_VALUE_CHARS]
 
     def end(_name):
         if open_elements.pop() == 'segment':
@@ -216,7 +217,7 @@ def _xml(path):
     parser.StartElementHandler, parser.EndElementHandler = start, end
     try:
         with csv_table.stream(path) as stream:
-            while piece := stream.read(PIECE):
+            while piece := stream.read(PARSE_CHUNK_BYTES):
                 parser.Parse(piece)
                 yield from made
                 made.clear()
@@ -228,14 +229,15 @@ def _xml(path):
 
 def _tle(path, satellite):
     """Two lines of a satellite of an OMM. Raises TargetError."""
-    where, fields = f'TLE file {path}: line {satellite.line}', {**USUAL, **satellite.fields}
-    for keyword, allowed in MUST_BE.items():
+    where, fields = f'TLE file {path}: line {satellite.line}', {**DEFAULT_FIELDS, **satellite.fields}
+    for keyword, allowed in ALLOWED_VALUES.items():
         if fields.get(keyword, allowed[0]).upper() not in allowed:
             raise TargetError(f'{where}: {keyword} = {fields[keyword]!r:.60}: must be {" or ".join(allowed)}')
     try:
-        for keyword, (low, high) in NUMBERS.items():
+        for keyword, (low, high) in NUMBER_LIMITS.items():
             value = csv_table.number(path, satellite.line, keyword, fields.get(keyword), low, high)
-            fields[keyword] = str(value % 360.0 if keyword in ANGLES else int(value) if keyword in INTEGERS else value)
+            fields[keyword] = str(value % 360.0 if keyword in ANGLE_KEYWORDS
+                                  else int(value) if keyword in INTEGER_KEYWORDS else value)
         day, second = lines.instant(path, satellite.line, 1, 'EPOCH', fields.get('EPOCH', ''))
     except csv_table.TableError as error:
         raise TargetError(f'TLE file {error}') from None
@@ -243,5 +245,5 @@ def _tle(path, satellite):
     satrec = Satrec()
     omm.initialize(satrec, {
         **fields, 'CLASSIFICATION_TYPE': 'U', 'EPHEMERIS_TYPE': '0', 'EPOCH': lines.text(day, second),
-        'OBJECT_ID': designator if CATALOGUED.fullmatch(designator) else '    '})
+        'OBJECT_ID': designator if DESIGNATOR_PATTERN.fullmatch(designator) else '    '})
     return export_tle(satrec)

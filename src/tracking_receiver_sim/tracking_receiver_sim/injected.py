@@ -3,48 +3,50 @@ import numpy as np
 
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
-from pedestal_common.graph.steps import SECOND
-from pedestal_common.injection import schedule, spoil, table
-from pedestal_common.wire.records import NEVER
+from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.injection import message_faults, schedule, table
+from pedestal_common.wire.records import NO_STAMP
 
-MESSAGES = spoil.codes('tracking_receiver')
-Fault = codes([fault.name for fault in table.FAULTS['tracking_receiver']])
+MESSAGE_FAULT_CODES = message_faults.codes('tracking_receiver')
+Fault = codes([fault.name for fault in table.INJECTED_FAULTS['tracking_receiver']])
 
-BOTH, CROSS_ELEVATION, ELEVATION = range(3)
+SLOPE_BOTH, SLOPE_CROSS_ELEVATION, SLOPE_ELEVATION = range(3)
 """Options of wrong_slope."""
 
-INJECTED = np.dtype([('power', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('latency_ns', 'i8'),
-                     ('clock_ns', 'i8'), ('bias', 'f8', (2,)), ('said', spoil.SPOILT)], align=True)
+INJECTED_DTYPE = np.dtype([('power', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('latency_ns', 'i8'),
+                           ('clock_ns', 'i8'), ('bias', 'f8', (2,)), ('said', message_faults.MESSAGE_FAULT_DTYPE)],
+                          align=True)
 """power ... latency_ns: constants of the receiver (receiver.CONSTANTS) when nothing is broken; clock_ns: added to the
 stamps; bias: added to the errors [rad]; said: what spoils the results."""
 
-ERRORS, RATE, RANGE = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate', 'tracking_receiver/range'
+(ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC, RANGE_TOPIC) = ('tracking_receiver/angle_error', 'tracking_receiver/angle_rate',
+                                                      'tracking_receiver/range')
 
 
 def initial(constants) -> np.ndarray:
-    """INJECTED (1,) of receiver.CONSTANTS (1,): nothing is broken."""
-    e = np.zeros(1, INJECTED)
+    """INJECTED_DTYPE (1,) of receiver.CONSTANTS (1,): nothing is broken."""
+    e = np.zeros(1, INJECTED_DTYPE)
     for name in ('power', 'cos_phi', 'sin_phi', 'latency_ns'):
         e[name] = constants[name]
     return e
 
 
 @compiled
-def _mend(c, e):
+def _clear_faults(c, e):
     """Nothing is broken."""
     c.power, c.cos_phi, c.sin_phi, c.latency_ns = e.power, e.cos_phi, e.sin_phi, e.latency_ns
     c.sign[0] = c.sign[1] = 1.0
     e.clock_ns = 0
     e.bias[0] = e.bias[1] = 0.0
-    spoil.restore(e.said)
+    message_faults.clear(e.said)
 
 
 @compiled
-def _break(c, e, fault, values):
+def _apply_fault(c, e, fault, values):
     """What a fault does to constants and results of the receiver."""
-    spoil.apply(e.said, MESSAGES, fault, values)
+    message_faults.apply(e.said, MESSAGE_FAULT_CODES, fault, values)
     if fault == Fault.DELAY:
-        c.latency_ns += round(values[0] * SECOND)
+        c.latency_ns += round(values[0] * NS_PER_SECOND)
     elif fault == Fault.BIAS:
         e.bias[0] += values[0]
         e.bias[1] += values[1]
@@ -52,38 +54,38 @@ def _break(c, e, fault, values):
         c.power *= 10.0**(-0.1 * values[0])
     elif fault == Fault.WRONG_SLOPE:
         for i in range(2):
-            if values[0] == BOTH or values[0] == CROSS_ELEVATION + i:
+            if values[0] == SLOPE_BOTH or values[0] == SLOPE_CROSS_ELEVATION + i:
                 c.sign[i] = -1.0
     elif fault == Fault.PHASE_180:
         c.cos_phi, c.sin_phi = -e.cos_phi, -e.sin_phi
     elif fault == Fault.CLOCK_STEP:
-        e.clock_ns += round(values[0] * SECOND)
+        e.clock_ns += round(values[0] * NS_PER_SECOND)
 
 
 @compiled
-def take(m, stamp):
+def apply_due_faults(m, stamp):
     """Mend everything, then break what is broken in the step of a stamp [ns]; m: unit.RECORD."""
-    _mend(m.constants, m.injected)
+    _clear_faults(m.constants, m.injected)
     schedule.begin(m.schedule)
-    for i in range(schedule.SLOTS):
+    for i in range(schedule.MAX_ACTIVE_FAULTS):
         row = m.schedule.row[i]
         if schedule.in_force(m.schedule, row, stamp):
-            _break(m.constants, m.injected, row.fault, row.values)
+            _apply_fault(m.constants, m.injected, row.fault, row.values)
 
 
 @compiled
-def spoil_messages(e, stamp, outputs):
+def corrupt_messages(e, stamp, outputs):
     """The results of a step, spoilt."""
-    error, rate, distance = outputs[ERRORS], outputs[RATE], outputs[RANGE]
+    error, rate, distance = outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC], outputs[RANGE_TOPIC]
     for i in range(2):
         error.vector[i] += e.bias[i]
         if e.said.sigma > 0.0:
-            error.vector[i] += spoil.noise(e.said, stamp, i)
-    spoil.numbers(e.said, error.vector, 0)
-    spoil.numbers(e.said, rate.vector, 3)
-    spoil.numbers(e.said, distance.range, 6)
+            error.vector[i] += message_faults.noise(e.said, stamp, i)
+    message_faults.numbers(e.said, error.vector, 0)
+    message_faults.numbers(e.said, rate.vector, 3)
+    message_faults.numbers(e.said, distance.range, 6)
     for message in (error, rate):
-        if message.stamp != NEVER:
-            message.stamp = NEVER if e.said.drop != 0 else message.stamp + e.clock_ns
-    if distance.stamp != NEVER:
-        distance.stamp = NEVER if e.said.drop != 0 else distance.stamp + e.clock_ns
+        if message.stamp != NO_STAMP:
+            message.stamp = NO_STAMP if e.said.drop != 0 else message.stamp + e.clock_ns
+    if distance.stamp != NO_STAMP:
+        distance.stamp = NO_STAMP if e.said.drop != 0 else distance.stamp + e.clock_ns

@@ -13,7 +13,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-SCALE = 2.0 * 1.8676215105779688
+U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688
 """u = pi D/lambda sin(theta) per half-power beamwidth of the cosine taper."""
 
 
@@ -29,15 +29,15 @@ def sum_pattern(v):
 
     Balanis, Antenna Theory, 3rd ed., table 12.1 (cosine distribution).
     """
-    u = SCALE * abs(v)
+    u = U_PER_BEAMWIDTH * abs(v)
     return 0.25 * math.pi**2 * sinc(u - 0.5 * math.pi) / (u + 0.5 * math.pi)
 
 
 @compiled
 def difference_pattern(v, k_m):
     """D at v beamwidths off the axis, slope k_m: sin(u) / (1 - (u/pi)^2) likewise, from one sine period."""
-    u = SCALE * abs(v)
-    return math.copysign(k_m / SCALE, v) * math.pi**2 * sinc(u - math.pi) / (u + math.pi)
+    u = U_PER_BEAMWIDTH * abs(v)
+    return math.copysign(k_m / U_PER_BEAMWIDTH, v) * math.pi**2 * sinc(u - math.pi) / (u + math.pi)
 
 
 @compiled

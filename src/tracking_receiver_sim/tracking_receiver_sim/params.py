@@ -2,20 +2,20 @@
 import dataclasses
 import math
 
-from pedestal_common.geometry.blockage import DOC as SECTORS_DOC
+from pedestal_common.geometry.blockage import BLOCKAGE_DOC as SECTORS_DOC
 from pedestal_common.geometry.blockage import sectors
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.lever_arm import LeverArm
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 from tracking_receiver_sim.path.params import PathParameters, PolarisationParameters
-from tracking_receiver_sim.smoothing import SMOOTHINGS, WINDOW
+from tracking_receiver_sim.smoothing import MAX_WINDOW_SAMPLES, SMOOTHING_KINDS
 
-KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp')
-SINE, STEP, RAMP = map(KINDS.index, ('sine', 'step', 'ramp'))
+TARGET_KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp')
+TARGET_SINE, TARGET_STEP, TARGET_RAMP = map(TARGET_KINDS.index, ('sine', 'step', 'ramp'))
 
-BEAMS = ('moving', 'held')
-MOVING, HELD = range(len(BEAMS))
+BEAM_MOTIONS = ('moving', 'held')
+BEAM_MOVING, BEAM_HELD = range(len(BEAM_MOTIONS))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +83,7 @@ class AngleParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class TargetParameters(Parameters):
     """What there is to track."""
-    kind: str = choice('leo_pass', KINDS, 'which target')
+    kind: str = choice('leo_pass', TARGET_KINDS, 'which target')
     station: StationParameters = group(StationParameters)
     leo_pass: LeoPassParameters = group(LeoPassParameters)
     track_file: TrackFileParameters = group(TrackFileParameters)
@@ -127,8 +127,9 @@ class ReceiverParameters(Parameters):
     range_exponent: float = parameter(2.0, 0.0, 4.0, '1', 'C/N0 falls with this power of range; 0: constant')
     horizon_mask: float = parameter(0.0, -math.pi / 2, math.pi / 2, 'rad', 'no signal from below this elevation')
     samples_per_step: int = parameter(5, 1, 100, '1', 'channel samples per drive step')
-    beam: str = choice('moving', BEAMS, 'between two steps; held: an electronic beam, which jumps at the steps')
-    smoothing: str = choice('none', SMOOTHINGS, "none: mean over the step; recursion: paper 002's over the samples")
+    beam: str = choice('moving', BEAM_MOTIONS, 'between two steps; held: an electronic beam, which jumps at the steps')
+    smoothing: str = choice('none', SMOOTHING_KINDS,
+                            "none: mean over the step; recursion: paper 002's over the samples")
     smoothing_samples: int = parameter(20, 1, 10000, '1', 'n of recursion and moving average')
     full_scale: float = parameter(0.7, 0.1, 100.0, 'beamwidths', 'largest error the detector puts out')
     agc_time_constant: float = parameter(0.05, 1e-3, 10.0, 's', 'smoothing of the sum power that normalises')
@@ -143,8 +144,8 @@ class ReceiverParameters(Parameters):
 
     def check(self):
         """Raise ParameterError for a moving average that is too long, or lock levels that are not in order."""
-        if self.smoothing == 'moving_average' and self.smoothing_samples > WINDOW:
-            raise ParameterError(f'smoothing_samples = {self.smoothing_samples}: a moving average takes 1 to {WINDOW}')
+        if self.smoothing == 'moving_average' and self.smoothing_samples > MAX_WINDOW_SAMPLES:
+            raise ParameterError(f'smoothing_samples = {self.smoothing_samples}: a moving average takes 1 to {MAX_WINDOW_SAMPLES}')
         if self.lose_level_dbhz > self.acquire_level_dbhz:
             raise ParameterError(f'lose_level_dbhz = {self.lose_level_dbhz:g} dB-Hz: must not be above '
                                  f'acquire_level_dbhz = {self.acquire_level_dbhz:g} dB-Hz')
@@ -171,7 +172,7 @@ class TrackingReceiverNodeParameters(TrackingReceiverParameters):
     """Parameters of tracking_receiver_node: the receiver and the run it is built for."""
     period: float = parameter(5e-3, 1e-4, 1.0, 's', 'drive step T')
     duration: float = parameter(3600.0, 0.1, 86400.0, 's', 'how long the target is laid out for')
-    inject: str = text('', table.DOC)
+    inject: str = text('', table.INJECT_DOC)
 
     def check(self):
         """Raises ParameterError for an `inject` that names no fault of the receiver."""

@@ -24,22 +24,22 @@ from pedestal_common.parameters import ParameterError
 from tracking_receiver_sim import smoothing, target
 from tracking_receiver_sim.error_rate import error_rate
 from tracking_receiver_sim.monopulse import channels, detect, thermal_noise
-from tracking_receiver_sim.params import BEAMS, HELD
+from tracking_receiver_sim.params import BEAM_HELD, BEAM_MOTIONS
 from tracking_receiver_sim.path import arrival, multipath, polarisation, scintillation
-from tracking_receiver_sim.smoothing import SMOOTHINGS
+from tracking_receiver_sim.smoothing import SMOOTHING_KINDS
 
 STATUS_TEXTS = dict(
     LOCKED='locked', NO_LOCK='no lock', BELOW_HORIZON='target below the horizon', NO_TARGET='target outside its track',
     NO_BEAM='direction of the beam not valid', STAMP_ORDER='stamp not after the one before',
     HIDDEN='target hidden by the superstructure')
-STATUSES = tuple(STATUS_TEXTS.values())
+STATUS_TEXT_BY_CODE = tuple(STATUS_TEXTS.values())
 Status = codes(STATUS_TEXTS)
 
 NORMALS_PER_SAMPLE = 6
 """Real and imaginary noise of the sum and of the two difference channels."""
-RING = 512
+RESULT_RING_SIZE = 512
 """Results that can be on their way to the output at once."""
-POWER_FLOOR = 0.01
+MIN_POWER_OVER_NOISE = 0.01
 """Least carrier power over noise power in one sample that the C/N0 estimate reports (-20 dB)."""
 
 Result = namedtuple('Result', 'error cn0_dbhz rates range')
@@ -47,26 +47,29 @@ Result = namedtuple('Result', 'error cn0_dbhz rates range')
 NaN for what is not locked or not measured."""
 NOT_MEASURED = (math.nan, math.nan)
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),
     ('agc_power', 'f8'), ('level_power', 'f8'),
-    ('smooth_cross_elevation', smoothing.SMOOTHER), ('smooth_elevation', smoothing.SMOOTHER),
+    ('smooth_cross_elevation', smoothing.SMOOTHER_DTYPE), ('smooth_elevation', smoothing.SMOOTHER_DTYPE),
     ('locked', 'i8'), ('timer_ns', 'i8'),
     ('written', 'i8'), ('released', 'i8'),
-    ('ring_stamp_ns', 'i8', RING), ('ring_locked', 'i8', RING),
-    ('ring_cross_elevation', 'f8', RING), ('ring_elevation', 'f8', RING), ('ring_cn0_dbhz', 'f8', RING),
-    ('ring_rate', 'f8', (RING, 2)), ('ring_range', 'f8', RING),
-    ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3), ('scintillation', 'f8', scintillation.NORMALS)], align=True)
+    ('ring_stamp_ns', 'i8', RESULT_RING_SIZE), ('ring_locked', 'i8', RESULT_RING_SIZE),
+    ('ring_cross_elevation', 'f8', RESULT_RING_SIZE), ('ring_elevation', 'f8', RESULT_RING_SIZE),
+    ('ring_cn0_dbhz', 'f8', RESULT_RING_SIZE),
+    ('ring_rate', 'f8', (RESULT_RING_SIZE, 2)), ('ring_range', 'f8', RESULT_RING_SIZE),
+    ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3), ('scintillation', 'f8', scintillation.NORMALS_PER_STEP)],
+                       align=True)
 """error_known: cross_elevation, elevation hold the true error at stamp_ns, direction the target in FLU [m];
 timer_ns: time past a lock level; written, released: results put into the ring and taken from it since the start;
 antenna: its ENU position against the station [m], antenna_velocity: FLU [m/s]."""
 
-CONSTANTS = np.dtype([
-    ('target', target.TARGET),
+CONSTANTS_DTYPE = np.dtype([
+    ('target', target.TARGET_DTYPE),
     ('beamwidth', 'f8'), ('slope', 'f8'), ('angle_scale', 'f8'), ('full_scale', 'f8'),
     ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('sign', 'f8', 2),
     ('boresight', 'f8', 2),
-    ('path', arrival.PATH), ('multipath', multipath.MULTIPATH), ('scintillation', scintillation.SCINTILLATION),
+    ('path', arrival.PATH_DTYPE), ('multipath', multipath.MULTIPATH_DTYPE),
+    ('scintillation', scintillation.SCINTILLATION_DTYPE),
     ('first_noise', 'i8', 2),
     ('samples', 'i8'), ('tau', 'f8'), ('period_ns', 'i8'), ('agc_gain', 'f8'), ('level_gain', 'f8'),
     ('smoothing', 'i8'), ('smoothing_gain', 'f8'), ('smoothing_samples', 'i8'), ('held', 'i8'),
@@ -74,38 +77,40 @@ CONSTANTS = np.dtype([
     ('acquire_power', 'f8'), ('lose_power', 'f8'), ('acquire_ns', 'i8'), ('lose_ns', 'i8'),
     ('latency_ns', 'i8'),
     ('rate_measured', 'i8'), ('rate_sigma', 'f8'), ('range_measured', 'i8'), ('range_sigma', 'f8'),
-    ('range_variance', 'f8'), ('lever_arm', 'f8', 3), ('sectors', 'f8', (blockage.MOST, 3))], align=True)
+    ('range_variance', 'f8'), ('lever_arm', 'f8', 3), ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
 """slope: true k_m; angle_scale: theta3 over the k_m the receiver assumes; sign: 1 or -1 of either difference channel;
 boresight: null of the differences off the beam, cross-elevation and elevation [rad]; first_noise: index of the first
 normal of rate and range, and of the scintillation;
 powers: carrier power in one sample over noise power in one sample; range_variance: in single precision."""
 
-INPUTS = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
-                   ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3), ('azimuth_rate', 'f8'), ('elevation_rate', 'f8'),
-                   ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
+INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
+                         ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3), ('azimuth_rate', 'f8'),
+                         ('elevation_rate', 'f8'),
+                         ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
 """Step's stamp [ns]; beam there and fresh (0 or 1); its true angles on the deck [rad]; true attitude deck -> earth;
 ENU position of base_link against the station [m]; rates of the beam on the deck [rad/s]; velocity of base_link [m/s]
 and rate of the deck [rad/s], FLU."""
 
-OUTPUTS = np.dtype([
+OUTPUTS_DTYPE = np.dtype([
     ('due', 'i8'), ('stamp_ns', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
     ('locked', 'i8'), ('status', 'i8'), ('rate', 'f8', 2), ('range', 'f8'),
     ('true_cross_elevation', 'f8'), ('true_elevation', 'f8'),
     ('target_valid', 'i8'), ('target_position', 'f8', 3), ('target_velocity', 'f8', 3)], align=True)
 """due: 1 when a result comes out in this step; then stamp_ns (of its measurement), errors [rad] (NaN while not
 locked), C/N0, locked, rate of the errors [rad/s] and range [m] belong to it (NaN while not locked or not measured; the
-range is rounded to the single precision of its topic). The rest belongs to this step: status (index into STATUSES),
+range is rounded to the single precision of its topic). The rest belongs to this step: status (index into
+STATUS_TEXT_BY_CODE),
 true error [rad], target ENU [m, m/s]; NaN where not known."""
 
 
 def constants(params, period, built) -> np.ndarray:
-    """The (1,) CONSTANTS of TrackingReceiverParameters, a drive step of `period` [s] and a target.Target."""
+    """The (1,) CONSTANTS_DTYPE of TrackingReceiverParameters, a drive step of `period` [s] and a target.Target."""
     antenna, receiver = params.antenna, params.receiver
-    if receiver.latency >= (RING - 1) * period:
-        raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RING - 1} periods of '
+    if receiver.latency >= (RESULT_RING_SIZE - 1) * period:
+        raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RESULT_RING_SIZE - 1} periods of '
                              f'{period:g} s')
     tau = period / receiver.samples_per_step
-    c = np.zeros(1, CONSTANTS)
+    c = np.zeros(1, CONSTANTS_DTYPE)
     c['target'], c['beamwidth'] = built.constants, antenna.beamwidth
     c['slope'] = antenna.slope * antenna.slope_factor
     c['angle_scale'] = antenna.beamwidth / antenna.slope
@@ -116,9 +121,9 @@ def constants(params, period, built) -> np.ndarray:
     c['samples'], c['tau'], c['period_ns'] = receiver.samples_per_step, tau, round(period * 1e9)
     c['agc_gain'] = -math.expm1(-tau / receiver.agc_time_constant)
     c['level_gain'] = -math.expm1(-tau / receiver.cn0_time_constant)
-    c['smoothing'] = SMOOTHINGS.index(receiver.smoothing)
+    c['smoothing'] = SMOOTHING_KINDS.index(receiver.smoothing)
     c['smoothing_gain'], c['smoothing_samples'] = 1.0 / receiver.smoothing_samples, receiver.smoothing_samples
-    c['held'] = BEAMS.index(receiver.beam) == HELD
+    c['held'] = BEAM_MOTIONS.index(receiver.beam) == BEAM_HELD
     c['boresight'] = antenna.boresight_cross_elevation, antenna.boresight_elevation
     c['path'], c['multipath'] = arrival.constants(params.path), multipath.constants(params.path.multipath)
     c['scintillation'] = scintillation.constants(params.path.scintillation, period)
@@ -140,8 +145,8 @@ def constants(params, period, built) -> np.ndarray:
 
 
 def initial_state() -> np.ndarray:
-    """The (1,) STATE before the first step: noise in the channels, not locked."""
-    s = np.zeros(1, STATE)
+    """The (1,) STATE_DTYPE before the first step: noise in the channels, not locked."""
+    s = np.zeros(1, STATE_DTYPE)
     s['stamp_ns'], s['agc_power'], s['level_power'] = -1, 1.0, 1.0
     return s
 
@@ -153,7 +158,7 @@ def _measured_normals(receiver) -> int:
 
 def normals_per_step(params) -> int:
     """How many standard normals `step` takes of TrackingReceiverParameters."""
-    return _measured_normals(params.receiver) + scintillation.NORMALS * params.path.scintillation.on
+    return _measured_normals(params.receiver) + scintillation.NORMALS_PER_STEP * params.path.scintillation.on
 
 
 def angle_noise(params, cn0_dbhz, period):
@@ -172,7 +177,7 @@ def age(params, period):
 
     params: TrackingReceiverParameters; period: drive step [s]."""
     receiver = params.receiver
-    if BEAMS.index(receiver.beam) != HELD:
+    if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
     return (smoothing.delay(receiver.smoothing, receiver.samples_per_step, receiver.smoothing_samples)
             * period / receiver.samples_per_step)
@@ -184,7 +189,7 @@ def beam_age(params, period):
     A beam that is held through a step is told at the step's end. params: TrackingReceiverParameters;
     period: drive step [s]."""
     receiver = params.receiver
-    if BEAMS.index(receiver.beam) != HELD:
+    if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
     return smoothing.steps_back(receiver.smoothing, receiver.samples_per_step, receiver.smoothing_samples) * period
 
@@ -313,15 +318,15 @@ def rate_and_range(s, c, i, target_state, normals):
 @compiled
 def delay(s, c, o, stamp_ns, result):
     """Put a Result into the ring and release the newest one measured at or before stamp_ns - latency."""
-    slot = s.written % RING
+    slot = s.written % RESULT_RING_SIZE
     s.ring_stamp_ns[slot], s.ring_locked[slot] = stamp_ns, s.locked
     s.ring_cross_elevation[slot], s.ring_elevation[slot] = result.error
     s.ring_rate[slot, 0], s.ring_rate[slot, 1] = result.rates
     s.ring_cn0_dbhz[slot], s.ring_range[slot] = result.cn0_dbhz, result.range
     s.written += 1
-    s.released = max(s.released, s.written - RING)
-    while s.released < s.written and s.ring_stamp_ns[s.released % RING] <= stamp_ns - c.latency_ns:
-        slot = s.released % RING
+    s.released = max(s.released, s.written - RESULT_RING_SIZE)
+    while s.released < s.written and s.ring_stamp_ns[s.released % RESULT_RING_SIZE] <= stamp_ns - c.latency_ns:
+        slot = s.released % RESULT_RING_SIZE
         s.released += 1
         o.due, o.stamp_ns, o.locked = 1, s.ring_stamp_ns[slot], s.ring_locked[slot]
         o.cross_elevation, o.elevation = s.ring_cross_elevation[slot], s.ring_elevation[slot]
@@ -330,7 +335,7 @@ def delay(s, c, o, stamp_ns, result):
 
 
 @compiled
-def forget(o):
+def reset_outputs(o):
     """Reset the outputs at the start of a step: nothing measured, nothing known."""
     o.due, o.stamp_ns, o.locked = 0, 0, 0
     o.cross_elevation, o.elevation, o.cn0_dbhz = math.nan, math.nan, math.nan
@@ -343,9 +348,10 @@ def forget(o):
 
 @compiled
 def step(s, c, i, o, breaks, coefficients, normals):
-    """One drive step: records STATE, CONSTANTS, INPUTS, OUTPUTS, breaks and coefficients of the Target, normals
-    (normals_per_step,). Never raises: the status in OUTPUTS names what is missing."""
-    forget(o)
+    """One drive step: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE, breaks and coefficients of
+    the Target, normals
+    (normals_per_step,). Never raises: the status in OUTPUTS_DTYPE names what is missing."""
+    reset_outputs(o)
     if i.stamp_ns <= s.stamp_ns:
         o.status = Status.STAMP_ORDER
         return
@@ -393,5 +399,5 @@ def step(s, c, i, o, breaks, coefficients, normals):
         o.status = Status.NO_BEAM
     if s.locked == 0:
         error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
-    cn0_dbhz = 10.0 * math.log10(max(s.level_power - 1.0, POWER_FLOOR) / c.tau)
+    cn0_dbhz = 10.0 * math.log10(max(s.level_power - 1.0, MIN_POWER_OVER_NOISE) / c.tau)
     delay(s, c, o, i.stamp_ns, Result(error, cn0_dbhz, rates, distance))

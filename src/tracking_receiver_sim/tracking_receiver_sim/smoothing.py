@@ -9,13 +9,14 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-SMOOTHINGS = ('none', 'recursion', 'moving_average')
-NO_SMOOTHING, RECURSION, MOVING_AVERAGE = range(len(SMOOTHINGS))
+SMOOTHING_KINDS = ('none', 'recursion', 'moving_average')
+SMOOTHING_NONE, SMOOTHING_RECURSION, SMOOTHING_MOVING_AVERAGE = range(len(SMOOTHING_KINDS))
 
-WINDOW = 256
+MAX_WINDOW_SAMPLES = 256
 """Longest moving average in samples."""
 
-SMOOTHER = np.dtype([('low_pass', 'f8'), ('sum', 'f8'), ('samples', 'f8', (WINDOW,)), ('count', 'i8')], align=True)
+SMOOTHER_DTYPE = np.dtype([('low_pass', 'f8'), ('sum', 'f8'), ('samples', 'f8', (MAX_WINDOW_SAMPLES,)),
+                           ('count', 'i8')], align=True)
 """Output of the recursion; sum of this step's samples; the last samples, how many there were since the start."""
 
 
@@ -30,26 +31,26 @@ def put(s, y, gain):
     """Take one sample y [rad]; gain: 1/n of the recursion [-]."""
     s.sum += y
     s.low_pass += gain * (y - s.low_pass)
-    s.samples[s.count % WINDOW] = y
+    s.samples[s.count % MAX_WINDOW_SAMPLES] = y
     s.count += 1
 
 
 @compiled
 def smoothed(s, kind, samples, n):
     """The smoothed error [rad] at the end of a step of `samples`; n: of the moving average, shorter at the start."""
-    if kind == RECURSION:
+    if kind == SMOOTHING_RECURSION:
         return s.low_pass
-    if kind == NO_SMOOTHING:
+    if kind == SMOOTHING_NONE:
         return s.sum / samples
     length = min(n, s.count)
     total = 0.0
     for k in range(s.count - length, s.count):
-        total += s.samples[k % WINDOW]
+        total += s.samples[k % MAX_WINDOW_SAMPLES]
     return total / length
 
 
 def delay(kind, samples, n):
-    """Mean delay of a kind of SMOOTHINGS, in samples before the newest."""
+    """Mean delay of a kind of SMOOTHING_KINDS, in samples before the newest."""
     return {'none': 0.5 * (samples - 1), 'recursion': n - 1.0, 'moving_average': 0.5 * (n - 1)}[kind]
 
 

@@ -4,7 +4,7 @@ Trajectories (leo_pass, track_file, flyby) become piecewise cubics in the statio
 built, so a step needs neither SGP4 nor a file; angle targets (sine, step, ramp) are closed forms. Before
 the first and past the last break a trajectory is not valid: no position, rather than an extrapolated one.
 
-leo_pass: SGP4 position and velocity at every KNOT_SPACING, joined by cubic Hermite pieces: within 1 mm and
+leo_pass: SGP4 position and velocity at every SGP4_KNOT_SPACING_S, joined by cubic Hermite pieces: within 1 mm and
 15 mm/s of SGP4 itself, whose velocity is 10 mm/s off the derivative of its own position. Against skyfield:
 0.3 mdeg with UT1 = UTC, the default; the true UT1 - UTC (`ut1_offset`, up to 0.9 s of earth rotation) moves an ISS
 pass by up to 0.04 deg (7 mdeg on the default pass). SGP4's own error is kilometres within days.
@@ -28,27 +28,27 @@ from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.parameters import record, record_type
-from tracking_receiver_sim.params import KINDS, RAMP, SINE, STEP, AngleParameters
+from tracking_receiver_sim.params import TARGET_KINDS, TARGET_RAMP, TARGET_SINE, TARGET_STEP, AngleParameters
 
-KNOT_SPACING = 1.0
+SGP4_KNOT_SPACING_S = 1.0
 """Between SGP4 knots [s]."""
-SEARCH_SPACING = 20.0
+PASS_SEARCH_STEP_S = 20.0
 """Between the pass finder's looks [s]; a LEO pass lasts minutes."""
-LOOKS = 41
+PEAK_SEARCH_POINTS = 41
 """In a row between two of these to find a peak."""
-MARGIN = 5.0
+RUN_MARGIN_S = 5.0
 """Time before and after the run [s] that every kind covers, for a program track; a track_file as far as it goes."""
 
 TargetState = namedtuple('TargetState', 'valid position velocity')
 """valid: 0 or 1; position: ENU of the station [m], velocity [m/s], three floats each, NaN where it is not valid."""
 
-TARGET = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))], align=True)
+TARGET_DTYPE = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))], align=True)
 
 
 class Target(typing.NamedTuple):
     """A target built for one run.
 
-    constants: (1,) TARGET record; breaks: (n + 1,) times [s]; coefficients: (4, n, 3), highest power first,
+    constants: (1,) TARGET_DTYPE record; breaks: (n + 1,) times [s]; coefficients: (4, n, 3), highest power first,
     of (t - breaks[i]), ENU [m]; start_time: UTC of stamp 0 in ISO 8601, empty where the target has no date; summary:
     lines on what a recorded flight is and asks of the antenna, none of any other target.
     """
@@ -82,14 +82,14 @@ def in_angles(kind, angle, t):
     tau = t - angle.start
     A, E, A_dot, E_dot = angle.azimuth, angle.elevation, 0.0, 0.0
     if tau >= 0.0:
-        if kind == SINE:
+        if kind == TARGET_SINE:
             w = 2.0 * math.pi * angle.frequency
             A, A_dot = A + angle.azimuth_amplitude * math.sin(w * tau), angle.azimuth_amplitude * w * math.cos(w * tau)
             E += angle.elevation_amplitude * math.sin(w * tau)
             E_dot = angle.elevation_amplitude * w * math.cos(w * tau)
-        elif kind == STEP:
+        elif kind == TARGET_STEP:
             A, E = A + angle.azimuth_amplitude, E + angle.elevation_amplitude
-        elif kind == RAMP:
+        elif kind == TARGET_RAMP:
             A, A_dot = A + angle.azimuth_rate * tau, angle.azimuth_rate
             E, E_dot = E + angle.elevation_rate * tau, angle.elevation_rate
     r = angle.range
@@ -102,8 +102,8 @@ def in_angles(kind, angle, t):
 
 @compiled
 def state(target, breaks, coefficients, t):
-    """TargetState at t [s]; target: record of TARGET, breaks and coefficients as in Target."""
-    if target.kind == SINE or target.kind == STEP or target.kind == RAMP:
+    """TargetState at t [s]; target: record of TARGET_DTYPE, breaks and coefficients as in Target."""
+    if target.kind == TARGET_SINE or target.kind == TARGET_STEP or target.kind == TARGET_RAMP:
         return in_angles(target.kind, target.angle, t)
     return on_track(breaks, coefficients, t)
 
@@ -131,13 +131,13 @@ def build(params, duration) -> Target:
     """A Target from TargetParameters for a run of `duration` [s] from stamp 0; raises TargetError."""
     builder = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}.get(params.kind, _angles)
     breaks, coefficients, *known = builder(params, duration)
-    constants = np.zeros(1, TARGET)
-    constants['kind'], constants['angle'] = KINDS.index(params.kind), record(params.angle)
+    constants = np.zeros(1, TARGET_DTYPE)
+    constants['kind'], constants['angle'] = TARGET_KINDS.index(params.kind), record(params.angle)
     return Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *known)
 
 
 def _angles(params, duration):
-    return np.array([-MARGIN, duration + MARGIN]), np.zeros((4, 1, 3))
+    return np.array([-RUN_MARGIN_S, duration + RUN_MARGIN_S]), np.zeros((4, 1, 3))
 
 
 def _flyby(params, duration):
@@ -147,8 +147,8 @@ def _flyby(params, duration):
     closest = np.array([-flyby.closest_distance * north, flyby.closest_distance * east, flyby.height])
     coefficients = np.zeros((4, 1, 3))
     coefficients[2, 0] = velocity
-    coefficients[3, 0] = closest - velocity * (MARGIN + flyby.closest_time)
-    return np.array([-MARGIN, duration + MARGIN]), coefficients
+    coefficients[3, 0] = closest - velocity * (RUN_MARGIN_S + flyby.closest_time)
+    return np.array([-RUN_MARGIN_S, duration + RUN_MARGIN_S]), coefficients
 
 
 # leo_pass
@@ -166,7 +166,7 @@ def culmination(params, satrec):
     best = -math.inf
     for day in np.arange(0.0, leo_pass.search_days, 1.0):
         seconds = 86400.0 * min(1.0, leo_pass.search_days - day)
-        times = 86400.0 * day + np.arange(-SEARCH_SPACING, seconds + 1.5 * SEARCH_SPACING, SEARCH_SPACING)
+        times = 86400.0 * day + np.arange(-PASS_SEARCH_STEP_S, seconds + 1.5 * PASS_SEARCH_STEP_S, PASS_SEARCH_STEP_S)
         elevation = elevations(times)
         for i in range(1, len(times) - 1):
             if elevation[i] > max(0.0, elevation[i - 1]) and elevation[i] >= elevation[i + 1]:
@@ -182,12 +182,12 @@ def culmination(params, satrec):
 
 def _peak(elevations, begin, end):
     """(time [s], elevation [deg]) of the one peak between begin and end, to a millisecond: looked for in ever narrower
-    rows of LOOKS."""
+    rows of PEAK_SEARCH_POINTS."""
     while end - begin > 1e-3:
-        times = np.linspace(begin, end, LOOKS)
+        times = np.linspace(begin, end, PEAK_SEARCH_POINTS)
         elevation = elevations(times)
         top = int(np.argmax(elevation))
-        begin, end = times[max(top - 1, 0)], times[min(top + 1, LOOKS - 1)]
+        begin, end = times[max(top - 1, 0)], times[min(top + 1, PEAK_SEARCH_POINTS - 1)]
     return float(times[top]), float(elevation[top])
 
 
@@ -199,9 +199,9 @@ def _start(params, satrec, duration):
         return orbit.julian_date(when.replace(microsecond=0))
     julian, fraction = orbit.julian_date(orbit.instant('start_time', params.leo_pass.start_time))
     age = julian - satrec.jdsatepoch + fraction - satrec.jdsatepochF
-    if abs(age) > orbit.TLE_AGE:
+    if abs(age) > orbit.MAX_TLE_AGE_DAYS:
         raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the TLE epoch '
-                          f'{orbit.iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within {orbit.TLE_AGE:g}')
+                          f'{orbit.iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within {orbit.MAX_TLE_AGE_DAYS:g}')
     return julian, fraction
 
 
@@ -209,7 +209,7 @@ def _start(params, satrec, duration):
 def _leo_pass(params, duration):
     satrec = orbit.satellite(params.leo_pass)
     julian, fraction = _start(params, satrec, duration)
-    knots = np.arange(-MARGIN, duration + MARGIN + KNOT_SPACING, KNOT_SPACING)
+    knots = np.arange(-RUN_MARGIN_S, duration + RUN_MARGIN_S + SGP4_KNOT_SPACING_S, SGP4_KNOT_SPACING_S)
     position, velocity = orbit.enu(satrec, params.station, julian, fraction, knots, params.leo_pass.ut1_offset)
     if position[:, 2].max() < 0.0:
         raise TargetError(f'satellite {satrec.satnum_str}: below the horizon from {orbit.iso(julian, fraction)} for '
@@ -231,5 +231,5 @@ def _hermite(x, y, y_dot):
 
 def _track_file(params, duration):
     from tracking_receiver_sim import track_files  # with scipy, which only a flight needs
-    laid = track_files.lay_out(params, duration, MARGIN)
+    laid = track_files.lay_out(params, duration, RUN_MARGIN_S)
     return laid.breaks, laid.coefficients, laid.start_time, laid.summary

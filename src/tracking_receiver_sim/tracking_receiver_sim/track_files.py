@@ -8,26 +8,27 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import course, directions, oem, stk
 from tracking_receiver_sim.track import fixes, flight, gpx, nmea, place, tables
 
-BEGINNING = 4096
+FORMAT_PROBE_BYTES = 4096
 """Bytes that say what a file is."""
 
 
-class Kind(typing.NamedTuple):
+class FileKind(typing.NamedTuple):
     """lay_out(data, TargetParameters, duration, margin) -> flight.Flight; run(data, TargetParameters, given) -> the
     parameters that follow where a scenario leaves them open."""
     lay_out: typing.Callable
     run: typing.Callable
 
 
-LOG = Kind(lambda log, target, _duration, _margin: flight.lay_out(log, target.track_file, target.station), place.run)
-ORBIT = Kind(course.of_orbit, course.run_of_orbit)
-DIRECTIONS = Kind(course.of_directions, course.run_of_directions)
+LOG_KIND = FileKind(lambda log, target, _duration, _margin: flight.lay_out(log, target.track_file, target.station),
+                    place.run)
+ORBIT_KIND = FileKind(course.of_orbit, course.run_of_orbit)
+DIRECTIONS_KIND = FileKind(course.of_directions, course.run_of_directions)
 
 
-class Form(typing.NamedTuple):
+class FileFormat(typing.NamedTuple):
     """bears(beginning: bytes): whether a file is one; read(TrackFileParameters): its data."""
     name: str
-    kind: Kind
+    kind: FileKind
     bears: typing.Callable
     read: typing.Callable
 
@@ -40,16 +41,16 @@ def _of(read):
     return lambda track: read(track.path, track.aircraft)
 
 
-FORMS = (
-    Form('CCSDS OEM', ORBIT, lambda beginning: beginning.startswith(oem.BEGINNING), _of(oem.read)),
-    Form('STK ephemeris', ORBIT, stk.BEGINNING.match, _of(stk.read)),
-    Form('GPX', LOG, lambda beginning: beginning.startswith(b'<'), _log(gpx.rows)),
-    Form('NMEA', LOG, lambda beginning: beginning.startswith((b'$', b'!')), _log(nmea.rows)),
-    Form('sat-nms program', DIRECTIONS, directions.is_program, _of(directions.read_program)),
-    Form('table of azimuth and elevation', DIRECTIONS, directions.is_table, _of(directions.read_table)),
-    Form('CSV', LOG, lambda beginning: True, _log(tables.rows)))
+FILE_FORMATS = (
+    FileFormat('CCSDS OEM', ORBIT_KIND, lambda beginning: beginning.startswith(oem.FILE_SIGNATURE), _of(oem.read)),
+    FileFormat('STK ephemeris', ORBIT_KIND, stk.FILE_SIGNATURE_PATTERN.match, _of(stk.read)),
+    FileFormat('GPX', LOG_KIND, lambda beginning: beginning.startswith(b'<'), _log(gpx.rows)),
+    FileFormat('NMEA', LOG_KIND, lambda beginning: beginning.startswith((b'$', b'!')), _log(nmea.rows)),
+    FileFormat('sat-nms program', DIRECTIONS_KIND, directions.is_program, _of(directions.read_program)),
+    FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table, _of(directions.read_table)),
+    FileFormat('CSV', LOG_KIND, lambda beginning: True, _log(tables.rows)))
 
-OPEN = (*place.STATION, 'receiver.reference_range', 'duration')
+DERIVED_PARAMETERS = (*place.STATION_FIELDS, 'receiver.reference_range', 'duration')
 """What a scenario may leave open: parameters of the receiver, and the duration of the run."""
 
 
@@ -57,10 +58,10 @@ def read(track):
     """(Kind, data) of the file of a TrackFileParameters. Raises csv_table.TableError."""
     if not track.path:
         raise csv_table.TableError('track_file.path is empty: must name a file: '
-                                   + ', '.join(form.name for form in FORMS))
+                                   + ', '.join(form.name for form in FILE_FORMATS))
     with csv_table.stream(track.path) as stream:
-        beginning = stream.read(BEGINNING).removeprefix(b'\xef\xbb\xbf').lstrip()
-    form = next(form for form in FORMS if form.bears(beginning))
+        beginning = stream.read(FORMAT_PROBE_BYTES).removeprefix(b'\xef\xbb\xbf').lstrip()
+    form = next(form for form in FILE_FORMATS if form.bears(beginning))
     return form.kind, form.read(track)
 
 
@@ -71,7 +72,7 @@ def lay_out(target, duration, margin) -> flight.Flight:
     return kind.lay_out(data, target, duration, margin)
 
 
-def left_open(target, given):
+def derived_parameters(target, given):
     """{name: value} that follow from the file of a TargetParameters; given: the names that are, of which only those of
     the station and the start matter here. Raises csv_table.TableError."""
     kind, data = read(target.track_file)

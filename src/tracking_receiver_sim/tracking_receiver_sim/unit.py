@@ -10,21 +10,26 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import nodes, noise
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
-from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis, joined
-from pedestal_common.wire.records import NEVER
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.wire.records import NO_STAMP
 from tracking_receiver_sim import injected, receiver, target
 
-BEAM, SHIP, ERRORS, TARGET = 'adu/truth', 'ship/truth', 'tracking_receiver/angle_error', 'target/truth'
-RATE, RANGE = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
+(DRIVE_TRUTH_TOPIC, SHIP_TRUTH_TOPIC, ANGLE_ERROR_TOPIC, TARGET_TRUTH_TOPIC) = ('adu/truth', 'ship/truth',
+                                                                                'tracking_receiver/angle_error',
+                                                                                'target/truth')
+ANGLE_RATE_TOPIC, RANGE_TOPIC = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
 
-FAULTS = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
+FAULT_STATUSES = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
 """Statuses that are kept for the next diagnosis."""
 
 
-RECORD = np.dtype([('state', receiver.STATE), ('constants', receiver.CONSTANTS), ('inputs', receiver.INPUTS),
-                   ('outputs', receiver.OUTPUTS), ('row', 'i8'), ('fault', 'i8'), ('schedule', schedule.SCHEDULE),
-                   ('injected', injected.INJECTED)], align=True)
-"""row: of the noise that the next step takes; fault: the last of FAULTS since the last diagnosis, else LOCKED."""
+RECORD_DTYPE = np.dtype([('state', receiver.STATE_DTYPE), ('constants', receiver.CONSTANTS_DTYPE),
+                         ('inputs', receiver.INPUTS_DTYPE),
+                         ('outputs', receiver.OUTPUTS_DTYPE), ('row', 'i8'), ('fault', 'i8'),
+                         ('schedule', schedule.SCHEDULE_DTYPE),
+                         ('injected', injected.INJECTED_DTYPE)], align=True)
+"""row: of the noise that the next step takes; fault: the last of FAULT_STATUSES since the last diagnosis, else
+LOCKED."""
 
 
 class Memory(typing.NamedTuple):
@@ -42,7 +47,7 @@ def decode(u, stamp, beam, ship):
     u.azimuth, u.elevation = beam.position[0], beam.position[1]
     u.azimuth_rate, u.elevation_rate = beam.velocity[0], beam.velocity[1]
     u.valid = 1
-    if ship.stamp != NEVER:
+    if ship.stamp != NO_STAMP:
         q = ship.orientation
         line_of_sight.rotation(q[0], q[1], q[2], q[3], u.mat_ed)
         for i in range(3):
@@ -53,12 +58,13 @@ def decode(u, stamp, beam, ship):
 @compiled
 def encode(o, c, stamp, outputs):
     """Outputs of the receiver -> records of its messages."""
-    error, rate, distance, truth = outputs[ERRORS], outputs[RATE], outputs[RANGE], outputs[TARGET]
-    error.stamp = o.stamp_ns if o.due == 1 else NEVER
+    (error, rate, distance, truth) = (outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC], outputs[RANGE_TOPIC],
+                                      outputs[TARGET_TRUTH_TOPIC])
+    error.stamp = o.stamp_ns if o.due == 1 else NO_STAMP
     error.vector[0], error.vector[1], error.vector[2] = o.cross_elevation, o.elevation, o.cn0_dbhz
-    rate.stamp = error.stamp if c.rate_measured != 0 else NEVER
+    rate.stamp = error.stamp if c.rate_measured != 0 else NO_STAMP
     rate.vector[0], rate.vector[1], rate.vector[2] = o.rate[0], o.rate[1], c.rate_sigma
-    distance.stamp = error.stamp if c.range_measured != 0 else NEVER
+    distance.stamp = error.stamp if c.range_measured != 0 else NO_STAMP
     distance.range[0], distance.variance[0] = o.range, c.range_variance
     truth.stamp = stamp
     truth.orientation[3] = 1.0
@@ -71,16 +77,16 @@ def law(memory, stamp, inputs, outputs):
     """Step k."""
     m = memory.record[0]
     if schedule.pending(m.schedule, stamp):
-        injected.take(m, stamp)
-    decode(m.inputs, stamp, inputs[BEAM], inputs[SHIP])
+        injected.apply_due_faults(m, stamp)
+    decode(m.inputs, stamp, inputs[DRIVE_TRUTH_TOPIC], inputs[SHIP_TRUTH_TOPIC])
     receiver.step(m.state, m.constants, m.inputs, m.outputs, memory.breaks, memory.coefficients,
                   memory.normals[m.row])
     m.row += 1
-    if m.outputs.status in FAULTS:
+    if m.outputs.status in FAULT_STATUSES:
         m.fault = m.outputs.status
     encode(m.outputs, m.constants, stamp, outputs)
     if m.schedule.pending != 0:
-        injected.spoil_messages(m.injected, stamp, outputs)
+        injected.corrupt_messages(m.injected, stamp, outputs)
 
 
 @compiled
@@ -93,7 +99,7 @@ def laws(memory, stamps, inputs, outputs):
 class TrackingReceiver(Simulated):
     """The receiver of a TrackingReceiverNodeParameters."""
     NODE, LAWS = nodes.row('tracking_receiver'), {Memory: (law, laws)}
-    VERBS = table.VERBS[NODE.name]
+    VERBS = table.INJECT_COMMANDS[NODE.name]
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
@@ -101,14 +107,15 @@ class TrackingReceiver(Simulated):
         self._noise = noise.generator(parameters.seed, self.NODE.name)
         self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)
-        record = joined(RECORD, state=receiver.initial_state(), constants=constants, fault=receiver.Status.LOCKED,
+        record = joined(RECORD_DTYPE, state=receiver.initial_state(), constants=constants,
+                        fault=receiver.Status.LOCKED,
                         schedule=schedule.empty(),
                         injected=injected.initial(constants))
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         self.memory = Memory(record, self.target.breaks, self.target.coefficients,
                              np.zeros((1, receiver.normals_per_step(parameters))))
-        if RANGE in self.messages:
-            self.messages[RANGE].field_of_view = parameters.antenna.beamwidth
+        if RANGE_TOPIC in self.messages:
+            self.messages[RANGE_TOPIC].field_of_view = parameters.antenna.beamwidth
 
     def block(self, steps):
         """The memory with noise (steps, normals_per_step) drawn for the next steps; the air has a stream of its own,
@@ -121,7 +128,8 @@ class TrackingReceiver(Simulated):
         return self.memory._replace(normals=drawn)
 
     def diagnose(self):
-        """ERROR with the last of FAULTS since the last diagnosis, WARN while not locked; values: C/N0, angle noise."""
+        """ERROR with the last of FAULT_STATUSES since the last diagnosis, WARN while not locked; values: C/N0, angle
+        noise."""
         outputs, fault = self.parts['outputs'], int(self.parts['fault'])
         self.parts['fault'] = receiver.Status.LOCKED
         status, p = int(outputs['status']), self.parameters
@@ -131,11 +139,12 @@ class TrackingReceiver(Simulated):
         if self.target.start_time:
             values.append(('stamp_0_utc', self.target.start_time))
         values += zip(('track_log', 'track_flight'), self.target.summary)
-        if fault in FAULTS:
-            return Diagnosis(ERROR, receiver.STATUSES[fault], values)
-        return Diagnosis(OK if status == receiver.Status.LOCKED else WARN, receiver.STATUSES[status], values)
+        if fault in FAULT_STATUSES:
+            return Diagnosis(LEVEL_ERROR, receiver.STATUS_TEXT_BY_CODE[fault], values)
+        return Diagnosis(LEVEL_OK if status == receiver.Status.LOCKED else LEVEL_WARN,
+                         receiver.STATUS_TEXT_BY_CODE[status], values)
 
     @staticmethod
     def idle(numbers):
         """Not exercised where no error is finite."""
-        return '' if np.isfinite(numbers[ERRORS][:, 0]).any() else 'the receiver never locked'
+        return '' if np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any() else 'the receiver never locked'

@@ -11,18 +11,19 @@ from acu_tracker.servo import position_loop
 from acu_tracker.signals import Flag
 from pedestal_common.compiled import compiled
 
-SUPERVISION = np.dtype([('axis', detectors.AXIS, (2,)), ('said', 'f8', (3,)), ('least', 'f8'), ('ready', 'f8'),
-                        ('lost', 'i8'), ('alarms', annunciator.ALARMS)], align=True)
+SUPERVISION_DTYPE = np.dtype([('axis', detectors.AXIS_DETECTORS_DTYPE, (2,)), ('said', 'f8', (3,)), ('least', 'f8'),
+                              ('ready', 'f8'),
+                              ('lost', 'i8'), ('alarms', annunciator.ALARM_LIST_DTYPE)], align=True)
 """said: errors [rad] and C/N0 [dB-Hz] of the receiver in the step before; least: lowest C/N0 that it has told; ready:
 stamp at which the drive was ready last [s]; lost: bits of the axes that had one motor when it was."""
 
-INVALID = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRAM | Flag.PRESET | Flag.ATTITUDE_ERROR
+INVALID_INPUT_FLAGS = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRAM | Flag.PRESET | Flag.ATTITUDE_ERROR
 """Flags of inputs that were not believed, but of the attitude, which is lost when that goes on."""
 
-OFF_TIME = 2.5
+BRAKE_GRIP_DEADLINE_S = 2.5
 """Time after the drive is ready no more until its brakes must hold [s]: longer than its longest stop."""
 
-ALWAYS, MOTORS, MOVING, FOLLOWING = table.JUDGED_WHEN
+JUDGED_ALWAYS, JUDGED_WITH_MOTORS, JUDGED_MOVING, JUDGED_FOLLOWING = table.JUDGED_ALARM_BITS
 
 Facts = namedtuple('Facts', 'dt gap lost latched attitude_lost attitude_jumped signal_lost unasked_rate beamwidth')
 """Of a step: dt, time since the one before, and 0 after a gap, whose length is `gap` [s], infinite in the first step;
@@ -30,12 +31,12 @@ whether steps between the two were lost; bits of the alarms that wait for a rese
 lost, or has jumped, and whether the signal of autotrack is lost. Beside that the rate at which an axis moves unasked
 [rad/s] and the beamwidth [rad]."""
 
-SILENCE = 0.3
+DRIVE_SILENCE_GAP_S = 0.3
 """Gap between two steps [s] beyond which the drive was silent."""
 
 
 def initialise(s):
-    """Nothing is wrong; s: view of SUPERVISION."""
+    """Nothing is wrong; s: view of SUPERVISION_DTYPE."""
     s['least'], s['ready'] = np.inf, -np.inf
     s['axis']['y'] = np.nan
     annunciator.initialise(s['alarms'])
@@ -46,19 +47,19 @@ def _of_motors(d, i, u, envelope, p, facts):
     """Bits of the alarms of axis i that its encoder, motors and commands give away. d: its detectors; envelope:
     servo.unasked.ENVELOPE; p: record of its AxisParameters."""
     y, dy, high, low = u.position[i], u.velocity[i], envelope.high[i], envelope.low[i]
-    bits, surge = 0, detectors.SURGE * p.limits.acceleration if facts.lost else 0.0
-    x = detectors.parted(d, y, dy, facts.dt, surge)
+    bits, surge = 0, detectors.MAX_ACCELERATION_RATIO * p.limits.acceleration if facts.lost else 0.0
+    x = detectors.encoder_motor_mismatch(d, y, dy, facts.dt, surge)
     if detectors.encoder_jump(x):
         bits |= table.Bit.AZIMUTH_ENCODER_JUMP
     if detectors.encoder_stuck(d, y, dy, facts.dt):
         bits |= table.Bit.AZIMUTH_ENCODER_STUCK
     if detectors.disagreement(d, x, facts.dt):
         bits |= table.Bit.AZIMUTH_ENCODER_DISAGREEMENT
-    if detectors.pushes(d, u.torque[i], p.feedforward.friction, facts.dt):
+    if detectors.excess_torque(d, u.torque[i], p.feedforward.friction, facts.dt):
         bits |= table.Bit.AZIMUTH_BRAKE_NOT_RELEASED
     if detectors.immobile(d, dy, high, low):
         bits |= table.Bit.AZIMUTH_IMMOBILE
-    if detectors.against(dy, high, low, facts.unasked_rate):
+    if detectors.opposes_command(dy, high, low, facts.unasked_rate):
         bits |= table.Bit.AZIMUTH_RUNAWAY
     return bits << i
 
@@ -80,10 +81,10 @@ def _of_loop(d, i, e, o, facts):
 @compiled
 def _of_axes(s, mode, u, o, c, envelope, facts):
     """Bits of the alarms of both axes. c: records (2,) of their constants."""
-    bits, off = 0, u.stamp - s.ready > OFF_TIME
+    bits, off = 0, u.stamp - s.ready > BRAKE_GRIP_DEADLINE_S
     for i in range(2):
         p, d, y, dy = c[i].p, s.axis[i], u.position[i], u.velocity[i]
-        if p.controller == position_loop.BEAM:
+        if p.controller == position_loop.CONTROLLER_BEAM:
             continue
         if facts.gap > 0.0 or not math.isfinite(d.y + d.dy):
             detectors.initialise(d, y, dy)
@@ -103,9 +104,9 @@ def _of_drive(s, u):
     if u.drive_ready:
         s.ready, s.lost = u.stamp, max(u.drive, 0)
     bits = s.lost * table.Bit.AZIMUTH_MOTOR_LOST
-    if u.drive == signals.EMERGENCY_STOP:
+    if u.drive == signals.DRIVE_EMERGENCY_STOP:
         bits |= table.Bit.EMERGENCY_STOP
-    elif u.drive >= signals.DRIVE_FAULT:
+    elif u.drive >= signals.FIRST_DRIVE_FAULT:
         bits |= table.Bit.DRIVE_FAULT
     return bits
 
@@ -128,7 +129,7 @@ def _of_unit(s, u, o, facts):
     """Bits of the alarms of the inputs, and of what the control unit has found elsewhere."""
     bits = facts.latched
     if 0.0 < facts.gap < math.inf:
-        bits |= table.Bit.TIME_JUMP | (table.Bit.DRIVE_SILENT if facts.gap > SILENCE else 0)
+        bits |= table.Bit.TIME_JUMP | (table.Bit.DRIVE_SILENT if facts.gap > DRIVE_SILENCE_GAP_S else 0)
     if not u.error_came or _repeated(s, u):
         bits |= table.Bit.RECEIVER_SILENT
     if facts.attitude_lost:
@@ -139,7 +140,7 @@ def _of_unit(s, u, o, facts):
         bits |= table.Bit.SIGNAL_LOST
     if o.invalid_input & Flag.ERROR_NOISY:
         bits |= table.Bit.RECEIVER_NOISY
-    if o.invalid_input & INVALID:
+    if o.invalid_input & INVALID_INPUT_FLAGS:
         bits |= table.Bit.INVALID_INPUT
     return bits | o.pins_wrong * table.Bit.AZIMUTH_STOW_PIN | _of_program(u, o)
 
@@ -158,14 +159,14 @@ def _of_program(u, o):
 @compiled
 def _judged(mode, c):
     """Bits of the alarms that mean something in a mode. c: records (2,) of the axes' constants."""
-    motors = c[0].p.controller != position_loop.BEAM or c[1].p.controller != position_loop.BEAM
-    return (ALWAYS | (MOTORS if motors else 0) | (MOVING if mode != Mode.STANDBY else 0)
-            | (FOLLOWING if modes.FOLLOWS[mode] else 0))
+    motors = c[0].p.controller != position_loop.CONTROLLER_BEAM or c[1].p.controller != position_loop.CONTROLLER_BEAM
+    return (JUDGED_ALWAYS | (JUDGED_WITH_MOTORS if motors else 0) | (JUDGED_MOVING if mode != Mode.STANDBY else 0)
+            | (JUDGED_FOLLOWING if modes.FOLLOWS_TARGET[mode] else 0))
 
 
 @compiled
 def take(s, mode, u, o, c, envelope, facts):
-    """Bring the alarms to a step with Facts. s: record of SUPERVISION; c: records (2,) of the axes' constants;
+    """Bring the alarms to a step with Facts. s: record of SUPERVISION_DTYPE; c: records (2,) of the axes' constants;
     envelope: servo.unasked.ENVELOPE of their commands."""
     bits = _of_drive(s, u) | _of_unit(s, u, o, facts) | _of_axes(s, mode, u, o, c, envelope, facts)
     if facts.gap > 0.0:

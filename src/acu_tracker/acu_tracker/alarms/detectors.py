@@ -8,7 +8,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-AXIS = np.dtype([
+AXIS_DETECTORS_DTYPE = np.dtype([
     ('y', 'f8'), ('dy', 'f8'),                              # of the step before [rad], [rad/s]; NaN: it was none
     ('apart', 'f8'), ('disagrees', 'i8'),                           # of `disagreement` [rad]
     ('turned', 'f8'), ('moved', 'f8'), ('stuck', 'i8'),             # of motors and encoder in this look [rad]
@@ -16,51 +16,52 @@ AXIS = np.dtype([
     ('e', 'f8'), ('area', 'f8'), ('loads', 'f8'), ('oscillates', 'i8'),         # of `oscillation` [rad], [rad s], [-]
 ], align=True)
 
-JUMP = 3e-3
+MAX_STEP_MISMATCH_RAD = 3e-3
 """Difference of encoder and motors over one step [rad]; wind-up and lash of a gear leave less than 1 mrad."""
 
-LOOK = 3e-3
+STUCK_TEST_TRAVEL_RAD = 3e-3
 """Travel of the motors over which the encoder must move as well [rad]: more than the lash."""
 
-STUCK, FREE = 0.1, 0.5
-"""Shares of LOOK: the encoder is stuck below the first, and moves from the second on."""
+STUCK_TRAVEL_SHARE, FREE_TRAVEL_SHARE = 0.1, 0.5
+"""Shares of STUCK_TEST_TRAVEL_RAD: the encoder is stuck below the first, and moves from the second on."""
 
-ASKED = 5e-3
+MIN_COMMANDED_RATE_RAD_S = 5e-3
 """Rate command beyond which an axis must move [rad/s]."""
 
-IDLE = 0.1
+IMMOBILE_RATE_SHARE = 0.1
 """Share of the command below which an axis does not obey it."""
 
-PUSHES = 50.0
+EXCESS_TORQUE_RATIO = 50.0
 """Torque over the Coulomb friction that no free axis needs for long: half of what brakes hold, twice a strong wind."""
 
-TO_AND_FRO = 0.1
+TORQUE_TIME_CONSTANT_S = 0.1
 """Time constant of the mean of the torque's amount [s]: an axis whose brakes drag and that turns back pushes on."""
 
-SURGE = 2.0
+MAX_ACCELERATION_RATIO = 2.0
 """Acceleration that an axis may reach, in those that are commanded at the most."""
 
-DIFFERENCE = 1e-2
-"""Difference of encoder and motors within APART [rad]: five times what lash and wind-up of a gear leave."""
+MAX_MISMATCH_RAD = 1e-2
+"""Difference of encoder and motors within MISMATCH_TIME_CONSTANT_S [rad]: five times what lash and wind-up of a gear
+leave."""
 
-APART = 2.0
+MISMATCH_TIME_CONSTANT_S = 2.0
 """Time in which a difference of encoder and motors is forgotten [s]."""
 
-STANDS = 2e-3
+STANDSTILL_RATE_RAD_S = 2e-3
 """Rate [rad/s] beyond which an axis moves."""
 
-LATE = 0.25
+FOLLOWING_ERROR_BEAMWIDTHS = 0.25
 """Following error that is too large, in beamwidths."""
 
-AREA = 1e-4
+MIN_HALF_WAVE_AREA = 1e-4
 """Area of the following error between two of its zeros [rad s] from which a half wave counts: 2 a / w, 1 mrad at
 3 Hz."""
 
-SUPERVISED = 5.0
+OSCILLATION_WINDOW_S = 5.0
 """Time over which half waves are counted [s]."""
 
-LOADS = 10.0
-"""Half waves within SUPERVISED that are an oscillation: faster than 1 Hz."""
+OSCILLATION_HALF_WAVES = 10.0
+"""Half waves within OSCILLATION_WINDOW_S that are an oscillation: faster than 1 Hz."""
 
 
 @compiled
@@ -76,7 +77,7 @@ def initialise(d, y, dy):
 
 
 @compiled
-def parted(d, y, dy, dt, acceleration):
+def encoder_motor_mismatch(d, y, dy, dt, acceleration):
     """By how much [rad] encoder and motors moved otherwise in this step: x = y - y' - (dy + dy') dt / 2.
 
     acceleration: that an axis may have reached between two steps of which those between were lost [rad/s2], else 0.
@@ -88,89 +89,94 @@ def parted(d, y, dy, dt, acceleration):
 
 @compiled
 def encoder_jump(x):
-    """Whether encoder and motors parted by more than JUMP in this step."""
-    return abs(x) > JUMP
+    """Whether encoder and motors parted by more than MAX_STEP_MISMATCH_RAD in this step."""
+    return abs(x) > MAX_STEP_MISMATCH_RAD
 
 
 @compiled
 def encoder_stuck(d, y, dy, dt):
-    """Whether the encoder stands while the motors turn. Looks end when the motors have turned by LOOK, one way."""
+    """Whether the encoder stands while the motors turn. Looks end when the motors have turned by
+    STUCK_TEST_TRAVEL_RAD, one way."""
     d.turned += 0.5 * (dy + d.dy) * dt
     d.moved += y - d.y
-    if abs(d.turned) > LOOK:
-        share = abs(d.moved) / LOOK
-        d.stuck = share < (FREE if d.stuck else STUCK)
+    if abs(d.turned) > STUCK_TEST_TRAVEL_RAD:
+        share = abs(d.moved) / STUCK_TEST_TRAVEL_RAD
+        d.stuck = share < (FREE_TRAVEL_SHARE if d.stuck else STUCK_TRAVEL_SHARE)
         d.turned = d.moved = 0.0
     return d.stuck != 0
 
 
 @compiled
 def disagreement(d, x, dt):
-    """Whether encoder and motors have parted by x of late: X' = x / dt - X / APART, |X| > DIFFERENCE."""
-    d.apart += x - d.apart * dt / APART
-    d.disagrees = beyond(d.disagrees, abs(d.apart), DIFFERENCE, 0.5 * DIFFERENCE)
+    """Whether encoder and motors have parted by x of late: X' = x / dt - X / MISMATCH_TIME_CONSTANT_S, |X| >
+    MAX_MISMATCH_RAD."""
+    d.apart += x - d.apart * dt / MISMATCH_TIME_CONSTANT_S
+    d.disagrees = beyond(d.disagrees, abs(d.apart), MAX_MISMATCH_RAD, 0.5 * MAX_MISMATCH_RAD)
     return d.disagrees != 0
 
 
 @compiled
 def immobile(d, dy, high, low):
-    """Whether the motors do not obey commands that were all beyond ASKED of late, and of one sign: less than IDLE of
-    the smallest of them, until it is three times that, or they are within half of ASKED; motion against them is none
+    """Whether the motors do not obey commands that were all beyond MIN_COMMANDED_RATE_RAD_S of late, and of one sign:
+    less than IMMOBILE_RATE_SHARE of
+    the smallest of them, until it is three times that, or they are within half of MIN_COMMANDED_RATE_RAD_S; motion
+    against them is none
     of that. high, low: envelope of the commands (servo.unasked)."""
-    asked = 0.5 * ASKED if d.immobile else ASKED
+    asked = 0.5 * MIN_COMMANDED_RATE_RAD_S if d.immobile else MIN_COMMANDED_RATE_RAD_S
     u = low if low > asked else high
     if low <= asked and high >= -asked:
         d.immobile = 0
     else:
-        d.immobile = abs(dy / u) < (3.0 * IDLE if d.immobile else IDLE)
+        d.immobile = abs(dy / u) < (3.0 * IMMOBILE_RATE_SHARE if d.immobile else IMMOBILE_RATE_SHARE)
     return d.immobile != 0
 
 
 @compiled
-def pushes(d, T, friction, dt):
+def excess_torque(d, T, friction, dt):
     """Whether a torque on the load is far more than the Coulomb friction, both [Nm], either way in the mean of
-    TO_AND_FRO."""
+    TORQUE_TIME_CONSTANT_S."""
     if math.isfinite(T):
-        d.push += (abs(T) - d.push) * min(dt / TO_AND_FRO, 1.0)
-    d.pushes = beyond(d.pushes, d.push, PUSHES * friction, 0.5 * PUSHES * friction)
+        d.push += (abs(T) - d.push) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
+    d.pushes = beyond(d.pushes, d.push, EXCESS_TORQUE_RATIO * friction, 0.5 * EXCESS_TORQUE_RATIO * friction)
     return d.pushes != 0
 
 
 @compiled
 def moves(d, dy):
     """Whether an axis moves."""
-    d.moves = beyond(d.moves, abs(dy), STANDS, 0.5 * STANDS)
+    d.moves = beyond(d.moves, abs(dy), STANDSTILL_RATE_RAD_S, 0.5 * STANDSTILL_RATE_RAD_S)
     return d.moves != 0
 
 
 @compiled
-def against(dy, high, low, threshold):
+def opposes_command(dy, high, low, threshold):
     """Whether a rate goes against its commands, which were of one sign of late.
 
     high, low: envelope of the commands (servo.unasked); threshold: rate that is expected of nobody [rad/s].
     """
-    return dy > threshold and high <= 0.0 and low < -STANDS or dy < -threshold and low >= 0.0 and high > STANDS
+    return dy > threshold and high <= 0.0 and low < -STANDSTILL_RATE_RAD_S or dy < -threshold and low >= 0.0 and high > STANDSTILL_RATE_RAD_S
 
 
 @compiled
 def following_error(d, e, limit):
-    """Whether the following error is beyond LATE of a limit [rad], the beamwidth."""
-    d.late = beyond(d.late, abs(e), LATE * limit, 0.5 * LATE * limit)
+    """Whether the following error is beyond FOLLOWING_ERROR_BEAMWIDTHS of a limit [rad], the beamwidth."""
+    d.late = beyond(d.late, abs(e), FOLLOWING_ERROR_BEAMWIDTHS * limit, 0.5 * FOLLOWING_ERROR_BEAMWIDTHS * limit)
     return d.late != 0
 
 
 @compiled
 def oscillation(d, e, dt):
     """Whether the following error [rad] oscillates (T. Haegglund, A control-loop performance monitor, Control
-    Engineering Practice 3, 1995): half waves whose area is beyond AREA are counted and forgotten within SUPERVISED;
-    LOADS of them are an oscillation."""
-    d.loads *= math.exp(-dt / SUPERVISED)
+    Engineering Practice 3, 1995): half waves whose area is beyond MIN_HALF_WAVE_AREA are counted and forgotten within
+    OSCILLATION_WINDOW_S;
+    OSCILLATION_HALF_WAVES of them are an oscillation."""
+    d.loads *= math.exp(-dt / OSCILLATION_WINDOW_S)
     if e * d.e < 0.0:
-        if d.area > AREA:
-            d.loads = min(d.loads + 1.0, 2.0 * LOADS)
+        if d.area > MIN_HALF_WAVE_AREA:
+            d.loads = min(d.loads + 1.0, 2.0 * OSCILLATION_HALF_WAVES)
         d.area = 0.0
     if e != 0.0:
         d.e = e
     d.area += abs(e) * dt
-    d.oscillates = beyond(d.oscillates, d.loads, LOADS, 0.5 * LOADS)
+    d.oscillates = beyond(d.oscillates, d.loads, OSCILLATION_HALF_WAVES, 0.5 * OSCILLATION_HALF_WAVES)
     return d.oscillates != 0

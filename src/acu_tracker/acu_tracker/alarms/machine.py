@@ -7,21 +7,21 @@ import numpy as np
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 
-STATES = ('normal', 'unacknowledged', 'acknowledged', 'returned unacknowledged', 'latched unacknowledged',
-          'latched acknowledged', 'shelved', 'suppressed by design')
-State = codes(STATES)
+ALARM_STATES = ('normal', 'unacknowledged', 'acknowledged', 'returned unacknowledged', 'latched unacknowledged',
+                'latched acknowledged', 'shelved', 'suppressed by design')
+State = codes(ALARM_STATES)
 
-EVENTS = ('raise', 'clear', 'acknowledge', 'reset', 'shelve', 'unshelve', 'suppress', 'release')
-Event = codes(EVENTS)
+ALARM_EVENTS = ('raise', 'clear', 'acknowledge', 'reset', 'shelve', 'unshelve', 'suppress', 'release')
+Event = codes(ALARM_EVENTS)
 """raise, clear: the condition is there, or gone, in this step; suppress, release: the alarm means nothing now, or does
 again; the others are asked for."""
 
-REFUSED = -1
+EVENT_REFUSED = -1
 """An event that a state does not take."""
 
-_N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(STATES)), REFUSED)
+_N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(ALARM_STATES)), EVENT_REFUSED)
 
-NEXT = np.array((
+STATE_TRANSITIONS = np.array((
     # raise, clear, acknowledge, reset, shelve, unshelve, suppress, release
     (_U, _N, _x, _x, _SH, _x, _SU, _N),        # normal
     (_U, _R, _A, _x, _SH, _x, _U, _U),         # unacknowledged
@@ -32,28 +32,30 @@ NEXT = np.array((
     (_SH, _SH, _x, _x, _SH, _N, _SH, _SH),     # shelved
     (_SU, _SU, _x, _x, _SH, _x, _SU, _N),      # suppressed by design
 ))
-"""NEXT[state, event] of an alarm that is not latched. An alarm that is there is never suppressed: its condition counts
+"""STATE_TRANSITIONS[state, event] of an alarm that is not latched. An alarm that is there is never suppressed: its
+condition counts
 as gone, so that it returns, and is acknowledged, before."""
 
-ANNUNCIATED = (False, True, True, True, True, True, False, False)
+IS_ANNUNCIATED = (False, True, True, True, True, True, False, False)
 """States in which an alarm is told."""
 
-LISTED = (False, True, True, True, True, True, True, False)
+IS_LISTED = (False, True, True, True, True, True, True, False)
 """States in which it is in the list of alarms: told, or shelved."""
 
-WAITING = (False, True, False, True, True, False, False, False)
+AWAITS_ACKNOWLEDGEMENT = (False, True, False, True, True, False, False, False)
 """States in which it waits for an acknowledgement."""
 
-LATCHED = (False, False, False, False, True, True, False, False)
+IS_LATCHED = (False, False, False, False, True, True, False, False)
 """States that only a reset ends."""
 
 
 @compiled
 def next_state(state, event, latched):
-    """The state after an event, REFUSED where the state does not take it; latched: 1 for an alarm that is reset."""
+    """The state after an event, EVENT_REFUSED where the state does not take it; latched: 1 for an alarm that is
+    reset."""
     if latched and event == Event.CLEAR:
         if state == State.UNACKNOWLEDGED:
             return State.LATCHED_UNACKNOWLEDGED
         if state == State.ACKNOWLEDGED:
             return State.LATCHED_ACKNOWLEDGED
-    return NEXT[state, event]
+    return STATE_TRANSITIONS[state, event]

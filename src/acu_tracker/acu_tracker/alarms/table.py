@@ -4,9 +4,9 @@ import typing
 from pedestal_common.codes import bits
 from pedestal_common.graph.topics import AXES
 
-PRIORITIES = ('critical', 'high', 'medium', 'low')
+ALARM_PRIORITIES = ('critical', 'high', 'medium', 'low')
 
-JUDGED = ('always', 'motors', 'moving', 'following')
+JUDGED_CASES = ('always', 'motors', 'moving', 'following')
 """When an alarm is judged, beside which it is suppressed by design: always; where the axes have motors; there in any
 mode but standby; in a mode that follows a target."""
 
@@ -14,12 +14,12 @@ mode but standby; in a mode that follows a target."""
 class Alarm(typing.NamedTuple):
     """A row of ALARMS.
 
-    priority     of PRIORITIES
+    priority     of ALARM_PRIORITIES
     on_delay     time for which its condition must be there before it is raised [s]; off_delay: gone before it clears
     latched      whether it stays until it is reset
     cause        names of the alarms that it may be a consequence of
     meaning      what is wrong; action: what the operator shall do
-    judged       of JUDGED
+    judged       of JUDGED_CASES
     """
     name: str
     priority: str
@@ -156,17 +156,18 @@ ALARMS = (
           'look at the sender of it'),
 )
 
-NAMES = tuple(alarm.name for alarm in ALARMS)
-INDEX = {name: i for i, name in enumerate(NAMES)}
+ALARM_NAMES = tuple(alarm.name for alarm in ALARMS)
+ALARM_INDEX = {name: i for i, name in enumerate(ALARM_NAMES)}
 
-ON_DELAY = tuple(alarm.on_delay for alarm in ALARMS)
-OFF_DELAY = tuple(alarm.off_delay for alarm in ALARMS)
-LATCHED = tuple(int(alarm.latched) for alarm in ALARMS)
-CAUSES = tuple(sum(1 << INDEX[name] for name in alarm.cause) for alarm in ALARMS)
+ON_DELAYS_S = tuple(alarm.on_delay for alarm in ALARMS)
+OFF_DELAYS_S = tuple(alarm.off_delay for alarm in ALARMS)
+LATCHED_FLAGS = tuple(int(alarm.latched) for alarm in ALARMS)
+CAUSE_BITS = tuple(sum(1 << ALARM_INDEX[name] for name in alarm.cause) for alarm in ALARMS)
 """Of each alarm the bits of its causes."""
 
-JUDGED_WHEN = tuple(sum(1 << i for i, alarm in enumerate(ALARMS) if alarm.judged == when) for when in JUDGED)
-"""Of each of JUDGED the bits of the alarms that are judged then."""
+JUDGED_ALARM_BITS = tuple(sum(1 << i for i,
+                              alarm in enumerate(ALARMS) if alarm.judged == when) for when in JUDGED_CASES)
+"""Of each of JUDGED_CASES the bits of the alarms that are judged then."""
 
-Bit = bits(NAMES)
+Bit = bits(ALARM_NAMES)
 """Of each alarm; shifted to the left, that of an alarm of the azimuth is that of the elevation."""

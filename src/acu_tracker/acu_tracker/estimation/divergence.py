@@ -10,19 +10,19 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-DIVERGENCE = np.dtype([('m', 'f8'), ('diverged', 'i8')], align=True)
+DIVERGENCE_DTYPE = np.dtype([('m', 'f8'), ('diverged', 'i8')], align=True)
 """m: the mean [-]; diverged: 1 since it was too large, until it is reset."""
 
-ERRORS = 100
+DIVERGENCE_ERROR_COUNT = 100
 """Number of errors that the mean is taken over. Honest filters reach 1.25 in their worst half second."""
 
-LARGEST = 12.5
+MAX_COUNTED_ERROR = 12.5
 """More does not count of one error, half the default gate: an interference of some errors is none of the filter."""
 
-LIMIT = 7.0
+DIVERGENCE_LIMIT = 7.0
 """Largest m. A filter that knows no acceleration, on a target that reverses, reaches 6.1 and keeps it in the beam."""
 
-LIMIT_WITHOUT_SIGNAL = 2.0
+COASTING_DIVERGENCE_LIMIT = 2.0
 """Largest m with which the filter may coast."""
 
 
@@ -37,13 +37,13 @@ def take(s, innovation):
     """Take the Innovation of an error; NaN where there was no prediction."""
     x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
     if x == x:
-        s.m += (min(x, LARGEST) - s.m) / ERRORS
+        s.m += (min(x, MAX_COUNTED_ERROR) - s.m) / DIVERGENCE_ERROR_COUNT
 
 
 @compiled
 def diverges(s, without_signal):
     """Return whether the filter has diverged by now. without_signal: it coasts, and nothing explains why."""
-    return s.m > (LIMIT_WITHOUT_SIGNAL if without_signal else LIMIT)
+    return s.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
 
 
 @compiled

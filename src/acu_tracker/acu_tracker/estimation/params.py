@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from acu_tracker.estimation.filters.kinds import KINDS, named_models
+from acu_tracker.estimation.filters.kinds import FILTER_KINDS, named_models
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 _DEG = math.pi / 180.0
@@ -76,7 +76,7 @@ class ImmParameters(Parameters):
 class FilterParameters(Parameters):
     """Filter of an axis: its kind, and for every kind its parameters; all may be changed while it runs."""
 
-    kind: str = choice('imm', KINDS, 'of the filter; may be changed while it runs')
+    kind: str = choice('imm', FILTER_KINDS, 'of the filter; may be changed while it runs')
     rate_measurement: bool = flag(False, 'use the measured rate of the target, where there is one (paper 004); '
                                   'imm_ukf does while it has no range')
     alpha_beta: AlphaBetaParameters = group(AlphaBetaParameters)

@@ -4,10 +4,10 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-REPETITION = np.dtype([('said', 'f8', (3,)), ('at', 'f8', (2,))], align=True)
+REPETITION_DTYPE = np.dtype([('said', 'f8', (3,)), ('at', 'f8', (2,))], align=True)
 """said: errors [rad] and C/N0 [dB-Hz]; at: deck angles [rad] of the beam when they were said first."""
 
-LOOK = 3e-3
+REPETITION_TRAVEL_RAD = 3e-3
 """Way of the beam [rad] on which they must change."""
 
 
@@ -18,4 +18,4 @@ def take(s, u, at):
         s.said[0], s.said[1], s.said[2] = u.cross_elevation, u.elevation, u.cn0_dbhz
         s.at[0], s.at[1] = at.A, at.E
         return False
-    return max(abs(at.A - s.at[0]), abs(at.E - s.at[1])) > LOOK
+    return max(abs(at.A - s.at[0]), abs(at.E - s.at[1])) > REPETITION_TRAVEL_RAD

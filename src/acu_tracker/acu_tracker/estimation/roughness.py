@@ -11,13 +11,13 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-ROUGHNESS = np.dtype([('nu', 'f8', (2,)), ('q', 'f8')], align=True)
+ROUGHNESS_DTYPE = np.dtype([('nu', 'f8', (2,)), ('q', 'f8')], align=True)
 """nu: innovations of the error before [rad], NaN: there was none; q [-]."""
 
-ERRORS = 10
+ROUGHNESS_ERROR_COUNT = 10
 """Number of errors that the mean is taken over."""
 
-LARGEST = 100.0
+MAX_COUNTED_DIFFERENCE = 100.0
 """More does not count of one difference, so that one outlier, which makes two, is left to the gate."""
 
 
@@ -38,5 +38,5 @@ def take(s, innovation, m):
         x += 0.25 * d * d / m.axis[i].variance
         s.nu[i] = nu
     if x == x:
-        s.q += (min(x, LARGEST) - s.q) / ERRORS
+        s.q += (min(x, MAX_COUNTED_DIFFERENCE) - s.q) / ROUGHNESS_ERROR_COUNT
     return s.q

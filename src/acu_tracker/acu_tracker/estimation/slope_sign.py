@@ -19,24 +19,25 @@ import numpy as np
 from acu_tracker.geometry.vector import Vector, dot, rotated
 from pedestal_common.compiled import compiled
 
-SLOPE_SIGN = np.dtype([('stamp', 'f8'), ('n', 'i8'), ('line', 'f8', (5, 2)), ('J', 'f8', (2, 2))], align=True)
+SLOPE_SIGN_DTYPE = np.dtype([('stamp', 'f8'), ('n', 'i8'), ('line', 'f8', (5, 2)), ('J', 'f8', (2, 2))], align=True)
 """stamp of the last error [s], -inf: there was none; n: errors in the lines, value and rate of the beam's unit vector
 (ENU) and of both errors [rad]; J+ and J- of both axes [-]."""
 
-LINE = 200
+LINE_ERROR_COUNT = 200
 """Errors that a line remembers: so many that the beam's way counts before its speed does."""
 
-ERRORS = 100
+SLOPE_ERROR_COUNT = 100
 """Number of errors that J is taken over; a reversal of the target is over in the mean of them."""
 
-FEWEST = 60
+MIN_ERROR_COUNT = 60
 """Errors since autotrack began, or the signal came back, before which nothing is said: means of a few are no ratio."""
 
-NEAR = 0.5
+MAX_ERROR_BEAMWIDTHS = 0.5
 """Largest error that is looked at [beamwidths]."""
 
-RATIO, LEAST, LEAK = 5.0, 0.5, 0.1
-"""Slope reversed: J+ > RATIO J- and J+ > J- + LEAST + LEAK (J+ + J- of the other axis). A target that reverses is a
+REVERSED_SLOPE_RATIO, REVERSED_SLOPE_MARGIN, CROSS_AXIS_LEAKAGE = 5.0, 0.5, 0.1
+"""Slope reversed: J+ > REVERSED_SLOPE_RATIO J- and J+ > J- + REVERSED_SLOPE_MARGIN + CROSS_AXIS_LEAKAGE (J+ + J- of
+the other axis). A target that reverses is a
 while ahead of the beam: at 11 deg/s2 J+ reaches 2.8 J- in 30 closed loops of uav_flyby, and without noise 2.9 at a
 bandwidth of 20 rad/s, 4.6 at 10. Of what the other axis does some is seen, as the beam's axes turn on its way: 0.0015
 where a beam of 1 deg on a rolling deck comes from half its width off, without noise."""
@@ -56,7 +57,7 @@ def beam(mat_ed, A, E):
 @compiled
 def near(u, beamwidth):
     """Whether an error of signals.INPUTS is on the straight part of its curve; beamwidth [rad]."""
-    return math.hypot(u.cross_elevation, u.elevation) < NEAR * beamwidth
+    return math.hypot(u.cross_elevation, u.elevation) < MAX_ERROR_BEAMWIDTHS * beamwidth
 
 
 @compiled
@@ -87,7 +88,7 @@ def _begin(s, u, error):
 @compiled
 def _reversed(J, other):
     """Whether J+ and J- of an axis say that its slope is; other: those of the other axis."""
-    return J[0] > RATIO * J[1] and J[0] > J[1] + LEAST + LEAK * (other[0] + other[1])
+    return J[0] > REVERSED_SLOPE_RATIO * J[1] and J[0] > J[1] + REVERSED_SLOPE_MARGIN + CROSS_AXIS_LEAKAGE * (other[0] + other[1])
 
 
 @compiled
@@ -101,14 +102,14 @@ def take(s, t, beam, error, variance, gap):
     if T > gap:
         _begin(s, beam.u, error)
         return False
-    n = s.n = min(s.n + 1, LINE)
-    # Gains of the least squares of n points; of the last n, as they fade, from LINE on.
+    n = s.n = min(s.n + 1, LINE_ERROR_COUNT)
+    # Gains of the least squares of n points; of the last n, as they fade, from LINE_ERROR_COUNT on.
     alpha, beta = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1))
     nu = Vector(_innovation(s, 0, beam.u.x, T, alpha, beta), _innovation(s, 1, beam.u.y, T, alpha, beta),
                 _innovation(s, 2, beam.u.z, T, alpha, beta))
     for i, along in enumerate((beam.across, beam.up)):
         b, e = dot(nu, along), _innovation(s, 3 + i, error[i], T, alpha, beta)
         if n > 2:
-            s.J[i, 0] += ((b + e) * (b + e) / variance - s.J[i, 0]) / ERRORS
-            s.J[i, 1] += ((b - e) * (b - e) / variance - s.J[i, 1]) / ERRORS
-    return n >= FEWEST and (_reversed(s.J[0], s.J[1]) or _reversed(s.J[1], s.J[0]))
+            s.J[i, 0] += ((b + e) * (b + e) / variance - s.J[i, 0]) / SLOPE_ERROR_COUNT
+            s.J[i, 1] += ((b - e) * (b - e) / variance - s.J[i, 1]) / SLOPE_ERROR_COUNT
+    return n >= MIN_ERROR_COUNT and (_reversed(s.J[0], s.J[1]) or _reversed(s.J[1], s.J[0]))

@@ -20,17 +20,18 @@ from acu_tracker.estimation.filters.measurement import (
     error_variance,
 )
 from acu_tracker.geometry import attitude, attitude_error, deck_reference, estimate_frame, lever_arm
-from acu_tracker.geometry.deck_reference import STILL, Attitude
+from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
 from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Vector, rotated
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
-TARGET = np.dtype([('tracker', tracker.TRACKER), ('frame', estimate_frame.FRAME),
-                   ('lever_arm', lever_arm.LEVER_ARM)], align=True)
+TARGET_DTYPE = np.dtype([('tracker', tracker.TRACKER_DTYPE), ('frame', estimate_frame.FRAME_DTYPE),
+                         ('lever_arm', lever_arm.LEVER_ARM_DTYPE)], align=True)
 
-GATED, STALE, NOISY, NO_ATTITUDE = tracker.GATED, tracker.STALE, tracker.NOISY, tracker.NOISY + 1
-"""Outcomes of `take`: those of the tracker, or NO_ATTITUDE."""
+(OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY, OUTCOME_NO_ATTITUDE) = (tracker.OUTCOME_GATED, tracker.OUTCOME_STALE,
+                                                                      tracker.OUTCOME_NOISY, tracker.OUTCOME_NOISY + 1)
+"""Outcomes of `take`: those of the tracker, or OUTCOME_NO_ATTITUDE."""
 
 Source = namedtuple('Source', 'framed motion')
 """The Motion of the target that is pointed at: in the frame of the estimate (framed 1) or in earth angles (framed
@@ -38,7 +39,7 @@ Source = namedtuple('Source', 'framed motion')
 
 
 def initialise(g):
-    """No estimate; g (n,) of TARGET."""
+    """No estimate; g (n,) of TARGET_DTYPE."""
     g['frame']['mat'] = np.eye(3)
 
 
@@ -66,13 +67,14 @@ def _measured_rates(g, moves, deck, u, at):
         framed = estimate_frame.of_deck(g.frame, deck)
         v, dv = lever_arm.to_ins(g.lever_arm, v, dv)
         return deck_reference.earth_rates(framed, v, dv)
-    motion = angles(LineOfSight(v, dv, STILL))
+    motion = angles(LineOfSight(v, dv, ZERO_VECTOR))
     return motion.azimuth.rate, motion.elevation.rate
 
 
 @compiled
 def take(g, p, c, deck, u, at, measured, restart_gap):
-    """Filter the receiver's error of INPUTS u: (STARTED, ACCEPTED, GATED, STALE, NOISY or NO_ATTITUDE; its
+    """Filter the receiver's error of INPUTS u: (STARTED, ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY or
+    OUTCOME_NO_ATTITUDE; its
     Innovation).
 
     p, c: records of SharedParameters and of tracker.CONSTANTS; deck: ATTITUDE; at: Pointing of the antenna when the
@@ -87,7 +89,7 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     known, now = attitude.at(deck, p, t)
     if deck.stabilised or g.frame.tilted:
         if not known:
-            return NO_ATTITUDE, NO_INNOVATION
+            return OUTCOME_NO_ATTITUDE, NO_INNOVATION
         azimuth, elevation = _measured_direction(g, p, now.mat, u.range if deck.stabilised else math.nan, azimuth,
                                                  elevation)
     azimuth_rate, elevation_rate = math.nan, math.nan
@@ -108,7 +110,7 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
             AxisMeasurement(elevation, R_elevation, elevation_rate, R_rate))
     outcome, innovation = tracker.observe(g.tracker, p.tracker, c, Measurement(t, axis, u.range, u.range_variance),
                                           restart_gap)
-    if outcome != STALE:
+    if outcome != OUTCOME_STALE:
         _choose_frame(g, c)
     return outcome, innovation
 
@@ -118,10 +120,10 @@ def _choose_frame(g, c):
     """Move the filter to the frame that suits the elevation of the target."""
     f = g.frame
     motion = tracker.outlook(g.tracker, c, g.tracker.stamp)
-    if not (f.tilted or motion.elevation.angle > estimate_frame.RAISE):
+    if not (f.tilted or motion.elevation.angle > estimate_frame.TILT_ELEVATION_RAD):
         return
     sight = estimate_frame.to_earth(f, motion)
-    if f.tilted and sight.u.z >= math.sin(estimate_frame.LOWER):
+    if f.tilted and sight.u.z >= math.sin(estimate_frame.LEVEL_ELEVATION_RAD):
         return
     if f.tilted:
         estimate_frame.level(f)
@@ -154,7 +156,7 @@ def on_deck(g, p, deck, t, source):
 @compiled
 def levelled_azimuth(g, level, source):
     """AxisMotion of the azimuth of a Source on a deck that stands still, level: Rotation deck -> earth."""
-    still = Attitude(level, STILL, STILL)
+    still = Attitude(level, ZERO_VECTOR, ZERO_VECTOR)
     if source.framed:
         still = estimate_frame.of_deck(g.frame, still)
     return angles(deck_reference.on_deck(still, line_of_sight(source.motion))).azimuth

@@ -11,17 +11,18 @@ from acu_tracker.estimation.filters import target_filter
 from acu_tracker.estimation.filters.measurement import NO_INNOVATION, Measurement, with_azimuth_near, with_rate
 from pedestal_common.compiled import compiled
 
-CONSTANTS = np.dtype([('filter', target_filter.CONSTANTS), ('gates', 'f8', (2,))], align=True)
+CONSTANTS_DTYPE = np.dtype([('filter', target_filter.CONSTANTS_DTYPE), ('gates', 'f8', (2,))], align=True)
 """gates: largest nu' S^-1 nu that is accepted, of the two angles, of one rate or range."""
 
-TRACKER = np.dtype([('filter', target_filter.FILTER), ('stamp', 'f8'), ('running', 'i8'), ('converged', 'i8'),
-                    ('roughness', roughness.ROUGHNESS),
-                    ('accepted_in_a_row', 'i8'), ('gated_in_a_row', 'i8'), ('rates_in_a_row', 'i8', (2,)),
-                    ('gated', 'i8'), ('rates_gated', 'i8'), ('ranges_gated', 'i8')], align=True)
+TRACKER_DTYPE = np.dtype([('filter', target_filter.FILTER_DTYPE), ('stamp', 'f8'), ('running', 'i8'),
+                          ('converged', 'i8'),
+                          ('roughness', roughness.ROUGHNESS_DTYPE),
+                          ('accepted_in_a_row', 'i8'), ('gated_in_a_row', 'i8'), ('rates_in_a_row', 'i8', (2,)),
+                          ('gated', 'i8'), ('rates_gated', 'i8'), ('ranges_gated', 'i8')], align=True)
 """stamp: of the last accepted measurement [s]; accepted_in_a_row, gated_in_a_row: measurements since the other
 happened; rates_in_a_row: rates of an axis that agreed with its angles; gated, rates_gated, ranges_gated: in all."""
 
-STARTED, ACCEPTED, GATED, STALE, NOISY = range(5)
+OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = range(5)
 """Outcomes of `observe`."""
 
 
@@ -45,7 +46,7 @@ def gate_of_one(gate):
 
 def constants(params, axes) -> np.ndarray:
     """Constants (1,) of TrackerParameters and the FilterParameters of both axes."""
-    c = np.zeros(1, CONSTANTS)
+    c = np.zeros(1, CONSTANTS_DTYPE)
     c['filter'] = target_filter.constants(params.ukf, axes, params.receiver.noise_bandwidth)
     c['gates'] = params.gate, gate_of_one(params.gate)
     return c
@@ -106,17 +107,18 @@ def _with_accepted_rates(t, p, c, m, innovation):
 
 @compiled
 def observe(t, p, c, m, restart_gap):
-    """Take a Measurement: (STARTED, ACCEPTED, GATED, STALE or NOISY; its Innovation, NaN where nothing was predicted).
+    """Take a Measurement: (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE or OUTCOME_NOISY; its
+    Innovation, NaN where nothing was predicted).
 
     Errors that are noise (`roughness`) are left alone. The direction is accepted or gated, and then each of range and
     rates by itself. The filter restarts after gate_restart gated ones in a row, and after restart_gap [s] without any.
     """
     T = m.stamp - t.stamp
     if t.running and T <= 0.0:
-        return STALE, NO_INNOVATION
+        return OUTCOME_STALE, NO_INNOVATION
     f, k = t.filter, c.filter
     m = target_filter.usable(k, m)
-    outcome, innovation = STARTED, NO_INNOVATION
+    outcome, innovation = OUTCOME_STARTED, NO_INNOVATION
     if t.running and T <= restart_gap:
         target_filter.predict(f, k, T)
         m = with_azimuth_near(m, target_filter.axes_azimuth(f))
@@ -124,21 +126,21 @@ def observe(t, p, c, m, restart_gap):
         if roughness.take(t.roughness, innovation, m) > p.gate:
             t.gated += 1
             t.accepted_in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
-            return NOISY, innovation
+            return OUTCOME_NOISY, innovation
         if innovation.range_nu * innovation.range_nu > c.gates[1] * innovation.range_S:
             t.ranges_gated += 1
             m = Measurement(m.stamp, m.axis, math.nan, m.range_variance)
         if innovation.axis[0].chi_square + innovation.axis[1].chi_square <= c.gates[0]:
             m = _with_accepted_rates(t, p, c, m, innovation)
             target_filter.correct(f, k, m)
-            outcome = ACCEPTED
+            outcome = OUTCOME_ACCEPTED
         else:
             t.gated += 1
             if t.gated_in_a_row + 1 < p.gate_restart:
                 t.gated_in_a_row += 1
                 t.accepted_in_a_row = t.rates_in_a_row[0] = t.rates_in_a_row[1] = 0
-                return GATED, innovation
-    if outcome == STARTED:
+                return OUTCOME_GATED, innovation
+    if outcome == OUTCOME_STARTED:
         near = outlook(t, c, t.stamp).azimuth.angle if t.running else math.nan
         target_filter.start(f, k, with_azimuth_near(m, near if math.isfinite(near) else m.axis[0].angle),
                             p.initial_rate)

@@ -4,28 +4,28 @@ import math
 import numpy as np
 
 from acu_tracker.geometry import attitude_error, attitude_jump, deck_reference
-from acu_tracker.geometry.deck_reference import STILL, Attitude
+from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
 from acu_tracker.geometry.history import bracket, history_type, push
 from acu_tracker.geometry.motion import angles, line_of_sight
 from acu_tracker.geometry.vector import Rotation, Vector, turn
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import ASHORE
+from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 from pedestal_common.geometry.quaternion import product
 
-ATTITUDE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('told', 'f8', (7,)),
-                     ('aligned', 'i8'), ('jump', attitude_jump.JUMP),
-                     ('error', attitude_error.ERROR)], align=True)
+ATTITUDE_DTYPE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('told', 'f8', (7,)),
+                           ('aligned', 'i8'), ('jump', attitude_jump.ATTITUDE_JUMP_DTYPE),
+                           ('error', attitude_error.ATTITUDE_ERROR_DTYPE)], align=True)
 """stabilised: 1 on a ship, 0 ashore, where the attitude never changes; history: quaternion (x, y, z, w) deck -> earth,
 w [rad/s], dw [rad/s2] of the last steps, as they are believed; told: the last q and w as they came; aligned: whether
 the INS was; error: how its error changes.
 """
 
-TURNS = 1e-6
+MIN_TURN_RATE_RAD_S = 1e-6
 """Rate [rad/s] of a deck from which its attitude changes from one measurement to the next."""
 
-UNKNOWN = Vector(math.nan, math.nan, math.nan)
+UNKNOWN_VECTOR = Vector(math.nan, math.nan, math.nan)
 
-INVALID, REPEATED, NEW = range(3)
+SAMPLE_INVALID, SAMPLE_REPEATED, SAMPLE_NEW = range(3)
 """What `take` makes of an attitude."""
 
 
@@ -66,42 +66,44 @@ def rotated(q, r):
 
 
 @compiled
-def _same(s, q, w):
+def _repeats(s, q, w):
     """Whether an INS says once more what it said before, though it says that the deck turns. Keeps what it says."""
     same, turns = True, False
     for i in range(7):
         x = q[i] if i < 4 else w[i - 4]
         same &= x == s.told[i]
-        turns |= i >= 4 and abs(x) > TURNS
+        turns |= i >= 4 and abs(x) > MIN_TURN_RATE_RAD_S
         s.told[i] = x
     return same and turns
 
 
 @compiled
-def _believe(s, row, last, T):
+def _correct_jump(s, row, last, T):
     """Turn the quaternion in a row of the history into the one that is believed, T [s] after that in row `last`."""
     a, b = s.history.sample[last], s.history.sample[row]
     predicted = rotated(a, (0.5 * T * (a[4] + b[4]), 0.5 * T * (a[5] + b[5]), 0.5 * T * (a[6] + b[6])))
-    b[0], b[1], b[2], b[3] = attitude_jump.believed(s.jump, predicted, (b[0], b[1], b[2], b[3]), T)
+    b[0], b[1], b[2], b[3] = attitude_jump.jump_corrected(s.jump, predicted, (b[0], b[1], b[2], b[3]), T)
 
 
 @compiled
 def take(s, p, t_k, stamp, q, w, aligning):
-    """Take a measured quaternion q (4,) and rate w (3,) [rad/s] into the history: INVALID, REPEATED or NEW.
+    """Take a measured quaternion q (4,) and rate w (3,) [rad/s] into the history: SAMPLE_INVALID, SAMPLE_REPEATED or
+    SAMPLE_NEW.
 
-    INVALID: not finite, no unit quaternion, older than the last or younger than the step t_k [s], or the numbers of
+    SAMPLE_INVALID: not finite, no unit quaternion, older than the last or younger than the step t_k [s], or the
+    numbers of
     the last though the deck turns. aligning: whether the INS is, so that its attitude may jump.
     """
     norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if not (abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
-        return INVALID
+        return SAMPLE_INVALID
     h = s.history
     last = h.newest
     T = stamp - h.stamp[last] if h.count > 0 else math.inf
     if not (T > 0.0 and stamp <= t_k):
-        return REPEATED if T == 0.0 else INVALID
-    if _same(s, q, w):
-        return INVALID
+        return SAMPLE_REPEATED if T == 0.0 else SAMPLE_INVALID
+    if _repeats(s, q, w):
+        return SAMPLE_INVALID
     row = push(h, stamp)
     # One sign of the quaternion, so that neighbours can be averaged.
     dot = 0.0
@@ -116,11 +118,11 @@ def take(s, p, t_k, stamp, q, w, aligning):
             h.sample[row, 7 + i] = smoothed_acceleration(
                 h.sample[last, 7 + i], w[i], h.sample[last, 4 + i], T, p.attitude_smoothing)
     if T <= p.attitude_timeout and s.aligned and not aligning:
-        _believe(s, row, last, T)
+        _correct_jump(s, row, last, T)
     else:
-        attitude_jump.forget(s.jump)
+        attitude_jump.clear(s.jump)
     s.aligned = not aligning
-    return NEW
+    return SAMPLE_NEW
 
 
 @compiled
@@ -128,13 +130,15 @@ def at(s, p, t):
     """(whether there is an attitude at t [s], between two samples or predicted from the last; the Attitude, deck ->
     earth, of NaN where there is none)."""
     if not s.stabilised:
-        return True, Attitude(turn(ASHORE[0], ASHORE[1], ASHORE[2], ASHORE[3]), STILL, STILL)
+        return True, Attitude(turn(ASHORE_ATTITUDE[0], ASHORE_ATTITUDE[1], ASHORE_ATTITUDE[2], ASHORE_ATTITUDE[3]),
+                              ZERO_VECTOR, ZERO_VECTOR)
     h = s.history
     last = h.sample[h.newest]
     T = t - h.stamp[h.newest]
     i, j, f = (h.newest, h.newest, 0.0) if T >= 0.0 else bracket(h, t)
     if h.count == 0 or T > p.attitude_timeout or i < 0:
-        return False, Attitude(Rotation(UNKNOWN, UNKNOWN, UNKNOWN), UNKNOWN, UNKNOWN)
+        return False, Attitude(Rotation(UNKNOWN_VECTOR, UNKNOWN_VECTOR, UNKNOWN_VECTOR), UNKNOWN_VECTOR,
+                               UNKNOWN_VECTOR)
     if T >= 0.0:
         dw = Vector(last[7], last[8], last[9])
         rate = Vector(last[4] + T * dw.x, last[5] + T * dw.y, last[6] + T * dw.z)

@@ -3,11 +3,11 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-ERROR = np.dtype([('told', 'i8'), ('noise', 'f8', (2,)), ('walk', 'f8', (2,))], align=True)
+ATTITUDE_ERROR_DTYPE = np.dtype([('told', 'i8'), ('noise', 'f8', (2,)), ('walk', 'f8', (2,))], align=True)
 """Variances of tilt (roll and pitch) and of heading, once told: noise of each sample [rad2], what they grow by as the
 error wanders [rad2/s]."""
 
-LARGEST = 0.5
+MAX_ATTITUDE_NOISE = 0.5
 """Noise [rad] and wander [rad/sqrt(s)] above which nobody is believed."""
 
 
@@ -16,7 +16,7 @@ def take(e, noise, walk):
     """Believe the 1-sigma (3,) of roll, pitch and heading that an INS says; False, and nothing changed, where one is
     none."""
     for i in range(3):
-        if not (0.0 <= noise[i] <= LARGEST and 0.0 <= walk[i] <= LARGEST):
+        if not (0.0 <= noise[i] <= MAX_ATTITUDE_NOISE and 0.0 <= walk[i] <= MAX_ATTITUDE_NOISE):
             return False
     e.noise[0], e.noise[1] = 0.5 * (noise[0] * noise[0] + noise[1] * noise[1]), noise[2] * noise[2]
     e.walk[0], e.walk[1] = 0.5 * (walk[0] * walk[0] + walk[1] * walk[1]), walk[2] * walk[2]

@@ -2,9 +2,10 @@
 
     p_k = b_k-1 (x) exp(w T / 2)    predicted by the rate w from the attitude b believed before
     b_k = c (x) q_k                 believed of the attitude q that is told; c = 1 as long as nothing has jumped
-    c = p_k (x) q_k*                after a jump, the angle between b_k and p_k is beyond JUMP
+    c = p_k (x) q_k*                after a jump, the angle between b_k and p_k is beyond ATTITUDE_JUMP_DTYPE
 
-(quaternions deck -> earth, so that c turns about axes of the earth). The angle of c then goes to 0 by RATE. Whoever
+(quaternions deck -> earth, so that c turns about axes of the earth). The angle of c then goes to 0 by
+JUMP_DECAY_RATE_RAD_S. Whoever
 tracks by the receiver does not feel a jump, whatever its size and whether it is the error or the end of one; whoever
 points by the attitude goes to the new one slowly enough that somebody can look.
 """
@@ -15,14 +16,14 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
 
-JUMP = np.dtype([('c', 'f8', (4,)), ('apart', 'i8')], align=True)
+ATTITUDE_JUMP_DTYPE = np.dtype([('c', 'f8', (4,)), ('apart', 'i8')], align=True)
 """c: quaternion (x, y, z, w) earth -> earth; apart: 1 while it is not that of no rotation."""
 
-ANGLE = 3e-3
+MAX_UNEXPLAINED_ANGLE_RAD = 3e-3
 """That the rates must explain in a step [rad]: a rate that is wrong by 0.5 rad/s, or a hundred times the noise of an
 INS."""
 
-RATE = 1e-3
+JUMP_DECAY_RATE_RAD_S = 1e-3
 """With which a jump is let in [rad/s]."""
 
 
@@ -39,16 +40,16 @@ def _half_angle(q):
 
 
 @compiled
-def forget(s):
+def clear(s):
     """Believe what is told."""
     s.apart = 0
 
 
 @compiled
-def _let_in(s, T):
-    """Take the angle of c down by RATE for T [s]."""
+def _decay(s, T):
+    """Take the angle of c down by JUMP_DECAY_RATE_RAD_S for T [s]."""
     half = _half_angle(s.c)
-    left = half - 0.5 * RATE * T
+    left = half - 0.5 * JUMP_DECAY_RATE_RAD_S * T
     if left <= 0.0:
         s.apart = 0
         return
@@ -57,14 +58,14 @@ def _let_in(s, T):
 
 
 @compiled
-def believed(s, predicted, told, T):
+def jump_corrected(s, predicted, told, T):
     """The quaternion that is believed of one that is told, T [s] after the one before; predicted: by the rates."""
     q = told
     if s.apart:
-        _let_in(s, T)
+        _decay(s, T)
         if s.apart:
             q = product(s.c, told)
-    if 2.0 * _half_angle(product(conjugate(predicted), q)) <= ANGLE:
+    if 2.0 * _half_angle(product(conjugate(predicted), q)) <= MAX_UNEXPLAINED_ANGLE_RAD:
         return q
     s.c[0], s.c[1], s.c[2], s.c[3] = product(predicted, conjugate(told))
     s.apart = 1

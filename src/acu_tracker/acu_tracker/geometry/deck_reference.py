@@ -10,7 +10,7 @@ from acu_tracker.geometry.vector import Vector, cross, minus, rotated, rotated_b
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 
-STILL = Vector(0.0, 0.0, 0.0)
+ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
 
 
 Attitude = namedtuple('Attitude', 'mat w dw')
@@ -32,7 +32,7 @@ def fixed_rates(w, A, E):
     """Rates (dA, dE) [rad/s] of the deck angles of an earth-fixed direction, now at A, E [rad], while the deck rotates
     at w [rad/s] (FLU)."""
     u = Vector(*line_of_sight.direction(A, E))
-    motion = angles(LineOfSight(u, times(-1.0, cross(w, u)), STILL))
+    motion = angles(LineOfSight(u, times(-1.0, cross(w, u)), ZERO_VECTOR))
     return motion.azimuth.rate, motion.elevation.rate
 
 
@@ -42,5 +42,5 @@ def earth_rates(attitude, u, du):
     u_e' = M (u' + w x u)."""
     wu = cross(attitude.w, u)
     du = Vector(du.x + wu.x, du.y + wu.y, du.z + wu.z)
-    motion = earth_angles(LineOfSight(rotated(attitude.mat, u), rotated(attitude.mat, du), STILL))
+    motion = earth_angles(LineOfSight(rotated(attitude.mat, u), rotated(attitude.mat, du), ZERO_VECTOR))
     return motion.azimuth.rate, motion.elevation.rate

@@ -6,19 +6,20 @@ import numpy as np
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
-DIRECTION = np.dtype([('stamp', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('moves', 'f8'), ('holds', 'f8')],
-                     align=True)
+DIRECTION_DTYPE = np.dtype([('stamp', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('moves', 'f8'),
+                            ('holds', 'f8')],
+                           align=True)
 """Azimuth and elevation [rad] at a stamp [s], -inf: none was given, and their rates [rad/s], which go on for `moves`
 [s]; it is good for `holds` [s]."""
 
 
 def initialise(d, angles):
-    """Angles (2,) [rad] that nobody has given; d: view of DIRECTION."""
+    """Angles (2,) [rad] that nobody has given; d: view of DIRECTION_DTYPE."""
     d['stamp'], d['angle'] = -math.inf, angles
 
 
-def give(d, stamp, angles, rates, moves, holds=0.0):
-    """Give angles and rates (2,) at a stamp [s]; d: view of DIRECTION."""
+def set_moving(d, stamp, angles, rates, moves, holds=0.0):
+    """Give angles and rates (2,) at a stamp [s]; d: view of DIRECTION_DTYPE."""
     d['stamp'], d['angle'], d['rate'], d['moves'], d['holds'] = stamp, angles, rates, moves, holds
 
 
@@ -29,7 +30,7 @@ def put(d, angle):
 
 
 @compiled
-def there(d, t):
+def valid_at(d, t):
     """Whether a direction is good at t [s]."""
     return t - d.stamp <= d.holds
 

@@ -5,7 +5,7 @@ from collections import namedtuple
 from acu_tracker.geometry.history import bracket, history_type, interpolated, push
 from pedestal_common.compiled import compiled
 
-ENCODERS = history_type(4)
+ENCODERS_DTYPE = history_type(4)
 """Azimuth, elevation [rad], their rates [rad/s], deck angles."""
 
 Pointing = namedtuple('Pointing', 'A E dA dE')

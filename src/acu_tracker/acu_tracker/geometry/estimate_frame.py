@@ -1,7 +1,8 @@
 """The frame of the target filter: the earth's, or near the zenith one whose equator lies along the target's motion.
 
-Azimuth and elevation are singular at the zenith. Above RAISE the filter changes to a frame in which the target moves
-along the equator, and back below LOWER. In it a great circle is an azimuth of constant rate.
+Azimuth and elevation are singular at the zenith. Above TILT_ELEVATION_RAD the filter changes to a frame in which the
+target moves
+along the equator, and back below LEVEL_ELEVATION_RAD. In it a great circle is an azimuth of constant rate.
 """
 import math
 
@@ -13,10 +14,10 @@ from acu_tracker.geometry.vector import Rotation, Vector, cross, dot, rotated, r
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
 
-RAISE, LOWER = math.radians(75.0), math.radians(70.0)
+TILT_ELEVATION_RAD, LEVEL_ELEVATION_RAD = math.radians(75.0), math.radians(70.0)
 """Elevation in the earth's frame [rad] above which the frame is tilted, below which it is not any more."""
 
-FRAME = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8')], align=True)
+FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8')], align=True)
 """mat: frame -> earth; tilted: 0 where both are the same."""
 
 

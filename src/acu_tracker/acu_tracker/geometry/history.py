@@ -3,21 +3,21 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-LENGTH = 64
+HISTORY_LENGTH = 64
 
 
 def history_type(width) -> np.dtype:
-    """Ring of LENGTH stamps [s] with `width` numbers each; `count` in use, `newest` the row of the last."""
-    return np.dtype([('stamp', 'f8', (LENGTH,)), ('sample', 'f8', (LENGTH, width)),
+    """Ring of HISTORY_LENGTH stamps [s] with `width` numbers each; `count` in use, `newest` the row of the last."""
+    return np.dtype([('stamp', 'f8', (HISTORY_LENGTH,)), ('sample', 'f8', (HISTORY_LENGTH, width)),
                      ('newest', 'i8'), ('count', 'i8')], align=True)
 
 
 @compiled
 def push(history, stamp):
     """Append a stamp [s] newer than all others: the row of its sample, which the caller fills."""
-    history.newest = (history.newest + 1) % LENGTH
+    history.newest = (history.newest + 1) % HISTORY_LENGTH
     history.stamp[history.newest] = stamp
-    history.count = min(history.count + 1, LENGTH)
+    history.count = min(history.count + 1, HISTORY_LENGTH)
     return history.newest
 
 
@@ -30,7 +30,7 @@ def bracket(history, t):
     if t == history.stamp[newer]:
         return newer, newer, 0.0
     for _ in range(history.count - 1):
-        older = (newer - 1) % LENGTH
+        older = (newer - 1) % HISTORY_LENGTH
         if history.stamp[older] <= t:
             return older, newer, (t - history.stamp[older]) / (history.stamp[newer] - history.stamp[older])
         newer = older

@@ -11,10 +11,10 @@ from acu_tracker.geometry.vector import Vector, minus, rotated, vector
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction, wrap
 
-LEVER_ARM = np.dtype([('arm', 'f8', (3,)), ('range', 'f8')], align=True)
+LEVER_ARM_DTYPE = np.dtype([('arm', 'f8', (3,)), ('range', 'f8')], align=True)
 """arm: r over the range of the INS, FLU [-]; range: that range [m], 0 where none was measured."""
 
-RANGE_SHARE = 0.05
+RANGE_SMOOTHING_SHARE = 0.05
 """Share of a measured range that the smoothed one takes."""
 
 
@@ -34,7 +34,7 @@ def from_ins(s, r, measured, running, v):
     if not running:
         s.range = R
     elif s.range > 0.0 and known:
-        s.range += RANGE_SHARE * (R - s.range)
+        s.range += RANGE_SMOOTHING_SHARE * (R - s.range)
     if not s.range > math.sqrt(r2):
         s.arm[:] = 0.0
         return v

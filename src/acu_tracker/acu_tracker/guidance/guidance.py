@@ -1,6 +1,7 @@
 """Where the axes are sent: the target of the mode on the deck, on the azimuth wrap that fits, or a slew ahead of it.
 
-g: record of GUIDANCE; k: of tracking.TRACKING; c: of control_unit.CONSTANTS; way: the bridge.Way of the program; gap:
+g: record of GUIDANCE_DTYPE; k: of tracking.TRACKING; c: of control_unit.CONSTANTS; way: the bridge.Way of the
+program; gap:
 the outage.Outage.
 """
 from collections import namedtuple
@@ -15,16 +16,17 @@ from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
 from acu_tracker.geometry.vector import rotation
 from acu_tracker.guidance import manual
 from acu_tracker.lookahead import planner
-from acu_tracker.mode import by_level
+from acu_tracker.mode import signal_level_modes
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import bridge, program_track
 from acu_tracker.search import acquisition
 from acu_tracker.servo import position_loop
 from pedestal_common.compiled import compiled
 
-GUIDANCE = np.dtype([
-    ('preset', direction.DIRECTION), ('slave', direction.DIRECTION), ('manual', manual.MANUAL),
-    ('bridge', bridge.BRIDGE), ('acquisition', acquisition.ACQUISITION), ('lookahead', planner.PLANNER),
+GUIDANCE_DTYPE = np.dtype([
+    ('preset', direction.DIRECTION_DTYPE), ('slave', direction.DIRECTION_DTYPE), ('manual', manual.MANUAL_DTYPE),
+    ('bridge', bridge.BRIDGE_DTYPE), ('acquisition', acquisition.ACQUISITION_DTYPE),
+    ('lookahead', planner.PLANNER_DTYPE),
     ('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('pointing_offset', 'f8'), ('overtravel', 'i8')], align=True)
 """bridge: the program where the target was last tracked; azimuth: raw one of the last reference; target_angles: deck
 angles of its target; pointing_offset: intended angle between beam and target [rad]; overtravel: 1: no azimuth wrap
@@ -35,7 +37,7 @@ Order = namedtuple('Order', 'mode begins azimuth stamp')
 
 
 def initialise(g, preset):
-    """No direction but the preset one (2,) [rad]; g: view of GUIDANCE."""
+    """No direction but the preset one (2,) [rad]; g: view of GUIDANCE_DTYPE."""
     direction.initialise(g['preset'], preset)
     direction.initialise(g['slave'], 0.0)
     manual.initialise(g['manual'])
@@ -53,7 +55,7 @@ def start_from(g, azimuth):
 def move_by_hand(g, c, order, ends, actual, dt):
     """Move the point that is commanded by hand on by dt [s]. ends: of both axes; actual: Motion of the axes, where it
     begins."""
-    heard = order.mode == Mode.RATE and manual.heard(g.manual, order.stamp)
+    heard = order.mode == Mode.RATE and manual.request_valid(g.manual, order.stamp)
     for i in range(2):
         if order.begins:
             manual.begin(g.manual, i, actual[i])
@@ -76,7 +78,7 @@ def motion(g, k, c, order, way, gap, now):
 def _reference(g, k, c, order, way, gap, t):
     """Reference Motion on the deck at t [s] of the mode: its target, on the azimuth wrap that fits, or a slew."""
     mode = order.mode
-    if not modes.FOLLOWS[mode]:
+    if not modes.FOLLOWS_TARGET[mode]:
         start_from(g, order.azimuth)
     if mode == Mode.STOW:
         return Motion(AxisMotion(c.axis[0].p.stow, 0.0, 0.0), AxisMotion(c.axis[1].p.stow, 0.0, 0.0))
@@ -103,10 +105,10 @@ def _source(g, k, c, mode, way, gap, t):
     """The target.Source of the mode at t [s]; the program bridges an outage that has a reason."""
     if mode == Mode.SLAVE:
         return target.Source(0, direction.motion_at(g.slave, t))
-    if modes.BY_TABLE[mode]:
+    if modes.FOLLOWS_TABLE[mode]:
         return target.Source(0, program_track.motion_at(way.program, t))
-    if modes.BY_LEVEL[mode]:
-        return by_level.source(g.acquisition, mode, c, way, t)
+    if modes.USES_SIGNAL_LEVEL[mode]:
+        return signal_level_modes.source(g.acquisition, mode, c, way, t)
     if way.valid and gap.coasting and gap.permitted and program_track.status(way.program, t) == Reason.NONE:
         return target.Source(0, bridge.motion_at(way, t))
     return target.outlook(k.target, c.tracker, t)
@@ -116,7 +118,7 @@ def _source(g, k, c, mode, way, gap, t):
 def _wrapped(g, limits, order, program, t, azimuth):
     """AxisMotion of the azimuth at t [s] on the wrap that fits; when a program begins, on one that holds all of it."""
     travel = Travel(0.0, 0.0)
-    begins = order.begins and modes.BY_TABLE[order.mode]
+    begins = order.begins and modes.FOLLOWS_TABLE[order.mode]
     if begins:
         travel = program_track.azimuth_travel(program, t)
     g.azimuth = azimuth_wrap.nearest(azimuth.angle, g.azimuth, limits.low, limits.high, travel)
@@ -138,19 +140,20 @@ def begin_by_level(g, k, c, before, mode, t):
     tracked = before == Mode.AUTOTRACK
     if tracked:
         sight = tracking.sight(k, c, t)
-        by_level.remember(g.acquisition, t, sight.u, sight.du)
-    elif not modes.BY_LEVEL[before]:
+        signal_level_modes.remember(g.acquisition, t, sight.u, sight.du)
+    elif not modes.USES_SIGNAL_LEVEL[before]:
         u, du = tracking.beam(k, c, t)
-        by_level.remember(g.acquisition, t, u, du)
-    by_level.begin(g.acquisition, mode, c, t, tracking.spread(k, c, t) if tracked and mode == Mode.SEARCH else np.nan)
+        signal_level_modes.remember(g.acquisition, t, u, du)
+    signal_level_modes.begin(g.acquisition, mode, c, t, tracking.spread(k, c, t) if tracked and mode == Mode.SEARCH
+                             else np.nan)
 
 
 @compiled
 def check_slope(g, k, c, u, at, way):
     """Judge an error of signals.INPUTS by the place where the target is expected; at: Pointing of the beam."""
     t = u.error_stamp - c.p.tracker.receiver.age
-    motion = attitude.on_deck(k.attitude, c.p, t, by_level.expected(g.acquisition, way, t))
-    by_level.check_slope(g.acquisition, at, motion, (u.cross_elevation, u.elevation))
+    motion = attitude.on_deck(k.attitude, c.p, t, signal_level_modes.expected(g.acquisition, way, t))
+    signal_level_modes.check_slope(g.acquisition, at, motion, (u.cross_elevation, u.elevation))
 
 
 @compiled
@@ -158,15 +161,15 @@ def look_ahead(g, k, c, mode, program, gap, t):
     """Plan ahead once in planner.INTERVAL: keyholes and hidden sectors on the path of the target; whether the mode
     begins anew, as there is another program."""
     h = g.lookahead
-    if not modes.FOLLOWS[mode] or mode == Mode.SLAVE:
-        planner.forget(h)
+    if not modes.FOLLOWS_TARGET[mode] or mode == Mode.SLAVE:
+        planner.clear_plan(h)
         g.overtravel, g.pointing_offset = 0, 0.0
         return False
     another = planner.another_program(h, program)
     if another:
         # The plan was for the previous program.
-        planner.forget(h)
-        bridge.forget(g.bridge)
+        planner.clear_plan(h)
+        bridge.clear(g.bridge)
     if planner.due(h, t):
         _look(g, k, c, mode, program, gap, t)
     return another
@@ -175,8 +178,8 @@ def look_ahead(g, k, c, mode, program, gap, t):
 @compiled
 def _look(g, k, c, mode, program, gap, t):
     """Look ahead from t [s] on along the program, or along the great circle of the target."""
-    if modes.BY_TABLE[mode]:
-        bridge.forget(g.bridge)
+    if modes.FOLLOWS_TABLE[mode]:
+        bridge.clear(g.bridge)
         planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, bridge.way(g.bridge, program))
         return
     if mode == Mode.AUTOTRACK and not gap.coasting:
@@ -185,6 +188,6 @@ def _look(g, k, c, mode, program, gap, t):
     if way.valid and program_track.status(program, t) == Reason.NONE:
         planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, way)
         return
-    sight = (line_of_sight(by_level.expected(g.acquisition, way, t)) if modes.BY_LEVEL[mode] else
+    sight = (line_of_sight(signal_level_modes.expected(g.acquisition, way, t)) if modes.USES_SIGNAL_LEVEL[mode] else
              tracking.sight(k, c, t))
     planner.look_along_great_circle(g.lookahead, c.lookahead, t, g.azimuth, sight.u, sight.du)

@@ -10,29 +10,29 @@ import numpy as np
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
-DEAD_MAN = 0.5
+RATE_REQUEST_TIMEOUT_S = 0.5
 """Time [s] for which an ask for rates holds; whoever jogs asks again and again."""
 
-SHARE = 0.5
+ACCELERATION_SHARE = 0.5
 """Of the shaper's acceleration with which the rate is ramped, so that the shaped reference follows without lag."""
 
-MANUAL = np.dtype([('asked', 'f8', (2,)), ('until', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)),
-                   ('acceleration', 'f8', (2,))], align=True)
+MANUAL_DTYPE = np.dtype([('asked', 'f8', (2,)), ('until', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)),
+                         ('acceleration', 'f8', (2,))], align=True)
 """asked: rates [rad/s] that hold until the stamp `until` [s]; angle, rate, acceleration of the commanded point."""
 
 
 def initialise(m):
-    """Nobody has asked; m: view of MANUAL."""
+    """Nobody has asked; m: view of MANUAL_DTYPE."""
     m['until'] = -math.inf
 
 
-def ask(m, rates, stamp):
-    """Ask for rates (2,) [rad/s] at a stamp [s]; m: view of MANUAL."""
-    m['asked'], m['until'] = rates, stamp + DEAD_MAN
+def request_rates(m, rates, stamp):
+    """Ask for rates (2,) [rad/s] at a stamp [s]; m: view of MANUAL_DTYPE."""
+    m['asked'], m['until'] = rates, stamp + RATE_REQUEST_TIMEOUT_S
 
 
 @compiled
-def heard(m, t):
+def request_valid(m, t):
     """Return whether the rates asked for hold at t [s]."""
     return t <= m.until
 
@@ -49,7 +49,7 @@ def step(m, i, shaper, ends, heard, dt):
     rates asked for hold. At one of the Ends, of its travel or in front of the floor, it stands, so that the way back
     begins at once."""
     wanted = min(max(m.asked[i], -shaper.rate), shaper.rate) if heard else 0.0
-    step = SHARE * shaper.acceleration * dt
+    step = ACCELERATION_SHARE * shaper.acceleration * dt
     rate = min(max(wanted, m.rate[i] - step), m.rate[i] + step)
     if dt > 0.0:
         m.acceleration[i] = (rate - m.rate[i]) / dt

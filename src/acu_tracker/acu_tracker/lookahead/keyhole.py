@@ -13,20 +13,20 @@ from acu_tracker.lookahead import slew as slews
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
-LIMITS = np.dtype([('rate', 'f8'), ('acceleration', 'f8'), ('low', 'f8'), ('high', 'f8'), ('highest', 'f8'),
-                   ('half_beam', 'f8')], align=True)
+SLEW_LIMITS_DTYPE = np.dtype([('rate', 'f8'), ('acceleration', 'f8'), ('low', 'f8'), ('high', 'f8'), ('highest', 'f8'),
+                              ('half_beam', 'f8')], align=True)
 """What a slew may use: rate [rad/s], acceleration [rad/s2], azimuth from low to high, elevation up to highest [rad];
 half_beam: half the beamwidth [rad]."""
 
-CANDIDATES, LEVELS, SAMPLES, BISECTIONS = 48, 4, 160, 24
+SLEW_CANDIDATE_COUNT, REFINEMENT_COUNT, SLEW_SAMPLE_COUNT, BISECTION_COUNT = 48, 4, 160, 24
 
-NOTHING, PLANNED, NO_WRAP, BEYOND = range(4)
+PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP, PLAN_BEYOND_PATH = range(4)
 """Outcomes of `plan`: no keyhole, a slew planned, no azimuth wrap that fits, a keyhole that ends beyond the path."""
 
 Passage = namedtuple('Passage', 'path azimuth limits after tilt')
 """A keyhole to be slewed through.
 
-path: a completed Path; azimuth: of the axis at its first row [rad]; limits: record of LIMITS; after: when
+path: a completed Path; azimuth: of the axis at its first row [rad]; limits: record of SLEW_LIMITS_DTYPE; after: when
 following is possible again [s]; tilt: rms about one axis of the deck's tilt [rad], normally distributed, which a
 slew cannot follow."""
 
@@ -41,7 +41,7 @@ def _lay(slew, passage, way, t1):
     path, k = passage.path, passage.limits
     A1, v1 = paths.azimuth_at(path, t1, k.rate)
     early, late, v = passage.after, paths.end(path), math.inf
-    for i in range(BISECTIONS):
+    for i in range(BISECTION_COUNT):
         t2 = late if i == 0 else early if i == 1 else 0.5 * (early + late)
         A2, v2 = paths.azimuth_at(path, t2, k.rate)
         D = way * (A2 - A1)
@@ -133,31 +133,33 @@ def find(path, rate, acceleration):
 
 @compiled
 def plan(slew, path, azimuth, limits, tilt):
-    """Find the keyhole of a completed Path, and the best slew through it: NOTHING, PLANNED, NO_WRAP or BEYOND.
+    """Find the keyhole of a completed Path, and the best slew through it: PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP or
+    PLAN_BEYOND_PATH.
 
     slew: records (2,) of SLEW, the first for the best, the second to try; the other arguments as in Passage. Bounded:
-    two directions, CANDIDATES + 9 LEVELS slews of SAMPLES each.
+    two directions, SLEW_CANDIDATE_COUNT + 9 REFINEMENT_COUNT slews of SLEW_SAMPLE_COUNT each.
     """
     first, last, needed = find(path, limits.rate, limits.acceleration)
     if first < 0:
-        return NOTHING
+        return PLAN_NO_KEYHOLE
     best, trial = slew[0], slew[1]
     t_in, t_out = path.t0 + first * path.h, path.t0 + last * path.h
     passage = Passage(path, azimuth, limits, t_out, tilt)
     natural = path.rows[last, 3] - path.rows[first, 3]
     # Leaving earlier than a whole revolution takes cannot help.
-    width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / CANDIDATES
+    width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / SLEW_CANDIDATE_COUNT
     laid, least, other = False, math.inf, math.inf
     for side in range(2):
         way = math.copysign(1.0, natural) * (1.0 - 2.0 * side)
-        centre, cost, step = t_in - 0.5 * CANDIDATES * width, math.inf, width
-        for level in range(LEVELS + 1):
+        centre, cost, step = t_in - 0.5 * SLEW_CANDIDATE_COUNT * width, math.inf, width
+        for level in range(REFINEMENT_COUNT + 1):
             # The whole interval, then finer about the best so far, at last the best itself with more samples.
-            around = 0 if level == LEVELS else CANDIDATES // 2 if level == 0 else 4
+            around = 0 if level == REFINEMENT_COUNT else SLEW_CANDIDATE_COUNT // 2 if level == 0 else 4
             middle = centre
             for k in range(-around, around + 1):
                 t1 = min(middle + k * step, t_in)
-                possible, here = _attempt(trial, passage, way, t1, SAMPLES if around > 0 else 10 * SAMPLES)
+                (possible, here) = _attempt(trial, passage, way, t1, SLEW_SAMPLE_COUNT if around > 0 else 10
+                                            * SLEW_SAMPLE_COUNT)
                 laid |= possible and side == 0
                 if here < cost:
                     centre, cost = t1, here
@@ -165,7 +167,7 @@ def plan(slew, path, azimuth, limits, tilt):
                 break
             step *= 0.25
         if not laid:
-            return BEYOND
+            return PLAN_BEYOND_PATH
         if cost < math.inf:
             other = max(least, cost)
             # Where both directions cost the same, the target's own.
@@ -174,10 +176,10 @@ def plan(slew, path, azimuth, limits, tilt):
                 trial.long_way = side
                 slew[0] = trial
     if least == math.inf:
-        return NO_WRAP
+        return PLAN_NO_WRAP
     top = first
     for i in range(first, last + 1):
         top = i if path.rows[i, 2] > path.rows[top, 2] else top
     best.culmination, best.highest = path.t0 + top * path.h, math.asin(min(path.rows[top, 2], 1.0))
     best.needed, best.other_cost = needed, other
-    return PLANNED
+    return PLAN_SLEW

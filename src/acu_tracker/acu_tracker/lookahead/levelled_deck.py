@@ -4,16 +4,16 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import ASHORE
+from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 
-LEVELLED_DECK = np.dtype([('mean', 'f8', (4,)), ('spread', 'f8'), ('since', 'f8'), ('latest', 'f8')], align=True)
+LEVELLED_DECK_DTYPE = np.dtype([('mean', 'f8', (4,)), ('spread', 'f8'), ('since', 'f8'), ('latest', 'f8')], align=True)
 """mean: quaternion (x, y, z, w) levelled deck -> earth; spread: mean square of the deck's tilt from it [rad2];
 since, latest: stamps [s] of the first and the last attitude in it, latest -inf before there is one."""
 
 
 def initialise(s):
-    """Ashore, and no attitude of a ship yet; s (n,) of LEVELLED_DECK."""
-    s['mean'], s['latest'] = ASHORE, -math.inf
+    """Ashore, and no attitude of a ship yet; s (n,) of LEVELLED_DECK_DTYPE."""
+    s['mean'], s['latest'] = ASHORE_ATTITUDE, -math.inf
 
 
 @compiled

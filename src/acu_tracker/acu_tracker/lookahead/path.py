@@ -8,7 +8,7 @@ from acu_tracker.program import bridge
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
-ROWS, COLUMNS = 1025, 6
+PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6
 
 
 Path = namedtuple('Path', 'rows t0 h')

@@ -1,6 +1,7 @@
 """The look-ahead: a keyhole that the antenna must slew through, sectors of the deck that will hide the target.
 
-Once in INTERVAL the next `horizon` seconds of the target's path are laid out on the levelled deck: along the program
+Once in LOOK_AHEAD_PERIOD_S the next `horizon` seconds of the target's path are laid out on the levelled deck: along
+the program
 track, in autotrack rotated so that it begins at the estimate, or along the great circle of the estimate where there is
 no program. The levelled deck is the mean attitude of the ship; a planned slew keeps the one it was made for.
 """
@@ -17,30 +18,34 @@ from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, rotation
 
-INTERVAL = 1.0
+LOOK_AHEAD_PERIOD_S = 1.0
 """Time between two look-aheads [s]."""
 
-FORECASTS = ('none', 'keyhole', 'no turn')
-NONE, KEYHOLE, NO_WRAP = range(len(FORECASTS))
+FORECAST_TEXTS = ('none', 'keyhole', 'no turn')
+FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
-PLANNER = np.dtype([
-    ('deck', levelled_deck.LEVELLED_DECK), ('looked', 'f8'),
-    ('forecast', 'i8'), ('forecasts', 'i8'), ('slew', slews.SLEW), ('level', 'f8', (3, 3)), ('deck_motion', 'f8'),
+PLANNER_DTYPE = np.dtype([
+    ('deck', levelled_deck.LEVELLED_DECK_DTYPE), ('looked', 'f8'),
+    ('forecast', 'i8'), ('forecasts', 'i8'), ('slew', slews.SLEW_DTYPE), ('level', 'f8', (3, 3)),
+    ('deck_motion', 'f8'),
     ('hidden', 'f8', (2,)), ('blockages', 'i8'), ('program', 'f8', (7,)),
-    ('next_slew', slews.SLEW, (2,)), ('next_level', 'f8', (3, 3)), ('rows', 'f8', (paths.ROWS, paths.COLUMNS)),
+    ('next_slew', slews.SLEW_DTYPE, (2,)), ('next_level', 'f8', (3, 3)),
+    ('rows', 'f8', (paths.PATH_ROW_COUNT, paths.PATH_COLUMN_COUNT)),
 ], align=True)
-"""looked: when the path was last laid out [s]; forecast: one of FORECASTS, counted by forecasts; slew: while it is
-KEYHOLE, on the levelled deck `level` (levelled deck -> earth), deck_motion: the deck's tilt from there then [rad rms];
+"""looked: when the path was last laid out [s]; forecast: one of FORECAST_TEXTS, counted by forecasts; slew: while it
+is
+FORECAST_KEYHOLE, on the levelled deck `level` (levelled deck -> earth), deck_motion: the deck's tilt from there then
+[rad rms];
 hidden: from when until when [s] a sector will hide the target, NaN none, counted by blockages; program: what
 `another_program` compares the last one by; next_slew, next_level, rows: those of the look-ahead under way."""
 
-CONSTANTS = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyhole.LIMITS),
-                      ('sectors', 'f8', (blockage.MOST, 3))], align=True)
+CONSTANTS_DTYPE = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyhole.SLEW_LIMITS_DTYPE),
+                            ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
 
 
 def constants(params) -> np.ndarray:
     """Constants (1,) of AcuParameters."""
-    c, k, a = np.zeros(1, CONSTANTS), params.keyhole, params.azimuth
+    c, k, a = np.zeros(1, CONSTANTS_DTYPE), params.keyhole, params.azimuth
     c['horizon'], c['notice'] = k.horizon, k.notice
     c['limits'] = (k.share * a.shaper.rate, k.share * a.shaper.acceleration, a.limits.low, a.limits.high,
                    params.elevation.limits.high - k.elevation_margin, 0.5 * params.tracker.receiver.beamwidth)
@@ -49,15 +54,15 @@ def constants(params) -> np.ndarray:
 
 
 def initialise(h):
-    """Nothing planned, nothing known; h (n,) of PLANNER."""
+    """Nothing planned, nothing known; h (n,) of PLANNER_DTYPE."""
     levelled_deck.initialise(h['deck'])
     h['looked'], h['hidden'] = -math.inf, math.nan
 
 
 @compiled
-def forget(h):
+def clear_plan(h):
     """Drop the plan; the next look-ahead is due at once."""
-    h.forecast = NONE
+    h.forecast = FORECAST_NONE
     h.looked = -math.inf
     h.hidden[:] = math.nan
 
@@ -78,8 +83,8 @@ def another_program(h, program):
 
 @compiled
 def due(h, t):
-    """Whether to look ahead at t [s]: INTERVAL after the last time, and not before a slew has ended."""
-    return not (t - h.looked < INTERVAL or (h.forecast == KEYHOLE and t <= h.slew.t2))
+    """Whether to look ahead at t [s]: LOOK_AHEAD_PERIOD_S after the last time, and not before a slew has ended."""
+    return not (t - h.looked < LOOK_AHEAD_PERIOD_S or (h.forecast == FORECAST_KEYHOLE and t <= h.slew.t2))
 
 
 @compiled
@@ -109,7 +114,7 @@ def _begin(h, c, t):
     q = h.deck.mean
     h.looked = t
     rotation(q[0], q[1], q[2], q[3], h.next_level)
-    return paths.Path(h.rows, t, c.horizon / (paths.ROWS - 1))
+    return paths.Path(h.rows, t, c.horizon / (paths.PATH_ROW_COUNT - 1))
 
 
 @compiled
@@ -124,17 +129,17 @@ def _look(h, c, path, count, azimuth, travel):
     paths.complete(path, travel)
     _look_for_sectors(h, c.sectors, path)
     outcome = keyhole.plan(h.next_slew, path, azimuth, c.limits, math.sqrt(0.5 * h.deck.spread))
-    if outcome == keyhole.PLANNED and h.next_slew[0].t1 - path.t0 <= c.notice:
+    if outcome == keyhole.PLAN_SLEW and h.next_slew[0].t1 - path.t0 <= c.notice:
         h.slew = h.next_slew[0]
         assign(h.level, h.next_level)
         h.deck_motion = math.sqrt(h.deck.spread)
-        h.forecast = KEYHOLE
+        h.forecast = FORECAST_KEYHOLE
         h.forecasts += 1
-    elif outcome == keyhole.NO_WRAP and h.forecast != NO_WRAP:
-        h.forecast = NO_WRAP
+    elif outcome == keyhole.PLAN_NO_WRAP and h.forecast != FORECAST_NO_WRAP:
+        h.forecast = FORECAST_NO_WRAP
         h.forecasts += 1
-    elif outcome == keyhole.NOTHING:
-        h.forecast = NONE
+    elif outcome == keyhole.PLAN_NO_KEYHOLE:
+        h.forecast = FORECAST_NONE
 
 
 @compiled
@@ -161,7 +166,7 @@ def _look_for_sectors(h, sectors, path):
 @compiled
 def slewing(h, t):
     """Whether a slew is under way at t [s]."""
-    return h.forecast == KEYHOLE and h.slew.t1 <= t <= h.slew.t2
+    return h.forecast == FORECAST_KEYHOLE and h.slew.t1 <= t <= h.slew.t2
 
 
 @compiled

@@ -8,11 +8,11 @@ from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, line_of
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
-SLEW = np.dtype([('t1', 'f8'), ('t2', 'f8'), ('azimuth1', 'f8'), ('azimuth2', 'f8'), ('rate1', 'f8'),
-                 ('rate2', 'f8'), ('peak', 'f8'), ('acceleration', 'f8'),
-                 ('culmination', 'f8'), ('highest', 'f8'), ('needed', 'f8'),
-                 ('loss', 'f8'), ('worst', 'f8'), ('cost', 'f8'), ('other_cost', 'f8'), ('long_way', 'i8')],
-                align=True)
+SLEW_DTYPE = np.dtype([('t1', 'f8'), ('t2', 'f8'), ('azimuth1', 'f8'), ('azimuth2', 'f8'), ('rate1', 'f8'),
+                       ('rate2', 'f8'), ('peak', 'f8'), ('acceleration', 'f8'),
+                       ('culmination', 'f8'), ('highest', 'f8'), ('needed', 'f8'),
+                       ('loss', 'f8'), ('worst', 'f8'), ('cost', 'f8'), ('other_cost', 'f8'), ('long_way', 'i8')],
+                      align=True)
 """Leaves the target at t1 [s] with azimuth1 [rad], rate1 [rad/s], meets it at t2; peak: its largest rate, signed;
 acceleration [rad/s2] in which it is reached; culmination [s] and highest [rad]: elevation there on the levelled deck;
 needed: largest azimuth rate that following would take [rad/s]; loss: expected time [s] further than half a beamwidth

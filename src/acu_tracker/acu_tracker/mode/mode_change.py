@@ -5,8 +5,8 @@ from acu_tracker import modes
 from acu_tracker.modes import Mode, Reason
 from pedestal_common.compiled import compiled
 
-MODE = np.dtype([('now', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('begins', 'i8'), ('table', 'i8'),
-                 ('fallback', 'i8')], align=True)
+MODE_DTYPE = np.dtype([('now', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('begins', 'i8'), ('table', 'i8'),
+                       ('fallback', 'i8')], align=True)
 """now: the mode; reason: of modes.REASONS; pending: the request that waits, NO_REQUEST; begins: 1 until the axes are
 sent where it wants them first; table: the mode whose table was followed last; fallback: the one chosen for the loss of
 the track."""
@@ -21,16 +21,16 @@ def initialise(m, params):
 
 def choose(m, name):
     """Choose what follows the loss of the track, by its name; m: view of MODE."""
-    m['fallback'] = modes.FALLBACKS[name]
+    m['fallback'] = modes.FALLBACK_MODES[name]
 
 
 @compiled
 def change(m, now, request):
     """Run the mode machine in a Situation with a `request` or NO_REQUEST: its result."""
     mode, reason, result = modes.next_mode(m.now, request, now)
-    if result == modes.ACCEPTED:
+    if result == modes.REQUEST_ACCEPTED:
         m.pending = modes.NO_REQUEST
-    if modes.BY_TABLE[mode]:
+    if modes.FOLLOWS_TABLE[mode]:
         m.table = mode
     if reason != Reason.NONE:
         m.reason = reason
@@ -40,39 +40,39 @@ def change(m, now, request):
 
 
 @compiled
-def begin(m):
+def restart(m):
     """Begin the mode anew."""
     m.begins = 1
 
 
 @compiled
-def begun(m):
+def mark_started(m):
     """Note that the axes were sent where the mode wants them."""
     m.begins = 0
 
 
 @compiled
-def wait_for(m, request):
+def set_pending(m, request):
     """Let a request wait, or NO_REQUEST."""
     m.pending = request
 
 
 @compiled
-def go_on(m, mode):
+def continue_in(m, mode):
     """Go on in a mode after a silence: the one before, or STANDBY."""
     if mode != m.now:
         m.now, m.reason = mode, Reason.SILENCE
 
 
 @compiled
-def explain(m, reason):
+def set_outage_reason(m, reason):
     """Take the reason of an outage, NONE: there is none any more."""
     if reason != Reason.NONE or m.reason == Reason.BLOCKED or m.reason == Reason.KEYHOLE:
         m.reason = reason
 
 
 @compiled
-def stowed(m):
+def mark_stowed(m):
     """Note that the pins are in, where that was requested."""
     if m.reason == Reason.REQUESTED:
         m.reason = Reason.PINS_IN

@@ -7,7 +7,7 @@ import numpy as np
 from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
 
-OUTAGE = np.dtype([('stamp', 'f8'), ('blocked', 'i8')], align=True)
+OUTAGE_DTYPE = np.dtype([('stamp', 'f8'), ('blocked', 'i8')], align=True)
 """stamp: when an outage had a reason last [s]; blocked: 1 while the target is hidden."""
 
 Outage = namedtuple('Outage', 'since coasting permitted')
@@ -17,7 +17,7 @@ explains that, now or within the last coast_time."""
 
 
 def initialise(s):
-    """Nothing explains an outage; s: view of OUTAGE."""
+    """Nothing explains an outage; s: view of OUTAGE_DTYPE."""
     s['stamp'] = -math.inf
 
 

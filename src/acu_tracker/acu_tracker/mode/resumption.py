@@ -7,15 +7,15 @@ from acu_tracker import modes
 from acu_tracker.modes import Mode
 from pedestal_common.compiled import compiled
 
-RESUMPTION = np.dtype([('mode', 'i8'), ('until', 'f8')], align=True)
+RESUMPTION_DTYPE = np.dtype([('mode', 'i8'), ('until', 'f8')], align=True)
 """mode: code of the one before the silence; until: stamp until which it is resumed [s], -inf: there is none."""
 
-DRIVE_RESTART = 0.3
+DRIVE_RESTART_GAP_S = 0.3
 """Silence [s] in which a drive may have been started again: a mode that it then ends for a while is resumed."""
 
 
 def initialise(s):
-    """Nothing was interrupted; s: view of RESUMPTION."""
+    """Nothing was interrupted; s: view of RESUMPTION_DTYPE."""
     s['until'] = -math.inf
 
 
@@ -24,13 +24,13 @@ def mode_after(s, mode, last, stamp, resume_time):
     """The mode after a silence from the stamp `last` to `stamp` [s]: it goes on, or is STANDBY after resume_time."""
     if stamp > last + resume_time:
         return Mode.STANDBY
-    if stamp - last > DRIVE_RESTART:
+    if stamp - last > DRIVE_RESTART_GAP_S:
         s.mode, s.until = mode, last + resume_time
     return mode
 
 
 @compiled
-def waits(s):
+def is_pending(s):
     """Whether a mode is kept."""
     return math.isfinite(s.until)
 
@@ -48,6 +48,6 @@ def pending(s, stamp, ended, locked, before):
 
 
 @compiled
-def forget(s):
+def cancel(s):
     """Resume nothing."""
     s.until = -math.inf

@@ -3,27 +3,28 @@ from acu_tracker.alarms import annunciator, table
 from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
 
-MOVES_UNASKED, FROZEN, DIVERGED = (table.INDEX[name] for name in ('moves unasked', 'drive frozen', 'diverged'))
+(UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM,
+ DIVERGENCE_ALARM) = (table.ALARM_INDEX[name] for name in ('moves unasked', 'drive frozen', 'diverged'))
 """Alarms of these faults."""
 
-LATCHED = 1 << MOVES_UNASKED | 1 << FROZEN | 1 << DIVERGED
+LATCHED_FAULT_BITS = 1 << UNCOMMANDED_MOTION_ALARM | 1 << FROZEN_DRIVE_ALARM | 1 << DIVERGENCE_ALARM
 
 
 @compiled
 def latched(moves_unasked, frozen, diverged):
     """Bits of the alarms whose fault waits for a reset; each of the faults: 1 while it does."""
-    return (moves_unasked << MOVES_UNASKED) | (frozen << FROZEN) | (diverged << DIVERGED)
+    return (moves_unasked << UNCOMMANDED_MOTION_ALARM) | (frozen << FROZEN_DRIVE_ALARM) | (diverged << DIVERGENCE_ALARM)
 
 
 @compiled
-def obeys(s):
+def axes_obey_commands(s):
     """Whether both axes obey; while one does not, the target leaves the beam, and no filter is to blame. s: record of
     conditions.SUPERVISION."""
     return not (s.axis[0].immobile or s.axis[1].immobile)
 
 
 @compiled
-def distrust(ready, moves_unasked, frozen):
+def drive_refusal(ready, moves_unasked, frozen):
     """NONE, or why a drive, ready or not, is not trusted with a mode."""
     if moves_unasked:
         return Reason.MOVES_UNASKED
@@ -34,7 +35,8 @@ def distrust(ready, moves_unasked, frozen):
 
 @compiled
 def reset(alarms, t):
-    """Reset the latched alarms at t [s], and know that the faults of LATCHED are no more; whether there was one."""
-    for i in (MOVES_UNASKED, FROZEN, DIVERGED):
-        annunciator.know(alarms, i, False, t)
+    """Reset the latched alarms at t [s], and know that the faults of LATCHED_FAULT_BITS are no more; whether there
+    was one."""
+    for i in (UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM):
+        annunciator.set_condition(alarms, i, False, t)
     return annunciator.reset(alarms, t)

@@ -9,7 +9,7 @@ from acu_tracker.lookahead import planner
 
 def keyhole(h, beamwidth):
     """The text of acu/keyhole: the planned slew, or that no azimuth wrap fits; beamwidth [rad]."""
-    if h['forecast'] == planner.NO_WRAP:
+    if h['forecast'] == planner.FORECAST_NO_WRAP:
         return 'keyhole ahead: no turn of the azimuth holds the pass, the axis will stop at the end of its travel'
     slew = h['slew']
     way = 'clockwise' if slew['peak'] > 0.0 else 'counter-clockwise'
@@ -34,8 +34,8 @@ def hidden(h):
 
 def numbers(h):
     """[(key, value text)] of the forecast; of a slew and of a hidden sector only where there is one."""
-    values = [('keyhole', planner.FORECASTS[h['forecast']])]
-    if h['forecast'] == planner.KEYHOLE:
+    values = [('keyhole', planner.FORECAST_TEXTS[h['forecast']])]
+    if h['forecast'] == planner.FORECAST_KEYHOLE:
         slew = h['slew']
         values += [('keyhole_begins_s', f'{slew["t1"]:.3f}'), ('keyhole_ends_s', f'{slew["t2"]:.3f}'),
                    ('keyhole_loss_s', f'{slew["loss"]:.3f}'), ('keyhole_worst_deg', f'{_deg(slew["worst"]):.3f}'),

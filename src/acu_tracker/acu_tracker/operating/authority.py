@@ -1,10 +1,10 @@
 """Who is in control: one holder at a time, by name. Everybody may stop the antenna, and with nobody in control ask."""
 from pedestal_common.wire.commands import Reply
 
-ROLES = ('operator', 'supervisor')
+CONTROL_ROLES = ('operator', 'supervisor')
 """A supervisor takes control away from whoever holds it."""
 
-EVERYBODYS = ('standby', 'stop', 'acu/standby', 'acu/stop')
+UNRESTRICTED_COMMANDS = ('standby', 'stop', 'acu/standby', 'acu/stop')
 """Verbs and services that whoever holds control cannot keep from others."""
 
 
@@ -16,7 +16,7 @@ class Authority:
 
     def admit(self, command):
         """Raise ValueError where a Command is of somebody who is not in control."""
-        if self.holder and command.who != self.holder and command.verb not in (*EVERYBODYS, 'take'):
+        if self.holder and command.who != self.holder and command.verb not in (*UNRESTRICTED_COMMANDS, 'take'):
             raise ValueError(f'control is held by {self.holder}')
 
     def take(self, who, role) -> Reply:

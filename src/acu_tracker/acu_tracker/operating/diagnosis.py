@@ -4,18 +4,18 @@ import math
 from acu_tracker import modes, signals
 from acu_tracker.operating import announcement
 from pedestal_common.graph import topics
-from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 
-FAULTS = {
+FAULT_TEXTS = {
     'moves unasked': 'the antenna moves unasked: {unasked}; acu/reset_faults once it is known why',
     'drive frozen': 'the drive repeats its numbers though it is told to move; acu/reset_faults once it is known why',
     'diverged': "autotrack diverged: the receiver's errors led away from the target; acu/reset_faults once their "
                 'slope, phase and sign are right'}
 """What is said of each fault of supervision.LATCHED, the gravest first."""
 
-GATED = {('error_gated',): 'an error of the receiver was too far off to be believed',
-         ('error_noisy',): 'the errors of the receiver are noise, and not used',
-         ('error_gated', 'error_noisy'): 'the errors of the receiver are noise, and not used'}
+GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was too far off to be believed',
+                     ('error_noisy',): 'the errors of the receiver are noise, and not used',
+                     ('error_gated', 'error_noisy'): 'the errors of the receiver are noise, and not used'}
 """What is said where nothing but these of signals.INVALID_INPUTS was refused."""
 
 
@@ -26,22 +26,24 @@ def of(unit):
     faults = unit.faults
     values = _values(unit, faults, invalid)
     if faults:
-        return Diagnosis(ERROR, FAULTS[faults[0]].format(unasked=_unasked(state['unasked'])), values)
-    if invalid in GATED:
-        return Diagnosis(WARN, GATED[invalid], values)
+        return Diagnosis(LEVEL_ERROR, FAULT_TEXTS[faults[0]].format(unasked=_uncommanded_motion(state['unasked'])),
+                         values)
+    if invalid in GATED_ERROR_TEXTS:
+        return Diagnosis(LEVEL_WARN, GATED_ERROR_TEXTS[invalid], values)
     if invalid:
-        return Diagnosis(ERROR, f'invalid input: {" ".join(invalid)}', values)
+        return Diagnosis(LEVEL_ERROR, f'invalid input: {" ".join(invalid)}', values)
     if state['guidance']['overtravel']:
-        return Diagnosis(WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit', values)
+        return Diagnosis(LEVEL_WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit',
+                         values)
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
-    return Diagnosis(WARN if outputs['coasting'] else OK, f'{mode} ({reason})', values)
+    return Diagnosis(LEVEL_WARN if outputs['coasting'] else LEVEL_OK, f'{mode} ({reason})', values)
 
 
 def _values(unit, faults, invalid):
     """[(key, text)]."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
-              ('fallback', modes.FALLBACK_OF[int(state['mode']['fallback'])]), ('control', unit.authority.holder),
+              ('fallback', modes.FALLBACK_NAMES[int(state['mode']['fallback'])]), ('control', unit.authority.holder),
               ('faults', ', '.join(faults)), ('locked', str(int(outputs['locked']))),
               ('coasting', str(int(outputs['coasting']))), ('drive', unit.drive_told)]
     if unit.parameters.stow_pins:
@@ -60,7 +62,7 @@ def _values(unit, faults, invalid):
             *((f'refused {mode}', why) for mode, why in unit.refusals().items())]
 
 
-def _unasked(movement):
+def _uncommanded_motion(movement):
     """How the axes move. movement: view of servo.unasked's record."""
     return ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded'
                      for axis, (rate, low, high) in zip(topics.AXES, movement['measured']))
@@ -68,4 +70,4 @@ def _unasked(movement):
 
 def _pins(code):
     """Where the stow pins are, as the drive says."""
-    return topics.BY_NAME['adu/stow_pins'].texts[code] if code != topics.SILENT else 'unknown'
+    return topics.TOPIC_BY_NAME['adu/stow_pins'].texts[code] if code != topics.NO_TEXT_CODE else 'unknown'

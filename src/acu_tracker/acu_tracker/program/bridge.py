@@ -14,29 +14,30 @@ from acu_tracker.modes import Reason
 from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
 
-BRIDGE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], align=True)
+BRIDGE_DTYPE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], align=True)
 """axis: ENU, of the length of the rotation's sine; cos: of its angle; valid: 0 where there is none."""
 
 Way = namedtuple('Way', 'program valid axis cos')
-"""A ProgramTrack, rotated where valid; fields as of BRIDGE."""
+"""A ProgramTrack, rotated where valid; fields as of BRIDGE_DTYPE."""
 
-LIKE_PROGRAM = math.cos(math.radians(3.0))
+MIN_PROGRAM_COSINE = math.cos(math.radians(3.0))
 """Cosine of the largest angle between program and estimate at which the program is used."""
 
 
 @compiled
 def begin(b, program, t, u):
-    """Find the rotation that puts the program at the ENU unit vector u at t [s]; not valid beyond LIKE_PROGRAM."""
+    """Find the rotation that puts the program at the ENU unit vector u at t [s]; not valid beyond
+    MIN_PROGRAM_COSINE."""
     b.valid = 0
     if program_track.status(program, t) == Reason.NONE:
         v = program_track.direction(program, t)
         b.cos = dot(v, u)
-        b.valid = b.cos > LIKE_PROGRAM
+        b.valid = b.cos > MIN_PROGRAM_COSINE
         b.axis[0], b.axis[1], b.axis[2] = cross(v, u)
 
 
 @compiled
-def forget(b):
+def clear(b):
     """Follow the program as it is."""
     b.valid = 0
 

@@ -17,26 +17,26 @@ from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters, station_frame
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph import topics
-from pedestal_common.graph.steps import DAY, SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY
 from pedestal_common.parameters import ParameterError, Parameters, group, parameter, text
 from pedestal_common.reproducible import arctan2, turned
 
-ROWS = 2400
+TABLE_ROW_COUNT = 2400
 """Of a table."""
 
-BEFORE = 10.0
+TABLE_LEAD_TIME_S = 10.0
 """Time [s] before now at which a table begins."""
 
-PER_ORBIT = 5400
+ROWS_PER_ORBIT = 5400
 """Rows per revolution of a satellite: 1 s of a low one."""
 
-SUN_INTERVAL = 30.0
+SUN_ROW_INTERVAL_S = 30.0
 """Time [s] between two rows of the sun, which moves by 0.13 deg in it."""
 
-SEARCHED = 2.0 * DAY
+RISE_SEARCH_SPAN_S = 2.0 * SECONDS_PER_DAY
 """Time ahead [s] in which the next rise is looked for."""
 
-LOOK = 20.0
+RISE_SEARCH_STEP_S = 20.0
 """Time [s] between two looks for it."""
 
 
@@ -94,16 +94,16 @@ class Predictor:
         """The Predicted of the satellite for a stamp [s]."""
         if self._satellite is None or not self._known:
             return Predicted(NO_TRACK, Reason.NO_ELEMENTS if self._known else Reason.NO_UTC)
-        interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / PER_ORBIT, 1), 1.0)
+        interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / ROWS_PER_ORBIT, 1), 1.0)
         if abs(self._age(stamp)) > self.parameters.oldest:
-            return Predicted(NO_TRACK, Reason.TOO_OLD, stamp, stamp + ROWS * interval)
+            return Predicted(NO_TRACK, Reason.TOO_OLD, stamp, stamp + TABLE_ROW_COUNT * interval)
         return _table(self._satellite_angles, stamp, interval)
 
     def sun(self, stamp) -> Predicted:
         """The Predicted of the sun for a stamp [s]."""
         if not self._known:
             return Predicted(NO_TRACK, Reason.NO_UTC)
-        return _table(self._sun_angles, stamp, SUN_INTERVAL)
+        return _table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
     def told(self, stamp):
         """[(key, text)] at a stamp [s]: where the sun is, unless UTC is not known, and the elements, if any."""
@@ -121,7 +121,7 @@ class Predictor:
         if reason == Reason.BELOW_HORIZON:
             rises = _next_rise(self._satellite_angles if mode == Mode.TLE else self._sun_angles, stamp)
             if math.isnan(rises):
-                return f'it does not rise within {SEARCHED / DAY:g} days'
+                return f'it does not rise within {RISE_SEARCH_SPAN_S / SECONDS_PER_DAY:g} days'
             return f'it rises at {orbit.iso(*self._julian(rises))}'
         return ''
 
@@ -129,9 +129,10 @@ class Predictor:
         """(Julian day, fraction) of a stamp [s]."""
         start = self.parameters.start_time
         begin = (orbit.instant('start_time', start) if start else
-                 datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=self.epoch * 1_000_000 // SECOND))
+                 datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=self.epoch
+                                                                    * 1_000_000 // NS_PER_SECOND))
         julian, fraction = orbit.julian_date(begin)
-        return julian, fraction + stamp / DAY
+        return julian, fraction + stamp / SECONDS_PER_DAY
 
     def _age(self, stamp):
         """Time [days] from the epoch of the elements to a stamp [s]."""
@@ -146,7 +147,7 @@ class Predictor:
     def _sun_angles(self, times):
         """Azimuth and elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
         julian, fraction = self._julian(0.0)
-        fractions = fraction + times / DAY
+        fractions = fraction + times / SECONDS_PER_DAY
         origin, to_enu = station_frame(self.parameters.station)
         fixed = np.einsum('nij,nj->ni', orbit.earth_fixed(julian, fractions),
                           sun.position(julian - sun.J2000 + fractions))
@@ -161,12 +162,12 @@ def _angles(enu):
 
 def _table(angles_at, stamp, interval):
     """The Predicted of angles_at(times), with a row every interval [s]."""
-    times = np.floor(stamp) - BEFORE + interval * np.arange(ROWS)
+    times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
     try:
         angles = angles_at(times)
     except TargetError:
         return Predicted(NO_TRACK, Reason.NO_ELEMENTS)
-    late = np.arange(ROWS // 2, ROWS * 19 // 20)
+    late = np.arange(TABLE_ROW_COUNT // 2, TABLE_ROW_COUNT * 19 // 20)
     down = late[angles[late, 1] < 0.0]
     return Predicted(ProgramTrack(times, angles), Reason.NONE, float(times[0]),
                      float(times[down[-1] if down.size else late[-1]]))
@@ -174,7 +175,7 @@ def _table(angles_at, stamp, interval):
 
 def _next_rise(angles_at, stamp):
     """Stamp [s] of the next rise after a stamp, to a second; NaN where there is none."""
-    times = stamp + np.arange(0.0, SEARCHED, LOOK)
+    times = stamp + np.arange(0.0, RISE_SEARCH_SPAN_S, RISE_SEARCH_STEP_S)
     try:
         elevation = angles_at(times)[:, 1]
     except TargetError:
@@ -183,4 +184,4 @@ def _next_rise(angles_at, stamp):
     if not rises.size:
         return math.nan
     i = rises[0]
-    return times[i] - LOOK * elevation[i] / (elevation[i + 1] - elevation[i])
+    return times[i] - RISE_SEARCH_STEP_S * elevation[i] / (elevation[i + 1] - elevation[i])

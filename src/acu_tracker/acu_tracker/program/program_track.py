@@ -12,8 +12,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_direction, wrap
 
-MAX_ROWS = 100_000
-STEEP = math.radians(80.0)
+MAX_PROGRAM_ROWS = 100_000
+STEEP_ELEVATION_RAD = math.radians(80.0)
 """Elevation of the rows above which directions are interpolated."""
 
 
@@ -35,8 +35,8 @@ def checked(times, angles):
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
         raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
-    if not 2 <= len(times) <= MAX_ROWS:
-        raise ProgramTrackError(f'program track has {len(times)} rows; must be 2 to {MAX_ROWS}')
+    if not 2 <= len(times) <= MAX_PROGRAM_ROWS:
+        raise ProgramTrackError(f'program track has {len(times)} rows; must be 2 to {MAX_PROGRAM_ROWS}')
     bad = np.flatnonzero(~(np.isfinite(times) & np.isfinite(angles).all(axis=1)))
     if bad.size:
         raise ProgramTrackError(f'program track row {bad[0]}: {times[bad[0]]} s {angles[bad[0]]} rad; must be finite')
@@ -130,10 +130,11 @@ def _interpolated_component(program, i, t, axis):
 
 @compiled
 def motion_at(program, t):
-    """Motion in earth angles at t [s]. Between two rows above STEEP, where the azimuth may change by any amount,
+    """Motion in earth angles at t [s]. Between two rows above STEEP_ELEVATION_RAD, where the azimuth may change by
+    any amount,
     the unit vector is interpolated instead of the angles."""
     i = interval(program.times, t)
-    if min(program.angles[i, 1], program.angles[i + 1, 1]) < STEEP or len(program.times) < 3:
+    if min(program.angles[i, 1], program.angles[i + 1, 1]) < STEEP_ELEVATION_RAD or len(program.times) < 3:
         return Motion(interpolated(program, t, 0), interpolated(program, t, 1))
     e, de, dde = _interpolated_component(program, i, t, 0)
     n, dn, ddn = _interpolated_component(program, i, t, 1)

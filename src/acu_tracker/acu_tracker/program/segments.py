@@ -6,7 +6,7 @@ import numpy as np
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, ProgramTrackError, checked
 from pedestal_common.graph.topics import AXES
 
-GAP = 3.0
+MAX_GAP_INTERVALS = 3.0
 """A segment goes on with the one before where its first row is at most so many of their intervals, the shorter one,
 later."""
 
@@ -38,7 +38,8 @@ class Segments:
         if kept:
             if followed:
                 self._check_turnaround(kept[-1], new)
-            if new.times[0] - kept[-1].times[-1] <= GAP * min(_last_interval(kept[-1]), new.times[1] - new.times[0]):
+            if new.times[0] - kept[-1].times[-1] <= MAX_GAP_INTERVALS * min(_last_interval(kept[-1]), new.times[1]
+                                                                            - new.times[0]):
                 last = kept.pop()
                 new = checked(np.append(last.times, new.times), np.vstack((last.angles, new.angles)))
         self._pieces = [*kept, new]

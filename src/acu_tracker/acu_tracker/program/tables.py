@@ -8,14 +8,14 @@ from acu_tracker import modes
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from pedestal_common.compiled import compiled
 
-FOLLOWED = tuple(row for row in modes.TABLE if row.table)
+TABLE_MODES = tuple(row for row in modes.MODE_ROWS if row.table)
 
-Tables = collections.namedtuple('Tables', [row.name for row in FOLLOWED])
+Tables = collections.namedtuple('Tables', [row.name for row in TABLE_MODES])
 """One ProgramTrack for each mode that follows a table, that of the program first."""
 
-NO_TABLES = Tables(*(NO_TRACK for _ in FOLLOWED))
+NO_TABLES = Tables(*(NO_TRACK for _ in TABLE_MODES))
 
-PLACE = tuple(FOLLOWED.index(row) if row.table else 0 for row in modes.TABLE)
+TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.MODE_ROWS)
 """For each mode the place of its table among them, that of the program where it follows none."""
 
 
@@ -32,4 +32,4 @@ def shifted(track, offset):
 @compiled
 def of_mode(tables, mode):
     """The table that a mode follows; of one that follows none the program."""
-    return tables[PLACE[mode]]
+    return tables[TABLE_INDEX[mode]]

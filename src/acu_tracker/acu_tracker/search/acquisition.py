@@ -20,13 +20,14 @@ from acu_tracker.search.pattern import Area, Point
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 
-PHASES = ('settle', 'look around', 'peak', 'check', 'checked', 'wrong slope')
-Phase = codes(PHASES)
+ACQUISITION_PHASES = ('settle', 'look around', 'peak', 'check', 'checked', 'wrong slope')
+Phase = codes(ACQUISITION_PHASES)
 
-ACQUISITION = np.dtype([
-    ('level', level.LEVEL), ('slopes', slope_check.SLOPES), ('step_track', step_track.STEP_TRACK),
-    ('place', place.PLACE), ('began', 'f8'), ('radius', 'f8'), ('peak', 'f8'), ('centre', 'f8', (2,)),
-    ('phase', 'i8'), ('since', 'f8'), ('look', 'i8'), ('levels', 'f8', (1 + side_lobe.PLACES,)), ('looks', 'i8'),
+ACQUISITION_DTYPE = np.dtype([
+    ('level', level.LEVEL_DTYPE), ('slopes', slope_check.SLOPES_DTYPE), ('step_track', step_track.STEP_TRACK_DTYPE),
+    ('place', place.PLACE_DTYPE), ('began', 'f8'), ('radius', 'f8'), ('peak', 'f8'), ('centre', 'f8', (2,)),
+    ('phase', 'i8'), ('since', 'f8'), ('look', 'i8'), ('levels', 'f8', (1 + side_lobe.LOOK_AROUND_PLACES,)),
+    ('looks', 'i8'),
     ('peaks', 'i8'), ('doubts', 'i8'), ('fair', 'f8'),
 ], align=True)
 """place: the expected one without a program; began: search or acquire [s]; radius: of the small area [rad]; peak: the
@@ -35,40 +36,42 @@ phase of acquire, entered at `since` [s]; look: place of the look-around or the 
 those before; looks, peaks: how many times it did; doubts: how many times the slopes were wrong;
 fair: when the level of autotrack was last that of the main lobe [s]."""
 
-LAGS = 4.0
+LEVEL_SETTLING_LAGS = 4.0
 """Time constants after which a level is that of a new place."""
 
-PASSED = 1.0
+PEAK_DROP_DB = 1.0
 """How far the level falls behind its peak before the beam goes back [dB]."""
 
-PATIENCE = 1.0
+MAX_RISE_TIME_S = 1.0
 """Longest time that a level may keep on rising [s]."""
 
-CIRCLE, PERIOD, TURNS = 0.1, 0.5, 2.0
+CIRCLE_RADIUS_BEAMWIDTHS, CIRCLE_PERIOD_S, CIRCLE_TURN_COUNT = 0.1, 0.5, 2.0
 """Of the slope check: radius [beamwidths], time of a turn [s], and their number; in the first the circle opens."""
 
-LEAST_ERRORS = 50
+MIN_CHECK_ERROR_COUNT = 50
 """Of the slope check."""
 
-MOST_LOOKS = 4
+MAX_LOOK_AROUND_COUNT = 4
 """Times that acquire looks around before it checks what it has."""
 
-ASIDE, FARTHEST = 0.3, 0.7
-"""Of a peak: the steps to either side and the farthest way to go [beamwidths]; a way beyond ASIDE is gone in two."""
+PEAK_STEP_BEAMWIDTHS, MAX_PEAK_MOVE_BEAMWIDTHS = 0.3, 0.7
+"""Of a peak: the steps to either side and the farthest way to go [beamwidths]; a way beyond PEAK_STEP_BEAMWIDTHS is
+gone in two."""
 
-MOST_PEAKS = 3
+MAX_PEAK_COUNT = 3
 
-SIDES = ((0.0, 0.0), (ASIDE, 0.0), (-ASIDE, 0.0), (0.0, ASIDE), (0.0, -ASIDE))
+PEAK_OFFSETS_BEAMWIDTHS = ((0.0, 0.0), (PEAK_STEP_BEAMWIDTHS, 0.0), (-PEAK_STEP_BEAMWIDTHS, 0.0),
+                           (0.0, PEAK_STEP_BEAMWIDTHS), (0.0, -PEAK_STEP_BEAMWIDTHS))
 """Places of a peak [beamwidths]."""
 
 
 def initialise(s):
-    """Nothing heard yet; s (n,) of ACQUISITION."""
+    """Nothing heard yet; s (n,) of ACQUISITION_DTYPE."""
     s['level']['stamp'] = -math.inf
 
 
 @compiled
-def hear(s, p, z, stamp, locked):
+def take_level(s, p, z, stamp, locked):
     """Take the level z [dB-Hz] of a stamp [s]; locked: whether the receiver gives errors. p: record of
     AcquisitionParameters."""
     level.take(s.level, p, z, stamp, locked)
@@ -91,7 +94,7 @@ def begin_search(s, p, beamwidth, t, sigma):
         s.radius = min(2.0 * sigma, p.full * beamwidth)
     s.peak = -math.inf
     s.centre[0] = s.centre[1] = 0.0
-    level.forget_times(s.level)
+    level.restart_times(s.level)
 
 
 @compiled
@@ -117,13 +120,13 @@ def searched(s, p, tau, beamwidth, t):
 
 
 @compiled
-def stand(s, x, e):
+def set_offset(s, x, e):
     """Put the beam at an offset (x, e) [rad] from the expected place."""
     s.centre[0], s.centre[1] = x, e
 
 
 @compiled
-def judge(s, t, fair):
+def note_fair_level(s, t, fair):
     """Keep at t [s] whether the level of autotrack is fair."""
     if fair:
         s.fair = t
@@ -145,9 +148,9 @@ def note_peak(s, offset):
 
 
 @compiled
-def passed(s, p):
+def peak_passed(s, p):
     """Whether a signal has been there and its peak is behind the beam. p: record of AcquisitionParameters."""
-    return level.detected(s.level, p) and (s.level.z < s.peak - PASSED or s.level.above_detect > PATIENCE)
+    return level.detected(s.level, p) and (s.level.z < s.peak - PEAK_DROP_DB or s.level.above_detect > MAX_RISE_TIME_S)
 
 
 @compiled
@@ -167,12 +170,12 @@ def _enter(s, phase, t):
 def acquire(s, p, beamwidth, t, distance):
     """Bring acquire to t [s]; distance: measured range of the target [m], NaN where there is none. p: record of
     AcquisitionParameters."""
-    settled = t - s.since >= LAGS * p.time_constant
+    settled = t - s.since >= LEVEL_SETTLING_LAGS * p.time_constant
     if s.phase == Phase.SETTLE and settled:
         s.levels[0] = s.level.z
         axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, distance)
         main = p.expected_dbhz > 0.0 and not side_lobe.suspected(s.level.z, axis)
-        if main or s.looks >= MOST_LOOKS:
+        if main or s.looks >= MAX_LOOK_AROUND_COUNT:
             _peak(s, t)
         else:
             _enter(s, Phase.LOOK_AROUND, t)
@@ -180,11 +183,11 @@ def acquire(s, p, beamwidth, t, distance):
     elif (s.phase == Phase.LOOK_AROUND or s.phase == Phase.PEAK) and settled:
         s.levels[s.look] = s.level.z
         s.look, s.since = s.look + 1, t
-        if s.phase == Phase.LOOK_AROUND and s.look > side_lobe.PLACES:
+        if s.phase == Phase.LOOK_AROUND and s.look > side_lobe.LOOK_AROUND_PLACES:
             _go_to_best(s, beamwidth, t)
-        elif s.phase == Phase.PEAK and s.look >= len(SIDES):
+        elif s.phase == Phase.PEAK and s.look >= len(PEAK_OFFSETS_BEAMWIDTHS):
             _go_to_peak(s, beamwidth, t)
-    elif s.phase == Phase.CHECK and t - s.since >= TURNS * PERIOD:
+    elif s.phase == Phase.CHECK and t - s.since >= CIRCLE_TURN_COUNT * CIRCLE_PERIOD_S:
         _judge(s, t)
 
 
@@ -212,10 +215,10 @@ def _go_to_peak(s, beamwidth, t):
     """After the steps to either side: go to the peak, and check the slopes there unless it was far."""
     far = False
     for i in range(2):
-        way = step_track.peak(s.levels[1 + 2 * i], s.levels[2 + 2 * i], ASIDE * beamwidth, beamwidth)
-        far |= abs(way) > ASIDE * beamwidth
-        s.centre[i] += min(max(way, -FARTHEST * beamwidth), FARTHEST * beamwidth)
-    if far and s.peaks < MOST_PEAKS:
+        way = step_track.peak(s.levels[1 + 2 * i], s.levels[2 + 2 * i], PEAK_STEP_BEAMWIDTHS * beamwidth, beamwidth)
+        far |= abs(way) > PEAK_STEP_BEAMWIDTHS * beamwidth
+        s.centre[i] += min(max(way, -MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth), MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth)
+    if far and s.peaks < MAX_PEAK_COUNT:
         _peak(s, t)
     else:
         _enter(s, Phase.CHECK, t)
@@ -225,14 +228,14 @@ def _go_to_peak(s, beamwidth, t):
 @compiled
 def _judge(s, t):
     """After the circle: where the slopes are right go to where the errors lead, where they are wrong twice give up."""
-    verdict = slope_check.verdict(s.slopes, LEAST_ERRORS)
-    if verdict == slope_check.RIGHT:
+    verdict = slope_check.verdict(s.slopes, MIN_CHECK_ERROR_COUNT)
+    if verdict == slope_check.VERDICT_RIGHT:
         # The mean error over whole turns is that at the centre: there the errors are on the straight part of their
         # curve, and fit together for the filter.
         s.centre[0] += s.slopes.e[0]
         s.centre[1] += s.slopes.e[1]
         s.phase = Phase.CHECKED
-    elif verdict == slope_check.WRONG:
+    elif verdict == slope_check.VERDICT_WRONG:
         s.doubts += 1
         if s.doubts > 1:
             s.phase = Phase.WRONG_SLOPE
@@ -249,11 +252,11 @@ def acquired(s, beamwidth, t):
         aside, up = side_lobe.place(s.look, beamwidth)
         return Point(x + aside, e + up, 0.0, 0.0)
     if s.phase == Phase.PEAK:
-        aside, up = SIDES[s.look]
+        aside, up = PEAK_OFFSETS_BEAMWIDTHS[s.look]
         return Point(x + aside * beamwidth, e + up * beamwidth, 0.0, 0.0)
     if s.phase != Phase.CHECK:
         return Point(x, e, 0.0, 0.0)
-    c = pattern.circle(CIRCLE * beamwidth, PERIOD, t - s.since)
+    c = pattern.circle(CIRCLE_RADIUS_BEAMWIDTHS * beamwidth, CIRCLE_PERIOD_S, t - s.since)
     return Point(x + c.x, e + c.y, c.dx, c.dy)
 
 
@@ -269,5 +272,6 @@ def take_error(s, expected, error):
 def failed(s, p, t):
     """Whether acquire gives up at t [s]: no signal at the centre any more, or no end within the timeout. p: record of
     AcquisitionParameters."""
-    settled = s.phase != Phase.LOOK_AROUND and s.phase != Phase.PEAK and t - s.since > LAGS * p.time_constant
+    settled = (s.phase != Phase.LOOK_AROUND and s.phase != Phase.PEAK and t - s.since > LEVEL_SETTLING_LAGS
+               * p.time_constant)
     return t - s.began > p.timeout or (settled and s.level.below_loss >= p.loss_time)

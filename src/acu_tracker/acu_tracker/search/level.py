@@ -15,22 +15,23 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-LEVEL = np.dtype([('mean', 'f8'), ('variance', 'f8'), ('samples', 'i8'), ('learnt', 'f8'),
-                  ('z', 'f8'), ('stamp', 'f8'), ('above_detect', 'f8'), ('above_track', 'f8'), ('below_loss', 'f8'),
-                  ('present', 'i8')], align=True)
+LEVEL_DTYPE = np.dtype([('mean', 'f8'), ('variance', 'f8'), ('samples', 'i8'), ('learnt', 'f8'),
+                        ('z', 'f8'), ('stamp', 'f8'), ('above_detect', 'f8'), ('above_track', 'f8'),
+                        ('below_loss', 'f8'),
+                        ('present', 'i8')], align=True)
 """mean, variance: m [dB-Hz], V [dB2] of so many samples, learnt for so long [s]; z: the last level, of this stamp [s];
 above_detect, above_track, below_loss: for how long it has been there [s]; present: whether there is a target."""
 
 Thresholds = namedtuple('Thresholds', 'detect track loss')
 """[dB-Hz]."""
 
-SIGMAS = 4.0
+DETECTION_SIGMAS = 4.0
 """Of the noise, that a target must stand above its mean."""
 
-LEAST_SIGMAS = 2.0
+MIN_LOSS_SIGMAS = 2.0
 """Of the noise, above which the threshold of the loss stands."""
 
-TRACK, LOSS = 1.0, -2.0
+TRACK_MARGIN_DB, LOSS_MARGIN_DB = 1.0, -2.0
 """Of the thresholds above detection [dB]."""
 
 
@@ -44,8 +45,8 @@ def known(s, p):
 def thresholds(s):
     """Thresholds above the noise that was learnt."""
     sigma = math.sqrt(s.variance)
-    detect = s.mean + SIGMAS * sigma
-    return Thresholds(detect, detect + TRACK, max(detect + LOSS, s.mean + LEAST_SIGMAS * sigma))
+    detect = s.mean + DETECTION_SIGMAS * sigma
+    return Thresholds(detect, detect + TRACK_MARGIN_DB, max(detect + LOSS_MARGIN_DB, s.mean + MIN_LOSS_SIGMAS * sigma))
 
 
 @compiled
@@ -93,14 +94,14 @@ def detected(s, p):
 
 
 @compiled
-def forget_noise(s, p):
+def restart_noise(s, p):
     """Learn anew what was not learnt to its end: a signal has come."""
     if not known(s, p):
         s.samples, s.learnt, s.mean, s.variance = 0, 0.0, 0.0, 0.0
 
 
 @compiled
-def forget_times(s):
+def restart_times(s):
     """Count the times anew: the beam has moved to another place."""
     s.above_detect = s.above_track = s.below_loss = 0.0
     s.present = 0

@@ -1,7 +1,7 @@
 """Parameters of search, acquisition and step track."""
 import dataclasses
 
-from acu_tracker.search.pattern import PATTERNS
+from acu_tracker.search.pattern import SEARCH_PATTERNS
 from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
 
 
@@ -19,7 +19,7 @@ class StepTrackParameters(Parameters):
 class SearchParameters(Parameters):
     """Mode search: on the last place, over a small area, over the full one, and again."""
 
-    pattern: str = choice('spiral', PATTERNS, 'of the path; the square and the raster lie along the track')
+    pattern: str = choice('spiral', SEARCH_PATTERNS, 'of the path; the square and the raster lie along the track')
     wait: float = parameter(2.5, 0.0, 600.0, 's', 'on the last place before the beam moves; there the noise is learnt')
     small: float = parameter(1.5, 0.1, 50.0, 'beamwidths', 'radius of the small area')
     full: float = parameter(5.0, 0.1, 200.0, 'beamwidths', 'radius of the full area')

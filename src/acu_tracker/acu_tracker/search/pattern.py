@@ -6,20 +6,20 @@ beam moves at a constant speed
     v <= b / (4 tau)
 
 along its path, so that the target is within the beam for about four time constants of the level (operations.md 2.2).
-It starts from rest in RISE, and rests for an instant in each corner: offset and rate have no jump.
+It starts from rest in SPEED_RISE_TIME_S, and rests for an instant in each corner: offset and rate have no jump.
 """
 import math
 from collections import namedtuple
 
 from pedestal_common.compiled import compiled
 
-PATTERNS = ('spiral', 'raster', 'square', 'sector')
-SPIRAL, RASTER, SQUARE, SECTOR = range(len(PATTERNS))
+SEARCH_PATTERNS = ('spiral', 'raster', 'square', 'sector')
+PATTERN_SPIRAL, PATTERN_RASTER, PATTERN_SQUARE, PATTERN_SECTOR = range(len(SEARCH_PATTERNS))
 """spiral: Archimedean; raster: lines along the track of the target, the middle one first, as a late prediction is off
 along its track; square: expanding, along the track and across; sector: lines from one edge of the area to the other.
 """
 
-RISE = 0.2
+SPEED_RISE_TIME_S = 0.2
 """Time in which the beam reaches its speed, and in which it comes to rest [s]."""
 
 Area = namedtuple('Area', 'pattern radius across pitch speed')
@@ -55,8 +55,8 @@ def circle(radius, period, t):
 @compiled
 def duration(area):
     """How long a pattern takes [s]."""
-    if area.pattern == SPIRAL:
-        return spiral_length(_turn_of(area), area.pitch) / area.speed + 0.5 * RISE
+    if area.pattern == PATTERN_SPIRAL:
+        return spiral_length(_turn_of(area), area.pitch) / area.speed + 0.5 * SPEED_RISE_TIME_S
     T, n = 0.0, vertices(area)
     for i in range(1, n):
         T += _leg_time(area, i)
@@ -66,7 +66,7 @@ def duration(area):
 @compiled
 def point(area, t):
     """Point of a pattern at t [s] after its begin; after its `duration` it rests where it ended."""
-    if area.pattern == SPIRAL:
+    if area.pattern == PATTERN_SPIRAL:
         return _on_spiral(area, t)
     n = vertices(area)
     for i in range(1, n):
@@ -96,7 +96,7 @@ def spiral_length(theta, pitch):
 def _on_spiral(area, t):
     """Point of the spiral: the length is v t after the rise, and Newton's method finds the angle that has it."""
     v, k, end = area.speed, 0.5 * area.pitch / math.pi, _turn_of(area)
-    length, rate = (0.5 * v * t * t / RISE, v * t / RISE) if t < RISE else (v * (t - 0.5 * RISE), v)
+    (length, rate) = (0.5 * v * t * t / SPEED_RISE_TIME_S, v * t / SPEED_RISE_TIME_S) if t < SPEED_RISE_TIME_S else (v * (t - 0.5 * SPEED_RISE_TIME_S), v)
     theta = min(length / k, math.sqrt(2.0 * length / k))
     for _ in range(6):
         theta -= (spiral_length(theta, area.pitch) - length) / (k * math.sqrt(1.0 + theta * theta))
@@ -116,7 +116,7 @@ def lines_aside(area):
 @compiled
 def vertices(area):
     """Number of corners of a pattern of straight legs, with its begin and its end."""
-    if area.pattern == SQUARE:
+    if area.pattern == PATTERN_SQUARE:
         return 4 * max(math.ceil(area.radius / area.pitch - 0.5), 1) + 3
     return 4 * lines_aside(area) + 3
 
@@ -126,13 +126,13 @@ def vertex(area, i):
     """(x, y) [rad] of corner i, 0 the centre."""
     if i == 0:
         return 0.0, 0.0
-    if area.pattern == SQUARE:
+    if area.pattern == PATTERN_SQUARE:
         # Legs of 1, 1, 2, 2, 3, 3 ... pitches, each a quarter of a turn on.
         return _alternating((i + 1) // 2) * area.pitch, _alternating(i // 2) * area.pitch
     # Boustrophedon: the corners of a line are its two ends, and the next line begins at the side where one ended.
     line = (i - 1) // 2
     x = area.radius if (i + line) % 2 == 1 else -area.radius
-    return x, (_alternating(line) if area.pattern == RASTER else line - lines_aside(area)) * area.pitch
+    return x, (_alternating(line) if area.pattern == PATTERN_RASTER else line - lines_aside(area)) * area.pitch
 
 
 @compiled
@@ -150,9 +150,9 @@ def _leg_length(area, i):
 
 @compiled
 def _leg_time(area, i):
-    """Time [s] from corner i - 1 to corner i, from rest to rest with the acceleration v / RISE."""
+    """Time [s] from corner i - 1 to corner i, from rest to rest with the acceleration v / SPEED_RISE_TIME_S."""
     L, v = _leg_length(area, i), area.speed
-    return L / v + RISE if L > v * RISE else 2.0 * math.sqrt(L * RISE / v)
+    return L / v + SPEED_RISE_TIME_S if L > v * SPEED_RISE_TIME_S else 2.0 * math.sqrt(L * SPEED_RISE_TIME_S / v)
 
 
 @compiled
@@ -160,8 +160,8 @@ def _on_leg(area, i, t):
     """Point of the leg to corner i, t [s] after it began."""
     x0, y0 = vertex(area, i - 1)
     x1, y1 = vertex(area, i)
-    L, T, a = _leg_length(area, i), _leg_time(area, i), area.speed / RISE
-    rise = min(RISE, 0.5 * T)
+    L, T, a = _leg_length(area, i), _leg_time(area, i), area.speed / SPEED_RISE_TIME_S
+    rise = min(SPEED_RISE_TIME_S, 0.5 * T)
     if t < rise:
         way, rate = 0.5 * a * t * t, a * t
     elif T - t < rise:

@@ -15,12 +15,12 @@ from acu_tracker.geometry.vector import Vector, dot, times, vector
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 
-PLACE = np.dtype([('u', 'f8', (3,)), ('du', 'f8', (3,)), ('stamp', 'f8')], align=True)
+PLACE_DTYPE = np.dtype([('u', 'f8', (3,)), ('du', 'f8', (3,)), ('stamp', 'f8')], align=True)
 """ENU unit vector u [-] of the target at a stamp [s], and its rate du [1/s]."""
 
-STILL = Vector(0.0, 0.0, 0.0)
+ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
 
-TAU = 10.0
+RATE_FADE_TIME_S = 10.0
 """Time constant with which the expected rate fades [s]."""
 
 
@@ -36,13 +36,13 @@ def remember(s, t, u, du):
 def motion_at(s, t):
     """Motion in earth angles at t [s], not before it was last known."""
     u, du = vector(s.u), vector(s.du)
-    W, left = math.sqrt(dot(du, du)), math.exp((s.stamp - t) / TAU)
-    angle = W * TAU * (1.0 - left)
+    W, left = math.sqrt(dot(du, du)), math.exp((s.stamp - t) / RATE_FADE_TIME_S)
+    angle = W * RATE_FADE_TIME_S * (1.0 - left)
     ahead = turned(u, du, W, angle)
     # d/d angle (u cos + du/W sin) = (du cos - u W sin) / W, and the angle grows by W left; the second derivative is
     # that of a circle and of the rate that fades.
     rate = times(left, turned(du, times(-W * W, u), W, angle))
-    bend, fading = times(-(W * left)**2, ahead), times(-1.0 / TAU, rate)
+    bend, fading = times(-(W * left)**2, ahead), times(-1.0 / RATE_FADE_TIME_S, rate)
     return earth_angles(LineOfSight(ahead, rate, Vector(bend.x + fading.x, bend.y + fading.y, bend.z + fading.z)))
 
 
@@ -58,6 +58,6 @@ def displaced(motion, p):
     pattern adds to the accelerations is left out."""
     n = line_of_sight.displaced_motion(motion.azimuth.angle, motion.elevation.angle, motion.azimuth.rate,
                                        motion.elevation.rate, p.x, p.y, p.dx, p.dy)
-    beam = angles(LineOfSight(Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]), STILL))
+    beam = angles(LineOfSight(Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]), ZERO_VECTOR))
     return Motion(AxisMotion(beam.azimuth.angle, beam.azimuth.rate, motion.azimuth.acceleration),
                   AxisMotion(beam.elevation.angle, beam.elevation.rate, motion.elevation.acceleration))

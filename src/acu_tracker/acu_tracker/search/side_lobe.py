@@ -9,14 +9,14 @@ import math
 
 from pedestal_common.compiled import compiled
 
-MARGIN = 10.0
+SIDE_LOBE_MARGIN_DB = 10.0
 """How far below its expected level a signal is taken for one in a side lobe [dB]."""
 
-PLACES = 6
-RADIUS = 1.2
+LOOK_AROUND_PLACES = 6
+LOOK_AROUND_BEAMWIDTHS = 1.2
 """Of the look-around [beamwidths]."""
 
-BETTER = 2.0
+MIN_IMPROVEMENT_DB = 2.0
 """How much higher the level must be at another place to go there [dB]."""
 
 
@@ -31,24 +31,25 @@ def expected(cn0_dbhz, reference_range, exponent, distance):
 
 @compiled
 def suspected(z, level):
-    """Whether a level z stands MARGIN below the expected one [dB-Hz]."""
-    return z < level - MARGIN
+    """Whether a level z stands SIDE_LOBE_MARGIN_DB below the expected one [dB-Hz]."""
+    return z < level - SIDE_LOBE_MARGIN_DB
 
 
 @compiled
 def place(i, beamwidth):
-    """Offset (x, e) [rad] of place i from the present one: 0 itself, 1 to PLACES around it."""
+    """Offset (x, e) [rad] of place i from the present one: 0 itself, 1 to LOOK_AROUND_PLACES around it."""
     if i == 0:
         return 0.0, 0.0
-    angle = 2.0 * math.pi * (i - 1) / PLACES
-    return RADIUS * beamwidth * math.cos(angle), RADIUS * beamwidth * math.sin(angle)
+    angle = 2.0 * math.pi * (i - 1) / LOOK_AROUND_PLACES
+    return LOOK_AROUND_BEAMWIDTHS * beamwidth * math.cos(angle), LOOK_AROUND_BEAMWIDTHS * beamwidth * math.sin(angle)
 
 
 @compiled
 def best(levels):
-    """The place to go to by the levels [dB-Hz] of all 1 + PLACES: the highest, 0 where none is BETTER."""
+    """The place to go to by the levels [dB-Hz] of all 1 + LOOK_AROUND_PLACES: the highest, 0 where none is
+    MIN_IMPROVEMENT_DB."""
     highest = 0
-    for i in range(1, 1 + PLACES):
+    for i in range(1, 1 + LOOK_AROUND_PLACES):
         if levels[i] > levels[highest]:
             highest = i
-    return highest if levels[highest] > levels[0] + BETTER else 0
+    return highest if levels[highest] > levels[0] + MIN_IMPROVEMENT_DB else 0

@@ -12,14 +12,14 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-SLOPES = np.dtype([('n', 'i8'), ('d', 'f8', (2,)), ('e', 'f8', (2,)), ('dd', 'f8', (3,)), ('ed', 'f8', (2, 2))],
-                  align=True)
+SLOPES_DTYPE = np.dtype([('n', 'i8'), ('d', 'f8', (2,)), ('e', 'f8', (2,)), ('dd', 'f8', (3,)), ('ed', 'f8', (2, 2))],
+                        align=True)
 """n samples, their means d', e' [rad], the sums S_dd (xx, xe, ee) and S_ed [rad2]."""
 
-LEAST = 0.5
+MIN_SLOPE = 0.5
 """Slope below which the loop is not closed: axes turned by 60 deg, which takes a whole phase margin."""
 
-UNKNOWN, RIGHT, WRONG = range(3)
+VERDICT_UNKNOWN, VERDICT_RIGHT, VERDICT_WRONG = range(3)
 """Verdicts."""
 
 
@@ -62,8 +62,8 @@ def slopes(s):
 
 @compiled
 def verdict(s, samples):
-    """RIGHT or WRONG once there are so many samples, UNKNOWN before."""
+    """VERDICT_RIGHT or VERDICT_WRONG once there are so many samples, VERDICT_UNKNOWN before."""
     if s.n < samples:
-        return UNKNOWN
+        return VERDICT_UNKNOWN
     x, e = slopes(s)
-    return RIGHT if x >= LEAST and e >= LEAST else WRONG
+    return VERDICT_RIGHT if x >= MIN_SLOPE and e >= MIN_SLOPE else VERDICT_WRONG

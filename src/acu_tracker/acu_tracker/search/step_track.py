@@ -12,15 +12,15 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-STEP_TRACK = np.dtype([('place', 'f8', (2,)), ('began', 'f8'), ('phase', 'i8'), ('since', 'f8'),
-                       ('sum', 'f8'), ('samples', 'i8'), ('plus', 'f8')], align=True)
+STEP_TRACK_DTYPE = np.dtype([('place', 'f8', (2,)), ('began', 'f8'), ('phase', 'i8'), ('since', 'f8'),
+                             ('sum', 'f8'), ('samples', 'i8'), ('plus', 'f8')], align=True)
 """place: offset of the beam between its steps [rad]; began: the cycle [s]; phase: one of the following; since: when
 the beam went to its place of the phase [s]; sum of so many levels there [dB-Hz]; plus: the mean on the plus side."""
 
-PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus', 'elevation minus', 'rest')
-REST = len(PHASES) - 1
+STEP_PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus', 'elevation minus', 'rest')
+REST_PHASE = len(STEP_PHASES) - 1
 
-SETTLED = 5.0
+STEP_SETTLING_LAGS = 5.0
 """Time constants of the level after which it is that of a new place."""
 
 
@@ -48,14 +48,14 @@ def step(s, p, beamwidth, tau, t, z, present):
     """(x, e) offset of the beam [rad] at t [s]; z: level that was measured since the last step, NaN where there is
     none; present: whether there is a signal to step on. p: record of StepTrackParameters; tau: of the level [s]."""
     d = p.step * beamwidth
-    if not present or (s.phase == REST and t - s.began < p.cycle):
+    if not present or (s.phase == REST_PHASE and t - s.began < p.cycle):
         if not present:
-            _enter(s, REST, t)
+            _enter(s, REST_PHASE, t)
         return s.place[0], s.place[1]
-    if s.phase == REST:
+    if s.phase == REST_PHASE:
         s.began = t
         _enter(s, 0, t)
-    settled = SETTLED * tau
+    settled = STEP_SETTLING_LAGS * tau
     if z == z and t - s.since > settled:
         s.sum += z
         s.samples += 1
@@ -69,7 +69,7 @@ def step(s, p, beamwidth, tau, t, z, present):
                 s.place[axis] += min(max(move, -d), d)
         _enter(s, s.phase + 1, t)
     x, e = s.place[0], s.place[1]
-    if s.phase == REST:
+    if s.phase == REST_PHASE:
         return x, e
     aside = d if s.phase % 2 == 0 else -d
     return (x + aside, e) if s.phase < 2 else (x, e + aside)

@@ -24,7 +24,7 @@ def start_from_actual(axis, c, u, immobile, begins, silence):
         if disobeys:
             rate = position_loop.realised(axis[i].command, rate)
         if silence or disobeys:
-            position_loop.take_back(axis[i], rate)
+            position_loop.replace_command(axis[i], rate)
         if begins or disobeys:
             position_loop.initialise(axis[i], c.axis[i].p, u.stamp, u.position[i], rate)
 

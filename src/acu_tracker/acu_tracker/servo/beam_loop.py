@@ -12,8 +12,8 @@ import math
 
 from pedestal_common.compiled import compiled
 
-FORMS = ('tracked', 'type_1', 'type_2')
-TRACKED, TYPE_1, TYPE_2 = range(len(FORMS))
+LOOP_FORMS = ('tracked', 'type_1', 'type_2')
+FORM_TRACKED, FORM_TYPE_1, FORM_TYPE_2 = range(len(LOOP_FORMS))
 
 
 @compiled
@@ -42,9 +42,9 @@ def coasted(R, v, T, compensation):
 
 @compiled
 def step(form, R, v, error, alpha, beta, T, compensation):
-    """(beam, its rate) of TYPE_1 or TYPE_2; arguments as of type_1, the error NaN where none came."""
+    """(beam, its rate) of FORM_TYPE_1 or FORM_TYPE_2; arguments as of type_1, the error NaN where none came."""
     if math.isnan(error):
         return coasted(R, v, T, compensation)
-    if form == TYPE_1:
+    if form == FORM_TYPE_1:
         return type_1(R, v, error, alpha, beta, T, compensation)
     return type_2(R, v, error, alpha, beta, T, compensation)

@@ -10,30 +10,31 @@ from acu_tracker.servo.ends import Ends, braking_distance
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
 
-MOST = 64
-DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
-       'clockwise within a turn, straight lines between; empty: elevation.limits.low')
+MAX_FLOOR_POINTS = 64
+FLOOR_DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
+             'clockwise within a turn, straight lines between; empty: elevation.limits.low')
 
-CELLS = 720
+CELL_COUNT = 720
 """Of a turn, in which the floor is looked up: half a degree."""
 
-CELL = 2.0 * math.pi / CELLS
+CELL_WIDTH_RAD = 2.0 * math.pi / CELL_COUNT
 
-FLOOR = np.dtype([('given', 'i8'), ('highest', 'f8', (CELLS,))], align=True)
-"""given: whether there is one; highest: of the floor in each cell [rad], that of azimuth 0 to CELL first."""
+FLOOR_DTYPE = np.dtype([('given', 'i8'), ('highest', 'f8', (CELL_COUNT,))], align=True)
+"""given: whether there is one; highest: of the floor in each cell [rad], that of azimuth 0 to CELL_WIDTH_RAD first."""
 
-FAR = 1e3
+MAX_AZIMUTH_RAD = 1e3
 """Azimuth [rad] that no travel holds: an infinite one has no cell, its conversion to a whole number is undefined."""
 
-ALLOWANCE = 1e-3
+FLOOR_CLEARANCE_RAD = 1e-3
 """Elevation [rad] by which the floor is cleared, so that the azimuth does not wait for the last encoder step."""
 
 
 def points(text):
-    """Azimuths and elevations (n,) [rad] of a text as in DOC, ((), ()) of an empty one. Raises ParameterError."""
+    """Azimuths and elevations (n,) [rad] of a text as in FLOOR_DOC, ((), ()) of an empty one. Raises
+    ParameterError."""
     parts = [part.split() for part in text.split(';') if part.strip()]
-    if len(parts) > MOST:
-        raise ParameterError(f'floor = {text!r}: {len(parts)} points; must be at most {MOST}')
+    if len(parts) > MAX_FLOOR_POINTS:
+        raise ParameterError(f'floor = {text!r}: {len(parts)} points; must be at most {MAX_FLOOR_POINTS}')
     try:
         rows = [(float(azimuth), float(elevation)) for azimuth, elevation in parts]
     except ValueError:
@@ -47,27 +48,28 @@ def points(text):
 
 
 def at(text, A):
-    """The floor of a text as in DOC at an azimuth [rad]; -inf where there is none."""
+    """The floor of a text as in FLOOR_DOC at an azimuth [rad]; -inf where there is none."""
     azimuths, elevations = points(text)
     return np.interp(A, azimuths, elevations, period=2.0 * math.pi) if azimuths else -math.inf
 
 
 def table(text) -> np.ndarray:
-    """FLOOR (1,) of a text as in DOC: in each cell the highest of its ends and of the points in it."""
+    """FLOOR_DTYPE (1,) of a text as in FLOOR_DOC: in each cell the highest of its ends and of the points in it."""
     A, f = points(text)
-    floor = np.zeros(1, FLOOR)
+    floor = np.zeros(1, FLOOR_DTYPE)
     if A:
-        edges = np.interp(CELL * np.arange(CELLS + 1), A, f, period=2.0 * math.pi)
+        edges = np.interp(CELL_WIDTH_RAD * np.arange(CELL_COUNT + 1), A, f, period=2.0 * math.pi)
         highest = np.maximum(edges[:-1], edges[1:])
-        np.maximum.at(highest, (np.mod(A, 2.0 * math.pi) / CELL).astype(int) % CELLS, f)
+        np.maximum.at(highest, (np.mod(A, 2.0 * math.pi) / CELL_WIDTH_RAD).astype(int) % CELL_COUNT, f)
         floor['given'], floor['highest'] = 1, highest
     return floor
 
 
 @compiled
 def _cell(A):
-    """The cell of an azimuth [rad], not yet brought into one turn; one beyond every travel counts as FAR away."""
-    return math.floor(min(max(A, -FAR), FAR) / CELL)
+    """The cell of an azimuth [rad], not yet brought into one turn; one beyond every travel counts as MAX_AZIMUTH_RAD
+    away."""
+    return math.floor(min(max(A, -MAX_AZIMUTH_RAD), MAX_AZIMUTH_RAD) / CELL_WIDTH_RAD)
 
 
 @compiled
@@ -75,15 +77,15 @@ def highest(floor, A, B):
     """The highest of the floor [rad] between two azimuths [rad]."""
     first, last = _cell(min(A, B)), _cell(max(A, B))
     top = -math.inf
-    for i in range(first, min(last, first + CELLS - 1) + 1):
-        top = max(top, floor.highest[i % CELLS])
+    for i in range(first, min(last, first + CELL_COUNT - 1) + 1):
+        top = max(top, floor.highest[i % CELL_COUNT])
     return top
 
 
 @compiled
 def above(floor, A, E):
     """Whether the floor is above an elevation at an azimuth [rad]."""
-    return floor.given != 0 and floor.highest[_cell(A) % CELLS] > E
+    return floor.given != 0 and floor.highest[_cell(A) % CELL_COUNT] > E
 
 
 @compiled
@@ -93,13 +95,15 @@ def of_azimuth(floor, limits, A, E):
     if not floor.given or above(floor, A, E):
         return Ends(limits.low, limits.high)
     first = last = _cell(A)
-    while last - first < CELLS and floor.highest[(first - 1) % CELLS] <= E and first * CELL > limits.low:
+    while last - first < CELL_COUNT and floor.highest[(first
+                                                       - 1) % CELL_COUNT] <= E and first * CELL_WIDTH_RAD > limits.low:
         first -= 1
-    while last - first < CELLS and floor.highest[(last + 1) % CELLS] <= E and (last + 1) * CELL < limits.high:
+    while last - first < CELL_COUNT and floor.highest[(last + 1) % CELL_COUNT] <= E and (last
+                                                                                         + 1) * CELL_WIDTH_RAD < limits.high:
         last += 1
-    if last - first >= CELLS:
+    if last - first >= CELL_COUNT:
         return Ends(limits.low, limits.high)
-    return Ends(max(limits.low, first * CELL), min(limits.high, (last + 1) * CELL))
+    return Ends(max(limits.low, first * CELL_WIDTH_RAD), min(limits.high, (last + 1) * CELL_WIDTH_RAD))
 
 
 @compiled
@@ -108,7 +112,7 @@ def of_elevation(floor, limits, A, ahead, target):
     target [rad]."""
     if not floor.given:
         return Ends(limits.low, limits.high)
-    top = max(highest(floor, A, ahead), highest(floor, A, target)) + ALLOWANCE
+    top = max(highest(floor, A, ahead), highest(floor, A, target)) + FLOOR_CLEARANCE_RAD
     return Ends(max(limits.low, min(top, limits.high)), limits.high)
 
 

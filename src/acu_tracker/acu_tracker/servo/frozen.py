@@ -9,11 +9,11 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-FROZEN = np.dtype([('told', 'f8', (6,)), ('since', 'f8'), ('way', 'f8', (2,)), ('frozen', 'i8')], align=True)
+FROZEN_DTYPE = np.dtype([('told', 'f8', (6,)), ('since', 'f8'), ('way', 'f8', (2,)), ('frozen', 'i8')], align=True)
 """told: angles [rad], rates [rad/s] and torques [Nm] of the step before; way: x of azimuth and elevation [rad], beyond
-LOOK since a stamp `since` [s]; frozen: 1 since one was so for long, until it is reset."""
+FROZEN_TEST_TRAVEL_RAD since a stamp `since` [s]; frozen: 1 since one was so for long, until it is reset."""
 
-LOOK = 3e-3
+FROZEN_TEST_TRAVEL_RAD = 3e-3
 """Way [rad] on which a number must change: ten times the lash of a gear, a sixth of a beamwidth of a degree."""
 
 
@@ -42,7 +42,7 @@ def watch(s, u, hold, anew):
         s.told[i], s.told[2 + i], s.told[4 + i] = u.position[i], u.velocity[i], u.torque[i]
     if not same:
         _restart(s, u.stamp)
-    elif max(abs(s.way[0]), abs(s.way[1])) <= LOOK:
+    elif max(abs(s.way[0]), abs(s.way[1])) <= FROZEN_TEST_TRAVEL_RAD:
         s.since = u.stamp
     elif u.stamp - s.since > hold:
         s.frozen = 1

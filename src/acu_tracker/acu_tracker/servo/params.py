@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from acu_tracker.servo.beam_loop import FORMS
+from acu_tracker.servo.beam_loop import LOOP_FORMS
 from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
 
 
@@ -44,7 +44,8 @@ class AdrcParameters(Parameters):
 class BeamParameters(Parameters):
     """The beam of a phased array (paper 002); alpha and rate_compensation belong to its own loops, type_1, type_2."""
 
-    form: str = choice('tracked', FORMS, "tracked: the target's filter predicted to t_m; type_1: the paper's loop; "
+    form: str = choice('tracked', LOOP_FORMS,
+                       "tracked: the target's filter predicted to t_m; type_1: the paper's loop; "
                        'type_2: that loop with the beam at its prediction')
     alpha: float = parameter(0.1, 1e-3, 1.0, '', 'gain on the angle; beta by Benedict and Bordner')
     rate_compensation: float = parameter(0.0, 0.0, 2.0, '', "delta: share of the deck's rate fed forward")

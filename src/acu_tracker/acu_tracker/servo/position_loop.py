@@ -16,11 +16,11 @@ from acu_tracker.servo import adrc, beam_loop, ends, feedforward, notch, pid, re
 from pedestal_common.compiled import compiled
 
 CONTROLLERS = ('pid', 'feedforward', 'adrc', 'beam')
-PID, FEEDFORWARD, ADRC, BEAM = range(len(CONTROLLERS))
+CONTROLLER_PID, CONTROLLER_FEEDFORWARD, CONTROLLER_ADRC, CONTROLLER_BEAM = range(len(CONTROLLERS))
 
-AXIS = np.dtype([
+AXIS_LOOP_DTYPE = np.dtype([
     ('controller', 'i8'), ('command', 'f8'),                                  # of the last step; [rad/s]
-    ('reference', reference.REFERENCE),
+    ('reference', reference.REFERENCE_DTYPE),
     ('integral', 'f8'), ('error', 'f8'), ('derivative', 'f8'),                # [rad/s], e [rad], D [rad/s]
     ('z', 'f8', (3,)), ('observed', 'f8'),                                    # adrc: z1 z2 z3 at this instant [s]
     ('notch', 'f8', (4,)),
@@ -42,17 +42,18 @@ Command = namedtuple('Command', 'rate torque reference angle_limited rate_limite
 the command; angle_limited, rate_limited, acceleration_limited: what was limited."""
 
 
-LARGEST_PHASE = 0.5
+MAX_DELAY_PHASE_RAD = 0.5
 """Largest bandwidth times delay of the command [rad]: what it takes of the phase margin of a loop."""
 
 
 def slowed(params, delay):
-    """AxisParameters whose loops a delay of the command [s] leaves stable, none faster than LARGEST_PHASE / delay."""
+    """AxisParameters whose loops a delay of the command [s] leaves stable, none faster than MAX_DELAY_PHASE_RAD /
+    delay."""
     if delay == 0.0:
         return params
     loops = {name: getattr(params, name) for name in ('pid', 'feedforward', 'adrc')}
     return dataclasses.replace(params, **{
-        name: dataclasses.replace(loop, bandwidth=min(loop.bandwidth, LARGEST_PHASE / delay))
+        name: dataclasses.replace(loop, bandwidth=min(loop.bandwidth, MAX_DELAY_PHASE_RAD / delay))
         for name, loop in loops.items()})
 
 
@@ -73,7 +74,7 @@ def realised(command, dy):
 
 
 @compiled
-def take_back(axis, rate):
+def replace_command(axis, rate):
     """Take the rate command in force for another [rad/s]: what the axis has made of it."""
     axis.command = rate
 
@@ -86,7 +87,7 @@ def initialise(axis, p, t_k, y, dy):
     p: record of AxisParameters, here and below.
     """
     axis.controller = p.controller
-    if p.controller == BEAM and axis.reference.planned.count > 0:
+    if p.controller == CONTROLLER_BEAM and axis.reference.planned.count > 0:
         axis.reference.rate = 0.0
         return
     reference.initialise(axis.reference, t_k, y, dy, axis.command)
@@ -115,7 +116,7 @@ def stop(axis, p, dt):
 @compiled
 def instant(p, t_k, t_m):
     """The instant [s] at which the controller needs the raw target: t_k for pid, else t_m."""
-    return t_k if p.controller == PID else t_m
+    return t_k if p.controller == CONTROLLER_PID else t_m
 
 
 @compiled
@@ -125,7 +126,7 @@ def follow(axis, c, target, feedback, now):
     c: record of the axis's constants, p its AxisParameters, notch its coefficients, reaction the time [s] given
     in front of a limit, braking the deceleration [rad/s2] there.
     """
-    if c.p.controller == BEAM:
+    if c.p.controller == CONTROLLER_BEAM:
         return _steer(axis, c.p, target, feedback, now.dt)
     return _step(axis, c, target, feedback, now)
 
@@ -135,9 +136,9 @@ def _steer(axis, p, target, feedback, T):
     """Command of an electronic beam: the raw target at t_m, or the beam of its own loop on the error."""
     b, r = p.beam, axis.reference
     beta, compensation = constant_gain.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
-    axis.controller = BEAM
+    axis.controller = CONTROLLER_BEAM
     r.acceleration = 0.0
-    if not feedback.closed or b.form == beam_loop.TRACKED:
+    if not feedback.closed or b.form == beam_loop.FORM_TRACKED:
         reference.put(r, target)
     else:
         r.angle, r.rate = beam_loop.step(b.form, r.angle, r.rate, feedback.error, b.alpha, beta, T, compensation)
@@ -158,10 +159,10 @@ def _step(axis, c, target, feedback, now):
     """
     p, r, y, dy = c.p, axis.reference, feedback.y, feedback.dy
     handover = axis.controller != p.controller
-    if p.controller == PID or (handover and axis.controller == PID):
+    if p.controller == CONTROLLER_PID or (handover and axis.controller == CONTROLLER_PID):
         reference.initialise(r, now.t_k, y, dy, axis.command)
     torque, rate_limited, acceleration_limited = 0.0, False, False
-    if p.controller == PID:
+    if p.controller == CONTROLLER_PID:
         v, angle_limited = _held_inside(target, feedback.ends.low, feedback.ends.high)
     else:
         angle_limited, rate_limited, acceleration_limited = reference.follow(r, p, target, now.t_m, axis.command,
@@ -200,10 +201,10 @@ def _held_inside(target, low, high):
 @compiled
 def _control_law(axis, p, e, v):
     """(rate command before notch and limits, what of it is fed forward) [rad/s]; e = v.angle - encoder, v at t_k."""
-    if p.controller == PID:
+    if p.controller == CONTROLLER_PID:
         return pid.rate(e, axis.integral, axis.derivative, p.pid.bandwidth, p.pid.derivative), 0.0
     r = axis.reference
-    if p.controller == FEEDFORWARD:
+    if p.controller == CONTROLLER_FEEDFORWARD:
         k = p.feedforward
         fed = feedforward.fed(r.rate, r.acceleration, k.rate_feedforward, k.acceleration_feedforward)
         return feedforward.rate(e, axis.integral, fed, k.bandwidth), fed
@@ -218,7 +219,7 @@ def _transfer(axis, p, e, v, feedback, t_k):
     axis.error, axis.derivative = e, v.rate - feedback.dy
     _initialise_feedback(axis, t_k, feedback.y, feedback.dy)
     u, fed = _control_law(axis, p, e, v)
-    if p.controller == ADRC:
+    if p.controller == CONTROLLER_ADRC:
         axis.z[2] = p.adrc.rate_bandwidth * (u - axis.command)
     else:
         axis.integral = axis.command - u
@@ -228,7 +229,7 @@ def _transfer(axis, p, e, v, feedback, t_k):
 @compiled
 def _update(axis, p, e, y, now):
     """Bring the states of the running controller to t_k."""
-    if p.controller == ADRC:
+    if p.controller == CONTROLLER_ADRC:
         h = now.t_k - axis.observed
         if h > 0.0:
             # The command and the acceleration in force since the observer's last instant.
@@ -237,8 +238,8 @@ def _update(axis, p, e, y, now):
                                                             p.adrc.rate_bandwidth, h)
             axis.observed = now.t_k
     else:
-        if p.controller == PID:
+        if p.controller == CONTROLLER_PID:
             axis.derivative = pid.derivative(axis.derivative, e, axis.error, now.dt, p.pid.derivative_time)
             axis.error = e
-        K_p, K_i = pid.gains(p.pid) if p.controller == PID else pid.gains(p.feedforward)
+        K_p, K_i = pid.gains(p.pid) if p.controller == CONTROLLER_PID else pid.gains(p.feedforward)
         axis.integral = pid.integrated(axis.integral, e, now.dt, K_p, K_i)

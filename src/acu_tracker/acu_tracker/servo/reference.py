@@ -6,16 +6,16 @@ controller begins there.
 """
 import numpy as np
 
-from acu_tracker.geometry.history import LENGTH, bracket, history_type, interpolated, push
+from acu_tracker.geometry.history import HISTORY_LENGTH, bracket, history_type, interpolated, push
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import shaper
 from pedestal_common.compiled import compiled
 
-REFERENCE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('planned', history_type(4))],
-                     align=True)
+REFERENCE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('planned', history_type(4))],
+                           align=True)
 """The shaped reference at its newest stamp [rad, rad/s, rad/s2]; planned: it and the rate command [rad/s], at t_m."""
 
-COMMAND = 3
+COMMAND_COLUMN = 3
 
 
 @compiled
@@ -34,7 +34,7 @@ def put(r, motion):
 def _plan(r, stamp, command):
     """Put the reference into the history at the stamp [s] at which the encoder is compared with it."""
     row = r.planned.sample[push(r.planned, stamp)]
-    row[0], row[1], row[2], row[COMMAND] = r.angle, r.rate, r.acceleration, command
+    row[0], row[1], row[2], row[COMMAND_COLUMN] = r.angle, r.rate, r.acceleration, command
 
 
 @compiled
@@ -64,7 +64,7 @@ def follow(r, p, target, stamp, command, ends):
 @compiled
 def commanded(r, command):
     """Put the rate command [rad/s] of this step beside its reference in the history."""
-    r.planned.sample[r.planned.newest, COMMAND] = command
+    r.planned.sample[r.planned.newest, COMMAND_COLUMN] = command
 
 
 @compiled
@@ -72,7 +72,7 @@ def _around(history, t):
     """(older row, newer row, fraction between them) at t [s]; the oldest where t lies before it."""
     i, j, f = bracket(history, t)
     if i < 0:
-        i = j = (history.newest + 1 - history.count) % LENGTH
+        i = j = (history.newest + 1 - history.count) % HISTORY_LENGTH
     return i, j, f
 
 
@@ -91,4 +91,4 @@ def planned(r, t):
 def in_force(r, t):
     """(rate command [rad/s], acceleration [rad/s2] of the reference) at t [s]."""
     rows = _around(r.planned, t)
-    return interpolated(r.planned, rows, COMMAND), interpolated(r.planned, rows, 2)
+    return interpolated(r.planned, rows, COMMAND_COLUMN), interpolated(r.planned, rows, 2)

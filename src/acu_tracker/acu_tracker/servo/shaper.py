@@ -9,7 +9,7 @@ from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
 
-SUB_STEPS = 4
+SUB_STEP_COUNT = 4
 
 
 @compiled
@@ -45,12 +45,12 @@ def shape(before, raw, dt, limits):
     raw: the AxisMotion to be followed, at the end of dt; limits: record of ShaperParameters.
     """
     p, v, a = before
-    h = dt / SUB_STEPS
+    h = dt / SUB_STEP_COUNT
     # The acceleration of the target itself is not available for closing the gap.
     r = max(limits.acceleration - abs(raw.acceleration), 0.2 * limits.acceleration)
     rate_limited = acceleration_limited = False
-    for i in range(SUB_STEPS):
-        back = (SUB_STEPS - i) * h
+    for i in range(SUB_STEP_COUNT):
+        back = (SUB_STEP_COUNT - i) * h
         e = p - (raw.angle - raw.rate * back + 0.5 * raw.acceleration * back * back)
         de = v - (raw.rate - raw.acceleration * back)
         wanted = raw.acceleration + fhan(e, de, r, limits.h0)

@@ -7,25 +7,27 @@ import numpy as np
 from adu_drive.array import electronic_beam
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import ERROR, OK, WARN, Diagnosis, Unit, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, Unit, joined
 from pedestal_common.wire.commands import Reply
-from pedestal_common.wire.records import NEVER
+from pedestal_common.wire.records import NO_STAMP
 
-COMMAND, JOINTS, TRUTH = 'acu/reference', 'joint_states', 'adu/truth'
-CLOCK, STATE = 'clock', 'adu/state'
+REFERENCE_TOPIC, JOINT_STATES_TOPIC, DRIVE_TRUTH_TOPIC = 'acu/reference', 'joint_states', 'adu/truth'
+CLOCK_TOPIC, DRIVE_STATE_TOPIC = 'clock', 'adu/state'
 
-CONDITIONS = topics.BY_NAME[STATE].texts
-ENABLED, DISABLED, EMERGENCY_STOP = map(CONDITIONS.index, ('enabled', 'disabled', 'emergency stop'))
+STATE_TEXTS = topics.TOPIC_BY_NAME[DRIVE_STATE_TOPIC].texts
+(STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP) = map(STATE_TEXTS.index,
+                                                                           ('enabled', 'disabled', 'emergency stop'))
 """Codes of adu/state."""
 
-SWITCHES = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('invalid', 'i8')])
+SWITCHES_DTYPE = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('invalid', 'i8')])
 """wanted: 0 when it was asked to be disabled; emergency: 1 while a stop is latched; stamp: of the last step [ns];
 invalid: 1 when a command held no angle since the last diagnosis."""
 
 
-RECORD = np.dtype([('state', electronic_beam.STATE), ('constants', electronic_beam.CONSTANTS),
-                   ('inputs', electronic_beam.INPUTS), ('outputs', electronic_beam.OUTPUTS), ('switches', SWITCHES)],
-                  align=True)
+RECORD_DTYPE = np.dtype([('state', electronic_beam.STATE_DTYPE), ('constants', electronic_beam.CONSTANTS_DTYPE),
+                         ('inputs', electronic_beam.INPUTS_DTYPE), ('outputs', electronic_beam.OUTPUTS_DTYPE),
+                         ('switches', SWITCHES_DTYPE)],
+                        align=True)
 
 
 class Memory(typing.NamedTuple):
@@ -35,15 +37,15 @@ class Memory(typing.NamedTuple):
 
 @compiled
 def condition(m):
-    """Code of adu/state of SWITCHES."""
-    return EMERGENCY_STOP if m.emergency else ENABLED if m.wanted else DISABLED
+    """Code of adu/state of SWITCHES_DTYPE."""
+    return STATE_CODE_EMERGENCY_STOP if m.emergency else STATE_CODE_ENABLED if m.wanted else STATE_CODE_DISABLED
 
 
 @compiled
 def decode(u, m, command):
     """Record of a command -> inputs of the beam, which is at the stamp of the last step."""
     u.stamp_ns = m.stamp
-    u.due = 1 if command.stamp != NEVER and condition(m) == ENABLED else 0
+    u.due = 1 if command.stamp != NO_STAMP and condition(m) == STATE_CODE_ENABLED else 0
     if u.due == 1:
         u.command_stamp_ns = command.stamp
         u.position[0], u.position[1] = command.position[0], command.position[1]
@@ -53,11 +55,11 @@ def decode(u, m, command):
 def encode(y, m, stamp, outputs):
     """Outputs of the beam -> records of its messages. A beam has no rate and no torque, and it points where it says.
     """
-    joints, truth = outputs[JOINTS], outputs[TRUTH]
-    joints.stamp = truth.stamp = outputs[CLOCK].stamp = stamp
+    joints, truth = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC]
+    joints.stamp = truth.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
         joints.position[i] = truth.position[i] = y.position[i]
-    outputs[STATE] = condition(m)
+    outputs[DRIVE_STATE_TOPIC] = condition(m)
 
 
 @compiled
@@ -65,9 +67,9 @@ def law(memory, stamp, inputs, outputs):
     """Step k: from t_k-1 to t_k by the command of step k - 1. While it is not enabled it hears nothing, and what is on
     its way to it is lost."""
     m = memory.record[0]
-    if m.switches.stamp != NEVER:
-        decode(m.inputs, m.switches, inputs[COMMAND])
-        if condition(m.switches) != ENABLED:
+    if m.switches.stamp != NO_STAMP:
+        decode(m.inputs, m.switches, inputs[REFERENCE_TOPIC])
+        if condition(m.switches) != STATE_CODE_ENABLED:
             m.state.released = m.state.written
         electronic_beam.step(m.state, m.constants, m.inputs, m.outputs)
         m.switches.invalid |= m.outputs.invalid_command
@@ -84,16 +86,16 @@ def laws(memory, stamps, inputs, outputs):
 
 class Beam(Unit):
     """One beam of a BeamParameters. It does not feel the ship."""
-    NODE, COMMAND, LAWS = nodes.ARRAY, COMMAND, {Memory: (law, laws)}
+    NODE, COMMAND, LAWS = nodes.ARRAY_DRIVE, REFERENCE_TOPIC, {Memory: (law, laws)}
     REQUESTS = ('adu/enable', 'adu/disable', 'adu/emergency_stop', 'adu/reset_faults')
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         p = parameters
-        switches = np.zeros(1, SWITCHES)
-        switches['wanted'], switches['stamp'] = 1, NEVER
+        switches = np.zeros(1, SWITCHES_DTYPE)
+        switches['wanted'], switches['stamp'] = 1, NO_STAMP
         constants = electronic_beam.constants(p.period, p.transport_delay, p.command_timeout * p.period)
-        self.memory = Memory(joined(RECORD, constants=constants, switches=switches,
+        self.memory = Memory(joined(RECORD_DTYPE, constants=constants, switches=switches,
                                     state=electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)))
         electronic_beam.read(self.parts['state'], self.parts['outputs'])
 
@@ -106,12 +108,12 @@ class Beam(Unit):
 
     def encode(self, topic, code):
         """The text of a code of adu/state."""
-        return CONDITIONS[code]
+        return STATE_TEXTS[code]
 
     @property
     def condition(self):
         """The text of adu/state as it is now, also between two steps."""
-        return CONDITIONS[condition(self.parts['switches'])]
+        return STATE_TEXTS[condition(self.parts['switches'])]
 
     def request(self, name):
         """Enable, disable, stop or reset; the Reply names the state that follows, or why it is refused."""
@@ -127,7 +129,7 @@ class Beam(Unit):
 
     def requests_for(self, topic, text):
         """The services that lead to a text of adu/state."""
-        if text == CONDITIONS[EMERGENCY_STOP]:
+        if text == STATE_TEXTS[STATE_CODE_EMERGENCY_STOP]:
             return ['adu/emergency_stop']
         latched = self.parts['switches']['emergency']
         return [*(['adu/reset_faults'] if latched else []), 'adu/enable' if text == 'enabled' else 'adu/disable']
@@ -139,17 +141,18 @@ class Beam(Unit):
         values = [*((f'{axis}_deg', f'{math.degrees(angle):.4f}')
                     for axis, angle in zip(topics.AXES, outputs['position'])), ('state', self.condition)]
         if self.condition != 'enabled':
-            return Diagnosis(ERROR if switches['emergency'] else WARN, self.condition, values)
+            return Diagnosis(LEVEL_ERROR if switches['emergency'] else LEVEL_WARN, self.condition, values)
         if invalid:
-            return Diagnosis(ERROR, f'{COMMAND} holds NaN or infinity, goes beyond {electronic_beam.LARGEST:g} rad or '
+            return Diagnosis(LEVEL_ERROR,
+                             f'{REFERENCE_TOPIC} holds NaN or infinity, goes beyond {electronic_beam.MAX_COMMAND_ANGLE_RAD:g} rad or '
                              'is not newer than the one before: the beam stays', values)
         if outputs['stale']:
             limit = self.parameters.command_timeout * self.parameters.period
-            return Diagnosis(ERROR, f'no new {COMMAND} for {limit:g} s: the beam stays', values)
-        return Diagnosis(OK, 'following', values)
+            return Diagnosis(LEVEL_ERROR, f'no new {REFERENCE_TOPIC} for {limit:g} s: the beam stays', values)
+        return Diagnosis(LEVEL_OK, 'following', values)
 
     @staticmethod
     def idle(numbers):
         """Why a recording did not exercise it: its command never changed."""
-        angles = numbers[COMMAND][:, :2]
+        angles = numbers[REFERENCE_TOPIC][:, :2]
         return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'

@@ -18,7 +18,7 @@ def errors(p):
 
 
 @inlined
-def told(theta, e):
+def reading(theta, e):
     """The angle [rad] that an encoder with these errors tells of an axis at theta: its disc is mounted off the centre
     (once a turn), its signal is interpolated between two lines of the disc, and its zero is not the axis' own."""
     if e.exact:

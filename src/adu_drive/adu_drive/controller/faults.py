@@ -15,7 +15,7 @@ class Fault(typing.NamedTuple):
     stops: bool = True
 
 
-FAULTS = (
+AXIS_FAULTS = (
     Fault('overcurrent', 'phase current of a motor; torque off at once, the brakes fall in', ('faults.overcurrent',)),
     Fault('overspeed', 'speed of a motor over the gear ratio', ('faults.overspeed',)),
     Fault('encoder disagreement', 'load encoder against the mean of the motor encoders',
@@ -32,33 +32,33 @@ FAULTS = (
           'by hand', ('limits.emergency',)),
     Fault('stow pin', 'a stow pin is not where it was sent within `pins.timeout`', ('pins.timeout',)),
 )
-"""Bit i of a fault word stands for FAULTS[i]."""
-Bit = bits([fault.name for fault in FAULTS])
-MOTORS_LOST = Bit.MOTOR_1_LOST | Bit.MOTOR_2_LOST
-ALL = (1 << len(FAULTS)) - 1
-_DROPS = Bit.OVERCURRENT | Bit.FINAL_LIMIT | Bit.EMERGENCY_LIMIT
-_STOPS = sum(1 << i for i, fault in enumerate(FAULTS) if fault.stops)
+"""Bit i of a fault word stands for AXIS_FAULTS[i]."""
+Bit = bits([fault.name for fault in AXIS_FAULTS])
+MOTORS_LOST_BITS = Bit.MOTOR_1_LOST | Bit.MOTOR_2_LOST
+ALL_FAULT_BITS = (1 << len(AXIS_FAULTS)) - 1
+_TORQUE_OFF_BITS = Bit.OVERCURRENT | Bit.FINAL_LIMIT | Bit.EMERGENCY_LIMIT
+_STOP_BITS = sum(1 << i for i, fault in enumerate(AXIS_FAULTS) if fault.stops)
 
 
 def names(bits):
     """The names of the faults in a fault word, a tuple."""
-    return tuple(fault.name for i, fault in enumerate(FAULTS) if int(bits) >> i & 1)
+    return tuple(fault.name for i, fault in enumerate(AXIS_FAULTS) if int(bits) >> i & 1)
 
 
-OUTWARDS = 1e-3
+MIN_OUTWARD_RATE_RAD_S = 1e-3
 """Rate [rad/s] from which an axis moves further behind its end."""
 
 
 @inlined
 def stops(bits):
     """Whether the drive stops on the faults of an axis."""
-    return bits & _STOPS != 0 or bits & MOTORS_LOST == MOTORS_LOST
+    return bits & _STOP_BITS != 0 or bits & MOTORS_LOST_BITS == MOTORS_LOST_BITS
 
 
 @inlined
-def drops(bits):
+def removes_torque(bits):
     """Whether nothing is left to stop an axis under control: the brakes fall in at once."""
-    return bits & _DROPS != 0 or bits & MOTORS_LOST == MOTORS_LOST
+    return bits & _TORQUE_OFF_BITS != 0 or bits & MOTORS_LOST_BITS == MOTORS_LOST_BITS
 
 
 @inlined
@@ -68,16 +68,16 @@ def late(periods, error, limit):
 
 
 @inlined
-def lost(motors):
+def lost_motor_faults(motors):
     """Fault word of the motors (2,) whose amplifiers are off."""
     return (Bit.MOTOR_1_LOST if motors[0] else 0) | (Bit.MOTOR_2_LOST if motors[1] else 0)
 
 
 @inlined
-def at_end(theta, omega, c):
+def end_switch_faults(theta, omega, c):
     """Fault word of the switches behind the ends of travel, with the load at theta [rad] at a rate omega [rad/s]."""
     bits = 0
-    if theta > c.final_high and omega > OUTWARDS or theta < c.final_low and omega < -OUTWARDS:
+    if theta > c.final_high and omega > MIN_OUTWARD_RATE_RAD_S or theta < c.final_low and omega < -MIN_OUTWARD_RATE_RAD_S:
         bits |= Bit.FINAL_LIMIT
     if theta > c.emergency_high or theta < c.emergency_low:
         bits |= Bit.EMERGENCY_LIMIT
@@ -85,7 +85,7 @@ def at_end(theta, omega, c):
 
 
 @inlined
-def detected(current_2, omega, disagreement, late_periods, heat, latched, c):
+def measured_faults(current_2, omega, disagreement, late_periods, heat, latched, c):
     """Fault word of one period of one axis; c its trip levels (see params.FaultParameters).
 
     current_2: larger square of a motor's current [A2]; omega: larger motor speed [rad/s]; disagreement: load encoder
@@ -101,6 +101,6 @@ def detected(current_2, omega, disagreement, late_periods, heat, latched, c):
         bits |= Bit.ENCODER_DISAGREEMENT
     if late_periods >= c.late_periods:
         bits |= Bit.FOLLOWING_ERROR
-    if heat > (min(thermal.WARM, c.heat) if latched & Bit.OVERTEMPERATURE else c.heat):
+    if heat > (min(thermal.WARNING_THERMAL_LOAD, c.heat) if latched & Bit.OVERTEMPERATURE else c.heat):
         bits |= Bit.OVERTEMPERATURE
     return bits

@@ -3,18 +3,19 @@ import math
 
 from pedestal_common.compiled import inlined
 
-BACK = 0.1
+MAX_RETURN_RATE_RAD_S = 0.1
 """Rate [rad/s] at which an axis is led back from far behind an end of its travel."""
 
 
 @inlined
 def approach_rate(distance, K, a):
-    """Largest rate [rad/s] towards an end of travel `distance` [rad] ahead; negative once it is passed, at most BACK.
+    """Largest rate [rad/s] towards an end of travel `distance` [rad] ahead; negative once it is passed, at most
+    MAX_RETURN_RATE_RAD_S.
 
     Braking at a [rad/s2] far out, proportional with K [1/s] close in; value and slope meet at a / K^2.
     """
-    if distance * K < -BACK:
-        return -BACK
+    if distance * K < -MAX_RETURN_RATE_RAD_S:
+        return -MAX_RETURN_RATE_RAD_S
     if distance * K * K <= a:
         return K * distance
     return math.sqrt(2.0 * a * distance - (a / K) ** 2)

@@ -17,7 +17,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import angles, wrap
 
-ZENITH = 1e-9
+MIN_ZENITH_DISTANCE_RAD = 1e-9
 """Closer to the zenith [rad] the azimuth of a beam turns no faster."""
 
 
@@ -63,7 +63,7 @@ def beam(c, A, E, A_dot, E_dot):
     vx, vy, vz = (T[0, 0] * vx + T[0, 1] * vy + T[0, 2] * vz, T[1, 0] * vx + T[1, 1] * vy + T[1, 2] * vz,
                   T[2, 0] * vx + T[2, 1] * vy + T[2, 2] * vz)
     azimuth, elevation = angles(x, y, z)
-    level = max(x * x + y * y, ZENITH * ZENITH)
+    level = max(x * x + y * y, MIN_ZENITH_DISTANCE_RAD * MIN_ZENITH_DISTANCE_RAD)
     azimuth_rate, elevation_rate = (y * vx - x * vy) / level, vz / math.sqrt(level)
     if E > 0.5 * math.pi:
         azimuth, elevation, elevation_rate = azimuth + math.pi, math.pi - elevation, -elevation_rate

@@ -7,10 +7,10 @@ x follows the torque the motor truly makes, so what trips on it stands for a sen
 """
 from pedestal_common.compiled import inlined
 
-COPPER = 0.00393
+COPPER_COEFFICIENT_PER_K = 0.00393
 """Temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)."""
 
-WARM = 0.8
+WARNING_THERMAL_LOAD = 0.8
 """Thermal load of a motor that is worth a warning."""
 
 

@@ -1,6 +1,7 @@
 """Wind torque on both axes, a function of time alone: a mean, and a gust on top of it.
 
-A spectral gust is the sum of LINES cosines with random phases, one for each of LINES equal steps of log f, so that
+A spectral gust is the sum of SPECTRAL_LINE_COUNT cosines with random phases, one for each of SPECTRAL_LINE_COUNT
+equal steps of log f, so that
 v(t) has the spectrum asked for (Shinozuka and Deodatis, Applied Mechanics Reviews 44 (1991) 191) and the same t
 gives the same torque. Drag goes with the square of the wind's speed: torque = mean (1 + v / V)^2.
 """
@@ -12,12 +13,13 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.reproducible import geomspace, power
 
-LINES = 128
-LOWEST, HIGHEST = 1e-4, 20.0
+SPECTRAL_LINE_COUNT = 128
+MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ = 1e-4, 20.0
 """Range of the spectra [Hz]; gusts quicker than 20 Hz are far smaller than an antenna."""
 
-NONE, STEP, SINE, SPECTRUM = range(4)
-_KINDS = {'none': NONE, 'step': STEP, 'sine': SINE, 'davenport': SPECTRUM, 'von_karman': SPECTRUM}
+GUST_NONE, GUST_STEP, GUST_SINE, GUST_SPECTRUM = range(4)
+_GUST_KINDS = {'none': GUST_NONE, 'step': GUST_STEP, 'sine': GUST_SINE, 'davenport': GUST_SPECTRUM,
+               'von_karman': GUST_SPECTRUM}
 
 
 def davenport(f, V):
@@ -36,19 +38,19 @@ def von_karman(f, V, L):
 
 def _lines(gust):
     """Amplitude of v / V, angular frequency [rad/s] and phase of every cosine."""
-    if _KINDS[gust.kind] != SPECTRUM:
-        return np.zeros((3, LINES))
-    edges = geomspace(LOWEST, HIGHEST, LINES + 1)
+    if _GUST_KINDS[gust.kind] != GUST_SPECTRUM:
+        return np.zeros((3, SPECTRAL_LINE_COUNT))
+    edges = geomspace(MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ, SPECTRAL_LINE_COUNT + 1)
     f = np.sqrt(edges[:-1] * edges[1:])
     density = davenport(f, gust.speed) if gust.kind == 'davenport' else von_karman(f, gust.speed, gust.length)
-    phase = np.random.default_rng(gust.seed).uniform(0.0, 2.0 * math.pi, LINES)
+    phase = np.random.default_rng(gust.seed).uniform(0.0, 2.0 * math.pi, SPECTRAL_LINE_COUNT)
     return np.array([gust.intensity * np.sqrt(2.0 * density * np.diff(edges)), 2.0 * math.pi * f, phase])
 
 
 def constants(p):
     """Constants of WindParameters: nested dictionary."""
     amplitude, omega, phase = _lines(p.gust)
-    return {'azimuth': p.azimuth, 'elevation': p.elevation, 'kind': _KINDS[p.gust.kind],
+    return {'azimuth': p.azimuth, 'elevation': p.elevation, 'kind': _GUST_KINDS[p.gust.kind],
             'gust_azimuth': p.gust.azimuth, 'gust_elevation': p.gust.elevation, 'start': p.gust.start,
             'omega_sine': 2.0 * math.pi * p.gust.frequency, 'amplitude': amplitude, 'omega': omega, 'phase': phase}
 
@@ -57,7 +59,7 @@ def constants(p):
 def turbulence(t, amplitude, omega, phase):
     """Longitudinal turbulence v / V at the time t [s]."""
     v = 0.0
-    for i in range(LINES):
+    for i in range(SPECTRAL_LINE_COUNT):
         v += amplitude[i] * math.cos(omega[i] * t + phase[i])
     return v
 
@@ -65,12 +67,12 @@ def turbulence(t, amplitude, omega, phase):
 @compiled
 def torques(c, t):
     """Torques [Nm] on the azimuth and elevation loads at the time t [s]."""
-    if c.kind == SPECTRUM:
+    if c.kind == GUST_SPECTRUM:
         g = 1.0 + turbulence(t, c.amplitude, c.omega, c.phase)
         return c.azimuth * g * abs(g), c.elevation * g * abs(g)      # a wind that turns round pushes back
     gust = 0.0
     if t >= c.start:
-        gust = 1.0 if c.kind == STEP else math.sin(c.omega_sine * (t - c.start)) if c.kind == SINE else 0.0
+        gust = 1.0 if c.kind == GUST_STEP else math.sin(c.omega_sine * (t - c.start)) if c.kind == GUST_SINE else 0.0
     return c.azimuth + c.gust_azimuth * gust, c.elevation + c.gust_elevation * gust
 
 

@@ -14,28 +14,36 @@ import types
 
 import numpy as np
 
-from adu_drive.plant.wind import HIGHEST, LINES, LOWEST, turbulence, von_karman
+from adu_drive.plant.wind import (
+    MAX_GUST_FREQUENCY_HZ,
+    MIN_GUST_FREQUENCY_HZ,
+    SPECTRAL_LINE_COUNT,
+    turbulence,
+    von_karman,
+)
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross, direction
 from pedestal_common.reproducible import geomspace, power
 
-SHARES = (1.0, 0.78, 0.55)
+TURBULENCE_SIGMA_RATIOS = (1.0, 0.78, 0.55)
 """sigma of u, v, w over that of u."""
 
 
 def constants(p):
     """Constants of WindFieldParameters: nested dictionary."""
-    edges, random = geomspace(LOWEST, HIGHEST, LINES + 1), np.random.default_rng(p.seed)
-    phase = random.uniform(0.0, 2.0 * math.pi, (3, LINES))
+    (edges, random) = (geomspace(MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ, SPECTRAL_LINE_COUNT + 1),
+                       np.random.default_rng(p.seed))
+    phase = random.uniform(0.0, 2.0 * math.pi, (3, SPECTRAL_LINE_COUNT))
     # Each component has its own frequencies, anywhere in the same bands: at equal ones they would stay correlated.
-    f = edges[:-1] * power(edges[1] / edges[0], random.uniform(0.0, 1.0, (3, LINES)))
-    area, amplitude = 0.25 * math.pi * p.diameter ** 2, np.zeros((3, LINES))
+    f = edges[:-1] * power(edges[1] / edges[0], random.uniform(0.0, 1.0, (3, SPECTRAL_LINE_COUNT)))
+    area, amplitude = 0.25 * math.pi * p.diameter ** 2, np.zeros((3, SPECTRAL_LINE_COUNT))
     if p.speed > 0.0:
         admittance = 1.0 / (1.0 + power(2.0 * f * math.sqrt(area) / p.speed, 4.0 / 3.0))
         amplitude = p.intensity * admittance * np.sqrt(2.0 * von_karman(f, p.speed, p.length) * np.diff(edges))
     to_x, to_y, _ = direction(p.from_azimuth + math.pi, 0.0)
     return {'blows': int(p.speed > 0.0), 'omega': 2.0 * math.pi * f,
-            'amplitude': np.array(SHARES)[:, np.newaxis] * amplitude, 'phase': phase, 'to_x': to_x, 'to_y': to_y,
+            'amplitude': np.array(TURBULENCE_SIGMA_RATIOS)[:, np.newaxis] * amplitude, 'phase': phase, 'to_x': to_x,
+            'to_y': to_y,
             'torque': 0.5 * p.density * p.speed ** 2 * area * p.diameter, 'c_1': p.c_1, 'c_2': p.c_2}
 
 

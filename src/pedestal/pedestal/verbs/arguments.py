@@ -58,11 +58,11 @@ def add_remote(parser):
 def remote(options, node='acu'):
     """A remote_node.Spun of the node `terminal`, by the options of add_remote."""
     from pedestal_common.graph import nodes
-    from pedestal_operator.remote_node import Remote, Spun, user
+    from pedestal_operator.remote_node import Remote, RemoteSession, user
     if options.beam and options.beam + '/' not in nodes.prefixes(nodes.MAX_BEAMS):
         raise ValueError(f'--beam {options.beam}: must be beam_1 to beam_{nodes.MAX_BEAMS}')
-    return Spun(lambda: Remote(f'terminal_{os.getpid()}', options.who or user(), node, options.beam),
-                ros_arguments(options))
+    return RemoteSession(lambda: Remote(f'terminal_{os.getpid()}', options.who or user(), node, options.beam),
+                         ros_arguments(options))
 
 
 def add_workers(parser):

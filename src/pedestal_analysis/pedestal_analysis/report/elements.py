@@ -6,7 +6,7 @@ import math
 
 from pedestal_analysis.report import figures
 
-STYLE = """
+PAGE_CSS = """
 :root { color-scheme: light dark; --ink: #20242a; --soft: #626a75; --line: #d5dae0; --paper: #ffffff; --bad: #b3261e; }
 @media (prefers-color-scheme: dark) {
   :root { --ink: #dfe3e8; --soft: #9aa3ae; --line: #3a414a; --paper: #16191d; --bad: #ff8a80; } }
@@ -37,7 +37,7 @@ def page(title, parts):
     """The text of a page of these parts, elements of HTML."""
     return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f'<title>{html.escape(title)}</title><style>{STYLE}</style></head>\n<body>\n'
+            f'<title>{html.escape(title)}</title><style>{PAGE_CSS}</style></head>\n<body>\n'
             + '\n'.join(parts) + '\n</body></html>\n')
 
 

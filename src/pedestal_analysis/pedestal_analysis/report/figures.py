@@ -11,17 +11,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter
 
-INK = '#20242a'
-RAW, FILTERED, TRUTH = '#8d949e', '#1f6fd1', '#e57a00'
-MOTOR_1, MOTOR_2 = '#0b8f8c', '#a04fc4'
-WIDTH = 7.4
+INK_COLOUR = '#20242a'
+RAW_COLOUR, FILTERED_COLOUR, TRUTH_COLOUR = '#8d949e', '#1f6fd1', '#e57a00'
+MOTOR_1_COLOUR, MOTOR_2_COLOUR = '#0b8f8c', '#a04fc4'
+FIGURE_WIDTH_INCH = 7.4
 """Of a figure [inch]."""
 
-STYLE = {
+MATPLOTLIB_STYLE = {
     'font.size': 9.0, 'axes.titlesize': 9.5, 'axes.titlelocation': 'left', 'legend.fontsize': 8.5,
     'legend.frameon': False, 'axes.spines.top': False, 'axes.spines.right': False, 'axes.grid': True,
-    'grid.color': '#88919c', 'grid.alpha': 0.25, 'grid.linewidth': 0.6, 'axes.edgecolor': INK, 'axes.labelcolor': INK,
-    'xtick.color': INK, 'ytick.color': INK, 'text.color': INK, 'axes.facecolor': 'none', 'figure.facecolor': 'none',
+    'grid.color': '#88919c', 'grid.alpha': 0.25, 'grid.linewidth': 0.6, 'axes.edgecolor': INK_COLOUR,
+    'axes.labelcolor': INK_COLOUR,
+    'xtick.color': INK_COLOUR, 'ytick.color': INK_COLOUR, 'text.color': INK_COLOUR, 'axes.facecolor': 'none',
+    'figure.facecolor': 'none',
     'lines.linewidth': 1.0, 'lines.solid_joinstyle': 'round', 'axes.formatter.useoffset': False,
     'axes.xmargin': 0.0, 'svg.fonttype': 'none',
 }
@@ -60,7 +62,7 @@ def spans(flags):
     return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist()))
 
 
-def new_panels(rows, columns=1, height=None, width=WIDTH, x='time [s]', y='', **options):
+def new_panels(rows, columns=1, height=None, width=FIGURE_WIDTH_INCH, x='time [s]', y='', **options):
     """Return (Figure, axes (rows, columns)).
 
     height, width: of the figure [inch], by default so high that a row has 1.75; x, y: labels below the last row and
@@ -91,15 +93,16 @@ def outside_legend(figure, axes):
     return figure
 
 
-METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},
-            'svg': {'Date': None, 'Creator': None, 'Format': None, 'Type': None}}
+FILE_METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},
+                 'svg': {'Date': None, 'Creator': None, 'Format': None, 'Type': None}}
 """What a file of each format does not say, so that equal data give equal bytes."""
 
-DASHES = {TRUTH: (0, (6.0, 1.5)), MOTOR_1: (0, (3.0, 1.0, 1.0, 1.0)), MOTOR_2: (0, (2.0, 1.2))}
+LINE_DASHES = {TRUTH_COLOUR: (0, (6.0, 1.5)), MOTOR_1_COLOUR: (0, (3.0, 1.0, 1.0, 1.0)),
+               MOTOR_2_COLOUR: (0, (2.0, 1.2))}
 """{colour: dashes} by which lines are told apart where colours are not; every other colour is solid."""
 
 
-WIDE = 2.0
+MIN_WIDE_LINE_PT = 2.0
 """Line width [pt] from which a line is told apart by that."""
 
 
@@ -122,20 +125,20 @@ def tidy(figure):
 
 def _dash(lines):
     for line in lines:
-        if line.get_linestyle() == '-' and line.get_linewidth() < WIDE and line.get_color() in DASHES:
-            line.set_linestyle(DASHES[line.get_color()])
+        if line.get_linestyle() == '-' and line.get_linewidth() < MIN_WIDE_LINE_PT and line.get_color() in LINE_DASHES:
+            line.set_linestyle(LINE_DASHES[line.get_color()])
 
 
 def store(figure, output, dpi=150):
     """Write a figure into a path by its suffix (.png, .pdf on white), or into a stream as transparent SVG."""
     kind = str(output).rpartition('.')[2] if isinstance(output, pathlib.Path) else 'svg'
     colours = {'transparent': True} if kind == 'svg' else {'facecolor': 'white'}
-    figure.savefig(output, format=kind, dpi=dpi, metadata=METADATA[kind], **colours)
+    figure.savefig(output, format=kind, dpi=dpi, metadata=FILE_METADATA[kind], **colours)
 
 
 def render(spec, data, output):
     """Draw the figure of a Spec into a path or stream, as `store` does. Equal data give equal bytes."""
-    with matplotlib.rc_context({**STYLE, 'svg.hashsalt': spec.key}):
+    with matplotlib.rc_context({**MATPLOTLIB_STYLE, 'svg.hashsalt': spec.key}):
         store(spec.draw(data), output, spec.dpi)
 
 
@@ -147,4 +150,4 @@ def inline(svg):
     svg = re.sub(r' xmlns(:xlink)?="[^"]*"', '', svg)
     svg = re.sub(r'<g id="[^"]*"', '<g', svg)
     svg = re.sub(r'<[^>]*>', lambda tag: re.sub(r'(\d\.\d\d)\d+', r'\1', tag[0]), svg)
-    return svg.replace(INK, 'currentColor')
+    return svg.replace(INK_COLOUR, 'currentColor')

@@ -15,14 +15,14 @@ from pedestal_analysis.report import (
     subject,
 )
 from pedestal_analysis.results import consistency, isolation, results, tracking
-from pedestal_analysis.results.tracking import DEGREES
+from pedestal_analysis.results.tracking import DEG_PER_RAD
 from pedestal_common.graph import topics
 from pedestal_common.graph.topics import AXES
 from pedestal_common.text_files.files import sha256
 from pedestal_recording import bag as bags
 from pedestal_recording.verify import verify
 
-SHOWN = 200
+MAX_DIAGNOSTICS_ROWS = 200
 """Rows of the table of diagnostics at the most."""
 
 def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathlib.Path:
@@ -42,7 +42,8 @@ def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathl
     if png_folder is not None:
         folder = pathlib.Path(png_folder)
         folder.mkdir(parents=True, exist_ok=True)
-        for spec in (*run_figures.FIGURES, *filter_figures.FIGURES, *attitude_figures.FIGURES, run_figures.OVERVIEW):
+        for spec in (*run_figures.FIGURES, *filter_figures.FIGURES, *attitude_figures.FIGURES,
+                     run_figures.OVERVIEW_FIGURE):
             if not data.lacks(spec.needs):
                 for kind in ('png', *([vector] if vector else ())):
                     figures.render(spec, data, folder / f'{spec.key}.{kind}')
@@ -85,8 +86,8 @@ def _torques(data):
 def _labelled(parts, *names):
     """Rows [label, number] of the results of some parts: those named, else all that have a label."""
     values = results.measured(parts)
-    return [[results.BY_NAME[name].label, elements.number(*values[name])] for name in names or values
-            if results.BY_NAME[name].label]
+    return [[results.RESULT_BY_NAME[name].label, elements.number(*values[name])] for name in names or values
+            if results.RESULT_BY_NAME[name].label]
 
 
 def _loop(bag, check):
@@ -106,7 +107,8 @@ def _loop(bag, check):
                       f'{tracking.known_rms(jitter):.3g} ms rms, 99 % within {late:.3g} ms, '
                       f'largest {np.abs(jitter).max():.3g} ms']]
     missing = max([check.steps - topic.count for topic in check.topics
-                   if topic.problems and topic.name in topics.BY_NAME and topics.BY_NAME[topic.name].rate == 'step'],
+                   if topic.problems and topic.name in topics.TOPIC_BY_NAME
+                   and topics.TOPIC_BY_NAME[topic.name].rate == 'step'],
                   default=0)
     return [*rows, ['steps', f'{check.steps}'],
             ['lost steps, made by the drive without the command for them', check.lost_steps or '0'],
@@ -125,14 +127,14 @@ def _results(bag, data, check):
     else:
         known = results.of_tracking(data.run)
         if tracking.by_encoders(bag):
-            parts.append(f'<p class="bad">Pointing errors by the encoders: {html.escape(tracking.BY_ENCODERS)}.</p>')
+            parts.append(f'<p class="bad">Pointing errors by the encoders: {html.escape(tracking.ENCODER_BEAM_NOTE)}.</p>')
         if not data.run.tracking.any():
             parts.append('<p class="bad">The run was never in autotrack for longer than the settling time, so nothing '
                          'was evaluated.</p>')
         parts.append(elements.table(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
                                     _pointing(bag, data, results.measured(known)), 'n'))
         parts.append('<p class="soft">Pointing and noise over the evaluated part: autotrack, from '
-                     f'{tracking.SETTLING:g} s after its start. Both axes: all samples of both, per axis.'
+                     f'{tracking.HANDOVER_SETTLING_S:g} s after its start. Both axes: all samples of both, per axis.'
                      '</p>')
         rows = _labelled(known, 'single_sample_noise_deg', 'lock_time_s', 'autotrack_time_s', 'evaluated_time_s',
                          'loss_s')
@@ -162,7 +164,7 @@ def _figures(module, data):
     return [elements.figure(spec, data, data.lacks(spec.needs)) for spec in module.FIGURES]
 
 
-def _honesty(known):
+def _consistency_table(known):
     """The table of a consistency.Consistency, and a sentence for each axis."""
     judged = known.axes
 
@@ -172,15 +174,16 @@ def _honesty(known):
     marks = [[f'{name}: {mark}' for name, mark in zip(AXES, of_axes) if mark]
              for of_axes in zip(*((axis.nis_mark, axis.nees_mark) for axis in judged))]
     rows = [row('mean NIS', 'nis', marks[0]), row('expected of an honest filter', 'nis_expected'),
-            row(f'NIS inside their {100.0 * consistency.PART:g} % band', 'nis_inside', unit='%', scale=100.0),
+            row(f'NIS inside their {100.0 * consistency.BAND_PROBABILITY:g} % band', 'nis_inside', unit='%',
+                scale=100.0),
             row('mean NEES (angle and rate)', 'nees', marks[1]),
-            [f'{100.0 * consistency.PART:g} % band of the mean, 2 expected',
+            [f'{100.0 * consistency.BAND_PROBABILITY:g} % band of the mean, 2 expected',
              *(' to '.join(map(elements.number, axis.nees_band)) for axis in judged), ''],
             row('independent errors', 'count'),
-            row('angle error, rms', 'error', unit='deg', scale=DEGREES),
-            row('sigma it states', 'sigma', unit='deg', scale=DEGREES),
-            row('rate error, rms', 'rate_error', unit='deg/s', scale=DEGREES),
-            row('rate sigma it states', 'rate_sigma', unit='deg/s', scale=DEGREES)]
+            row('angle error, rms', 'error', unit='deg', scale=DEG_PER_RAD),
+            row('sigma it states', 'sigma', unit='deg', scale=DEG_PER_RAD),
+            row('rate error, rms', 'rate_error', unit='deg/s', scale=DEG_PER_RAD),
+            row('rate sigma it states', 'rate_sigma', unit='deg/s', scale=DEG_PER_RAD)]
     verdicts = ''.join(f'<p>{name.capitalize()}: {html.escape(axis.verdict)}.</p>' for name, axis in zip(AXES, judged))
     return elements.table(['', 'azimuth', 'elevation', ''], rows, 'n') + verdicts + (
         '<p class="soft">Over the evaluated part. NIS: innovations in units of what the filter expects of them; NEES: '
@@ -208,15 +211,15 @@ def _diagnostics(statuses):
             places, stamps = zip(*((place, stamp) for place, (stamp, *_) in group))
             if level:
                 when = f'{stamps[0]:.1f}' if len(stamps) == 1 else f'{stamps[0]:.1f} to {stamps[-1]:.1f}'
-                rows[places[0]] = [when, node, run_figures.LEVELS[min(level, 3)][0], message]
+                rows[places[0]] = [when, node, run_figures.LEVEL_COLOURS[min(level, 3)][0], message]
     if not rows:
         return [title, '<p>None.</p>' if statuses else '<p class="soft">No diagnostics in the bag.</p>']
-    more = [f'<p class="soft">and {len(rows) - SHOWN} more.</p>'] if len(rows) > SHOWN else []
-    shown = [rows[place] for place in sorted(rows)][:SHOWN]
+    more = [f'<p class="soft">and {len(rows) - MAX_DIAGNOSTICS_ROWS} more.</p>'] if len(rows) > MAX_DIAGNOSTICS_ROWS else []
+    shown = [rows[place] for place in sorted(rows)][:MAX_DIAGNOSTICS_ROWS]
     return [title, elements.table(['time [s]', 'node', 'level', 'message'], shown), *more]
 
 
-def _made(bag, data):
+def _provenance_table(bag, data):
     """The table of what a bag is of, how it was made and what its file is."""
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
@@ -235,12 +238,14 @@ def _page(bag, data, check):
     name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',
-        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)), _made(bag, data),
+        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)),
+        _provenance_table(bag, data),
         *_results(bag, data, check), *_gaps(bag, check),
         '<h2 id="figures">Figures</h2><p class="soft">The paper: antenna tracking with a Kalman filter and a '
         'dual-motor anti-backlash drive, its UAV experiment. Grey: measured, blue: filtered or achieved, '
         'orange: truth.</p>',
         *_figures(run_figures, data),
-        '<h2 id="filter">Is the filter honest?</h2>', *([_honesty(data.filter)] if data.filter is not None else []),
+        '<h2 id="filter">Is the filter honest?</h2>', *([_consistency_table(data.filter)] if data.filter is not None
+                                                        else []),
         *_figures(filter_figures, data), *_deck(bag, data), *_diagnostics(data.statuses)]
     return elements.page(f'Tracking run: {name}', parts)

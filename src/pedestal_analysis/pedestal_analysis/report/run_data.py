@@ -4,7 +4,7 @@ import typing
 
 import numpy as np
 
-from pedestal_analysis.results import consistency, known_attitude, measured, tracking
+from pedestal_analysis.results import consistency, known_attitude, measured_direction, tracking
 from pedestal_common.graph import topics
 from pedestal_recording import bag as bags
 
@@ -60,7 +60,7 @@ def read(bag) -> RunData:
     run, no_truth = _tracking(bag)
     raw = _raw_angles(run, table(bag, 'ship/truth')) if run is not None else None
     motors = table(bag, 'adu/motor_states')
-    if motors and not {f'{motor}.effort' for motor in topics.MOTORS} <= set(motors):
+    if motors and not {f'{motor}.effort' for motor in topics.MOTOR_NAMES} <= set(motors):
         motors = None
     statuses = [(log / 1e9, status.name, int(status.level), status.message)
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status
@@ -74,11 +74,11 @@ def table(bag, topic):
 
     Raises bag.BagError when the stamps of a topic of the steps go back: nothing drawn over them would be true.
     """
-    if bag.topics.get(topic) != topics.BY_NAME[topic].type or not bag.rows(topic).size:
+    if bag.topics.get(topic) != topics.TOPIC_BY_NAME[topic].type or not bag.rows(topic).size:
         return None
     columns = bag.table(topic)
     t = columns['t']
-    back = np.flatnonzero(np.diff(t) < 0.0) if topics.BY_NAME[topic].rate == 'step' else np.zeros(0, int)
+    back = np.flatnonzero(np.diff(t) < 0.0) if topics.TOPIC_BY_NAME[topic].rate == 'step' else np.zeros(0, int)
     if back.size:
         raise bags.BagError(f'{bag.file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
                             f'{t[back[0] + 1]:.6f} s; `pedestal verify` says what else is wrong')
@@ -104,7 +104,7 @@ def _raw_angles(run, ship):
     if ship is not None:
         at = np.searchsorted(ship['t'], run.t - 1e-9).clip(0, ship['t'].size - 1)
         quaternions = np.column_stack([ship[f'orientation.{axis}'][at] for axis in 'xyzw'])
-    return measured.earth_angles(np.column_stack((run.azimuth, run.elevation)), run.measured, quaternions)
+    return measured_direction.earth_angles(np.column_stack((run.azimuth, run.elevation)), run.measured, quaternions)
 
 
 def _filter(bag, run):

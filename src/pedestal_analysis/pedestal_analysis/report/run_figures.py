@@ -8,13 +8,13 @@ from matplotlib.patches import Patch
 
 from acu_tracker import modes
 from pedestal_analysis.report.figures import (
-    FILTERED,
-    INK,
-    MOTOR_1,
-    MOTOR_2,
-    RAW,
-    TRUTH,
-    WIDTH,
+    FIGURE_WIDTH_INCH,
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
     Spec,
     draw_line,
     new_panels,
@@ -22,13 +22,13 @@ from pedestal_analysis.report.figures import (
     spans,
 )
 
-MODES = dict(zip(modes.MODES, itertools.cycle((
+MODE_COLOURS = dict(zip(modes.MODES, itertools.cycle((
     '#9aa0a6', '#a87b51', '#8364c8', '#b9a3e3', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#e58a95', '#f2b84b',
     '#5b6abf', '#7a8b2a', '#c46aa8', '#4f4f4f'))))
 """{mode: colour}."""
-LEVELS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
-LOCKED = '#5f93c4'
-ZOOM = 2.0
+LEVEL_COLOURS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
+LOCKED_COLOUR = '#5f93c4'
+ZOOM_SPAN_S = 2.0
 """Seconds of a zoomed figure."""
 
 
@@ -44,21 +44,21 @@ def _continuous(angle, beside=None):
 
 
 def _middle(run):
-    """The ZOOM seconds in the middle of what was evaluated, else of the run."""
+    """The ZOOM_SPAN_S seconds in the middle of what was evaluated, else of the run."""
     t = run.t[run.tracking] if run.tracking.any() else run.t
     middle = 0.5 * (t[0] + t[-1])
-    return middle - 0.5 * ZOOM, middle + 0.5 * ZOOM
+    return middle - 0.5 * ZOOM_SPAN_S, middle + 0.5 * ZOOM_SPAN_S
 
 
 def _slowest(run, angles):
-    """The ZOOM seconds of what was evaluated in which the angles (n, 2) changed least."""
-    steps = round(ZOOM / np.median(np.diff(run.t)))
+    """The ZOOM_SPAN_S seconds of what was evaluated in which the angles (n, 2) changed least."""
+    steps = round(ZOOM_SPAN_S / np.median(np.diff(run.t)))
     if run.tracking.sum() <= steps or not 0 < steps < run.t.size:
         return _middle(run)
     change = np.abs(angles[steps:] - angles[:-steps]).sum(axis=1)
     change[~(run.tracking[steps:] & run.tracking[:-steps]) | ~np.isfinite(change)] = np.inf
     start = run.t[np.argmin(change)]
-    return start, start + ZOOM
+    return start, start + ZOOM_SPAN_S
 
 
 def _scale_to(axes, t, values, tracking):
@@ -74,7 +74,7 @@ def _scale_to(axes, t, values, tracking):
                   va='bottom', fontsize=7.5, transform=axes.transAxes)
 
 
-AXES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
+AXIS_TITLES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
 
 
 def draw_errors(axes, data, i, window=None):
@@ -82,15 +82,15 @@ def draw_errors(axes, data, i, window=None):
     truth in a window (first, last time [s])."""
     run = data.run
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
-    draw_line(axes, run.t, raw, window, color=RAW, linewidth=0.7, label='receiver, before the filter')
+    draw_line(axes, run.t, raw, window, color=RAW_COLOUR, linewidth=0.7, label='receiver, before the filter')
     if window is not None:
         truth = np.degrees((run.cross_elevation, run.elevation_error)[i])
-        draw_line(axes, run.t, truth, window, color=TRUTH, label='truth')
+        draw_line(axes, run.t, truth, window, color=TRUTH_COLOUR, label='truth')
     else:
         _scale_to(axes, run.t, raw, run.tracking)
-    draw_line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
+    draw_line(axes, run.t, filtered, window, color=FILTERED_COLOUR, linewidth=1.2, label='after the filter')
     axes.set_ylabel('error [deg]')
-    axes.set_title(AXES[i][0])
+    axes.set_title(AXIS_TITLES[i][0])
 
 
 def error(data, window=None):
@@ -103,26 +103,27 @@ def error(data, window=None):
 
 
 def error_zoom(data):
-    """The middle ZOOM seconds of `error`, with the truth."""
+    """The middle ZOOM_SPAN_S seconds of `error`, with the truth."""
     return error(data, _middle(data.run))
 
 
 def angle(data, zoomed=False):
-    """Line of sight in earth angles [deg], as measured and as filtered; zoomed: the ZOOM seconds in which the target
+    """Line of sight in earth angles [deg], as measured and as filtered; zoomed: the ZOOM_SPAN_S seconds in which the
+    target
     moved least, with the truth."""
     run = data.run
-    figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXES], sharex=True)
+    figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXIS_TITLES], sharex=True)
     truth = np.column_stack([_continuous(run.target_earth[:, i]) for i in range(2)])
     window = _slowest(run, truth) if zoomed else None
     for i, axes in enumerate(panels[:, 0]):
         beam = _continuous(run.beam_earth[:, i], truth[:, i])
         scale = np.cos(run.beam_earth[:, 1] + run.filtered[:, 1]) if i == 0 else 1.0
         filtered = beam + np.degrees(run.filtered[:, i] / scale)
-        draw_line(axes, run.t, _continuous(data.raw_angles[:, i], truth[:, i]), window, color=RAW,
+        draw_line(axes, run.t, _continuous(data.raw_angles[:, i], truth[:, i]), window, color=RAW_COLOUR,
               linewidth=0.8 if zoomed else 2.5, label='measured, before the filter')
         if zoomed:
-            draw_line(axes, run.t, truth[:, i], window, color=TRUTH, label='truth')
-        draw_line(axes, run.t, filtered, window, color=FILTERED, linewidth=1.2, label='after the filter')
+            draw_line(axes, run.t, truth[:, i], window, color=TRUTH_COLOUR, label='truth')
+        draw_line(axes, run.t, filtered, window, color=FILTERED_COLOUR, linewidth=1.2, label='after the filter')
     return outside_legend(figure, panels[0, 0])
 
 
@@ -130,8 +131,9 @@ def draw_azimuth(axes, data):
     """Draw the azimuth of antenna and target in earth angles [deg]."""
     run = data.run
     beam = _continuous(run.beam_earth[:, 0])
-    draw_line(axes, run.t, _continuous(run.target_earth[:, 0], beam), color=TRUTH, linewidth=2.5, label='target')
-    draw_line(axes, run.t, beam, color=FILTERED, label='antenna')
+    draw_line(axes, run.t, _continuous(run.target_earth[:, 0], beam), color=TRUTH_COLOUR, linewidth=2.5,
+              label='target')
+    draw_line(axes, run.t, beam, color=FILTERED_COLOUR, label='antenna')
     axes.set_xlabel('time [s]')
     axes.set_ylabel('azimuth [deg]')
 
@@ -145,21 +147,21 @@ def azimuth(data):
 
 def _shade_modes(axes, data):
     for start, stop, mode in data.modes:
-        axes.axvspan(start, stop, color=MODES.get(mode, RAW), alpha=0.10, linewidth=0.0)
+        axes.axvspan(start, stop, color=MODE_COLOURS.get(mode, RAW_COLOUR), alpha=0.10, linewidth=0.0)
     for start, _, _ in data.modes[1:]:
-        axes.axvline(start, color=INK, linewidth=0.6, linestyle=':')
+        axes.axvline(start, color=INK_COLOUR, linewidth=0.6, linestyle=':')
 
 
 def draw_pointing(axes, data, i):
     """Draw the true pointing error [deg], i: 0 cross-elevation, 1 elevation; dashed: a tenth of the beamwidth."""
     run = data.run
     error = np.degrees((run.cross_elevation, run.elevation_error)[i])
-    draw_line(axes, run.t, error, color=TRUTH, linewidth=0.8)
+    draw_line(axes, run.t, error, color=TRUTH_COLOUR, linewidth=0.8)
     _scale_to(axes, run.t, error, run.tracking)
     if np.isfinite(data.beamwidth):
         for sign in (-0.1, 0.1):
-            axes.axhline(sign * np.degrees(data.beamwidth), color=INK, linewidth=0.8, linestyle='--')
-    axes.set_title(AXES[i][0])
+            axes.axhline(sign * np.degrees(data.beamwidth), color=INK_COLOUR, linewidth=0.8, linestyle='--')
+    axes.set_title(AXIS_TITLES[i][0])
     axes.set_ylabel('error [deg]')
 
 
@@ -171,7 +173,7 @@ def pointing(data):
     for i in range(2):
         draw_pointing(panels[i, 0], data, i)
     axes = panels[2, 0]
-    draw_line(axes, run.t, np.where(distance > 0.0, distance, np.nan), color=TRUTH, linewidth=0.8)
+    draw_line(axes, run.t, np.where(distance > 0.0, distance, np.nan), color=TRUTH_COLOUR, linewidth=0.8)
     axes.set_yscale('log' if np.any(distance > 0.0) else 'linear')
     axes.set_title('angle between beam and target, whole run')
     axes.set_ylabel('off axis [deg]')
@@ -184,7 +186,8 @@ def pointing(data):
 def _mode_legend(figure, data):
     names = dict.fromkeys(mode for _, _, mode in data.modes)
     if names:
-        figure.legend([Patch(color=MODES.get(name, RAW), alpha=0.45, linewidth=0.0) for name in names], list(names),
+        figure.legend([Patch(color=MODE_COLOURS.get(name, RAW_COLOUR), alpha=0.45, linewidth=0.0) for name in names],
+                      list(names),
                       loc='outside upper right', ncols=len(names))
 
 
@@ -193,9 +196,9 @@ def draw_torques(axes, data, axis, window=None):
     motors = data.motors
     first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
     width = 0.7 if window is None else 1.0
-    draw_line(axes, motors['t'], first, window, color=MOTOR_1, linewidth=width, label='motor 1')
-    draw_line(axes, motors['t'], second, window, color=MOTOR_2, linewidth=width, label='motor 2')
-    draw_line(axes, motors['t'], 0.5 * (first - second), window, color=INK, linewidth=0.9, linestyle='--',
+    draw_line(axes, motors['t'], first, window, color=MOTOR_1_COLOUR, linewidth=width, label='motor 1')
+    draw_line(axes, motors['t'], second, window, color=MOTOR_2_COLOUR, linewidth=width, label='motor 2')
+    draw_line(axes, motors['t'], 0.5 * (first - second), window, color=INK_COLOUR, linewidth=0.9, linestyle='--',
           label='bias, half their difference')
     axes.set_ylabel('torque [Nm]')
     axes.set_title(axis)
@@ -203,17 +206,17 @@ def draw_torques(axes, data, axis, window=None):
 
 def _start(data):
     start = data.motors['t'][0]
-    return start, start + ZOOM
+    return start, start + ZOOM_SPAN_S
 
 
 def torques(data):
-    """Torques of both motors of each axis [Nm], whole and the first ZOOM seconds."""
+    """Torques of both motors of each axis [Nm], whole and the first ZOOM_SPAN_S seconds."""
     window = _start(data)
     figure, panels = new_panels(2, 2, height=4.5, sharex='col', sharey='row', width_ratios=(3, 2))
     for row, axis in zip(panels, ('azimuth', 'elevation')):
         draw_torques(row[0], data, axis)
         draw_torques(row[1], data, axis, window)
-        row[1].set_title(f'{axis}, first {ZOOM:g} s')
+        row[1].set_title(f'{axis}, first {ZOOM_SPAN_S:g} s')
         row[1].set_ylabel('')
     return outside_legend(figure, panels[0, 0])
 
@@ -221,9 +224,9 @@ def torques(data):
 def draw_carrier(axes, data):
     """Draw C/N0 [dB-Hz]; shaded where the receiver was locked."""
     table = data.receiver
-    draw_line(axes, table['t'], table['z'], color=RAW, linewidth=0.8, label='C/N0')
+    draw_line(axes, table['t'], table['z'], color=RAW_COLOUR, linewidth=0.8, label='C/N0')
     for first, last in spans(np.isfinite(table['x'])):
-        axes.axvspan(table['t'][first], table['t'][last], color=LOCKED, alpha=0.15, linewidth=0.0)
+        axes.axvspan(table['t'][first], table['t'][last], color=LOCKED_COLOUR, alpha=0.15, linewidth=0.0)
     axes.set_xlabel('time [s]')
     axes.set_ylabel('C/N0 [dB-Hz]')
 
@@ -233,7 +236,7 @@ def carrier(data):
     figure, panels = new_panels(1, height=2.7)
     draw_carrier(panels[0, 0], data)
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend([*handles, Patch(color=LOCKED, alpha=0.3, linewidth=0.0)], [*labels, 'locked'],
+    figure.legend([*handles, Patch(color=LOCKED_COLOUR, alpha=0.3, linewidth=0.0)], [*labels, 'locked'],
                   loc='outside upper right', ncols=2)
     return figure
 
@@ -243,16 +246,16 @@ def draw_sky(axes, data):
     run = data.run
     axes.set_theta_zero_location('N')
     axes.set_theta_direction(-1)
-    for angles, colour, width, label in ((run.target_earth, TRUTH, 3.0, 'target'),
-                                         (run.beam_earth, FILTERED, 1.1, 'beam')):
+    for angles, colour, width, label in ((run.target_earth, TRUTH_COLOUR, 3.0, 'target'),
+                                         (run.beam_earth, FILTERED_COLOUR, 1.1, 'beam')):
         path = angles[::max(1, run.t.size // 1500)]
         axes.plot(path[:, 0], 90.0 - np.degrees(path[:, 1]), color=colour, linewidth=width, label=label)
         known = angles[np.isfinite(angles).all(axis=1)]
         for row, marker in ((0, 'o'), (-1, 's')) if known.size else ():
             axes.plot(known[row, 0], 90.0 - np.degrees(known[row, 1]), marker, color=colour, markersize=6,
                       markerfacecolor='white' if row == 0 else colour)
-    axes.plot([], [], 'o', color=INK, markersize=6, markerfacecolor='white', label='start')
-    axes.plot([], [], 's', color=INK, markersize=6, label='end')
+    axes.plot([], [], 'o', color=INK_COLOUR, markersize=6, markerfacecolor='white', label='start')
+    axes.plot([], [], 's', color=INK_COLOUR, markersize=6, label='end')
     axes.set_rlim(0.0, 90.0)
     axes.set_rgrids((30.0, 60.0), ('60°', '30°'), angle=22.5, fontsize=8)
     axes.set_thetagrids(range(0, 360, 45), ('N', 'NE', 'E', 'SE', 'S', 'SW', 'W', 'NW'))
@@ -260,7 +263,7 @@ def draw_sky(axes, data):
 
 def sky(data):
     """Target and beam over the station, north up."""
-    figure = Figure(figsize=(WIDTH, 4.2), layout='constrained')
+    figure = Figure(figsize=(FIGURE_WIDTH_INCH, 4.2), layout='constrained')
     axes = figure.subplots(subplot_kw={'projection': 'polar'})
     draw_sky(axes, data)
     axes.legend(loc='center left', bbox_to_anchor=(1.2, 0.5))
@@ -269,18 +272,19 @@ def sky(data):
 
 def timeline(data):
     """Mode of the ACU, lock of the receiver, level that each node reported."""
-    rows = ([('ACU mode', [(start, stop - start, MODES.get(mode, RAW)) for start, stop, mode in data.modes])]
+    rows = ([('ACU mode', [(start, stop - start, MODE_COLOURS.get(mode, RAW_COLOUR)) for start, stop,
+                           mode in data.modes])]
             if data.modes else [])
     if data.receiver:
         t = data.receiver['t']
-        rows.append(('receiver locked', [(t[first], t[last] - t[first], LOCKED)
+        rows.append(('receiver locked', [(t[first], t[last] - t[first], LOCKED_COLOUR)
                                          for first, last in spans(np.isfinite(data.receiver['x']))]))
     end = max([stop for _, stop, _ in data.modes] + [stamp for stamp, *_ in data.statuses])
     for node in dict.fromkeys(node for _, node, *_ in data.statuses):
         own = [(stamp, level) for stamp, name, level, _ in data.statuses if name == node]
         own = [own[0], *(after for before, after in zip(own, own[1:]) if after[1] != before[1])]
         stops = [stamp for stamp, _ in own[1:]] + [end]
-        rows.append((f'{node} diagnostics', [(start, stop - start, LEVELS[min(level, 3)][1])
+        rows.append((f'{node} diagnostics', [(start, stop - start, LEVEL_COLOURS[min(level, 3)][1])
                                              for (start, level), stop in zip(own, stops)]))
     figure, panels = new_panels(1, height=0.85 + 0.3 * len(rows))
     axes = panels[0, 0]
@@ -291,8 +295,8 @@ def timeline(data):
     axes.set_yticks(range(len(rows)), [name for name, _ in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.grid(axis='y', visible=False)
-    keys = [(mode, MODES.get(mode, RAW)) for mode in dict.fromkeys(mode for _, _, mode in data.modes)]
-    keys += [LEVELS[level] for level in sorted({min(level, 3) for _, _, level, _ in data.statuses})]
+    keys = [(mode, MODE_COLOURS.get(mode, RAW_COLOUR)) for mode in dict.fromkeys(mode for _, _, mode in data.modes)]
+    keys += [LEVEL_COLOURS[level] for level in sorted({min(level, 3) for _, _, level, _ in data.statuses})]
     figure.legend([Patch(color=colour, linewidth=0.0) for _, colour in keys], [name for name, _ in keys],
                   loc='outside upper right', ncols=len(keys))
     return figure
@@ -309,7 +313,7 @@ def overview(data):
     for i, axis in enumerate(('azimuth', 'elevation')):
         axes = figure.add_subplot(grid[2 + i, 0])
         draw_torques(axes, data, axis, _start(data))
-        axes.set_title(f'{axis}: motor torques, first {ZOOM:g} s')
+        axes.set_title(f'{axis}: motor torques, first {ZOOM_SPAN_S:g} s')
         if i == 0:
             axes.tick_params(labelbottom=False)
     bottom.append(axes)
@@ -323,9 +327,9 @@ def overview(data):
     for i in range(2):
         column = [figure.add_subplot(grid[2 * i:2 * i + 2, 1]), figure.add_subplot(grid[2 * i:2 * i + 2, 2])]
         draw_errors(column[0], data, i)
-        column[0].set_title(f'{AXES[i][0]}: measured error')
+        column[0].set_title(f'{AXIS_TITLES[i][0]}: measured error')
         draw_pointing(column[1], data, i)
-        column[1].set_title(f'{AXES[i][0]}: pointing error against truth')
+        column[1].set_title(f'{AXIS_TITLES[i][0]}: pointing error against truth')
         if i == 0:
             column[0].legend(loc='upper right')
         else:
@@ -342,13 +346,15 @@ FIGURES = (
          'jumps from sample to sample; the filtered line of sight seen from the beam (blue) is what the position '
          "loop gets instead, but for the error of the encoders, and on a ship that of its INS's attitude.",
          ('truth', 'lock'), error),
-    Spec('error_zoom', 'Error, zoomed (figure 8 of the paper)', f'The middle {ZOOM:g} s of the evaluated part: the '
+    Spec('error_zoom', 'Error, zoomed (figure 8 of the paper)',
+         f'The middle {ZOOM_SPAN_S:g} s of the evaluated part: the '
          'position loop holds the filtered error (blue) near zero; the true one (orange) is what the filter leaves of '
          'the noise (grey).', ('truth', 'lock'), error_zoom),
     Spec('angle', 'Angle before and after the filter (figure 9 of the paper)', 'Line of sight in earth angles as '
          'measured (grey: encoder plus receiver) and as filtered (blue): one curve at this scale.',
          ('truth', 'lock'), angle),
-    Spec('angle_zoom', 'Angle, zoomed (figure 10 of the paper)', f'The {ZOOM:g} s in which the target moved least, '
+    Spec('angle_zoom', 'Angle, zoomed (figure 10 of the paper)',
+         f'The {ZOOM_SPAN_S:g} s in which the target moved least, '
          'where the noise stands out best: filtered (blue) against measured (grey) and true (orange).',
          ('truth', 'lock'), functools.partial(angle, zoomed=True)),
     Spec('azimuth', 'Azimuth trajectory (figure 11 of the paper)', "The antenna's azimuth (blue) comes to the "
@@ -363,4 +369,4 @@ FIGURES = (
     Spec('timeline', 'Modes and health', 'Mode of the ACU, lock of the receiver and the level each node reported.',
          ('modes',), timeline),
 )
-OVERVIEW = Spec('overview', '', '', ('truth', 'lock', 'motors'), overview, dpi=100)
+OVERVIEW_FIGURE = Spec('overview', '', '', ('truth', 'lock', 'motors'), overview, dpi=100)

@@ -8,7 +8,7 @@ from pedestal_common import parameters
 from pedestal_common.geometry import orbit
 from tracking_receiver_sim.params import TargetParameters
 
-SAID = {
+TARGET_DESCRIPTIONS = {
     'leo_pass': lambda target: f'satellite {target.leo_pass.line_1[2:7]}, by its TLE',
     'track_file': lambda target: f'the track in {target.track_file.path.rpartition("/")[2]}',
     'flyby': lambda target: (f'straight flight at {target.flyby.speed:g} m/s, {target.flyby.height:g} m above the '
@@ -19,7 +19,7 @@ SAID = {
 }
 """{kind of target: TargetParameters -> what it is}."""
 
-ON_EARTH = ('leo_pass', 'track_file')
+STATION_TARGET_KINDS = ('leo_pass', 'track_file')
 """Kinds that depend on where the station is."""
 
 
@@ -39,8 +39,8 @@ def rows(bag, data):
         values = {}
     if not values:
         return beamwidth
-    station = [['station', place(target.station)]] if target.kind in ON_EARTH else []
-    return [['target', SAID[target.kind](target)], *_sky(bag, data), *station, *beamwidth]
+    station = [['station', place(target.station)]] if target.kind in STATION_TARGET_KINDS else []
+    return [['target', TARGET_DESCRIPTIONS[target.kind](target)], *_sky(bag, data), *station, *beamwidth]
 
 
 def _sky(bag, data):

@@ -10,31 +10,32 @@ import re
 
 import numpy as np
 
-from pedestal_analysis.results import measured, tracking
+from pedestal_analysis.results import measured_direction, tracking
 from pedestal_common.geometry import orbit
 from pedestal_common.graph import nodes
 from pedestal_recording import bag as bags
 from pedestal_recording import columns
 from pedestal_recording.export import whole
 
-RATES = 1e-3, 1000.0
+RATE_LIMITS_HZ = 1e-3, 1000.0
 """Records a second."""
 
-SEGMENT = 10_000
+SEGMENT_STEPS = 10_000
 """Steps of a segment, which are in memory at once."""
 
-STATION = 'PEDESTAL'
+DEFAULT_STATION_NAME = 'PEDESTAL'
 """Name of the station where the user says none."""
 
-NAME = re.compile(r'[ -~]{1,80}')
+PARTICIPANT_PATTERN = re.compile(r'[ -~]{1,80}')
 """What the name of a participant may be."""
 
-LAUNCH = re.compile(r'(\d\d)(\d{3})([A-Z]{1,3}) *')
+TLE_DESIGNATOR_PATTERN = re.compile(r'(\d\d)(\d{3})([A-Z]{1,3}) *')
 """The international designator of a TLE."""
 
-NUMBERS = {'joint_states': ('azimuth.position', 'elevation.position'),
-           'tracking_receiver/angle_error': ('x', 'y', 'z'),
-           'ship/imu/data': tuple(f'orientation.{axis}' for axis in 'xyzw'), 'tracking_receiver/range': ('range',)}
+TOPIC_COLUMNS = {'joint_states': ('azimuth.position', 'elevation.position'),
+                 'tracking_receiver/angle_error': ('x', 'y', 'z'),
+                 'ship/imu/data': tuple(f'orientation.{axis}' for axis in 'xyzw'),
+                 'tracking_receiver/range': ('range',)}
 """{topic: its columns that are read}."""
 
 
@@ -43,13 +44,13 @@ def export(path, created, output=None, rate=10.0, participants=(), overwrite=Fal
 
     created: datetime of the message, UTC. output: a file that ends in .tdm, or a folder, default `export` in the bag.
     rate: records a second at the most. participants: names of the station and of the target, where they are not
-    STATION and the international designator of the TLE. overwrite: replace files.
+    DEFAULT_STATION_NAME and the international designator of the TLE. overwrite: replace files.
     Raises bag.BagError and ValueError, or, before anything is written, FileExistsError.
     """
-    if not RATES[0] <= rate <= RATES[1]:
-        raise ValueError(f'--rate {rate:g}: must be {RATES[0]:g} to {RATES[1]:g} records a second')
+    if not RATE_LIMITS_HZ[0] <= rate <= RATE_LIMITS_HZ[1]:
+        raise ValueError(f'--rate {rate:g}: must be {RATE_LIMITS_HZ[0]:g} to {RATE_LIMITS_HZ[1]:g} records a second')
     for name in participants:
-        if not NAME.fullmatch(name):
+        if not PARTICIPANT_PATTERN.fullmatch(name):
             raise ValueError(f'--participants {name!r:.60}: must be at most 80 ASCII characters')
     bag = bags.read(path)
     for file, view in _files(bag, output, overwrite).items():
@@ -88,7 +89,7 @@ class _Tracks:
 
     def __init__(self, bag, rate):
         self.bag, self.begin = bag, _utc_of_zero(bag)
-        rows = {topic: bag.rows(topic) for topic in NUMBERS if topic in bag.topics}
+        rows = {topic: bag.rows(topic) for topic in TOPIC_COLUMNS if topic in bag.topics}
         self.rows = {topic: of for topic, of in rows.items() if of.size}
         missing = [name for name in ('joint_states', 'tracking_receiver/angle_error') if name not in self.rows]
         if missing:
@@ -99,11 +100,11 @@ class _Tracks:
 
     def segments(self):
         """Iterator of (times, angles (n, 2) [deg], range (n,) [km] or NaN, C/N0 (n,) [dB-Hz]), none of them empty."""
-        for at in range(0, len(self.stamps), SEGMENT):
-            stamps = self.stamps[at:at + SEGMENT]
+        for at in range(0, len(self.stamps), SEGMENT_STEPS):
+            stamps = self.stamps[at:at + SEGMENT_STEPS]
             beam, error = self._at('joint_states', stamps), self._at('tracking_receiver/angle_error', stamps)
             attitude = self._at('ship/imu/data', stamps) if 'ship/imu/data' in self.rows else None
-            angles = np.degrees(measured.earth_angles(beam, error[:, :2], attitude))
+            angles = np.degrees(measured_direction.earth_angles(beam, error[:, :2], attitude))
             mode = tracking.modes(self.bag, (stamps - self.bag.start) / 1e9)
             there = np.isfinite(angles).all(axis=1) & ((mode == 'autotrack') | ('acu/mode' not in self.bag.topics))
             if there.any():
@@ -112,8 +113,8 @@ class _Tracks:
                        1e-3 * self._at('tracking_receiver/range', stamps)[there, 0], error[there, 2])
 
     def _at(self, topic, stamps):
-        """NUMBERS of a topic (n, k) at stamps (n,) [ns]; NaN where it has no message of that stamp."""
-        out = np.full((len(stamps), len(NUMBERS[topic])), np.nan)
+        """TOPIC_COLUMNS of a topic (n, k) at stamps (n,) [ns]; NaN where it has no message of that stamp."""
+        out = np.full((len(stamps), len(TOPIC_COLUMNS[topic])), np.nan)
         rows = self.rows.get(topic, self.bag.index[:0])
         _, here, there = np.intersect1d(stamps, rows.stamp, return_indices=True)
         if here.size:
@@ -122,7 +123,7 @@ class _Tracks:
                 table = columns.table([data for *_, data in self.bag.take(chosen)], self.bag.topics[topic], chosen.log)
             except ValueError as error:
                 raise bags.BagError(f'{self.bag.path}: {topic}: {error}') from None
-            for i, name in enumerate(NUMBERS[topic]):
+            for i, name in enumerate(TOPIC_COLUMNS[topic]):
                 out[here, i] = table.get(name, np.nan)
         return out
 
@@ -153,11 +154,12 @@ def _participants(bag, names):
     """(name of the station, name of the target)."""
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     target = str(receiver.get('target.kind', 'TARGET')).upper()[:80]
-    launch = LAUNCH.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[9:17])
+    launch = TLE_DESIGNATOR_PATTERN.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[9:17])
     if target == 'LEO_PASS' and launch:
         year, number, piece = launch.groups()
         target = f'{1900 + int(year) + 100 * (int(year) < 57)}-{number}{piece}'
-    return (*names, *(STATION, target if NAME.fullmatch(target) else 'TARGET')[len(names):])
+    return (*names, *(DEFAULT_STATION_NAME, target
+                      if PARTICIPANT_PATTERN.fullmatch(target) else 'TARGET')[len(names):])
 
 
 def _segment(segment, participants):

@@ -6,15 +6,25 @@ import math
 import numpy as np
 
 from pedestal_analysis.report import elements
-from pedestal_analysis.report.figures import FILTERED, INK, RAW, TRUTH, Spec, draw_line, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    Spec,
+    draw_line,
+    new_panels,
+)
 from pedestal_analysis.results import tracking
 from pedestal_analysis.trials import comparison, statistics
-from pedestal_bringup.loop import recorded
+from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import nodes
 
-SHOWN = ('pointing_rms_deg', 'pointing_max_deg', 'azimuth_following_rms_deg', 'elevation_following_rms_deg',
-         'lock_time_s', 'loss_s', 'azimuth_nis_mean', 'azimuth_nees_mean', 'elevation_nis_mean', 'elevation_nees_mean',
-         'isolation_db', 'heading_error_rms_deg')
+HISTOGRAM_RESULTS = ('pointing_rms_deg', 'pointing_max_deg', 'azimuth_following_rms_deg',
+                     'elevation_following_rms_deg',
+                     'lock_time_s', 'loss_s', 'azimuth_nis_mean', 'azimuth_nees_mean', 'elevation_nis_mean',
+                     'elevation_nees_mean',
+                     'isolation_db', 'heading_error_rms_deg')
 """Results whose histograms are drawn, where they vary."""
 
 
@@ -38,7 +48,7 @@ def read(plan, table, by, sides, command, count=10) -> Trials:
     known = [i for i in places if math.isfinite(table.column(by)[i])] or places
     chosen = {'worst': places[0], 'median': known[len(known) // 2]}
     beam = nodes.beam_of(by)
-    flown = [(f'{name}: trial {i}', tracking.read(recorded.record(plan.scenario(i), beam)))
+    flown = [(f'{name}: trial {i}', tracking.read(memory_recording.record(plan.scenario(i), beam)))
              for name, i in chosen.items()]
     return Trials(plan, table, by, places[:count], flown, sides, command)
 
@@ -57,13 +67,13 @@ def _varying(table, names):
 
 def histograms(trials):
     """How the results are spread over the trials, two a row; the median dashed."""
-    shown = _varying(trials.table, [name for name in trials.table.there if nodes.plain(name) in SHOWN])
+    shown = _varying(trials.table, [name for name in trials.table.there if nodes.plain(name) in HISTOGRAM_RESULTS])
     rows = max(1, -(-len(shown) // 2))
     figure, panels = new_panels(rows, 2, height=0.5 + 1.7 * rows, x='')
     for axes, (name, values) in zip(panels.flat, shown):
         values = values[np.isfinite(values)]
-        axes.hist(values, bins='auto' if len(values) < 5000 else 80, color=FILTERED, alpha=0.7)
-        axes.axvline(np.median(values), color=INK, linestyle='--', linewidth=0.8)
+        axes.hist(values, bins='auto' if len(values) < 5000 else 80, color=FILTERED_COLOUR, alpha=0.7)
+        axes.axvline(np.median(values), color=INK_COLOUR, linestyle='--', linewidth=0.8)
         axes.set_xlabel(_label(name))
         axes.locator_params(axis='x', nbins=5)
     for axes in panels.flat[len(shown):]:
@@ -78,8 +88,8 @@ def scatter(trials):
     figure, panels = new_panels(rows, 2, height=0.5 + 2.0 * rows, x='')
     values = trials.table.column(trials.by)
     for axes, (name, given) in zip(panels.flat, varied):
-        axes.plot(given, values, '.', color=RAW, markersize=3)
-        axes.plot(given[trials.worst], values[trials.worst], 'o', color=TRUTH, markersize=4)
+        axes.plot(given, values, '.', color=RAW_COLOUR, markersize=3)
+        axes.plot(given[trials.worst], values[trials.worst], 'o', color=TRUTH_COLOUR, markersize=4)
         axes.margins(0.03)
         axes.set_xlabel(name)
         axes.set_ylabel(_label(trials.by), fontsize=8)
@@ -99,7 +109,7 @@ def worst_and_median(trials):
         if pointing:
             errors = np.where(run.since[:, np.newaxis], errors, np.nan)
         for axes, values, axis in zip(column, errors.T, ('cross-elevation' if pointing else 'azimuth', 'elevation')):
-            draw_line(axes, run.t, values, color=TRUTH, linewidth=0.8)
+            draw_line(axes, run.t, values, color=TRUTH_COLOUR, linewidth=0.8)
             axes.set_title(f'{title}, {axis}')
     return figure
 
@@ -109,14 +119,14 @@ def pairs(trials):
     figure, panels = new_panels(1, 2, height=3.3, x=('', 'difference of a pair'))
     a, b = trials.sides.pairs(trials.by)
     left, right = panels[0]
-    left.plot(b, a, '.', color=FILTERED, markersize=4)
+    left.plot(b, a, '.', color=FILTERED_COLOUR, markersize=4)
     ends = [min(a.min(), b.min()), max(a.max(), b.max())]
-    left.plot(ends, ends, color=INK, linewidth=0.8)
+    left.plot(ends, ends, color=INK_COLOUR, linewidth=0.8)
     left.set_xlabel(trials.sides.name_b, fontsize=7)
     left.set_ylabel(trials.sides.name_a, fontsize=7)
     left.set_title(_label(trials.by))
-    right.hist(a - b, bins='auto', color=FILTERED, alpha=0.7)
-    right.axvline(0.0, color=INK, linewidth=0.8)
+    right.hist(a - b, bins='auto', color=FILTERED_COLOUR, alpha=0.7)
+    right.axvline(0.0, color=INK_COLOUR, linewidth=0.8)
     return figure
 
 

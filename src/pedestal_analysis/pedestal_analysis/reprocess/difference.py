@@ -14,16 +14,17 @@ from pedestal_common.graph import layouts, topics
 from pedestal_common.wire import messages
 from pedestal_recording import columns
 
-REST = 'names, frames and the rest'
+REST_FIELD = 'names, frames and the rest'
 """The field that stands for everything in a message that is neither its stamp nor one of its numbers."""
 
-RELATIVE = 1e-9
+RELATIVE_TOLERANCE = 1e-9
 """Relative tolerance; the absolute one is of the column (layouts)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Tolerance:
-    """How far numbers may differ: absolute and relative; None: that of the column and RELATIVE. ignored: patterns of
+    """How far numbers may differ: absolute and relative; None: that of the column and RELATIVE_TOLERANCE. ignored:
+    patterns of
     topics or of topic.field that are not compared, for example 'acu/reference*'."""
     absolute: float | None = None
     relative: float | None = None
@@ -32,7 +33,7 @@ class Tolerance:
     def of(self, column):
         """(absolute, relative) of a layouts.Column."""
         return (column.tolerance if self.absolute is None else self.absolute,
-                RELATIVE if self.relative is None else self.relative)
+                RELATIVE_TOLERANCE if self.relative is None else self.relative)
 
     def ignores(self, name):
         """Whether a topic or topic.field is not compared."""
@@ -106,7 +107,7 @@ class Output:
 
 def recorded(data, log, topic) -> Output:
     """The Output in CDR messages of a topic logged at `log` (n,) [ns]. Raises ValueError when they are none."""
-    type_name = topics.BY_NAME[topic].type
+    type_name = topics.TOPIC_BY_NAME[topic].type
     log = np.asarray(log, np.int64)
     if type_name == 'std_msgs/msg/String':
         return Output(log, np.zeros((len(data), 0)), columns.table(data, type_name, log)['data'])
@@ -144,10 +145,10 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
             beyond = different & ~(size <= absolute + relative * np.abs(a))
         add(column.name, different, beyond, np.where(np.isfinite(size), size, math.inf))
     if template is not None:
-        type_name = topics.BY_NAME[topic].type
+        type_name = topics.TOPIC_BY_NAME[topic].type
         names = {column.name for column in layouts.columns(topic)}
         different = ~columns.alike(data, type_name, messages.serialize(template), names)
-        add(REST, different, different, np.full(different.size, math.inf), was.stamps)
+        add(REST_FIELD, different, different, np.full(different.size, math.inf), was.stamps)
     return difference
 
 

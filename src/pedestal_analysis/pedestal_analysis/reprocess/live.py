@@ -19,15 +19,15 @@ from pedestal_bringup.graph.processes import RunError, command_line
 from pedestal_bringup.scenario import parameter_file
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
 from pedestal_common.wire import commands, messages, records
 
-START = 300.0
+NODE_START_TIMEOUT_S = 300.0
 """Seconds within which the node has started; it may be compiling its laws for the first time."""
-PATIENCE = 20.0
+ANSWER_TIMEOUT_S = 20.0
 """Seconds within which it answers a step."""
-STOP = 10.0
+STOP_TIMEOUT_S = 10.0
 
 
 class Feeder(Operator):
@@ -69,8 +69,8 @@ class Feeder(Operator):
         """Publish a message that no step waits for, and wait until it has arrived."""
         publisher = self.publishers_of[name]
         publisher.publish(data)
-        if not publisher.wait_for_all_acked(Duration(seconds=PATIENCE)):
-            raise RunError(f'{self.node} did not take {name} within {PATIENCE:g} s')
+        if not publisher.wait_for_all_acked(Duration(seconds=ANSWER_TIMEOUT_S)):
+            raise RunError(f'{self.node} did not take {name} within {ANSWER_TIMEOUT_S:g} s')
 
 
 class Live:
@@ -98,13 +98,13 @@ class Live:
         if command.verb not in self.services:
             before = len(self.feeder.replies)
             self.feeder.asks.publish(messages.serialize(commands.message(command)))
-            self.until(lambda: len(self.feeder.replies) > before, PATIENCE, lambda: f'reply to {command}')
+            self.until(lambda: len(self.feeder.replies) > before, ANSWER_TIMEOUT_S, lambda: f'reply to {command}')
             return
         service = command.verb
         client = self.feeder.create_client(Trigger, service)
-        self.until(client.service_is_ready, PATIENCE, lambda: f'service {service}')
+        self.until(client.service_is_ready, ANSWER_TIMEOUT_S, lambda: f'service {service}')
         future = client.call_async(Trigger.Request())
-        self.until(future.done, PATIENCE, lambda: f'answer of {service}')
+        self.until(future.done, ANSWER_TIMEOUT_S, lambda: f'answer of {service}')
         self.feeder.destroy_client(client)
 
 
@@ -146,13 +146,14 @@ def _run(recording, done, params, folder):
         try:
             live = Live(feeder, process, log, done.unit.REQUESTS)
             live.until(lambda: all(publisher.get_subscription_count() for publisher in feeder.publishers_of.values())
-                       and feeder.count_publishers('diagnostics'), START, lambda: 'reader of its inputs')
+                       and feeder.count_publishers('diagnostics'), NODE_START_TIMEOUT_S,
+                       lambda: 'reader of its inputs')
             time.sleep(0.5)  # the other side of the discovery
             steps = _feed(recording, done, live)
         finally:
             process.send_signal(signal.SIGINT)
             try:
-                process.wait(STOP)
+                process.wait(STOP_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
@@ -175,7 +176,7 @@ def _feed(recording, done, live):
 
     def missing(step):
         names = [name for name, count in due.items() if len(feeder.answers[name]) < count[step]]
-        return f'{", ".join(names)} for step {feed.stamps[step] / SECOND:.6f} s'
+        return f'{", ".join(names)} for step {feed.stamps[step] / NS_PER_SECOND:.6f} s'
 
     for step in range(len(feed.stamps)):
         for name, row in events[step]:
@@ -185,7 +186,8 @@ def _feed(recording, done, live):
         for name, rows in feed.rows.items():
             if rows[step] >= 0 and name in feeder.publishers_of:
                 feeder.publishers_of[name].publish(recording.data(name)[rows[step]])
-        live.until(lambda step=step: answered(step), START if step == 0 else PATIENCE, lambda step=step: missing(step))
+        live.until(lambda step=step: answered(step), NODE_START_TIMEOUT_S if step == 0 else ANSWER_TIMEOUT_S,
+                   lambda step=step: missing(step))
     return steps
 
 
@@ -193,7 +195,7 @@ def _due(done, name):
     """How many messages of a topic must have come by each step (n,)."""
     if records.is_text(name):
         return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
-    return np.cumsum(done.steps[name]['stamp'] != records.NEVER)
+    return np.cumsum(done.steps[name]['stamp'] != records.NO_STAMP)
 
 
 def _output(name, data, done, steps):

@@ -9,35 +9,35 @@ from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from pedestal_analysis.reprocess.playlist import latched, reads
-from pedestal_analysis.reprocess.terminal import RIGHT, StatusLine
+from pedestal_analysis.reprocess.terminal import RIGHT_ARROW_CODES, StatusLine
 from pedestal_common.graph import nodes
-from pedestal_common.graph.steps import SECOND, GraphError
+from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.node import middleware, shell
 from pedestal_recording import bag as bags
 
-ANSWERS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
-           for node in nodes.NODES if node.answer}
+ANSWER_TOPICS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
+                 for node in nodes.NODES if node.answer}
 """{node: (topic, the topic on which the node answers it in every step, with the same stamp)}: what lockstep waits for.
 The drive begins the steps: it answers nothing (None). The INS answers late, by its latency, and is not waited for."""
 
-HELP = 'space: pause, go on   n or right arrow: one step   q: quit'
-WINDOW = 1000
+KEY_HELP = 'space: pause, go on   n or right arrow: one step   q: quit'
+MAX_UNACKNOWLEDGED_MESSAGES = 1000
 """Messages of a topic that may be unacknowledged: Fast DDS keeps 5000 and refuses more."""
 
-SETTLING = 0.5
+DISCOVERY_SETTLING_S = 0.5
 """Seconds from the coming of the last reader to the first message, in which other nodes still find each other."""
 
-UNKNOWN = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
+UNDISCOVERED_NODE_PATH = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
 """What rmw calls the node of a writer it has found before it has found the node."""
 
-LOOK, READERS_LOOK, KEY_LOOK = 0.1, 0.5, 0.05
+POSITION_REFRESH_S, SUBSCRIBER_POLL_S, KEYBOARD_POLL_S = 0.1, 0.5, 0.05
 """Seconds between two looks at the position shown, at who still reads, at the keyboard while waiting."""
 
-LEAVE = 5.0
+SUBSCRIBER_EXIT_TIMEOUT_S = 5.0
 """Seconds that tell a reader that ended, which is known at once, from one that was killed: Fast DDS waits 20 s for it
 and then forgets what it did not take."""
 
-QUIET, PARTING = 0.5, 1.0
+ANSWER_QUIET_S, STOPPED_ARRIVAL_TIMEOUT_S = 0.5, 1.0
 """Seconds without another answer after which the node under test has answered all; seconds a stopped replay waits
 until what it sent has arrived."""
 
@@ -45,9 +45,9 @@ _stamp_of = struct.Struct('<iI').unpack_from
 
 
 def answer_of(node, graph):
-    """ANSWERS of a node by its name in a graph {name: Link}; an array of several beams is asked by its first."""
+    """ANSWER_TOPICS of a node by its name in a graph {name: Link}; an array of several beams is asked by its first."""
     return tuple(name if name is None or name in graph else f'{nodes.beam_of(node) or "beam_1"}/{name}'
-                 for name in ANSWERS[nodes.plain(node)])
+                 for name in ANSWER_TOPICS[nodes.plain(node)])
 
 
 @dataclasses.dataclass
@@ -69,7 +69,7 @@ class NodeUnderTest:
     def silence(self, stamp, deadline):
         """The GraphError when it did not answer within the deadline [s]."""
         step = stamp if self.trigger is None else self.asked
-        return GraphError(f'no {self.answer} for step {step / SECOND:.6f} s after {deadline:g} s; silent: {self.name}')
+        return GraphError(f'no {self.answer} for step {step / NS_PER_SECOND:.6f} s after {deadline:g} s; silent: {self.name}')
 
 
 class Pace:
@@ -84,7 +84,7 @@ class Pace:
         """Do what a key says."""
         if key == b' ':
             self.paused, self._steps = not self.paused, 0
-        elif key == b'n' or key in RIGHT:
+        elif key == b'n' or key in RIGHT_ARROW_CODES:
             self._steps += self.paused
             self.paused = True
         elif key == b'q':
@@ -97,12 +97,12 @@ class Pace:
             if self._steps:
                 self._steps -= 1
                 return 0.0
-            return KEY_LOOK
+            return KEYBOARD_POLL_S
         if self.rate is None:
             return 0.0
         if self._base is None:
             self._base = now, stamp
-        return self._base[0] + (stamp - self._base[1]) / SECOND / self.rate - now
+        return self._base[0] + (stamp - self._base[1]) / NS_PER_SECOND / self.rate - now
 
     def __str__(self):
         return 'paused' if self.paused else 'lockstep' if self.rate is None else f'{self.rate:g} x'
@@ -124,14 +124,14 @@ class Player(Node):
     """
 
     def __init__(self, playlist, companion, options, keyboard, stopped):
-        super().__init__(nodes.STAND_IN)
+        super().__init__(nodes.REPLAY_NODE)
         self.playlist, self.companion = playlist, companion
         self.nodes, self.deadline = options.nodes, options.deadline
         self.keyboard, self.stopped, self.status = keyboard, stopped, StatusLine()
         self.graph = playlist.bag.graph
         self.channels = {name: Channel(self._publisher(name, playlist.bag.topics[name])) for name in playlist.names}
         self.under_test = [NodeUnderTest(node, *answer_of(node, self.graph)) for node in self.nodes
-                           if nodes.plain(node) in ANSWERS]
+                           if nodes.plain(node) in ANSWER_TOPICS]
         self.pace = Pace(options.rate, options.paused)
         for topic in self.graph.values():
             if any(node in topic.writers for node in self.nodes):
@@ -159,7 +159,7 @@ class Player(Node):
         def take(data):
             if node is not None:
                 seconds, nanoseconds = _stamp_of(data, 4)
-                node.answered = max(node.answered, seconds * SECOND + nanoseconds)
+                node.answered = max(node.answered, seconds * NS_PER_SECOND + nanoseconds)
                 node.answers += 1
         profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)
         self.create_subscription(middleware.message_class(topic.type), topic.name, take, profile, raw=True)
@@ -198,7 +198,7 @@ class Player(Node):
             unread, now = self._unread(), time.monotonic()
             for name in self.channels:
                 others = self._other_writers(name) if name != self.companion else []
-                if UNKNOWN in others and now - begun < self.deadline:
+                if UNDISCOVERED_NODE_PATH in others and now - begun < self.deadline:
                     settled = now
                 elif others:
                     raise GraphError(f'{name} already has a writer, {", ".join(others)}: its messages would come '
@@ -211,11 +211,11 @@ class Player(Node):
                     present = sorted(set(self.get_node_names()) - {self.get_name()})
                     raise GraphError(f'nobody reads {name} after {self.deadline:g} s; waited for {who}; present: '
                                      f'{", ".join(present) or "no node"}')
-            elif now - settled > SETTLING:
+            elif now - settled > DISCOVERY_SETTLING_S:
                 if self.companion and self._other_writers(self.companion):
                     self.destroy_publisher(self.channels.pop(self.companion).publisher)
                 return True
-            self._spin(KEY_LOOK)
+            self._spin(KEYBOARD_POLL_S)
         return False
 
     def play(self):
@@ -240,7 +240,7 @@ class Player(Node):
 
     def _send(self, name, stamp, data):
         channel = self.channels[name]
-        if channel.sent - channel.arrived >= WINDOW:
+        if channel.sent - channel.arrived >= MAX_UNACKNOWLEDGED_MESSAGES:
             self._await_arrival(name, self.deadline)
         channel.publisher.publish(data)
         channel.sent += 1
@@ -253,12 +253,12 @@ class Player(Node):
         since, readers = time.monotonic(), channel.publisher.get_subscription_count()
         while not channel.publisher.wait_for_all_acked(Duration(seconds=0)):
             waited = time.monotonic() - since
-            if waited > PARTING and self.stopped():
+            if waited > STOPPED_ARRIVAL_TIMEOUT_S and self.stopped():
                 raise shell.Stopped
             if waited > limit:
                 raise GraphError(f'a reader of {name} took nothing for {limit:g} s')
             self._spin(0.002)
-        if time.monotonic() > since + LEAVE and channel.publisher.get_subscription_count() < readers:
+        if time.monotonic() > since + SUBSCRIBER_EXIT_TIMEOUT_S and channel.publisher.get_subscription_count() < readers:
             raise GraphError(f'a reader of {name} died before it had taken all')
         channel.arrived = channel.sent
 
@@ -277,7 +277,7 @@ class Player(Node):
                 if now - self._spun > 0.01:
                     self._spin(0)
                 return True
-            self._spin(min(wait, KEY_LOOK))
+            self._spin(min(wait, KEYBOARD_POLL_S))
 
     def _ended(self):
         return self.pace.quit or self.stopped()
@@ -289,23 +289,23 @@ class Player(Node):
             return self.pace.wait(stamp, now)
         if now - since > self.deadline:
             raise late.silence(stamp, self.deadline)
-        return KEY_LOOK
+        return KEYBOARD_POLL_S
 
     def _late(self, stamp=-1):
         return next((node for node in self.under_test if node.owes(stamp)), None)
 
     def _look(self, now):
         if now >= self._next_look:
-            self._next_look = now + LOOK
+            self._next_look = now + POSITION_REFRESH_S
             start, end = self.playlist.origin, self.playlist.end
-            self.status.show(f'{(self.position - start) / SECOND:.3f} / {(end - start) / SECOND:.3f} s  {self.pace}'
-                             + (f'   {HELP}' if self.keyboard.there else ''))
+            self.status.show(f'{(self.position - start) / NS_PER_SECOND:.3f} / {(end - start) / NS_PER_SECOND:.3f} s  {self.pace}'
+                             + (f'   {KEY_HELP}' if self.keyboard.there else ''))
         if now >= self._next_readers:
-            self._next_readers = now + READERS_LOOK
+            self._next_readers = now + SUBSCRIBER_POLL_S
             unread = self._unread()
             if unread:
                 name, who = unread
-                raise GraphError(f'{name} is no longer read by {who}, at {self.position / SECOND:.6f} s')
+                raise GraphError(f'{name} is no longer read by {who}, at {self.position / NS_PER_SECOND:.6f} s')
 
     def finish(self):
         """Wait until everything sent has arrived and the nodes under test have answered. Raises GraphError after the
@@ -313,11 +313,11 @@ class Player(Node):
         if self._ended():
             with contextlib.suppress(GraphError, shell.Stopped):
                 for name in self.channels:
-                    self._await_arrival(name, PARTING)
+                    self._await_arrival(name, STOPPED_ARRIVAL_TIMEOUT_S)
             return
         for name in self.channels:
             self._await_arrival(name, self.deadline)
-        limit = self.deadline if self.pace.rate is None else QUIET
+        limit = self.deadline if self.pace.rate is None else ANSWER_QUIET_S
         count, since = -1, 0.0
         while self._late() and not self._ended():
             now, answers = time.monotonic(), sum(node.answers for node in self.under_test)
@@ -327,7 +327,7 @@ class Player(Node):
                 if self.pace.rate is None:
                     raise self._late().silence(-1, self.deadline)
                 return
-            self._spin(KEY_LOOK)
+            self._spin(KEYBOARD_POLL_S)
 
     def close(self):
         """Leave the graph."""

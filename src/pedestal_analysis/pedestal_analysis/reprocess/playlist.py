@@ -9,7 +9,7 @@ import itertools
 import numpy as np
 
 from pedestal_common.graph import nodes, topics
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import did_you_mean
 from pedestal_recording import bag as bags
 
@@ -26,7 +26,7 @@ def writes(graph, node, name):
 
 def latched(graph, name):
     """Whether a topic of the graph {name: Link} holds until its next message."""
-    return name in graph and topics.QOS[graph[name].rate].latched
+    return name in graph and topics.QOS_BY_RATE[graph[name].rate].latched
 
 
 def select(bag, of, names):
@@ -39,7 +39,7 @@ def select(bag, of, names):
         return bags.chosen_topics(bag, names)
     if not of:
         return list(bag.topics)
-    chosen, graph, known = [], bag.graph, nodes.members(nodes.NAMES, bag.beams)
+    chosen, graph, known = [], bag.graph, nodes.members(nodes.NODE_NAMES, bag.beams)
     for node in of:
         if node not in known:
             raise bags.BagError(f'--node {node} is no node;{did_you_mean(node, known)} there are {", ".join(known)}')
@@ -77,14 +77,14 @@ class Playlist:
         where, stamps, ranks = where[order], stamps[order], ranks[order]
         self.origin = int(stamps[ranks >= 0][0] if (ranks >= 0).any() else stamps[0])
         self.end = int(stamps[-1])
-        begin = self.origin + round(start * SECOND)
-        stop = begin + round(duration * SECOND) if duration is not None else self.end
+        begin = self.origin + round(start * NS_PER_SECOND)
+        stop = begin + round(duration * NS_PER_SECOND) if duration is not None else self.end
         before = np.flatnonzero((ranks < 0) & (stamps < begin))
         held = np.array([before[ranks[before] == topic][-1] for topic in np.unique(ranks[before])], int)
         inside = np.flatnonzero((stamps >= begin) & (stamps <= stop))
         if not inside.size:
             raise bags.BagError(f'{bag.path}: no message from {start:g} s on; it is '
-                                f'{(self.end - self.origin) / SECOND:g} s long')
+                                f'{(self.end - self.origin) / NS_PER_SECOND:g} s long')
         self.first, self.last = int(stamps[inside[0]]), int(stamps[inside[-1]])
         stamps[held] = self.first
         chosen = np.concatenate((held, inside))

@@ -21,18 +21,18 @@ from pedestal_analysis.reprocess import difference
 from pedestal_bringup.scenario import parameter_file, scenario
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
-from pedestal_common.graph.steps import SECOND, GraphError, Steps
+from pedestal_common.graph.steps import NS_PER_SECOND, GraphError, Steps
 from pedestal_common.node.unit import announced
 from pedestal_common.wire import commands, messages, records
 from pedestal_recording import bag as bags
 
-STANDS_FOR = {'adu/truth': 'joint_states'}
+SUBSTITUTE_TOPICS = {'adu/truth': 'joint_states'}
 """{topic: topic that stands for it in an old recording}: receivers once looked where the encoders said."""
 
-AFTER_ALL = 2**63 - 1
+AFTER_LAST_STAMP = 2**63 - 1
 """Stamp of the step of a message after which its writer answered none."""
 
-UNITS = tuple(node.name for node in nodes.NODES if node.unit)
+RECOMPUTABLE_NODES = tuple(node.name for node in nodes.NODES if node.unit)
 """Nodes that can be recomputed."""
 
 
@@ -41,7 +41,7 @@ def row_of(recording, node) -> nodes.Node:
     return nodes.row(node, recording.bag.beams > 0)
 
 
-def writer_of(topic) -> nodes.Node:
+def publishing_node(topic) -> nodes.Node:
     """The Node that writes a topic."""
     return next(node for node in nodes.NODES if topic in (*node.writes, node.replies))
 
@@ -64,8 +64,8 @@ class Recording:
         return topic in self.bag.topics and len(self.rows(topic)) > 0
 
     def source(self, topic):
-        """The recorded topic whose messages a node gets that reads a topic: itself, or what STANDS_FOR it."""
-        return topic if topic in self.bag.topics else STANDS_FOR.get(topic, topic)
+        """The recorded topic whose messages a node gets that reads a topic: itself, or what SUBSTITUTE_TOPICS it."""
+        return topic if topic in self.bag.topics else SUBSTITUTE_TOPICS.get(topic, topic)
 
     def feeds(self, topic):
         """Whether there are messages for a node that reads a topic."""
@@ -86,7 +86,7 @@ class Recording:
     def data(self, topic):
         """The CDR bytes of its messages."""
         if topic not in self._data:
-            wanted, source = topics.BY_NAME[topic].type, self.source(topic)
+            wanted, source = topics.TOPIC_BY_NAME[topic].type, self.source(topic)
             if self.bag.topics[source] != wanted:
                 raise RecomputeError(f'{self.bag.path}: {source} is {self.bag.topics[source]}; must be {wanted}')
             self._data[topic] = [data for _, _, _, data in self.bag.raw(source)]
@@ -105,14 +105,15 @@ class Recording:
 
     def steps(self, topic):
         """Stamps [ns] of the steps that messages without one belong to: in our lockstep recordings their log says, in
-        others they came before the answer to that step; AFTER_ALL where none came any more, their log where no answer
+        others they came before the answer to that step; AFTER_LAST_STAMP where none came any more, their log where no
+        answer
         was recorded."""
         log = self.rows(topic).log - self.bag.start
-        answer = writer_of(topic).writes[0]
+        answer = publishing_node(topic).writes[0]
         if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(answer):
             return log
         after = np.searchsorted(self.arrival(answer), self.arrival(topic))
-        return np.append(self.output(answer).stamps, AFTER_ALL)[after]
+        return np.append(self.output(answer).stamps, AFTER_LAST_STAMP)[after]
 
     def commands(self, topic, stamps):
         """{step: [Command]} of a topic of replies, but those of a schedule, which the parameters hold; steps are rows
@@ -121,10 +122,10 @@ class Recording:
         rows = np.searchsorted(stamps, self.steps(topic)).tolist() if self.has(topic) else ()
         for step, data in zip(rows, self.data(topic) if self.has(topic) else ()):
             try:
-                command, _ = commands.of_reply(messages.deserialize(data, topics.BY_NAME[topic].type))
+                command, _ = commands.of_reply(messages.deserialize(data, topics.TOPIC_BY_NAME[topic].type))
             except ValueError as error:
                 raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
-            if command.who != commands.SCHEDULE:
+            if command.who != commands.SCHEDULE_CLIENT:
                 asked.setdefault(step, []).append(command)
         return asked
 
@@ -172,7 +173,7 @@ def feed(recording, unit) -> Feed:
     order = np.lexsort((sources, stamps)) if recording.lockstep else np.argsort(arrival, kind='stable')
 
     steps, taken = [], []
-    matched = Steps(trigger, {name: round(latency * SECOND) for name, latency in latencies.items()},
+    matched = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
                     recording.lockstep, lambda *step: steps.append(step), prompt=paces, held=nodes.held(latencies))
     problem = ''
     try:
@@ -196,11 +197,11 @@ def _events(recording, unit, stamps, taken):
     last input of each step came. What a writer says along with a late message of its own comes as late."""
     events = []
     for name in unit.reads:
-        if topics.BY_NAME[name].rate != 'step' and recording.has(name):
+        if topics.TOPIC_BY_NAME[name].rate != 'step' and recording.has(name):
             if recording.has(unit.NODE.writes[0]) or recording.bag.metadata.get('pacing') == 'lockstep':
                 late = max((latency for other, latency in unit.latencies.items()
-                            if writer_of(other) is writer_of(name)), default=0.0)
-                steps = np.searchsorted(stamps - round(late * SECOND), recording.steps(name))
+                            if publishing_node(other) is publishing_node(name)), default=0.0)
+                steps = np.searchsorted(stamps - round(late * NS_PER_SECOND), recording.steps(name))
             else:
                 steps = np.searchsorted(taken, recording.arrival(name))
             events += [(step, name, row) for row, step in enumerate(steps.tolist())]
@@ -255,7 +256,7 @@ def compute(recording, unit, fed, states=None, requests=None):
             break
         for topic, row in events.get(step, ()):
             try:
-                message = messages.deserialize(recording.data(topic)[row], topics.BY_NAME[topic].type)
+                message = messages.deserialize(recording.data(topic)[row], topics.TOPIC_BY_NAME[topic].type)
                 unit.decode(topic, messages.since(message, recording.bag.start))
             except ValueError:
                 pass  # refused, as the node does
@@ -267,7 +268,7 @@ def compute(recording, unit, fed, states=None, requests=None):
             last = step + 1
             if unit.encode(state, int(outputs[step][state])) != states[step]:
                 unit.memory.record[...] = before
-                made[step] = ask([commands.Command(service, commands.SERVICE)
+                made[step] = ask([commands.Command(service, commands.SERVICE_CLIENT)
                                   for service in unit.requests_for(state, states[step])], step)
                 last = step
     return outputs, {step: done for step, done in made.items() if done}
@@ -278,7 +279,7 @@ def outputs_of(unit, fed, outputs):
     written = {}
     for name in unit.writes:
         if not records.is_text(name):
-            sent = outputs[name]['stamp'] != records.NEVER
+            sent = outputs[name]['stamp'] != records.NO_STAMP
             written[name] = difference.Output(outputs[name]['stamp'][sent], records.numbers(outputs, name)[sent])
         elif name not in unit.MOMENTARY:
             stamps, texts = announced(unit, name, fed.stamps, outputs)
@@ -301,7 +302,7 @@ def unit_of(recording, node, params):
     """The unit of a node with parameters of its dataclass, in the graph that was recorded."""
     row = row_of(recording, node)
     names = [other.name for other in nodes.NODES if any(map(recording.has, other.writes))]
-    flags = [flag for flag in topics.FLAGS if getattr(params, flag, False)]
+    flags = [flag for flag in topics.TOPIC_FLAGS if getattr(params, flag, False)]
     unit = row.unit_type()(params, nodes.reads(row, names, flags))
     unit.epoch = recording.bag.start
     return unit
@@ -351,15 +352,15 @@ def chosen(recording, names, file_values):
         if nodes.beam_of(name):
             raise RecomputeError(f'--node {name}: of one beam at a time; say --beam {nodes.beam_of(name)} --node '
                                  f'{nodes.plain(name)}')
-        if name not in UNITS:
-            raise RecomputeError(f'--node {name}: must be one of {", ".join(UNITS)}')
+        if name not in RECOMPUTABLE_NODES:
+            raise RecomputeError(f'--node {name}: must be one of {", ".join(RECOMPUTABLE_NODES)}')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
 
     def able(name):
         row = row_of(recording, name)
         begun = recording.feeds(row.reads[0]) or row.reads[0] in row.writes and recording.has(row.writes[0])
         return begun and name in (known or ('acu',)) and (name == 'acu' or any(map(recording.has, row.writes)))
-    selected = [name for name in UNITS if (name in names if names else able(name))]
+    selected = [name for name in RECOMPUTABLE_NODES if (name in names if names else able(name))]
     if not selected:
         raise RecomputeError(f'{recording.bag.path}: no node whose inputs are in it; there are '
                              f'{", ".join(recording.bag.topics)}')
@@ -376,14 +377,15 @@ def file_parameters(path, beam=''):
         chosen = scenario.load(str(path))
         return {node: chosen.given(beam + node if nodes.row(node).of_beam else node) for node in chosen.values
                 if not nodes.beam_of(node)}
-    return {node: values for name, values in sections.items() if (node := name.removeprefix(beam)) in UNITS}
+    return {node: values for name,
+            values in sections.items() if (node := name.removeprefix(beam)) in RECOMPUTABLE_NODES}
 
 
 def overrides(texts, names):
     """{node: {key: value}} of texts [node.]key=value; the node may be left out where there is only one."""
     parameters = {}
     for text in texts:
-        if text.partition('=')[0].partition('.')[0] not in scenario.RUN and len(names) == 1:
+        if text.partition('=')[0].partition('.')[0] not in scenario.SECTION_NODES and len(names) == 1:
             text = f'{names[0]}.{text}'
         node, key, value = scenario.parse_override(text)
         if node not in names:
@@ -410,7 +412,7 @@ def measure(path, node='acu'):
         recording = Recording(path)
         done = recompute(recording, node, parameters_of(recording, node))
         compare(recording, done.outputs, done.unit, difference.Tolerance())
-        return (done.feed.stamps[-1] - done.feed.stamps[0]) / SECOND
+        return (done.feed.stamps[-1] - done.feed.stamps[0]) / NS_PER_SECOND
 
     run()
     begun = time.perf_counter()

@@ -9,7 +9,7 @@ from pedestal_analysis.reprocess import difference, recompute, what_if
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.results import row
 from pedestal_common.graph import topics
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import messages, records
 from pedestal_recording.writer import Writer
 
@@ -79,7 +79,7 @@ def _node_report(recording, node, given, changes, options):
 
 
 def _title(recording, done, params_file):
-    stamps = done.feed.stamps / SECOND
+    stamps = done.feed.stamps / NS_PER_SECOND
     span = f'{stamps[0]:g} to {stamps[-1]:g} s' if len(stamps) else 'no step'
     pacing = 'lockstep' if recording.lockstep else 'realtime'
     if params_file:
@@ -113,7 +113,7 @@ def _requests(done):
 
 
 def _requests_of_step(done, step, made):
-    return [f'{command} asked for at {done.feed.stamps[step] / SECOND:.6f} s{"" if granted else ", and refused"}'
+    return [f'{command} asked for at {done.feed.stamps[step] / NS_PER_SECOND:.6f} s{"" if granted else ", and refused"}'
             for command, granted in made]
 
 
@@ -156,7 +156,7 @@ def _new_numbers(recording, outputs, done):
 
 def _by_encoders(recording):
     """A line on errors that are not those of the dish, in a list; none where its true direction was recorded."""
-    return [f'note: {tracking.BY_ENCODERS}'] if tracking.by_encoders(recording.bag) else []
+    return [f'note: {tracking.ENCODER_BEAM_NOTE}'] if tracking.by_encoders(recording.bag) else []
 
 
 def _old_against_new(recording, old, new, tolerance, changes):
@@ -167,7 +167,7 @@ def _old_against_new(recording, old, new, tolerance, changes):
     lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
     rows = []
     if new.node == 'acu' and len(new.feed.stamps):
-        lines += [f'note: {what_if.NOTE}', *_by_encoders(recording),
+        lines += [f'note: {what_if.COMPARISON_NOTE}', *_by_encoders(recording),
                   f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']
         for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
             ratio = f'{b / a:9.4g}' if a and math.isfinite(b / a) else f'{"":9}'

@@ -7,11 +7,11 @@ import time
 
 import rclpy
 
-from pedestal_analysis.reprocess.player import ANSWERS, Player, answer_of
+from pedestal_analysis.reprocess.player import ANSWER_TOPICS, Player, answer_of
 from pedestal_analysis.reprocess.playlist import Playlist, select, writes
 from pedestal_analysis.reprocess.terminal import Keyboard
 from pedestal_common.graph import nodes
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware, shell
 from pedestal_recording import bag as bags
 
@@ -112,7 +112,7 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
                 player.close()
             return ReplayResult(
                 str(path), {name: channel.sent for name, channel in player.channels.items()},
-                playlist.first / SECOND, player.position / SECOND, wall,
+                playlist.first / NS_PER_SECOND, player.position / NS_PER_SECOND, wall,
                 {node.name: (node.answers, node.steps) for node in player.under_test if node.trigger},
                 'stopped' if stopped() else 'quit' if player.pace.quit else 'whole')
     finally:
@@ -120,11 +120,11 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
 
 
 def _check_lockstep(under_test, chosen, graph):
-    answering = [node for node in under_test if nodes.plain(node) in ANSWERS]
+    answering = [node for node in under_test if nodes.plain(node) in ANSWER_TOPICS]
     if not answering:
         why = (f'{", ".join(under_test)} answers no step at its stamp' if under_test else
                'say with --node who answers the steps')
-        raise ValueError(f'--lockstep: {why}; there are {", ".join(ANSWERS)}')
+        raise ValueError(f'--lockstep: {why}; there are {", ".join(ANSWER_TOPICS)}')
     for node in answering:
         trigger, _ = answer_of(node, graph)
         if trigger not in (None, *chosen):

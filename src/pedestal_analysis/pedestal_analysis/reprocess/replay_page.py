@@ -7,32 +7,32 @@ import time
 
 import numpy as np
 
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import commands, messages, records
 from pedestal_operator import remote_node
 from pedestal_operator.antenna import Antenna
 from pedestal_operator.page import page_log, page_sky, page_state
 from pedestal_operator.page.page_log import Log
-from pedestal_operator.page.page_passes import Coming
-from pedestal_operator.page.page_security import ROLES
+from pedestal_operator.page.page_passes import UpcomingPasses
+from pedestal_operator.page.page_security import PAGE_ROLES
 from pedestal_operator.page.page_server import PageServer
 from pedestal_recording import bag as bags
 
-FRAME, SLOW = 0.1, 1.0
+PAGE_FRAME_PERIOD_S, SLOW_FRAME_PERIOD_S = 0.1, 1.0
 """Time [s] between two states that pages are sent, and two of what changes slowly."""
 
-SLOWEST, FASTEST = 0.05, 50.0
+MIN_REPLAY_RATE, MAX_REPLAY_RATE = 0.05, 50.0
 """Times real time."""
 
-EVENTS = 5000
+MAX_EVENT_MESSAGES = 5000
 """Messages of a topic that are looked through for the event log, the first ones."""
 
-LATELY = 60
+DIAGNOSTICS_LOOKBACK = 60
 """Diagnostics before a moment in which the last one of each node is looked for."""
 
-NUMBERS = (*remote_node.NUMBERS, *page_state.NUMBERS)
-TEXTS = (*remote_node.TEXTS, 'ins/state', 'acu/blockage')
-LISTS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_result')
+NUMBER_TOPICS = (*remote_node.NUMBER_TOPICS, *page_state.EXTRA_NUMBER_TOPICS)
+TEXT_TOPICS = (*remote_node.TEXT_TOPICS, 'ins/state', 'acu/blockage')
+LIST_TOPICS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_result')
 
 
 class Recording(Antenna):
@@ -43,19 +43,19 @@ class Recording(Antenna):
 
     def __init__(self, bag):
         self._bag, self.beam = bag, bag.beam
-        self._rows = {name: bag.rows(name) for name in (*NUMBERS, *TEXTS, *LISTS)
+        self._rows = {name: bag.rows(name) for name in (*NUMBER_TOPICS, *TEXT_TOPICS, *LIST_TOPICS)
                       if name in bag.topics and len(bag.rows(name))}
         if 'joint_states' not in self._rows:
             raise bags.BagError(f'{bag.path}: no joint_states in it, which the page shows')
-        self._times = {name: np.maximum.accumulate(rows.stamp if name in NUMBERS else rows.log)
+        self._times = {name: np.maximum.accumulate(rows.stamp if name in NUMBER_TOPICS else rows.log)
                        for name, rows in self._rows.items()}
         joints = self._times['joint_states']
-        self._begin, self.length = int(joints[0]), (int(joints[-1]) - int(joints[0])) / SECOND
-        self._decoders = {name: records.Decoder(name, records.empty(records.of(name), 1)) for name in NUMBERS}
-        self.configuration = {name: value for node in page_state.WANTED
+        self._begin, self.length = int(joints[0]), (int(joints[-1]) - int(joints[0])) / NS_PER_SECOND
+        self._decoders = {name: records.Decoder(name, records.empty(records.of(name), 1)) for name in NUMBER_TOPICS}
+        self.configuration = {name: value for node in page_state.SHOWN_PARAMETERS
                               for name, value in bag.configuration['parameters'].get(node, {}).items()}
         self.configuration['graph.start'] = bag.start
-        self.alarms, self.path, self.log = [], None, Log(most=EVENTS)
+        self.alarms, self.path, self.log = [], None, Log(most=MAX_EVENT_MESSAGES)
         self.numbers, self.texts, self.status, self._heard = {}, {}, {}, {}
         self._read_log()
         self.move(0.0)
@@ -63,42 +63,42 @@ class Recording(Antenna):
     @property
     def now(self):
         """The time of the recording [s], UTC in realtime."""
-        return (self._begin + round(self.position * SECOND)) / SECOND
+        return (self._begin + round(self.position * NS_PER_SECOND)) / NS_PER_SECOND
 
     def present(self, name):
         """Whether a topic or node had been heard lately."""
-        return name in self._heard and self.now - self._heard[name] < remote_node.FRESH
+        return name in self._heard and self.now - self._heard[name] < remote_node.MAX_MESSAGE_AGE_S
 
     def lines(self):
         """What had happened so far, for the event log."""
-        return [line for line in self.log.lines if line['t'] <= self.now][-page_log.MOST:]
+        return [line for line in self.log.lines if line['t'] <= self.now][-page_log.MAX_LOG_LINES:]
 
     def move(self, position):
         """Go to a position [s]."""
         self.move_numbers(position)
-        for name in TEXTS:
+        for name in TEXT_TOPICS:
             for text in self._messages(name, 1):
                 self.texts[name] = text.data
         self.alarms = [status for array in self._messages('acu/alarms', 1) for status in array.status]
         for message in self._messages('acu/program_track', 1):
             self.path = page_sky.path(message, page_state.epoch(self)) or self.path
         last = self._count('diagnostics')
-        for time_of, array in zip(self._times.get('diagnostics', ())[max(last - LATELY, 0):last],
-                                  self._messages('diagnostics', LATELY)):
+        for time_of, array in zip(self._times.get('diagnostics', ())[max(last - DIAGNOSTICS_LOOKBACK, 0):last],
+                                  self._messages('diagnostics', DIAGNOSTICS_LOOKBACK)):
             for status in array.status:
-                self.status[status.name], self._heard[status.name] = status, time_of / SECOND
+                self.status[status.name], self._heard[status.name] = status, time_of / NS_PER_SECOND
 
     def move_numbers(self, position):
         """The same for the numbers only."""
         self.position = min(max(position, 0.0), self.length)
         self.numbers, self.texts, self.status, self._heard = {}, {}, {}, {}
-        for name in NUMBERS:
+        for name in NUMBER_TOPICS:
             for time_of, data in self._last(name, 1):
-                self.numbers[name], self._heard[name] = self._decoders[name].decoded(data)[1], time_of / SECOND
+                self.numbers[name], self._heard[name] = self._decoders[name].decoded(data)[1], time_of / NS_PER_SECOND
 
     def _count(self, name):
         """How many messages of a topic there had been."""
-        moment = self._begin + round(self.position * SECOND)
+        moment = self._begin + round(self.position * NS_PER_SECOND)
         return int(np.searchsorted(self._times[name], moment, 'right')) if name in self._rows else 0
 
     def _last(self, name, most):
@@ -117,17 +117,17 @@ class Recording(Antenna):
         """All that happened, in its order."""
         told = []
         for name in ('acu/mode', 'adu/state', 'acu/command_result', 'acu/alarms'):
-            rows = self._rows.get(name, ())[:EVENTS]
+            rows = self._rows.get(name, ())[:MAX_EVENT_MESSAGES]
             told += [(row_log, name, messages.deserialize(data, self._bag.topics[name]))
                      for row_log, (*_, data) in zip(rows.log.tolist() if len(rows) else (), self._bag.take(rows))]
         for log, name, message in sorted(told, key=lambda row: row[0]):
             if name == 'acu/command_result':
-                self.log.replied(log / SECOND, *commands.of_reply(message))
+                self.log.replied(log / NS_PER_SECOND, *commands.of_reply(message))
             elif name == 'acu/alarms':
-                self.position, self.alarms = (log - self._begin) / SECOND, message.status
-                self.log.alarms(log / SECOND, page_state.alarms(self))
+                self.position, self.alarms = (log - self._begin) / NS_PER_SECOND, message.status
+                self.log.alarms(log / NS_PER_SECOND, page_state.alarms(self))
             else:
-                self.log.text(log / SECOND, name, message.data)
+                self.log.text(log / NS_PER_SECOND, name, message.data)
 
 
 class Player:
@@ -137,10 +137,10 @@ class Player:
     def __init__(self, recording, port, options):
         self._recording, self._lock = recording, threading.Lock()
         self._playing, self._rate = not options.paused, options.rate
-        self._coming = Coming()
+        self._coming = UpcomingPasses()
         recording.move(options.start)
         self._server = PageServer('127.0.0.1', port, (), 32, self._past)
-        self.url = self._server.access.url(ROLES[0])
+        self.url = self._server.access.url(PAGE_ROLES[0])
 
     def play(self, stopped):
         """Serve until stopped() is true."""
@@ -151,10 +151,10 @@ class Player:
                 moved = self._hear()
                 if self._playing:
                     self._go(self._recording.position + self._rate * (now - before))
-                self._show(moved or now - slow >= SLOW)
-            slow = now if moved or now - slow >= SLOW else slow
+                self._show(moved or now - slow >= SLOW_FRAME_PERIOD_S)
+            slow = now if moved or now - slow >= SLOW_FRAME_PERIOD_S else slow
             before = now
-            time.sleep(FRAME)
+            time.sleep(PAGE_FRAME_PERIOD_S)
         self._server.close()
         self._coming.close()
 
@@ -179,7 +179,7 @@ class Player:
                 self._go(float(wanted['position']))
                 moved = True
             if _number(wanted.get('rate')):
-                self._rate = min(max(float(wanted['rate']), SLOWEST), FASTEST)
+                self._rate = min(max(float(wanted['rate']), MIN_REPLAY_RATE), MAX_REPLAY_RATE)
             if isinstance(wanted.get('playing'), bool):
                 again = wanted['playing'] and self._recording.position >= self._recording.length
                 self._go(0.0 if again else self._recording.position)
@@ -187,13 +187,13 @@ class Player:
 
     def _show(self, slowly):
         recording = self._recording
-        sections = {'now': page_state.now(recording), 'told': page_state.told(recording),
+        sections = {'now': page_state.now(recording), 'told': page_state.status_section(recording),
                     'alarms': page_state.alarms(recording), 'log': recording.lines(),
                     'replay': {'length': recording.length, 'position': recording.position, 'playing': self._playing,
                                'rate': self._rate}}
         if slowly:
-            past = page_sky.Past(page_state.SPAN)
-            for frame in self._frames(SLOW):
+            past = page_sky.BeamHistory(page_state.CHART_SPAN_S)
+            for frame in self._frames(SLOW_FRAME_PERIOD_S):
                 past.add(frame['t'], frame['beam'])
             sections |= {'fixed': page_state.fixed(recording), 'past': past.places,
                          'sky': page_state.sky(recording, self._coming.look(recording))}
@@ -201,13 +201,13 @@ class Player:
 
     def _past(self):
         with self._lock:
-            return [page_state.history_row(frame) for frame in self._frames(page_state.PERIOD)]
+            return [page_state.history_row(frame) for frame in self._frames(page_state.CHART_PERIOD_S)]
 
     def _frames(self, period):
         """[page_state.now] of the time of the strip charts before this moment."""
         recording, position = self._recording, self._recording.position
         frames = []
-        for count in itertools.count(-round(page_state.SPAN / period)):
+        for count in itertools.count(-round(page_state.CHART_SPAN_S / period)):
             if position + count * period >= 0.0 and count <= 0:
                 recording.move_numbers(position + count * period)
                 frames.append(page_state.now(recording))

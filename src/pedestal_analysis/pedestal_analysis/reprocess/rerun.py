@@ -8,7 +8,7 @@ from pedestal_common import parameters
 from pedestal_common.text_files import files
 from pedestal_recording import bag as bags
 
-SHOWN = 4
+MAX_SHOWN_FIELDS = 4
 """Fields shown of the first message that differs on a topic."""
 
 
@@ -58,9 +58,9 @@ class RerunResult:
 
 def _line(topic):
     counts = f'{topic.was} messages' if topic.was == topic.now else f'{topic.was} messages, now {topic.now}'
-    more = f' and {len(topic.changes) - SHOWN} more fields' if len(topic.changes) > SHOWN else ''
+    more = f' and {len(topic.changes) - MAX_SHOWN_FIELDS} more fields' if len(topic.changes) > MAX_SHOWN_FIELDS else ''
     return (f'{topic.name}: {counts}, {topic.different} differ, the first at {topic.first / 1e9:.6f} s: '
-            f'{", ".join(topic.changes[:SHOWN])}{more}')
+            f'{", ".join(topic.changes[:MAX_SHOWN_FIELDS])}{more}')
 
 
 def _short(text):
@@ -89,7 +89,7 @@ def configured(bag):
         now = parameters.as_dict(chosen.node_parameters(node))
         values[node].update({key: value for key, value in then.items() if key not in now or now[key] != value})
         # A topic that the version of the recording did not have is not there.
-        values[node].update({key: False for owner, told, flag in scenario.MEASURED for key in (told, flag)
+        values[node].update({key: False for owner, told, flag in scenario.MEASUREMENT_FLAGS for key in (told, flag)
                              if key in now and key not in then})
     changed = dataclasses.replace(chosen, values=values)
     for node in recorded:

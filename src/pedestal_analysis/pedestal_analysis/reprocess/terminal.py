@@ -11,7 +11,7 @@ import termios
 import tty
 
 _KEY = re.compile(rb'\x1b[\[O][A-D]|.', re.DOTALL)
-RIGHT = (b'\x1b[C', b'\x1bOC')
+RIGHT_ARROW_CODES = (b'\x1b[C', b'\x1bOC')
 """What the right arrow sends."""
 
 

@@ -12,14 +12,14 @@ import numpy as np
 
 from pedestal_analysis.results import results, tracking
 from pedestal_analysis.results.results import Result
-from pedestal_analysis.results.tracking import DEGREES, known_rms, largest
+from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 from pedestal_common.graph.topics import AXES
 
-RIPPLE = 0.25
+RIPPLE_WINDOW_S = 0.25
 """What is faster than a moving mean of this length [s] counts as noise of a command."""
 
-NOTE = ('the recorded antenna does not move with the recomputed command: compared are the estimate against the '
-        'recorded truth and the noise of estimate and command; for the pointing, run the scenario anew')
+COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed command: compared are the estimate against the '
+                   'recorded truth and the noise of estimate and command; for the pointing, run the scenario anew')
 
 
 class Overlay:
@@ -36,7 +36,7 @@ class Overlay:
         return self._outputs[topic].table(topic) if topic in self._outputs else self._bag.table(topic)
 
 
-class Answers:
+class RecomputedAcu:
     """What an ACU answered in an Overlay. estimate, command: tables of acu/estimate and acu/rate_command; autotrack:
     stamps [s] of its estimates in autotrack; common: stamps [s] at which it is judged."""
 
@@ -47,14 +47,14 @@ class Answers:
         self.common = t[:0]
 
     def ripple(self, table):
-        """Rms [rad/s] of what is faster than RIPPLE in the velocities of a table."""
+        """Rms [rad/s] of what is faster than RIPPLE_WINDOW_S in the velocities of a table."""
         return known_rms(np.concatenate([_ripple(table['t'], table[f'{axis}.velocity'], self.common)
                                          for axis in AXES]))
 
 
 def _ripple(t, values, common):
     values = values[np.isin(t, common)]
-    length = max(1, round(RIPPLE / np.median(np.diff(t)))) if t.size > 1 else 1
+    length = max(1, round(RIPPLE_WINDOW_S / np.median(np.diff(t)))) if t.size > 1 else 1
     if values.size < 2 * length:
         return np.full(1, math.nan)
     mean = np.convolve(values, np.full(length, 1.0 / length), 'valid')
@@ -62,9 +62,9 @@ def _ripple(t, values, common):
 
 
 @dataclasses.dataclass
-class AgainstTruth:
+class TruthComparison:
     """The estimate of Answers and the recorded antenna in a tracking.Tracking, against the recorded truth."""
-    answers: Answers
+    answers: RecomputedAcu
     run: tracking.Tracking
 
     @functools.cached_property
@@ -111,32 +111,33 @@ class AgainstTruth:
                 known_rms((rate * scale - true_rate)[known]))
 
 
-NUMBERS = (
+COMPARISON_RESULTS = (
     Result('autotrack_from_s', 's', 'answers', lambda acu: acu.autotrack[0] if acu.autotrack.size else math.nan,
            'When the ACU came to autotrack.'),
     Result('tracked_percent', '%', 'answers', lambda acu: 100.0 * acu.autotrack.size / max(acu.estimate['t'].size, 1),
            'Share of the steps in autotrack.'),
-    Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.true) * DEGREES,
+    Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.true) * DEG_PER_RAD,
            'Rms of the true pointing error of the recorded antenna, both axes together.'),
-    Result('estimate_error_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error) * DEGREES,
+    Result('estimate_error_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error) * DEG_PER_RAD,
            'Rms of estimate less truth, both axes together.'),
-    Result('estimate_error_cross_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 0]) * DEGREES,
+    Result('estimate_error_cross_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 0])
+           * DEG_PER_RAD,
            'Rms of estimate less truth in cross-elevation.'),
-    Result('estimate_error_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 1]) * DEGREES,
+    Result('estimate_error_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 1]) * DEG_PER_RAD,
            'Rms of estimate less truth in elevation.'),
-    Result('estimate_error_max_deg', 'deg', 'truth', lambda acu: largest(acu.error) * DEGREES,
+    Result('estimate_error_max_deg', 'deg', 'truth', lambda acu: largest(acu.error) * DEG_PER_RAD,
            'Largest of estimate less truth on either axis.'),
-    Result('single_sample_noise_deg', 'deg', 'truth', lambda acu: acu.noise * DEGREES,
+    Result('single_sample_noise_deg', 'deg', 'truth', lambda acu: acu.noise * DEG_PER_RAD,
            "Rms of the receiver's error less the true one."),
     Result('noise_reduction', '-', 'truth', lambda acu: acu.noise / known_rms(acu.error),
            "The receiver's noise over the error of the estimate."),
     Result('estimate_lag_s', 's', 'truth', lambda acu: acu.motion[0], 'How late the estimate is.'),
-    Result('estimate_rate_error_rms_deg_s', 'deg/s', 'truth', lambda acu: acu.motion[1] * DEGREES,
+    Result('estimate_rate_error_rms_deg_s', 'deg/s', 'truth', lambda acu: acu.motion[1] * DEG_PER_RAD,
            "Rms of the estimate's rate less the true one."),
-    Result('estimate_rate_noise_deg_s', 'deg/s', 'answers', lambda acu: acu.ripple(acu.estimate) * DEGREES,
-           f"Rms of what is faster than {RIPPLE:g} s in the estimate's rate."),
-    Result('command_noise_deg_s', 'deg/s', 'answers', lambda acu: acu.ripple(acu.command) * DEGREES,
-           f'Rms of what is faster than {RIPPLE:g} s in the rate command.'),
+    Result('estimate_rate_noise_deg_s', 'deg/s', 'answers', lambda acu: acu.ripple(acu.estimate) * DEG_PER_RAD,
+           f"Rms of what is faster than {RIPPLE_WINDOW_S:g} s in the estimate's rate."),
+    Result('command_noise_deg_s', 'deg/s', 'answers', lambda acu: acu.ripple(acu.command) * DEG_PER_RAD,
+           f'Rms of what is faster than {RIPPLE_WINDOW_S:g} s in the rate command.'),
     Result('evaluated_time_s', 's', 'answers',
            lambda acu: acu.common.size * float(np.median(np.diff(acu.estimate['t']))),
            'How long all versions were in autotrack and settled.'),
@@ -149,14 +150,16 @@ def numbers(bag, versions) -> dict:
     Over the time in which all of them are in autotrack and settled, so that they are judged on the same samples.
     """
     overlays = [Overlay(bag, outputs) for outputs in versions]
-    answers = [Answers(overlay) for overlay in overlays]
+    answers = [RecomputedAcu(overlay) for overlay in overlays]
     try:
-        truths = [AgainstTruth(acu, tracking.read(overlay)) for acu, overlay in zip(answers, overlays)]
+        truths = [TruthComparison(acu, tracking.read(overlay)) for acu, overlay in zip(answers, overlays)]
     except ValueError:
         truths = [None] * len(versions)
     common = functools.reduce(np.intersect1d, [acu.autotrack for acu in answers])
-    start = max((acu.autotrack[0] for acu in answers if acu.autotrack.size), default=math.inf) + tracking.SETTLING
+    start = (max((acu.autotrack[0] for acu in answers if acu.autotrack.size), default=math.inf)
+             + tracking.HANDOVER_SETTLING_S)
     for acu in answers:
         acu.common = common[common >= start]
-    columns = [results.measured({'answers': acu, 'truth': truth}, NUMBERS) for acu, truth in zip(answers, truths)]
+    columns = [results.measured({'answers': acu, 'truth': truth}, COMPARISON_RESULTS) for acu,
+               truth in zip(answers, truths)]
     return {name: ([column[name][0] for column in columns], unit) for name, (_, unit) in columns[0].items()}

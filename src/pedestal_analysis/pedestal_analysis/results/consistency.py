@@ -18,16 +18,16 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 
-FREEDOMS = 2
+NEES_FREEDOMS = 2
 """Of the NEES: angle and rate."""
-PART = 0.95
+BAND_PROBABILITY = 0.95
 """Share of honest filters inside a band."""
 
-NOTABLE = 0.1
+NOTABLE_DEVIATION = 0.1
 """Share of its expectation by which a mean is off, beside lying outside of its band, where a table marks it: over
 minutes the band is narrower than any model is true."""
 
-NAMES = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
+FILTER_NUMBERS = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
 
 
 @dataclasses.dataclass
@@ -79,15 +79,15 @@ def read(bag, run):
         return None
     t = run.t
     at_steps = functools.partial(tracking.on_grid, bag, t)
-    numbers = at_steps('acu/filter', [f'{axis}_{name}.position' for name in NAMES for axis in topics.AXES])
-    numbers = dict(zip(NAMES, np.split(numbers, len(NAMES), axis=1)))
+    numbers = at_steps('acu/filter', [f'{axis}_{name}.position' for name in FILTER_NUMBERS for axis in topics.AXES])
+    numbers = dict(zip(FILTER_NUMBERS, np.split(numbers, len(FILTER_NUMBERS), axis=1)))
     probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in topics.AXES
                                          for model in topics.MOTION_MODELS]).reshape(t.size, 2, -1)
     estimate = at_steps('acu/estimate', [f'{axis}.{field}' for field in ('position', 'velocity')
                                         for axis in topics.AXES])
     place, twist = ('position.x', 'position.y', 'position.z'), ('twist.linear.x', 'twist.linear.y', 'twist.linear.z')
     relative, velocity = at_steps('target/truth', place), at_steps('target/truth', twist)
-    attitude, ship_velocity = np.tile(line_of_sight.ASHORE, (t.size, 1)), np.zeros((t.size, 3))
+    attitude, ship_velocity = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1)), np.zeros((t.size, 3))
     if 'ship/truth' in bag.topics:
         relative = relative - at_steps('ship/truth', place)
         attitude = at_steps('ship/truth', [f'orientation.{letter}' for letter in 'xyzw'])
@@ -118,15 +118,18 @@ def independent(values):
 
 
 def bounds(freedoms):
-    """(low, high) that hold a chi-square value with this many degrees of freedom, a number or an array, with PART."""
+    """(low, high) that hold a chi-square value with this many degrees of freedom, a number or an array, with
+    BAND_PROBABILITY."""
     # A long run has few different numbers, and each is found by iteration.
     different, places = np.unique(freedoms, return_inverse=True)
     places = places.reshape(np.shape(freedoms))
-    return tuple(special.chdtri(different, tail)[places] for tail in (0.5 + 0.5 * PART, 0.5 - 0.5 * PART))
+    return tuple(special.chdtri(different, tail)[places] for tail in (0.5 + 0.5 * BAND_PROBABILITY, 0.5 - 0.5
+                                                                      * BAND_PROBABILITY))
 
 
 def band(freedoms, count):
-    """The two bounds that hold the mean of `count` chi-square values with this many degrees of freedom with PART."""
+    """The two bounds that hold the mean of `count` chi-square values with this many degrees of freedom with
+    BAND_PROBABILITY."""
     return tuple(float(bound / count) for bound in bounds(freedoms * count))
 
 
@@ -168,7 +171,7 @@ class Axis:
     @functools.cached_property
     def nees_band(self):
         """Of the mean of the NEES."""
-        return band(FREEDOMS, self.count) if self._nees.size else (math.nan, math.nan)
+        return band(NEES_FREEDOMS, self.count) if self._nees.size else (math.nan, math.nan)
 
     @property
     def nis_mark(self):
@@ -178,7 +181,7 @@ class Axis:
     @property
     def nees_mark(self):
         """The `mark` of its NEES."""
-        return mark(self.nees, FREEDOMS, self.nees_band)
+        return mark(self.nees, NEES_FREEDOMS, self.nees_band)
 
     @property
     def verdict(self):
@@ -186,8 +189,8 @@ class Axis:
         if not math.isfinite(self.nees):
             return 'nothing was evaluated'
         low, high = self.nees_band
-        times = math.sqrt(self.nees / FREEDOMS)
-        where = f'mean NEES {self.nees:.3g}, {100.0 * PART:g} % of honest filters have {low:.3g} to {high:.3g}'
+        times = math.sqrt(self.nees / NEES_FREEDOMS)
+        where = f'mean NEES {self.nees:.3g}, {100.0 * BAND_PROBABILITY:g} % of honest filters have {low:.3g} to {high:.3g}'
         if self.nees > high:
             return f'too sure of itself: its errors are {times:.2g} times what it states ({where})'
         if self.nees < low:
@@ -196,11 +199,12 @@ class Axis:
 
 
 def mark(mean, expected, band):
-    """'too sure' or 'too careful' where a mean of squared errors is off its expectation by more than NOTABLE and
+    """'too sure' or 'too careful' where a mean of squared errors is off its expectation by more than
+    NOTABLE_DEVIATION and
     outside of its band, else ''."""
-    if mean > max(band[1], (1.0 + NOTABLE) * expected):
+    if mean > max(band[1], (1.0 + NOTABLE_DEVIATION) * expected):
         return 'too sure'
-    return 'too careful' if mean < min(band[0], (1.0 - NOTABLE) * expected) else ''
+    return 'too careful' if mean < min(band[0], (1.0 - NOTABLE_DEVIATION) * expected) else ''
 
 
 def _mean(values):

@@ -18,21 +18,21 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 from pedestal_common.parameters import record
 
-FREQUENCIES = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
-"""Hz; whole periods in PERIOD."""
-PERIOD = 4.0
-DROPPED, KEPT = 1, 2
+SINE_FREQUENCIES_HZ = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
+"""Hz; whole periods in COMMON_PERIOD_S."""
+COMMON_PERIOD_S = 4.0
+SETTLING_PERIODS, MEASURED_PERIODS = 1, 2
 """Periods to settle and to measure."""
-TERMS = 4
-RATE = (0.1, 0.06)
+SERIES_TERMS = 4
+IDENTIFICATION_RATES_RAD_S = (0.1, 0.06)
 """Rates of the axes [rad/s]: above the excitation, and inside the travel for a whole record."""
-PEAK = 0.004
+SINE_PEAK_RAD_S = 0.004
 """Of each sine [rad/s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RateLoop:
-    """One axis: W (n,) complex at w (n,) [rad/s]; f (TERMS,): the series of 1 / W."""
+    """One axis: W (n,) complex at w (n,) [rad/s]; f (SERIES_TERMS,): the series of 1 / W."""
     w: np.ndarray
     W: np.ndarray
     f: np.ndarray
@@ -52,7 +52,7 @@ class RateLoop:
         return np.abs(1.0 - (k_v + 1j * k_a * self.w) * self.W)
 
 
-def series(w, W, terms=TERMS):
+def series(w, W, terms=SERIES_TERMS):
     """f (terms,) of the least-squares fit 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + ..."""
     basis = (1j * w[:, np.newaxis]) ** np.arange(terms)
     wanted = 1.0 / W
@@ -88,38 +88,39 @@ def _drive(state, constants, inputs, outputs, rate, torque, position):
 def identify(scenario, torque=True) -> dict:
     """{axis: RateLoop} of a scenario's drive in still air; torque: with the ACU's torque feed-forward, or without.
 
-    Raises ValueError for a period that does not divide PERIOD, and for travel that is too short.
+    Raises ValueError for a period that does not divide COMMON_PERIOD_S, and for travel that is too short.
     """
     acu, drive = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     axes = [getattr(drive, name) for name in topics.AXES]
-    duration = (DROPPED + KEPT) * PERIOD
+    duration = (SETTLING_PERIODS + MEASURED_PERIODS) * COMMON_PERIOD_S
     start = {f'initial_{name}': 0.5 * (axis.limits.lower + axis.limits.upper - rate * duration)
-             for name, axis, rate in zip(topics.AXES, axes, RATE)}
+             for name, axis, rate in zip(topics.AXES, axes, IDENTIFICATION_RATES_RAD_S)}
     drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True, **start)
-    w = 2.0 * math.pi * FREQUENCIES
-    steps = round(PERIOD / drive.period)
-    if abs(steps * drive.period - PERIOD) > 1e-9:
-        raise ValueError(f'adu.period = {drive.period:g} s: must divide the {PERIOD:g} s it is identified over')
-    for name, axis, rate in zip(topics.AXES, axes, RATE):
+    w = 2.0 * math.pi * SINE_FREQUENCIES_HZ
+    steps = round(COMMON_PERIOD_S / drive.period)
+    if abs(steps * drive.period - COMMON_PERIOD_S) > 1e-9:
+        raise ValueError(f'adu.period = {drive.period:g} s: must divide the {COMMON_PERIOD_S:g} s it is identified over')
+    for name, axis, rate in zip(topics.AXES, axes, IDENTIFICATION_RATES_RAD_S):
         if axis.limits.upper - axis.limits.lower < 1.1 * rate * duration:
             raise ValueError(f'adu.{name}.limits: travel must be at least '
                              f'{1.1 * rate * duration:g} rad to identify the drive')
     # Schroeder's phases keep the peak of the sum low.
     k = np.arange(len(w))
     angle = w * drive.period * np.arange(steps)[:, np.newaxis] - math.pi * k * (k + 1) / len(k)
-    v, a = PEAK * np.cos(angle).sum(axis=1), -PEAK * (w * np.sin(angle)).sum(axis=1)
-    rate, acceleration = np.tile(v, DROPPED + KEPT)[:, np.newaxis] + RATE, np.tile(a, DROPPED + KEPT)
+    v, a = SINE_PEAK_RAD_S * np.cos(angle).sum(axis=1), -SINE_PEAK_RAD_S * (w * np.sin(angle)).sum(axis=1)
+    (rate, acceleration) = (np.tile(v, SETTLING_PERIODS + MEASURED_PERIODS)[:, np.newaxis]
+                            + IDENTIFICATION_RATES_RAD_S, np.tile(a, SETTLING_PERIODS + MEASURED_PERIODS))
     torques = np.zeros_like(rate)
     for i, name in enumerate(topics.AXES if torque else ()):
         known = record(getattr(acu, name).feedforward)[0]
         torques[:, i] = [feedforward.torque(*motion, known) for motion in zip(rate[:, i], acceleration)]
     state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
-    inputs, outputs = np.zeros(1, drive_unit.INPUTS), np.zeros(1, drive_unit.OUTPUTS)
+    inputs, outputs = np.zeros(1, drive_unit.INPUTS_DTYPE), np.zeros(1, drive_unit.OUTPUTS_DTYPE)
     inputs['enable'] = 1
     drive_unit.read(state[0], constants[0], outputs[0])
     position = np.empty_like(rate)
     _drive(state, constants, inputs, outputs, rate, torques, position)
-    kept = slice(DROPPED * steps, None)
+    kept = slice(SETTLING_PERIODS * steps, None)
     loops = {}
     for i, name in enumerate(topics.AXES):
         W = response(rate[kept, i], position[kept, i], drive.period, drive.transport_delay, w)

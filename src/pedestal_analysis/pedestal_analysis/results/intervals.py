@@ -4,12 +4,13 @@ import math
 import numpy as np
 from scipy.special import stdtrit
 
-CONFIDENCE = 0.95
+CONFIDENCE_LEVEL = 0.95
 """Of the interval of a mean."""
 
 
 def interval(values):
-    """(mean, low, high) of the values (n,) of n independent runs: mean and its CONFIDENCE interval by Student's t,
+    """(mean, low, high) of the values (n,) of n independent runs: mean and its CONFIDENCE_LEVEL interval by Student's
+    t,
 
         mean -+ t_(n-1) s / sqrt(n),        s: standard deviation of the values.
 
@@ -19,7 +20,7 @@ def interval(values):
     n, mean = len(values), float(np.mean(values))
     if n < 2:
         return mean, math.nan, math.nan
-    half = float(stdtrit(n - 1, 0.5 * (1.0 + CONFIDENCE)) * np.std(values, ddof=1) / math.sqrt(n))
+    half = float(stdtrit(n - 1, 0.5 * (1.0 + CONFIDENCE_LEVEL)) * np.std(values, ddof=1) / math.sqrt(n))
     return mean, mean - half, mean + half
 
 

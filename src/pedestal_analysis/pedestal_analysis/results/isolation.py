@@ -13,7 +13,8 @@ coherent  the part of the true pointing error that a linear law of the ship's ro
           because there a wrong attitude, a delay or friction acts while the target moves across the deck.
 
 Noise that is independent of the ship fits nine series a little as well, by chance. `floor` is the rms of that fit
-which is expected of noise with the power spectrum of what the regression leaves over, smoothed over SMOOTHED, in
+which is expected of noise with the power spectrum of what the regression leaves over, smoothed over
+SMOOTHING_HALF_WIDTH_HZ, in
 random phases. `limit`, 20 log10(motion / floor), is therefore the isolation that a run of this length and noise can
 show: where the isolation is near the limit (or above, by chance), the ship cannot be told from noise in the error, and
 a run with less noise shows more (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
@@ -25,9 +26,9 @@ import numpy as np
 
 from pedestal_analysis.results import tracking
 
-SMOOTHED = 0.02
+SMOOTHING_HALF_WIDTH_HZ = 0.02
 """Half the width [Hz] over which the power spectrum of the remainder is averaged."""
-LEAST = 20.0
+MIN_TRACKED_TIME_S = 20.0
 """Shortest evaluated time [s] that can tell: a few periods of the ship."""
 
 
@@ -91,7 +92,7 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     # The regression takes the share `weight` of the noise out of each frequency; its neighbours tell what was there.
     weight = np.sum(np.abs(np.fft.fft(basis, axis=0))**2, axis=1) / n
     power = np.sum(np.abs(np.fft.fft(error - basis @ explained, axis=0))**2, axis=1) / n
-    width = 2 * round(SMOOTHED * n * dt) + 1
+    width = 2 * round(SMOOTHING_HALF_WIDTH_HZ * n * dt) + 1
     power, left = (ndimage.uniform_filter1d(x, width, mode='wrap') for x in (power, 1.0 - weight))
     power /= np.maximum(left, 0.1)
     return Isolation(math.sqrt(np.mean(moved**2) / 2.0), math.sqrt(np.sum(explained**2) / (2 * n)),
@@ -99,7 +100,8 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
 
 
 def read(bag, run):
-    """The Isolation of a bag.Bag whose tracking.Tracking is `run`; None ashore or when less than LEAST was tracked."""
+    """The Isolation of a bag.Bag whose tracking.Tracking is `run`; None ashore or when less than MIN_TRACKED_TIME_S
+    was tracked."""
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None
     ship = tracking.on_grid(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),
@@ -112,8 +114,8 @@ def read(bag, run):
     if math.isfinite(run.beamwidth):
         on &= np.hypot(*error.T) <= 0.5 * run.beamwidth
     for begin, end, _ in tracking.keyholes(bag):
-        on &= (run.t < begin) | (run.t > end + tracking.SETTLING)
+        on &= (run.t < begin) | (run.t > end + tracking.HANDOVER_SETTLING_S)
     dt = float(np.median(np.diff(run.t)))
-    if np.sum(on) * dt < LEAST:
+    if np.sum(on) * dt < MIN_TRACKED_TIME_S:
         return None
     return measure(dt, error[on], target[on], ship[on, :4], ship[on, 4:])

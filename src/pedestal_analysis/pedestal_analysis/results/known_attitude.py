@@ -6,7 +6,7 @@ import numpy as np
 
 from pedestal_analysis.results import tracking
 
-TOPIC, STATE = 'ship/imu/data', 'ins/state'
+ATTITUDE_TOPIC, INS_STATE_TOPIC = 'ship/imu/data', 'ins/state'
 
 
 @dataclasses.dataclass
@@ -47,9 +47,9 @@ class KnownAttitude:
 
 def read(bag):
     """The KnownAttitude of a bag.Bag; None ashore."""
-    if any(topic not in bag.topics or not bag.rows(topic).size for topic in ('ship/truth', TOPIC)):
+    if any(topic not in bag.topics or not bag.rows(topic).size for topic in ('ship/truth', ATTITUDE_TOPIC)):
         return None
-    table = bag.table(TOPIC)
+    table = bag.table(ATTITUDE_TOPIC)
     t = table['t']
     quaternion = [f'orientation.{letter}' for letter in 'xyzw']
     true = tracking.on_grid(bag, t, 'ship/truth', quaternion)
@@ -65,8 +65,8 @@ def read(bag):
 
 
 def _aligned(bag, first):
-    if STATE not in bag.topics or not bag.rows(STATE).size:
+    if INS_STATE_TOPIC not in bag.topics or not bag.rows(INS_STATE_TOPIC).size:
         return float(first)
-    states = bag.table(STATE)
+    states = bag.table(INS_STATE_TOPIC)
     times = states['t'][np.array(states['data']) == 'aligned']
     return float(times[0]) if times.size else math.nan

@@ -14,7 +14,7 @@ import typing
 import numpy as np
 
 from pedestal_analysis.results import consistency, isolation, known_attitude, tracking
-from pedestal_analysis.results.tracking import DEGREES, known_rms, largest
+from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 
 
 class Result(typing.NamedTuple):
@@ -87,7 +87,8 @@ RESULTS = (
            'How long the target was further than half a beamwidth off, in any mode, once the run counts as tracking.',
            'time further than half a beamwidth off, once tracking'),
     Result('evaluated_time_s', 's', 'tracking', lambda run: float(np.sum(run.tracking) * run.period),
-           f'How long the run was in autotrack, from {tracking.SETTLING:g} s after its start.', 'time evaluated'),
+           f'How long the run was in autotrack, from {tracking.HANDOVER_SETTLING_S:g} s after its start.',
+           'time evaluated'),
     Result('azimuth_nis_mean', '-', 'filter', lambda known: known.axes[0].nis,
            "Mean squared innovation of azimuth in units of the filter's variance; 1 for each number measured.",
            mark=lambda known: known.axes[0].nis_mark),
@@ -102,10 +103,10 @@ RESULTS = (
            mark=lambda known: known.axes[1].nees_mark),
     Result('keyhole_loss_predicted_s', 's', 'keyholes', lambda slews: sum(loss for _, _, loss in slews),
            'How long the ACU announced that it would lose the target in keyholes.'),
-    Result('ship_line_of_sight_rms_deg', 'deg', 'isolation', lambda ship: ship.motion * DEGREES,
+    Result('ship_line_of_sight_rms_deg', 'deg', 'isolation', lambda ship: ship.motion * DEG_PER_RAD,
            "How far the ship's rotation moved the line of sight on the deck, rms per axis.",
            "line of sight moved by the ship's rotation, rms per axis"),
-    Result('ship_coherent_error_rms_deg', 'deg', 'isolation', lambda ship: ship.coherent * DEGREES,
+    Result('ship_coherent_error_rms_deg', 'deg', 'isolation', lambda ship: ship.coherent * DEG_PER_RAD,
            "Part of the pointing error that a linear law of the ship's rotation explains, rms per axis.",
            'pointing error that follows it, rms per axis'),
     Result('isolation_db', 'dB', 'isolation', lambda ship: ship.isolation,
@@ -114,14 +115,14 @@ RESULTS = (
            'Isolation that a run of this length and noise can show at all.', 'isolation that noise alone would show'),
     Result('aligned_s', 's', 'attitude', lambda ins: ins.aligned,
            'When the INS reported that it was aligned.', 'INS aligned at'),
-    Result('heading_at_alignment_deg', 'deg', 'attitude', lambda ins: ins.at_alignment[0] * DEGREES,
+    Result('heading_at_alignment_deg', 'deg', 'attitude', lambda ins: ins.at_alignment[0] * DEG_PER_RAD,
            'Heading error of the INS when it was aligned, clockwise.', 'heading error then'),
-    Result('heading_sigma_at_alignment_deg', 'deg', 'attitude', lambda ins: ins.at_alignment[1] * DEGREES,
+    Result('heading_sigma_at_alignment_deg', 'deg', 'attitude', lambda ins: ins.at_alignment[1] * DEG_PER_RAD,
            'Standard deviation that the INS stated for its heading when it was aligned.',
            '1 sigma of heading then, as the INS says'),
-    Result('heading_error_rms_deg', 'deg', 'attitude', lambda ins: known_rms(ins.heading[ins.after]) * DEGREES,
+    Result('heading_error_rms_deg', 'deg', 'attitude', lambda ins: known_rms(ins.heading[ins.after]) * DEG_PER_RAD,
            'Rms of the heading error of the INS since it was aligned.', 'heading error from then on, rms'),
-    Result('level_error_rms_deg', 'deg', 'attitude', lambda ins: known_rms(ins.error[ins.after, :2]) * DEGREES,
+    Result('level_error_rms_deg', 'deg', 'attitude', lambda ins: known_rms(ins.error[ins.after, :2]) * DEG_PER_RAD,
            'Rms of the level error of the INS since it was aligned, per axis.',
            'level error from then on, rms per axis'),
     Result('lost_steps', 'steps', 'run', lambda run: float(run.drive.get('lost_steps', math.nan)),
@@ -133,7 +134,7 @@ RESULTS = (
            'How often `pedestal run` started a node again that had died, in realtime.'),
 )
 
-BY_NAME = {result.name: result for result in RESULTS}
+RESULT_BY_NAME = {result.name: result for result in RESULTS}
 
 
 def of_tracking(run):
@@ -171,7 +172,7 @@ def row(case, metric, value, unit='', target=None):
 
 def rows(case, values):
     """The rows of a --json file of what `measured` gave."""
-    return [row(case, name, value, unit, BY_NAME[name].target) for name, (value, unit) in values.items()]
+    return [row(case, name, value, unit, RESULT_BY_NAME[name].target) for name, (value, unit) in values.items()]
 
 
 def documented(table=RESULTS):

@@ -12,11 +12,11 @@ from pedestal_common.parameters import build
 from tracking_receiver_sim.path import arrival
 from tracking_receiver_sim.path.params import PathParameters
 
-SETTLING = 2.0
+HANDOVER_SETTLING_S = 2.0
 """Seconds after the first hand-over to autotrack that are left out of every statistic."""
-DEGREES = math.degrees(1.0)
-BY_ENCODERS = ('there is no adu/truth in it, so the beam is taken to be where joint_states say: what moves the dish '
-               'off its encoders does not show')
+DEG_PER_RAD = math.degrees(1.0)
+ENCODER_BEAM_NOTE = ('there is no adu/truth in it, so the beam is taken to be where joint_states say: what moves the dish '
+                     'off its encoders does not show')
 """What is said of the numbers of a recording from before the drive told where its dish truly points."""
 
 
@@ -34,7 +34,7 @@ def _true_error(direction, relative, attitude, error):
 
 
 @compiled
-def _seen(beam, attitude, known_attitude, estimate, filtered, beam_earth):
+def _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_earth):
     """Fill, per row: the filtered error (cross-elevation, elevation) seen from the beam, the beam's earth angles.
 
     attitude is the true one, known_attitude the INS's, in whose earth angles the estimate is given.
@@ -54,18 +54,18 @@ def _seen(beam, attitude, known_attitude, estimate, filtered, beam_earth):
 
 
 @compiled
-def _began(beam, error, out):
+def _interval_start_error(beam, error, out):
     for k in range(1, len(beam)):
         azimuth, elevation = line_of_sight.displaced(beam[k - 1, 0], beam[k - 1, 1], error[k - 1, 0], error[k - 1, 1])
         x, y, z = line_of_sight.direction(azimuth, elevation)
         out[k, 0], out[k, 1] = line_of_sight.offsets(beam[k, 0], beam[k, 1], x, y, z)
 
 
-def began(beam, error):
+def interval_start_error(beam, error):
     """Pointing error (n, 2) at the beginning of the intervals in which a beam (n, 2) [rad] that jumps at the steps
     stood, from the one (n, 2) at their ends, the stamps: beam k against the target of k - 1; NaN in the first."""
     out = np.full(beam.shape, np.nan)
-    _began(np.ascontiguousarray(beam), np.ascontiguousarray(error), out)
+    _interval_start_error(np.ascontiguousarray(beam), np.ascontiguousarray(error), out)
     return out
 
 
@@ -115,7 +115,7 @@ class Tracking:
     @property
     def following(self):
         """Reference less encoder (n, 2) [deg]."""
-        return (self.reference - np.column_stack((self.azimuth, self.elevation))) * DEGREES
+        return (self.reference - np.column_stack((self.azimuth, self.elevation))) * DEG_PER_RAD
 
     @functools.cached_property
     def true(self):
@@ -130,25 +130,25 @@ class Tracking:
     @functools.cached_property
     def by_encoders(self):
         """Error by the encoders (k, 2) [deg] over the evaluated part."""
-        return self.encoder_error[self.tracking] * DEGREES
+        return self.encoder_error[self.tracking] * DEG_PER_RAD
 
     @functools.cached_property
     def noise(self):
         """Measured less true error (k, 2) [deg] over the evaluated part; of an electronic beam less the true error in
         the middle of the interval, which the receiver measures."""
         true = 0.5 * (self.true + self.begun[self.tracking]) if self.electronic else self.true
-        return (self.measured[self.tracking] - true) * DEGREES
+        return (self.measured[self.tracking] - true) * DEG_PER_RAD
 
     @functools.cached_property
     def filter_error(self):
         """Filtered less true error (k, 2) [deg] over the evaluated part."""
-        return (self.filtered[self.tracking] - self.true) * DEGREES
+        return (self.filtered[self.tracking] - self.true) * DEG_PER_RAD
 
     def pointing(self, measure, axis=slice(None)):
         """measure(true error) [deg] over the evaluated part; of an electronic beam at the end or at the beginning of
         its intervals, whichever is larger."""
         errors = (self.true, self.begun[self.tracking]) if self.electronic else (self.true,)
-        return max(measure(error[:, axis]) for error in errors) * DEGREES
+        return max(measure(error[:, axis]) for error in errors) * DEG_PER_RAD
 
     @property
     def lock_time(self):
@@ -209,7 +209,7 @@ def _arriving(bag, relative, velocity):
 
 
 def by_encoders(bag):
-    """Whether the beam of a bag is taken to be where its encoders say (BY_ENCODERS); an array's steering is the
+    """Whether the beam of a bag is taken to be where its encoders say (ENCODER_BEAM_NOTE); an array's steering is the
     truth."""
     return not bag.beams and 'adu/truth' not in bag.topics
 
@@ -233,7 +233,7 @@ def read(bag) -> Tracking:
         ship = ship + _lever_arm(bag, attitude)
     else:
         ship = np.zeros((t.size, 3))
-        attitude = known_attitude = np.tile(line_of_sight.ASHORE, (t.size, 1))
+        attitude = known_attitude = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1))
     measured = at_steps('tracking_receiver/angle_error', ('x', 'y', 'z'))
     estimate = at_steps('acu/estimate', ('azimuth.position', 'elevation.position'))
     error, encoder_error, filtered, beam_earth = np.full((4, t.size, 2), np.nan)
@@ -242,18 +242,18 @@ def read(bag) -> Tracking:
     _true_error(beam, relative, attitude, error)
     if beam is not encoders and not bag.beams:
         _true_error(encoders, relative, attitude, encoder_error)
-    _seen(beam, attitude, known_attitude, estimate, filtered, beam_earth)
+    _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_earth)
     target_earth = np.column_stack((np.arctan2(relative[:, 0], relative[:, 1]),
                                     np.arctan2(relative[:, 2], np.hypot(relative[:, 0], relative[:, 1]))))
     mode = modes(bag, t)
     automatic = mode == 'autotrack'
-    start = t[automatic][0] + SETTLING if automatic.any() else math.inf
+    start = t[automatic][0] + HANDOVER_SETTLING_S if automatic.any() else math.inf
     reference = at_steps('acu/reference', ('azimuth.position', 'elevation.position'))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t, *encoders.T, reference, *error.T, encoder_error, measured[:, :2], measured[:, 2],
                     filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
                     automatic & (t >= start), t >= start, beamwidth(bag),
-                    began(beam, error) if bag.beams else np.full_like(error, np.nan))
+                    interval_start_error(beam, error) if bag.beams else np.full_like(error, np.nan))
 
 
 def modes(bag, t):

@@ -24,7 +24,7 @@ class Kind(typing.NamedTuple):
     extremes: typing.Callable
 
 
-KINDS = {
+DISTRIBUTION_KINDS = {
     'uniform': Kind('uniform(low, high)', 2, lambda u, ends: ends[0] + u * (ends[1] - ends[0]), lambda ends: ends),
     'normal': Kind('normal(mean, sigma)', 2, lambda u, moments: moments[0] + special.ndtri(u) * moments[1],
                    lambda moments: None),
@@ -41,7 +41,8 @@ class VaryError(ValueError):
 
 
 class Distribution(typing.NamedTuple):
-    """text: as it was written; kind: of KINDS; arguments: numbers, of a choice any values; factor: whether it is a
+    """text: as it was written; kind: of DISTRIBUTION_KINDS; arguments: numbers, of a choice any values; factor:
+    whether it is a
     factor of what the scenario says."""
     text: str
     kind: str
@@ -54,30 +55,30 @@ class Distribution(typing.NamedTuple):
         if whole and self.kind == 'uniform':
             low, high = self.arguments
             return np.floor(low + u * (high - low + 1.0))
-        return KINDS[self.kind].quantile(u, self.arguments)
+        return DISTRIBUTION_KINDS[self.kind].quantile(u, self.arguments)
 
     @property
     def extremes(self):
         """The values that decide whether it stays in a range; None where it has no ends."""
-        return KINDS[self.kind].extremes(self.arguments)
+        return DISTRIBUTION_KINDS[self.kind].extremes(self.arguments)
 
 
 def parse(text) -> Distribution:
     """The Distribution that a text such as 'normal(1, 0.1)x' says. Raises VaryError."""
     match = _WRITTEN.fullmatch(text.strip())
-    usage = ', '.join(kind.usage for kind in KINDS.values())
+    usage = ', '.join(kind.usage for kind in DISTRIBUTION_KINDS.values())
     if not match:
         raise VaryError(f'{text!r}: must be one of {usage}, for a factor with an x behind it')
     name, inside, factor = match[1], match[2], bool(match[3])
-    if name not in KINDS:
-        raise VaryError(f'{text!r}:{did_you_mean(name, KINDS)} there are {usage}')
+    if name not in DISTRIBUTION_KINDS:
+        raise VaryError(f'{text!r}:{did_you_mean(name, DISTRIBUTION_KINDS)} there are {usage}')
     try:
         arguments = tuple(plain_yaml.parse(part) for part in inside.split(','))
     except yaml.YAMLError as error:
         raise VaryError(f'{text!r}: {plain_yaml.problem(error)}') from None
-    expected = KINDS[name].arguments
+    expected = DISTRIBUTION_KINDS[name].arguments
     if None in arguments or expected not in (None, len(arguments)):
-        raise VaryError(f'{text!r}: must be {KINDS[name].usage}')
+        raise VaryError(f'{text!r}: must be {DISTRIBUTION_KINDS[name].usage}')
     if name != 'choice' or factor:
         arguments = tuple(_number(text, value) for value in arguments)
     if name == 'uniform' and not arguments[0] < arguments[1]:

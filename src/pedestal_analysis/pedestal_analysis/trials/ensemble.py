@@ -11,18 +11,18 @@ import numpy as np
 from pedestal_analysis.results import results
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.table import Table
-from pedestal_bringup.loop import closed_loop, recorded, side_by_side
+from pedestal_bringup.loop import closed_loop, memory_recording, side_by_side
 from pedestal_common.wire import records
 
-BATCH = 4
+MIN_BATCH_TRIALS = 4
 """Trials that one worker makes at a time, unless they run side by side: so many at most are lost for each worker when
 it is killed."""
 
-MEASURED = tuple(result.name for result in results.RESULTS if result.part not in ('run', 'supervised'))
+TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part not in ('run', 'supervised'))
 """Results of a trial: those of `pedestal run` but for what it says of the processes."""
 
-TOPICS = ('joint_states', 'adu/truth', 'tracking_receiver/angle_error', 'target/truth', 'acu/rate_command',
-          'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode')
+MEASURED_TOPICS = ('joint_states', 'adu/truth', 'tracking_receiver/angle_error', 'target/truth', 'acu/rate_command',
+                   'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode')
 """What they are measured on ashore; the stamps of acu/mode are those of acu/rate_command."""
 
 
@@ -33,7 +33,7 @@ class TrialError(ValueError):
 def table(plan, folder, name='trials') -> Table:
     """The table.Table of the trials of a plan.Plan in a folder."""
     prefixes = plan.scenario(0).prefixes
-    heads = [f'{prefix}{result}' for prefix in prefixes for result in MEASURED]
+    heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]
     return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads)
 
 
@@ -49,11 +49,12 @@ def _trial(plan, i):
 @functools.lru_cache(maxsize=1)
 def _memory(trials, steps):
     """What trials side by side keep, batch after batch: new memory costs up to a tenth of their time."""
-    return np.empty((trials, steps), records.of(*TOPICS))
+    return np.empty((trials, steps), records.of(*MEASURED_TOPICS))
 
 
 def _batch(plan):
-    """The results of every trial of a short Plan, each in the order of MEASURED for each beam, None for what it does
+    """The results of every trial of a short Plan, each in the order of TRIAL_RESULTS for each beam, None for what it
+    does
     not have; what workers do."""
     scenarios, found = [], [[] for _ in range(plan.runs)]
     for i in range(plan.runs):
@@ -64,18 +65,18 @@ def _batch(plan):
         for i, chosen in enumerate(scenarios):
             with _trial(plan, i):
                 loops.append(closed_loop.Loop(chosen, beam))
-        runs = (iter(side_by_side.runs(loops, TOPICS, _memory(len(loops), loops[0].steps)))
-                if side_by_side.fit(loops) else (loop.run() for loop in loops))
+        runs = (iter(side_by_side.runs(loops, MEASURED_TOPICS, _memory(len(loops), loops[0].steps)))
+                if side_by_side.can_run_parallel(loops) else (loop.run() for loop in loops))
         for i, chosen in enumerate(scenarios):
             with _trial(plan, i):
-                values = results.measured(results.of_bag(recorded.Recorded(chosen, next(runs))))
-                found[i] += [values.get(name, (None,))[0] for name in MEASURED]
+                values = results.measured(results.of_bag(memory_recording.MemoryRecording(chosen, next(runs))))
+                found[i] += [values.get(name, (None,))[0] for name in TRIAL_RESULTS]
     return found
 
 
-def _together(plan):
+def _batch_size(plan):
     """How many trials of a plan a worker makes at a time."""
-    return max(BATCH, side_by_side.room(plan.scenario(0), TOPICS))
+    return max(MIN_BATCH_TRIALS, side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS))
 
 
 def make(plans, tables, pool, progress=lambda done, total: None):
@@ -83,7 +84,7 @@ def make(plans, tables, pool, progress=lambda done, total: None):
 
     pool: monte_carlo.Pool. progress(trials done, trials in all) is called as they come. Raises TrialError.
     """
-    pieces, size = [], min(map(_together, plans))
+    pieces, size = [], min(map(_batch_size, plans))
     for first in range(0, max(plan.runs for plan in plans), size):
         for plan, rows in zip(plans, tables):
             numbers = range(max(first, len(rows.rows)), min(first + size, plan.runs))

@@ -16,9 +16,9 @@ import joblib
 import numpy as np
 from joblib.externals import loky
 
-from pedestal_common.law_cache import COLUMNS, ROOF, digest
+from pedestal_common.law_cache import COLUMN_PACKAGES, UPPER_PACKAGES, digest
 
-TIMEOUT = 10.0
+SCHEDULER_TIMEOUT_S = 10.0
 """Longest time to wait for a scheduler, or for its first worker [s]."""
 
 
@@ -66,7 +66,7 @@ class Pool:
         items = list(items)
         options = {'n_jobs': -1} if self.scheduler else {'n_jobs': min(self.workers, len(items) or 1),
                                                          'backend': 'loky'}
-        with _ctrl_c_held_back() if options['n_jobs'] > 1 else contextlib.nullcontext():
+        with _deferred_interrupt() if options['n_jobs'] > 1 else contextlib.nullcontext():
             results = joblib.Parallel(return_as='generator', **options)(map(joblib.delayed(function), items))
             self._stack.callback(results.close)
         for done, result in enumerate(results, 1):
@@ -82,7 +82,7 @@ class Pool:
 
 
 @contextlib.contextmanager
-def _ctrl_c_held_back():
+def _deferred_interrupt():
     """Keep Ctrl-C, which reaches every process of a terminal, from workers started now; this process ends them.
 
     The resource trackers that start with the first worker unblock the signal, so they are started before. Here it must
@@ -127,15 +127,15 @@ def _client(address):
     for name in ('distributed', 'tornado'):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what went wrong is raised as well
     try:
-        client = distributed.Client(address, timeout=TIMEOUT, set_as_default=False)
+        client = distributed.Client(address, timeout=SCHEDULER_TIMEOUT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise RuntimeError(f'--scheduler {address}: nobody answers as a Dask scheduler: {error}') from None
     try:
-        client.wait_for_workers(1, timeout=TIMEOUT)
+        client.wait_for_workers(1, timeout=SCHEDULER_TIMEOUT_S)
         others = [worker for worker, theirs in client.run(sources).items() if theirs != sources()]
         problem = others and f'other versions of the pedestal packages or of numba on {", ".join(others)}'
     except TimeoutError:
-        problem = f'no worker came within {TIMEOUT:g} s'
+        problem = f'no worker came within {SCHEDULER_TIMEOUT_S:g} s'
     except Exception as error:  # Dask raises here what a worker could not import
         problem = f'a worker cannot work: {error}'
     if problem:
@@ -146,4 +146,4 @@ def _client(address):
 
 def sources():
     """Digest of all that determines the numbers: the packages' sources and the version of numba."""
-    return digest(('pedestal_common', *COLUMNS, *ROOF))
+    return digest(('pedestal_common', *COLUMN_PACKAGES, *UPPER_PACKAGES))

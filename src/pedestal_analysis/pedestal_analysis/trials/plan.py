@@ -19,7 +19,7 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.text_files import csv_table, plain_yaml
 
-OF_THE_PLAN = ('seed', 'duration', 'pacing', 'beam', 'beams')
+PLAN_HEADER_KEYS = ('seed', 'duration', 'pacing', 'beam', 'beams')
 """Keys of the header that all trials share, or have from their number."""
 
 
@@ -147,7 +147,7 @@ def _field(nominal, column):
     """The dataclass field of a parameter node.key that trials can vary. Raises VaryError, ScenarioError."""
     node, _, key = column.partition('.')
     scenario.parameters_of(node)
-    if node == 'scenario' and key in OF_THE_PLAN:
+    if node == 'scenario' and key in PLAN_HEADER_KEYS:
         raise VaryError(f'--vary {column}: is the same for every trial, or follows from its number')
     there = dict.fromkeys((*map(nodes.plain, nominal.nodes), *nominal.nodes, 'scenario'))
     there.pop('operator', None)  # it has no parameters but those of the header
@@ -164,7 +164,7 @@ def _parameters(nominal, node):
     return nominal.header if node == 'scenario' else nominal.node_parameters(node)
 
 
-def _said(nominal, column):
+def _nominal_value(nominal, column):
     """What the scenario says of node.key."""
     node, _, key = column.partition('.')
     return parameters.as_dict(_parameters(nominal, node))[key]
@@ -174,7 +174,7 @@ def _values(nominal, column, distribution, u):
     """The values of a drawn parameter in the trials, at u (runs,)."""
     whole = _field(nominal, column).type is int
     if distribution.factor:
-        said = _said(nominal, column)
+        said = _nominal_value(nominal, column)
         if isinstance(said, bool | str) or said == 0:
             raise VaryError(f'--vary {column}={distribution.text}: a factor of {said!r} varies nothing')
         values = said * distribution.draw(u)
@@ -194,7 +194,8 @@ def _check(nominal, made, column, distribution):
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
     extremes = [min(values), max(values)] if numbers else list(dict.fromkeys(values))
     if distribution and distribution.extremes:
-        scaled = np.array(distribution.extremes, object) * (_said(nominal, column) if distribution.factor else 1)
+        scaled = (np.array(distribution.extremes, object) * (_nominal_value(nominal, column) if distribution.factor
+                                                             else 1))
         extremes += _rounded(scaled.tolist(), _field(nominal, column).type is int)
     for value in extremes:
         try:

@@ -19,7 +19,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
 
 PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
-Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE))
+Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL))
 
 
 class Question(typing.NamedTuple):
@@ -30,7 +30,7 @@ class Question(typing.NamedTuple):
     sentence: str
 
 
-QUESTIONS = (
+TRIAL_QUESTIONS = (
     Question('locked', 'lock_time_s', np.isfinite, 'The receiver locked.'),
     Question('tracked', 'evaluated_time_s', lambda time: time > 0.0, 'The run reached settled autotrack.'),
     Question('never_lost', 'loss_s', lambda loss: loss == 0.0,
@@ -45,13 +45,13 @@ QUESTIONS = (
 
 def percentile(values, share):
     """(value, low, high) of a percentile, 0 to 100, of values (n,); NaN where n is too small for a bound."""
-    interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE)
+    interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE_LEVEL)
     return np.percentile(values, share), interval.low, interval.high
 
 
 def rate(count, n):
     """(share, low, high) [%] of `count` times yes out of n."""
-    interval = stats.binomtest(count, n).proportion_ci(intervals.CONFIDENCE, method='exact')
+    interval = stats.binomtest(count, n).proportion_ci(intervals.CONFIDENCE_LEVEL, method='exact')
     return 100.0 * count / n, 100.0 * interval.low, 100.0 * interval.high
 
 
@@ -70,7 +70,7 @@ def rank_correlation(x, y):
 
 def unit(name):
     """The unit of a column of a table, such as beam_2/loss_s."""
-    return results.BY_NAME[nodes.plain(name)].unit
+    return results.RESULT_BY_NAME[nodes.plain(name)].unit
 
 
 def case_of(case, name):
@@ -97,11 +97,11 @@ def of_results(case, table):
 
 
 def of_questions(case, table):
-    """The rows of the rates of QUESTIONS over a table.Table."""
+    """The rows of the rates of TRIAL_QUESTIONS over a table.Table."""
     found = []
     for name in table.there:
         own, metric = case_of(case, name)
-        for question in QUESTIONS:
+        for question in TRIAL_QUESTIONS:
             if question.result == metric:
                 yes = question.holds(table.column(name))
                 found.append(intervals.estimated(own, f'{question.name}/rate', rate(int(np.sum(yes)), len(yes)), '%',
@@ -128,7 +128,7 @@ def of_sensitivity(case, table):
 
 def larger_is_better(name):
     """Whether more of a result is better, by its target."""
-    return (results.BY_NAME[nodes.plain(name)].target or '').startswith('>')
+    return (results.RESULT_BY_NAME[nodes.plain(name)].target or '').startswith('>')
 
 
 def ranking(name, values):

@@ -13,7 +13,7 @@ import pathlib
 
 import numpy as np
 
-COLUMNS = ('trial', 'seed')
+LEADING_COLUMNS = ('trial', 'seed')
 """Before the varied parameters and the results."""
 
 
@@ -38,7 +38,7 @@ class Table:
     @property
     def head(self):
         """The heads of all columns."""
-        return [*COLUMNS, *self.varied, *self.results]
+        return [*LEADING_COLUMNS, *self.varied, *self.results]
 
     def __enter__(self):
         self.file.parent.mkdir(parents=True, exist_ok=True)
@@ -111,7 +111,7 @@ class Table:
     @property
     def there(self):
         """The results that any trial has."""
-        first = len(COLUMNS) + len(self.varied)
+        first = len(LEADING_COLUMNS) + len(self.varied)
         return [name for i, name in enumerate(self.results, first) if any(row[i] for row in self.rows)]
 
 

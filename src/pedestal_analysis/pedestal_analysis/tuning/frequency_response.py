@@ -19,11 +19,11 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
 
-MOTORS = ('motor_1', 'motor_2')
-START = (-2.0, 0.15)
+MOTOR_FIELDS = ('motor_1', 'motor_2')
+SWEEP_START_ANGLES_RAD = (-2.0, 0.15)
 """Where the axes start [rad]."""
 
-RATE = (0.1, 0.03)
+SWEEP_RATES_RAD_S = (0.1, 0.03)
 """Rates of the axes [rad/s]: far above the excitation and the Stribeck rate, inside the travel for a whole record."""
 
 
@@ -58,13 +58,13 @@ class Sweep:
         return np.tile(self.peak / np.abs(one).max() * one, self.dropped + self.kept)
 
 
-CURRENT = Sweep(0.1, 10.0, 4000.0, 60, 5, 5, 1.5)
+CURRENT_SWEEP = Sweep(0.1, 10.0, 4000.0, 60, 5, 5, 1.5)
 """Peak in A."""
 
-SPEED = Sweep(1.0, 1.0, 900.0, 120, 2, 4, 0.015)
+SPEED_SWEEP = Sweep(1.0, 1.0, 900.0, 120, 2, 4, 0.015)
 """Peak in rad/s of the load: 6 Nm of a motor, less than the bias."""
 
-POSITION = Sweep(8.0, 0.25, 95.0, 300, 2, 3, 0.012)
+POSITION_SWEEP = Sweep(8.0, 0.25, 95.0, 300, 2, 3, 0.012)
 """Peak in rad/s: half of what would open the teeth at the paper's 5 Nm of bias. Up to nearly half of 1 / 5 ms."""
 
 
@@ -100,7 +100,7 @@ def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
         axis.speed_control(s, c, rate[n], 0.0, 1, True, True)
         speed[n] = c.per_2N * (m1.measured + m2.measured)
         i_1, i_2 = m1.i_ref, m2.i_ref
-        for k in range(n * axis.CURRENT_TICKS, (n + 1) * axis.CURRENT_TICKS):
+        for k in range(n * axis.CURRENT_LOOP_STEP_COUNT, (n + 1) * axis.CURRENT_LOOP_STEP_COUNT):
             m1.i_ref, m2.i_ref = i_1 + current[k], i_2 + current[k]
             wanted[k, 0], wanted[k, 1], made[k, 0], made[k, 1] = m1.i_ref, m2.i_ref, m1.i_q, m2.i_q
             axis.current_control(m1, k1)
@@ -112,45 +112,49 @@ def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
 def _run_inner(drive, index, rate, current):
     """(speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of axis `index` of a drive (AduParameters), with signals added to
     its rate command (n,) [rad/s] and current references (5 n,) [A]."""
-    drive = dataclasses.replace(drive, initial_azimuth=START[0], initial_elevation=START[1])
+    drive = dataclasses.replace(drive, initial_azimuth=SWEEP_START_ANGLES_RAD[0],
+                                initial_elevation=SWEEP_START_ANGLES_RAD[1])
     speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
     [s], [c] = drive_unit.initial_state(drive), drive_unit.constants(drive)
-    _inner_loops(s[AXES[index]], c[AXES[index]], c['substeps'], RATE[index] + rate, current, speed, wanted, made)
+    _inner_loops(s[AXES[index]], c[AXES[index]], c['substeps'], SWEEP_RATES_RAD_S[index] + rate, current, speed,
+                 wanted, made)
     return speed, wanted, made
 
 
-def current(drive, sweep=CURRENT):
+def current(drive, sweep=CURRENT_SWEEP):
     """Responses of the current loops of the azimuth's motors: {name: Response}."""
-    added = sweep.signal(axis.CURRENT_PERIOD)
-    _, wanted, made = _run_inner(drive, 0, np.zeros(len(added) // axis.CURRENT_TICKS), added)
+    added = sweep.signal(axis.CURRENT_LOOP_PERIOD_S)
+    _, wanted, made = _run_inner(drive, 0, np.zeros(len(added) // axis.CURRENT_LOOP_STEP_COUNT), added)
     return {f'current/{motor}': response(sweep, wanted[:, j] - made[:, j], made[:, j])
-            for j, motor in enumerate(MOTORS)}
+            for j, motor in enumerate(MOTOR_FIELDS)}
 
 
-def speed(drive, sweep=SPEED):
+def speed(drive, sweep=SPEED_SWEEP):
     """Responses of the speed loops of both axes: {name: Response}."""
-    added, responses = sweep.signal(axis.SPEED_PERIOD), {}
+    added, responses = sweep.signal(axis.SPEED_LOOP_PERIOD_S), {}
     for i, name in enumerate(AXES):
-        measured, _, _ = _run_inner(drive, i, added, np.zeros(len(added) * axis.CURRENT_TICKS))
-        responses[f'speed/{name}'] = response(sweep, RATE[i] + added - measured, measured)
+        measured, _, _ = _run_inner(drive, i, added, np.zeros(len(added) * axis.CURRENT_LOOP_STEP_COUNT))
+        responses[f'speed/{name}'] = response(sweep, SWEEP_RATES_RAD_S[i] + added - measured, measured)
     return responses
 
 
-MOVING = {
+MOVING_CASE_PARAMETERS = {
     'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0, 'scenario.program.interval': 1.0,
-    'adu.initial_azimuth': START[0], 'adu.initial_elevation': START[1],
+    'adu.initial_azimuth': SWEEP_START_ANGLES_RAD[0], 'adu.initial_elevation': SWEEP_START_ANGLES_RAD[1],
     'tracking_receiver.target.kind': 'ramp',
-    'tracking_receiver.target.angle.azimuth': START[0], 'tracking_receiver.target.angle.elevation': START[1],
-    'tracking_receiver.target.angle.azimuth_rate': RATE[0], 'tracking_receiver.target.angle.elevation_rate': RATE[1]}
+    'tracking_receiver.target.angle.azimuth': SWEEP_START_ANGLES_RAD[0],
+    'tracking_receiver.target.angle.elevation': SWEEP_START_ANGLES_RAD[1],
+    'tracking_receiver.target.angle.azimuth_rate': SWEEP_RATES_RAD_S[0],
+    'tracking_receiver.target.angle.elevation_rate': SWEEP_RATES_RAD_S[1]}
 """Both axes follow a program track of constant rates."""
 
 
 def case(name, scenario, parameters):
     """The Case of a position loop: a scenario with parameters changed, moving at constant rates."""
-    return Case(name, scenario, {**MOVING, **parameters})
+    return Case(name, scenario, {**MOVING_CASE_PARAMETERS, **parameters})
 
 
-def position(case, axes=AXES, sweep=POSITION):
+def position(case, axes=AXES, sweep=POSITION_SWEEP):
     """Responses of the position loops of a case: {name: Response}."""
     loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
     loop = closed_loop.Loop(loaded)

@@ -19,21 +19,21 @@ import pathlib
 
 import numpy as np
 
-from adu_drive.params import SPEED_PERIOD
+from adu_drive.params import SPEED_LOOP_PERIOD_S
 from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_bringup.scenario import parameter_file, scenario
 from pedestal_common.graph.topics import AXES
 from pedestal_recording import configuration
 
-SPEED, RATIO = 28.0, 8.0
+DEFAULT_SPEED_CROSSOVER_HZ, CROSSOVER_RATIO = 28.0, 8.0
 """Where nothing is asked: crossover of the speed loop [Hz]; that over the one of the position loop."""
 
-SLOWER, TRIES = 0.85, 12
+SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
 """A loop short of its margins becomes slower by this factor, at most so often."""
 
-STILL = {'scenario.ship': False, 'scenario.program.source': 'target', 'acu.initial_mode': 'program',
-         'adu.initially_enabled': True, 'adu.wind.azimuth': 0.0, 'adu.wind.elevation': 0.0,
-         'adu.wind.gust.kind': 'none'}
+STILL_AIR_PARAMETERS = {'scenario.ship': False, 'scenario.program.source': 'target', 'acu.initial_mode': 'program',
+                        'adu.initially_enabled': True, 'adu.wind.azimuth': 0.0, 'adu.wind.elevation': 0.0,
+                        'adu.wind.gust.kind': 'none'}
 """A plant is measured ashore in still air."""
 
 
@@ -42,7 +42,7 @@ class LoopError(ValueError):
 
 
 @dataclasses.dataclass(frozen=True)
-class Asked:
+class LoopRequirements:
     """What the loops are to reach: crossovers of speed and position loop [Hz], None for what follows from the other;
     margins [deg], [dB]."""
     speed: float | None = None
@@ -120,7 +120,7 @@ def _rounded(gains):
     return {key: value if isinstance(value, str) else float(f'{value:.4g}') for key, value in gains.items()}
 
 
-def holds(margins, asked):
+def meets_margins(margins, asked):
     """Whether margins, as frequency.margins gives them, are those that are asked. A gain margin beyond the band
     counts as held; a loop that is never above 1 has none."""
     phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
@@ -148,7 +148,7 @@ class Loops:
 
     def _case(self):
         said = dict(text.split('=', 1) for text in self.overrides)
-        return frequency.case(self.name, self.source, {**said, **self.gains, **STILL})
+        return frequency.case(self.name, self.source, {**said, **self.gains, **STILL_AIR_PARAMETERS})
 
     def _sweep(self, axis, sweep, period):
         """A sweep whose torque stays below half of the bias, so that the teeth stay closed, and whose highest
@@ -168,8 +168,9 @@ class Loops:
             found = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
             return min(found.values(), key=lambda response: frequency.margins(response)['phase_margin_deg'][0])
         if loop == 'speed':
-            return frequency.speed(drive, self._sweep(axis, frequency.SPEED, SPEED_PERIOD))[f'speed/{name}']
-        sweep = self._sweep(axis, frequency.POSITION, drive.period)
+            return frequency.speed(drive, self._sweep(axis, frequency.SPEED_SWEEP,
+                                                      SPEED_LOOP_PERIOD_S))[f'speed/{name}']
+        sweep = self._sweep(axis, frequency.POSITION_SWEEP, drive.period)
         found = frequency.position(self._case(), (name,), sweep)[f'position/{name}/{self.name}']
         # A drive that has tripped sends nothing.
         return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
@@ -182,10 +183,10 @@ class Loops:
     def close(self, loop, name, asked, set_to, fastest):
         """(w, margins) of the first loop, from crossover `fastest` [rad/s] down, that holds what is asked; set_to(w)
         takes the gains for w. Raises LoopError where none does."""
-        for w in fastest * SLOWER**np.arange(TRIES):
+        for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
             margins = self.measured(loop, name)
-            if margins and holds(margins, asked):
+            if margins and meets_margins(margins, asked):
                 return w, margins
         found = 'the drive trips'
         if margins:
@@ -198,12 +199,13 @@ class Loops:
 def design(loops, axes, asked, progress):
     """Design the loops of some axes and return the table's rows [(loop, axis, asked Hz, margins)]. progress(share,
     text) is called as it goes on. Raises LoopError."""
-    wanted_s = 2.0 * math.pi * (asked.speed or RATIO * (asked.position or SPEED / RATIO))
+    wanted_s = (2.0 * math.pi * (asked.speed or CROSSOVER_RATIO * (asked.position or DEFAULT_SPEED_CROSSOVER_HZ
+                                                                   / CROSSOVER_RATIO)))
     rows, reached = [], {}
     for name in AXES:  # the other axis moves along, so it is designed too
         plant = loops.plants[name]
         loops.set('adu', name, drive_gains(plant, wanted_s))
-        loops.set('acu', name, control_gains(plant, wanted_s, wanted_s / RATIO))
+        loops.set('acu', name, control_gains(plant, wanted_s, wanted_s / CROSSOVER_RATIO))
     for i, name in enumerate(axes):
         plant = loops.plants[name]
         progress(i / len(axes), f'{name}: current and speed loop')
@@ -217,9 +219,9 @@ def design(loops, axes, asked, progress):
     for i, name in enumerate(axes):
         progress((i + 0.5) / len(axes), f'{name}: position loop')
         plant, w_s = loops.plants[name], reached[name]
-        w_p = min(2.0 * math.pi * asked.position if asked.position else math.inf, wanted_s / RATIO)
+        w_p = min(2.0 * math.pi * asked.position if asked.position else math.inf, wanted_s / CROSSOVER_RATIO)
         if not asked.position:
-            w_p = w_s / RATIO
+            w_p = w_s / CROSSOVER_RATIO
 
         def set_position(w, name=name, plant=plant, w_s=w_s):
             loops.set('acu', name, control_gains(plant, w_s, w))
@@ -254,7 +256,8 @@ def main(options, progress):
     for name in ('filter', 'feedforward', 'runs', 'seed', 'duration'):
         if getattr(options, name):
             raise LoopError(f'--{name}: does not go with --loops, which measures the plant')
-    asked = Asked(options.speed_bandwidth, options.position_bandwidth, options.phase_margin, options.gain_margin)
+    asked = LoopRequirements(options.speed_bandwidth, options.position_bandwidth, options.phase_margin,
+                             options.gain_margin)
     axes = AXES if options.axis == 'both' else (options.axis,)
     loops = Loops(options.source, options.param)
     file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')

@@ -2,14 +2,15 @@
 
 recording   the recorded inputs go through the ACU's step function, as in `pedestal recompute`, with changed
             parameters. The criterion maximises the mean log-density of the innovations of the angle, log N(nu; 0, S),
-            which rewards small innovations and a correct S alike. Beyond HUBER sigmas it falls linearly, so that an
-            outlier counts as one. Every other PIECE of time is kept apart and validates the result.
+            which rewards small innovations and a correct S alike. Beyond HUBER_LIMIT_SIGMAS sigmas it falls linearly,
+            so that an
+            outlier counts as one. Every other PIECE_LENGTH_S of time is kept apart and validates the result.
 scenario    the compiled closed loop runs on stated seeds. The criterion minimises the rms of the true pointing error
             of the axis (cross-elevation, elevation) in settled autotrack; another seed validates the result.
 feed-forward    the rate loop of the drive is identified (identification.py); k_v and k_a follow from it. The closed
             loop validates them.
 
-The search is that of tuning.py. The result is a ROS 2 parameter file, for nodes and `pedestal run` alike.
+The search is that of parameter_search.py. The result is a ROS 2 parameter file, for nodes and `pedestal run` alike.
 """
 import dataclasses
 import math
@@ -17,31 +18,31 @@ import pathlib
 
 import numpy as np
 
-from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
-from acu_tracker.unit import RANGE
+from acu_tracker.unit import RANGE_TOPIC
 from pedestal_analysis.reprocess import recompute, what_if
 from pedestal_analysis.results import identification
-from pedestal_analysis.results.tracking import SETTLING
-from pedestal_analysis.tuning import tuning
+from pedestal_analysis.results.tracking import HANDOVER_SETTLING_S
+from pedestal_analysis.tuning import parameter_search
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import parameter_file, scenario
 from pedestal_common import parameters
 from pedestal_common.graph import layouts, topics
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import records
 from pedestal_recording import configuration
 
-HUBER = 4.0
+HUBER_LIMIT_SIGMAS = 4.0
 """Standard deviations of an innovation beyond which it is an outlier."""
-CONVERGED, PIECE = 1.0, 0.5
+CONVERGENCE_TIME_S, PIECE_LENGTH_S = 1.0, 0.5
 """Recording: time for the filter to converge after the first error [s]; length of the pieces it is split into [s]."""
 AXES = topics.AXES
-RUNS = 2
+DEFAULT_SEED_COUNT = 2
 """Seeds a scenario is tuned on."""
 ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
-UKF = ('cv_noise', 'ca_noise', 'dwell')
+TUNED_UKF_PARAMETERS = ('cv_noise', 'ca_noise', 'dwell')
 """Tuned parameters of tracker.ukf; the others matter only at the start."""
 
 
@@ -60,9 +61,10 @@ class Score:
 
 
 def log_density(innovation, sigma):
-    """log N(nu; 0, sigma^2) less its constant, made linear beyond HUBER sigmas (Huber 1964)."""
+    """log N(nu; 0, sigma^2) less its constant, made linear beyond HUBER_LIMIT_SIGMAS sigmas (Huber 1964)."""
     z = np.abs(innovation / sigma)
-    return -np.where(z <= HUBER, 0.5 * z * z, HUBER * (z - 0.5 * HUBER)) - np.log(sigma)
+    return -np.where(z <= HUBER_LIMIT_SIGMAS, 0.5 * z * z, HUBER_LIMIT_SIGMAS
+                     * (z - 0.5 * HUBER_LIMIT_SIGMAS)) - np.log(sigma)
 
 
 def _mean(values):
@@ -71,7 +73,7 @@ def _mean(values):
                      for column in values.T])
 
 
-class Recorded:
+class RecordedSource:
     """A recording on which filters are tuned. criterion: the negative mean log-density of the innovations.
 
     of_beams: whether it has several beams. Their nodes are `beam_1/acu`, ..., so that only pedestal resolves `acu`.
@@ -86,18 +88,18 @@ class Recorded:
         done = recompute.recompute(self.recording, 'acu', self.params)
         self.feed = done.feed
         self.requests = {step: [command for command, _ in made] for step, made in done.requests.items()}
-        present = self.feed.inputs[RANGE]['stamp'] != records.NEVER
-        self.ranged = np.isfinite(self.feed.inputs[RANGE]['range'][present]).any()
-        t = self.feed.stamps / SECOND
+        present = self.feed.inputs[RANGE_TOPIC]['stamp'] != records.NO_STAMP
+        self.ranged = np.isfinite(self.feed.inputs[RANGE_TOPIC]['range'][present]).any()
+        t = self.feed.stamps / NS_PER_SECOND
         compared = np.isfinite(self._innovations(done.steps)[0]).all(axis=1)
         if not compared.any():
             raise TuneError(f'{path}: the receiver gave no error that the filter could be compared with')
-        counted = compared & (t >= t[compared][0] + CONVERGED)
-        even = np.floor(t / PIECE).astype(int) % 2 == 0
+        counted = compared & (t >= t[compared][0] + CONVERGENCE_TIME_S)
+        even = np.floor(t / PIECE_LENGTH_S).astype(int) % 2 == 0
         self.parts = counted & even, counted & ~even
         if not all(part.any() for part in self.parts):
             raise TuneError(f'{path}: the receiver gave errors for {np.ptp(t[compared]):.3g} s; must be at least '
-                            f'{CONVERGED + 2.0 * PIECE:g} s')
+                            f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
 
     def _innovations(self, steps):
         """Innovation, its sigma and NIS (3, n, 2) of both axes in steps (n,)."""
@@ -123,7 +125,7 @@ class Recorded:
                      {name: (numbers[name][0][0], numbers[name][1]) for name in ESTIMATE_ERRORS if name in numbers})
 
 
-class Simulated:
+class SimulatedSource:
     """A scenario on whose closed loop parameters are tuned. criterion: rms pointing error [deg] in settled autotrack,
     or in any mode but standby. Raises TuneError where it is never in such a mode."""
 
@@ -141,7 +143,7 @@ class Simulated:
         self._scenarios = {seed: load(seed) for seed in (*self.seeds, *self.kept_seeds)}
         if not np.isfinite(self.criterion(self.params)).all():
             mode = 'out of standby' if any_mode else 'in autotrack'
-            raise TuneError(f'scenario {chosen.name}: never {mode} for more than {SETTLING:g} s')
+            raise TuneError(f'scenario {chosen.name}: never {mode} for more than {HANDOVER_SETTLING_S:g} s')
 
     def runs(self, params, seeds):
         """(steps, truth) of the settled parts of all runs, records of closed_loop.STEP and TRUTH."""
@@ -149,7 +151,7 @@ class Simulated:
         for seed in seeds:
             run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
             on = run['acu/mode'] != Mode.STANDBY if self.any_mode else run['acu/mode'] == Mode.AUTOTRACK
-            start = run.t[on][0] + SETTLING if on.any() else math.inf
+            start = run.t[on][0] + HANDOVER_SETTLING_S if on.any() else math.inf
             settled = on & (run.t >= start)
             parts.append((run.steps[settled], run.truth[settled]))
         return tuple(map(np.concatenate, zip(*parts)))
@@ -197,10 +199,12 @@ def filters(source, kind, axes, progress):
         def with_ukf(ukf):
             return dataclasses.replace(params, tracker=dataclasses.replace(params.tracker, ukf=ukf))
 
-        best, _ = tuning.tuned(params.tracker.ukf, lambda ukf: counted(source.criterion(with_ukf(ukf))[rows].sum(), 0),
-                               UKF)
-        best = _rounded(best, UKF)
-        return with_ukf(best), {**settings, **{f'tracker.ukf.{name}': getattr(best, name) for name in UKF}}
+        best, _ = parameter_search.tuned(params.tracker.ukf,
+                                         lambda ukf: counted(source.criterion(with_ukf(ukf))[rows].sum(), 0),
+                                         TUNED_UKF_PARAMETERS)
+        best = _rounded(best, TUNED_UKF_PARAMETERS)
+        return with_ukf(best), {**settings,
+                                **{f'tracker.ukf.{name}': getattr(best, name) for name in TUNED_UKF_PARAMETERS}}
     for part, axis in enumerate(axes):
         count, i = 0, AXES.index(axis)
 
@@ -208,10 +212,10 @@ def filters(source, kind, axes, progress):
             return counted(source.criterion(_with_filter(params, axis, changed))[i], part)
 
         given = getattr(params, axis).filter
-        best = _rounded(tuning.tuned(given, cost)[0], tuning.names(given))
+        best = _rounded(parameter_search.tuned(given, cost)[0], parameter_search.names(given))
         params = _with_filter(params, axis, best)
         values = parameters.as_dict(best)
-        names = tuning.names(given) + (('imm.models',) if kind == 'imm' else ())
+        names = parameter_search.names(given) + (('imm.models',) if kind == 'imm' else ())
         settings.update({f'{axis}.filter.{name}': values[name] for name in names})
     return params, settings
 
@@ -246,11 +250,11 @@ def main(options, command, progress):
     _check(options, is_bag, file)
     progress(0.0, 'reading' if is_bag else 'compiling the laws (the first time)')
     if is_bag:
-        source = Recorded(pathlib.Path(options.source))
+        source = RecordedSource(pathlib.Path(options.source))
     else:
         def load(seed):
             return scenario.load(options.source, options.param, seed, options.duration)
-        source = Simulated(load, options.seed, options.runs or RUNS, options.feedforward)
+        source = SimulatedSource(load, options.seed, options.runs or DEFAULT_SEED_COUNT, options.feedforward)
     if options.feedforward:
         params, settings = feedforward(load(options.seed), source, axes, progress)
     else:
@@ -271,8 +275,8 @@ def _check(options, is_bag, file):
     """Raises TuneError for options that do not fit together, or a file that exists."""
     if bool(options.filter) == options.feedforward:
         raise TuneError('one of --filter KIND and --feedforward must be given')
-    if options.filter and options.filter not in KINDS:
-        raise TuneError(f'--filter {options.filter}: must be one of {", ".join(KINDS)}')
+    if options.filter and options.filter not in FILTER_KINDS:
+        raise TuneError(f'--filter {options.filter}: must be one of {", ".join(FILTER_KINDS)}')
     if is_bag and options.feedforward:
         raise TuneError('--feedforward: identifies the drive of a scenario; a recording has none')
     for name in ('seed', 'runs', 'duration', 'param'):

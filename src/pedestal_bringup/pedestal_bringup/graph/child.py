@@ -20,7 +20,7 @@ import time
 import traceback
 
 PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_MM, PR_SET_MM_MAP = 1, 15, 35, 14
-STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+BLOCKED_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _libc = ctypes.CDLL(None)
 _libc.sbrk.restype = _libc.malloc.restype = ctypes.c_void_p
 
@@ -40,7 +40,7 @@ class Child:
         parent = os.getpid()
         if copy:
             gc.freeze()
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, BLOCKED_SIGNALS)
         try:
             self.pid = os.fork()
             if not self.pid:
@@ -48,7 +48,7 @@ class Child:
                     held = _settle(parent, output, gate, mask)
                     become = _as_copy if copy and _take_name(command) else _as_interpreter
                     return become(command, held, rehearse)
-                _live(life)
+                _run_child(life)
         except OSError:
             os.close(self._begin)
             raise
@@ -89,7 +89,7 @@ class Child:
         self.send_signal(signal.SIGKILL)
 
 
-def _live(life):
+def _run_child(life):
     """Call life(), and end with its exit code: nothing that goes wrong brings a child back to where its parent is."""
     code = 1
     try:
@@ -120,7 +120,7 @@ def _settle(parent, output, gate, mask):
         if descriptor > 2 and descriptor != gate:
             with contextlib.suppress(OSError):
                 os.close(descriptor)
-    for number in STOPPING:
+    for number in BLOCKED_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)

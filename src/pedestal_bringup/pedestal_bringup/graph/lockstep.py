@@ -4,10 +4,10 @@ import time
 
 from rclpy.executors import SingleThreadedExecutor
 
-from pedestal_bringup.graph.processes import RunError, how
+from pedestal_bringup.graph.processes import RunError, exit_description
 from pedestal_common.graph import nodes
 
-ENDING = (nodes.DRIVE, 'recorder')
+SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')
 """Nodes that end by themselves when the run is over."""
 
 
@@ -21,11 +21,11 @@ def watch(graph, operator, tracks, progress):
     def stuck(names):
         return operator.stuck(names, executor)
 
-    while graph.ended().get(nodes.DRIVE) != 0:
+    while graph.ended().get(nodes.DRIVE_NODE) != 0:
         executor.spin_once(timeout_sec=0.1 if sent else 0.02)
         sent = sent or operator.send_to(graph.scenario.nodes, tracks)
         progress(operator.time)
-        if any(code != 0 or node not in ENDING for node, code in graph.ended().items()):
+        if any(code != 0 or node not in SELF_ENDING_NODES for node, code in graph.ended().items()):
             raise failure(graph, stuck, operator.silent(header.deadline))
         mute = operator.silent(2.0 * header.deadline)
         if mute:
@@ -43,7 +43,7 @@ def failure(graph, stuck, unheard=None):
     """
     time.sleep(0.5)
     ended = graph.ended()
-    ending = graph.processes if ended.get(nodes.DRIVE) == 0 else ENDING
+    ending = graph.processes if ended.get(nodes.DRIVE_NODE) == 0 else SELF_ENDING_NODES
     early = {node: code for node, code in ended.items() if code != 0 or node not in ending}
     lines = {node: graph.last_lines(node) for node in graph.processes}
     accused = {name for node in early for name in graph.result(node).get('silent', ())}
@@ -57,7 +57,7 @@ def failure(graph, stuck, unheard=None):
             node for node in silent if node in mute] or mute or silent
     culprit = (killed or silent or list(early))[0]
     if culprit in killed:
-        reason = how(early[culprit])
+        reason = exit_description(early[culprit])
     elif culprit in silent:
         reason = 'has fallen silent'
     else:

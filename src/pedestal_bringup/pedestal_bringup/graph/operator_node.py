@@ -11,10 +11,10 @@ from pedestal_common.graph import nodes
 from pedestal_common.node.shell import Shell
 from pedestal_common.wire import messages
 
-DISCOVERY_TIME = 0.5
+DISCOVERY_TIME_S = 0.5
 """Seconds a run looks for another graph on its domain before it starts its own."""
 
-ANSWER_TIME = 2.0
+SERVICE_TIMEOUT_S = 2.0
 """Seconds a node has to answer a parameter service before it counts as stuck."""
 
 
@@ -57,7 +57,7 @@ class Operator(Shell):
 
     def refuse_company(self):
         """Raise RunError when the nodes of another graph are on this domain: they would hear this one."""
-        deadline = time.monotonic() + DISCOVERY_TIME
+        deadline = time.monotonic() + DISCOVERY_TIME_S
         while time.monotonic() < deadline:
             names = self.get_node_names()
             if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.module):
@@ -93,7 +93,7 @@ class Operator(Shell):
         """{node: its answer to a request for parameters} of those that answer in time."""
         clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in names}
         asked = {}
-        deadline = time.monotonic() + ANSWER_TIME
+        deadline = time.monotonic() + SERVICE_TIMEOUT_S
         while time.monotonic() < deadline and not (len(asked) == len(clients) and all(
                 answer.done() for answer in asked.values())):
             for node, client in clients.items():

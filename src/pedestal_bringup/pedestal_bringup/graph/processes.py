@@ -13,10 +13,10 @@ import time
 from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
 
-LOG_LINES = 8
-STOP_TIME = 20.0
+SHOWN_LOG_LINES = 8
+NODE_STOP_TIMEOUT_S = 20.0
 
-LOG_SPACE = 64 * 1024
+RESERVED_LOG_BYTES = 64 * 1024
 """Bytes of the disk that a log holds in advance, so that the cause of an end is kept also when it is full by then."""
 
 FALLOC_FL_KEEP_SIZE = 1
@@ -115,7 +115,8 @@ class Graph:
     def _hold(self, node):
         with open(self._log_of(node), 'ab') as output:
             self._log_starts[node] = size = output.seek(0, os.SEEK_END)
-            _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size), ctypes.c_long(LOG_SPACE))
+            _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size),
+                            ctypes.c_long(RESERVED_LOG_BYTES))
             self.processes[node] = Child(command_line(node, self.scenario.row(node).module, self.file),
                                          output.fileno(), functools.partial(_load_laws, self.scenario, node))
         with contextlib.suppress(OSError):
@@ -130,7 +131,7 @@ class Graph:
     def stop(self):
         """Ask the nodes that still run to end; whether each ends with exit code 0. The recorder ends last, and in
         realtime the drive first: it stops its axes while the others are there."""
-        first = [nodes.DRIVE] if self.scenario.header.pacing == 'realtime' else []
+        first = [nodes.DRIVE_NODE] if self.scenario.header.pacing == 'realtime' else []
         others = [node for node in self.processes if node not in (*first, 'recorder')]
         with uninterrupted():
             return not any([code for group in (first, others, ['recorder']) for code in self._stop(group)])
@@ -142,7 +143,7 @@ class Graph:
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
                 process.send_signal(signal.SIGCONT)
-        deadline = time.monotonic() + STOP_TIME
+        deadline = time.monotonic() + NODE_STOP_TIMEOUT_S
         for process in processes:
             try:
                 process.wait(max(deadline - time.monotonic(), 0.0))
@@ -161,7 +162,7 @@ class Graph:
 
     def last_lines(self, node):
         """The end of a node's log, its result left out."""
-        return [line for line in self._lines(node) if not line.startswith('{')][-LOG_LINES:]
+        return [line for line in self._lines(node) if not line.startswith('{')][-SHOWN_LOG_LINES:]
 
     def result(self, node):
         """The last JSON object in a node's log: its result, or why it ended (shell.main); {} where there is none."""
@@ -194,7 +195,7 @@ class Graph:
         return f' ({lines[-1]})' if lines and code > 0 else ''
 
 
-def how(code):
+def exit_description(code):
     """How a process with this exit code ended."""
     return f'died by signal {signal.Signals(-code).name}' if code < 0 else f'ended with exit code {code}'
 

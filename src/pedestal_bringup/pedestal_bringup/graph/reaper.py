@@ -12,7 +12,7 @@ import signal
 import sys
 import time
 
-PATIENCE = 20.0
+GRACE_PERIOD_S = 20.0
 """Seconds the nodes have to end by themselves."""
 
 
@@ -24,7 +24,7 @@ def main():
     for line in sys.stdin:
         with contextlib.suppress(OSError, AttributeError):
             nodes.append(os.pidfd_open(int(line)))
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + GRACE_PERIOD_S
     _signal(nodes, signal.SIGCONT)
     while nodes and time.monotonic() < deadline:
         ended, _, _ = select.select(nodes, (), (), deadline - time.monotonic())

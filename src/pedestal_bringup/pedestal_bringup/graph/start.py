@@ -5,10 +5,10 @@ import time
 from pedestal_bringup.graph.processes import log_folder
 from pedestal_bringup.scenario import parameter_file
 from pedestal_common.graph import nodes
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_recording import configuration
 
-START_TIME = 5.0
+START_LEAD_TIME_S = 5.0
 """Seconds from the start of the nodes of a realtime run to the beginning of its time: a warm start takes two of them.
 Who comes later has lost steps, no more."""
 
@@ -26,7 +26,7 @@ class Outcome:
 
 def begins(scenario):
     """graph.start of a run whose nodes start now [ns UTC]; 0 in lockstep, where time is that of the steps."""
-    return time.time_ns() + round(START_TIME * SECOND) if scenario.header.pacing == 'realtime' else 0
+    return time.time_ns() + round(START_LEAD_TIME_S * NS_PER_SECOND) if scenario.header.pacing == 'realtime' else 0
 
 
 def parameters_of_all(scenario, bag, start):
@@ -38,5 +38,5 @@ def parameters_of_all(scenario, bag, start):
     sections = {node: {**scenario.given(node), **shared} for node in scenario.nodes if node != 'operator'}
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
     if start and not scenario.header.beam:
-        sections[nodes.DRIVE].setdefault('state_file', str(log_folder(bag) / f'{nodes.DRIVE}.state'))
+        sections[nodes.DRIVE_NODE].setdefault('state_file', str(log_folder(bag) / f'{nodes.DRIVE_NODE}.state'))
     return parameter_file.text(sections)

@@ -8,20 +8,20 @@ import time
 
 from rclpy.executors import SingleThreadedExecutor
 
-from pedestal_bringup.graph.processes import RunError, how
+from pedestal_bringup.graph.processes import RunError, exit_description
 from pedestal_bringup.graph.restarts import Losses, Restarts, Silence
 from pedestal_common.compiled import is_compiled
 from pedestal_common.graph import nodes
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_recording.verify import count
 
-LAST_START = 0.5
+RESTART_CUTOFF_S = 0.5
 """A node that dies in the last seconds of a run is not started again."""
 
-LATE = 20.0
+SHUTDOWN_GRACE_S = 20.0
 """Seconds the drive may go on after the end of the run before it is told to end."""
 
-CALL = 5.0
+MAX_SILENCE_S = 5.0
 """Seconds without diagnostics, which come every second, after which a node is called silent."""
 
 
@@ -41,7 +41,7 @@ def prepare(scenario):
             complaint = process.stderr.read()
             if process.wait() != 0:
                 lines = complaint.strip().splitlines()
-                raise RunError(f'the laws of {node} do not compile: it {how(process.returncode)}'
+                raise RunError(f'the laws of {node} do not compile: it {exit_description(process.returncode)}'
                                + (f'; {lines[-1]}' if lines else ''))
     finally:
         for process in processes.values():
@@ -57,7 +57,7 @@ class Supervisor:
     def __init__(self, graph, operator, start):
         header = graph.scenario.header
         self._graph, self._operator = graph, operator
-        self._start, self._end = start, start + round(header.duration * SECOND)
+        self._start, self._end = start, start + round(header.duration * NS_PER_SECOND)
         self._limits = header.restart
         self.restarts = Restarts(self._limits.attempts, self._limits.within, self._limits.delay)
         self._silence, self.losses = Silence(), Losses()
@@ -75,23 +75,23 @@ class Supervisor:
         self._operator.send(tracks)
         while self._goes_on():
             executor.spin_once(timeout_sec=0.1)
-            progress(min(max(time.time_ns() - self._start, 0), self._end - self._start) / SECOND)
+            progress(min(max(time.time_ns() - self._start, 0), self._end - self._start) / NS_PER_SECOND)
             self.look(time.monotonic())
 
     def _goes_on(self):
         """Until the drive ends at the end of the run; where it is not there to do so, or does not, nobody waits."""
-        now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE].poll() is None
+        now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE_NODE].poll() is None
         if now < self._end:
             return drive_runs or not self._is_nearly_over()
-        return drive_runs and now < self._end + LATE * SECOND
+        return drive_runs and now < self._end + SHUTDOWN_GRACE_S * NS_PER_SECOND
 
     def _is_nearly_over(self):
-        return time.time_ns() > self._end - LAST_START * SECOND
+        return time.time_ns() > self._end - RESTART_CUTOFF_S * NS_PER_SECOND
 
     def look(self, now):
         """Start again what has died, kill what has been silent for too long. now: monotonic [s]."""
         self._silence.look(now)
-        for node in self._silence.longer_than(min(CALL, self._limits.silence or CALL), now):
+        for node in self._silence.longer_than(min(MAX_SILENCE_S, self._limits.silence or MAX_SILENCE_S), now):
             if node not in self._called:
                 self._called.add(node)
                 report(f'{node} is silent')
@@ -108,7 +108,8 @@ class Supervisor:
     def _bury(self, node, code, now):
         """A node has died: it is started again, or the run is given up."""
         limits = self._limits
-        reason = 'was silent and was killed' if node in self._called and code == -signal.SIGKILL else how(code)
+        reason = ('was silent and was killed' if node in self._called and code == -signal.SIGKILL
+                  else exit_description(code))
         self._dead.add(node)
         self._called.discard(node)
         self._silence.forget(node)
@@ -123,7 +124,7 @@ class Supervisor:
     def _note(self, status, now):
         node = status.name
         self._silence.note(node, now)
-        if node == nodes.DRIVE:
+        if node == nodes.DRIVE_NODE:
             for value in status.values:
                 if value.key == 'lost_steps' and (lost := count(value.value)) is not None:
                     self.losses.note(lost, now)

@@ -36,8 +36,8 @@ def _in_lockstep(graph, operator, tracks, progress):
         lockstep.watch(graph, operator, tracks, progress)
     except KeyboardInterrupt:
         graph.stop()
-        return Outcome(graph.result(nodes.DRIVE), graph.result('recorder'), stopped=True)
-    return Outcome(graph.outcome(nodes.DRIVE), graph.outcome('recorder'))
+        return Outcome(graph.result(nodes.DRIVE_NODE), graph.result('recorder'), stopped=True)
+    return Outcome(graph.outcome(nodes.DRIVE_NODE), graph.outcome('recorder'))
 
 
 def _in_realtime(graph, operator, tracks, progress):
@@ -54,7 +54,8 @@ def _in_realtime(graph, operator, tracks, progress):
         stopped = True
     graph.stop()
     recorder = graph.result('recorder') if stopped else graph.outcome('recorder')
-    return Outcome(graph.result(nodes.DRIVE), recorder, supervised.restarts.count, supervised.losses.count, stopped)
+    return Outcome(graph.result(nodes.DRIVE_NODE), recorder, supervised.restarts.count, supervised.losses.count,
+                   stopped)
 
 
 def send_program(plan, start=None, ros_arguments=()) -> int:

@@ -17,20 +17,21 @@ from adu_drive.array import beam_unit
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import layouts, nodes, topics
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.law import by_type
-from pedestal_common.node.unit import BLOCK, Unit, announced
+from pedestal_common.node.unit import MAX_BLOCK_STEPS, Unit, announced
 from pedestal_common.wire import records
 
-COMMAND, REFERENCE = 'acu/rate_command', 'acu/reference'
+COMMAND_TOPIC, REFERENCE_TOPIC = 'acu/rate_command', 'acu/reference'
 
-STEP = records.of(*(topic.name for topic in topics.TOPICS if topic.rate == 'step' or records.is_text(topic.name)))
+STEP_DTYPE = records.of(*(topic.name for topic in topics.TOPICS
+                          if topic.rate == 'step' or records.is_text(topic.name)))
 """One step: every topic but the program track, commands and the diagnostics."""
 
-TRUTH = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
+TRUTH_DTYPE = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
 """What no topic tells of t_k: bias torques [Nm], the true error of the beam (cross-elevation, elevation) [rad]."""
 
-_LAWS = {memory: law for node in nodes.UNITS for memory, (law, _) in node.unit_type().LAWS.items()}
+_LAWS = {memory: law for node in nodes.UNIT_NODES for memory, (law, _) in node.unit_type().LAWS.items()}
 
 
 def step(memory, stamp, inputs, outputs):
@@ -42,7 +43,7 @@ by_type(step, lambda memory: None if isinstance(memory, types.NoneType) else _LA
 
 
 def true_bias(drive, truth):
-    """Fill bias of a TRUTH from the memory of the drive; a beam has none. Compiled code calls it."""
+    """Fill bias of a TRUTH_DTYPE from the memory of the drive; a beam has none. Compiled code calls it."""
     raise NotImplementedError
 
 
@@ -57,7 +58,7 @@ def _true_bias(drive, truth):
 
 @compiled
 def loop(units, first, period_ns, before, injected, steps, truth):
-    """Steps first, first + 1 ... into steps (n,) of STEP and truth (n,) of TRUTH.
+    """Steps first, first + 1 ... into steps (n,) of STEP_DTYPE and truth (n,) of TRUTH_DTYPE.
 
     units: memories of drive, ship, INS (both None ashore), receiver and control unit. before (1,): the step before, as
     the drive obeys it; injected (n, 2): added to the rate commands [rad/s] and to the angles [rad] on their way to it.
@@ -75,17 +76,18 @@ def loop(units, first, period_ns, before, injected, steps, truth):
         truth[k].error[0], truth[k].error[1] = true.true_cross_elevation, true.true_elevation
         before[0] = steps[k]
         for i in range(2):
-            before[0][COMMAND].velocity[i] += injected[k, i]
-            before[0][REFERENCE].position[i] += injected[k, i]
+            before[0][COMMAND_TOPIC].velocity[i] += injected[k, i]
+            before[0][REFERENCE_TOPIC].position[i] += injected[k, i]
 
 
-ORDER = ('adu', 'ship_motion', 'ins', 'tracking_receiver', 'acu')
+UNIT_ORDER = ('adu', 'ship_motion', 'ins', 'tracking_receiver', 'acu')
 """Of the units in a step."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """A run in memory: steps (n,) of STEP, or of some of its topics, truth (n,) of TRUTH, the stamps (n,) [ns] of the
+    """A run in memory: steps (n,) of STEP_DTYPE, or of some of its topics, truth (n,) of TRUTH_DTYPE, the stamps (n,)
+    [ns] of the
     steps; units {name: Unit}; forecasts [(stamp [ns], announcement.numbers)] at every whole second, as the control
     unit's diagnostics tell them.
 
@@ -116,21 +118,21 @@ class Run:
         written = [name for unit in self.units.values() for name in unit.writes]
         kept = [topic for topic in topics.TOPICS if topic.name in written and topic.name in self.steps.dtype.names]
         return {topic.name: topic.type for topic in kept
-                if records.is_text(topic.name) or (self.steps[topic.name]['stamp'] != records.NEVER).any()}
+                if records.is_text(topic.name) or (self.steps[topic.name]['stamp'] != records.NO_STAMP).any()}
 
     def table(self, topic):
         """{column: array (n,)} of a topic, a row per message, as of a bag (columns.table)."""
         if records.is_text(topic):
             unit = next(unit for unit in self.units.values() if topic in unit.NODE.writes)
-            if topics.BY_NAME[topic].type != 'std_msgs/msg/String':
+            if topics.TOPIC_BY_NAME[topic].type != 'std_msgs/msg/String':
                 # A list: what it said is not kept, only when it changed.
-                return {'t': self.t[np.flatnonzero(np.diff(self.steps[topic], prepend=topics.SILENT))]}
+                return {'t': self.t[np.flatnonzero(np.diff(self.steps[topic], prepend=topics.NO_TEXT_CODE))]}
             stamps, texts = announced(unit, topic, self.stamps, self.steps)
-            return {'t': stamps / SECOND, 'data': texts}
-        sent = self.steps[topic]['stamp'] != records.NEVER
+            return {'t': stamps / NS_PER_SECOND, 'data': texts}
+        sent = self.steps[topic]['stamp'] != records.NO_STAMP
         sent = slice(None) if sent.all() else sent
         numbers = records.numbers(self.steps, topic)[sent]
-        return {'t': self.steps[topic]['stamp'][sent] / SECOND,
+        return {'t': self.steps[topic]['stamp'][sent] / NS_PER_SECOND,
                 **{column.name: numbers[:, i] for i, column in enumerate(layouts.columns(topic))}}
 
 
@@ -143,28 +145,29 @@ class Loop:
     def __init__(self, scenario, beam='', changed=()):
         prefix = f'{beam}/' if beam else scenario.prefixes[0]
         self.units: dict[str, Unit] = {}
-        for name in ORDER:
+        for name in UNIT_ORDER:
             full = prefix + name if nodes.row(name).of_beam else name
             if full in scenario.nodes:
                 self.units[name] = scenario.unit(full, dict(changed).get(name))
         for topic, message in Plan(scenario).tracks.items():
             if topic.startswith(prefix):
                 self.units['acu'].decode(nodes.plain(topic), message)
-        period = self.units[nodes.DRIVE].parameters.period
-        self.period_ns = round(period * SECOND)
+        period = self.units[nodes.DRIVE_NODE].parameters.period
+        self.period_ns = round(period * NS_PER_SECOND)
         self.steps = round(scenario.header.duration / period) + 1
 
     def attend(self, first, forecasts):
         """Before step `first`: add to forecasts where a second begins, obey what the units' schedules say."""
         stamp = first * self.period_ns
-        if stamp // SECOND > (stamp - self.period_ns) // SECOND:
+        if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))
         for unit in self.units.values():
             unit.obey_due(stamp)
 
     def free_until(self, first):
         """The step after `first` before which to `attend` again."""
-        due = min((first * self.period_ns // SECOND + 1) * SECOND, *(unit.next_due for unit in self.units.values()))
+        due = min((first * self.period_ns // NS_PER_SECOND + 1) * NS_PER_SECOND,
+                  *(unit.next_due for unit in self.units.values()))
         return min(-(-due // self.period_ns), self.steps)
 
     def run(self, injected=None, watch=None) -> Run:
@@ -172,14 +175,16 @@ class Loop:
         again: sees the units in between. To be called once."""
         if injected is None:
             injected = np.zeros((self.steps, 2))
-        steps, truth = records.empty(STEP, self.steps), np.zeros(self.steps, TRUTH)
-        before, forecasts = records.empty(STEP, 1), []
+        steps, truth = records.empty(STEP_DTYPE, self.steps), np.zeros(self.steps, TRUTH_DTYPE)
+        before, forecasts = records.empty(STEP_DTYPE, 1), []
         first = 0
         while first < self.steps:
             self.attend(first, forecasts)
-            last = min(first + (watch(first) if watch else BLOCK), first + BLOCK, self.free_until(first))
+            last = min(first + (watch(first) if watch else MAX_BLOCK_STEPS), first + MAX_BLOCK_STEPS,
+                       self.free_until(first))
             part = slice(first, last)
-            memories = tuple(self.units[name].block(last - first) if name in self.units else None for name in ORDER)
+            memories = tuple(self.units[name].block(last - first) if name in self.units else None
+                             for name in UNIT_ORDER)
             loop(memories, first, self.period_ns, before, injected[part], steps[part], truth[part])
             first = last
         return Run(steps, truth, np.arange(self.steps) * self.period_ns, self.units, forecasts)

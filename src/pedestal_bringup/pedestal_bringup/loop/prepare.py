@@ -1,7 +1,8 @@
 """Compiles laws that are not in the cache, so that what calls them starts warm.
 
 `python -m pedestal_bringup.loop.prepare` compiles those of every node on both cores, then those of the closed loop;
-`... NAME` those of the nodes of one of UNITS; `... NODE NAME` those of one node of a scenario: the scenario of this
+`... NAME` those of the nodes of one of COMPILED_UNITS; `... NODE NAME` those of one node of a scenario: the scenario
+of this
 name as YAML on the standard input.
 """
 import concurrent.futures
@@ -14,15 +15,15 @@ from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
 from pedestal_common.compiled import compiled_once, done, is_compiled
 
-UNITS = (('leo_pass', 'acu'), ('leo_pass', 'adu'), ('leo_pass', 'tracking_receiver'), ('ship_pass', 'ins'),
-         ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'))
+COMPILED_UNITS = (('leo_pass', 'acu'), ('leo_pass', 'adu'), ('leo_pass', 'tracking_receiver'), ('ship_pass', 'ins'),
+                  ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'))
 """(scenario, node) that have the laws of every unit, the slowest first."""
 
-LOOPS = (('leo_pass', side_by_side.FEWEST), ('ship_pass', 1), ('leo_pass', 1))
+COMPILED_LOOPS = (('leo_pass', side_by_side.MIN_PARALLEL_LOOPS), ('ship_pass', 1), ('leo_pass', 1))
 """(scenario, how many side by side) of closed loops that have the laws on lanes, on a ship and ashore, the slowest
 first."""
 
-SHORT = 0.1
+COMPILE_RUN_S = 0.1
 """Length [s] of the run that compiles a closed loop."""
 
 
@@ -51,7 +52,7 @@ def _loop_done(name, count):
 
 def _compile_loop(name, count):
     begun = time.perf_counter()
-    loops = [closed_loop.Loop(scenario.load(name, duration=SHORT)) for _ in range(count)]
+    loops = [closed_loop.Loop(scenario.load(name, duration=COMPILE_RUN_S)) for _ in range(count)]
     if count > 1:
         side_by_side.runs(loops, ('joint_states',))
     else:
@@ -63,7 +64,7 @@ def _compile_loop(name, count):
 
 
 def compile_cold(units, loops):
-    """Compile what is not in the cache of parts of UNITS and LOOPS, a line for each that was not."""
+    """Compile what is not in the cache of parts of COMPILED_UNITS and COMPILED_LOOPS, a line for each that was not."""
     units = [part for part in units if not is_compiled(_unit(*part))]
     loops = [part for part in loops if (mark := _loop_done(*part)) is None or not mark.exists()]
     if not units and not loops:
@@ -80,9 +81,9 @@ def main():
     """Compile what the command line names; the exit code."""
     match sys.argv[1:]:
         case []:
-            compile_cold(UNITS, LOOPS)
+            compile_cold(COMPILED_UNITS, COMPILED_LOOPS)
         case [name]:
-            compile_cold([part for part in UNITS if part[0] == name], ())
+            compile_cold([part for part in COMPILED_UNITS if part[0] == name], ())
         case [node, name]:
             of_node(scenario.parse(name, sys.stdin.read()).unit(node))
     return 0

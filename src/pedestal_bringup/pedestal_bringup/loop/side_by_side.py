@@ -13,21 +13,21 @@ from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.program.tables import Tables
 from adu_drive import lanes
 from adu_drive import unit as drive_unit
-from pedestal_bringup.loop.closed_loop import STEP, TRUTH, Run
+from pedestal_bringup.loop.closed_loop import STEP_DTYPE, TRUTH_DTYPE, Run
 from pedestal_common.compiled import compiled
 from pedestal_common.wire import records
 from tracking_receiver_sim import unit as receiver_unit
 
-UNITS = {'adu': drive_unit.Adu, 'tracking_receiver': receiver_unit.TrackingReceiver, 'acu': acu_unit.Acu}
+LANE_UNIT_TYPES = {'adu': drive_unit.Adu, 'tracking_receiver': receiver_unit.TrackingReceiver, 'acu': acu_unit.Acu}
 """The units of a loop ashore, of which each trial has its own."""
 
-FEWEST = 8
+MIN_PARALLEL_LOOPS = 8
 """Loops that are worth the lanes, most of which would be idle."""
 
-BLOCK = 200
+MAX_STEPS_PER_CALL = 200
 """Steps of one call at most, for which the noise is drawn at once."""
 
-MEMORY = 2**30
+MAX_MEMORY_BYTES = 2**30
 """For what trials side by side keep [bytes]."""
 
 
@@ -61,7 +61,7 @@ def _acu_law(acus, i, stamp, step):
     acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
 
 
-class Kept(typing.NamedTuple):
+class KeptSteps(typing.NamedTuple):
     """What is kept of steps. words (m,): which 8-byte words of a STEP; said: the steps as `_words`; rows (trials, n,
     m): where they are put, of all steps, because `_loop` would be compiled anew for a part of the columns."""
     words: np.ndarray
@@ -77,7 +77,7 @@ def _loop(drives, receivers, acus, first, last, period_ns, steps, kept):
     ControlUnits. steps (2, trials) of STEP: those of even and of odd numbers, the present ones and the ones before by
     turns.
     """
-    moving = drive_unit.LANES(drives)
+    moving = drive_unit.DRIVE_LANES(drives)
     for k in range(first, last):
         stamp, now = k * period_ns, k % 2
         drive_unit.law_of_lanes(moving, stamp, steps[1 - now], steps[now])
@@ -93,20 +93,21 @@ def _words(records):
     return records.view(np.int64).reshape(*records.shape, -1)
 
 
-def room(scenario, names):
+def max_parallel_trials(scenario, names):
     """How many trials of a scenario.Scenario can run side by side, which keep the topics named; 0 where none can."""
     if scenario.header.ship or scenario.header.beam:
         return 0
     steps = scenario.header.duration / scenario.node_parameters('adu').period
-    return min(lanes.WIDTH, int(MEMORY / (steps * records.of(*names).itemsize)))
+    return min(lanes.LANE_COUNT, int(MAX_MEMORY_BYTES / (steps * records.of(*names).itemsize)))
 
 
-def fit(loops):
+def can_run_parallel(loops):
     """Whether closed_loop.Loops can run side by side: of drives with motors ashore, alike in period, length and in the
     shapes of what they work on."""
-    ours = all({name: type(unit) for name, unit in loop.units.items()} == UNITS and loop.units['adu'].fits_lanes
+    ours = all({name: type(unit) for name, unit in loop.units.items()} == LANE_UNIT_TYPES
+               and loop.units['adu'].fits_lanes
                for loop in loops)
-    return FEWEST <= len(loops) <= lanes.WIDTH and ours and len(set(map(_shape, loops))) == 1
+    return MIN_PARALLEL_LOOPS <= len(loops) <= lanes.LANE_COUNT and ours and len(set(map(_shape, loops))) == 1
 
 
 def _shape(loop):
@@ -125,7 +126,7 @@ def _stacked(units):
     return record
 
 
-def _one_after_another(tracks):
+def _joined_tracks(tracks):
     """(the rows of ProgramTracks in one, where each ends (n + 1,), 0 first): they may differ in length."""
     return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
 
@@ -135,28 +136,28 @@ def runs(loops, names, kept=None):
 
     kept: memory (trials, steps) of records.of(names) for what they say, which others in it overwrite; None: new.
     """
-    drives, receivers, acus = ([loop.units[name] for loop in loops] for name in UNITS)
+    drives, receivers, acus = ([loop.units[name] for loop in loops] for name in LANE_UNIT_TYPES)
     drive_record, receiver_record, acu_record = _stacked(drives), _stacked(receivers), _stacked(acus)
-    moving = lanes.beside(drive_record)
+    moving = lanes.to_lanes(drive_record)
     breaks, coefficients = (np.stack([getattr(unit.memory, name) for unit in receivers])
                             for name in ('breaks', 'coefficients'))
     period_ns, count = loops[0].period_ns, loops[0].steps
-    steps = records.empty(STEP, 2 * len(loops)).reshape(2, len(loops))
+    steps = records.empty(STEP_DTYPE, 2 * len(loops)).reshape(2, len(loops))
     kept = np.empty((len(loops), count), records.of(*names)) if kept is None else kept
-    words = np.arange(STEP.itemsize // lanes.WORD).view(STEP)[list(names)].astype(kept.dtype).view(np.int64)
-    keeps = Kept(words, _words(steps), _words(kept))
+    words = np.arange(STEP_DTYPE.itemsize // lanes.WORD_BYTES).view(STEP_DTYPE)[list(names)].astype(kept.dtype).view(np.int64)
+    keeps = KeptSteps(words, _words(steps), _words(kept))
     forecasts = [[] for _ in loops]
     first = 0
     while first < count:
         for loop, told in zip(loops, forecasts):
             loop.attend(first, told)
-        last = min(first + BLOCK, *(loop.free_until(first) for loop in loops))
+        last = min(first + MAX_STEPS_PER_CALL, *(loop.free_until(first) for loop in loops))
         blocks = [unit.block(last - first) for unit in receivers]
-        tables, ends = zip(*map(_one_after_another, zip(*(unit.memory.tables for unit in acus))))
+        tables, ends = zip(*map(_joined_tracks, zip(*(unit.memory.tables for unit in acus))))
         _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
                                            np.stack([block.normals for block in blocks])),
               ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
         first = last
-    lanes.take_back(moving, drive_record)
-    return [Run(steps, np.zeros(0, TRUTH), np.arange(count) * period_ns, loop.units, told)
+    lanes.from_lanes(moving, drive_record)
+    return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, told)
             for loop, steps, told in zip(loops, kept, forecasts)]

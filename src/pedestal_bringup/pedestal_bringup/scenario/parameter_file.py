@@ -4,7 +4,7 @@ import yaml
 
 from pedestal_common.text_files import plain_yaml
 
-ANYWHERE = '/**/'
+ANY_NAMESPACE = '/**/'
 
 
 class ParameterFileError(ValueError):
@@ -13,13 +13,13 @@ class ParameterFileError(ValueError):
 
 def text(sections):
     """The file of {node: {name: value}}; a node of a beam is named as 'beam_2/acu'."""
-    return yaml.safe_dump({ANYWHERE + node: {'ros__parameters': values} for node, values in sections.items()},
+    return yaml.safe_dump({ANY_NAMESPACE + node: {'ros__parameters': values} for node, values in sections.items()},
                           sort_keys=False)
 
 
 def node_of(section):
     """The node that a section acu, /acu or /**/acu is of."""
-    return str(section).removeprefix(ANYWHERE).removeprefix('/')
+    return str(section).removeprefix(ANY_NAMESPACE).removeprefix('/')
 
 
 def dotted(tree, prefix=''):

@@ -78,14 +78,14 @@ class ScenarioParameters(parameters.Parameters):
         return self.beams if self.beam else 0
 
 
-RUN = tuple(node.name for node in nodes.NODES if node.module)
+SECTION_NODES = tuple(node.name for node in nodes.NODES if node.module)
 """Nodes that a scenario can have a section for."""
 
-OF_BEAMS = tuple(node.name for node in nodes.NODES if node.of_beam)
+BEAM_NODES = tuple(node.name for node in nodes.NODES if node.of_beam)
 """Those that each beam of several has of its own."""
 
 
-SHARED = (
+SHARED_PARAMETERS = (
     ('adu', 'period', 'acu', 'tracker.receiver.integration'),
     ('adu', 'transport_delay', 'acu', 'command_delay'),
     ('tracking_receiver', 'receiver.latency', 'acu', 'receiver_latency'),
@@ -104,8 +104,8 @@ SHARED = (
 """(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
 
 
-MEASURED = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
-                 for topic in map(topics.BY_NAME.get, node.writes) if topic.measured)
+MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
+                          for topic in map(topics.TOPIC_BY_NAME.get, node.writes) if topic.measured)
 """(node, its parameter, that of its readers): whether one of its topics is there at all."""
 
 
@@ -152,7 +152,7 @@ class Scenario:
     def unit(self, node, parameters=None):
         """The unit of one of its nodes; parameters: in the place of the scenario's."""
         row, chosen = self.row(node), parameters or self.node_parameters(node)
-        flags = [flag for flag in topics.FLAGS if getattr(chosen, flag, False)]
+        flags = [flag for flag in topics.TOPIC_FLAGS if getattr(chosen, flag, False)]
         return row.unit_type()(chosen, nodes.reads(row, self.nodes, flags))
 
     def as_yaml(self):
@@ -180,7 +180,7 @@ def text(name_or_path):
     path = pathlib.Path(name_or_path)
     if path.suffix in ('.yaml', '.yml'):
         try:
-            return path.stem, files.read_text(path, plain_yaml.LARGEST)
+            return path.stem, files.read_text(path, plain_yaml.MAX_YAML_BYTES)
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f'scenario file {path}: {plain_yaml.problem(error)}') from None
     entry = _folder() / f'{name_or_path}.yaml'
@@ -197,7 +197,7 @@ def _whole(sections, node):
 
 
 def _is_node(name):
-    return nodes.plain(name) in (OF_BEAMS if nodes.beam_of(name) else RUN)
+    return nodes.plain(name) in (BEAM_NODES if nodes.beam_of(name) else SECTION_NODES)
 
 
 def _sections(name, content):
@@ -210,7 +210,7 @@ def _sections(name, content):
     sections = {}
     for section, body in ((parameter_file.node_of(section), body) for section, body in tree.items()):
         if section != 'scenario' and not _is_node(section):
-            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(RUN)}')
+            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(SECTION_NODES)}')
         whole = isinstance(body, dict) and list(body) == ['ros__parameters']
         values = body['ros__parameters'] or {} if whole else None
         if not isinstance(values, dict):
@@ -223,9 +223,9 @@ def parameters_of(node):
     """The parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`; ScenarioError for
     any other name."""
     if node in ('scenario', 'beam_steering'):
-        return ScenarioParameters if node == 'scenario' else nodes.ARRAY.parameters_type()
+        return ScenarioParameters if node == 'scenario' else nodes.ARRAY_DRIVE.parameters_type()
     if not _is_node(node):
-        raise ScenarioError(f'{node!r} is no node; there are {", ".join(RUN)}, beam_steering, scenario')
+        raise ScenarioError(f'{node!r} is no node; there are {", ".join(SECTION_NODES)}, beam_steering, scenario')
     return nodes.row(node).parameters_type()
 
 
@@ -313,14 +313,14 @@ def checked(changed, seed=None, duration=None, pacing=None):
             header_values[key] = value
     _follow_flight(name, sections.get('tracking_receiver', {}), header_values)
     header = _checked(name, 'scenario', ScenarioParameters, header_values)
-    of_beams = [name for name in nodes.members(OF_BEAMS, header.graph_beams) if nodes.beam_of(name)]
+    of_beams = [name for name in nodes.members(BEAM_NODES, header.graph_beams) if nodes.beam_of(name)]
     for node in sections:
         if nodes.beam_of(node) and node not in of_beams:
             raise ScenarioError(f'scenario {name}: section {node!r}: the scenario has beams = {header.beams}')
     if header.beam:
         for axis in ('azimuth', 'elevation'):
             sections.setdefault('acu', {}).setdefault(f'{axis}.controller', 'beam')
-    for node in (*RUN, *of_beams):
+    for node in (*SECTION_NODES, *of_beams):
         sections.setdefault(node, {})
         _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
     _spread(name, sections, header, seed)
@@ -344,8 +344,8 @@ def _follow_flight(name, receiver_values, header_values):
         return
     from tracking_receiver_sim import track_files  # with scipy, which only a flight needs
     given = {*receiver_values, *({'duration'} & set(header_values))}
-    if not given.issuperset(track_files.OPEN):
-        for key, value in track_files.left_open(target, given).items():
+    if not given.issuperset(track_files.DERIVED_PARAMETERS):
+        for key, value in track_files.derived_parameters(target, given).items():
             (header_values if key == 'duration' else receiver_values).setdefault(key, value)
 
 
@@ -380,7 +380,7 @@ def _spread(name, sections, header, seed):
 
     for node in ('acu', 'tracking_receiver'):
         share(node, 'period', said('adu', 'period'))
-    for owner, key, flag in MEASURED:
+    for owner, key, flag in MEASUREMENT_FLAGS:
         measured = (header.ship or not nodes.row(owner).optional) and said(owner, key, False)
         for node in ('acu', 'recorder'):
             if measured or any(flag in values for section, values in sections.items()
@@ -392,7 +392,7 @@ def _spread(name, sections, header, seed):
         section, key = modelled[0]
         raise ScenarioError(f'scenario {name}, {section}: {key}: the INS tells it; it is of use with '
                             'ins.error_told = false')
-    for owner, key, node, known_as in SHARED:
+    for owner, key, node, known_as in SHARED_PARAMETERS:
         if key in sections[owner]:
             sections[node].setdefault(known_as, sections[owner][key])
     if header.beam:
@@ -415,11 +415,11 @@ def _spread_to_beam(name, node, sections, header, seed):
     if node == own_receiver and (seed is not None or 'seed' not in values):
         spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
         values['seed'] = int(spread.generate_state(1)[0] >> 1)
-    for owner, key, other, known_as in SHARED:
+    for owner, key, other, known_as in SHARED_PARAMETERS:
         own = sections.get(f'{beam}/{owner}', {})
         if nodes.plain(node) == other and key in own:
             values.setdefault(known_as, own[key])
-    for _, key, _ in MEASURED:
+    for _, key, _ in MEASUREMENT_FLAGS:
         if key in sections[own_receiver]:
             raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: is the same for every beam; say it in '
                                 'tracking_receiver')

@@ -6,17 +6,18 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
 
-MOST = 8
-DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low azimuth_high elevation_high; ...' [rad] on the "
-       'deck, clockwise from low to high; empty: none')
+MAX_SECTORS = 8
+BLOCKAGE_DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low azimuth_high elevation_high; ...' [rad] on the "
+                'deck, clockwise from low to high; empty: none')
 
 
 def sectors(text) -> np.ndarray:
-    """The table (MOST, 3) [rad] that `blocked` takes, of a text as in DOC; ParameterError names what is wrong."""
-    table = np.full((MOST, 3), -math.inf)
+    """The table (MAX_SECTORS, 3) [rad] that `blocked` takes, of a text as in BLOCKAGE_DOC; ParameterError names what
+    is wrong."""
+    table = np.full((MAX_SECTORS, 3), -math.inf)
     parts = [part.split() for part in text.split(';') if part.strip()]
-    if len(parts) > MOST:
-        raise ParameterError(f'blockage = {text!r}: {len(parts)} sectors; must be at most {MOST}')
+    if len(parts) > MAX_SECTORS:
+        raise ParameterError(f'blockage = {text!r}: {len(parts)} sectors; must be at most {MAX_SECTORS}')
     for row, words in zip(table, parts):
         try:
             row[:] = [float(word) for word in words]
@@ -34,7 +35,7 @@ def sectors(text) -> np.ndarray:
 @compiled
 def blocked(table, azimuth, elevation):
     """Whether a direction of the deck lies in a sector; not where it is NaN."""
-    for i in range(MOST):
+    for i in range(MAX_SECTORS):
         low, high, top = table[i, 0], table[i, 1], table[i, 2]
         if elevation <= top:
             beyond = azimuth - low

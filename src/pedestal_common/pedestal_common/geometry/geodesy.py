@@ -7,7 +7,7 @@ import numpy as np
 from pedestal_common.parameters import Parameters, parameter
 from pedestal_common.reproducible import cos, sin
 
-EARTH_RADIUS, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
+EARTH_RADIUS_M, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
 """WGS84 [m], [-]."""
 
 EARTH_RATE = 7.29211514670698e-5
@@ -25,7 +25,7 @@ class StationParameters(Parameters):
 def geocentric(latitude, longitude, height):
     """Earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or numbers."""
     e2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
-    N = EARTH_RADIUS / np.sqrt(1.0 - e2 * sin(latitude)**2)
+    N = EARTH_RADIUS_M / np.sqrt(1.0 - e2 * sin(latitude)**2)
     return np.stack([(N + height) * cos(latitude) * cos(longitude),
                      (N + height) * cos(latitude) * sin(longitude),
                      (N * (1.0 - e2) + height) * sin(latitude)], axis=-1)
@@ -42,7 +42,7 @@ def station_frame(station):
 def destination(latitude_deg, longitude_deg, bearing, distance):
     """(latitude, longitude) [deg] of the place at a distance [m] along the great circle that leaves with a bearing
     [rad, clockwise from north], on a sphere: the distance is right to 0.6 %."""
-    phi, delta = math.radians(latitude_deg), distance / EARTH_RADIUS
+    phi, delta = math.radians(latitude_deg), distance / EARTH_RADIUS_M
     sin_there = math.sin(phi) * math.cos(delta) + math.cos(phi) * math.sin(delta) * math.cos(bearing)
     east = math.atan2(math.sin(bearing) * math.sin(delta) * math.cos(phi),
                       math.cos(delta) - math.sin(phi) * sin_there)

@@ -167,7 +167,7 @@ def quaternion(roll, pitch, yaw):
             cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
 
 
-ASHORE = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+ASHORE_ATTITUDE = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
 """Quaternion (x, y, z, w) deck -> earth of a pedestal ashore: the bow points north."""
 
 

@@ -10,15 +10,15 @@ from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
 from pedestal_common.geometry.geodesy import EARTH_RATE, station_frame
-from pedestal_common.graph.steps import DAY
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.reproducible import arctan2, cos, sin, turned
 
-TLE_NUMBERS = (
+TLE_NUMBER_COLUMNS = (
     {'epoch year': (18, 20), 'epoch day': (20, 32)},
     {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
      'mean anomaly': (43, 51), 'mean motion': (52, 63)})
 """Columns of the fields of both TLE lines that must be numbers."""
-TLE_AGE = 30.0
+MAX_TLE_AGE_DAYS = 30.0
 """Largest time from the TLE epoch [days]: beyond it SGP4 is useless."""
 
 
@@ -38,7 +38,7 @@ def satellite(leo_pass) -> Satrec:
         checksum = str(compute_checksum(line))
         if line[68] != checksum:
             raise TargetError(f'{name}: checksum {line[68]!r}, must be {checksum!r}: {line!r}')
-        for field, (first, end) in TLE_NUMBERS[number - 1].items():
+        for field, (first, end) in TLE_NUMBER_COLUMNS[number - 1].items():
             if not line[first:end].replace('.', '', 1).strip().isdigit():
                 raise TargetError(f'{name}: {field} {line[first:end]!r} is not a number')
     if lines[0][2:7] != lines[1][2:7]:
@@ -52,7 +52,7 @@ def satellite(leo_pass) -> Satrec:
 def earth_fixed(julian, fractions, ut1_offset=0.0):
     """Rotations (n, 3, 3) from TEME, the true equator and mean equinox of date, to the earth at julian + fractions
     (n,), UTC."""
-    theta = gstime(julian) + EARTH_RATE * DAY * fractions + EARTH_RATE * ut1_offset
+    theta = gstime(julian) + EARTH_RATE * SECONDS_PER_DAY * fractions + EARTH_RATE * ut1_offset
     c, s = cos(theta), sin(theta)
     to_fixed = np.zeros((len(fractions), 3, 3))
     to_fixed[:, 0, 0], to_fixed[:, 0, 1], to_fixed[:, 1, 0], to_fixed[:, 1, 1], to_fixed[:, 2, 2] = c, s, -s, c, 1.0
@@ -64,7 +64,7 @@ def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
 
     ut1_offset: UT1 - UTC [s].
     """
-    fractions = fraction + times / DAY
+    fractions = fraction + times / SECONDS_PER_DAY
     error, position, velocity = satrec.sgp4_array(np.full(len(times), julian), fractions)
     if error.any():
         i = int(np.argmax(error != 0))

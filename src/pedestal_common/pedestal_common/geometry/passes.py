@@ -1,7 +1,9 @@
 """Passes of a satellite over a station: from when it rises above the horizon until it sets.
 
-The elevation by SGP4 is looked at every LOOK seconds. Where its sign changes the instant is found to a millisecond;
-the culmination is the highest instant between rise and set. A pass shorter than LOOK may be missed: it stays below
+The elevation by SGP4 is looked at every SEARCH_STEP_S seconds. Where its sign changes the instant is found to a
+millisecond;
+the culmination is the highest instant between rise and set. A pass shorter than SEARCH_STEP_S may be missed: it stays
+below
 1 deg.
 """
 import datetime
@@ -13,15 +15,15 @@ from scipy.optimize import brentq, minimize_scalar
 
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.orbit import TargetError
-from pedestal_common.graph.steps import DAY
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 
-LOOK = 20.0
+SEARCH_STEP_S = 20.0
 """Time between two looks [s]."""
-LOWEST = 10.0
+MIN_CULMINATION_DEG = 10.0
 """Culmination [deg] below which a pass is left out: it stays where refraction and buildings are."""
-AHEAD = 5.0
+SEARCH_DAYS = 5.0
 """Time that is searched [days]."""
-LONGEST = 1.0
+MAX_PASS_DAYS = 1.0
 """Of a pass that is searched for [days]: no run is longer."""
 
 
@@ -40,8 +42,9 @@ class Pass(typing.NamedTuple):
         return (self.set - self.rise).total_seconds()
 
 
-def after(satrec, station, begin, days=AHEAD) -> list[Pass]:
-    """The passes that rise after `begin` (datetime, UTC) and set within `days`, those below LOWEST left out.
+def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
+    """The passes that rise after `begin` (datetime, UTC) and set within `days`, those below MIN_CULMINATION_DEG left
+    out.
 
     satrec: as of orbit.satellite; station: StationParameters. Raises TargetError where the satellite does not rise or
     set, or where SGP4 ends.
@@ -58,7 +61,7 @@ def after(satrec, station, begin, days=AHEAD) -> list[Pass]:
     def crossing(i):
         return brentq(lambda t: elevation(t)[0], times[i], times[i + 1], xtol=1e-3)
 
-    times = np.arange(0.0, DAY * days, LOOK)
+    times = np.arange(0.0, SECONDS_PER_DAY * days, SEARCH_STEP_S)
     seen = elevation(times)
     above = seen > 0.0
     if above.all() or not above.any():
@@ -74,45 +77,46 @@ def after(satrec, station, begin, days=AHEAD) -> list[Pass]:
         j = int(later[0])
         best = i + 1 + int(np.argmax(seen[i + 1:j + 1]))
         rise, down = crossing(i), crossing(j)
-        top = minimize_scalar(lambda t: -elevation(t)[0], bounds=(max(rise, times[best] - LOOK),
-                              min(down, times[best] + LOOK)), method='bounded', options={'xatol': 1e-3})
-        if -top.fun >= LOWEST:
+        top = minimize_scalar(lambda t: -elevation(t)[0], bounds=(max(rise, times[best] - SEARCH_STEP_S),
+                              min(down, times[best] + SEARCH_STEP_S)), method='bounded', options={'xatol': 1e-3})
+        if -top.fun >= MIN_CULMINATION_DEG:
             found.append(Pass(*(begin + datetime.timedelta(milliseconds=round(1e3 * t)) for t in (rise, top.x, down)),
                               azimuth(rise), float(-top.fun), azimuth(down)))
     return found
 
 
-def first_look(satrec, now):
+def search_start(satrec, now):
     """(from when passes are counted, why not from now or ''): from now, or from the TLE epoch of an old TLE."""
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
-    age = (now - epoch).total_seconds() / DAY
-    if abs(age) <= orbit.TLE_AGE:
+    age = (now - epoch).total_seconds() / SECONDS_PER_DAY
+    if abs(age) <= orbit.MAX_TLE_AGE_DAYS:
         return now, ''
     return epoch, (f'the TLE of satellite {satrec.satnum_str} is of {epoch:%Y-%m-%d}, {abs(age):.0f} days '
-                   f'{"old" if age > 0.0 else "ahead"}; SGP4 holds for {orbit.TLE_AGE:g}')
+                   f'{"old" if age > 0.0 else "ahead"}; SGP4 holds for {orbit.MAX_TLE_AGE_DAYS:g}')
 
 
-def chosen(satrec, station, which, now) -> Pass:
+def chosen_pass(satrec, station, which, now) -> Pass:
     """The pass that `which` names: 'next' after now, 'N' of those that `after` lists from `first_look`, or the one at
     or after a UTC. now: datetime, UTC. Raises TargetError."""
-    begin, old = first_look(satrec, now)
+    begin, old = search_start(satrec, now)
     if which == 'next' or which.isdecimal():
         if which == 'next' and old:
             raise TargetError(f'--pass next: {old}. Take a new TLE, or name a pass of that time by its number or its '
                               'UTC (--pass list)')
         number = 1 if which == 'next' else int(which)
-        found = after(satrec, station, begin)
+        found = passes_after(satrec, station, begin)
         if not 1 <= number <= len(found):
-            raise TargetError(f'--pass {which}: there are {len(found)} passes above {LOWEST:g} deg within {AHEAD:g} '
+            raise TargetError(f'--pass {which}: there are {len(found)} passes above {MIN_CULMINATION_DEG:g} deg within {SEARCH_DAYS:g} '
                               f'days of {begin:%Y-%m-%dT%H:%M:%SZ}')
         return found[number - 1]
     when = orbit.instant('--pass', which)
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
-    age = (when - epoch).total_seconds() / DAY
-    if abs(age) > orbit.TLE_AGE:
+    age = (when - epoch).total_seconds() / SECONDS_PER_DAY
+    if abs(age) > orbit.MAX_TLE_AGE_DAYS:
         raise TargetError(f'--pass {which}: {age:.1f} days from the TLE epoch {epoch:%Y-%m-%dT%H:%M:%SZ}, must be '
-                          f'within {orbit.TLE_AGE:g}')
-    for found in after(satrec, station, when - datetime.timedelta(days=LONGEST), AHEAD + LONGEST):
+                          f'within {orbit.MAX_TLE_AGE_DAYS:g}')
+    for found in passes_after(satrec, station, when - datetime.timedelta(days=MAX_PASS_DAYS), SEARCH_DAYS
+                              + MAX_PASS_DAYS):
         if found.set > when:
             return found
-    raise TargetError(f'--pass {which}: no pass above {LOWEST:g} deg within {AHEAD:g} days of it')
+    raise TargetError(f'--pass {which}: no pass above {MIN_CULMINATION_DEG:g} deg within {SEARCH_DAYS:g} days of it')

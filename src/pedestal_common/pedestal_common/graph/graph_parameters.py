@@ -4,13 +4,13 @@ import dataclasses
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.nodes import MAX_BEAMS
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 
 
 def topic_flags(names):
     """Return the base of a parameter dataclass that has the flag of each of these topics that has one."""
     flagged = {}
-    for topic in map(topics.BY_NAME.get, names):
+    for topic in map(topics.TOPIC_BY_NAME.get, names):
         if topic.flag:
             flagged.setdefault(topic.flag, []).append(topic.name)
     return dataclasses.make_dataclass('TopicFlags', [
@@ -27,7 +27,8 @@ class GraphParameters(parameters.Parameters):
     beams: int = parameters.parameter(0, 0, MAX_BEAMS, '', 'beams of an electronic array, each of several in '
                                       'its namespace beam_i; 0: a drive with motors')
     deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
-    start: int = parameters.parameter(0, 0, 2**31 * SECOND, 'ns', 'realtime: UTC at which the time of the scenario is '
+    start: int = parameters.parameter(0, 0, 2**31 * NS_PER_SECOND, 'ns',
+                                      'realtime: UTC at which the time of the scenario is '
                                       '0; 0: the day begins')
     future: float = parameters.parameter(0.05, 1e-3, 10.0, 's', 'realtime: a stamp further ahead of the time of this '
                                          'node is refused')
@@ -40,9 +41,9 @@ class GraphParameters(parameters.Parameters):
     def check(self):
         """Raises ParameterError for a name in `nodes` that is no node."""
         for name in self._names:
-            if name not in nodes.NAMES:
+            if name not in nodes.NODE_NAMES:
                 raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}' is none of "
-                                                f'{", ".join(nodes.NAMES)}')
+                                                f'{", ".join(nodes.NODE_NAMES)}')
 
     @property
     def members(self):

@@ -75,7 +75,7 @@ class Column(typing.NamedTuple):
 
 def fields(topic) -> tuple:
     """The Fields of a topic of the table, whose numbers make its record; () of a text."""
-    row = topics.BY_NAME[topic]
+    row = topics.TOPIC_BY_NAME[topic]
     return tuple(field for field in LAYOUTS.get(row.type, ())
                  if field.recorded and field.name in (row.only or (field.name,)))
 
@@ -89,7 +89,7 @@ def _names(field, row):
 
 def columns(topic) -> tuple:
     """The Columns of a topic of the table, in the order of its record."""
-    row = topics.BY_NAME[topic]
+    row = topics.TOPIC_BY_NAME[topic]
     return tuple(Column(name := field.column.format(part), field.name, row.units.get(name, field.unit),
                         field.tolerance)
                  for field in fields(topic) for part in _names(field, row))
@@ -112,7 +112,7 @@ def column(type_name, path, texts):
 
 def unit(topic, type_name, column) -> str:
     """The unit of a column of a topic of this type, '' for one that has none or is not known."""
-    row = topics.BY_NAME.get(topic)
+    row = topics.TOPIC_BY_NAME.get(topic)
     if row is None or row.type != type_name:
         return ''
     if column in row.units:
@@ -126,5 +126,5 @@ def unit(topic, type_name, column) -> str:
 
 def of_filter(steps, name):
     """(n, 2): a number of topics.FILTER for both axes, in records (n,) that hold acu/filter."""
-    numbers = steps['acu/filter']['position'].reshape(len(steps), len(topics.AXES), len(topics.FILTER))
-    return numbers[:, :, list(topics.FILTER).index(name)]
+    numbers = steps['acu/filter']['position'].reshape(len(steps), len(topics.AXES), len(topics.FILTER_UNITS))
+    return numbers[:, :, list(topics.FILTER_UNITS).index(name)]

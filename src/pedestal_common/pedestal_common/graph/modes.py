@@ -4,7 +4,7 @@ import typing
 
 
 class Row(typing.NamedTuple):
-    """A row of TABLE.
+    """A row of MODE_ROWS.
 
     doc: what the axes do; entry: when it can be entered; exit: when it ends by itself. needs, ends: of the Conditions
     in acu_tracker.modes, the one without which it cannot be entered and the one without which it ends, '' for none.
@@ -31,7 +31,7 @@ class Row(typing.NamedTuple):
     button: bool = True
 
 
-TABLE = (
+MODE_ROWS = (
     Row('standby', 'rate command 0', 'always; after a fault'),
     Row('stop', 'the axes stand where they come to rest', 'encoders valid', button=False),
     Row('stow', 'the stow angles; with `stow_pins` the pins go in once the axes stand there',
@@ -73,4 +73,4 @@ TABLE = (
 """Another mode is a row here. A condition of its own is a field of acu_tracker.modes.Conditions; guidance has what it
 asks of the axes."""
 
-MODES = tuple(row.name for row in TABLE)
+MODES = tuple(row.name for row in MODE_ROWS)

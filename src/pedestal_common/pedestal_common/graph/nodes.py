@@ -8,14 +8,14 @@ import importlib
 import re
 import typing
 
-from pedestal_common.graph.topics import BY_NAME, TOPICS
+from pedestal_common.graph.topics import TOPIC_BY_NAME, TOPICS
 
 MAX_BEAMS = 16
 
-STAND_IN = 'replay'
+REPLAY_NODE = 'replay'
 """The node that replays a recording to the others."""
 
-DRIVE = 'adu'
+DRIVE_NODE = 'adu'
 """The node that owns the time."""
 
 
@@ -101,7 +101,7 @@ NODES = (
          answer='acu/rate_command',
          obeys='acu/command', replies='acu/command_result',
          doc='antenna control unit: filter, modes, position loop', stands_for='the product itself', of_beam=True),
-    Node(DRIVE, 'adu_drive.adu_node', 'adu_drive.params:AduNodeParameters', 'adu_drive.unit:Adu',
+    Node(DRIVE_NODE, 'adu_drive.adu_node', 'adu_drive.params:AduNodeParameters', 'adu_drive.unit:Adu',
          reads=('clock', 'acu/rate_command', 'ship/truth', 'acu/stow_pins'),
          writes=('joint_states', 'adu/truth', 'clock', 'adu/motor_states', 'adu/state', 'adu/stow_pins'),
          answer='joint_states', obeys='adu/inject', replies='adu/injected',
@@ -115,34 +115,34 @@ NODES = (
 )
 """In the order in which a graph is started. Those with a unit write `diagnostics` as well."""
 
-ARRAY = Node(DRIVE, 'adu_drive.beam_steering_node', 'adu_drive.params:BeamParameters',
-             'adu_drive.array.beam_unit:Beam',
-             reads=('clock', 'acu/reference'),
-             writes=('joint_states', 'adu/truth', 'clock', 'adu/state'),
-             answer='joint_states',
-             doc='electronically steered array in the place of the drive (`beam: true`): no motors',
-             stands_for='beam steering computer and array')
+ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.params:BeamParameters',
+                   'adu_drive.array.beam_unit:Beam',
+                   reads=('clock', 'acu/reference'),
+                   writes=('joint_states', 'adu/truth', 'clock', 'adu/state'),
+                   answer='joint_states',
+                   doc='electronically steered array in the place of the drive (`beam: true`): no motors',
+                   stands_for='beam steering computer and array')
 """The drive of an array: it obeys angles instead of rates and does not feel the ship."""
 
-NAMES = tuple(node.name for node in NODES)
-UNITS = (*(node for node in NODES if node.unit), ARRAY)
+NODE_NAMES = tuple(node.name for node in NODES)
+UNIT_NODES = (*(node for node in NODES if node.unit), ARRAY_DRIVE)
 
-OF_BEAM = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
-                     *(topic for node in NODES if node.of_beam
-                       for topic in (*node.writes, node.obeys, node.replies) if topic)))
+BEAM_TOPICS = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
+                         *(topic for node in NODES if node.of_beam
+                           for topic in (*node.writes, node.obeys, node.replies) if topic)))
 """Topics that each beam of several has of its own: what its nodes write, and what shared nodes write for each."""
 
 
 def row(name, array=False) -> Node:
     """The Node of a name, 'beam_2/acu' as well as 'acu'; array: of a graph whose drive is an electronic array."""
-    if array and name == DRIVE:
-        return ARRAY
-    return NODES[NAMES.index(plain(name))]
+    if array and name == DRIVE_NODE:
+        return ARRAY_DRIVE
+    return NODES[NODE_NAMES.index(plain(name))]
 
 
 def of_executable(module) -> Node:
     """The Node that a module runs."""
-    return next(node for node in (*NODES, ARRAY) if node.module == module)
+    return next(node for node in (*NODES, ARRAY_DRIVE) if node.module == module)
 
 
 def beam_of(name):
@@ -189,7 +189,7 @@ def links(beams=0) -> dict:
                    and node.name not in writers]
         if not writers and not (readers and topic.rate == 'command'):
             continue
-        for prefix in prefixes(beams) if topic.name in OF_BEAM else ('',):
+        for prefix in prefixes(beams) if topic.name in BEAM_TOPICS else ('',):
             of_this = [tuple(name for name in members(names, beams)
                              if not prefix or beam_of(name) in ('', prefix[:-1])) for names in (writers, readers)]
             links[prefix + topic.name] = Link(prefix + topic.name, topic.type, topic.rate, topic.flag, *of_this)
@@ -206,7 +206,7 @@ def recorded(names, flags=(), beams=0) -> list:
 
 def held(names) -> frozenset:
     """Those of these topics of a graph that hold (see Topic)."""
-    return frozenset(name for name in names if BY_NAME[plain(name)].holds)
+    return frozenset(name for name in names if TOPIC_BY_NAME[plain(name)].holds)
 
 
 def readers(link, names):
@@ -225,6 +225,6 @@ def reads(node, names, flags=()) -> tuple:
     def is_read(topic):
         writers = [other for other in NODES if topic in other.writes]
         absent = all(other.optional and other.name not in plain_names for other in writers)
-        flag = BY_NAME[topic].flag
+        flag = TOPIC_BY_NAME[topic].flag
         return topic == node.reads[0] or not absent and (not flag or flag in flags)
     return tuple(topic for topic in node.reads if is_read(topic))

@@ -1,9 +1,9 @@
 """Step matching: which messages belong to step t_k. No ROS here: a recorded run is matched as its nodes were."""
 import collections
 
-SECOND = 1_000_000_000
+NS_PER_SECOND = 1_000_000_000
 """[ns]"""
-DAY = 86_400
+SECONDS_PER_DAY = 86_400
 """[s]"""
 
 
@@ -49,14 +49,14 @@ class Steps:
         """One input has come; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
         last = self._last[topic]
         if last is not None and stamp <= last:
-            self._refuse(f'{topic} stamp went back from {last / SECOND:.6f} to {stamp / SECOND:.6f} s')
+            self._refuse(f'{topic} stamp went back from {last / NS_PER_SECOND:.6f} to {stamp / NS_PER_SECOND:.6f} s')
             return
         self._last[topic] = stamp
         if topic == self.trigger:
             if self._lockstep and last is not None:
                 if self._period is not None and stamp - last != self._period:
-                    raise GraphError(f'{topic} stamp jumped from {last / SECOND:.6f} to {stamp / SECOND:.6f} s; '
-                                     f'the period is {self._period / SECOND:.6f} s')
+                    raise GraphError(f'{topic} stamp jumped from {last / NS_PER_SECOND:.6f} to {stamp / NS_PER_SECOND:.6f} s; '
+                                     f'the period is {self._period / NS_PER_SECOND:.6f} s')
                 self._period = stamp - last
             self._ahead.append((stamp, message))
             if self._pending is not None and not self._lockstep:
@@ -105,8 +105,8 @@ class Steps:
         if not arrived:
             return False
         if self._lockstep and arrived[0][0] != due:
-            raise GraphError(f'{topic} is stamped {arrived[0][0] / SECOND:.6f} s where {due / SECOND:.6f} s is due; '
-                             f'is its latency what this node was told ({self._latency[topic] / SECOND:.6f} s)?')
+            raise GraphError(f'{topic} is stamped {arrived[0][0] / NS_PER_SECOND:.6f} s where {due / NS_PER_SECOND:.6f} s is due; '
+                             f'is its latency what this node was told ({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
         return arrived[0][0] >= due
 
     def give_up(self):

@@ -6,33 +6,33 @@ Rate
     second  one per writer at every whole second of the drive's time
     change  whenever it changes; it belongs to the step that its writer answers next
     command whenever somebody asks; what it did, and before which step, is told by the reply
-The rate gives the quality of service: see QOS.
+The rate gives the quality of service: see QOS_BY_RATE.
 """
 import typing
 
 AXES = ('azimuth', 'elevation')
-MOTORS = tuple(f'{axis}_motor_{i}' for axis in AXES for i in (1, 2))
+MOTOR_NAMES = tuple(f'{axis}_motor_{i}' for axis in AXES for i in (1, 2))
 MOTION_MODELS = ('cv', 'ca', 'singer', 'current_statistical')
 """Motion models of the target that the ACU's filters know."""
 
-FILTER = {'innovation': 'rad', 'rate_innovation': 'rad/s', 'nis': '', 'sigma': 'rad', 'rate_sigma': 'rad/s',
-          'correlation': '', 'innovation_sigma': 'rad', **dict.fromkeys(MOTION_MODELS, '')}
+FILTER_UNITS = {'innovation': 'rad', 'rate_innovation': 'rad/s', 'nis': '', 'sigma': 'rad', 'rate_sigma': 'rad/s',
+                'correlation': '', 'innovation_sigma': 'rad', **dict.fromkeys(MOTION_MODELS, '')}
 """{number: unit} that acu/filter tells of the filter of one axis; of a model its probability."""
 
-ENABLED = ('enabled', 'enabled: azimuth motor lost', 'enabled: elevation motor lost',
-           'enabled: azimuth and elevation motor lost')
+ENABLED_STATES = ('enabled', 'enabled: azimuth motor lost', 'enabled: elevation motor lost',
+                  'enabled: azimuth and elevation motor lost')
 """Texts of adu/state with which the drive follows commands: bit 0 of their place says that the azimuth has one motor
 of its pair only, bit 1 that the elevation has."""
 
-PINS = ('out', 'moving', 'in', 'failed')
+PIN_STATE_TEXTS = ('out', 'moving', 'in', 'failed')
 """Of a stow pin: it lets its axis move, is on its way, holds it; it is not where it was sent."""
 
-SILENT = -1
+NO_TEXT_CODE = -1
 """In records the code of a text or a list that was never published."""
 
 
 class Qos(typing.NamedTuple):
-    """Quality of service of a rate: a row of QOS. Writers are reliable, and so are readers in lockstep.
+    """Quality of service of a rate: a row of QOS_BY_RATE. Writers are reliable, and so are readers in lockstep.
 
     latched     who comes late gets the last message
     lockstep    messages kept by writers and readers in lockstep; 0: all
@@ -53,14 +53,14 @@ class Qos(typing.NamedTuple):
     unlatched: bool = False
 
 
-QOS = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reliable=False, recorded=4000),
-       'once': Qos(latched=True, lockstep=1, written=1, read=1, reliable=True, recorded=100, unlatched=True),
-       'change': Qos(latched=True, lockstep=1, written=1, read=8, reliable=True, recorded=1000),
-       'command': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
-       'reply': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
-       'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000)}
+QOS_BY_RATE = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reliable=False, recorded=4000),
+               'once': Qos(latched=True, lockstep=1, written=1, read=1, reliable=True, recorded=100, unlatched=True),
+               'change': Qos(latched=True, lockstep=1, written=1, read=8, reliable=True, recorded=1000),
+               'command': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
+               'reply': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
+               'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000)}
 
-BETWEEN_STEPS = 'change', 'reply'
+EVENT_RATES = 'change', 'reply'
 """Rates of what is said between two steps, when there is something to say."""
 
 
@@ -104,17 +104,18 @@ TOPICS = (
           '`azimuth`, `elevation`: true deck angle [rad] and rate [rad/s] of the dish, or of the beam of an array: '
           'what simulated equipment reads, and the ACU never', frame='base_link', only=('position', 'velocity')),
     Topic('adu/motor_states', 'sensor_msgs/msg/JointState', 'step',
-          '`azimuth_motor_1` ... `elevation_motor_2`: shaft angle [rad], rate [rad/s], torque [Nm]', names=MOTORS,
+          '`azimuth_motor_1` ... `elevation_motor_2`: shaft angle [rad], rate [rad/s], torque [Nm]', names=MOTOR_NAMES,
           frame='base_link'),
     Topic('adu/state', 'std_msgs/msg/String', 'change',
           '`enabled` when the drive follows commands, `enabled: azimuth motor lost` when with one motor of a pair; '
           'otherwise why not: `stopping`, `engaging brakes`, `disabled`, `releasing brakes`, `emergency stop`, '
           '`fault: azimuth overspeed, ...`',
-          texts=(*ENABLED, 'stopping', 'engaging brakes', 'disabled', 'releasing brakes', 'emergency stop'),
+          texts=(*ENABLED_STATES, 'stopping', 'engaging brakes', 'disabled', 'releasing brakes', 'emergency stop'),
           inputs={'code': 'drive'}),
     Topic('adu/stow_pins', 'std_msgs/msg/String', 'change',
           'where the stow pin of each axis is: `azimuth out, elevation out`, ...; `out`, `moving`, `in`, `failed`',
-          texts=tuple(f'azimuth {azimuth}, elevation {elevation}' for azimuth in PINS for elevation in PINS),
+          texts=tuple(f'azimuth {azimuth}, elevation {elevation}' for azimuth in PIN_STATE_TEXTS
+                      for elevation in PIN_STATE_TEXTS),
           measured='stow_pins', flag='stow_pins', inputs={'code': 'pins'}),
     Topic('ship/truth', 'nav_msgs/msg/Odometry', 'step',
           'pose of `base_link` (FLU) in `earth` (ENU), twist in `base_link`', frame='earth', child='base_link'),
@@ -166,9 +167,9 @@ TOPICS = (
           'one point: what the position loop follows, deck angles at t_k', frame='base_link'),
     Topic('acu/filter', 'sensor_msgs/msg/JointState', 'step',
           'named numbers of each axis, all in `position`, NaN where there is none in this step: '
-          + ', '.join(f'`azimuth_{name}`' + (f' [{unit}]' if unit else '') for name, unit in FILTER.items()),
-          names=tuple(f'{axis}_{name}' for axis in AXES for name in FILTER), frame='earth', only=('position',),
-          units={f'{axis}_{name}.position': unit for axis in AXES for name, unit in FILTER.items()}),
+          + ', '.join(f'`azimuth_{name}`' + (f' [{unit}]' if unit else '') for name, unit in FILTER_UNITS.items()),
+          names=tuple(f'{axis}_{name}' for axis in AXES for name in FILTER_UNITS), frame='earth', only=('position',),
+          units={f'{axis}_{name}.position': unit for axis in AXES for name, unit in FILTER_UNITS.items()}),
     Topic('acu/mode', 'std_msgs/msg/String', 'change', 'the mode'),
     Topic('acu/stow_pins', 'std_msgs/msg/String', 'change',
           'where the stow pins shall be: `out` or `in`; nothing until one of the modes `stow` and `unstow` says so',
@@ -198,5 +199,5 @@ TOPICS = (
     Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'second', 'state of each node'),
 )
 
-BY_NAME = {topic.name: topic for topic in TOPICS}
-FLAGS = tuple(dict.fromkeys(topic.flag for topic in TOPICS if topic.flag))
+TOPIC_BY_NAME = {topic.name: topic for topic in TOPICS}
+TOPIC_FLAGS = tuple(dict.fromkeys(topic.flag for topic in TOPICS if topic.flag))

@@ -11,27 +11,27 @@ force break it again: no fault has to remember what it found.
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import table
-from pedestal_common.wire.records import NEVER
+from pedestal_common.wire.records import NO_STAMP
 
-SLOTS = 16
+MAX_ACTIVE_FAULTS = 16
 """Faults that can be in force in a node at a time."""
 
-ROW = np.dtype([('used', 'i8'), ('fault', 'i8'), ('end', 'i8'), ('duration', 'i8'),
-                ('values', 'f8', (table.MOST_VALUES,))], align=True)
+FAULT_DTYPE = np.dtype([('used', 'i8'), ('fault', 'i8'), ('end', 'i8'), ('duration', 'i8'),
+                        ('values', 'f8', (table.MAX_FAULT_VALUES,))], align=True)
 """used: 1 of one that is in force; fault: table.code; end: the stamp [ns] of the first step in which it is not, NEVER
 before its first step; duration [ns]; values of its arguments, of an option its place."""
 
-SCHEDULE = np.dtype([('stamp', 'i8'), ('pending', 'i8'), ('row', ROW, (SLOTS,))], align=True)
+SCHEDULE_DTYPE = np.dtype([('stamp', 'i8'), ('pending', 'i8'), ('row', FAULT_DTYPE, (MAX_ACTIVE_FAULTS,))], align=True)
 """stamp: of the last step [ns], NEVER before the first; pending: 1 while the law has to look: a fault is in force, or
 was in the last step."""
 
 
 def empty() -> np.ndarray:
-    """SCHEDULE (1,) before the first step: nothing is injected."""
-    made = np.zeros(1, SCHEDULE)
-    made['stamp'] = NEVER
+    """SCHEDULE_DTYPE (1,) before the first step: nothing is injected."""
+    made = np.zeros(1, SCHEDULE_DTYPE)
+    made['stamp'] = NO_STAMP
     return made
 
 
@@ -53,7 +53,7 @@ def in_force(schedule, row, stamp):
     """Whether a row is in force in the step of a stamp [ns]; a new one is from this step on."""
     if row.used == 0:
         return False
-    if row.end == NEVER:
+    if row.end == NO_STAMP:
         row.end = stamp + row.duration
     if stamp >= row.end:
         row.used = 0
@@ -63,13 +63,14 @@ def in_force(schedule, row, stamp):
 
 
 def add(schedule, code, values, duration):
-    """Put a fault into a SCHEDULE, in force from the next step on for a duration [s]. Raises ValueError where no slot
+    """Put a fault into a SCHEDULE_DTYPE, in force from the next step on for a duration [s]. Raises ValueError where
+    no slot
     is free."""
     free = np.flatnonzero(schedule['row']['used'] == 0)
     if not free.size:
-        raise ValueError(f'{SLOTS} faults are in force, which is all a node can have at a time')
+        raise ValueError(f'{MAX_ACTIVE_FAULTS} faults are in force, which is all a node can have at a time')
     row = schedule['row'][free[0]]
-    row['used'], row['fault'], row['end'], row['duration'] = 1, code, NEVER, round(duration * SECOND)
+    row['used'], row['fault'], row['end'], row['duration'] = 1, code, NO_STAMP, round(duration * NS_PER_SECOND)
     row['values'] = 0.0
     row['values'][:len(values)] = values
     schedule['pending'] = 1

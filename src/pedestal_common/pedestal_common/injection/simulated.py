@@ -1,9 +1,9 @@
 """A unit of simulated equipment: faults can be injected into it."""
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import schedule, table
 from pedestal_common.node.unit import Unit
 from pedestal_common.wire.commands import Reply
-from pedestal_common.wire.records import NEVER
+from pedestal_common.wire.records import NO_STAMP
 
 
 class Simulated(Unit):
@@ -17,8 +17,8 @@ class Simulated(Unit):
     def obey(self, command, arguments):
         """Inject a fault, from the next step on; the Reply names the stamp of the step before."""
         part, node = self.parts['schedule'], self.NODE.name
-        since = '' if part['stamp'] == NEVER else f' from the step after {part["stamp"] / SECOND:.6f} s on'
-        if command.verb == table.CLEAR.name:
+        since = '' if part['stamp'] == NO_STAMP else f' from the step after {part["stamp"] / NS_PER_SECOND:.6f} s on'
+        if command.verb == table.CLEAR_COMMAND.name:
             schedule.clear(part)
             return Reply(True, f'no fault{since}')
         refusal = self.lockstep and table.refused_in_lockstep(node, command.verb)
@@ -27,7 +27,8 @@ class Simulated(Unit):
         *values, duration = [argument.options.index(arguments[argument.name]) if argument.options else
                              arguments[argument.name] for argument in self._fault(command.verb).arguments]
         schedule.add(part, table.code(node, command.verb), values, duration)
-        return Reply(True, f'{command.verb}{since}' + (f', for {duration:g} s' if duration < table.LONGEST else ''))
+        return Reply(True, f'{command.verb}{since}' + (f', for {duration:g} s' if duration < table.MAX_FAULT_DURATION_S
+                                                       else ''))
 
     def _fault(self, name):
-        return table.FAULTS[self.NODE.name][table.code(self.NODE.name, name)]
+        return table.INJECTED_FAULTS[self.NODE.name][table.code(self.NODE.name, name)]

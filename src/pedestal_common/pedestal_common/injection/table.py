@@ -6,7 +6,7 @@ A fault is a verb that a simulated node obeys on its topic `NODE/inject` and in 
 import typing
 
 from pedestal_common.parameters import ParameterError
-from pedestal_common.wire.commands import Argument, Verb, schedule
+from pedestal_common.wire.commands import Argument, CommandDefinition, schedule
 
 
 class Fault(typing.NamedTuple):
@@ -21,9 +21,10 @@ class Fault(typing.NamedTuple):
     lockstep: bool = True
 
 
-LONGEST = 86400.0
+MAX_FAULT_DURATION_S = 86400.0
 
-_DURATION = Argument('duration', 'how long; left out: to the end', 1e-3, LONGEST, 's', default=LONGEST)
+_DURATION = Argument('duration', 'how long; left out: to the end', 1e-3, MAX_FAULT_DURATION_S, 's',
+                     default=MAX_FAULT_DURATION_S)
 
 
 def _fault(name, doc, *arguments, lockstep=True):
@@ -48,10 +49,10 @@ def _noise(default, high, unit):
 _AXIS = _option('axis', 'of the pedestal', 'azimuth', 'elevation')
 _MOTOR = _option('motor', 'of its axis', '1', '2')
 _DECK_AXIS = _option('axis', 'of the deck, FLU', 'x', 'y', 'z')
-_LATE = _number('time', 'by which', 0.05, 0.1, 's', low=1e-3)
-_AHEAD = _number('time', 'by which, positive ahead', 0.1, 10.0, 's')
+_DELAY = _number('time', 'by which', 0.05, 0.1, 's', low=1e-3)
+_CLOCK_OFFSET = _number('time', 'by which, positive ahead', 0.1, 10.0, 's')
 
-FAULTS = {
+INJECTED_FAULTS = {
     'adu': (
         _fault('motor_loss', 'the inverter of a motor is off: no current, no torque', _AXIS, _MOTOR),
         _fault('encoder_jump', 'the load encoder reads more', _AXIS, _number('size', 'by which', 0.01, 3.2, 'rad')),
@@ -63,14 +64,14 @@ FAULTS = {
         _fault('gust', 'a torque on the load, at once', _AXIS, _number('torque', 'on the axis', 2000.0, 1e5, 'Nm')),
         _fault('pin_stuck', 'a stow pin stays where it is', _AXIS),
         _fault('drop', 'commands do not reach it'),
-        _fault('delay', 'commands reach it late', _LATE),
+        _fault('delay', 'commands reach it late', _DELAY),
         _fault('freeze', '`joint_states` and `adu/motor_states` keep their numbers under new stamps'),
         _fault('bias', 'the rate on `joint_states` is wrong', _AXIS, _number('size', 'by which', 0.1, 3.0, 'rad/s')),
         _fault('nan', 'the numbers of `joint_states` are NaN'),
         _fault('noise', 'white noise on the angles of `joint_states`', *_noise(1e-3, 1.0, 'rad'))),
     'tracking_receiver': (
         _fault('drop', 'its results do not come', lockstep=False),
-        _fault('delay', 'its results come late, their stamps are right', _LATE, lockstep=False),
+        _fault('delay', 'its results come late, their stamps are right', _DELAY, lockstep=False),
         _fault('freeze', 'its results keep their numbers under new stamps'),
         _fault('bias', 'its errors are wrong', _number('cross_elevation', 'by which', 0.002, 0.1, 'rad'),
                _number('elevation', 'by which', 0.0, 0.1, 'rad')),
@@ -80,7 +81,7 @@ FAULTS = {
         _fault('wrong_slope', 'difference channels have the wrong sign',
                _option('axis', 'which of them', 'both', 'cross_elevation', 'elevation')),
         _fault('phase_180', 'the difference channels are turned by 180 deg against the sum'),
-        _fault('clock_step', 'its clock steps: the stamps of its results are wrong', _AHEAD, lockstep=False)),
+        _fault('clock_step', 'its clock steps: the stamps of its results are wrong', _CLOCK_OFFSET, lockstep=False)),
     'ship_motion': (
         _fault('drop', 'the IMU is silent', lockstep=False),
         _fault('freeze', 'the IMU keeps its numbers under new stamps'),
@@ -90,7 +91,7 @@ FAULTS = {
         _fault('noise', 'white noise on the rates of the IMU', *_noise(0.05, 1.0, 'rad/s'))),
     'ins': (
         _fault('drop', 'its attitude does not come', lockstep=False),
-        _fault('delay', 'its attitude comes late, its stamps are right', _LATE, lockstep=False),
+        _fault('delay', 'its attitude comes late, its stamps are right', _DELAY, lockstep=False),
         _fault('freeze', 'attitude and rate keep their numbers under new stamps'),
         _fault('bias', 'its deck rate is wrong', _DECK_AXIS, _number('rate', 'by which', 0.01, 1.0, 'rad/s')),
         _fault('nan', 'its numbers are NaN'),
@@ -98,29 +99,29 @@ FAULTS = {
         _fault('ins_jump', 'its attitude jumps, and back at the end', _number('roll', 'by which', 0.0, 3.2, 'rad'),
                _number('pitch', 'by which', 0.0, 1.6, 'rad'),
                _number('heading', 'by which, clockwise', 0.02, 3.2, 'rad')),
-        _fault('clock_step', 'its clock steps: the stamps of its attitude are wrong', _AHEAD, lockstep=False))}
+        _fault('clock_step', 'its clock steps: the stamps of its attitude are wrong', _CLOCK_OFFSET, lockstep=False))}
 """{node: its Faults}, by the names of nodes.NODES."""
 
-CLEAR = Verb('clear', 'ends all faults of the node')
+CLEAR_COMMAND = CommandDefinition('clear', 'ends all faults of the node')
 
-VERBS = {node: (*faults, CLEAR) for node, faults in FAULTS.items()}
+INJECT_COMMANDS = {node: (*faults, CLEAR_COMMAND) for node, faults in INJECTED_FAULTS.items()}
 """{node: what it obeys on `NODE/inject`}."""
 
-MOST_VALUES = max(len(fault.arguments) for faults in FAULTS.values() for fault in faults) - 1
+MAX_FAULT_VALUES = max(len(fault.arguments) for faults in INJECTED_FAULTS.values() for fault in faults) - 1
 """Arguments of a fault beside its duration."""
 
-DOC = "faults injected at times [s]: 'AT FAULT argument=value ... duration=s; ...'; empty: none"
+INJECT_DOC = "faults injected at times [s]: 'AT FAULT argument=value ... duration=s; ...'; empty: none"
 """Of the parameter `inject`."""
 
 
 def code(node, name) -> int:
     """The number of a fault among those of its node, for compiled laws."""
-    return [fault.name for fault in FAULTS[node]].index(name)
+    return [fault.name for fault in INJECTED_FAULTS[node]].index(name)
 
 
 def due(node, text) -> list:
     """[(at [ns], Command)] of the parameter `inject` of a node, in order of time. Raises ParameterError."""
-    return schedule('inject', text, VERBS[node])
+    return schedule('inject', text, INJECT_COMMANDS[node])
 
 
 def check_pacing(node, text, lockstep):
@@ -132,7 +133,7 @@ def check_pacing(node, text, lockstep):
 
 def refused_in_lockstep(node, name) -> str:
     """Why a lockstep graph cannot have a fault of a node, '' where it can."""
-    fault = next((fault for fault in FAULTS[node] if fault.name == name), None)
+    fault = next((fault for fault in INJECTED_FAULTS[node] if fault.name == name), None)
     if fault is None or fault.lockstep:
         return ''
     return f'{name} of {node}: {fault.doc}; in lockstep everybody would wait, it takes pacing realtime'

@@ -10,14 +10,14 @@ from rclpy.signals import SignalHandlerOptions
 
 from pedestal_common.graph import topics
 
-PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
+DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
 """{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
 
 
 def qos(rate, role='lockstep') -> QoSProfile:
     """The profile of topics of a rate: in lockstep for writers and readers, in realtime of a role `written`, `read` or
     `recorded` (see topics.Qos)."""
-    row = topics.QOS[rate]
+    row = topics.QOS_BY_RATE[rate]
     depth, reliable = getattr(row, role), role != 'read' or row.reliable
     return QoSProfile(history=HistoryPolicy.KEEP_LAST if depth else HistoryPolicy.KEEP_ALL, depth=depth or 1,
                       reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
@@ -39,8 +39,8 @@ def set_defaults():
     SUBNET: the graph may spread over several hosts, by UDP (fastdds_subnet.xml).
     """
     scope = os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    if scope in PROFILES:
-        profile = str(pathlib.Path(__file__).parents[1] / PROFILES[scope])
+    if scope in DDS_PROFILES:
+        profile = str(pathlib.Path(__file__).parents[1] / DDS_PROFILES[scope])
         chosen = os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', profile)
         if (scope, chosen) == ('LOCALHOST', profile):
             os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SYSTEM_DEFAULT'

@@ -23,20 +23,20 @@ from rclpy.node import Node
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
-from pedestal_common.graph.steps import DAY, SECOND, GraphError
+from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY, GraphError
 from pedestal_common.node import middleware
 from pedestal_common.node.diagnostics import Diagnostics
-from pedestal_common.node.listening import Listener, subscribe
+from pedestal_common.node.subscriptions import TopicSubscriber, subscribe
 from pedestal_common.realtime import utc
 from pedestal_common.wire import messages
 
-START_DEADLINE = 300.0
+START_DEADLINE_S = 300.0
 """Seconds a node waits for its graph: the others may be compiling their laws for the first time."""
 
-PARTING = 1.0
+ACKNOWLEDGE_TIMEOUT_S = 1.0
 """Seconds a node that ends waits for readers to take what it published."""
 
-FAREWELL = 0.1
+EXIT_DELAY_S = 0.1
 """Seconds it stays when its endpoints have left."""
 
 class Stopped(BaseException):  # noqa: N818  no error: the node was told to stop
@@ -44,8 +44,8 @@ class Stopped(BaseException):  # noqa: N818  no error: the node was told to stop
     numba would take for an error of the law it compiles."""
 
 
-EXPECTED = (parameters.ParameterError, GraphError, ValueError, OSError, InvalidParameterTypeException,
-            InvalidParameterValueException, Stopped)
+EXPECTED_ERRORS = (parameters.ParameterError, GraphError, ValueError, OSError, InvalidParameterTypeException,
+                   InvalidParameterValueException, Stopped)
 """What a node may end with in one line; anything else is a defect and shows its traceback."""
 
 _stop = []
@@ -55,10 +55,10 @@ _compiling = []
 """Not empty while it compiles, which can be cut short."""
 
 
-STOPS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
+STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
 """What a node is stopped by; the last only by itself, see _on_signal."""
 
-AGAIN = 0.02
+STOP_RETRY_S = 0.02
 """Seconds after which a node that could not be stopped at once stops itself."""
 
 _HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
@@ -73,7 +73,7 @@ def _on_signal(_number, frame):
         if frame.f_code.co_name in _HOOKS:
             # A signal that comes while machine code is made is always told here: it would be a message on stderr, and
             # the code would be lost.
-            signal.setitimer(signal.ITIMER_REAL, AGAIN)
+            signal.setitimer(signal.ITIMER_REAL, STOP_RETRY_S)
             return
         frame = frame.f_back
     raise Stopped
@@ -137,7 +137,7 @@ class Shell(Node):
     def _place(self, name):
         """(namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their end."""
         namespace = self.get_namespace().rstrip('/') + '/'
-        prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NAMES
+        prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NODE_NAMES
                        and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')
         return namespace.removesuffix(prefix), prefix
 
@@ -199,7 +199,7 @@ class Shell(Node):
         """The stamp [ns] at which the time of the units is 0: 0 in lockstep, `graph.start`, or the day's beginning
         of the first stamp that is asked for."""
         if self._epoch is None:
-            self._epoch = stamp // (DAY * SECOND) * DAY * SECOND
+            self._epoch = stamp // (SECONDS_PER_DAY * NS_PER_SECOND) * SECONDS_PER_DAY * NS_PER_SECOND
         return self._epoch
 
     def writer(self, name):
@@ -221,7 +221,7 @@ class Shell(Node):
                                      self._guarded(lambda data: take(decode(data)[1], False)),
                                      middleware.qos(link.rate), raw=True)
         else:
-            listener = Listener(self, link, ros_name, decode, take)
+            listener = TopicSubscriber(self, link, ros_name, decode, take)
             self.listeners.append(listener)
             listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
 
@@ -244,7 +244,7 @@ class Shell(Node):
         def call(*args):
             try:
                 function(*args)
-            except EXPECTED as error:
+            except EXPECTED_ERRORS as error:
                 self.failure = self.failure or error
                 self.finished = True
         call.__signature__ = inspect.signature(function)
@@ -268,10 +268,10 @@ class Shell(Node):
             self._started = True
             if self.graph.lockstep:
                 self.await_graph()
-                self._next_second = -(-stamp // SECOND) * SECOND
+                self._next_second = -(-stamp // NS_PER_SECOND) * NS_PER_SECOND
             self.get_logger().info('runs')
         if self.graph.lockstep and stamp >= self._next_second:
-            self._next_second = (stamp // SECOND + 1) * SECOND
+            self._next_second = (stamp // NS_PER_SECOND + 1) * NS_PER_SECOND
             self.diagnostics.publish(stamp)
 
     def prepare(self, unit):
@@ -305,14 +305,14 @@ class Shell(Node):
     def await_graph(self):
         """Wait until every topic this node writes has all its readers of the run.
 
-        Raises GraphError after START_DEADLINE, or when another graph writes the same topics.
+        Raises GraphError after START_DEADLINE_S, or when another graph writes the same topics.
         """
-        deadline = time.monotonic() + START_DEADLINE
+        deadline = time.monotonic() + START_DEADLINE_S
         for link, publisher in self.publishers_by_link.items():
             wanted = nodes.readers(link, self.graph.members)
             while missing := self._missing(publisher, wanted):
                 if time.monotonic() > deadline:
-                    raise GraphError(f'{link.name} is not read by {", ".join(missing)} after {START_DEADLINE:g} s')
+                    raise GraphError(f'{link.name} is not read by {", ".join(missing)} after {START_DEADLINE_S:g} s')
                 if _stop:
                     raise Stopped
                 time.sleep(0.01)
@@ -328,7 +328,7 @@ class Shell(Node):
             return []
         there = self.get_subscriptions_info_by_topic(publisher.topic_name)
         names = {node_of(info, self._root) for info in there}
-        missing = [name for name in wanted if name not in names and nodes.STAND_IN not in names]
+        missing = [name for name in wanted if name not in names and nodes.REPLAY_NODE not in names]
         return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
     def spin(self, executor):
@@ -347,28 +347,28 @@ class Shell(Node):
     def close(self):
         """Called once before the node ends; overridden by a node that has something to put away. What was published
         and is still on its way would die with the node, so it waits a little for the readers."""
-        deadline = time.monotonic() + PARTING
+        deadline = time.monotonic() + ACKNOWLEDGE_TIMEOUT_S
         for publisher in self.publishers_by_link.values():
             publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
 
-def _say(stream, line):
+def _write_line(stream, line):
     """A last line, past Python's buffer: what a full disk or a closed pipe does not take is no reason for another end
     than the one it tells."""
     with contextlib.suppress(OSError):
         os.write(stream.fileno(), f'{line}\n'.encode())
 
 
-def _leave(node, code):
+def _end_process(node, code):
     """End the process with an exit code as soon as the endpoints of its node have left the graph.
 
     The participant is not destroyed: where others leave at that moment Fast DDS 2.14 may hang in it, in 1 of 100 ends
     of a graph (DomainParticipant::set_listener waits for a callback with the mutex that the callback wants). So it
-    stays for FAREWELL: others who do not hear that a reader has left wait for it, for the 20 s of its lease."""
+    stays for EXIT_DELAY_S: others who do not hear that a reader has left wait for it, for the 20 s of its lease."""
     with node.handle, contextlib.suppress(OSError):
         node.destroy_node()
         sys.stdout.flush()
-    time.sleep(FAREWELL)
+    time.sleep(EXIT_DELAY_S)
     os._exit(code)
 
 
@@ -378,7 +378,7 @@ def main(make_node, args=None):
     Exit code 0; 1 with one line on stderr. On stdout its `result`, if it has one, as a JSON object, to which an error
     adds {'error': the line, 'silent': the nodes that it waited for}.
     """
-    for number in STOPS:
+    for number in STOP_SIGNALS:
         signal.signal(number, _on_signal)
     node, code = None, 0
     name = os.path.basename(sys.argv[0])
@@ -396,18 +396,18 @@ def main(make_node, args=None):
         if node.failure is not None:
             raise node.failure
         if node.result:
-            _say(sys.stdout, json.dumps(node.result))
+            _write_line(sys.stdout, json.dumps(node.result))
     except Stopped:
         pass
-    except EXPECTED as error:
+    except EXPECTED_ERRORS as error:
         code = 1
         result = node.result if node is not None else {}
-        _say(sys.stdout, json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}))
-        _say(sys.stderr, f'{name}: error: {error}')
+        _write_line(sys.stdout, json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}))
+        _write_line(sys.stderr, f'{name}: error: {error}')
     # It ends anyway; Python's own end would give a late signal its deadly default back.
-    for number in STOPS:
+    for number in STOP_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     if node is not None:
-        _leave(node, code)
+        _end_process(node, code)
     rclpy.try_shutdown()
     return code

@@ -14,17 +14,17 @@ from pedestal_common.parameters import as_dict
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
 
-OK, WARN, ERROR = 0, 1, 2
+LEVEL_OK, LEVEL_WARN, LEVEL_ERROR = 0, 1, 2
 
-NEVER_DUE = 2**63 - 1
+NEVER_DUE_NS = 2**63 - 1
 """Time [ns] of a command that does not come."""
 
-BLOCK = 2000
+MAX_BLOCK_STEPS = 2000
 """Steps for which a unit holds noise ready at most."""
 
 
 class Diagnosis(typing.NamedTuple):
-    """How a node is: level OK, WARN or ERROR; one line for people; values [(key, text)]."""
+    """How a node is: level OK, LEVEL_WARN or LEVEL_ERROR; one line for people; values [(key, text)]."""
     level: int
     message: str
     values: list
@@ -87,7 +87,7 @@ class Unit(typing.Protocol):
         self.inputs = records.empty(self.inputs_type(), 1)
         self.outputs = records.empty(self.outputs_type(), 1)
         values = as_dict(parameters)
-        self.writes = tuple(name for name in self.NODE.writes if values.get(topics.BY_NAME[name].measured, True))
+        self.writes = tuple(name for name in self.NODE.writes if values.get(topics.TOPIC_BY_NAME[name].measured, True))
         self.messages = {name: messages.template(name) for name in self.writes if not records.is_text(name)}
         self.answered = collections.deque(maxlen=1000)
         self._due = collections.deque(self.schedule())
@@ -95,7 +95,7 @@ class Unit(typing.Protocol):
     @classmethod
     def inputs_type(cls) -> np.dtype:
         """The record of what it reads; what comes once, before the first step, is not in it (see `decode`)."""
-        return records.of(*(name for name in cls.NODE.reads if topics.BY_NAME[name].rate != 'once'))
+        return records.of(*(name for name in cls.NODE.reads if topics.TOPIC_BY_NAME[name].rate != 'once'))
 
     @classmethod
     def outputs_type(cls) -> np.dtype:
@@ -111,11 +111,11 @@ class Unit(typing.Protocol):
     def latencies(self) -> dict:
         """{topic: s} of what a step waits for beside its trigger: how much older than the step it is."""
         return {name: self.latency(name) for name in self.reads
-                if name != self.trigger and topics.BY_NAME[name].rate == 'step'}
+                if name != self.trigger and topics.TOPIC_BY_NAME[name].rate == 'step'}
 
     def latency(self, topic) -> float:
         """How much older than the step [s] a topic is."""
-        return getattr(self.parameters, topics.BY_NAME[topic].latency, 0.0)
+        return getattr(self.parameters, topics.TOPIC_BY_NAME[topic].latency, 0.0)
 
     @property
     def parts(self):
@@ -123,7 +123,8 @@ class Unit(typing.Protocol):
         return self.memory.record[0]
 
     def block(self, steps) -> tuple:
-        """The memory with which the next `steps` (at most BLOCK) are made; overridden where they need noise."""
+        """The memory with which the next `steps` (at most MAX_BLOCK_STEPS) are made; overridden where they need
+        noise."""
         return self.memory
 
     def step(self, stamps, inputs, outputs):
@@ -132,7 +133,7 @@ class Unit(typing.Protocol):
         first = 0
         while first < len(stamps):
             self.obey_due(stamps[first])
-            last = min(first + BLOCK, len(stamps), int(np.searchsorted(stamps, self.next_due)))
+            last = min(first + MAX_BLOCK_STEPS, len(stamps), int(np.searchsorted(stamps, self.next_due)))
             part = slice(first, last)
             law_of_many(self.block(last - first), stamps[part], inputs[part], outputs[part])
             first = last
@@ -144,7 +145,7 @@ class Unit(typing.Protocol):
     @property
     def next_due(self):
         """Time [ns] of the next command of its schedule."""
-        return self._due[0][0] if self._due else NEVER_DUE
+        return self._due[0][0] if self._due else NEVER_DUE_NS
 
     def obey_due(self, stamp):
         """Obey what its schedule says for the step of a stamp [ns] and before. A unit that begins later than its
@@ -186,7 +187,7 @@ class Unit(typing.Protocol):
 
     def encode(self, topic, code):
         """The text of a code of a text topic that it writes, or the message of a list of texts."""
-        return topics.BY_NAME[topic].texts[code]
+        return topics.TOPIC_BY_NAME[topic].texts[code]
 
     def configure(self, parameters):
         """Take other values of the parameters that are LIVE."""
@@ -243,9 +244,9 @@ def announced(unit, topic, stamps, outputs):
     A text belongs to the step that its writer answers with it, by the answer's stamp where that is late.
     """
     answers = next(outputs[name]['stamp'] for name in unit.NODE.writes if not records.is_text(name))
-    stamps = np.where(answers != records.NEVER, answers, stamps)
+    stamps = np.where(answers != records.NO_STAMP, answers, stamps)
     codes, rows, texts = outputs[topic], [], []
-    for row in np.flatnonzero(np.diff(codes, prepend=topics.SILENT)).tolist():
+    for row in np.flatnonzero(np.diff(codes, prepend=topics.NO_TEXT_CODE)).tolist():
         text = unit.encode(topic, int(codes[row]))
         if not texts or text != texts[-1]:
             rows.append(row)

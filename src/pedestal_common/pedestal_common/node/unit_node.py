@@ -11,9 +11,9 @@ import numpy as np
 from std_srvs.srv import Trigger
 
 from pedestal_common.graph import nodes, topics
-from pedestal_common.graph.steps import SECOND, Steps
+from pedestal_common.graph.steps import NS_PER_SECOND, Steps
 from pedestal_common.node import shell
-from pedestal_common.node.unit import ERROR, WARN
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
 from pedestal_common.realtime import priority
 from pedestal_common.wire import commands, messages, records
 
@@ -27,11 +27,11 @@ class Port:
                          for name in (unit.trigger, *unit.latencies)}
         self.stamps = np.zeros(1, np.int64)
         self._initial = unit.memory.record.copy()
-        written = [name for name in unit.writes if not prefix or name in nodes.OF_BEAM
+        written = [name for name in unit.writes if not prefix or name in nodes.BEAM_TOPICS
                    or prefix == nodes.prefixes(node.graph.beams)[0]]
         self._encoders = [(records.Encoder(name, message, unit.outputs), node.writer(self.named(name)))
                           for name, message in unit.messages.items() if name in written]
-        self._texts = {name: [node.writer(self.named(name)), topics.SILENT, '']
+        self._texts = {name: [node.writer(self.named(name)), topics.NO_TEXT_CODE, '']
                        for name in written if records.is_text(name)}
         self._reply = node.writer(self.named(unit.NODE.replies)) if unit.NODE.replies else None
         self._announce, self._epoch_of = node.announce, node.epoch
@@ -39,7 +39,7 @@ class Port:
 
     def named(self, topic):
         """The topic as the graph names it."""
-        return self.prefix + topic if topic in nodes.OF_BEAM else topic
+        return self.prefix + topic if topic in nodes.BEAM_TOPICS else topic
 
     def step(self, stamp, values):
         """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing came}. The unit counts
@@ -47,7 +47,7 @@ class Port:
         self._epoch, self._last = self._epoch_of(stamp), stamp
         self.unit.epoch = self._epoch
         for name, decoder in self.decoders.items():
-            came, numbers = values.get(name) or (records.NEVER, None)
+            came, numbers = values.get(name) or (records.NO_STAMP, None)
             decoder.put(came - self._epoch, numbers)
         self.stamps[0] = stamp - self._epoch
         self.unit.step(self.stamps, self.unit.inputs, self.unit.outputs)
@@ -108,7 +108,7 @@ class UnitNode(shell.Shell):
         self.row = nodes.of_executable(module)
         unit_type = self.row.unit_type()
         super().__init__(self.row.name, self.row.parameters_type(), unit_type.LIVE)
-        flags = [flag for flag in topics.FLAGS if getattr(self.parameters, flag, False)]
+        flags = [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag, False)]
         reads = nodes.reads(self.row, self.graph.members, flags)
         prefixes = nodes.prefixes(self.graph.beams) if serves_beams else ('',)
         self.ports = []
@@ -142,7 +142,7 @@ class UnitNode(shell.Shell):
         if self.row.obeys:
             self.message_reader(port.named(self.row.obeys), self._command_taker(port))
         for name in port.unit.reads:
-            rate = topics.BY_NAME[name].rate
+            rate = topics.TOPIC_BY_NAME[name].rate
             if rate == 'change':
                 self.message_reader(port.named(name), self._text_taker(port, name))
             elif rate == 'once':
@@ -202,7 +202,7 @@ class UnitNode(shell.Shell):
 
         In lockstep a step whose inputs stay away for the deadline ends the node with the names of the silent writers.
         """
-        self.steps = Steps(trigger, {name: round(latency * SECOND) for name, latency in latencies.items()},
+        self.steps = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
                            self.graph.lockstep, self._answer, held=nodes.held(latencies))
         decoders = {name: decoder for port in self.ports for name, decoder in port.decoders.items()}
         for name in (trigger, *latencies):
@@ -264,7 +264,7 @@ class UnitNode(shell.Shell):
     def _watch_trigger(self):
         """Realtime: whether the trigger stays away; unless it was this node that was held up, or the graph has not
         begun."""
-        now, limit = time.monotonic_ns(), self.graph.silence * SECOND
+        now, limit = time.monotonic_ns(), self.graph.silence * NS_PER_SECOND
         if self.clock()[1] < self.graph.start:
             self._answered = self._begun = now
         held_up, self._watched = now - self._watched > limit, now
@@ -289,13 +289,13 @@ class UnitNode(shell.Shell):
         elif time.monotonic() - self._progress[1] > self.graph.deadline:
             waiting = self.steps.waiting_for
             silent = [writer for name in waiting for writer in self._link(name)[0].writers]
-            raise shell.GraphError(f'no {", ".join(waiting)} for step {pending / SECOND:.6f} s after '
+            raise shell.GraphError(f'no {", ".join(waiting)} for step {pending / NS_PER_SECOND:.6f} s after '
                                    f'{self.graph.deadline:g} s', silent)
 
     def _service(self, name):
         """The callback of a service: asks every unit between two steps and answers with what it reads back."""
         def serve(_request, response):
-            [reply] = {port.command(commands.Command(name, commands.SERVICE)) for port in self.ports}
+            [reply] = {port.command(commands.Command(name, commands.SERVICE_CLIENT)) for port in self.ports}
             if name.endswith('/reset_faults') and reply.granted:
                 self.refused = ''
             response.success, response.message = reply
@@ -318,11 +318,11 @@ class UnitNode(shell.Shell):
             since = (time.monotonic_ns() - self._answered) * 1e-9
             text = (f'no {self.steps.trigger} so far' if self._answered == self._begun else
                     f'no {self.steps.trigger} for {since:.1f} s')
-            text = f'{text}; {diagnosis.message}' if diagnosis.level == ERROR else text
-            return diagnosis._replace(level=ERROR, message=text)
+            text = f'{text}; {diagnosis.message}' if diagnosis.level == LEVEL_ERROR else text
+            return diagnosis._replace(level=LEVEL_ERROR, message=text)
         refusal = self.refused or (self.steps.refusal if self.steps else '')
-        if refusal and diagnosis.level < ERROR:
-            return diagnosis._replace(level=WARN, message=refusal)
+        if refusal and diagnosis.level < LEVEL_ERROR:
+            return diagnosis._replace(level=LEVEL_WARN, message=refusal)
         return diagnosis
 
 

@@ -6,38 +6,39 @@ both are known by their pace, if that is another for each; otherwise neither is,
 """
 import collections
 
-INTERVAL = 5_000_000
+DEFAULT_INTERVAL_NS = 5_000_000
 """Time between two messages [ns] taken for that of a stream of which only one has come."""
 
-SLACK = 4
+NUMBER_SLACK = 4
 """Numbers by which a stream may be ahead of twice its pace and of what it owes."""
 
-OWED = 1_000_000_000
+MAX_BACKLOG_NS = 1_000_000_000
 """Time [ns] of whose messages a stream may be behind: a writer that was held up catches up, and of its burst some are
 left out."""
 
-PAUSE = 4.0
+MAX_PAUSE_INTERVALS = 4.0
 """Time between two messages, in intervals of their stream, that is believed of its interval."""
 
-NEAR = 20
+CLOSE_NUMBER_GAP = 20
 """Two streams that both speak and whose numbers are this close are not told apart."""
 
-WINDOW, STRIDE = 40, 8
-"""Messages of which a stream's pace is the median time per number over STRIDE of them: one that is held up, and a few
+PACE_WINDOW_MESSAGES, PACE_STRIDE_MESSAGES = 40, 8
+"""Messages of which a stream's pace is the median time per number over PACE_STRIDE_MESSAGES of them: one that is held
+up, and a few
 that then come at once, do not change it."""
 
-FASTER = 0.85
+MAX_PACE_RATIO = 0.85
 """Of two streams that were close the faster one is told by its pace if that takes less than this part of the time of
 the other's, and if both have kept theirs to the square root of this."""
 
-RESOLVED = 200_000_000
+ACTIVE_LIMIT_NS = 200_000_000
 """A stream speaks while it was heard within this time [ns]. Of two that are close one has gone when for so long the
 numbers were those of one."""
 
-RECENT = 1_000_000_000
+RECENT_LIMIT_NS = 1_000_000_000
 """A stream that was silent for so long [ns] takes part with the next few of its numbers only."""
 
-FORGOTTEN = 30_000_000_000
+EXPIRY_LIMIT_NS = 30_000_000_000
 """A stream that was silent for so long [ns] is no longer known."""
 
 
@@ -53,7 +54,7 @@ class Stream:
                  'source', 'unclear')
 
     def __init__(self, number, source, now):
-        self._heard = collections.deque([(number, source)], WINDOW)
+        self._heard = collections.deque([(number, source)], PACE_WINDOW_MESSAGES)
         self.begun = now
         self.last, self.source, self.arrival = number, source, now
         self.interval = self.looked = None
@@ -67,21 +68,23 @@ class Stream:
 
     def growth(self, elapsed):
         """By how much its numbers grow at the most in a time [ns]."""
-        return SLACK + 2.0 * elapsed / (self.interval or INTERVAL)
+        return NUMBER_SLACK + 2.0 * elapsed / (self.interval or DEFAULT_INTERVAL_NS)
 
     def near(self, other):
         """Whether what this one says next could be of the other one, or the other way round."""
         behind, ahead = (self, other) if self.last < other.last else (other, self)
-        return ahead.last - behind.last <= NEAR or behind.fits(ahead.last, ahead.source)
+        return ahead.last - behind.last <= CLOSE_NUMBER_GAP or behind.fits(ahead.last, ahead.source)
 
     def follow(self, number, source, now):
         """The message is of this stream; how many were left out before it."""
         gap, elapsed = number - self.last, source - self.source
         if elapsed > 0:
-            interval = self.interval or INTERVAL
-            self.owed = min(max(self.owed + elapsed / interval - gap, 0.0), OWED / interval)
-            # A silence, as of a cut cable, says little about the pace: it is taken for PAUSE intervals at the most.
-            step = min(elapsed / gap, RESOLVED if self.interval is None else PAUSE * self.interval)
+            interval = self.interval or DEFAULT_INTERVAL_NS
+            self.owed = min(max(self.owed + elapsed / interval - gap, 0.0), MAX_BACKLOG_NS / interval)
+            # A silence, as of a cut cable, says little about the pace: it is taken for MAX_PAUSE_INTERVALS intervals
+            # at the most.
+            step = min(elapsed / gap, ACTIVE_LIMIT_NS if self.interval is None else MAX_PAUSE_INTERVALS
+                       * self.interval)
             self.interval = step if self.interval is None else self.interval + 0.05 * (step - self.interval)
         if gap > 1:
             self.skipped = self.last, number
@@ -93,10 +96,11 @@ class Stream:
     def pace(self):
         """Time per number [ns], None of a stream that has not said enough."""
         heard = list(self._heard)
-        if len(heard) < 3 * STRIDE:
+        if len(heard) < 3 * PACE_STRIDE_MESSAGES:
             return None
         paces = sorted((source - earlier_source) / (number - earlier)
-                       for (earlier, earlier_source), (number, source) in zip(heard, heard[STRIDE:], strict=False))
+                       for (earlier, earlier_source), (number, source) in zip(heard, heard[PACE_STRIDE_MESSAGES:],
+                                                                              strict=False))
         return paces[len(paces) // 2]
 
     def revive(self, stream):
@@ -113,17 +117,17 @@ class Streams:
         self.streams = []
         self.lost = 0
         self._close = ()                # streams that are not told apart; what is said since is of unclear ones
-        self._parted = 0, -FORGOTTEN    # (lowest number, when [ns]) of those that were close last
-        self._heard = -RESOLVED
+        self._parted = 0, -EXPIRY_LIMIT_NS    # (lowest number, when [ns]) of those that were close last
+        self._heard = -ACTIVE_LIMIT_NS
 
     def of(self, number, source, now):
         """The Stream of a message, a new one where it continues none; None where it may be of several. number: its
         sequence number; source: when it was sent, now: when it came [ns]."""
         heard, self._heard = self._heard, now
-        recent = [stream for stream in self.streams if heard - stream.arrival < RECENT]
-        speaking = [stream for stream in recent if heard - stream.arrival < RESOLVED]
+        recent = [stream for stream in self.streams if heard - stream.arrival < RECENT_LIMIT_NS]
+        speaking = [stream for stream in recent if heard - stream.arrival < ACTIVE_LIMIT_NS]
         fitting = [stream for stream in recent
-                   if stream.fits(number, source) and (stream in speaking or number - stream.last <= NEAR)]
+                   if stream.fits(number, source) and (stream in speaking or number - stream.last <= CLOSE_NUMBER_GAP)]
         if len(fitting) == 1 or not fitting and (fitting := self._silent(number, source)):
             stream = fitting[0]
             self.lost += stream.follow(number, source, now)
@@ -143,7 +147,7 @@ class Streams:
 
     def several(self, now):
         """Whether more than one of the streams speaks at the time now [ns]."""
-        return sum(now - stream.arrival < RESOLVED for stream in self.streams) > 1
+        return sum(now - stream.arrival < ACTIVE_LIMIT_NS for stream in self.streams) > 1
 
     def _silent(self, number, source):
         """[the stream heard last] of those that do not speak and that the message can be of."""
@@ -152,11 +156,11 @@ class Streams:
 
     def _begun(self, number, source, now):
         """A new stream: of a writer that was close to another one perhaps, which then is known."""
-        self.streams = [other for other in self.streams if now - other.arrival < FORGOTTEN]
+        self.streams = [other for other in self.streams if now - other.arrival < EXPIRY_LIMIT_NS]
         stream = Stream(number, source, now)
         stream.unclear = bool(self._close)
         lowest, since = self._parted
-        stream.known = number >= lowest and now - since < FORGOTTEN
+        stream.known = number >= lowest and now - since < EXPIRY_LIMIT_NS
         self.streams.append(stream)
         return stream
 
@@ -171,13 +175,14 @@ class Streams:
         """Streams that were close, once two have parted and are known by their pace, or one of them has gone."""
         for stream in self._close:
             stream.arrival = now
-        speaking = [stream for stream in self.streams if stream.unclear and now - stream.arrival < RESOLVED]
-        if len(speaking) == 1 and now - speaking[0].begun >= RESOLVED:
+        speaking = [stream for stream in self.streams if stream.unclear and now - stream.arrival < ACTIVE_LIMIT_NS]
+        if len(speaking) == 1 and now - speaking[0].begun >= ACTIVE_LIMIT_NS:
             speaking[0].known = True    # as whoever spoke beside the one in charge: nobody knows which this is
             self._cleared(speaking)
         elif len(speaking) == len(self._close) == 2:
             before, after = (_by_pace(pair) for pair in (self._close, speaking))
-            if before and after and all(_same(was, pace) for (was, _), (pace, _) in zip(before, after, strict=True)):
+            if before and after and all(_same_pace(was, pace) for (was, _), (pace, _) in zip(before, after,
+                                                                                             strict=True)):
                 for (_, stream), (_, found) in zip(before, after, strict=True):
                     stream.revive(found)
                 self._cleared([stream for _, stream in before])
@@ -197,9 +202,9 @@ def _by_pace(pair):
         return []
     paced.sort(key=lambda one: one[0])
     (fast, _), (slow, _) = paced
-    return paced if fast < FASTER * slow else []
+    return paced if fast < MAX_PACE_RATIO * slow else []
 
 
-def _same(was, pace):
+def _same_pace(was, pace):
     """Whether a pace [ns] is the one that was."""
-    return FASTER < min(was, pace)**2 / max(was, pace)**2
+    return MAX_PACE_RATIO < min(was, pace)**2 / max(was, pace)**2

@@ -1,18 +1,20 @@
 """UTC for stamps that never go back: a steady clock and a bounded, slewed offset to the system's clock. No clock is
 read here; who runs it hands over pairs of readings.
 
-    t = steady + offset,    |d offset / d steady| <= SLEW
+    t = steady + offset,    |d offset / d steady| <= MAX_SLEW_RATE
 
-The offset follows the system's clock, which NTP or PTP slews, at no more than SLEW. A difference beyond STEP is a step
+The offset follows the system's clock, which NTP or PTP slews, at no more than MAX_SLEW_RATE. A difference beyond
+MIN_CLOCK_STEP_NS is a step
 of the system's clock and is named. A step forward is taken at once. After a step back the time goes on as it was and
 is slewed: it would take a stamp twice otherwise. It then is ahead of nodes that start later, by `ahead`; the way out
 is a restart of the node that says so.
 """
-SLEW = 500e-6
+MAX_SLEW_RATE = 500e-6
 """Largest rate at which the offset follows [s/s]: that of adjtime(3)."""
 
-STEP = 10_000_000
-"""Difference [ns] between two readings beyond which the system's clock was stepped: SLEW would need 20 s for it."""
+MIN_CLOCK_STEP_NS = 10_000_000
+"""Difference [ns] between two readings beyond which the system's clock was stepped: MAX_SLEW_RATE would need 20 s for
+it."""
 
 
 class Utc:
@@ -33,12 +35,12 @@ class Utc:
         self._steady += elapsed
         jump = system - steady - self._system_offset
         self._system_offset += jump
-        if abs(jump) > STEP + SLEW * elapsed:
+        if abs(jump) > MIN_CLOCK_STEP_NS + MAX_SLEW_RATE * elapsed:
             self.steps += 1
             self.last_step = jump
             if self.ahead < 0:
                 self._offset = self._system_offset
-        limit = round(SLEW * elapsed)
+        limit = round(MAX_SLEW_RATE * elapsed)
         self._offset -= max(-limit, min(limit, self.ahead))
         return self._steady + self._offset
 

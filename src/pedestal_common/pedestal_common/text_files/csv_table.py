@@ -8,10 +8,10 @@ import numpy as np
 
 from pedestal_common.text_files import files
 
-LARGEST = 64_000_000
+MAX_CSV_BYTES = 64_000_000
 """Bytes of a file."""
 
-MOST_ROWS = 1_000_000
+MAX_CSV_ROWS = 1_000_000
 
 
 class TableError(ValueError):
@@ -37,7 +37,7 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
             rows.extend(number(path, reader.line_num, name, row[name], *there[name]) if name in there else 0.0
                         for name in (*columns, *optional))
             step = rows[-width] - rows[-2 * width] if len(rows) > width else max_step
-            if len(rows) > MOST_ROWS * width:
+            if len(rows) > MAX_CSV_ROWS * width:
                 raise too_long(path, reader.line_num)
             if not 0.0 < step <= max_step:
                 raise bad_step(path, reader.line_num, f'{first} = {rows[-width]:.10g}', step, unit, max_step,
@@ -49,9 +49,9 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
 
 @contextlib.contextmanager
 def stream(path):
-    """Context with the bytes of a file of at most LARGEST. What cannot be read raises TableError."""
+    """Context with the bytes of a file of at most MAX_CSV_BYTES. What cannot be read raises TableError."""
     try:
-        with files.open_regular(path, LARGEST) as file:
+        with files.open_regular(path, MAX_CSV_BYTES) as file:
             yield file
     except OSError as error:
         raise TableError(f'{path}: {error.strerror}') from None
@@ -86,8 +86,8 @@ def number(path, line, name, cell, low, high):
 
 
 def too_long(path, line):
-    """The TableError of a file with more than MOST_ROWS rows."""
-    return TableError(f'{path}: line {line}: must be at most {MOST_ROWS} rows')
+    """The TableError of a file with more than MAX_CSV_ROWS rows."""
+    return TableError(f'{path}: line {line}: must be at most {MAX_CSV_ROWS} rows')
 
 
 def bad_step(path, line, value, step, unit, max_step, step_name):

@@ -4,7 +4,7 @@ import hashlib
 import os
 import stat
 
-SPARSE = 16_000_000, 100
+SPARSE_FILE_LIMITS = 16_000_000, 100
 """A file longer than this [bytes], of which the disk holds less than one part in so many, is one large hole."""
 
 
@@ -20,7 +20,7 @@ def open_regular(path, largest=None):
             raise OSError(errno.EINVAL, 'not a regular file', str(path))
         if largest is not None and info.st_size > largest:
             raise OSError(errno.EFBIG, f'{info.st_size} bytes, must be at most {largest}', str(path))
-        if info.st_size > SPARSE[0] and info.st_blocks * 512 * SPARSE[1] < info.st_size:
+        if info.st_size > SPARSE_FILE_LIMITS[0] and info.st_blocks * 512 * SPARSE_FILE_LIMITS[1] < info.st_size:
             raise OSError(errno.EINVAL, f'{info.st_size} bytes long, of which the disk holds {info.st_blocks * 512}',
                           str(path))
         return os.fdopen(descriptor, 'rb')

@@ -10,10 +10,10 @@ import yaml
 
 from pedestal_common.text_files import files
 
-LARGEST = 2_000_000
+MAX_YAML_BYTES = 2_000_000
 """Bytes of a file; every parameter of an array of 16 beams is a tenth of it."""
 
-DEPTH, VALUES = 20, 200_000
+MAX_DEPTH, MAX_VALUES = 20, 200_000
 """Sections in sections, and values with those that aliases stand for, at the most."""
 
 _TAG = 'tag:yaml.org,2002:'
@@ -68,7 +68,7 @@ def _check(events):
         if getattr(event, 'tag', None):
             raise yaml.composer.ComposerError(None, None, f'tag {event.tag}', event.start_mark)
         if isinstance(event, yaml.AliasEvent):
-            count += sizes.get(event.anchor, VALUES)  # of nothing, or of what it stands in
+            count += sizes.get(event.anchor, MAX_VALUES)  # of nothing, or of what it stands in
         elif isinstance(event, yaml.CollectionStartEvent):
             begun.append((event.anchor, count))
         elif isinstance(event, yaml.CollectionEndEvent):
@@ -77,14 +77,15 @@ def _check(events):
         elif isinstance(event, yaml.ScalarEvent):
             sizes[event.anchor] = 1
         count += 1
-        if len(begun) > DEPTH or count > VALUES:
-            most = f'{DEPTH} sections in sections' if len(begun) > DEPTH else f'{VALUES} values'
+        if len(begun) > MAX_DEPTH or count > MAX_VALUES:
+            most = f'{MAX_DEPTH} sections in sections' if len(begun) > MAX_DEPTH else f'{MAX_VALUES} values'
             raise yaml.composer.ComposerError(None, None, f'more than {most}', event.start_mark)
 
 
 def read(path):
-    """The values of a YAML file of at most LARGEST bytes. Raises OSError, UnicodeDecodeError, yaml.YAMLError."""
-    return parse(files.read_text(path, LARGEST))
+    """The values of a YAML file of at most MAX_YAML_BYTES bytes. Raises OSError, UnicodeDecodeError,
+    yaml.YAMLError."""
+    return parse(files.read_text(path, MAX_YAML_BYTES))
 
 
 def problem(error) -> str:

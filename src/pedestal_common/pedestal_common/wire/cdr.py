@@ -7,22 +7,22 @@ import struct
 
 from rosbags.interfaces import Nodetype
 
-from pedestal_common.wire.messages import TYPESTORE
+from pedestal_common.wire.messages import ROS_TYPESTORE
 
 _SIZES = {'bool': 1, 'byte': 1, 'char': 1, 'int8': 1, 'uint8': 1, 'int16': 2, 'uint16': 2, 'int32': 4, 'uint32': 4,
           'int64': 8, 'uint64': 8, 'float32': 4, 'float64': 8}
 _DTYPES = {'bool': 'u1', 'byte': 'u1', 'char': 'u1', **{name: f'{name[0]}{size}' for name, size in _SIZES.items()
                                                        if name[0] in 'iuf'}}
 
-STAMPED = {'rosgraph_msgs/msg/Clock'}
-STAMPED.update(name for name, (_, fields) in TYPESTORE.fielddefs.items()
-               if fields and fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header')))
+STAMPED_TYPES = {'rosgraph_msgs/msg/Clock'}
+STAMPED_TYPES.update(name for name, (_, fields) in ROS_TYPESTORE.fielddefs.items()
+                     if fields and fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header')))
 """Types whose bytes 4 to 12 are their stamp."""
 
-NUMBERS = 400_000
+MAX_MESSAGE_NUMBERS = 400_000
 """Numbers in one message at the most; a program track of a whole day has 350,000."""
 
-PADDING = 4
+PADDING_LIMIT_BYTES = 4
 """Bytes that DDS may add behind a message, less than this."""
 
 
@@ -47,7 +47,7 @@ class Places:
             raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
 
     def _fields(self, type_name, prefix):
-        for name, node in TYPESTORE.fielddefs[type_name][1]:
+        for name, node in ROS_TYPESTORE.fielddefs[type_name][1]:
             self._node(node, prefix + name)
 
     def _take(self, size, alignment, path):
@@ -74,8 +74,8 @@ class Places:
         elif kind == Nodetype.BASE:
             size = _SIZES[what[0]]
             self.numbers.append((path, self._take(size, size, path), self.order + _DTYPES[what[0]]))
-            if len(self.numbers) > NUMBERS:
-                raise ValueError(f'a {len(self.data)} bytes long message has more than {NUMBERS} numbers')
+            if len(self.numbers) > MAX_MESSAGE_NUMBERS:
+                raise ValueError(f'a {len(self.data)} bytes long message has more than {MAX_MESSAGE_NUMBERS} numbers')
         else:
             count = what[1] if kind == Nodetype.ARRAY else self._length(path)
             for i in range(count):

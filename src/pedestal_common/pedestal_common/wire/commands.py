@@ -12,19 +12,19 @@ import typing
 from pedestal_common.parameters import ParameterError, did_you_mean
 from pedestal_common.wire import messages
 
-SERVICE, SCHEDULE = 'service', 'scenario'
+SERVICE_CLIENT, SCHEDULE_CLIENT = 'service', 'scenario'
 """Who asks by a service, which does not know its caller, and by a schedule."""
 
-RESERVED = ('granted', 'reply')
+RESERVED_KEYS = ('granted', 'reply')
 """Values of a reply beside the arguments."""
 
-LONGEST = 200
+MAX_TEXT_CHARACTERS = 200
 """Characters of a name or value at the most."""
 
-MOST = 20
+MAX_ARGUMENTS = 20
 """Arguments of a command at the most."""
 
-LATEST = 1_000_000_000
+MAX_COMMAND_AGE_NS = 1_000_000_000
 """Time [ns] from sent to heard after which a command is too old to be obeyed."""
 
 SCHEDULE_DOC = "to be obeyed at times [s]: 'AT VERB name=value ...; AT VERB ...'; empty: none"
@@ -68,7 +68,7 @@ class Argument(typing.NamedTuple):
         return f'{self.low:g} to {self.high:g}' if self.low > -math.inf else 'text'
 
 
-class Verb(typing.NamedTuple):
+class CommandDefinition(typing.NamedTuple):
     """A row of a unit's table of verbs."""
     name: str
     doc: str
@@ -116,15 +116,15 @@ def _value(verb, argument, text):
 def of_message(status) -> Command:
     """The Command in a DiagnosticStatus. Raises ValueError."""
     given = [(value.key, value.value) for value in status.values]
-    if len(given) > MOST:
-        raise ValueError(f'{len(given)} arguments: must be at most {MOST}')
+    if len(given) > MAX_ARGUMENTS:
+        raise ValueError(f'{len(given)} arguments: must be at most {MAX_ARGUMENTS}')
     for text in (status.name, status.hardware_id, status.message, *(text for pair in given for text in pair)):
-        if len(text) > LONGEST or not text.isprintable():
-            raise ValueError(f'a text of {len(text)} characters: must be at most {LONGEST}, all of them printable')
+        if len(text) > MAX_TEXT_CHARACTERS or not text.isprintable():
+            raise ValueError(f'a text of {len(text)} characters: must be at most {MAX_TEXT_CHARACTERS}, all of them printable')
     arguments = dict(given)
-    if len(arguments) < len(given) or set(arguments) & {*RESERVED, ''}:
+    if len(arguments) < len(given) or set(arguments) & {*RESERVED_KEYS, ''}:
         raise ValueError(f'arguments {", ".join(key for key, _ in given)}: each must be there once and none be called '
-                         f'{" or ".join(RESERVED)}')
+                         f'{" or ".join(RESERVED_KEYS)}')
     return Command(status.name, status.hardware_id, status.message, arguments)
 
 
@@ -146,10 +146,10 @@ def reply_message(command, reply):
 
 def of_reply(status):
     """(Command, Reply) of a DiagnosticStatus on a topic of replies. Raises ValueError."""
-    rest = [value for value in status.values if value.key not in RESERVED]
-    told = {value.key: value.value for value in status.values if value.key in RESERVED}
-    if set(told) != set(RESERVED):
-        raise ValueError(f'a reply without {" and ".join(RESERVED)}')
+    rest = [value for value in status.values if value.key not in RESERVED_KEYS]
+    told = {value.key: value.value for value in status.values if value.key in RESERVED_KEYS}
+    if set(told) != set(RESERVED_KEYS):
+        raise ValueError(f'a reply without {" and ".join(RESERVED_KEYS)}')
     bare = messages.DiagnosticStatus(level=0, name=status.name, hardware_id=status.hardware_id,
                                      message=status.message, values=rest)
     return of_message(bare), Reply(told['granted'] == 'true', told['reply'])
@@ -175,7 +175,7 @@ def schedule(name, text, verbs) -> list:
         try:
             if not (re.fullmatch(r'\d+(\.\d+)?', at) and len(at) < 20 and rest.strip()):
                 raise ValueError('must be AT VERB name=value ..., AT in seconds')
-            command = parsed(rest)._replace(who=SCHEDULE)
+            command = parsed(rest)._replace(who=SCHEDULE_CLIENT)
             values(verbs, command)
         except ValueError as error:
             raise ParameterError(f'{name} = {part!r}: {error}') from None

@@ -9,12 +9,12 @@ import itertools
 from numba.extending import overload
 
 from pedestal_common.graph import layouts, topics
-from pedestal_common.wire.records import NEVER
+from pedestal_common.wire.records import NO_STAMP
 
 
 def _numbers(topic):
     """Yield (input, [its numbers in the record of a topic as source text]) of the fields of its layout."""
-    given, row = topics.BY_NAME[topic].inputs, topics.BY_NAME[topic]
+    given, row = topics.TOPIC_BY_NAME[topic].inputs, topics.TOPIC_BY_NAME[topic]
     for field in layouts.fields(topic):
         if field.name in given:
             count = len(field.components or row.names)
@@ -27,20 +27,20 @@ def fields(names) -> list:
     """Return the fields of a record of these topics' inputs, as numpy takes them."""
     kinds = {'came': 'i8', 'code': 'i8', 'stamp': 'f8'}
     return [field for topic in names for field in (
-        *((name, kinds[key]) for key, name in topics.BY_NAME[topic].inputs.items() if key in kinds),
+        *((name, kinds[key]) for key, name in topics.TOPIC_BY_NAME[topic].inputs.items() if key in kinds),
         *((name, 'f8', (len(places),)) if len(places) > 1 else (name, 'f8') for name, places in _numbers(topic)))]
 
 
 def _lines(topic):
     """Yield the source lines of the copy of one topic."""
-    given = topics.BY_NAME[topic].inputs
+    given = topics.TOPIC_BY_NAME[topic].inputs
     yield f'    m = inputs[{topic!r}]'
     if 'code' in given:
         yield f'    u.{given["code"]} = m'
         return
     if 'came' in given:
-        yield f'    u.{given["came"]} = m.stamp != {NEVER}'
-    yield f'    if m.stamp != {NEVER}:'
+        yield f'    u.{given["came"]} = m.stamp != {NO_STAMP}'
+    yield f'    if m.stamp != {NO_STAMP}:'
     if 'stamp' in given:
         yield f'        u.{given["stamp"]} = m.stamp * 1e-9'
     for name, places in _numbers(topic):
@@ -51,7 +51,7 @@ def _lines(topic):
 def taking(names):
     """Return the function take(u, inputs) for laws: the records of these topics -> inputs u."""
     made = {}
-    lines = [line for topic in names if topics.BY_NAME[topic].inputs for line in _lines(topic)]
+    lines = [line for topic in names if topics.TOPIC_BY_NAME[topic].inputs for line in _lines(topic)]
     exec('\n'.join(('def take(u, inputs):', *lines)), made)    # static, as the compiler needs the names of fields
     overload(made['take'], inline='always')(lambda u, inputs: made['take'])
     return made['take']

@@ -11,11 +11,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from pedestal_common.graph import layouts, topics
 
-TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
-_TYPES = TYPESTORE.types
+ROS_TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
+_TYPES = ROS_TYPESTORE.types
 _STAMP = struct.Struct('<iI')
 
-LARGEST = 8_000_000
+MAX_CDR_BYTES = 8_000_000
 """Bytes of a message at the most; a program track of a whole day has 7 million."""
 
 Clock = _TYPES['rosgraph_msgs/msg/Clock']
@@ -43,22 +43,23 @@ Vector3Stamped = _TYPES['geometry_msgs/msg/Vector3Stamped']
 
 def serialize(message) -> bytes:
     """CDR bytes of a message, padding zeroed."""
-    return bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
+    return bytes(ROS_TYPESTORE.serialize_cdr(message, message.__msgtype__))
 
 
 def deserialize(data, type_name):
-    """The message in CDR bytes; raises ValueError naming the type when they do not hold one, or are over LARGEST."""
-    if len(data) > LARGEST:
-        raise ValueError(f'{len(data)} bytes of a {type_name}, must be at most {LARGEST}')
+    """The message in CDR bytes; raises ValueError naming the type when they do not hold one, or are over
+    MAX_CDR_BYTES."""
+    if len(data) > MAX_CDR_BYTES:
+        raise ValueError(f'{len(data)} bytes of a {type_name}, must be at most {MAX_CDR_BYTES}')
     try:
-        return TYPESTORE.deserialize_cdr(data, type_name)
+        return ROS_TYPESTORE.deserialize_cdr(data, type_name)
     except Exception as error:
         raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
 
 
 def definition(type_name) -> bytes:
     """The definition of a message type and of those in it, as a reader of `ros2msg` schemas wants it."""
-    return TYPESTORE.generate_msgdef(type_name, ros_version=2)[0].encode()
+    return ROS_TYPESTORE.generate_msgdef(type_name, ros_version=2)[0].encode()
 
 
 def nanoseconds(stamp) -> int:
@@ -148,7 +149,7 @@ _TEMPLATES = {'sensor_msgs/msg/JointState': _joint_state, 'trajectory_msgs/msg/J
 
 def template(topic):
     """A message of a stamped topic of the table as its writer begins it: names and frames set, numbers zero."""
-    row = topics.BY_NAME[topic]
+    row = topics.TOPIC_BY_NAME[topic]
     return _TEMPLATES[row.type](row)
 
 

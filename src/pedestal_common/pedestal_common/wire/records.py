@@ -3,7 +3,7 @@
 A unit reads and writes one record that has a field for each of its topics:
 
     stamped message     stamp [ns], then the fields of its layout; one that did not come, or is not to be sent, has
-                        stamp NEVER
+                        stamp NO_STAMP
     text, list of texts a whole number, its code; topics.SILENT before the first
 
 A Decoder takes the numbers out of the CDR bytes of a message, an Encoder puts numbers into them, both by the places at
@@ -16,10 +16,10 @@ import numpy as np
 from pedestal_common.graph import layouts, topics
 from pedestal_common.wire import cdr, messages
 
-NEVER = -2**63
+NO_STAMP = -2**63
 """Stamp [ns] of a message that did not come."""
 
-TEXTS = ('std_msgs/msg/String', 'diagnostic_msgs/msg/DiagnosticArray')
+TEXT_TYPES = ('std_msgs/msg/String', 'diagnostic_msgs/msg/DiagnosticArray')
 """Types of a text and of a list of texts."""
 
 _STAMP = struct.Struct('<iI')
@@ -27,7 +27,7 @@ _FORMATS = {'f8': 'd', 'f4': 'f'}
 
 
 def _type(topic):
-    row = topics.BY_NAME[topic]
+    row = topics.TOPIC_BY_NAME[topic]
     if is_text(topic):
         return 'i8'
     sizes = [(field.name, 'f8', (len(field.components or row.names),)) for field in layouts.fields(topic)]
@@ -41,7 +41,7 @@ def of(*names) -> np.dtype:
 
 def is_text(topic) -> bool:
     """Whether a topic of the table is a text, or a list of them, told by its code."""
-    return topics.BY_NAME[topic].type in TEXTS and topics.BY_NAME[topic].rate == 'change'
+    return topics.TOPIC_BY_NAME[topic].type in TEXT_TYPES and topics.TOPIC_BY_NAME[topic].rate == 'change'
 
 
 def empty(record_type, count) -> np.ndarray:
@@ -49,9 +49,9 @@ def empty(record_type, count) -> np.ndarray:
     made = np.zeros(count, record_type)
     for name in record_type.names:
         if record_type[name].names is None:
-            made[name] = topics.SILENT
+            made[name] = topics.NO_TEXT_CODE
         else:
-            made[name]['stamp'] = NEVER
+            made[name]['stamp'] = NO_STAMP
     return made
 
 
@@ -63,7 +63,7 @@ def numbers(records, topic) -> np.ndarray:
 
 def code_of(topic, text) -> int:
     """The code of a text that a reader tells apart; of any other the number of those."""
-    texts = topics.BY_NAME[topic].texts
+    texts = topics.TOPIC_BY_NAME[topic].texts
     return texts.index(text) if text in texts else len(texts)
 
 
@@ -74,7 +74,7 @@ class _Shape:
     """
 
     def __init__(self, topic, data):
-        type_name = topics.BY_NAME[topic].type
+        type_name = topics.TOPIC_BY_NAME[topic].type
         places = cdr.Places(data, type_name)
         index = {column.name: i for i, column in enumerate(layouts.columns(topic))}
         self.size = places.stop
@@ -90,8 +90,8 @@ class _Shape:
 
     def fits(self, data):
         """Whether the numbers of a message lie at the same places."""
-        return 0 <= len(data) - self.size < cdr.PADDING and all([data[start:stop] == text
-                                                                 for start, stop, text in self.guard])
+        return 0 <= len(data) - self.size < cdr.PADDING_LIMIT_BYTES and all([data[start:stop] == text
+                                                                             for start, stop, text in self.guard])
 
 
 def _joined(fixed):
@@ -146,7 +146,7 @@ class Decoder:
     def put(self, stamp, values):
         """Put what `decoded` gave into the record; values None: nothing came."""
         if values is None:
-            self._stamp[0] = NEVER
+            self._stamp[0] = NO_STAMP
         else:
             self._stamp[0] = stamp
             self._numbers[:] = values
@@ -171,7 +171,7 @@ class Encoder:
     @property
     def due(self):
         """Whether the record holds a message."""
-        return self._stamp[0] != NEVER
+        return self._stamp[0] != NO_STAMP
 
     def encoded(self, epoch=0) -> bytes:
         """The message with the numbers of the record, its stamp counted from the epoch [ns]."""

@@ -1,10 +1,10 @@
 """The event log of the page: who asked for what, and what the antenna said of it. No ROS here."""
 import collections
 
-MOST = 200
+MAX_LOG_LINES = 200
 """Lines that are shown, and people whose jogs are remembered."""
 
-JOG, PAUSE = 'rate', 2.0
+JOG_VERB, NEW_JOG_PAUSE_S = 'rate', 2.0
 """The verb of a jog, which is asked for again and again, and the time [s] after which another one is a new line."""
 
 
@@ -12,7 +12,7 @@ class Log:
     """The newest lines, at most so many. lines: [{'t': s UTC, 'who': name, 'text': line, 'bad': whether it is a
     refusal or an alarm}]; revision: counts them."""
 
-    def __init__(self, most=MOST):
+    def __init__(self, most=MAX_LOG_LINES):
         self.lines, self.revision = collections.deque(maxlen=most), 0
         self._jogged, self._texts, self._alarms = {}, {}, {}
 
@@ -23,12 +23,12 @@ class Log:
 
     def replied(self, t, command, reply):
         """A commands.Command was answered by a commands.Reply."""
-        before, self._jogged[command.who] = self._jogged.get(command.who, -PAUSE), t
-        if command.verb != JOG:
+        before, self._jogged[command.who] = self._jogged.get(command.who, -NEW_JOG_PAUSE_S), t
+        if command.verb != JOG_VERB:
             del self._jogged[command.who]
-        elif t - before < PAUSE and reply.granted:
+        elif t - before < NEW_JOG_PAUSE_S and reply.granted:
             return
-        if len(self._jogged) > MOST:
+        if len(self._jogged) > MAX_LOG_LINES:
             self._jogged.clear()
         self.say(t, command.who, f'{command.verb}: {reply.text}', not reply.granted)
 

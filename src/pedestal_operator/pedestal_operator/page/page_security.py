@@ -10,13 +10,13 @@ import secrets
 import typing
 from http import cookies
 
-ROLES = ('operator', 'monitor', 'supervisor')
+PAGE_ROLES = ('operator', 'monitor', 'supervisor')
 """A monitor looks and may stop; an operator asks; a supervisor takes control away from others."""
 
-FREE = ('stop',)
+UNRESTRICTED_VERBS = ('stop',)
 """Verbs that every role may ask for."""
 
-SUPERVISORS = (('take', 'role', 'supervisor'),)
+SUPERVISOR_REQUESTS = (('take', 'role', 'supervisor'),)
 """(verb, argument, value) for supervisors only."""
 
 
@@ -43,7 +43,7 @@ class Access:
     """The tokens of a server at an address and port, made anew with it. names: by which it is called beside that."""
 
     def __init__(self, address, port, names=()):
-        self.tokens = {role: secrets.token_urlsafe(24) for role in ROLES}
+        self.tokens = {role: secrets.token_urlsafe(24) for role in PAGE_ROLES}
         self.cookie = f'pedestal_page_{port}'
         known = {address, *names}
         if is_loopback(address):
@@ -76,14 +76,14 @@ class Access:
         return jar[self.cookie].value if self.cookie in jar else ''
 
 
-def may(role, verb, arguments) -> str:
+def refusal_reason(role, verb, arguments) -> str:
     """'' where a role may ask for a verb with {argument: value}, else why not."""
-    if verb in FREE:
+    if verb in UNRESTRICTED_VERBS:
         return ''
     if role == 'monitor':
         return 'this page may only look, and stop'
     if role != 'supervisor' and any(verb == name and str(arguments.get(argument)) == value
-                                    for name, argument, value in SUPERVISORS):
+                                    for name, argument, value in SUPERVISOR_REQUESTS):
         return 'only a supervisor takes control away'
     return ''
 

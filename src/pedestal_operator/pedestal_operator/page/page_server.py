@@ -1,9 +1,10 @@
 """The server of the page: its files, and a web socket for each page, in a thread of its own. No ROS here.
 
 What a page is sent is a state in sections, each with a revision. Messages are numbered, and a page says which one it
-has seen. While AHEAD of them are on their way it gets no other; then one with the sections that have changed since, so
+has seen. While MAX_UNSEEN_MESSAGES of them are on their way it gets no other; then one with the sections that have
+changed since, so
 the newest wins: nothing is queued for anybody but the few replies to what he asked. A page that sees nothing for
-PATIENCE is dropped.
+PAGE_TIMEOUT_S is dropped.
 """
 import asyncio
 import collections
@@ -27,28 +28,28 @@ from starlette.websockets import WebSocketDisconnect
 from pedestal_operator.page import page_security
 from pedestal_operator.page.page_security import Refused
 
-STATIC = pathlib.Path(__file__).parents[1] / 'static'
+STATIC_FOLDER = pathlib.Path(__file__).parents[1] / 'static'
 
-AHEAD = 4
+MAX_UNSEEN_MESSAGES = 4
 """Messages that a page has not seen yet at the most."""
 
-PATIENCE = 5.0
+PAGE_TIMEOUT_S = 5.0
 """Time [s] for which a page may see nothing before it is dropped."""
 
-LONGEST = 4096
+MAX_MESSAGE_BYTES = 4096
 """Bytes of a message from a page at the most."""
 
-WAITING, REPLIES = 200, 50
+MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50
 """Asks of all pages that wait for the node, and replies that wait for a page, at the most."""
 
-ASKS, PER = 40, 1.0
+REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0
 """So many asks of a page are heard in this time [s]; a jog takes five."""
 
-STOPPING = 1.0
+SHUTDOWN_TIMEOUT_S = 1.0
 """Time [s] that the pages are given when the server ends."""
 
 
-class Asked(typing.NamedTuple):
+class PageMessage(typing.NamedTuple):
     """What a page has asked: a dict, None where it has left; age: of the newest state that it has seen [s]."""
     client: 'Client'
     message: dict | None
@@ -60,9 +61,9 @@ class Client:
 
     def __init__(self, name, role, address):
         self.name, self.role, self.address = name, role, address
-        self.replies = collections.deque(maxlen=REPLIES)
+        self.replies = collections.deque(maxlen=MAX_QUEUED_REPLIES)
         self.wake = asyncio.Event()
-        self._revisions, self._asked = {}, collections.deque(maxlen=ASKS)
+        self._revisions, self._asked = {}, collections.deque(maxlen=REQUEST_BURST_LIMIT)
         self._number, self._sent, self._seen = 0, {}, time.monotonic()
 
     def __str__(self):
@@ -90,12 +91,12 @@ class Client:
     @property
     def busy(self):
         """Whether it has enough to see."""
-        return len(self._sent) >= AHEAD
+        return len(self._sent) >= MAX_UNSEEN_MESSAGES
 
     @property
     def gone(self):
-        """Whether it has seen nothing for PATIENCE."""
-        return self.busy and time.monotonic() - next(iter(self._sent.values())) > PATIENCE
+        """Whether it has seen nothing for PAGE_TIMEOUT_S."""
+        return self.busy and time.monotonic() - next(iter(self._sent.values())) > PAGE_TIMEOUT_S
 
     @property
     def age(self):
@@ -103,9 +104,9 @@ class Client:
         return time.monotonic() - self._seen
 
     def too_fast(self):
-        """Whether it asks more than ASKS times in PER."""
+        """Whether it asks more than REQUEST_BURST_LIMIT times in REQUEST_BURST_PERIOD_S."""
         self._asked.append(time.monotonic())
-        return len(self._asked) == ASKS and self._asked[-1] - self._asked[0] < PER
+        return len(self._asked) == REQUEST_BURST_LIMIT and self._asked[-1] - self._asked[0] < REQUEST_BURST_PERIOD_S
 
 
 class PageServer:
@@ -116,7 +117,7 @@ class PageServer:
     """
 
     def __init__(self, address, port, names, most, history):
-        self.pages, self.asked = 0, queue.Queue(WAITING)
+        self.pages, self.asked = 0, queue.Queue(MAX_QUEUED_REQUESTS)
         family = socket.AF_INET6 if ':' in address else socket.AF_INET
         self._socket = socket.create_server((address, port), family=family)
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
@@ -124,11 +125,12 @@ class PageServer:
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0
         self._published = {}
         app = Starlette(routes=[Route('/', self._index), Route('/history', self._past),
-                                WebSocketRoute('/socket', self._talk), Mount('/', StaticFiles(directory=STATIC))])
+                                WebSocketRoute('/socket', self._talk),
+                                Mount('/', StaticFiles(directory=STATIC_FOLDER))])
         self._server = uvicorn.Server(uvicorn.Config(
             self._guarded(app), log_config=None, log_level='critical', access_log=False, lifespan='off', http='h11',
-            ws='websockets-sansio', ws_max_size=LONGEST, ws_per_message_deflate=False, proxy_headers=False,
-            server_header=False, timeout_graceful_shutdown=STOPPING))
+            ws='websockets-sansio', ws_max_size=MAX_MESSAGE_BYTES, ws_per_message_deflate=False, proxy_headers=False,
+            server_header=False, timeout_graceful_shutdown=SHUTDOWN_TIMEOUT_S))
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name='page_server', daemon=True)
         self._thread.start()
@@ -165,9 +167,9 @@ class PageServer:
         client.wake.set()
 
     def close(self):
-        """End: every page is told, and those that do not listen are left after STOPPING."""
+        """End: every page is told, and those that do not listen are left after SHUTDOWN_TIMEOUT_S."""
         self._server.should_exit = True
-        self._thread.join(3.0 * STOPPING)
+        self._thread.join(3.0 * SHUTDOWN_TIMEOUT_S)
 
     def _guarded(self, app):
         """The app behind page_security; its answers carry the headers."""
@@ -185,7 +187,7 @@ class PageServer:
     async def _index(self, request):
         """The page; the address with the token only sets the cookie, so that the token stays out of the history."""
         if 'token' not in request.query_params:
-            return await StaticFiles(directory=STATIC).get_response('index.html', request.scope)
+            return await StaticFiles(directory=STATIC_FOLDER).get_response('index.html', request.scope)
         answer = RedirectResponse('/', 303)
         answer.set_cookie(self.access.cookie, self.access.tokens[request.scope['role']], httponly=True,
                           samesite='strict')
@@ -218,14 +220,14 @@ class PageServer:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            self._ask(Asked(client, None, client.age))
+            self._ask(PageMessage(client, None, client.age))
 
     async def _tell(self, websocket, client):
         while not client.gone:
             await client.wake.wait()
             client.wake.clear()
             if not client.busy:
-                await asyncio.wait_for(websocket.send_text(client.newest(self._sections)), PATIENCE)
+                await asyncio.wait_for(websocket.send_text(client.newest(self._sections)), PAGE_TIMEOUT_S)
 
     async def _hear(self, websocket, client):
         with contextlib.suppress(WebSocketDisconnect):
@@ -236,8 +238,9 @@ class PageServer:
                 elif 'seen' in message:
                     client.see(message['seen'])
                 elif client.too_fast():
-                    self._say(client, json.dumps({'error': f'more than {ASKS} messages in {PER:g} s'}))
-                elif not self._ask(Asked(client, message, client.age)):
+                    self._say(client,
+                              json.dumps({'error': f'more than {REQUEST_BURST_LIMIT} messages in {REQUEST_BURST_PERIOD_S:g} s'}))
+                elif not self._ask(PageMessage(client, message, client.age)):
                     self._say(client, json.dumps({'error': 'too many asks wait for the antenna'}))
 
     def _ask(self, asked):

@@ -9,13 +9,13 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 from pedestal_common.wire import messages
 
-STEP = 5.0
+HORIZON_STEP_DEG = 5.0
 """Degrees of azimuth between two points of what is drawn around the horizon."""
 
-MOST = 240
+MAX_PATH_POINTS = 240
 """Points of a path at the most."""
 
-MOVED = 0.3
+MIN_HISTORY_STEP_DEG = 0.3
 """Degrees from one place of the past to the next: less than a line is wide."""
 
 
@@ -37,10 +37,10 @@ def path(message, midnight):
 
 
 def thinned(path):
-    """[[azimuth, elevation, time], ...] of a Path, MOST rows."""
+    """[[azimuth, elevation, time], ...] of a Path, MAX_PATH_POINTS rows."""
     if path is None:
         return []
-    rows = np.unique(np.linspace(0, len(path.times) - 1, MOST).astype(int))
+    rows = np.unique(np.linspace(0, len(path.times) - 1, MAX_PATH_POINTS).astype(int))
     return np.column_stack((path.angles[rows], path.times[rows])).round(3).tolist()
 
 
@@ -60,7 +60,7 @@ def passage(path, loss):
              'travel': round(float(azimuth[fall] - azimuth[rise]), 1), 'loss': loss}]
 
 
-class Past:
+class BeamHistory:
     """Where the beam was in the last `span` seconds. places: [[azimuth, elevation], ...] [deg]."""
 
     def __init__(self, span):
@@ -71,7 +71,7 @@ class Past:
         while self._rows and self._rows[0][0] < t - self._span:
             self._rows.popleft()
         last = self._rows[-1][1] if self._rows else (math.inf, math.inf)
-        if max(abs(a - b) for a, b in zip(place, last)) >= MOVED:
+        if max(abs(a - b) for a, b in zip(place, last)) >= MIN_HISTORY_STEP_DEG:
             self._rows.append((t, place))
 
     @property
@@ -98,10 +98,10 @@ class Deck:
         return [round(math.degrees(angle), 3) for angle in earth]
 
     def line(self, points):
-        """[[azimuth, elevation], ...] of deck angles [deg], a point each STEP between two of them."""
+        """[[azimuth, elevation], ...] of deck angles [deg], a point each HORIZON_STEP_DEG between two of them."""
         found = []
         for (A, E), (B, F) in zip(points, points[1:]):
-            count = max(int(abs(B - A) / STEP), 1)
+            count = max(int(abs(B - A) / HORIZON_STEP_DEG), 1)
             found += [self.seen(A + (B - A) * i / count, E + (F - E) * i / count) for i in range(count)]
         return found + [self.seen(*points[-1])] if points else found
 

@@ -8,53 +8,56 @@ None).
 import math
 
 from pedestal_common.graph import topics
-from pedestal_common.graph.modes import TABLE
+from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_operator.page import page_sky
 
-RECEIVER, MOTORS, ATTITUDE = 'tracking_receiver/angle_error', 'adu/motor_states', 'ship/imu/data'
-NUMBERS = (MOTORS, ATTITUDE)
+(ANGLE_ERROR_TOPIC, MOTOR_STATES_TOPIC, ATTITUDE_TOPIC) = ('tracking_receiver/angle_error', 'adu/motor_states',
+                                                           'ship/imu/data')
+EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
 """Topics that the page needs beside those of every client."""
 
-TEXTS = {'mode': 'acu/mode', 'drive': 'adu/state', 'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
+TEXT_TOPIC_BY_NAME = {'mode': 'acu/mode', 'drive': 'adu/state', 'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
 """{what the page calls it: the topic of the text}."""
 
-STATION, ELEMENTS = ('latitude_deg', 'longitude_deg', 'height'), ('line_1', 'line_2')
+STATION_PARAMETERS, ELEMENT_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height'), ('line_1', 'line_2')
 """Parameters of the station, and of the elements of a satellite."""
 
-WANTED = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor', 'prediction.start_time',
-                  *(f'prediction.station.{name}' for name in STATION),
-                  *(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high')),
-                  *(f'{axis}.stow' for axis in topics.AXES)),
-          'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz', 'target.kind',
-                                *(f'target.leo_pass.{name}' for name in ELEMENTS))}
+SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor', 'prediction.start_time',
+                            *(f'prediction.station.{name}' for name in STATION_PARAMETERS),
+                            *(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high')),
+                            *(f'{axis}.stow' for axis in topics.AXES)),
+                    'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz', 'target.kind',
+                                          *(f'target.leo_pass.{name}' for name in ELEMENT_PARAMETERS))}
 """{node: its parameters that are shown}."""
 
-MODES = tuple(row.name for row in TABLE if row.button)
+BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button; `stop` has one of its own, `rate` is the jog, `slave` is for programs."""
 
-SPAN, PERIOD = 600.0, 0.5
+CHART_SPAN_S, CHART_PERIOD_S = 600.0, 0.5
 """Time [s] of the strip charts, and from one of their points to the next."""
 
-REFUSED = 'refused '
+REFUSAL_PREFIX = 'refused '
 """Before the name of a mode in the diagnostics of the control unit."""
 
-HISTORY = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate', 'elevation_rate',
-           *topics.MOTORS, 'level')
+HISTORY_COLUMNS = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate',
+                   'elevation_rate',
+                   *topics.MOTOR_NAMES, 'level')
 
 
 def _deck(antenna):
-    return page_sky.Deck(antenna.numbers[ATTITUDE][:4] if antenna.present(ATTITUDE) else None)
+    return page_sky.Deck(antenna.numbers[ATTITUDE_TOPIC][:4] if antenna.present(ATTITUDE_TOPIC) else None)
 
 
 def now(antenna) -> dict:
     """The numbers of this moment: angles and rates [deg, deg/s], errors [deg], level [dB-Hz], torques [Nm]."""
     actual, commanded = antenna.angles('joint_states'), antenna.angles('acu/reference')
     receiver, torques = (math.nan,) * 3, ()
-    if antenna.present(RECEIVER):
-        x, y, level = antenna.numbers[RECEIVER]
+    if antenna.present(ANGLE_ERROR_TOPIC):
+        x, y, level = antenna.numbers[ANGLE_ERROR_TOPIC]
         receiver = math.degrees(x), math.degrees(y), level
-    if antenna.present(MOTORS):
-        torques = [round(float(torque), 3) for torque in antenna.numbers[MOTORS][-len(topics.MOTORS):]]
+    if antenna.present(MOTOR_STATES_TOPIC):
+        torques = [round(float(torque),
+                         3) for torque in antenna.numbers[MOTOR_STATES_TOPIC][-len(topics.MOTOR_NAMES):]]
     return {'t': antenna.now, 'mode': antenna.texts.get('acu/mode', ''),
             'axes': [{'actual': a, 'commanded': c, 'error': c - a, 'rate': rate}
                      for a, c, rate in zip(actual, commanded, antenna.rates())],
@@ -63,18 +66,18 @@ def now(antenna) -> dict:
 
 
 def history_row(frame) -> list:
-    """A row of HISTORY from `now`."""
+    """A row of HISTORY_COLUMNS from `now`."""
     azimuth, elevation = frame['axes']
     x, y, level = frame['receiver']
-    torques = [*frame['torques'], *(math.nan,) * len(topics.MOTORS)][:len(topics.MOTORS)]
+    torques = [*frame['torques'], *(math.nan,) * len(topics.MOTOR_NAMES)][:len(topics.MOTOR_NAMES)]
     row = (x, y, azimuth['error'], elevation['error'], azimuth['rate'], elevation['rate'], *torques, level)
     return [round(frame['t'], 2), *(round(float(value), 5) for value in row)]
 
 
-def told(antenna, heard=('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')) -> dict:
+def status_section(antenna, heard=('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')) -> dict:
     """What changes once a second at the most: mode and why, control, axes, times to the limits, refusals."""
     acu = antenna.told('acu')
-    texts = {name: antenna.texts.get(topic, '') for name, topic in TEXTS.items()}
+    texts = {name: antenna.texts.get(topic, '') for name, topic in TEXT_TOPIC_BY_NAME.items()}
     return {'present': bool(acu), **texts,
             **{key: acu.get(key, '') for key in ('reason', 'fallback', 'control', 'faults', 'locked', 'coasting')},
             'axes': [{'limit_s': acu.get(f'{axis} limit_s', ''), 'limited': acu.get(f'{axis} limited', '')}
@@ -82,12 +85,12 @@ def told(antenna, heard=('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion'
             'steps': acu.get('clock_steps', ''), 'offset_ms': acu.get('offset joint_states_ms', ''),
             'nodes': {name: antenna.status[name].message if antenna.present(name) else 'silent'
                       for name in heard if name in antenna.status},
-            'refused': refusals(acu) if acu else dict.fromkeys((*MODES, 'rate'), 'the control unit is silent')}
+            'refused': refusals(acu) if acu else dict.fromkeys((*BUTTON_MODES, 'rate'), 'the control unit is silent')}
 
 
 def refusals(acu) -> dict:
     """{mode: why it would be refused now}, which the control unit asks its own table of modes."""
-    return {key.removeprefix(REFUSED): why for key, why in acu.items() if key.startswith(REFUSED)}
+    return {key.removeprefix(REFUSAL_PREFIX): why for key, why in acu.items() if key.startswith(REFUSAL_PREFIX)}
 
 
 def alarms(antenna) -> list:
@@ -115,7 +118,8 @@ def fixed(antenna) -> dict:
 
     def degrees(name):
         return math.degrees(p.get(name, math.nan))
-    return {'beamwidth': degrees('tracker.receiver.beamwidth'), 'history': HISTORY, 'span': SPAN, 'modes': MODES,
+    return {'beamwidth': degrees('tracker.receiver.beamwidth'), 'history': HISTORY_COLUMNS, 'span': CHART_SPAN_S,
+            'modes': BUTTON_MODES,
             'limits': [[degrees(f'{axis}.limits.{end}') for end in ('low', 'high')] for axis in topics.AXES],
             'stow': [degrees(f'{axis}.stow') for axis in topics.AXES],
             'detect': p.get('receiver.acquire_level_dbhz'), 'loss': p.get('receiver.lose_level_dbhz')}
@@ -138,4 +142,4 @@ def sky(antenna, coming) -> dict:
             'floor': deck.line([*floor, [floor[0][0] + 360.0, floor[0][1]]]) if floor else
                      deck.line([[0.0, low], [360.0, low]]) if low > 0.0 else [],
             'top': deck.line([[0.0, high], [360.0, high]]) if high < 90.0 else [],
-            'bow': deck.seen(0.0, 0.0) if antenna.present(ATTITUDE) else []}
+            'bow': deck.seen(0.0, 0.0) if antenna.present(ATTITUDE_TOPIC) else []}

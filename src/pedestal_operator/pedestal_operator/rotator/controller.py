@@ -4,20 +4,20 @@ import math
 
 from pedestal_operator.rotator.pointing import Pointing
 
-PATIENCE = 1.5
+CLIENT_REPLY_TIMEOUT_S = 1.5
 """Time [s] within which the control unit replies; Hamlib's clients wait for 2 s."""
 
-RELEASED = 10.0
+CONTROL_TIMEOUT_S = 10.0
 """Time [s] without a command of its holder after which control is given back."""
 
-JOG_AGAIN = 0.2
+JOG_REPEAT_PERIOD_S = 0.2
 """Time [s] after which a jog is asked for again: less than half of the dead man's."""
 
-DONE, REFUSED, OUT_OF_REACH, BUSY, SILENT = range(5)
+OUTCOME_DONE, OUTCOME_REFUSED, OUTCOME_OUT_OF_REACH, OUTCOME_BUSY, OUTCOME_NO_REPLY = range(5)
 """What came of an ask: the control unit was willing, or not; no such place; another client is in control; no reply."""
 
 
-class Ask:
+class PendingRequest:
     """An ask of a client on its way. outcome: of the list above, None as long as it is not known."""
 
     def __init__(self, numbers, deadline, outcome=None):
@@ -32,16 +32,16 @@ class Ask:
                 self.numbers.remove(number)
                 self._refusal = self._refusal or ('' if reply.granted else reply.text)
         if self.outcome is None and (not self.numbers or now >= self.deadline):
-            self.outcome = SILENT if self.numbers else _outcome(self._refusal)
+            self.outcome = OUTCOME_NO_REPLY if self.numbers else _outcome(self._refusal)
         return self.outcome
 
 
 def _outcome(refusal):
     if not refusal:
-        return DONE
+        return OUTCOME_DONE
     if 'control is held' in refusal:
-        return BUSY
-    return OUT_OF_REACH if 'outside limits' in refusal or 'must be' in refusal else REFUSED
+        return OUTCOME_BUSY
+    return OUTCOME_OUT_OF_REACH if 'outside limits' in refusal or 'must be' in refusal else OUTCOME_REFUSED
 
 
 class Controller:
@@ -53,26 +53,26 @@ class Controller:
         self._holder, self._used = '', 0.0
         self._jog, self._told, self._jogs = None, 0.0, False
 
-    def go(self, client, azimuth, elevation, now) -> Ask:
+    def go(self, client, azimuth, elevation, now) -> PendingRequest:
         """Point at a direction [deg]."""
         return self._ask(client, now, lambda: self.pointing.go(azimuth, elevation, now))
 
-    def do(self, client, verb, now) -> Ask:
+    def do(self, client, verb, now) -> PendingRequest:
         """Ask for a verb without arguments."""
         return self._ask(client, now, lambda: self._remote.ask(verb), continues=False)
 
-    def jog(self, client, rates, now) -> Ask:
+    def jog(self, client, rates, now) -> PendingRequest:
         """Move at rates (azimuth, elevation) [deg/s] until something else is asked for or the client leaves."""
         ask = self._ask(client, now, lambda: self._remote.ask('rate', _rates(rates)), continues=False)
         if ask.outcome is None:
             self._jog, self._told, self._jogs = rates, now, False
         return ask
 
-    def stop(self, client, now) -> Ask:
+    def stop(self, client, now) -> PendingRequest:
         """Stand: everybody may ask for it."""
         self.pointing.forget()
         self._jog, self._remote.who = None, client
-        return Ask([self._remote.ask('stop')], now + PATIENCE)
+        return PendingRequest([self._remote.ask('stop')], now + CLIENT_REPLY_TIMEOUT_S)
 
     def look(self, now):
         """Keep a jog alive; end a motion that no set-point continues; give control back when nobody uses it."""
@@ -82,10 +82,10 @@ class Controller:
         if self._jogs and not jogs:
             self._jog = None    # somebody has asked for another mode
         self._jogs = jogs
-        if self._jog and now - self._told >= JOG_AGAIN:
+        if self._jog and now - self._told >= JOG_REPEAT_PERIOD_S:
             self._told = self._used = now
             self._remote.ask('rate', _rates(self._jog))
-        if self._holder and now - self._used > RELEASED:
+        if self._holder and now - self._used > CONTROL_TIMEOUT_S:
             self.leave(self._holder, now)
 
     def leave(self, client, now):
@@ -101,14 +101,15 @@ class Controller:
 
     def _ask(self, client, now, ask, continues=True):
         if self._holder not in ('', client):
-            return Ask([], now, BUSY)
+            return PendingRequest([], now, OUTCOME_BUSY)
         if not continues:
             self.pointing.forget()
         self._jog, self._remote.who = None, client
         numbers = [] if self._holder else [self._remote.ask('take')]
         self._holder, self._used = client, now
         number = ask()
-        return Ask([], now, OUT_OF_REACH) if number is None else Ask([*numbers, number], now + PATIENCE)
+        return PendingRequest([], now, OUTCOME_OUT_OF_REACH) if number is None else PendingRequest([*numbers, number],
+                                                                                                   now + CLIENT_REPLY_TIMEOUT_S)
 
 
 def _rates(rates):

@@ -6,13 +6,13 @@ import selectors
 import socket
 import tty
 
-UNREAD = 65_536
+MAX_UNREAD_BYTES = 65_536
 """Bytes of answers that a client may leave unread; what comes then is dropped."""
 
-WAITING = 100
+MAX_WAITING_LINES = 100
 """Lines of a client that may wait for an answer before it is no longer read."""
 
-PIECE = 65_536
+READ_CHUNK_BYTES = 65_536
 
 
 class Lines:
@@ -45,7 +45,7 @@ class Client:
     def receive(self):
         """Take what has come."""
         try:
-            data = os.read(self.stream.fileno(), PIECE)
+            data = os.read(self.stream.fileno(), READ_CHUNK_BYTES)
         except BlockingIOError:
             return
         except OSError as error:
@@ -58,7 +58,7 @@ class Client:
 
     def say(self, data):
         """Put an answer behind those that are still to be sent."""
-        if len(self._out) + len(data) > UNREAD:
+        if len(self._out) + len(data) > MAX_UNREAD_BYTES:
             self.dropped += 1
         else:
             self._out += data
@@ -104,7 +104,7 @@ class LineServer:
         for key, _ in self._selector.select(0):
             if key.fileobj is self._server:
                 self._accept()
-            elif len(key.data.lines) <= WAITING:
+            elif len(key.data.lines) <= MAX_WAITING_LINES:
                 key.data.receive()
 
     def send(self):

@@ -10,14 +10,14 @@ import numpy as np
 
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
-from pedestal_operator.rotator.course import Course
 from pedestal_operator.rotator.rotctld import Limits, turn
+from pedestal_operator.rotator.set_point_filter import SetPointFilter
 
-FOREVER = 3600.0
+SLAVE_DURATION_S = 3600.0
 """Time [s] for which a direction on a ship holds."""
 
-ATTITUDE = 'ship/imu/data'
-LIMITS = tuple(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high'))
+ATTITUDE_TOPIC = 'ship/imu/data'
+LIMIT_PARAMETERS = tuple(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high'))
 """Parameters of the control unit."""
 
 
@@ -26,14 +26,14 @@ class Pointing:
 
     def __init__(self, remote):
         self._remote = remote
-        self._course = Course()
-        self._query = remote.query(LIMITS)
-        remote.hear(ATTITUDE)
+        self._course = SetPointFilter()
+        self._query = remote.query(LIMIT_PARAMETERS)
+        remote.hear(ATTITUDE_TOPIC)
 
     @property
     def aboard(self):
         """Whether the antenna stands on a ship."""
-        return self._remote.present(ATTITUDE)
+        return self._remote.present(ATTITUDE_TOPIC)
 
     @property
     def _mode(self):
@@ -59,7 +59,7 @@ class Pointing:
         if not self.aboard:
             return angles
         deck_to_earth = np.zeros((3, 3))
-        line_of_sight.rotation(*self._remote.numbers[ATTITUDE][:4], deck_to_earth)
+        line_of_sight.rotation(*self._remote.numbers[ATTITUDE_TOPIC][:4], deck_to_earth)
         beam = line_of_sight.direction(*np.radians(angles))
         return tuple(np.degrees(line_of_sight.earth_angles(*(deck_to_earth @ beam))))
 
@@ -86,12 +86,12 @@ class Pointing:
 
     def forget(self):
         """The next set-point is the first one."""
-        self._course = Course()
+        self._course = SetPointFilter()
 
     def _ask(self, angles, rates=(0.0, 0.0), moves=0.0):
         names = (*topics.AXES, *(f'{axis}_rate' for axis in topics.AXES))
         arguments = {**dict(zip(names, np.radians((*angles, *rates)))), 'moves': moves}
         if self.aboard:
-            arguments['holds'] = FOREVER
+            arguments['holds'] = SLAVE_DURATION_S
         return self._remote.ask(self._mode, arguments)
 

@@ -9,10 +9,11 @@ import math
 import re
 import typing
 
-LONGEST = 256
+MAX_LINE_BYTES = 256
 """Bytes of a line at the most."""
 
-OK, INVALID, NOT_IMPLEMENTED, TIMEOUT, REJECTED, NOT_AVAILABLE, BUSY = 0, -1, -4, -5, -9, -11, -14
+(RESULT_OK, RESULT_INVALID, RESULT_NOT_IMPLEMENTED, RESULT_TIMEOUT, RESULT_REJECTED, RESULT_NOT_AVAILABLE,
+ RESULT_BUSY) = (0, -1, -4, -5, -9, -11, -14)
 """Results `RPRT n` (hamlib/rig.h)."""
 
 
@@ -28,18 +29,19 @@ COMMANDS = (Row('p', 'get_pos'), Row('P', 'set_pos', 2, True), Row('S', 'stop', 
             Row('R', 'reset', 1, True), Row('M', 'move', 2, True), Row('_', 'get_info'), Row('s', 'get_status'),
             Row('1', 'dump_caps'), Row('', 'dump_state'), Row('q', 'quit'), Row('Q', 'quit'))
 
-SETS = tuple(row.name for row in COMMANDS if row.sets)
+SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)
 
-UNAVAILABLE = (*'wCUuXx3LlDdEeBAaVv', 'send_cmd', 'set_conf', 'set_func', 'get_func', 'set_parm', 'get_parm',
-               'dump_conf', 'lonlat2loc', 'loc2lonlat', 'dms2dec', 'dec2dms', 'dmmm2dec', 'dec2dmmm', 'qrb',
-               'a_sp2a_lp', 'd_sp2d_lp', 'set_level', 'get_level')
+UNAVAILABLE_COMMANDS = (*'wCUuXx3LlDdEeBAaVv', 'send_cmd', 'set_conf', 'set_func', 'get_func', 'set_parm', 'get_parm',
+                        'dump_conf', 'lonlat2loc', 'loc2lonlat', 'dms2dec', 'dec2dms', 'dmmm2dec', 'dec2dmmm', 'qrb',
+                        'a_sp2a_lp', 'd_sp2d_lp', 'set_level', 'get_level')
 """Commands of the reference that an antenna control unit has no use for."""
 
-DIRECTIONS = {2: (0, 1), 4: (0, -1), 8: (-1, 0), 16: (1, 0), 32: (-1, 1), 64: (1, 1), 128: (-1, -1), 256: (1, -1)}
+MOVE_DIRECTIONS = {2: (0, 1), 4: (0, -1), 8: (-1, 0), 16: (1, 0), 32: (-1, 1), 64: (1, 1), 128: (-1, -1), 256: (1, -1)}
 """{number: way (azimuth, elevation)} of `move`."""
 
-_WORDS = {'UP': 2, 'DOWN': 4, 'LEFT': 8, 'CCW': 8, 'RIGHT': 16, 'CW': 16, 'UP_LEFT': 32, 'UP_CCW': 32, 'UP_RIGHT': 64,
-          'UP_CW': 64, 'DOWN_LEFT': 128, 'DOWN_CCW': 128, 'DOWN_RIGHT': 256, 'DOWN_CW': 256}
+_DIRECTION_NUMBERS = {'UP': 2, 'DOWN': 4, 'LEFT': 8, 'CCW': 8, 'RIGHT': 16, 'CW': 16, 'UP_LEFT': 32, 'UP_CCW': 32,
+                      'UP_RIGHT': 64,
+                      'UP_CW': 64, 'DOWN_LEFT': 128, 'DOWN_CCW': 128, 'DOWN_RIGHT': 256, 'DOWN_CW': 256}
 
 
 class Limits(typing.NamedTuple):
@@ -55,7 +57,7 @@ class Request(typing.NamedTuple):
     values: tuple = ()
     separator: str = ''
     header: str = ''
-    error: int = OK
+    error: int = RESULT_OK
 
 
 def read(line) -> Request | None:
@@ -73,25 +75,25 @@ def read(line) -> Request | None:
     name = called[1:] if called.startswith('\\') else called
     row = next((row for row in COMMANDS if name == (row.name if name != called else row.letter)), None)
     if row is None:
-        known = name in UNAVAILABLE
-        return Request(name, (), separator, f'{name}:', NOT_AVAILABLE if known else NOT_IMPLEMENTED)
+        known = name in UNAVAILABLE_COMMANDS
+        return Request(name, (), separator, f'{name}:', RESULT_NOT_AVAILABLE if known else RESULT_NOT_IMPLEMENTED)
     given = words[1:]
     header = f'{row.name}: {" ".join(given)}' if given else f'{row.name}:'
     if len(given) != row.arguments:
-        return Request(row.name, (), separator, header, INVALID)
+        return Request(row.name, (), separator, header, RESULT_INVALID)
     try:
         values = _values(row.name, given)
     except ValueError:
-        return Request(row.name, (), separator, header, INVALID)
+        return Request(row.name, (), separator, header, RESULT_INVALID)
     return Request(row.name, values, separator, header)
 
 
 def _values(name, given):
     """The numbers of a command's arguments. Raises ValueError."""
     if name == 'move':
-        way = _WORDS.get(given[0].upper()) or int(given[0])
+        way = _DIRECTION_NUMBERS.get(given[0].upper()) or int(given[0])
         speed = int(given[1])
-        if way not in DIRECTIONS or not (speed == -1 or 1 <= speed <= 100):
+        if way not in MOVE_DIRECTIONS or not (speed == -1 or 1 <= speed <= 100):
             raise ValueError
         return way, speed
     values = tuple(_number(text) for text in given)
@@ -110,10 +112,10 @@ def _number(text):
 def answer(request, result, lines=()) -> bytes:
     """The answer to a Request: its result, and lines of what was asked for, [(name in extended responses, text)]."""
     if not request.separator:
-        text = ''.join(f'{value}\n' for _, value in lines) if lines and result == OK else f'RPRT {result}\n'
+        text = ''.join(f'{value}\n' for _, value in lines) if lines and result == RESULT_OK else f'RPRT {result}\n'
         return text.encode()
     parts = [request.header]
-    if result == OK:
+    if result == RESULT_OK:
         parts += [f'{name}: {value}' if name else value for name, value in lines]
     return (request.separator.join((*parts, f'RPRT {result}')) + '\n').encode()
 

@@ -7,7 +7,7 @@ from pedestal_operator.remote_node import Remote
 from pedestal_operator.rotator.controller import Controller
 from pedestal_operator.rotator.line_server import LineServer
 
-LOOK = 0.005
+POLL_PERIOD_S = 0.005
 """Time [s] between two looks at the clients."""
 
 
@@ -39,7 +39,7 @@ class ServerNode(Remote):
         self._server = LineServer(name, p.address, p.port, p.clients, longest, self.device, make_client)
         self.get_logger().info(f'listens on {p.address}:{self._server.port}'
                                + (f' and {self.device}' if self.device else ''))
-        self.every(LOOK, self._look)
+        self.every(POLL_PERIOD_S, self._look)
 
     def serve(self, client, now):
         """Answer what a client has said, at the time now [s]; overridden."""

@@ -13,14 +13,14 @@ import math
 import typing
 import xml.etree.ElementTree as ElementTree
 
-from pedestal_common.geometry.line_of_sight import ASHORE
+from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 from pedestal_common.graph import topics
 from pedestal_common.wire import messages
 
-VIEWERS = importlib.resources.files('pedestal_operator.viewers') / 'files'
+VIEWER_FOLDER = importlib.resources.files('pedestal_operator.viewers') / 'files'
 """The folder of what viewers open: layouts, the model of the pedestal."""
 
-DESCRIPTION = (VIEWERS / 'pedestal.urdf').read_text()
+PEDESTAL_URDF = (VIEWER_FOLDER / 'pedestal.urdf').read_text()
 """The model of the pedestal, as the topic robot_description has it."""
 
 
@@ -45,7 +45,7 @@ def _numbers(text):
     return tuple(float(word) for word in text.split())
 
 
-def joints(description=DESCRIPTION) -> tuple:
+def joints(description=PEDESTAL_URDF) -> tuple:
     """The Joints of a URDF whose frames are parallel where every angle is 0 (no `rpy`), in its order."""
     found = []
     for joint in ElementTree.fromstring(description).iter('joint'):
@@ -56,7 +56,7 @@ def joints(description=DESCRIPTION) -> tuple:
     return tuple(found)
 
 
-JOINTS = joints()
+PEDESTAL_JOINTS = joints()
 
 
 def _turned(axis, angle):
@@ -65,7 +65,7 @@ def _turned(axis, angle):
     return *(sine * part for part in axis), math.cos(0.5 * angle)
 
 
-def of_deck(attitude=ASHORE) -> Transform:
+def of_deck(attitude=ASHORE_ATTITUDE) -> Transform:
     """The deck in the earth. attitude: quaternion (x, y, z, w) deck -> earth."""
     return Transform('earth', 'base_link', (0.0, 0.0, 0.0), tuple(attitude))
 
@@ -76,12 +76,12 @@ def of_pedestal(angles, prefix='') -> list:
     turned = dict(zip(topics.AXES, angles))
     return [Transform(joint.parent if joint.parent == 'base_link' else prefix + joint.parent, prefix + joint.child,
                       joint.origin, _turned(joint.axis or (0.0, 0.0, 0.0), turned.get(joint.name, 0.0)))
-            for joint in JOINTS]
+            for joint in PEDESTAL_JOINTS]
 
 
 def tf_message(stamp, transforms):
     """The tf2_msgs/msg/TFMessage of Transforms at a stamp [ns]."""
-    types = messages.TYPESTORE.types
+    types = messages.ROS_TYPESTORE.types
     stamped, transform = (types[f'geometry_msgs/msg/{name}'] for name in ('TransformStamped', 'Transform'))
     of_all = []
     for given in transforms:

@@ -1,5 +1,5 @@
 """A topic of the graph that is heard only as long as somebody wants it."""
-from pedestal_common.node import listening
+from pedestal_common.node import subscriptions
 
 
 class OnDemand:
@@ -11,7 +11,7 @@ class OnDemand:
     def want(self, wanted):
         """Begin or cease to hear the topic."""
         if wanted and not self._subscriptions:
-            self._subscriptions = listening.subscribe(self._node, self._link, self._link.name, self._take, 'read')
+            self._subscriptions = subscriptions.subscribe(self._node, self._link, self._link.name, self._take, 'read')
         elif not wanted:
             while self._subscriptions:
                 self._node.destroy_subscription(self._subscriptions.pop())

@@ -1,4 +1,4 @@
 """What this machine makes of the graph, the compiled core and bags: one benchmark a module, run() -> its rows."""
 
-MODULES = {'graph': 'lockstep', 'core': 'core', 'bag': 'recording'}
+BENCH_MODULES = {'graph': 'lockstep', 'core': 'core', 'bag': 'recording'}
 """{name on the command line: module}."""

@@ -12,9 +12,9 @@ from rclpy.node import Node
 from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.node import middleware, shell
 
-ROLES = ('tracking_receiver', 'acu', 'adu', 'recorder')
-TRIGGERS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
-WARM_UP = 300
+RING_NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
+TRIGGER_TOPICS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
+WARM_UP_LAPS = 300
 """Laps before the clock starts."""
 
 
@@ -23,7 +23,7 @@ def _filled(topic):
     type_name = topic.type
     message = middleware.message_class(type_name)()
     if type_name.endswith('JointState'):
-        message.name = list(topics.BY_NAME[topic.name].names)
+        message.name = list(topics.TOPIC_BY_NAME[topic.name].names)
         for field in layouts.fields(topic.name):
             setattr(message, field.name, [0.0] * len(message.name))
     elif type_name.endswith('JointTrajectory'):
@@ -41,17 +41,17 @@ class Ring(Node):
     def __init__(self, role, steps):
         super().__init__(role)
         self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
-        step_topics = [link for link in nodes.recorded(ROLES) if link.rate == 'step']
+        step_topics = [link for link in nodes.recorded(RING_NODES) if link.rate == 'step']
         profile = middleware.qos('step')
         self.writers = [(self.create_publisher(middleware.message_class(topic.type), topic.name, profile),
-                         _filled(topic), len(nodes.readers(topic, ROLES)))
+                         _filled(topic), len(nodes.readers(topic, RING_NODES)))
                         for topic in step_topics if role in topic.writers]
         for topic in step_topics:
             kind = middleware.message_class(topic.type)
             if role == 'recorder':
                 self.create_subscription(kind, topic.name, self.ignore, profile, raw=True)
             elif role in topic.readers:
-                take = self.pass_on if TRIGGERS[role] == topic.name else self.ignore
+                take = self.pass_on if TRIGGER_TOPICS[role] == topic.name else self.ignore
                 self.create_subscription(kind, topic.name, take, profile)
         if role == 'adu':
             self.start_timer = self.create_timer(0.01, self.start)
@@ -76,9 +76,9 @@ class Ring(Node):
     def pass_on(self, _message):
         """Send what this node writes in a lap; the drive prints the time of a lap [us] after the last."""
         self.lap += 1
-        if self.lap == WARM_UP:
+        if self.lap == WARM_UP_LAPS:
             self.begun = time.perf_counter()
-        if self.lap == self.steps + WARM_UP and self.get_name() == 'adu':
+        if self.lap == self.steps + WARM_UP_LAPS and self.get_name() == 'adu':
             print(json.dumps({'lap_us': (time.perf_counter() - self.begun) / self.steps * 1e6}), flush=True)
             self.finished = True
             return

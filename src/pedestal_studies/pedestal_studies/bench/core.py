@@ -23,10 +23,10 @@ from pedestal_common.parameters import build
 from pedestal_studies.bench import solve_ivp_axis
 from pedestal_studies.bench.table import best_of, show
 
-CORE_SECONDS, TRIAL_SECONDS = 20.0, 10.0
-SHORT, ROUNDS = 40, 100
+CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0
+SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100
 """Drive steps that nobody else is likely to interrupt, and how often."""
-SUBSTEPS = 2 * 100
+SUBSTEPS_PER_STEP = 2 * 100
 """Plant sub-steps of both axes in one drive step of 5 ms."""
 SOLVE_IVP_TICKS = 100
 
@@ -39,22 +39,22 @@ def _drive_steps(state, constants, inputs, outputs, count):
 
 @compiled
 def _steps_on_lanes(drives, count):
-    moving = adu_unit.LANES(drives)
+    moving = adu_unit.DRIVE_LANES(drives)
     for _ in range(count):
         drive_unit.step(moving.state, moving.constants, moving.inputs, moving.outputs)
 
 
 FILTER_STEPS = 20_000
 FILTERPY_STEPS = 500
-FILTER_PERIOD = 0.01
+FILTER_PERIOD_S = 0.01
 
 
 def filter_step(**parameters):
     """Time [us] of one prediction and correction of an axis_filter of FilterParameters on a noisy ramp."""
     constants = axis_filter.constants(build(FilterParameters, parameters))
-    t = FILTER_PERIOD * np.arange(FILTER_STEPS)
+    t = FILTER_PERIOD_S * np.arange(FILTER_STEPS)
     y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
-    variance, state = np.full(FILTER_STEPS, 2.5e-7), np.zeros(1, axis_filter.FILTER)
+    variance, state = np.full(FILTER_STEPS, 2.5e-7), np.zeros(1, axis_filter.FILTER_DTYPE)
     _filter_steps(state, constants, t, y, variance)
     return best_of(lambda: _filter_steps(state, constants, t, y, variance)) / FILTER_STEPS * 1e6
 
@@ -70,9 +70,9 @@ def _filter_steps(state, constants, t, y, R):
 
 def unscented_step():
     """Time [us] of one prediction and correction of both Cartesian filters, azimuth, elevation and range measured."""
-    state, constants = np.zeros(1, unscented.STATE), unscented.constants(UkfParameters())
+    state, constants = np.zeros(1, unscented.STATE_DTYPE), unscented.constants(UkfParameters())
     noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
-    measured = noise + np.outer(FILTER_PERIOD * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
+    measured = noise + np.outer(FILTER_PERIOD_S * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
     _unscented_steps(state, constants, measured)
     return best_of(lambda: _unscented_steps(state, constants, measured)) / FILTER_STEPS * 1e6
 
@@ -86,7 +86,7 @@ def _unscented_steps(state, constants, measured):
     unscented.start(s, c, first, 500.0, 1.0)
     for k in range(len(measured)):
         A, E, r = measured[k]
-        unscented.predict(s, c, FILTER_PERIOD)
+        unscented.predict(s, c, FILTER_PERIOD_S)
         m = Measurement(0.0, (AxisMeasurement(A, R, math.nan, math.nan), AxisMeasurement(E, R, math.nan, math.nan)),
                         r, 1.0)
         unscented.innovation(s, m)
@@ -97,14 +97,14 @@ def filterpy_unscented():
     """filterpy's IMMEstimator of two UnscentedKalmanFilter of nine states, three numbers measured."""
     def one():
         made = UnscentedKalmanFilter(
-            9, 3, FILTER_PERIOD, lambda x: np.array([np.arctan2(x[0], x[1]), np.arctan2(x[2], np.hypot(x[0], x[1])),
-                                                     np.linalg.norm(x[:3])]),
+            9, 3, FILTER_PERIOD_S, lambda x: np.array([np.arctan2(x[0], x[1]), np.arctan2(x[2], np.hypot(x[0], x[1])),
+                                                       np.linalg.norm(x[:3])]),
             lambda x, dt: F @ x, MerweScaledSigmaPoints(9, unscented.ALPHA, unscented.BETA, unscented.KAPPA))
         made.x = np.array([0.0, 478.0, 148.0, 0.5, *np.zeros(5)])
         made.Q, made.R = 0.01 * np.eye(9), np.diag([2.5e-7, 2.5e-7, 1.0])
         return made
 
-    T = FILTER_PERIOD
+    T = FILTER_PERIOD_S
     F = np.kron([[1.0, T, 0.5 * T * T], [0.0, 1.0, T], [0.0, 0.0, 1.0]], np.eye(3))
     return IMMEstimator([one(), one()], np.full(2, 0.5), np.array([[0.998, 0.002], [0.002, 0.998]]))
 
@@ -114,7 +114,8 @@ def filterpy_steps():
     and of two unscented filters."""
     def three():
         made = KalmanFilter(3, 1)
-        made.F = np.array([[1.0, FILTER_PERIOD, 0.5 * FILTER_PERIOD**2], [0.0, 1.0, FILTER_PERIOD], [0.0, 0.0, 1.0]])
+        made.F = np.array([[1.0, FILTER_PERIOD_S, 0.5 * FILTER_PERIOD_S**2], [0.0, 1.0, FILTER_PERIOD_S],
+                           [0.0, 0.0, 1.0]])
         made.H, made.R, made.Q = np.array([[1.0, 0.0, 0.0]]), np.array([[2.5e-7]]), 1e-6 * np.eye(3)
         return made
 
@@ -146,38 +147,39 @@ def filter_rows():
 def drive_rows():
     """One drive beside as many as there are lanes, by turns; whole trials on lanes, by the time of one core."""
     params = AduParameters(initial_elevation=0.7)
-    one = np.zeros(1, adu_unit.RECORD)
+    one = np.zeros(1, adu_unit.RECORD_DTYPE)
     one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)
     one['inputs']['azimuth']['rate'], one['inputs']['elevation']['rate'], one['inputs']['enable'] = 0.02, -0.01, 1
-    drives, (state, constants, inputs, outputs) = lanes.beside(one), (
+    drives, (state, constants, inputs, outputs) = lanes.to_lanes(one), (
         one[name] for name in ('state', 'constants', 'inputs', 'outputs'))
     _drive_steps(state, constants, inputs, outputs, 200)
     _steps_on_lanes(drives, 200)
-    alone, together = zip(*((best_of(lambda: _drive_steps(state, constants, inputs, outputs, SHORT), 1),
-                             best_of(lambda: _steps_on_lanes(drives, SHORT), 1)) for _ in range(ROUNDS)))
-    substep = min(alone) / SHORT / SUBSTEPS * 1e9
-    on_lanes = min(together) / SHORT / SUBSTEPS / lanes.WIDTH * 1e9
-    trials = [scenario.load('leo_pass', seed=seed, duration=TRIAL_SECONDS) for seed in range(lanes.WIDTH)]
-    side_by_side.runs([closed_loop.Loop(trial) for trial in trials], ensemble.TOPICS)
+    alone, together = zip(*((best_of(lambda: _drive_steps(state, constants, inputs, outputs, SHORT_RUN_STEPS), 1),
+                             best_of(lambda: _steps_on_lanes(drives, SHORT_RUN_STEPS),
+                                     1)) for _ in range(SHORT_RUN_COUNT)))
+    substep = min(alone) / SHORT_RUN_STEPS / SUBSTEPS_PER_STEP * 1e9
+    on_lanes = min(together) / SHORT_RUN_STEPS / SUBSTEPS_PER_STEP / lanes.LANE_COUNT * 1e9
+    trials = [scenario.load('leo_pass', seed=seed, duration=TRIAL_DURATION_S) for seed in range(lanes.LANE_COUNT)]
+    side_by_side.runs([closed_loop.Loop(trial) for trial in trials], ensemble.MEASURED_TOPICS)
     seconds = math.inf
     for _ in range(3):
         loops, begun = [closed_loop.Loop(trial) for trial in trials], time.process_time()
-        side_by_side.runs(loops, ensemble.TOPICS)
+        side_by_side.runs(loops, ensemble.MEASURED_TOPICS)
         seconds = min(seconds, time.process_time() - begun)
     return [row('core', 'substep_ns', substep, 'ns', '<= 45'), row('lanes', 'substep_ns', on_lanes, 'ns', '<= 8'),
             row('lanes', 'ratio', substep / on_lanes, '-', '>= 4'),
-            row('lanes', 'realtime_factor', lanes.WIDTH * TRIAL_SECONDS / seconds, '', '>= 1000')]
+            row('lanes', 'realtime_factor', lanes.LANE_COUNT * TRIAL_DURATION_S / seconds, '', '>= 1000')]
 
 
 def run():
     """Print the table and return its rows."""
     drives = drive_rows()
-    loop = scenario.load('ship_pass', duration=CORE_SECONDS)
+    loop = scenario.load('ship_pass', duration=CORE_DURATION_S)
     closed_loop.Loop(loop).run()
     loops = [closed_loop.Loop(loop) for _ in range(5)]
-    factor = CORE_SECONDS / best_of(lambda: loops.pop().run())
+    factor = CORE_DURATION_S / best_of(lambda: loops.pop().run())
 
-    tick = axis.CURRENT_PERIOD
+    tick = axis.CURRENT_LOOP_PERIOD_S
     scipy_time = best_of(lambda: solve_ivp_axis.run(AduParameters().azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)
     scipy_substep = scipy_time / SOLVE_IVP_TICKS / 2 * 1e9
     rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'),

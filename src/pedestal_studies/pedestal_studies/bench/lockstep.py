@@ -18,17 +18,17 @@ from pedestal_recording import bag
 from pedestal_studies.bench import bare_ring
 from pedestal_studies.bench.table import show
 
-ROUNDS = 3
+ROUND_COUNT = 3
 RING_STEPS = 3000
-RUN_SECONDS = 15.0
-LATENCY_SECONDS = 10.0
+RUN_DURATION_S = 15.0
+LATENCY_DURATION_S = 10.0
 
 
 def bare_lap():
     """Lap time [us] of the bare ring: as many processes, the same messages, no work."""
     processes = {role: subprocess.Popen([sys.executable, '-m', bare_ring.__name__, role, str(RING_STEPS)],
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-                 for role in bare_ring.ROLES}
+                 for role in bare_ring.RING_NODES}
     try:
         output, complaint = processes['adu'].communicate(timeout=120.0)
     except subprocess.TimeoutExpired:
@@ -61,12 +61,12 @@ def run():
     """Print the table and return its rows."""
     bare, laps, factors = [], [], []
     with tempfile.TemporaryDirectory() as folder:
-        for number in range(ROUNDS):
+        for number in range(ROUND_COUNT):
             bare.append(bare_lap())
-            result, _ = graph_run(folder, number, 'lockstep', RUN_SECONDS)
+            result, _ = graph_run(folder, number, 'lockstep', RUN_DURATION_S)
             laps.append(result.drive['wall_s'] / result.drive['steps'] * 1e6)
             factors.append(result.drive['realtime_factor'])
-        result, path = graph_run(folder, 'realtime', 'realtime', LATENCY_SECONDS)
+        result, path = graph_run(folder, 'realtime', 'realtime', LATENCY_DURATION_S)
         latency = latencies(path)
     lap, floor = statistics.median(laps), statistics.median(bare)
     rows = [row('graph', 'lap_us', lap, 'us'), row('graph', 'bare_ring_us', floor, 'us'),
@@ -75,5 +75,5 @@ def run():
             row('realtime', 'latency_p50_us', float(np.percentile(latency, 50)) * 1e6, 'us'),
             row('realtime', 'latency_p99_us', float(np.percentile(latency, 99)) * 1e6, 'us'),
             row('realtime', 'lost_steps', result.drive['lost_steps'], '')]
-    show(f'lockstep ring, median of {ROUNDS} interleaved rounds, {len(os.sched_getaffinity(0))} cores', rows)
+    show(f'lockstep ring, median of {ROUND_COUNT} interleaved rounds, {len(os.sched_getaffinity(0))} cores', rows)
     return rows

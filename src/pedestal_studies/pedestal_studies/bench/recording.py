@@ -16,14 +16,14 @@ from pedestal_recording.verify import verify
 from pedestal_studies.bench.lockstep import graph_run
 from pedestal_studies.bench.table import best_of, show
 
-ROUNDS = 3
-BAG_SECONDS = 30.0
-TRAFFIC = 5.0
+ROUND_COUNT = 3
+BAG_DURATION_S = 30.0
+TRAFFIC_FACTOR = 5.0
 """Times the traffic of the demo in real time that the recorder is given."""
-DISK_BYTES = 200_000_000
+DISK_TEST_BYTES = 200_000_000
 
 
-def recorded(path, again, rate):
+def measure_recorder(path, again, rate):
     """(messages/s, lost, CPU time over wall time) of a recorder given a bag's messages, rate times real time."""
     with open(pathlib.Path(again).with_suffix('.log'), 'w+') as log:
         recorder = subprocess.Popen([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args',
@@ -62,18 +62,18 @@ def disk_rate(folder):
 
     def fill():
         with open(pathlib.Path(folder) / 'block', 'wb', buffering=0) as file:
-            for _ in range(DISK_BYTES // len(block)):
+            for _ in range(DISK_TEST_BYTES // len(block)):
                 file.write(block)
             os.fsync(file.fileno())
-    return DISK_BYTES / best_of(fill, 3)
+    return DISK_TEST_BYTES / best_of(fill, 3)
 
 
 def run():
-    """Print the table and return its rows: the recorder under TRAFFIC, and given all at once."""
+    """Print the table and return its rows: the recorder under TRAFFIC_FACTOR, and given all at once."""
     with tempfile.TemporaryDirectory() as folder:
-        _, path = graph_run(folder, 'demo', 'lockstep', BAG_SECONDS)
-        rate, lost, load = recorded(path, f'{folder}/paced', TRAFFIC)
-        limit, lost_at_limit, _ = recorded(path, f'{folder}/flooded', 1e6)
+        _, path = graph_run(folder, 'demo', 'lockstep', BAG_DURATION_S)
+        rate, lost, load = measure_recorder(path, f'{folder}/paced', TRAFFIC_FACTOR)
+        limit, lost_at_limit, _ = measure_recorder(path, f'{folder}/flooded', 1e6)
         content = bag.read(path)
         raw = [(content.topics[name], data) for name, _, _, data in content.raw()]
         count, size = len(raw), content.file.stat().st_size
@@ -81,7 +81,7 @@ def run():
         scanned = count / best_of(lambda: bag.read(path), 3)
         read = count / best_of(lambda: [messages.deserialize(data, kind) for kind, data in raw], 3)
         disk = disk_rate(folder)
-        factor = statistics.median(recompute.measure(path) for _ in range(ROUNDS))
+        factor = statistics.median(recompute.measure(path) for _ in range(ROUND_COUNT))
     rows = [row('record', 'messages_per_s', rate, '1/s'), row('record', 'lost', lost, '', '0'),
             row('record', 'cpu_percent', 100.0 * load, '%'),
             row('record', 'bytes_per_message', size / count, 'B'),
@@ -92,9 +92,10 @@ def run():
             row('verify', 'scan_messages_per_s', scanned, '1/s'),
             row('verify', 'deserialise_messages_per_s', read, '1/s'),
             row('recompute', 'realtime_factor', factor, '', '>= 100')]
-    show(f'bags: {count} messages of the demo, {BAG_SECONDS:g} s, recorded again at {TRAFFIC:g} x real time', rows)
+    show(f'bags: {count} messages of the demo, {BAG_DURATION_S:g} s, recorded again at {TRAFFIC_FACTOR:g} x real time',
+         rows)
     print(f'record: given all at once, the recorder and whoever feeds it reach {limit:.0f} messages/s, '
-          f'{limit * BAG_SECONDS / count:.0f} x the demo; the disk ({disk / 1e6:.0f} MB/s) would take '
+          f'{limit * BAG_DURATION_S / count:.0f} x the demo; the disk ({disk / 1e6:.0f} MB/s) would take '
           f'{disk * count / size:.0f}.\n'
           f'The limit is their own work per message, at {limit * size / count / disk:.2%} of the disk.\n'
           f'verify: {checked / scanned:.0%} of what finding the messages in the file allows; to deserialise them all '

@@ -19,7 +19,7 @@ def _of(study, *claims):
     return tuple(Claim(claim, reading, study, *where) for claim, reading, *where in claims)
 
 
-PAPER_000 = (
+PAPER_000_CLAIMS = (
     Claim('figures 1 to 4: block diagrams, gear train, simulation model', 'built: graph.md, The chain; adu_drive'),
     Claim('table 1: 30 Nm, 1500 rpm, 4.7 kW; 1.736 and 1.731 ohm, 20.199 and 20.149 mH between the terminals',
           'half of each is that of a phase: defaults of `adu`'),
@@ -59,7 +59,7 @@ PAPER_000 = (
           'fight_torque_rms_nm'),
          ('the same', 'a speed loop for each motor', 'independent-loops', 'fight_torque_rms_nm')))
 
-PAPER_001 = (
+PAPER_001_CLAIMS = (
     Claim('figures 1, 2: block diagrams', 'built: ship_motion_sim/alignment'),
     Claim('34 deg north; 3, 3 and 180 deg misaligned', 'as printed'),
     Claim('gyros: drift 0.01 deg/h, random walk 0.005 deg/sqrt(h), scale 90 ppm', 'as printed'),
@@ -79,7 +79,7 @@ PAPER_001 = (
          ('the same', 'level, ADRC', 'adrc', 'level_rms_arcmin')))
 
 _STEP, _RAMP = 'step/alpha=0.1/T=10ms/{}', 'ramp/{}deg_s/T={}ms'
-PAPER_002 = (
+PAPER_002_CLAIMS = (
     Claim('figures 1, 2, 8: block diagrams', 'built: pedestal_studies/rigs/angle_loop.py'),
     Claim('(2): 8.4 Hz for n = 20, T = 1 ms', '1/((n - 1) T) is 8.38 Hz; the recursion is at -3 dB at 8.17 Hz'),
     *_of('phased-array',
@@ -103,7 +103,7 @@ PAPER_002 = (
          ('lost when the lag passes half a beamwidth', "lag, in beamwidths, of a linear receiver's beam",
           'loss/half-beamwidth/type-1', 'linear_lag_beamwidths')))
 
-PAPER_003 = (
+PAPER_003_CLAIMS = (
     Claim('figures 1, 2, 5 to 7: block diagrams, test stand', 'built: pedestal_studies/rigs/feedforward_loop.py'),
     Claim('20 deg to and fro at 3.50 deg/s, as 30 m/s at 500 m', 'as printed; 3.44 deg/s'),
     *_of('manoeuvre',
@@ -125,7 +125,7 @@ PAPER_003 = (
           'miss_ratio_to_kalman_cv'),
          ('the same', 'the same, elevation', 'elevation/drive-imm', 'miss_ratio_to_kalman_cv')))
 
-PAPER_004 = (
+PAPER_004_CLAIMS = (
     Claim('T = 0.01 s; begins with the measured angle and rate', 'as printed; noises and flight are ours'),
     *_of('telemetry-flight',
          *((f'figure{"s" if " " in numbers else ""} {numbers}: {axis}, {what} (no number)',
@@ -147,4 +147,5 @@ PAPER_004 = (
          ('uniformly asymptotically stable (no number)', 'largest eigenvalue', 'position-rate',
           'largest_eigenvalue')))
 
-PAPERS = {'000': PAPER_000, '001': PAPER_001, '002': PAPER_002, '003': PAPER_003, '004': PAPER_004}
+CLAIMS_BY_PAPER = {'000': PAPER_000_CLAIMS, '001': PAPER_001_CLAIMS, '002': PAPER_002_CLAIMS, '003': PAPER_003_CLAIMS,
+                   '004': PAPER_004_CLAIMS}

@@ -23,13 +23,13 @@ from pedestal_studies.papers import (
     rate_measurement,
     telemetry_flight,
 )
-from pedestal_studies.rigs.feedforward_loop import REVERSALS
+from pedestal_studies.rigs.feedforward_loop import REVERSAL_S_BY_AXIS
 from pedestal_studies.rigs.profiles import PROFILES
 from pedestal_studies.system import acquisition, budget, filters
 
-FILE = 'docs/rows.json'
+ROWS_FILE = 'docs/rows.json'
 
-SEEN = (
+SCENARIO_RESULTS = (
     ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ('the same, largest', 'leo_pass', 'pointing_max_deg'),
     ("the rms over the receiver's single-sample noise", 'leo_pass', 'pointing_to_noise'),
@@ -53,7 +53,7 @@ SEEN = (
      'noise_reduction_cross_elevation'),
     ('the same, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
 """(what, case, metric) of the study scenarios in docs/measured.md."""
-HEADLINE = (
+HEADLINE_RESULTS = (
     ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ("the same over the receiver's single-sample noise", 'leo_pass', 'pointing_to_noise'),
     ('a UAV at 500 m: noise of a sample over that of the estimate, elevation', 'uav_flyby',
@@ -75,14 +75,14 @@ class Rows(dict):
         return self.used[key]
 
 
-def of_studies(rows_of):
+def rows_by_key(rows_of):
     """Rows of {study: its rows}."""
     return Rows({(study, row['case'], row['metric']): row for study, rows in rows_of.items() for row in rows})
 
 
 def read(root='.'):
     """The Rows in FILE of a checkout."""
-    return of_studies(json.loads(pathlib.Path(root, FILE).read_text()))
+    return rows_by_key(json.loads(pathlib.Path(root, ROWS_FILE).read_text()))
 
 
 def write(rows, root='.'):
@@ -93,7 +93,7 @@ def write(rows, root='.'):
     for (study, *_), row in sorted(rows.used.items()):
         lines.setdefault(study, []).append('  ' + json.dumps(row))
     content = ',\n'.join(f' "{study}": [\n' + ',\n'.join(of) + ']' for study, of in lines.items())
-    pathlib.Path(root, FILE).write_text('{\n' + content + '\n}\n')
+    pathlib.Path(root, ROWS_FILE).write_text('{\n' + content + '\n}\n')
 
 
 def _cells(row):
@@ -102,7 +102,7 @@ def _cells(row):
     return value, console.interval(row), str(row.get('runs', ''))
 
 
-def _asked(row):
+def _target_text(row):
     return f'{row["target"] or ""}{" MISSED" if missed(row) else ""}'.strip()
 
 
@@ -115,12 +115,12 @@ def _spread(row):
     return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
 
 
-def seen_table(seen):
-    """rows -> the table of what is said of the scenarios, SEEN or HEADLINE."""
+def results_table(seen):
+    """rows -> the table of what is said of the scenarios, SCENARIO_RESULTS or HEADLINE_RESULTS."""
     def table(rows):
         of = [rows['scenarios', case, metric] for _, case, metric in seen]
         return ('what', 'mean', '95 % interval', 'seeds', 'asked'), [
-            (what, *_cells(row), _asked(row)) for (what, *_), row in zip(seen, of)]
+            (what, *_cells(row), _target_text(row)) for (what, *_), row in zip(seen, of)]
     return table
 
 
@@ -128,17 +128,17 @@ def claim_table(paper):
     """rows -> the table of the claims of a paper."""
     def table(rows):
         lines = []
-        for claim in claims.PAPERS[paper]:
+        for claim in claims.CLAIMS_BY_PAPER[paper]:
             where, asked, cells = '', '', ('', '', '')
             if claim.study:
                 row = rows[claim.study, claim.case, claim.metric]
-                where, asked, cells = f'{claim.study}: {claim.case}', _asked(row), _cells(row)
+                where, asked, cells = f'{claim.study}: {claim.case}', _target_text(row), _cells(row)
             lines.append((claim.claim, claim.reading, *cells, asked, where))
         return ('claim', 'reading', 'ours', '95 % interval', 'runs', 'asked', 'study: case'), lines
     return table
 
 
-COLOURED = filters.SHOWN.replace('white', 'coloured')
+COLOURED_NOISE = filters.SHOWN_NOISE.replace('white', 'coloured')
 FILTER_METRICS = ('angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'rate_over_sigma')
 
 
@@ -147,10 +147,10 @@ def filter_numbers(rows):
     lines = []
     for name in filters.SHOWN_FILTERS:
         on = [profile for profile in PROFILES
-              if ('filters', f'{profile}/{name}/{filters.SHOWN}', 'reduction') in rows]
-        lines += [(name, profile, *(_spread(rows['filters', f'{profile}/{name}/{filters.SHOWN}', metric])
+              if ('filters', f'{profile}/{name}/{filters.SHOWN_NOISE}', 'reduction') in rows]
+        lines += [(name, profile, *(_spread(rows['filters', f'{profile}/{name}/{filters.SHOWN_NOISE}', metric])
                                     for metric in FILTER_METRICS),
-                   _spread(rows['filters', f'{profile}/{name}/{COLOURED}', 'reduction'])) for profile in on]
+                   _spread(rows['filters', f'{profile}/{name}/{COLOURED_NOISE}', 'reduction'])) for profile in on]
     return ('filter', 'motion', 'angle rms deg', 'reduction', 'rate rms deg/s', 'mean NIS',
             'rate error over own sigma', 'reduction of noise within 5 Hz'), lines
 
@@ -159,18 +159,18 @@ def manoeuvre_numbers(rows):
     """Errors of rate and acceleration inside every reversal."""
     lines = [(name, f'{reversal:g} s', *(_spread(rows['manoeuvre', f'reversal-{reversal:g}s/{name}', metric])
                                          for metric in ('rate_rms_deg_s', 'acceleration_rms_deg_s2')))
-             for name in manoeuvre.FILTERS for reversal in manoeuvre.REVERSALS]
+             for name in manoeuvre.FILTERS for reversal in manoeuvre.REVERSAL_DURATIONS_S]
     return ('filter', 'reversal', 'rate deg/s', 'acceleration deg/s2'), lines
 
 
 def feedforward_numbers(rows):
     """Miss and rate noise of the sources of paper 003's feed-forward."""
     lines = []
-    for axis in REVERSALS:
+    for axis in REVERSAL_S_BY_AXIS:
         for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state', 'kalman-ca-40-predicted'):
             case = f'{axis}/{name}'
             ratio = _spread(rows['imm-feedforward', case, 'miss_ratio_at_equal_rate_noise']) if (
-                case in imm_feedforward.RATIOS) else ''
+                case in imm_feedforward.MISS_RATIO_TARGETS) else ''
             lines.append((case, *(_spread(rows['imm-feedforward', case, metric]) for metric in (
                 'miss_rms_deg', 'rate_noise_deg_s')), ratio))
         lines += [(case, _spread(rows['imm-feedforward', case, 'miss_rms_deg']), '', '')
@@ -192,15 +192,15 @@ def pareto_numbers(rows):
     lines = [(name, *(_spread(rows['pareto', name, metric]) for metric in (
         'least_miss_deg', 'rate_noise_at_least_miss_deg_s')),
         _spread(rows['pareto', name, 'miss_ratio_at_equal_rate_noise'])
-        if ('pareto', name, 'miss_ratio_at_equal_rate_noise') in rows else '') for name in pareto.TUNINGS]
+        if ('pareto', name, 'miss_ratio_at_equal_rate_noise') in rows else '') for name in pareto.FILTER_TUNINGS]
     return ('filter', 'least miss of any tuning, deg', 'rate noise then, deg/s',
             'miss over that of imm-predicted, with its rate noise'), lines
 
 
 def flyby_numbers(rows):
     """Errors on the 60 m flyby with a rate that is measured, or differenced from the angles."""
-    lines = [(name, *(_spread(rows['rate-measurement', f'{rate_measurement.PROFILE}/{name}', metric])
-                      for metric in ('angle_rms_deg', 'rate_rms_deg_s'))) for name in rate_measurement.FLYBYS]
+    lines = [(name, *(_spread(rows['rate-measurement', f'{rate_measurement.FLYBY_PROFILE}/{name}', metric])
+                      for metric in ('angle_rms_deg', 'rate_rms_deg_s'))) for name in rate_measurement.FLYBY_CASES]
     return ('rate', 'angle rms deg', 'rate rms deg/s'), lines
 
 
@@ -208,9 +208,10 @@ def alignment_numbers(rows):
     """The methods of alignment beside the information limit."""
     metrics = ('time_to_12arcmin_rms_s', *(f'azimuth_rms_arcmin_{t}s' for t in (100, 250, 300, 600)),
                'level_rms_arcmin')
-    swell = [f'azimuth_{metric}_{alignment.SWELL_TIME}s' for metric in ('rms_arcmin', 'error_over_sigma')]
+    swell = [f'azimuth_{metric}_{alignment.SWELL_EVALUATION_TIME_S}s' for metric in ('rms_arcmin', 'error_over_sigma')]
     lines = [(name, *(_spread(rows['alignment', name, metric]) for metric in metrics),
-              *(_spread(rows['alignment', f'{name}/swell', metric]) for metric in swell)) for name in alignment.CASES]
+              *(_spread(rows['alignment', f'{name}/swell',
+                             metric]) for metric in swell)) for name in alignment.CASE_METHODS]
     return ('method', 'below 12 arcmin, s', '100 s', '250 s', '300 s', '600 s', 'level', 'on swell, 200 s',
             'the same over own sigma'), [
         *lines, ('limit', *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
@@ -219,17 +220,17 @@ def alignment_numbers(rows):
 def acquisition_numbers(rows):
     """How long acquisition takes, and how often it succeeds."""
     lines = []
-    for case in acquisition.CASES:
+    for case in acquisition.CASE_NAMES:
         if case == 'steptrack_geo':
             continue
         time, found, least = (rows['acquisition', case, metric] for metric in (
             'tracked_after_s', 'found_percent', 'found_percent_low'))
         lines.append((f'`{case}`', *_cells(time), f'{found["value"]:.0f} %', f'{least["value"]:.1f} %',
-                      _asked(found)))
+                      _target_text(found)))
     loss, off = (rows['acquisition', 'steptrack_geo', metric] for metric in (
         'level_loss_rms_db', 'pointing_max_beamwidths'))
     return ('case', 'tracked after', '95 % interval', 'runs', 'found', 'at least', 'asked'), [
-        *lines, ('`steptrack_geo`: level lost after 90 s, rms', *_cells(loss), '', '', _asked(loss)),
+        *lines, ('`steptrack_geo`: level lost after 90 s, rms', *_cells(loss), '', '', _target_text(loss)),
         ('the same: largest error', *_cells(off), '', '', '')]
 
 
@@ -241,7 +242,7 @@ def array_numbers(rows):
     lines = []
     for case in (*(f'{loop}/{target}' for loop in ARRAY_LOOPS for target in ('ramp', 'sine', 'sway')
                    if target == 'sway' or not loop.endswith('-delta')),
-                 *phased_array.INS_LOOPS, *phased_array.GRAPH):
+                 *phased_array.INS_LOOPS, *phased_array.GRAPH_CASES):
         isolation = _spread(rows['phased-array', case, 'isolation_db']) if (
             'phased-array', case, 'isolation_db') in rows else ''
         lines.append((case, _spread(rows['phased-array', case, 'max_error_deg']), isolation,
@@ -249,12 +250,12 @@ def array_numbers(rows):
     return ('loop', 'largest error without noise, deg', 'isolation dB', 'jitter rms deg'), lines
 
 
-MILLI = 1e3
+MDEG_PER_DEG = 1e3
 
 
 def _milli(row):
     """A row in degrees as millidegrees, mean and half its interval."""
-    return _spread({key: value * MILLI if key in ('value', 'ci_low', 'ci_high') else value
+    return _spread({key: value * MDEG_PER_DEG if key in ('value', 'ci_low', 'ci_high') else value
                     for key, value in row.items()})
 
 
@@ -270,7 +271,7 @@ def budget_table(mode):
             'cross_elevation_rms_deg', 'elevation_rms_deg', 'rms_deg'))) for name, (kind, doc) in kinds.items()]
         whole = lines.pop()
         ratio = rows['budget', f'{mode}/combined', 'to_whole']
-        combined = ('combined', '', f'all of it; over the whole {_spread(ratio)}, asked {_asked(ratio)}', '', '',
+        combined = ('combined', '', f'all of it; over the whole {_spread(ratio)}, asked {_target_text(ratio)}', '', '',
                     _milli(rows['budget', f'{mode}/combined', 'rms_deg']))
         return ('term', 'kind', 'what it is', 'cross-elevation, mdeg rms', 'elevation', 'together'), [
             *lines, combined, whole]
@@ -280,40 +281,42 @@ def budget_table(mode):
 def direction_table(mode):
     """rows -> the systematic contributions of a mode along the pass, both axes with their signs."""
     def table(rows):
-        cases = [f'{mode}/{time}s' for time in budget.TIMES]
+        cases = [f'{mode}/{time}s' for time in budget.TABLE_TIMES_S]
         head = [f'az {rows["budget", case, "azimuth_deg"]["value"]:.0f}, '
                 f'el {rows["budget", case, "elevation_deg"]["value"]:.0f} deg' for case in cases]
         names = [*budget.documented(mode, random=False), 'systematic']
         return ('term', *head), [
-            (name, *(', '.join(f'{MILLI * rows["budget", case, f"{name}_{axis}_deg"]["value"]:+.2f}'
-                               for axis in budget.ACROSS) for case in cases)) for name in names]
+            (name, *(', '.join(f'{MDEG_PER_DEG * rows["budget", case, f"{name}_{axis}_deg"]["value"]:+.2f}'
+                               for axis in budget.ERROR_COLUMNS) for case in cases)) for name in names]
     return table
 
 
-TABLES = {'results over seeds': seen_table(SEEN), 'headline results': seen_table(HEADLINE),
-          **{f'budget of {mode}': budget_table(mode) for mode in budget.MODES},
-          **{f'directions of {mode}': direction_table(mode) for mode in budget.MODES},
-          **{f'claims of paper {paper}': claim_table(paper) for paper in claims.PAPERS},
+TABLES = {'results over seeds': results_table(SCENARIO_RESULTS), 'headline results': results_table(HEADLINE_RESULTS),
+          **{f'budget of {mode}': budget_table(mode) for mode in budget.MODE_OVERRIDES},
+          **{f'directions of {mode}': direction_table(mode) for mode in budget.MODE_OVERRIDES},
+          **{f'claims of paper {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
           'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
           'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
           'acquisition': acquisition_numbers, 'array loops': array_numbers, 'matrices': matrix_table}
 """{name: rows -> (head, lines)}."""
 
-STUDIES = tuple(dict.fromkeys((*(claim.study for of in claims.PAPERS.values() for claim in of if claim.study),
-                               'filters', 'pareto', 'scenarios', 'budget', 'acquisition')))
+PUBLISHED_STUDIES = tuple(dict.fromkeys((*(claim.study for of in claims.CLAIMS_BY_PAPER.values() for claim in of
+                                           if claim.study),
+                                         'filters', 'pareto', 'scenarios', 'budget', 'acquisition')))
 
 
 def main(names=(), root='.') -> int:
-    """Run the STUDIES of these names, by default all, with their own number of runs, and write FILE; the rows of the
+    """Run the PUBLISHED_STUDIES of these names, by default all, with their own number of runs, and write FILE; the
+    rows of the
     others stay."""
-    rows_of = json.loads(pathlib.Path(root, FILE).read_text()) if names else {}
+    rows_of = json.loads(pathlib.Path(root, ROWS_FILE).read_text()) if names else {}
     with monte_carlo.Pool() as pool, console.progress_of_share() as progress:
-        for name in names or STUDIES:
+        for name in names or PUBLISHED_STUDIES:
             study = pedestal_studies.study(name)
             many = {'pool': pool} if 'pool' in inspect.signature(study.run).parameters else {}
             print(name, flush=True)
             rows_of[name] = study.run(progress, **many).rows
-    write(of_studies(rows_of), root)
+    write(rows_by_key(rows_of), root)
     return 0
 
 

@@ -15,7 +15,15 @@ from collections import namedtuple
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import pseudo_values, row
 from pedestal_analysis.trials import monte_carlo
@@ -27,7 +35,7 @@ from pedestal_studies.rigs.rows import Result
 from ship_motion_sim import imu
 from ship_motion_sim.navigation import navigator
 from ship_motion_sim.params import (
-    METHODS,
+    INS_METHODS,
     AlignmentParameters,
     ImuParameters,
     PlainParameters,
@@ -36,51 +44,52 @@ from ship_motion_sim.params import (
 )
 from ship_motion_sim.sea import motion
 
-RUNS = 400
+DEFAULT_RUNS = 400
 """Of the cases without a suffix and of swell; a quarter of them for each quadrant. With 50 an rms is known to 10 %
 only, which is more than the best methods are apart."""
 
-BATCH = 5
+BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
 
-SEED, QUADRANT_SEED, SWELL_SEED = 1, 2, 3
-PERIOD, STEP, EVERY = 0.01, 0.02, 1.0
+BASE_SEED, QUADRANT_SEED, SWELL_SEED = 1, 2, 3
+IMU_PERIOD_S, LAW_STEP_S, EVALUATION_PERIOD_S = 0.01, 0.02, 1.0
 """Step of the IMU, of the laws, of what is evaluated [s]."""
 
-DURATION, SHORT = 600.0, 300.0
+RUN_DURATION_S, SHORT_RUN_DURATION_S = 600.0, 300.0
 """Length of a run; of one in a quadrant or on swell [s]."""
 
-ARCMIN = math.radians(1.0 / 60.0)
-HOUR = 3600.0
-GYRO_BIAS, GYRO_NOISE = math.radians(0.01) / HOUR, math.radians(0.005) / 60.0
+ARCMIN_RAD = math.radians(1.0 / 60.0)
+HOUR_S = 3600.0
+GYRO_BIAS_RAD_S, GYRO_NOISE_DENSITY = math.radians(0.01) / HOUR_S, math.radians(0.005) / 60.0
 G = 9.80665
-ACCELEROMETER_BIAS, ACCELEROMETER_NOISE = 3e-5 * G, 6e-6 * G
+ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_NOISE_DENSITY = 3e-5 * G, 6e-6 * G
 """Paper 001, section 5."""
 
-SHIP = ShipParameters(motion='plain', speed=0.0, latitude_deg=34.0, plain=PlainParameters(
+SHIP_PARAMETERS = ShipParameters(motion='plain', speed=0.0, latitude_deg=34.0, plain=PlainParameters(
     roll_amplitude_deg=7.0, roll_period=1.0 / 0.3, pitch_amplitude_deg=5.0, pitch_period=1.0 / 0.5,
     yaw_amplitude_deg=9.0, yaw_period=1.0 / 0.2))
 """Its table 1: x is to starboard, y to the bow."""
 
-MISALIGNED = np.radians((3.0, 3.0, 180.0))
+MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))
 """a_x, a_y, a_z."""
 
-VELOCITY_NOISE, SWELL, SWELL_FREQUENCY = 0.05, 0.5, 0.1
+VELOCITY_NOISE_M_S, SWELL_VELOCITY_M_S, SWELL_FREQUENCY_HZ = 0.05, 0.5, 0.1
 """[m/s], [m/s], [Hz]."""
 
-SETTINGS = AlignmentParameters(step=STEP, aligned_sigma=1e-5, velocity_disturbance=VELOCITY_NOISE,
-                               gyro_noise=GYRO_NOISE, gyro_bias=GYRO_BIAS, accelerometer_bias=ACCELEROMETER_BIAS)
+INS_PARAMETERS = AlignmentParameters(step=LAW_STEP_S, aligned_sigma=1e-5, velocity_disturbance=VELOCITY_NOISE_M_S,
+                                     gyro_noise=GYRO_NOISE_DENSITY, gyro_bias=GYRO_BIAS_RAD_S,
+                                     accelerometer_bias=ACCELEROMETER_BIAS_M_S2)
 """Parameters of the INS. Its alignment never ends, so that its error can be evaluated to the end of a run."""
 
-CASES = {method.replace('_', '-'): method for method in METHODS if method != 'model'}
-COLOURS = dict(zip(CASES, (RAW, TRUTH, MOTOR_1, FILTERED, MOTOR_2)))
-SETTLED = 12.0
+CASE_METHODS = {method.replace('_', '-'): method for method in INS_METHODS if method != 'model'}
+CASE_COLOURS = dict(zip(CASE_METHODS, (RAW_COLOUR, TRUTH_COLOUR, MOTOR_1_COLOUR, FILTERED_COLOUR, MOTOR_2_COLOUR)))
+SETTLED_AZIMUTH_ARCMIN = 12.0
 """Azimuth has settled when the rms over the runs stays below this [arcmin]."""
-TIMES = (100, 250, 300, 600)
+EVALUATION_TIMES_S = (100, 250, 300, 600)
 """Instants of the rows of the azimuth's rms [s]."""
-SWELL_TIME = 200
+SWELL_EVALUATION_TIME_S = 200
 
-ESTIMATE = np.dtype([('quaternion', 'f8', (4,)), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8')])
+ALIGNMENT_ESTIMATE = np.dtype([('quaternion', 'f8', (4,)), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8')])
 """Attitude deck -> earth (x, y, z, w) and 1 sigmas [rad] of a navigator."""
 
 Sensors = namedtuple('Sensors', 'state constants ship inputs truth outputs')
@@ -109,7 +118,7 @@ class Sums(typing.NamedTuple):
                     self.steps + more.steps, self.runs + more.runs)
 
 
-PARTS = 20
+JACKKNIFE_PARTS = 20
 """Parts of the runs from which the intervals of what is measured over all of them follow."""
 
 
@@ -126,7 +135,7 @@ class Accuracy:
     @property
     def rms(self):
         """Rms of the errors over the runs (n, 3) [arcmin]."""
-        return np.sqrt(self.whole.squares / self.whole.runs) / ARCMIN
+        return np.sqrt(self.whole.squares / self.whole.runs) / ARCMIN_RAD
 
     @property
     def azimuth(self):
@@ -135,8 +144,8 @@ class Accuracy:
 
     @property
     def level(self):
-        """Rms of the level errors over the runs and the time from SHORT on [arcmin]."""
-        return tracking.rms(self.rms[round(SHORT / EVERY):, :2])
+        """Rms of the level errors over the runs and the time from SHORT_RUN_DURATION_S on [arcmin]."""
+        return tracking.rms(self.rms[round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S):, :2])
 
     @property
     def ratio(self):
@@ -163,7 +172,7 @@ class Batch:
     @property
     def duration(self):
         """Length of its runs [s]."""
-        return SHORT if self.kind else DURATION
+        return SHORT_RUN_DURATION_S if self.kind else RUN_DURATION_S
 
 
 @compiled
@@ -188,7 +197,7 @@ def simulate(sensors, normals, velocity, out):
 
 @compiled
 def align(state, constants, angle, force, dt, every, estimates):
-    """Run a navigator on increments (n, 3) of dt [s]; estimates: ESTIMATE after every `every`-th of them."""
+    """Run a navigator on increments (n, 3) of dt [s]; estimates: ALIGNMENT_ESTIMATE after every `every`-th of them."""
     aid = np.zeros(3)
     for k in range(len(angle)):
         navigator.step(state[0], constants[0], angle[k], force[k], dt, aid)
@@ -214,44 +223,44 @@ def misaligned(attitude, angles):
     return attitude
 
 
-def circumstances(batch, random):
+def draw_conditions(batch, random):
     """(heading [deg], misalignment (3,) [rad], signs or sizes of the six biases) of one run."""
     if not batch.kind.startswith('quadrant'):
         # The paper's axes are starboard and bow; here x is to the bow, y to port.
-        return 0.0, MISALIGNED, np.array((1.0, -1.0, 1.0, 1.0, -1.0, 1.0))
+        return 0.0, MISALIGNMENT_RAD, np.array((1.0, -1.0, 1.0, 1.0, -1.0, 1.0))
     azimuth = 0.5 * math.pi * (int(batch.kind[-1]) - 1 + random.random())
-    return random.uniform(0.0, 360.0), np.array((*MISALIGNED[:2], azimuth)), random.standard_normal(6)
+    return random.uniform(0.0, 360.0), np.array((*MISALIGNMENT_RAD[:2], azimuth)), random.standard_normal(6)
 
 
 def disturbance(batch, random, n):
     """Velocity (n + 1, 3) of sea and swell at the IMU's samples, ENU [m/s]."""
-    held = round(STEP / PERIOD)
-    velocity = np.repeat(VELOCITY_NOISE * random.standard_normal((n // held + 1, 3)), held, axis=0)[:n + 1]
+    held = round(LAW_STEP_S / IMU_PERIOD_S)
+    velocity = np.repeat(VELOCITY_NOISE_M_S * random.standard_normal((n // held + 1, 3)), held, axis=0)[:n + 1]
     if batch.kind == 'swell':
-        t = PERIOD * np.arange(n + 1)[:, None]
-        velocity = velocity + SWELL * np.sin(2.0 * math.pi * (SWELL_FREQUENCY * t + random.random(3)))
+        t = IMU_PERIOD_S * np.arange(n + 1)[:, None]
+        velocity = velocity + SWELL_VELOCITY_M_S * np.sin(2.0 * math.pi * (SWELL_FREQUENCY_HZ * t + random.random(3)))
     return velocity
 
 
-def recorded(batch, run):
+def simulated_run(batch, run):
     """(Increments, misaligned attitude (x, y, z, w) at 0 s) of one run of a batch."""
-    seed = {'': SEED, 'swell': SWELL_SEED}.get(batch.kind, QUADRANT_SEED)
+    seed = {'': BASE_SEED, 'swell': SWELL_SEED}.get(batch.kind, QUADRANT_SEED)
     random = np.random.default_rng((seed, *batch.kind.encode()[-1:], run))
-    heading, angles, biases = circumstances(batch, random)
-    biases = biases * np.repeat((GYRO_BIAS, ACCELEROMETER_BIAS), 3)
+    heading, angles, biases = draw_conditions(batch, random)
+    biases = biases * np.repeat((GYRO_BIAS_RAD_S, ACCELEROMETER_BIAS_M_S2), 3)
     params = ShipMotionParameters(
-        dataclasses.replace(SHIP, heading_deg=heading),
-        ImuParameters(*biases[:3], GYRO_NOISE, *biases[3:], ACCELEROMETER_NOISE, gyro_scale=90e-6,
+        dataclasses.replace(SHIP_PARAMETERS, heading_deg=heading),
+        ImuParameters(*biases[:3], GYRO_NOISE_DENSITY, *biases[3:], ACCELEROMETER_NOISE_DENSITY, gyro_scale=90e-6,
                       accelerometer_scale=70e-6, output='increment'))
-    ship, n = motion.constants(params.ship), round(batch.duration / PERIOD)
+    ship, n = motion.constants(params.ship), round(batch.duration / IMU_PERIOD_S)
     ship['phase'][0, :4] = random.uniform(0.0, 2.0 * math.pi, 4)
-    inputs, truth = np.zeros(1, imu.INPUTS), np.zeros(1, motion.OUTPUTS)
-    inputs['dt'] = PERIOD
+    inputs, truth = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, motion.OUTPUTS_DTYPE)
+    inputs['dt'] = IMU_PERIOD_S
     motion.truth(ship[0], 0.0, truth[0])
     start = misaligned(truth[0]['quaternion'], angles)
     increments = Increments(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)))
-    simulate(Sensors(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS)),
-             random.standard_normal((n, imu.NORMALS)), disturbance(batch, random, n), increments)
+    simulate(Sensors(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS_DTYPE)),
+             random.standard_normal((n, imu.IMU_NORMALS_PER_STEP)), disturbance(batch, random, n), increments)
     return increments, start
 
 
@@ -263,69 +272,73 @@ def errors(estimated, attitude):
     return np.stack((x, y, z), axis=1) * (angle / np.where(size > 0.0, size, 1.0))[:, None]
 
 
-def aligned(batch):
+def align_batch(batch):
     """{case: Sums} of a batch."""
-    every, latitude = round(EVERY / PERIOD), math.radians(SHIP.latitude_deg)
-    n, sums = round(batch.duration / EVERY), {}
+    every, latitude = round(EVALUATION_PERIOD_S / IMU_PERIOD_S), math.radians(SHIP_PARAMETERS.latitude_deg)
+    n, sums = round(batch.duration / EVALUATION_PERIOD_S), {}
     for i in range(batch.count):
-        (angle, force, attitude), start = recorded(batch, batch.first + i)
-        for case, method in CASES.items():
-            constants = navigator.constants(SETTINGS, method, 'none', latitude)
-            state, estimates = navigator.initial_state(constants, start), np.zeros(n, ESTIMATE)
-            align(state.copy(), constants, angle[:2], force[:2], PERIOD, every, estimates)      # compiled by now
+        (angle, force, attitude), start = simulated_run(batch, batch.first + i)
+        for case, method in CASE_METHODS.items():
+            constants = navigator.constants(INS_PARAMETERS, method, 'none', latitude)
+            state, estimates = navigator.initial_state(constants, start), np.zeros(n, ALIGNMENT_ESTIMATE)
+            align(state.copy(), constants, angle[:2], force[:2], IMU_PERIOD_S, every, estimates)      # compiled by now
             begun = time.perf_counter()
-            align(state, constants, angle, force, PERIOD, every, estimates)
+            align(state, constants, angle, force, IMU_PERIOD_S, every, estimates)
             wall_time = time.perf_counter() - begun
             e = errors(estimates['quaternion'], attitude[every - 1::every])
             sums[case] = sums.get(case, Sums()).plus(Sums(
                 e * e, (e[:, 2] / estimates['azimuth_sigma'])**2, e if batch.first + i == 0 else None, wall_time,
-                batch.duration / STEP, 1))
+                batch.duration / LAW_STEP_S, 1))
     return sums
 
 
 def limit():
     """(azimuth, level) 1 sigma (n,) [rad] of the information limit: the Riccati covariance and the biases."""
-    constants = navigator.constants(SETTINGS, 'riccati_eso', 'none', math.radians(SHIP.latitude_deg))
-    state, n = navigator.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(DURATION / PERIOD)
-    estimates, still = np.zeros(round(DURATION / EVERY), ESTIMATE), np.zeros((n, 3))
+    constants = navigator.constants(INS_PARAMETERS, 'riccati_eso', 'none', math.radians(SHIP_PARAMETERS.latitude_deg))
+    state, n = navigator.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(RUN_DURATION_S / IMU_PERIOD_S)
+    estimates, still = np.zeros(round(RUN_DURATION_S / EVALUATION_PERIOD_S), ALIGNMENT_ESTIMATE), np.zeros((n, 3))
     k = constants[0]['conditions']
-    still_force = np.tile((0.0, 0.0, float(k['gravity']) * PERIOD), (n, 1))
-    align(state, constants, still + k['earth_rate'] * PERIOD, still_force, PERIOD, round(EVERY / PERIOD),
+    still_force = np.tile((0.0, 0.0, float(k['gravity']) * IMU_PERIOD_S), (n, 1))
+    align(state, constants, still + k['earth_rate'] * IMU_PERIOD_S, still_force, IMU_PERIOD_S,
+          round(EVALUATION_PERIOD_S / IMU_PERIOD_S),
           estimates)
     return estimates['azimuth_sigma'], estimates['level_sigma']
 
 
 def settling_time(rms):
-    """Last time [s] at which an rms (n,) [arcmin] is above SETTLED; NaN when it ends above."""
-    above = np.flatnonzero(rms > SETTLED)
+    """Last time [s] at which an rms (n,) [arcmin] is above SETTLED_AZIMUTH_ARCMIN; NaN when it ends above."""
+    above = np.flatnonzero(rms > SETTLED_AZIMUTH_ARCMIN)
     if len(above) and above[-1] == len(rms) - 1:
         return math.nan
-    return EVERY * (above[-1] + 1) if len(above) else 0.0
+    return EVALUATION_PERIOD_S * (above[-1] + 1) if len(above) else 0.0
 
 
-def at(values, t):
-    """The value of a series (n,), one every EVERY, at t [s]."""
-    return values[round(t / EVERY) - 1]
+def value_at(values, t):
+    """The value of a series (n,), one every EVALUATION_PERIOD_S, at t [s]."""
+    return values[round(t / EVALUATION_PERIOD_S) - 1]
 
 
-TARGETS = {
+METRIC_TARGETS = {
     ('classical', 'time_to_12arcmin_rms_s'): '434 +- 15', ('adrc', 'time_to_12arcmin_rms_s'): '234 +- 25',
     **{(case, metric): target for case in ('riccati-eso', 'oba') for metric, target in
        (('time_to_12arcmin_rms_s', '<= 130'), ('azimuth_rms_arcmin_250s', '<= 7.5'),
         ('azimuth_rms_arcmin_300s', '<= 6.5'))},
-    ('oba/swell', f'azimuth_rms_arcmin_{SWELL_TIME}s'): '<= 10',
-    **{(f'{case}/swell', f'azimuth_error_over_sigma_{SWELL_TIME}s'): '<= 1.3' for case in CASES}}
-PAPER = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
+    ('oba/swell', f'azimuth_rms_arcmin_{SWELL_EVALUATION_TIME_S}s'): '<= 10',
+    **{(f'{case}/swell', f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s'): '<= 1.3' for case in CASE_METHODS}}
+PAPER_VALUES = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
 
 
-MEASURES = {
+KIND_METRICS = {
     '': {'time_to_12arcmin_rms_s': ('s', lambda a: settling_time(a.azimuth)),
-         **{f'azimuth_rms_arcmin_{t}s': ('arcmin', lambda a, t=t: at(a.azimuth, t)) for t in TIMES},
+         **{f'azimuth_rms_arcmin_{t}s': ('arcmin', lambda a, t=t: value_at(a.azimuth, t)) for t in EVALUATION_TIMES_S},
          'level_rms_arcmin': ('arcmin', lambda a: a.level),
-         'azimuth_error_over_sigma_300s': ('-', lambda a: at(a.ratio, 300))},
-    'swell': {f'azimuth_rms_arcmin_{SWELL_TIME}s': ('arcmin', lambda a: at(a.azimuth, SWELL_TIME)),
-              f'azimuth_error_over_sigma_{SWELL_TIME}s': ('-', lambda a: at(a.ratio, SWELL_TIME))},
-    'quadrant': {'azimuth_rms_arcmin_300s': ('arcmin', lambda a: at(a.azimuth, 300))}}
+         'azimuth_error_over_sigma_300s': ('-', lambda a: value_at(a.ratio, 300))},
+    'swell': {f'azimuth_rms_arcmin_{SWELL_EVALUATION_TIME_S}s': ('arcmin', lambda a: value_at(a.azimuth,
+                                                                                              SWELL_EVALUATION_TIME_S)),
+              f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s': ('-',
+                                                                       lambda a: value_at(a.ratio,
+                                                                                          SWELL_EVALUATION_TIME_S))},
+    'quadrant': {'azimuth_rms_arcmin_300s': ('arcmin', lambda a: value_at(a.azimuth, 300))}}
 """{kind of runs: {metric: (unit, its value of an Accuracy)}}."""
 
 
@@ -335,20 +348,21 @@ def rows(accuracy, bound):
     for kind, cases in accuracy.items():
         for method, a in cases.items():
             case = f'{method}/{kind}'.rstrip('/')
-            table += [row(case, metric, a.over_parts(value), unit, PAPER.get((case, metric)),
-                          TARGETS.get((case, metric)), a.whole.runs)
-                      for metric, (unit, value) in MEASURES[kind.partition('-')[0]].items()]
-    azimuth, level = (sigma / ARCMIN for sigma in bound)
+            table += [row(case, metric, a.over_parts(value), unit, PAPER_VALUES.get((case, metric)),
+                          METRIC_TARGETS.get((case, metric)), a.whole.runs)
+                      for metric, (unit, value) in KIND_METRICS[kind.partition('-')[0]].items()]
+    azimuth, level = (sigma / ARCMIN_RAD for sigma in bound)
     table += [row('limit', 'time_to_12arcmin_rms_s', settling_time(azimuth), 's'),
-              *(row('limit', f'azimuth_rms_arcmin_{t}s', at(azimuth, t), 'arcmin') for t in TIMES),
-              row('limit', 'level_rms_arcmin', tracking.rms(level[round(SHORT / EVERY):]), 'arcmin')]
+              *(row('limit', f'azimuth_rms_arcmin_{t}s', value_at(azimuth, t), 'arcmin') for t in EVALUATION_TIMES_S),
+              row('limit', 'level_rms_arcmin', tracking.rms(level[round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S):]),
+                  'arcmin')]
     return table + [row(case, 'step_us', a.step_us, 'us') for case, a in accuracy[''].items()]
 
 
 def remarks(runs):
     """Sentences that the rows need, after this number of runs."""
     return [
-        f'{runs} runs; every number is one of all of them, such as an rms, its interval by the jackknife over {PARTS} '
+        f'{runs} runs; every number is one of all of them, such as an rms, its interval by the jackknife over {JACKKNIFE_PARTS} '
         'parts of them. The last crossing of 12 arcmin is known to tens of seconds only where the rms flattens out '
         'just below. What kicks the classical loop off 180 deg turns it by more than a turn, so its time hangs on '
         'details: bandwidths of 0.024 to 0.028 rad/s give 414 to 494 s in no order, the other signs of the tilts at '
@@ -356,20 +370,20 @@ def remarks(runs):
         'level_rms_arcmin is over 300 to 600 s; step_us is one step of 0.02 s with its two of the strapdown.']
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Align by every method, `runs` times; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     quarter = -(-runs // 4)
     kinds = {'': runs, 'swell': runs, **{f'quadrant-{n}': quarter for n in range(1, 5)}}
-    batches = [Batch(kind, *part) for kind, count in kinds.items() for part in monte_carlo.batches(count, BATCH)]
-    parts = {(kind, case): [Sums()] * min(PARTS, -(-count // BATCH))
-             for kind, count in kinds.items() for case in CASES}
-    for batch, sums in zip(batches, pool.map(aligned, batches, progress)):
+    batches = [Batch(kind, *part) for kind, count in kinds.items() for part in monte_carlo.batches(count, BATCH_RUNS)]
+    parts = {(kind, case): [Sums()] * min(JACKKNIFE_PARTS, -(-count // BATCH_RUNS))
+             for kind, count in kinds.items() for case in CASE_METHODS}
+    for batch, sums in zip(batches, pool.map(align_batch, batches, progress)):
         for case, more in sums.items():
             of_case = parts[batch.kind, case]
-            i = batch.first // BATCH % len(of_case)
+            i = batch.first // BATCH_RUNS % len(of_case)
             of_case[i] = of_case[i].plus(more)
-    accuracy = {kind: {case: Accuracy(parts[kind, case]) for case in CASES} for kind in kinds}
+    accuracy = {kind: {case: Accuracy(parts[kind, case]) for case in CASE_METHODS} for kind in kinds}
     bound = limit()
     return Result(rows(accuracy, bound), figures(accuracy, bound), remarks(runs))
 
@@ -380,52 +394,53 @@ def figures(accuracy, bound):
             'swell': lambda: swell_figure(accuracy['swell'], bound)}
 
 
-RMS = 'rms of the error [arcmin]'
+RMS_LABEL = 'rms of the error [arcmin]'
 
 
 def azimuth_figure(accuracy, bound):
     """Figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs, {case: Accuracy}."""
-    figure, axes = new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS))
-    t = EVERY * np.arange(1, len(bound[0]) + 1)
+    figure, axes = new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS_LABEL))
+    t = EVALUATION_PERIOD_S * np.arange(1, len(bound[0]) + 1)
     for case, a in accuracy.items():
-        axes[0, 0].plot(t, np.degrees(a.whole.first[:, 2]), color=COLOURS[case], label=case)
-        axes[1, 0].plot(t, a.whole.first[:, 2] / ARCMIN, color=COLOURS[case])
-        axes[2, 0].plot(t, a.rms[:, 2], color=COLOURS[case], label=case)
+        axes[0, 0].plot(t, np.degrees(a.whole.first[:, 2]), color=CASE_COLOURS[case], label=case)
+        axes[1, 0].plot(t, a.whole.first[:, 2] / ARCMIN_RAD, color=CASE_COLOURS[case])
+        axes[2, 0].plot(t, a.rms[:, 2], color=CASE_COLOURS[case], label=case)
     axes[0, 0].set_title('azimuth error of one run (figure 3 of the paper)')
     axes[1, 0].set_title('the same after 100 s (figure 4)')
-    axes[1, 0].set_xlim(100.0, DURATION)
+    axes[1, 0].set_xlim(100.0, RUN_DURATION_S)
     axes[1, 0].set_ylim(-60.0, 60.0)
-    finish(axes[2, 0], bound[0], 'azimuth: rms over the runs')
+    finish_panel(axes[2, 0], bound[0], 'azimuth: rms over the runs')
     return drawing.legend(figure)
 
 
-def finish(axes, bound, title):
+def finish_panel(axes, bound, title):
     """Add the limit, a logarithmic scale and a title to a panel of rms over time."""
-    t = EVERY * np.arange(1, len(bound) + 1)
-    axes.plot(t, bound / ARCMIN, color=INK, linestyle='--', linewidth=1.0, label='information limit')
+    t = EVALUATION_PERIOD_S * np.arange(1, len(bound) + 1)
+    axes.plot(t, bound / ARCMIN_RAD, color=INK_COLOUR, linestyle='--', linewidth=1.0, label='information limit')
     axes.set_yscale('log')
     axes.set_title(title)
 
 
 def level_figure(accuracy, bound):
     """Figure 4 of the paper for level: one run after 100 s; then the rms over all."""
-    figure, axes = new_panels(2, height=6.4, y=('level error [arcmin]', RMS))
-    t = EVERY * np.arange(1, len(bound[1]) + 1)
+    figure, axes = new_panels(2, height=6.4, y=('level error [arcmin]', RMS_LABEL))
+    t = EVALUATION_PERIOD_S * np.arange(1, len(bound[1]) + 1)
     for case, a in accuracy.items():
-        axes[0, 0].plot(t, a.whole.first[:, 0] / ARCMIN, color=COLOURS[case], linewidth=0.8, label=case)
-        axes[1, 0].plot(t, tracking.rms(a.rms[:, :2], axis=1), color=COLOURS[case], label=case)
+        axes[0, 0].plot(t, a.whole.first[:, 0] / ARCMIN_RAD, color=CASE_COLOURS[case], linewidth=0.8, label=case)
+        axes[1, 0].plot(t, tracking.rms(a.rms[:, :2], axis=1), color=CASE_COLOURS[case], label=case)
     axes[0, 0].set_title('level error about east of one run (figure 4 of the paper)')
-    axes[0, 0].set_xlim(100.0, DURATION)
+    axes[0, 0].set_xlim(100.0, RUN_DURATION_S)
     axes[0, 0].set_ylim(-4.0, 4.0)
-    finish(axes[1, 0], bound[1], 'level: rms over the runs')
+    finish_panel(axes[1, 0], bound[1], 'level: rms over the runs')
     return drawing.legend(figure)
 
 
 def swell_figure(accuracy, bound):
     """Rms of the azimuth on swell, {case: Accuracy}, beside the limit."""
-    figure, axes = new_panels(1, height=3.8, y=RMS)
+    figure, axes = new_panels(1, height=3.8, y=RMS_LABEL)
     for case, a in accuracy.items():
-        axes[0, 0].plot(EVERY * np.arange(1, len(a.rms) + 1), a.rms[:, 2], color=COLOURS[case], label=case)
-    finish(axes[0, 0], bound[0][:round(SHORT / EVERY)],
-           f'azimuth on swell of {SWELL:g} m/s, {SWELL_FREQUENCY:g} Hz: rms over the runs')
+        axes[0, 0].plot(EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1), a.rms[:, 2], color=CASE_COLOURS[case],
+                        label=case)
+    finish_panel(axes[0, 0], bound[0][:round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S)],
+                 f'azimuth on swell of {SWELL_VELOCITY_M_S:g} m/s, {SWELL_FREQUENCY_HZ:g} Hz: rms over the runs')
     return drawing.legend(figure)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases
@@ -17,13 +17,13 @@ from pedestal_studies.papers import servo
 from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 
-SETTLED = 2.0
+STANDSTILL_START_S = 2.0
 """Standstill is evaluated from this time on after a step [s]."""
 
-REVERSAL_AMPLITUDE = 0.05
+REVERSAL_AMPLITUDE_RAD = 0.05
 """Sine of the reversals [rad]."""
 
-REVERSALS = {'reversal': 0.2, 'fast_reversal': 4.0}
+REVERSAL_FREQUENCIES_RAD_S = {'reversal': 0.2, 'fast_reversal': 4.0}
 """Its angular frequency [rad/s]: slow, so that only lash is left; 0.2 rad/s at its peak, where friction joins in."""
 
 
@@ -35,15 +35,15 @@ def bias(schedule, torque=12.0, hold=14.0, out=45.0):
 
 PAPER_CASES = {'bias-off': bias('off'), 'bias-on': {}, 'hold-fade': bias('hold_fade')}
 
-SCHEDULES = {
+BIAS_SCHEDULES = {
     'off': bias('off'), 'constant-5': bias('constant', 5.0), 'constant-12': bias('constant', 12.0),
     'fade-5': bias('fade', 5.0, 0.0, 30.0), 'fade-12': bias('fade', 12.0, 0.0, 30.0), 'hold-fade': bias('hold_fade')}
 
-STRUCTURES = {
+SPEED_LOOP_STRUCTURES = {
     'mean-speed': {'adu.azimuth.speed_loop.structure': 'mean'},
     'independent-loops': {'adu.azimuth.speed_loop.structure': 'independent'}}
 
-TARGETS = {
+METRIC_TARGETS = {
     ('bias-off', 'standstill_peak_to_peak_rad'): '> 5e-4', ('bias-on', 'standstill_peak_to_peak_rad'): '< 2e-6',
     ('hold-fade', 'standstill_peak_to_peak_rad'): '< 2e-6', ('bias-on', 'reversal_ratio_off_to_on'): '> 30',
     ('hold-fade', 'reversal_ratio_off_to_on'): '> 30',
@@ -51,22 +51,22 @@ TARGETS = {
 
 
 def reversal_case(kind, name):
-    """The Case of three periods of a sine of REVERSALS."""
+    """The Case of three periods of a sine of REVERSAL_FREQUENCIES_RAD_S."""
     return cases.sine_case(Case(name, 'servo_sine', {
-        **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE}),
-        REVERSALS[kind], 3)
+        **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE_RAD}),
+        REVERSAL_FREQUENCIES_RAD_S[kind], 3)
 
 
-FAST = {**servo.FULL_TORQUE, 'acu.azimuth.shaper.acceleration': 40.0}
+FAST_STEP_PARAMETERS = {**servo.FULL_TORQUE_PARAMETERS, 'acu.azimuth.shaper.acceleration': 40.0}
 """The controller of a step at 40 rad/s2, which needs all torque."""
 
-MOVED = 0.5
+MOVE_DURATION_S = 0.5
 """The step of the two structures is over by then [s]."""
 
 
 def standstill(record):
-    """(times [s], load angle [rad]) from SETTLED on."""
-    late = record.t >= SETTLED
+    """(times [s], load angle [rad]) from STANDSTILL_START_S on."""
+    late = record.t >= STANDSTILL_START_S
     return record.t[late], record['adu/truth']['position'][late, 0]
 
 
@@ -78,7 +78,7 @@ def steady_residual(record, amplitude, w):
     return t[steady], metrics.residual(t[steady], error[steady], period)
 
 
-def fight(record):
+def opposing_torque(record):
     """Torque (n,) [Nm] with which the motors oppose each other beyond the commanded bias."""
     motors = record['adu/motor_states']['effort'][:, :2]
     return 0.5 * (motors[:, 0] - motors[:, 1]) - record.truth['bias'][:, 0]
@@ -89,12 +89,15 @@ def synchronism_error(record):
     return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
 
-CASES = {('standstill', name): Case(name, 'servo_step', changed, SETTLED + 1.0)
+CASES = {('standstill', name): Case(name, 'servo_step', changed, STANDSTILL_START_S + 1.0)
          for name, changed in PAPER_CASES.items()}
-CASES |= {(kind, name): reversal_case(kind, name) for kind in REVERSALS for name in PAPER_CASES}
-CASES |= {('sine', name): Case(name, 'servo_sine', {**servo.BEST, **changed}) for name, changed in SCHEDULES.items()}
-CASES |= {('step', name): Case(name, 'servo_step', {**FAST, **changed}) for name, changed in SCHEDULES.items()}
-CASES |= {('structure', name): Case(name, 'servo_step', changed, SETTLED) for name, changed in STRUCTURES.items()}
+CASES |= {(kind, name): reversal_case(kind, name) for kind in REVERSAL_FREQUENCIES_RAD_S for name in PAPER_CASES}
+CASES |= {('sine', name): Case(name, 'servo_sine', {**servo.BEST_PARAMETERS, **changed}) for name,
+          changed in BIAS_SCHEDULES.items()}
+CASES |= {('step', name): Case(name, 'servo_step', {**FAST_STEP_PARAMETERS, **changed}) for name,
+          changed in BIAS_SCHEDULES.items()}
+CASES |= {('structure', name): Case(name, 'servo_step', changed, STANDSTILL_START_S) for name,
+          changed in SPEED_LOOP_STRUCTURES.items()}
 """{(kind, case): a step and the standstill after it; reversals; the sine of 0.4 Hz and the fast step with every
 schedule; a step with one speed loop, or one for each motor}."""
 
@@ -103,19 +106,19 @@ def measured(kind, name, record):
     """{metric: (value, unit)} of one record."""
     if kind == 'standstill':
         return {'standstill_peak_to_peak_rad': (np.ptp(standstill(record)[1]), 'rad')}
-    if kind in REVERSALS:
-        left = steady_residual(record, REVERSAL_AMPLITUDE, REVERSALS[kind])[1]
+    if kind in REVERSAL_FREQUENCIES_RAD_S:
+        left = steady_residual(record, REVERSAL_AMPLITUDE_RAD, REVERSAL_FREQUENCIES_RAD_S[kind])[1]
         return {f'{kind}_error_rad': (metrics.peak(left), 'rad')}
     if kind == 'sine':
-        left = steady_residual(record, servo.AMPLITUDE, servo.FREQUENCIES['0p4hz'])[1]
+        left = steady_residual(record, servo.SINE_AMPLITUDE_RAD, servo.SINE_FREQUENCIES_RAD_S['0p4hz'])[1]
         return {'sine_residual_rad': (metrics.peak(left), 'rad')}
     if kind == 'step':
-        overshoot = metrics.overshoot_percent(record['adu/truth']['position'][:, 0], servo.STEP)
+        overshoot = metrics.overshoot_percent(record['adu/truth']['position'][:, 0], servo.STEP_SIZE_RAD)
         return {'step_overshoot_percent': (overshoot, '%')}
-    moving = record.t < MOVED
-    return {'fight_torque_rms_nm': (tracking.rms(fight(record)[~moving]), 'Nm'),
+    moving = record.t < MOVE_DURATION_S
+    return {'fight_torque_rms_nm': (tracking.rms(opposing_torque(record)[~moving]), 'Nm'),
             'synchronism_error_rms_rad_s': (tracking.rms(synchronism_error(record)[~moving]), 'rad/s'),
-            'move_fight_torque_rms_nm': (tracking.rms(fight(record)[moving]), 'Nm'),
+            'move_fight_torque_rms_nm': (tracking.rms(opposing_torque(record)[moving]), 'Nm'),
             'move_synchronism_error_rms_rad_s': (tracking.rms(synchronism_error(record)[moving]), 'rad/s')}
 
 
@@ -124,11 +127,11 @@ def rows(done):
     table = []
     for (kind, name), record in done.items():
         values = measured(kind, name, record)
-        if kind in REVERSALS and name != 'bias-off' and (kind, 'bias-off') in done:
+        if kind in REVERSAL_FREQUENCIES_RAD_S and name != 'bias-off' and (kind, 'bias-off') in done:
             without = measured(kind, 'bias-off', done[kind, 'bias-off'])[f'{kind}_error_rad'][0]
             values[f'{kind}_ratio_off_to_on'] = without / values[f'{kind}_error_rad'][0], ''
         case = f'schedule-{name}' if kind in ('sine', 'step') and name != 'hold-fade' else name
-        table += [row(case, metric, value, unit, target=TARGETS.get((name, metric)))
+        table += [row(case, metric, value, unit, target=METRIC_TARGETS.get((name, metric)))
                   for metric, (value, unit) in values.items()]
     return table
 
@@ -146,14 +149,14 @@ def remarks(table):
     """Sentences that the rows need; table: those rows."""
     values = {(row['case'], row['metric']): row['value'] for row in table}
     return [
-        f'reversal is the sine {REVERSAL_AMPLITUDE:g} rad sin({REVERSALS["reversal"]:g} t); fast_reversal goes '
-        f'through it at up to {REVERSAL_AMPLITUDE * REVERSALS["fast_reversal"]:g} rad/s. What bias leaves of the fast '
+        f'reversal is the sine {REVERSAL_AMPLITUDE_RAD:g} rad sin({REVERSAL_FREQUENCIES_RAD_S["reversal"]:g} t); fast_reversal goes '
+        f'through it at up to {REVERSAL_AMPLITUDE_RAD * REVERSAL_FREQUENCIES_RAD_S["fast_reversal"]:g} rad/s. What bias leaves of the fast '
         'one is the friction that changes its sign, no lash: its ratio is '
         f'{values["bias-on", "fast_reversal_ratio_off_to_on"]:.0f}, not '
         f'{values["bias-on", "reversal_ratio_off_to_on"]:.0f}.',
         'The overshoot of the fast step hardly depends on the schedule: the shaper ends the move gently. A constant '
         'bias costs what it takes from the peak torque, which a sharper move would show.',
-        f'Two speed loops keep the motors closer together in the move (move_*, the first {MOVED:g} s). Then their '
+        f'Two speed loops keep the motors closer together in the move (move_*, the first {MOVE_DURATION_S:g} s). Then their '
         'integrals take the bias that comes back for an error and remove it: the lash opens and they fight on.',
     ]
 
@@ -172,10 +175,10 @@ def standstill_figure(done):
     for column, name in enumerate(('bias-off', 'bias-on')):
         record = done['standstill', name]
         t, y = standstill(record)
-        axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH, FILTERED)[column])
+        axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH_COLOUR, FILTERED_COLOUR)[column])
         axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
         drawing.draw_torques(axes[1, column], record)
-    axes[0, 0].set_xlim(SETTLED, SETTLED + 0.5)
+    axes[0, 0].set_xlim(STANDSTILL_START_S, STANDSTILL_START_S + 0.5)
     axes[1, 0].set_ylim(-20.0, 20.0)
     return drawing.legend(figure)
 
@@ -186,11 +189,11 @@ def reversal_figure(done):
     figure, axes = new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
                               height_ratios=(1, 1.2, 1.2))
     t = done['reversal', 'bias-off'].t
-    w = REVERSALS['reversal']
-    axes[0, 0].plot(t, REVERSAL_AMPLITUDE * np.sin(w * t), color=INK)
+    w = REVERSAL_FREQUENCIES_RAD_S['reversal']
+    axes[0, 0].plot(t, REVERSAL_AMPLITUDE_RAD * np.sin(w * t), color=INK_COLOUR)
     for panel, name in zip(axes[1:, 0], ('bias-off', 'bias-on')):
-        t, left = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE, w)
-        panel.plot(t, 1e6 * left, color=TRUTH if name == 'bias-off' else FILTERED)
+        t, left = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE_RAD, w)
+        panel.plot(t, 1e6 * left, color=TRUTH_COLOUR if name == 'bias-off' else FILTERED_COLOUR)
         panel.set_title(f'{name}: error without its fundamental')
     axes[2, 0].set_xlim(*reversal_window())
     return figure
@@ -198,7 +201,7 @@ def reversal_figure(done):
 
 def reversal_window():
     """(begin, end) [s] of the 3 s about the first reversal in the second period of the slow sine."""
-    at = 1.25 * 2.0 * math.pi / REVERSALS['reversal']
+    at = 1.25 * 2.0 * math.pi / REVERSAL_FREQUENCIES_RAD_S['reversal']
     return at - 1.0, at + 2.0
 
 
@@ -215,16 +218,17 @@ def torques_figure(done):
 
 def schedules_figure(done):
     """Every schedule twice: what it leaves of the sine, and what it costs the fast step."""
-    names = list(SCHEDULES)
+    names = list(BIAS_SCHEDULES)
     sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
     step = [measured('step', name, done['step', name])['step_overshoot_percent'][0] for name in names]
     figure, axes = new_panels(1, 2, height=3.2, sharey=True)
     for panel, values, bound, label in ((axes[0, 0], sine, 100.0, 'left of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
                                         (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
-        bars = panel.barh(names, values, color=[FILTERED if name == 'hold-fade' else RAW for name in names])
+        bars = panel.barh(names, values, color=[FILTERED_COLOUR if name == 'hold-fade' else RAW_COLOUR
+                                                for name in names])
         panel.bar_label(bars, [f'{value:.0f}' if value >= 100.0 else f'{value:.3g}' for value in values], padding=3,
                         bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.0})
-        panel.axvline(bound, color=INK, linewidth=0.8, linestyle='--')
+        panel.axvline(bound, color=INK_COLOUR, linewidth=0.8, linestyle='--')
         panel.set_xlim(0.0, 1.2 * max(*values, bound))
         panel.grid(axis='y', visible=False)
         panel.set_xlabel(f'{label}, dashed: target')
@@ -235,10 +239,10 @@ def schedules_figure(done):
 def structures_figure(done):
     """One speed loop on the mean speed against one for each motor, over the step of the paper."""
     figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'fight torque [Nm]'), sharex=True, sharey='row')
-    for column, name in enumerate(STRUCTURES):
+    for column, name in enumerate(SPEED_LOOP_STRUCTURES):
         record = done['structure', name]
         drawing.draw_torques(axes[0, column], record)
-        axes[1, column].plot(record.t, fight(record), color=INK)
+        axes[1, column].plot(record.t, opposing_torque(record), color=INK_COLOUR)
         axes[0, column].set_title(name)
     axes[0, 0].set_xlim(0.0, 1.0)
     return drawing.legend(figure)

@@ -13,20 +13,28 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation.filters.motion_models import MODELS
+from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.modes import Mode
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases, monte_carlo
 from pedestal_common.parameters import as_dict
 from pedestal_studies.rigs import drawing, feedforward_loop, metrics, profiles
 from pedestal_studies.rigs.feedforward_loop import (
-    METRICS,
-    REVERSALS,
-    SEED,
-    SIGMA,
+    METRIC_UNITS,
+    MISS_SIGMA_RAD,
+    NOISE_SEED,
+    REVERSAL_S_BY_AXIS,
     Source,
     T,
     ca,
@@ -37,19 +45,19 @@ from pedestal_studies.rigs.feedforward_loop import (
 )
 from pedestal_studies.rigs.rows import Result
 
-RUNS = 50
+DEFAULT_RUNS = 50
 """Runs of each case, with independent noise."""
 
-DRIVE_SECONDS, DRIVE_START, DRIVE_ELEVATION = 36.0, 6.0, 0.5
+DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5
 """Of the runs through the product: duration, what of it is left to the hand-over to autotrack [s], where [rad]."""
 
-CV = (0.1, 0.2, 0.3, 0.5, 4.0)
+CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)
 """Process noises of the conventional filter [deg/s2/sqrt(Hz)]."""
 
-USUAL_CV = {'azimuth': 0.1, 'elevation': 0.3}
+PAPER_CV_NOISES = {'azimuth': 0.1, 'elevation': 0.3}
 """The process noise of `kalman-cv`: the nearest to the paper's results, which prints none."""
 
-SOURCES = {
+FEEDFORWARD_SOURCES = {
     'imm': imm(40.0, False), 'imm-predicted': imm(40.0, True), 'perfect-state': Source(None, True),
     'imm-b-predicted': imm(5.0, True), 'kalman-ca-0.1': ca(0.1), 'kalman-ca-40': ca(40.0),
     'kalman-ca-40-predicted': dataclasses.replace(ca(40.0), predicted=True)}
@@ -57,75 +65,80 @@ SOURCES = {
 
 def cv_name(axis, q):
     """Name of the case of a conventional filter, q [deg/s2/sqrt(Hz)]."""
-    return f'{axis}/kalman-cv' if q == USUAL_CV[axis] else f'{axis}/kalman-cv-{q:g}'
+    return f'{axis}/kalman-cv' if q == PAPER_CV_NOISES[axis] else f'{axis}/kalman-cv-{q:g}'
 
 
-CASES = {f'{axis}/kalman-cv': (axis, cv(q)) for axis, q in USUAL_CV.items()}
-CASES |= {f'{axis}/{name}': (axis, source) for axis in REVERSALS for name, source in SOURCES.items()}
-CASES |= {cv_name(axis, q): (axis, cv(q)) for axis in REVERSALS for q in CV}
+CASES = {f'{axis}/kalman-cv': (axis, cv(q)) for axis, q in PAPER_CV_NOISES.items()}
+CASES |= {f'{axis}/{name}': (axis, source) for axis in REVERSAL_S_BY_AXIS for name,
+          source in FEEDFORWARD_SOURCES.items()}
+CASES |= {cv_name(axis, q): (axis, cv(q)) for axis in REVERSAL_S_BY_AXIS for q in CV_NOISES}
 
 
 def drive_case(axis, tuned):
     """A Case of reversals without a pause on an axis, tracked with a filter (FilterParameters)."""
-    w = math.pi / REVERSALS[axis]
+    w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
-                  profiles.RATE / w if name == axis else 0.0 for name in REVERSALS}
+                  profiles.S_MOTION_RATE_RAD_S / w if name == axis else 0.0 for name in REVERSAL_S_BY_AXIS}
     return cases.Case(axis, 'uav_flyby', {
         'tracking_receiver.target.kind': 'sine', 'tracking_receiver.target.angle.frequency': 0.5 * w / math.pi,
-        'tracking_receiver.target.angle.range': 510.0, 'tracking_receiver.target.angle.elevation': DRIVE_ELEVATION,
-        **amplitudes, 'tracking_receiver.receiver.latency': feedforward_loop.DELAY * T, 'scenario.program.interval': T,
-        'adu.initial_azimuth': 0.0, 'adu.initial_elevation': DRIVE_ELEVATION,
+        'tracking_receiver.target.angle.range': 510.0, 'tracking_receiver.target.angle.elevation': DRIVE_ELEVATION_RAD,
+        **amplitudes, 'tracking_receiver.receiver.latency': feedforward_loop.MISS_DELAY_STEPS * T,
+        'scenario.program.interval': T,
+        'adu.initial_azimuth': 0.0, 'adu.initial_elevation': DRIVE_ELEVATION_RAD,
         **{f'acu.{axis}.filter.{name}': value for name, value in as_dict(tuned).items()
-           if value != as_dict(FilterParameters())[name]}}, DRIVE_SECONDS)
+           if value != as_dict(FilterParameters())[name]}}, DRIVE_DURATION_S)
 
 
 DRIVE_CASES = {
-    f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSALS for name, tuned in {
-        'kalman-cv': cv(USUAL_CV[axis]).filter, 'imm': SOURCES['imm'].filter, 'imm-default': filter_of('imm')}.items()}
+    f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSAL_S_BY_AXIS for name, tuned in {
+        'kalman-cv': cv(PAPER_CV_NOISES[axis]).filter, 'imm': FEEDFORWARD_SOURCES['imm'].filter,
+        'imm-default': filter_of('imm')}.items()}
 
 
-def driven(item):
-    """(times [s], true error of the axis [rad]), each (n,), from DRIVE_START on, of an item (name of DRIVE_CASES,
+def drive_error(item):
+    """(times [s], true error of the axis [rad]), each (n,), from DRIVE_EVALUATION_START_S on, of an item (name of
+    DRIVE_CASES,
     seed); errors NaN if autotrack was left."""
     name, seed = item
     record = DRIVE_CASES[name].with_seed(seed).run()
-    record = record.where(record.t >= DRIVE_START)
-    error = record.truth['error'][:, list(REVERSALS).index(name.partition('/')[0])]
+    record = record.where(record.t >= DRIVE_EVALUATION_START_S)
+    error = record.truth['error'][:, list(REVERSAL_S_BY_AXIS).index(name.partition('/')[0])]
     return record.t, error if np.all(record['acu/mode'] == Mode.AUTOTRACK) else np.full_like(error, math.nan)
 
 
-def driven_measures(item):
+def drive_misses(item):
     """(rms, largest) miss [deg] of an item as of `driven`."""
-    _, error = driven(item)
+    _, error = drive_error(item)
     return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
 
 
-TARGETS = {
+MISS_TARGETS_DEG = {
     'azimuth/kalman-cv': '0.16 to 0.17', 'azimuth/imm': '<= 0.036', 'azimuth/imm-predicted': '<= 0.025',
     'elevation/kalman-cv': '0.085 to 0.095', 'elevation/imm': '<= 0.028', 'elevation/imm-predicted': '<= 0.018'}
 """Of miss_rms_deg."""
 
-PAPER = {'azimuth/kalman-cv': 0.17, 'azimuth/imm': 0.035, 'elevation/kalman-cv': 0.1, 'elevation/imm': 0.03}
+PAPER_MISSES_DEG = {'azimuth/kalman-cv': 0.17, 'azimuth/imm': 0.035, 'elevation/kalman-cv': 0.1, 'elevation/imm': 0.03}
 """Miss rms of the paper [deg]: what it calls its largest."""
 
-MAIN = {f'{axis}/{name}' for axis in REVERSALS for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state')}
+MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS for name in ('kalman-cv', 'imm', 'imm-predicted',
+                                                                           'perfect-state')}
 """The cases that get all rows."""
 
-RATIOS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('>= 6', None),
-          'elevation/imm': ('>= 3', 3.0), 'elevation/imm-predicted': ('>= 5', None)}
+MISS_RATIO_TARGETS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('>= 6', None),
+                      'elevation/imm': ('>= 3', 3.0), 'elevation/imm-predicted': ('>= 5', None)}
 """Target and paper of how often the miss of kalman-cv is that of a case; of the azimuth the paper prints 4 to 5."""
 
 
-def conventional(misses, axis):
+def conventional_curve(misses, axis):
     """(rate noise [deg/s], miss [deg]) of the conventional filter, an array (2, n, runs) over CV."""
-    return np.array([[misses[cv_name(axis, q)].of(metric) for q in CV]
+    return np.array([[misses[cv_name(axis, q)].of(metric) for q in CV_NOISES]
                      for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 
 def at_rate_noise(misses, axis, rate_noise):
     """Miss (runs,) [deg] of a conventional filter tuned to a rate noise (runs,) [deg/s] in each run, between those of
     CV (log-log), and that of the quietest where even that is louder, which misses by less than it should."""
-    noises, curve = np.log(conventional(misses, axis))
+    noises, curve = np.log(conventional_curve(misses, axis))
     return np.exp([np.interp(*run) for run in zip(np.log(rate_noise), noises.T, curve.T)])
 
 
@@ -134,11 +147,11 @@ def rows(misses):
     table = []
     for name, case in misses.items():
         axis, miss = case.axis, case.of('miss_rms_deg')
-        table.append(row(name, 'miss_rms_deg', miss, 'deg', PAPER.get(name), TARGETS.get(name)))
-        table += [row(name, metric, case.of(metric), unit) for metric, unit in METRICS.items()
-                  if metric == 'rate_noise_deg_s' or metric != 'miss_rms_deg' and name in MAIN]
-        if name in RATIOS:
-            target, paper = RATIOS[name]
+        table.append(row(name, 'miss_rms_deg', miss, 'deg', PAPER_MISSES_DEG.get(name), MISS_TARGETS_DEG.get(name)))
+        table += [row(name, metric, case.of(metric), unit) for metric, unit in METRIC_UNITS.items()
+                  if metric == 'rate_noise_deg_s' or metric != 'miss_rms_deg' and name in MAIN_CASES]
+        if name in MISS_RATIO_TARGETS:
+            target, paper = MISS_RATIO_TARGETS[name]
             table.append(row(name, 'miss_ratio_to_kalman_cv', misses[f'{axis}/kalman-cv'].of('miss_rms_deg') / miss,
                              '', paper, target))
             table.append(row(name, 'miss_ratio_at_equal_rate_noise',
@@ -160,19 +173,19 @@ def drive_rows(of_drive):
 
 def remarks(misses):
     """Sentences that the rows need."""
-    value = {(name, metric): case.mean(metric) for name, case in misses.items() for metric in METRICS}
-    late = (feedforward_loop.DELAY + 0.5) * T
-    steepest = math.pi * math.degrees(profiles.RATE) / REVERSALS['azimuth']
+    value = {(name, metric): case.mean(metric) for name, case in misses.items() for metric in METRIC_UNITS}
+    late = (feedforward_loop.MISS_DELAY_STEPS + 0.5) * T
+    steepest = math.pi * math.degrees(profiles.S_MOTION_RATE_RAD_S) / REVERSAL_S_BY_AXIS['azimuth']
     return [
         'Not printed in the paper and chosen here: the time of a reversal, sample time, noise '
-        f'({math.degrees(SIGMA):g} deg), delay, rate loop, K_p and every constant of the filters. Its "largest miss '
+        f'({math.degrees(MISS_SIGMA_RAD):g} deg), delay, rate loop, K_p and every constant of the filters. Its "largest miss '
         '(RMS)" is read as the rms over the whole motion; miss_worst_second_deg is the rms of the worst second.',
         f'What is fed forward {1e3 * late:g} ms late (d + T / 2) misses by a (d + T / 2) / K_p in a long turn, '
         f'{steepest * late / feedforward_loop.K_P:.3f} deg at the {steepest:.1f} deg/s2 of the azimuth: '
         'imm-predicted is without that. The rate of kalman-cv is the same predicted or not.',
         'perfect-state is what noise of the miss and jerk in the rate loop leave: the limit of this servo.',
-        f'The elevation of the paper (0.1 deg) needs a conventional filter of {USUAL_CV["elevation"]:g} '
-        f'deg/s2/sqrt(Hz); with the {USUAL_CV["azimuth"]:g} of its azimuth it misses by '
+        f'The elevation of the paper (0.1 deg) needs a conventional filter of {PAPER_CV_NOISES["elevation"]:g} '
+        f'deg/s2/sqrt(Hz); with the {PAPER_CV_NOISES["azimuth"]:g} of its azimuth it misses by '
         f'{value["elevation/kalman-cv-0.1", "miss_rms_deg"]:.3f} deg.',
         'The miss alone can be had from any filter by more noise: a conventional one of 4 deg/s2/sqrt(Hz) misses by '
         f'{value["azimuth/kalman-cv-4", "miss_rms_deg"]:.3f} deg, a ca of 40 deg/s3/sqrt(Hz), predicted, by '
@@ -188,7 +201,8 @@ def remarks(misses):
     ]
 
 
-COLOURS = {'kalman-cv': TRUTH, 'imm': MOTOR_1, 'imm-predicted': FILTERED, 'perfect-state': INK}
+SOURCE_COLOURS = {'kalman-cv': TRUTH_COLOUR, 'imm': MOTOR_1_COLOUR, 'imm-predicted': FILTERED_COLOUR,
+                  'perfect-state': INK_COLOUR}
 
 
 def figures(misses):
@@ -214,8 +228,8 @@ def miss_figure(axis, those, misses):
     for name, panel in zip(names, axes[:, 0]):
         case = f'{axis}/{name}'
         one = feedforward_loop.steps_of(*CASES[case], 0, 1)['miss'][0, counts]
-        panel.plot(t, np.degrees(one), color=RAW, linewidth=0.7, label='one run')
-        panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=FILTERED, linewidth=1.4,
+        panel.plot(t, np.degrees(one), color=RAW_COLOUR, linewidth=0.7, label='one run')
+        panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=FILTERED_COLOUR, linewidth=1.4,
                    label='mean of the runs')
         panel.set_title(f'{name}: {misses[case].mean("miss_rms_deg"):.3f} deg rms')
     axes[0, 0].set_title(f'{axis}, {those} of the paper. {axes[0, 0].get_title(loc="left")}')
@@ -227,10 +241,10 @@ def feedforward_figure():
     figure, axes = new_panels(2, height=5.4, y=('rate [deg/s]', 'acceleration [deg/s2]'), sharex=True)
     t, counts, target = from_first_reversal('azimuth')
     for panel, field, column in ((axes[0, 0], 'rate', 1), (axes[1, 0], 'acceleration', 2)):
-        panel.plot(t, np.degrees(target[counts, column]), color=INK, linestyle='--', label='truth')
+        panel.plot(t, np.degrees(target[counts, column]), color=INK_COLOUR, linestyle='--', label='truth')
         for name in ('kalman-cv', 'imm', 'imm-predicted'):
             one = feedforward_loop.steps_of(*CASES[f'azimuth/{name}'], 0, 1)[field][0, counts]
-            panel.plot(t, np.degrees(one), color=COLOURS[name], label=name)
+            panel.plot(t, np.degrees(one), color=SOURCE_COLOURS[name], label=name)
     reversal = t[np.argmax(np.abs(target[counts, 2]))]
     axes[0, 0].set_xlim(reversal - 1.5, reversal + 2.5)
     axes[0, 0].set_title('fed forward through a reversal of the azimuth')
@@ -242,11 +256,11 @@ def probability_figure():
     figure, axes = new_panels(2, height=4.6, y=('acceleration\n[deg/s2]', 'probability'), sharex=True,
                               height_ratios=(1, 1.6))
     t, counts, target = from_first_reversal('azimuth')
-    mu = feedforward_loop.steps_of(*CASES['azimuth/imm'], 0, feedforward_loop.BATCH)['mu'][:, counts].mean(axis=0)
-    axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=INK)
+    mu = feedforward_loop.steps_of(*CASES['azimuth/imm'], 0, feedforward_loop.BATCH_RUNS)['mu'][:, counts].mean(axis=0)
+    axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=INK_COLOUR)
     axes[0, 0].set_title('the target, and the probability of each model of imm')
-    for model, colour in (('cv', TRUTH), ('ca', MOTOR_2), ('current_statistical', FILTERED)):
-        axes[1, 0].plot(t, mu[:, MODELS.index(model)], color=colour, label=model)
+    for model, colour in (('cv', TRUTH_COLOUR), ('ca', MOTOR_2_COLOUR), ('current_statistical', FILTERED_COLOUR)):
+        axes[1, 0].plot(t, mu[:, MODEL_NAMES.index(model)], color=colour, label=model)
     axes[1, 0].set_ylim(0.0, 1.0)
     return drawing.legend(figure)
 
@@ -255,12 +269,12 @@ def tuning_figure(misses):
     """Miss against noise of the rate fed forward, over the tunings."""
     figure, axes = new_panels(1, 2, height=3.8, x='noise of the rate fed forward [deg/s]', y='miss rms [deg]',
                               sharex=True, sharey=True)
-    for axis, panel in zip(REVERSALS, axes[0]):
-        panel.loglog(*conventional(misses, axis).mean(axis=-1), '.-', color=TRUTH, label='kalman-cv, q '
-                     f'{CV[0]:g} to {CV[-1]:g}')
-        for name, colour, marker in (('kalman-ca-0.1', RAW, 'v'), ('kalman-ca-40-predicted', RAW, '^'),
-                                     ('imm', MOTOR_1, 'o'), ('imm-predicted', FILTERED, 'o'),
-                                     ('imm-b-predicted', MOTOR_2, 's')):
+    for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[0]):
+        panel.loglog(*conventional_curve(misses, axis).mean(axis=-1), '.-', color=TRUTH_COLOUR, label='kalman-cv, q '
+                     f'{CV_NOISES[0]:g} to {CV_NOISES[-1]:g}')
+        for name, colour, marker in (('kalman-ca-0.1', RAW_COLOUR, 'v'), ('kalman-ca-40-predicted', RAW_COLOUR, '^'),
+                                     ('imm', MOTOR_1_COLOUR, 'o'), ('imm-predicted', FILTERED_COLOUR, 'o'),
+                                     ('imm-b-predicted', MOTOR_2_COLOUR, 's')):
             case = misses[f'{axis}/{name}']
             panel.loglog(case.mean('rate_noise_deg_s'), case.mean('miss_rms_deg'), marker, color=colour, label=name)
         panel.set_title(axis)
@@ -272,21 +286,21 @@ def tuning_figure(misses):
 def drive_figure():
     """Miss of the product in reversals without a pause, one run of each filter."""
     figure, axes = new_panels(2, height=4.8, y='miss [deg]', sharex=True)
-    for axis, panel in zip(REVERSALS, axes[:, 0]):
-        for name, colour in (('kalman-cv', TRUTH), ('imm', MOTOR_1), ('imm-default', FILTERED)):
-            t, miss = driven((f'{axis}/drive-{name}', SEED))
+    for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[:, 0]):
+        for name, colour in (('kalman-cv', TRUTH_COLOUR), ('imm', MOTOR_1_COLOUR), ('imm-default', FILTERED_COLOUR)):
+            t, miss = drive_error((f'{axis}/drive-{name}', NOISE_SEED))
             panel.plot(t, np.degrees(miss), color=colour, label=name)
-        panel.set_xlim(DRIVE_START, DRIVE_START + 8.0)
-        panel.set_title(f'{axis}: control unit, motors and gears, target in reversals of {REVERSALS[axis]:g} s')
+        panel.set_xlim(DRIVE_EVALUATION_START_S, DRIVE_EVALUATION_START_S + 8.0)
+        panel.set_title(f'{axis}: control unit, motors and gears, target in reversals of {REVERSAL_S_BY_AXIS[axis]:g} s')
     return drawing.legend(figure)
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run CASES and DRIVE_CASES `runs` times; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     misses = statistics(CASES, runs, pool, lambda share, text: progress(0.5 * share, text))
-    items = [(name, SEED + i) for name in DRIVE_CASES for i in range(runs)]
-    done = np.array(list(pool.map(driven_measures, items, lambda share, text: progress(
+    items = [(name, NOISE_SEED + i) for name in DRIVE_CASES for i in range(runs)]
+    done = np.array(list(pool.map(drive_misses, items, lambda share, text: progress(
         0.5 + 0.5 * share, f'the whole chain, {text}'))))
     of_drive = dict(zip(DRIVE_CASES, done.reshape(len(DRIVE_CASES), runs, 2)))
     return Result(rows(misses) + drive_rows(of_drive), figures(misses), remarks(misses))

@@ -8,69 +8,78 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.rigs import drawing, ensemble, feedforward_loop, profiles
 from pedestal_studies.rigs.rows import Result
 
-RUNS = 200
+DEFAULT_RUNS = 200
 """Of the motion; the paper has 50."""
 
-BATCH, SEED = 25, 1
+BATCH_RUNS, NOISE_SEED = 25, 1
 
-REVERSALS = (4.0, 2.0, 1.0, 0.5, 0.35)
+REVERSAL_DURATIONS_S = (4.0, 2.0, 1.0, 0.5, 0.35)
 """Duration of each [s]: 2.7 to 31 deg/s2 at its peak."""
 
-LEAD = 5.0
+LEAD_TIME_S = 5.0
 """Uniform motion before it all begins [s]."""
 
-NOISE = ensemble.Noise(feedforward_loop.SIGMA)
+MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)
 
 FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
            'imm-a': feedforward_loop.imm(40.0, False).filter, 'imm-b': feedforward_loop.imm(5.0, False).filter}
 
-COLOURS = {'cv': TRUTH, 'ca': RAW, 'imm-a': MOTOR_1, 'imm-b': FILTERED}
+FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'imm-a': MOTOR_1_COLOUR, 'imm-b': FILTERED_COLOUR}
 
-RATIO_TARGET = '>= 3'
+RATE_RATIO_TARGET = '>= 3'
 """Of the rate error of cv over that of imm-b."""
 
 
 def motion():
     """(times (n,) [s], truth (angle, rate, acceleration), each (n,), {reversal: mask (n,) of it}) of all reversals."""
-    stroke, rate = profiles.STROKE, profiles.RATE
-    begin, legs, starts = LEAD, [], {}
-    for reversal in REVERSALS:
+    stroke, rate = profiles.S_MOTION_STROKE_RAD, profiles.S_MOTION_RATE_RAD_S
+    begin, legs, starts = LEAD_TIME_S, [], {}
+    for reversal in REVERSAL_DURATIONS_S:
         uniform = stroke / rate - 2.0 * reversal / math.pi
         legs.append(begin)
         starts[reversal] = begin + 0.5 * uniform
         begin += uniform + reversal
-    t = ensemble.PERIOD * np.arange(round(begin / ensemble.PERIOD))
-    truth = np.array([rate * (t - LEAD), np.full(len(t), rate), np.zeros(len(t))])
-    for i, (reversal, begin) in enumerate(zip(REVERSALS, legs)):
+    t = ensemble.MEASUREMENT_PERIOD_S * np.arange(round(begin / ensemble.MEASUREMENT_PERIOD_S))
+    truth = np.array([rate * (t - LEAD_TIME_S), np.full(len(t), rate), np.zeros(len(t))])
+    for i, (reversal, begin) in enumerate(zip(REVERSAL_DURATIONS_S, legs)):
         later = t >= begin
         truth[:, later] = (-1.0) ** i * np.array(profiles.s_motion(t[later] - begin, stroke, rate, reversal))
     return t, tuple(truth), {reversal: (t >= start) & (t <= start + reversal) for reversal, start in starts.items()}
 
 
 def batch(item):
-    """(MOMENTS (n,) over the runs, rms (count, len(REVERSALS), 2) of rate [deg/s] and acceleration [deg/s2] of every
+    """(MOMENTS (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2) of rate [deg/s] and acceleration
+    [deg/s2] of every
     run inside the reversals) of an item (filter, first run, number of runs)."""
     name, first, count = item
     t, truth, reversals = motion()
-    sums = ensemble.moments(FILTERS[name], t, truth, NOISE, ensemble.records(truth, NOISE, SEED, first, count))
+    sums = ensemble.moments(FILTERS[name], t, truth, MEASUREMENT_NOISE, ensemble.records(truth, MEASUREMENT_NOISE,
+                                                                                         NOISE_SEED, first, count))
     inside = [ensemble.over_time(sums[:, mask]) for mask in reversals.values()]
     rms = np.degrees([[ensemble.rms(of, what) for what in ('rate', 'acceleration')] for of in inside])
     return ensemble.over_runs(sums), rms.transpose(2, 0, 1)
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Filter `runs` noisy records with each of FILTERS; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
-    items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH)]
+    items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH_RUNS)]
     sums_of, errors = {}, {}
     for (name, *_), (sums, rms) in zip(items, pool.map(batch, items, progress)):
-        sums_of[name] = ensemble.added(sums_of[name], sums) if name in sums_of else sums
+        sums_of[name] = ensemble.sum_of_moments(sums_of[name], sums) if name in sums_of else sums
         errors.setdefault(name, []).append(rms)
     values = measured({name: np.concatenate(rms) for name, rms in errors.items()})
     figures = {'figure-3': lambda: moments_figure(sums_of, 'rate', 'rate [deg/s]'),
@@ -81,8 +90,9 @@ def run(progress, runs=RUNS, pool=None) -> Result:
 
 def measured(errors):
     """{(reversal, filter): rms (2, runs) of rate [deg/s] and acceleration [deg/s2]}; errors {filter: (runs,
-    len(REVERSALS), 2)}."""
-    return {(reversal, name): rms[:, i].T for i, reversal in enumerate(REVERSALS) for name, rms in errors.items()}
+    len(REVERSAL_DURATIONS_S), 2)}."""
+    return {(reversal, name): rms[:, i].T for i, reversal in enumerate(REVERSAL_DURATIONS_S) for name,
+            rms in errors.items()}
 
 
 def rows(values):
@@ -94,19 +104,20 @@ def rows(values):
                   row(case, 'acceleration_rms_deg_s2', acceleration, 'deg/s2')]
         if name != 'cv':
             cv = values[reversal, 'cv']
-            table += [row(case, 'rate_ratio_of_cv', cv[0] / rate, '', None, RATIO_TARGET if name == 'imm-b' else None),
+            table += [row(case, 'rate_ratio_of_cv', cv[0] / rate, '', None, RATE_RATIO_TARGET
+                          if name == 'imm-b' else None),
                       row(case, 'acceleration_ratio_of_cv', cv[1] / acceleration, '')]
     return table
 
 
 def peak_acceleration(reversal):
     """Peak acceleration [deg/s2] of a reversal of this duration [s]."""
-    return math.pi * math.degrees(profiles.RATE) / reversal
+    return math.pi * math.degrees(profiles.S_MOTION_RATE_RAD_S) / reversal
 
 
 def remarks(values):
     """Sentences that the rows need; values as of `measured`."""
-    worse = [f'{peak_acceleration(reversal):.1f}' for reversal in REVERSALS
+    worse = [f'{peak_acceleration(reversal):.1f}' for reversal in REVERSAL_DURATIONS_S
              if values[reversal, 'imm-a'][1].mean() > values[reversal, 'cv'][1].mean()]
     lines = ['_ratio_of_cv: how many times the error of cv is that of the filter. cv has no acceleration: its error '
              'is the acceleration itself.']
@@ -122,26 +133,27 @@ def moments_figure(sums_of, what, label):
     t, truth, _ = motion()
     figure, axes = new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
     of = truth[('angle', 'rate', 'acceleration').index(what)]
-    axes[0, 0].plot(t, np.degrees(of), color=INK, linestyle='--', linewidth=0.8, label='truth')
+    axes[0, 0].plot(t, np.degrees(of), color=INK_COLOUR, linestyle='--', linewidth=0.8, label='truth')
     for name in ('cv', 'imm-b'):
         sums = sums_of[name]
         mean = sums[what] / sums['runs']
         sigma = np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - mean * mean, 0.0))
-        axes[0, 0].plot(t, np.degrees(of + mean), color=COLOURS[name], label=name)
-        axes[1, 0].plot(t, np.degrees(mean), color=COLOURS[name])
-        axes[1, 0].fill_between(t, np.degrees(mean - sigma), np.degrees(mean + sigma), color=COLOURS[name], alpha=0.25,
+        axes[0, 0].plot(t, np.degrees(of + mean), color=FILTER_COLOURS[name], label=name)
+        axes[1, 0].plot(t, np.degrees(mean), color=FILTER_COLOURS[name])
+        axes[1, 0].fill_between(t, np.degrees(mean - sigma), np.degrees(mean + sigma), color=FILTER_COLOURS[name],
+                                alpha=0.25,
                                 linewidth=0.0)
-    axes[1, 0].set_xlim(LEAD - 1.0, t[-1])
+    axes[1, 0].set_xlim(LEAD_TIME_S - 1.0, t[-1])
     return drawing.legend(figure)
 
 
 def sharpness_figure(values):
     """Errors of rate and acceleration against the sharpness of the reversal."""
     figure, axes = new_panels(1, 2, height=3.6, x='peak acceleration of the reversal [deg/s2]', sharex=True)
-    x = [peak_acceleration(reversal) for reversal in REVERSALS]
+    x = [peak_acceleration(reversal) for reversal in REVERSAL_DURATIONS_S]
     for i, (panel, label) in enumerate(zip(axes[0], ('rate rms [deg/s]', 'acceleration rms [deg/s2]'))):
-        for name, colour in COLOURS.items():
-            y = [values[reversal, name][i].mean() for reversal in REVERSALS]
+        for name, colour in FILTER_COLOURS.items():
+            y = [values[reversal, name][i].mean() for reversal in REVERSAL_DURATIONS_S]
             panel.loglog(x, y, 'o-', ms=3.5, color=colour, label=name)
         panel.set_ylabel(label)
         panel.set_xticks(x, [f'{value:.2g}' for value in x])

@@ -9,19 +9,27 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.rigs import drawing, feedforward_loop
 from pedestal_studies.rigs.feedforward_loop import Source
 from pedestal_studies.rigs.rows import Result
 
-RUNS = 50
+DEFAULT_RUNS = 50
 """Of each tuning, as many as in the paper."""
 
-AXIS = 'azimuth'
+LOOP_AXIS = 'azimuth'
 
-REFERENCE = feedforward_loop.imm(40.0, True)
+REFERENCE_SOURCE = feedforward_loop.imm(40.0, True)
 """imm-predicted of the study imm-feedforward: the point that the rows compare with."""
 
 
@@ -34,27 +42,27 @@ def _logarithmic(low, high, points):
     return [float(f'{value:.3g}') for value in np.geomspace(low, high, points)]
 
 
-TUNINGS = {
+FILTER_TUNINGS = {
     'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), feedforward_loop.cv),
     'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), feedforward_loop.ca),
     'current_statistical': ('a_max [deg/s2], alpha 0.5 1/s', _logarithmic(0.5, 1000.0, 13), _cs),
     'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10), lambda q: feedforward_loop.imm(q, True))}
 """{filter: (what is tuned, its values, the Source of a value)}."""
 
-COLOURS = {'cv': TRUTH, 'ca': RAW, 'current_statistical': MOTOR_2, 'imm': FILTERED}
+FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'current_statistical': MOTOR_2_COLOUR, 'imm': FILTERED_COLOUR}
 
-TARGET = '>= 5'
+MISS_RATIO_TARGET = '>= 5'
 """Of the miss of cv at the rate noise of the imm over that of the imm (reference: 7 to 9)."""
 
 
 def cases():
     """{(filter, value): (axis, Source)}, and the reference."""
-    tunings = {(name, value): (AXIS, dataclasses.replace(source(value), predicted=True))
-             for name, (_, values, source) in TUNINGS.items() for value in values}
-    return tunings | {('reference', 0.0): (AXIS, REFERENCE)}
+    tunings = {(name, value): (LOOP_AXIS, dataclasses.replace(source(value), predicted=True))
+             for name, (_, values, source) in FILTER_TUNINGS.items() for value in values}
+    return tunings | {('reference', 0.0): (LOOP_AXIS, REFERENCE_SOURCE)}
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run every tuning `runs` times; pool: monte_carlo.Pool, None for this process."""
     misses = feedforward_loop.statistics(cases(), runs, pool or monte_carlo.Pool(1), progress)
     points = {case: measured(misses[case]) for case in misses}
@@ -69,7 +77,7 @@ def measured(statistics):
 
 def curve(points, name):
     """(rate noise [deg/s], miss [deg]) of a filter over its tunings, an array (2, n)."""
-    return np.array([points[name, value] for value in TUNINGS[name][1]]).T
+    return np.array([points[name, value] for value in FILTER_TUNINGS[name][1]]).T
 
 
 def frontier(points, name):
@@ -101,7 +109,7 @@ def rows(points):
     noise, miss = points['reference', 0.0]
     table = [row('imm-predicted', 'miss_rms_deg', miss, 'deg'),
              row('imm-predicted', 'rate_noise_deg_s', noise, 'deg/s')]
-    for name in TUNINGS:
+    for name in FILTER_TUNINGS:
         fronts = [frontier({case: values[:, i] for case, values in points.items()}, name) for i in range(len(miss))]
         table += [row(name, 'least_miss_deg', np.array([front[1, -1] for front in fronts]), 'deg'),
                   row(name, 'rate_noise_at_least_miss_deg_s', np.array([front[0, -1] for front in fronts]), 'deg/s')]
@@ -109,7 +117,7 @@ def rows(points):
             equal = np.array([miss_at(*run) for run in zip(fronts, noise)])
             table += [row(name, 'miss_at_equal_rate_noise_deg', equal, 'deg'),
                       row(name, 'miss_ratio_at_equal_rate_noise', equal / miss, '', None,
-                          TARGET if name == 'cv' else None)]
+                          MISS_RATIO_TARGET if name == 'cv' else None)]
         if all(front[1, -1] <= own for front, own in zip(fronts, miss)):
             table.append(row(name, 'rate_noise_at_equal_miss_deg_s',
                              np.array([noise_at(*run) for run in zip(fronts, miss)]), 'deg/s'))
@@ -119,10 +127,10 @@ def rows(points):
 def remarks(points):
     """Sentences that the rows need; points {(filter, value): (rate noise [deg/s], miss [deg])}: means of the runs."""
     tuned = '; '.join(f'{name}: {what} {values[0]:g} to {values[-1]:g}'
-                      for name, (what, values, _) in TUNINGS.items())
+                      for name, (what, values, _) in FILTER_TUNINGS.items())
     noise, miss = points['reference', 0.0]
-    loud = [name for name in TUNINGS if frontier(points, name)[0, 0] > noise]
-    never = [name for name in TUNINGS if frontier(points, name)[1, -1] > miss]
+    loud = [name for name in FILTER_TUNINGS if frontier(points, name)[0, 0] > noise]
+    never = [name for name in FILTER_TUNINGS if frontier(points, name)[1, -1] > miss]
     lines = [f'Every filter is predicted to the instant of its command; tuned are {tuned}. The rows read the curves '
              'at the rate noise and the miss of imm-predicted (study imm-feedforward), straight between two tunings '
              'on logarithmic scales.']
@@ -138,14 +146,14 @@ def miss_figure(points):
     figure, axes = new_panels(1, height=4.8, x='noise of the rate fed forward, uniform part [deg/s]',
                               y='miss rms [deg]')
     panel = axes[0, 0]
-    for name, colour in COLOURS.items():
-        panel.loglog(*curve(points, name), '.-', ms=5.0, color=colour, label=f'{name}, {TUNINGS[name][0]}')
-        values = TUNINGS[name][1]
+    for name, colour in FILTER_COLOURS.items():
+        panel.loglog(*curve(points, name), '.-', ms=5.0, color=colour, label=f'{name}, {FILTER_TUNINGS[name][0]}')
+        values = FILTER_TUNINGS[name][1]
         for value in (values[0], values[len(values) // 2], values[-1]):
             panel.annotate(f'{value:g}', points[name, value], xytext=(3, 3), textcoords='offset points', color=colour,
                            fontsize=8)
-    panel.loglog(*points['reference', 0.0], 'o', ms=7.0, color=MOTOR_1, fillstyle='none', label='imm-predicted')
+    panel.loglog(*points['reference', 0.0], 'o', ms=7.0, color=MOTOR_1_COLOUR, fillstyle='none', label='imm-predicted')
     noise, miss = points['reference', 0.0]
-    panel.axvline(noise, color=INK, linewidth=0.6, linestyle=':')
-    panel.axhline(miss, color=INK, linewidth=0.6, linestyle=':')
+    panel.axvline(noise, color=INK_COLOUR, linewidth=0.6, linestyle=':')
+    panel.axhline(miss, color=INK_COLOUR, linewidth=0.6, linestyle=':')
     return drawing.legend(figure)

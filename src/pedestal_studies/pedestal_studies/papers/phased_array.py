@@ -12,44 +12,53 @@ import math
 import numpy as np
 
 from pedestal_analysis.results.intervals import row
-from pedestal_analysis.results.tracking import began, rms
+from pedestal_analysis.results.tracking import interval_start_error, rms
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
 from pedestal_studies.rigs import phased_array_figures as figures
-from pedestal_studies.rigs.angle_loop import GRID, LENGTH, SMOOTHINGS, Better, Paper, delay_limit, spectral_radius
+from pedestal_studies.rigs.angle_loop import (
+    GRID_STEP_S,
+    SMOOTHING_CODES,
+    SMOOTHING_SAMPLES,
+    FilterLoop,
+    PaperLoop,
+    delay_limit,
+    spectral_radius,
+)
 from pedestal_studies.rigs.metrics import overshoot_percent, peak
 from pedestal_studies.rigs.rows import Result
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 
-RUNS, SEED = 40, 1
+DEFAULT_RUNS, FIRST_SEED = 40, 1
 """Runs of each case with noise; seed of the first."""
 
-STEP = math.radians(1.0)
-ALPHAS, PERIODS, DELAYS, SLOPES = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80), (0.5, 0.7, 1.0, 1.5, 2.0)
-RATES = (10, 20, 30, 40)
+STEP_SIZE_RAD = math.radians(1.0)
+(ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS, SLOPE_RATIOS) = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80), (0.5, 0.7, 1.0, 1.5, 2.0)
+RAMP_RATES_DEG_S = (10, 20, 30, 40)
 """Of figure 6 [deg/s]."""
 
-SINE_RATE, SINE_ACCELERATION = 30.0, 10.0
+SINE_RATE_DEG_S, SINE_ACCELERATION_DEG_S2 = 30.0, 10.0
 """Of figure 7 [deg/s, deg/s2]."""
 
-SWAY, SWAY_PERIOD = math.radians(10.0), 8.0
+SWAY_AMPLITUDE_RAD, SWAY_PERIOD_S = math.radians(10.0), 8.0
 """Of figure 9 [rad, s]."""
 
-DELTAS = (0.0, 0.85, 1.0)
-DELAY = 20
-"""Delay of figure 7 and of all loops of LOOPS [ms]."""
+RATE_COMPENSATIONS = (0.0, 0.85, 1.0)
+LOOP_DELAY_MS = 20
+"""Delay of figure 7 and of all loops of COMPARED_LOOPS [ms]."""
 
-NOISE, INS_ANGLE, INS_RATE = math.radians(0.05), math.radians(0.005), math.radians(0.01)
+(RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S) = (math.radians(0.05), math.radians(0.005),
+                                                                   math.radians(0.01))
 """1-sigma of one millisecond: the receiver's, the INS's attitude and rate [rad, rad/s]."""
 
-LATE = 5
+INS_STAMP_ERROR_MS = 5
 """Stamp error of the INS [ms]."""
 
-SECONDS, SETTLED = 60.0, 30.0
+RECORD_DURATION_S, EVALUATION_START_S = 60.0, 30.0
 """Length of a record of a moving target, and the time from which it is evaluated [s]."""
 
-BEAMWIDTH = math.radians(1.0)
+BEAMWIDTH_RAD = math.radians(1.0)
 """Of the array where the loop is lost."""
 
 
@@ -58,22 +67,24 @@ def jerk(q):
     return math.radians(math.sqrt(q))
 
 
-LOOPS = {
-    'paper': Paper(delay=DELAY), 'paper-delta': Paper(delay=DELAY, delta=0.85),
-    'type-2': Paper(delay=DELAY, form='type_2'), 'type-2-delta': Paper(delay=DELAY, form='type_2', delta=0.85),
-    'tracked-10ms': Better(jerk(1.0), NOISE, hold=10), 'best': Better(jerk(0.1), NOISE),
-    'fast': Better(jerk(1.0), NOISE), 'faster': Better(jerk(10.0), NOISE),
-    'best-delay-150ms': Better(jerk(0.1), NOISE, delay=150),
-    'best-told-10ms-less': Better(jerk(0.1), NOISE, known=DELAY - 10)}
+COMPARED_LOOPS = {
+    'paper': PaperLoop(delay=LOOP_DELAY_MS), 'paper-delta': PaperLoop(delay=LOOP_DELAY_MS, delta=0.85),
+    'type-2': PaperLoop(delay=LOOP_DELAY_MS, form='type_2'), 'type-2-delta': PaperLoop(delay=LOOP_DELAY_MS,
+                                                                                       form='type_2', delta=0.85),
+    'tracked-10ms': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD, hold=10), 'best': FilterLoop(jerk(0.1),
+                                                                                           RECEIVER_NOISE_RAD),
+    'fast': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD), 'faster': FilterLoop(jerk(10.0), RECEIVER_NOISE_RAD),
+    'best-delay-150ms': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, delay=150),
+    'best-told-10ms-less': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, known=LOOP_DELAY_MS - 10)}
 """Loops on one plant. The paper's filter with the ship's rate; its type-2 form; constant-acceleration filters on
 beam in force + error, predicted to the middle of the interval, steered every 1 ms (tracked-10ms: every 10 ms)."""
 
 INS_LOOPS = {
-    'best/sway-ins': Better(jerk(1e-3), NOISE, ins=True, late=LATE),
-    'best/sway-ins/exact-stamps': Better(jerk(1e-3), NOISE, ins=True),
-    'best/sway-ins/rate-only': Better(jerk(1e-3), NOISE, ins=True, tau=0.0)}
+    'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True, late=INS_STAMP_ERROR_MS),
+    'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True),
+    'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True, tau=0.0)}
 
-TARGETS = {
+METRIC_TARGETS = {
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): '19.7 +- 0.5',
     ('step/alpha=0.1/T=10ms/S1', 'overshoot_percent'): '24.4 +- 0.5',
     ('step/alpha=0.1/T=5ms/S1', 'overshoot_percent'): '34.1 +- 1',
@@ -86,13 +97,13 @@ TARGETS = {
     ('best/sine', 'jitter_rms_deg'): '<= 0.006', ('best/sway', 'isolation_db'): '>= 48',
     ('best/sway-ins', 'isolation_db'): '>= 60', ('best/sway-ins/exact-stamps', 'isolation_db'): '>= 90'}
 
-PAPER = {
+PAPER_VALUES = {
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): 20.0, ('step/alpha=0.1/T=10ms/S1', 'overshoot_percent'): 20.0,
     ('step/alpha=0.1/T=10ms/S2', 'overshoot_percent'): 20.0,
     ('ramp/30deg_s/T=10ms', 'lag_deg'): 0.3, ('ramp/30deg_s/T=5ms', 'lag_deg'): 0.15, ('sine', 'lag_deg'): 0.3}
 """What is printed."""
 
-REMARKS = [
+STUDY_REMARKS = [
     'sine: the paper prints 0.30 deg, the v T of its largest rate alone. The reading is '
     'sqrt((v T)^2 + (a T^2 / beta)^2): the acceleration needs an innovation too, 0.30 and 0.19 deg a quarter of a '
     'period apart.',
@@ -112,7 +123,7 @@ REMARKS = [
 
 def instants(seconds):
     """Middles of the milliseconds of a record (n,) [s]."""
-    return (np.arange(round(seconds / GRID)) - 0.5) * GRID
+    return (np.arange(round(seconds / GRID_STEP_S)) - 0.5) * GRID_STEP_S
 
 
 def sine(t, amplitude, w):
@@ -122,28 +133,28 @@ def sine(t, amplitude, w):
 
 def ramp_target(rate):
     """Angle (n,) [rad] of figure 6's ramp; rate [deg/s]."""
-    return math.radians(rate) * instants(SECONDS)
+    return math.radians(rate) * instants(RECORD_DURATION_S)
 
 
-def sine_target(rate=SINE_RATE):
+def sine_target(rate=SINE_RATE_DEG_S):
     """Angle (n,) [rad] of figure 7's sine, of any largest rate [deg/s] at its frequency."""
-    w = SINE_ACCELERATION / SINE_RATE
-    return sine(instants(SECONDS), math.radians(rate) / w, w)[0]
+    w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
+    return sine(instants(RECORD_DURATION_S), math.radians(rate) / w, w)[0]
 
 
 def sway_target():
     """(angle [rad], rate [rad/s]), each (n,), of the line of sight on the swaying deck."""
-    return sine(instants(SECONDS), SWAY, 2.0 * math.pi / SWAY_PERIOD)
+    return sine(instants(RECORD_DURATION_S), SWAY_AMPLITUDE_RAD, 2.0 * math.pi / SWAY_PERIOD_S)
 
 
 def settled(x):
     """The part of a record (n,) that is evaluated."""
-    return x[round(SETTLED / GRID):]
+    return x[round(EVALUATION_START_S / GRID_STEP_S):]
 
 
 def isolation(error):
     """Isolation [dB] from the ship's sway with a remaining error [rad]."""
-    return -20.0 * math.log10(error / SWAY)
+    return -20.0 * math.log10(error / SWAY_AMPLITUDE_RAD)
 
 
 def name(loop):
@@ -155,12 +166,13 @@ def name(loop):
 
 def steps():
     """{Paper: step response (n,) of the beam, over the size of the step} from rest; the step is at sample 0."""
-    loops = [Paper(alpha, T, smoothing=S) for alpha in ALPHAS for T in PERIODS for S in SMOOTHINGS]
-    loops += [Paper(delay=delay, smoothing=S) for delay in DELAYS[1:] for S in SMOOTHINGS]
-    loops += [Paper(slope=slope) for slope in SLOPES if slope != 1.0]
-    target = np.full(3000 + LENGTH, STEP)
-    target[:LENGTH] = 0.0
-    return {loop: loop.run(target)[0][LENGTH:] / STEP for loop in loops}
+    loops = [PaperLoop(alpha, T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
+             for S in SMOOTHING_CODES]
+    loops += [PaperLoop(delay=delay, smoothing=S) for delay in LOOP_DELAYS_MS[1:] for S in SMOOTHING_CODES]
+    loops += [PaperLoop(slope=slope) for slope in SLOPE_RATIOS if slope != 1.0]
+    target = np.full(3000 + SMOOTHING_SAMPLES, STEP_SIZE_RAD)
+    target[:SMOOTHING_SAMPLES] = 0.0
+    return {loop: loop.run(target)[0][SMOOTHING_SAMPLES:] / STEP_SIZE_RAD for loop in loops}
 
 
 def step_rows(done):
@@ -170,8 +182,8 @@ def step_rows(done):
         case = f'step/{name(loop)}'
         outside = np.flatnonzero(np.abs(y - 1.0) > 0.05)[-1] + 1
         rows += [(case, 'overshoot_percent', overshoot_percent(y, 1.0), '%'),
-                 (case, 'rise_90percent_s', np.argmax(y >= 0.9) * GRID, 's'),
-                 (case, 'settling_5percent_s', outside * GRID if outside < len(y) else math.nan, 's')]
+                 (case, 'rise_90percent_s', np.argmax(y >= 0.9) * GRID_STEP_S, 's'),
+                 (case, 'settling_5percent_s', outside * GRID_STEP_S if outside < len(y) else math.nan, 's')]
     return rows
 
 
@@ -189,8 +201,9 @@ def eigenvalue_limit(loop, near):
 
 def limits():
     """{Paper: (largest stable delay by bisection, by eigenvalues) [ms]}."""
-    loops = [Paper(alpha, T, smoothing=S) for alpha in ALPHAS for T in PERIODS for S in SMOOTHINGS]
-    loops += [Paper(slope=slope) for slope in SLOPES if slope != 1.0] + [Paper(form='type_2')]
+    loops = [PaperLoop(alpha, T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
+             for S in SMOOTHING_CODES]
+    loops += [PaperLoop(slope=slope) for slope in SLOPE_RATIOS if slope != 1.0] + [PaperLoop(form='type_2')]
     delays = {}
     for loop in loops:
         limit = delay_limit(loop)
@@ -211,7 +224,7 @@ def lag_rows(case, loop, target, rate=None):
     """Rows of the error the receiver reads, and of the beam's true error with each smoothing; arguments of
     Paper.run."""
     rows = [(case, 'lag_deg', math.degrees(peak(settled(loop.run(target, rate)[1]))), 'deg')]
-    for S in SMOOTHINGS:
+    for S in SMOOTHING_CODES:
         beam, _ = dataclasses.replace(loop, smoothing=S).run(target, rate)
         rows.append((f'{case}/{S}', 'true_lag_deg', math.degrees(peak(settled(target - beam))), 'deg'))
     return rows
@@ -220,13 +233,13 @@ def lag_rows(case, loop, target, rate=None):
 def moving_rows():
     """Rows of figures 6, 7 and 9."""
     rows = []
-    for T, rates in zip(PERIODS, (RATES, (30,))):
+    for T, rates in zip(LOOP_PERIODS_MS, (RAMP_RATES_DEG_S, (30,))):
         for rate in rates:
-            rows += lag_rows(f'ramp/{rate}deg_s/T={T}ms', Paper(period=T), ramp_target(rate))
-    rows += lag_rows('sine', Paper(delay=DELAY), sine_target())
+            rows += lag_rows(f'ramp/{rate}deg_s/T={T}ms', PaperLoop(period=T), ramp_target(rate))
+    rows += lag_rows('sine', PaperLoop(delay=LOOP_DELAY_MS), sine_target())
     target, rate = sway_target()
-    for delta in DELTAS:
-        lags = lag_rows(f'sway/delta={delta:g}', Paper(delta=delta), target, rate)
+    for delta in RATE_COMPENSATIONS:
+        lags = lag_rows(f'sway/delta={delta:g}', PaperLoop(delta=delta), target, rate)
         rows += lags
         rows += [(case, 'isolation_db' if metric == 'lag_deg' else 'true_isolation_db', isolation(math.radians(lag)),
                   'dB') for case, metric, lag, _ in lags]
@@ -235,56 +248,59 @@ def moving_rows():
 
 def noises(run):
     """Noise of the receiver [rad], of the INS's attitude [rad] and rate [rad/s], each (n,), of one run."""
-    rng = np.random.default_rng(SEED + run)
-    return [sigma * rng.standard_normal(round(SECONDS / GRID)) for sigma in (NOISE, INS_ANGLE, INS_RATE)]
+    rng = np.random.default_rng(FIRST_SEED + run)
+    return [sigma * rng.standard_normal(round(RECORD_DURATION_S / GRID_STEP_S)) for sigma in (RECEIVER_NOISE_RAD,
+                                                                                              INS_ANGLE_NOISE_RAD,
+                                                                                              INS_RATE_NOISE_RAD_S)]
 
 
 def compared_targets():
-    """{name: angle (n,) [rad]} of the targets of LOOPS."""
+    """{name: angle (n,) [rad]} of the targets of COMPARED_LOOPS."""
     return {'ramp': ramp_target(30.0), 'sine': sine_target(), 'sway': sway_target()[0]}
 
 
-def at_ends(error, target):
+def max_error_at_ends(error, target):
     """Largest error [rad] at the ends of the milliseconds, from the error (n,) in their middles: by then the target
     (n,) has moved half-way to its neighbours."""
     half = 0.5 * np.diff(target)
     return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))
 
 
-COMPARED = (*(f'{loop}/{target}' for loop in LOOPS for target in ('ramp', 'sine', 'sway')), *INS_LOOPS)
-"""The cases of LOOPS on all targets and INS_LOOPS."""
+COMPARED_CASES = (*(f'{loop}/{target}' for loop in COMPARED_LOOPS for target in ('ramp', 'sine', 'sway')), *INS_LOOPS)
+"""The cases of COMPARED_LOOPS on all targets and INS_LOOPS."""
 
 
 def beam(case, run=None):
-    """Beam (n,) [rad] of one of COMPARED; run: which noise, None for none."""
+    """Beam (n,) [rad] of one of COMPARED_CASES; run: which noise, None for none."""
     sway, rate = sway_target()
     noise, ins_angle, ins_rate = 3 * (np.zeros(len(sway)),) if run is None else noises(run)
     if case in INS_LOOPS:
         return INS_LOOPS[case].run(sway, noise, sway + ins_angle, rate + ins_rate)[0]
     name, of = case.split('/')
-    loop = LOOPS[name]
-    more = {'rate': rate} if isinstance(loop, Paper) and of == 'sway' else {}
+    loop = COMPARED_LOOPS[name]
+    more = {'rate': rate} if isinstance(loop, PaperLoop) and of == 'sway' else {}
     return loop.run(compared_targets()[of], noise=noise, **more)[0]
 
 
 def jitter(item):
-    """Rms [deg] that noise moves the beam by in every run of an item (one of COMPARED or GRAPH, how many runs)."""
+    """Rms [deg] that noise moves the beam by in every run of an item (one of COMPARED_CASES or GRAPH_CASES, how many
+    runs)."""
     case, runs = item
-    if case in GRAPH:
+    if case in GRAPH_CASES:
         quiet = graph_error(case, quiet=True)
-        return [math.degrees(rms((graph_error(case, seed=SEED + i) - quiet)[:, 1])) for i in range(runs)]
+        return [math.degrees(rms((graph_error(case, seed=FIRST_SEED + i) - quiet)[:, 1])) for i in range(runs)]
     clean = beam(case)
     return [math.degrees(rms(settled(beam(case, i) - clean))) for i in range(runs)]
 
 
-def compared():
-    """{case: true error without noise (n,) [rad]} of COMPARED."""
+def compared_errors():
+    """{case: true error without noise (n,) [rad]} of COMPARED_CASES."""
     targets = compared_targets()
-    return {case: targets[target_of(case)] - beam(case) for case in COMPARED}
+    return {case: targets[target_of(case)] - beam(case) for case in COMPARED_CASES}
 
 
 def target_of(case):
-    """The name of the target of one of COMPARED."""
+    """The name of the target of one of COMPARED_CASES."""
     return case.split('/')[1].removesuffix('-ins')
 
 
@@ -292,7 +308,7 @@ def compared_rows(done, jitters):
     """Rows (case, metric, value, unit) of `compared`; jitters {case: rms of every run [deg]}."""
     rows, targets = [], compared_targets()
     for case, error in done.items():
-        worst, at_the_ends = peak(settled(error)), at_ends(error, targets[target_of(case)])
+        worst, at_the_ends = peak(settled(error)), max_error_at_ends(error, targets[target_of(case)])
         rows += [(case, 'max_error_deg', math.degrees(worst), 'deg'),
                  (case, 'ends_max_error_deg', math.degrees(at_the_ends), 'deg'),
                  (case, 'jitter_rms_deg', jitters[case], 'deg')]
@@ -302,30 +318,30 @@ def compared_rows(done, jitters):
     return rows
 
 
-RECEIVERS = {
+RECEIVER_LOSS_POWERS = {
     'half-beamwidth': 0.5,
     'pattern': 10.0**(0.1 * (ReceiverParameters().lose_level_dbhz - ReceiverParameters().cn0_dbhz))}
 """Power, over that on axis, at which a receiver loses the signal: at half a beamwidth; at ours with its defaults."""
 
 
-def losing(kind, form):
-    """The Paper of a form with a kind of RECEIVERS."""
-    return Paper(delay=DELAY, form=form, beamwidth=BEAMWIDTH, lost=RECEIVERS[kind])
+def signal_loss_loop(kind, form):
+    """The Paper of a form with a kind of RECEIVER_LOSS_POWERS."""
+    return PaperLoop(delay=LOOP_DELAY_MS, form=form, beamwidth=BEAMWIDTH_RAD, lost=RECEIVER_LOSS_POWERS[kind])
 
 
-def from_rest(rate):
+def sine_from_rest(rate):
     """Angle (n,) [rad] of the sine target of a largest rate [deg/s], starting at rest from one of its ends."""
-    w = SINE_ACCELERATION / SINE_RATE
-    return math.radians(rate) / w * (1.0 - np.cos(w * np.maximum(instants(SECONDS), 0.0)))
+    w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
+    return math.radians(rate) / w * (1.0 - np.cos(w * np.maximum(instants(RECORD_DURATION_S), 0.0)))
 
 
 def kept(loop, rate):
     """Whether a Paper keeps the sine of this largest rate [deg/s] in its beam to the end."""
-    target = from_rest(rate)
-    return peak(settled(target - loop.run(target)[0])) < BEAMWIDTH
+    target = sine_from_rest(rate)
+    return peak(settled(target - loop.run(target)[0])) < BEAMWIDTH_RAD
 
 
-def largest_kept(loop):
+def max_kept_rate(loop):
     """The largest rate [deg/s] of the sine that a Paper keeps, by bisection."""
     low, high = 1.0, 400.0
     while high - low > 0.05:
@@ -338,55 +354,59 @@ def loss_rows():
     """Rows of the largest rate of the sine that a loop keeps, and of the error with a linear receiver at that rate."""
     rows = []
     for form in ('type_1', 'type_2'):
-        for kind in RECEIVERS:
-            rate = largest_kept(losing(kind, form))
-            target = from_rest(rate)
-            lag = peak(target - dataclasses.replace(losing(kind, form), beamwidth=0.0).run(target)[0])
+        for kind in RECEIVER_LOSS_POWERS:
+            rate = max_kept_rate(signal_loss_loop(kind, form))
+            target = sine_from_rest(rate)
+            lag = peak(target - dataclasses.replace(signal_loss_loop(kind, form), beamwidth=0.0).run(target)[0])
             case = f'loss/{kind}/{form.replace("_", "-")}'
             rows += [(case, 'rate_deg_s', rate, 'deg/s'),
-                     (case, 'linear_lag_beamwidths', lag / BEAMWIDTH, 'beamwidths')]
+                     (case, 'linear_lag_beamwidths', lag / BEAMWIDTH_RAD, 'beamwidths')]
     return rows
 
 
-PAPERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth', 'elevation')
-          for key, value in (('form', 'type_1'), ('rate_compensation', 0.85))}
+PAPER_LOOP_PARAMETERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth', 'elevation')
+                         for key, value in (('form', 'type_1'), ('rate_compensation', 0.85))}
 
-GRAPH = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001}, 'graph/T=10ms/paper-delta': PAPERS}
+GRAPH_CASES = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
+               'graph/T=10ms/paper-delta': PAPER_LOOP_PARAMETERS}
 """{case: parameters of the scenario phased_array_sway}: its own, steered every 1 ms, and the paper's loop."""
 
-QUIET = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_noise': 0.0, 'ins.heading_noise': 0.0,
-         'ins.rate_noise': 0.0}
+NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_noise': 0.0, 'ins.heading_noise': 0.0,
+                        'ins.rate_noise': 0.0}
 
 
 def graph_case(case, quiet=False):
-    """The Case of one of GRAPH; quiet: without noise in receiver and INS, but with the gains of the noisy case."""
-    noisy = Case(case, 'phased_array_sway', GRAPH[case])
+    """The Case of one of GRAPH_CASES; quiet: without noise in receiver and INS, but with the gains of the noisy
+    case."""
+    noisy = Case(case, 'phased_array_sway', GRAPH_CASES[case])
     if not quiet:
         return noisy
     tracking = noisy.loaded().node_parameters('tracking_receiver')
     sigma = receiver.angle_noise(tracking, tracking.receiver.cn0_dbhz, tracking.period)
-    return dataclasses.replace(noisy, parameters={**GRAPH[case], **QUIET, 'acu.tracker.receiver.sigma_floor': sigma})
+    return dataclasses.replace(noisy, parameters={**GRAPH_CASES[case], **NOISELESS_PARAMETERS,
+                                                  'acu.tracker.receiver.sigma_floor': sigma})
 
 
-GRAPH_SETTLED = 10.0
-"""The time from which the runs of GRAPH are evaluated [s]."""
+GRAPH_EVALUATION_START_S = 10.0
+"""The time from which the runs of GRAPH_CASES are evaluated [s]."""
 
 
 def graph_error(case, quiet=False, seed=None):
-    """True error (n, 2) [rad] of one of GRAPH once settled, at the ends of the intervals; arguments as of
+    """True error (n, 2) [rad] of one of GRAPH_CASES once settled, at the ends of the intervals; arguments as of
     `graph_case`."""
     run = graph_case(case, quiet).with_seed(seed).run()
-    return run.truth['error'][run.t >= GRAPH_SETTLED]
+    return run.truth['error'][run.t >= GRAPH_EVALUATION_START_S]
 
 
 def graph_rows(jitters):
-    """Rows of GRAPH: cross-elevation and elevation together, at both ends of the intervals; jitters {case: rms of
+    """Rows of GRAPH_CASES: cross-elevation and elevation together, at both ends of the intervals; jitters {case: rms
+    of
     every run [deg]}, in elevation."""
     rows = []
-    for case in GRAPH:
+    for case in GRAPH_CASES:
         quiet = graph_case(case, quiet=True).run()
-        kept = quiet.t >= GRAPH_SETTLED
-        ends = quiet.truth['error'], began(quiet['adu/truth']['position'], quiet.truth['error'])
+        kept = quiet.t >= GRAPH_EVALUATION_START_S
+        ends = quiet.truth['error'], interval_start_error(quiet['adu/truth']['position'], quiet.truth['error'])
         worst = max(peak(np.hypot(*error[kept].T)) for error in ends)
         rows += [(case, 'max_error_deg', math.degrees(worst), 'deg'), (case, 'isolation_db', isolation(worst), 'dB'),
                  (case, 'jitter_rms_deg', jitters[case], 'deg')]
@@ -398,7 +418,7 @@ def readings(loops, target, rate=None):
     errors = {}
     for label, loop in loops.items():
         errors[label] = {}
-        for S in SMOOTHINGS:
+        for S in SMOOTHING_CODES:
             beam, read = dataclasses.replace(loop, smoothing=S).run(target, rate)
             errors[label][S] = read, target - beam
     return errors
@@ -410,12 +430,12 @@ def drawings(done, limit, errors):
         return {loop: y for loop, y in done.items() if loop.slope == 1.0
                 and all(getattr(loop, field) == value for field, value in fixed.items())}
 
-    ramps = {T: readings({f'T = {T} ms': Paper(period=T)}, ramp_target(30.0)) for T in PERIODS}
-    rates = [readings({f'{rate} deg/s': Paper()}, ramp_target(rate)) for rate in RATES]
-    sways = readings({f'delta {delta:g}': Paper(delta=delta) for delta in DELTAS}, *sway_target())
-    loop = losing('half-beamwidth', 'type_1')
-    rate = largest_kept(loop)
-    lost = {f'{x * rate:.1f} deg/s': (from_rest(x * rate) - loop.run(from_rest(x * rate))[0]) / BEAMWIDTH
+    ramps = {T: readings({f'T = {T} ms': PaperLoop(period=T)}, ramp_target(30.0)) for T in LOOP_PERIODS_MS}
+    rates = [readings({f'{rate} deg/s': PaperLoop()}, ramp_target(rate)) for rate in RAMP_RATES_DEG_S]
+    sways = readings({f'delta {delta:g}': PaperLoop(delta=delta) for delta in RATE_COMPENSATIONS}, *sway_target())
+    loop = signal_loss_loop('half-beamwidth', 'type_1')
+    rate = max_kept_rate(loop)
+    lost = {f'{x * rate:.1f} deg/s': (sine_from_rest(x * rate) - loop.run(sine_from_rest(x * rate))[0]) / BEAMWIDTH_RAD
             for x in (0.99, 1.01)}
     draw = functools.partial
     return {
@@ -428,16 +448,16 @@ def drawings(done, limit, errors):
         'figure-6-left': draw(figures.lags, {**ramps[10], **ramps[5]}, 'figure 6, left: 30 deg/s', (0.0, 1.5)),
         'figure-6-right': draw(figures.lags, {label: lag for lags in rates for label, lag in lags.items()},
                                'figure 6, right: rates, T = 10 ms', (0.0, 1.5)),
-        'figure-7': draw(figures.lags, readings({'sine': Paper(delay=DELAY)}, sine_target()),
+        'figure-7': draw(figures.lags, readings({'sine': PaperLoop(delay=LOOP_DELAY_MS)}, sine_target()),
                          'figure 7: sine of 30 deg/s and 10 deg/s2, delay 20 ms', (20.0, 58.0)),
         'figure-9': draw(figures.lags, sways, 'figure 9: sway of 10 deg in 8 s, ship rate compensated by delta',
                          (20.0, 36.0)),
         'stability': draw(figures.stability, limit),
-        'better': draw(figures.better, errors, (20.0, 40.0)),
+        'better': draw(figures.filter_loop_errors, errors, (20.0, 40.0)),
         'loss': draw(figures.loss, lost, (0.0, 20.0))}
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run all loops on all targets, those with noise `runs` times; pool: monte_carlo.Pool, None for this process."""
     progress(0.0, 'steps')
     done = steps()
@@ -447,15 +467,15 @@ def run(progress, runs=RUNS, pool=None) -> Result:
     table += limit_rows(limit)
     progress(0.4, 'ramps, sine, sway')
     table += moving_rows()
-    errors, cases = compared(), (*COMPARED, *GRAPH)
+    errors, cases = compared_errors(), (*COMPARED_CASES, *GRAPH_CASES)
     jitters = dict(zip(cases, (pool or monte_carlo.Pool(1)).map(
         jitter, [(case, runs) for case in cases], lambda share, text: progress(0.5 + 0.4 * share, f'noise, {text}'))))
     table += compared_rows(errors, jitters)
     progress(0.9, 'beams that lose the target')
     table += loss_rows()
     table += graph_rows(jitters)
-    rows = [row(case, metric, value, unit, PAPER.get((case, metric)), TARGETS.get((case, metric)))
+    rows = [row(case, metric, value, unit, PAPER_VALUES.get((case, metric)), METRIC_TARGETS.get((case, metric)))
             for case, metric, value, unit in table]
     shown = [r for r in rows if r['target'] is not None or r['case'].startswith(('graph/', 'loss/'))
              or (r['case'].startswith('best/') and r['metric'].startswith('ends_'))]
-    return Result(rows, drawings(done, limit, errors), REMARKS, shown)
+    return Result(rows, drawings(done, limit, errors), STUDY_REMARKS, shown)

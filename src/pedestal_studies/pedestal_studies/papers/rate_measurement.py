@@ -17,54 +17,61 @@ import numpy as np
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_2, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_common.compiled import compiled
 from pedestal_studies.rigs import drawing, ensemble, profiles
-from pedestal_studies.rigs.ensemble import PERIOD as T
+from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.rigs.rows import Result
 
-RUNS = 40
+DEFAULT_RUNS = 40
 """Flybys."""
 
-SIGMA = math.radians(0.03)
+ANGLE_SIGMA_RAD = math.radians(0.03)
 """Of a measured angle [rad]."""
 
 ALPHA = 0.5
 """Manoeuvre frequency [1/s]."""
 
-SIGMA_A = (0.05, 0.5, 3.0)
+ACCELERATION_SIGMAS_DEG_S2 = (0.05, 0.5, 3.0)
 """Standard deviation of the acceleration [deg/s2]."""
 
-RATE_SIGMA = {'position': math.nan, 'position-rate': 0.1, 'position-rate-0.02': 0.02}
+RATE_SIGMAS_DEG_S = {'position': math.nan, 'position-rate': 0.1, 'position-rate-0.02': 0.02}
 """Of a measured rate [deg/s]; NaN: none."""
 
-MAIN = 0.5
-"""The sigma_a [deg/s2] of the rows that are named after RATE_SIGMA alone."""
+MAIN_SIGMA_DEG_S2 = 0.5
+"""The sigma_a [deg/s2] of the rows that are named after RATE_SIGMAS_DEG_S alone."""
 
-FREQUENCY = 0.2
+DYNAMIC_ERROR_FREQUENCY_HZ = 0.2
 """Of the dynamic error [Hz]."""
 
-BAND = np.geomspace(0.01, 0.5 / T, 2000)
+RESPONSE_FREQUENCIES_HZ = np.geomspace(0.01, 0.5 / T, 2000)
 """Frequencies of the responses [Hz]."""
 
-SETTLING = 20000
+SETTLING_STEPS = 20000
 """Steps after which the gains are constant, also with the smallest sigma_a."""
 
-PROFILE = 'flyby-60m'
+FLYBY_PROFILE = 'flyby-60m'
 
-PEAK_SHARE, FLOOR = 1.2, 0.3
+MAX_ACCELERATION_RATIO, MIN_SIGMA_RATIO = 1.2, 0.3
 """Of the filter of a flight: a_max over its largest acceleration, and the least sigma_a over that."""
 
-SKIPPED = 5.0
+SETTLING_TIME_S = 5.0
 """Of the flyby, for the filter to settle [s]."""
 
-DIFFERENCED = {'differenced-1': 1, 'differenced-20': 20}
+DIFFERENCED_RATES = {'differenced-1': 1, 'differenced-20': 20}
 """Rates from differences of the measured angles, over this many T."""
 
-BATCH, SEED = 25, 1
+BATCH_RUNS, NOISE_SEED = 25, 1
 """Flybys of one piece of work, and of their noise."""
 
 
@@ -77,19 +84,19 @@ def filter_of(a_max, floor):
 @compiled
 def _settle(f, c, rate, R_rate, steps):
     """Run the filter for `steps` on a target at rest; rate: 0 where it is measured, else NaN."""
-    axis_filter.start(f[0], c[0], 0.0, SIGMA * SIGMA, 1.0)
+    axis_filter.start(f[0], c[0], 0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, 1.0)
     for _ in range(steps):
         axis_filter.predict(f[0], c[0], T)
-        axis_filter.correct(f[0], c[0], AxisMeasurement(0.0, SIGMA * SIGMA, rate, R_rate))
+        axis_filter.correct(f[0], c[0], AxisMeasurement(0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, rate, R_rate))
 
 
 @compiled
 def _step(f, c, y, y_rate, R_rate):
     axis_filter.predict(f[0], c[0], T)
-    axis_filter.correct(f[0], c[0], AxisMeasurement(y, SIGMA * SIGMA, y_rate, R_rate))
+    axis_filter.correct(f[0], c[0], AxisMeasurement(y, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, y_rate, R_rate))
 
 
-def settled(sigma_a, rate_sigma):
+def steady_state_matrices(sigma_a, rate_sigma):
     """(A (3, 3), B (3, 2)) of X+ = A X + B (y, y') once the gains are constant; sigma_a [deg/s2], rate_sigma [deg/s].
 
     B has a column of zeros for a rate that is not measured (NaN).
@@ -97,8 +104,8 @@ def settled(sigma_a, rate_sigma):
     c = axis_filter.constants(filter_of(math.radians(sigma_a), 1.0))        # floor 1: sigma_a = a_max at all times
     R_rate = math.radians(rate_sigma) ** 2
     none = 0.0 if math.isfinite(R_rate) else math.nan
-    f = np.zeros(1, axis_filter.FILTER)
-    _settle(f, c, none, R_rate, SETTLING)
+    f = np.zeros(1, axis_filter.FILTER_DTYPE)
+    _settle(f, c, none, R_rate, SETTLING_STEPS)
 
     def after(x, y, y_rate):
         one = f.copy()
@@ -119,62 +126,66 @@ def responses(A, B, frequency):
 
 
 def bandwidth(G):
-    """Frequency [Hz] at which |G| (n,) over BAND first falls below -3 dB; NaN if it never does."""
+    """Frequency [Hz] at which |G| (n,) over RESPONSE_FREQUENCIES_HZ first falls below -3 dB; NaN if it never does."""
     gain = np.log(np.abs(G)) - 0.5 * math.log(0.5)
     below = np.flatnonzero(gain < 0.0)
     if below.size == 0:
         return math.nan
     i = below[0]
-    return float(BAND[i - 1] * (BAND[i] / BAND[i - 1]) ** (gain[i - 1] / (gain[i - 1] - gain[i])))
+    return float(RESPONSE_FREQUENCIES_HZ[i - 1] * (RESPONSE_FREQUENCIES_HZ[i]
+                                                   / RESPONSE_FREQUENCIES_HZ[i - 1]) ** (gain[i - 1]
+                                                                                         / (gain[i - 1] - gain[i])))
 
 
 def measures(sigma_a, rate_sigma):
     """{metric: (value, unit)} of the filter with constant gains."""
-    A, B = settled(sigma_a, rate_sigma)
-    angle, rate = responses(A, B, BAND)
-    error = 1.0 - responses(A, B, np.array([FREQUENCY]))[0][0]
+    A, B = steady_state_matrices(sigma_a, rate_sigma)
+    angle, rate = responses(A, B, RESPONSE_FREQUENCIES_HZ)
+    error = 1.0 - responses(A, B, np.array([DYNAMIC_ERROR_FREQUENCY_HZ]))[0][0]
     return {'rate_bandwidth_hz': (bandwidth(rate), 'Hz'), 'angle_bandwidth_hz': (bandwidth(angle), 'Hz'),
             'dynamic_error_0p2hz': (abs(error), ''), 'largest_eigenvalue': (np.abs(np.linalg.eigvals(A)).max(), '')}
 
 
-CASES = {name if sigma_a == MAIN else f'{name}/sigma_a-{sigma_a:g}': (sigma_a, rate_sigma)
-         for sigma_a in (MAIN, *SIGMA_A) for name, rate_sigma in RATE_SIGMA.items()}
+CASES = {name if sigma_a == MAIN_SIGMA_DEG_S2 else f'{name}/sigma_a-{sigma_a:g}': (sigma_a, rate_sigma)
+         for sigma_a in (MAIN_SIGMA_DEG_S2, *ACCELERATION_SIGMAS_DEG_S2) for name,
+         rate_sigma in RATE_SIGMAS_DEG_S.items()}
 
 
-def differenced(y, steps):
+def differenced_rate(y, steps):
     """(rate (n,) [rad/s], its variance) from differences of angles y (n,) [rad] over `steps` T; NaN in the first
     steps."""
     rate = np.full(len(y), math.nan)
     rate[steps:] = (y[steps:] - y[:-steps]) / (steps * T)
-    return rate, 2.0 * (SIGMA / (steps * T)) ** 2
+    return rate, 2.0 * (ANGLE_SIGMA_RAD / (steps * T)) ** 2
 
 
 def filtered(t, target, y, y_rate, R_rate):
     """ESTIMATE (n,) of the filter for a target (n, 3) of angles and rates (n,) measured at times (n,) [s]; R_rate: the
     variance of the rates [rad2/s2]."""
-    c = axis_filter.constants(filter_of(PEAK_SHARE * np.abs(target[:, 2]).max(), FLOOR))
-    out = np.zeros(len(t), axis_filter.ESTIMATE)
-    axis_filter.estimates(c, t, y, np.full(len(t), SIGMA * SIGMA), y_rate, np.full(len(t), R_rate),
-                          ensemble.INITIAL_RATE, out)
+    c = axis_filter.constants(filter_of(MAX_ACCELERATION_RATIO * np.abs(target[:, 2]).max(), MIN_SIGMA_RATIO))
+    out = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE)
+    axis_filter.estimates(c, t, y, np.full(len(t), ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD), y_rate, np.full(len(t), R_rate),
+                          ensemble.INITIAL_RATE_SIGMA_RAD_S, out)
     return out
 
 
 def flyby():
-    """(times (n,) [s], angle, rate and acceleration (n, 3)) of PROFILE."""
-    t = T * np.arange(round(profiles.DURATION / T))
-    return t, np.column_stack(profiles.truth(PROFILE, t))
+    """(times (n,) [s], angle, rate and acceleration (n, 3)) of FLYBY_PROFILE."""
+    t = T * np.arange(round(profiles.RECORD_DURATION_S / T))
+    return t, np.column_stack(profiles.truth(FLYBY_PROFILE, t))
 
 
-def flown(name, run):
-    """(measured angle [rad], measured rate [rad/s], ESTIMATE), each (n,), of one flyby; name: of FLYBYS; the noise
+def flyby_record(name, run):
+    """(measured angle [rad], measured rate [rad/s], ESTIMATE), each (n,), of one flyby; name: of FLYBY_CASES; the
+    noise
     depends on `run` alone."""
     t, target = flyby()
-    normals = ensemble.drawn(SEED, run, 1, len(t))[:, 0]
-    y = target[:, 0] + SIGMA * normals[0]
-    if name in DIFFERENCED:
-        y_rate, R_rate = differenced(y, DIFFERENCED[name])
+    normals = ensemble.normal_draws(NOISE_SEED, run, 1, len(t))[:, 0]
+    y = target[:, 0] + ANGLE_SIGMA_RAD * normals[0]
+    if name in DIFFERENCED_RATES:
+        y_rate, R_rate = differenced_rate(y, DIFFERENCED_RATES[name])
     else:
-        sigma = math.radians(RATE_SIGMA[name])
+        sigma = math.radians(RATE_SIGMAS_DEG_S[name])
         y_rate, R_rate = target[:, 1] + sigma * normals[1], sigma * sigma
     return y, y_rate, filtered(t, target, y, y_rate, R_rate)
 
@@ -184,18 +195,19 @@ def batch(item):
     runs)."""
     name, first, count = item
     t, target = flyby()
-    counts = t >= SKIPPED
-    estimates = [flown(name, run)[2] for run in range(first, first + count)]
+    counts = t >= SETTLING_TIME_S
+    estimates = [flyby_record(name, run)[2] for run in range(first, first + count)]
     return np.degrees([[tracking.rms((out[field] - target[:, i])[counts]) for i, field in enumerate(('angle', 'rate'))]
                        for out in estimates])
 
 
-FLYBYS = (*RATE_SIGMA, *DIFFERENCED)
-TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5', ('position-rate', 'dynamic_error_ratio'): '>= 9'}
+FLYBY_CASES = (*RATE_SIGMAS_DEG_S, *DIFFERENCED_RATES)
+METRIC_TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5',
+                  ('position-rate', 'dynamic_error_ratio'): '>= 9'}
 
 
 def rows(measured, errors):
-    """The rows of measured {case: as of `measures`} and errors {name of FLYBYS: rms (runs, 2) [deg, deg/s]}."""
+    """The rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms (runs, 2) [deg, deg/s]}."""
     table = []
     for name, values in measured.items():
         table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)
@@ -206,32 +218,33 @@ def rows(measured, errors):
             for metric, over, under in (('rate_bandwidth', values, without), ('dynamic_error', without, values)):
                 full = next(key for key in values if key.startswith(metric))
                 ratio = over[full][0] / under[full][0]
-                table.append(row(name, f'{metric}_ratio', ratio, '', target=TARGETS.get((name, f'{metric}_ratio'))))
+                table.append(row(name, f'{metric}_ratio', ratio, '',
+                                 target=METRIC_TARGETS.get((name, f'{metric}_ratio'))))
     for name, rms in errors.items():
-        table += [row(f'{PROFILE}/{name}', 'angle_rms_deg', rms[:, 0], 'deg'),
-                  row(f'{PROFILE}/{name}', 'rate_rms_deg_s', rms[:, 1], 'deg/s')]
+        table += [row(f'{FLYBY_PROFILE}/{name}', 'angle_rms_deg', rms[:, 0], 'deg'),
+                  row(f'{FLYBY_PROFILE}/{name}', 'rate_rms_deg_s', rms[:, 1], 'deg/s')]
     return table
 
 
 def remarks(measured, errors):
     """Sentences that the rows need; arguments as of `rows`."""
-    one, twenty, without = (errors[name][:, 0].mean() for name in (*DIFFERENCED, 'position'))
+    one, twenty, without = (errors[name][:, 0].mean() for name in (*DIFFERENCED_RATES, 'position'))
     largest, slowest = max((measured[name]['largest_eigenvalue'][0], name) for name in measured)
     return [
-        f'Paper 004 prints neither its noises nor its sigma_a: here {math.degrees(SIGMA):g} deg, sigma_a '
-        f'{", ".join(f"{sigma_a:g}" for sigma_a in SIGMA_A)} deg/s2 and a rate to 0.1 and 0.02 deg/s; rows without '
-        f'sigma_a in their name have {MAIN:g} deg/s2. It claims a wider band and a smaller dynamic error, without a '
+        f'Paper 004 prints neither its noises nor its sigma_a: here {math.degrees(ANGLE_SIGMA_RAD):g} deg, sigma_a '
+        f'{", ".join(f"{sigma_a:g}" for sigma_a in ACCELERATION_SIGMAS_DEG_S2)} deg/s2 and a rate to 0.1 and 0.02 deg/s; rows without '
+        f'sigma_a in their name have {MAIN_SIGMA_DEG_S2:g} deg/s2. It claims a wider band and a smaller dynamic error, without a '
         'number: true, and by how much depends on these.',
         'An angle_bandwidth_hz without a number: the angle never falls by 3 dB, a measured rate carries it beyond.',
         f'Stable in every case: the largest eigenvalue is {largest:.4f} ({slowest}).',
         f'Only an independent rate helps. The rate of the same angles, differenced over {T:g} s, leaves the error on '
-        f'{PROFILE} where it was ({one:.4f} deg, {without:.4f} without); over {DIFFERENCED["differenced-20"] * T:g} s '
+        f'{FLYBY_PROFILE} where it was ({one:.4f} deg, {without:.4f} without); over {DIFFERENCED_RATES["differenced-20"] * T:g} s '
         f'and believed to be white it harms ({twenty:.4f} deg): it is half that time late, and its errors are those '
         'of the angles.',
     ]
 
 
-COLOURS = {'position': TRUTH, 'position-rate': FILTERED, 'position-rate-0.02': MOTOR_2}
+CASE_COLOURS = {'position': TRUTH_COLOUR, 'position-rate': FILTERED_COLOUR, 'position-rate-0.02': MOTOR_2_COLOUR}
 
 
 def figures():
@@ -243,16 +256,17 @@ def bode_figure():
     """Responses of angle and rate with and without a measured rate, and their dynamic errors."""
     figure, axes = new_panels(2, 2, height=5.6, x='frequency [Hz]', y=('gain [dB]', 'dynamic error |1 - G|'),
                               sharex=True)
-    for name, colour in COLOURS.items():
-        angle, rate = responses(*settled(MAIN, RATE_SIGMA[name]), BAND)
+    for name, colour in CASE_COLOURS.items():
+        (angle, rate) = responses(*steady_state_matrices(MAIN_SIGMA_DEG_S2, RATE_SIGMAS_DEG_S[name]),
+                                  RESPONSE_FREQUENCIES_HZ)
         for column, G in enumerate((angle, rate)):
-            axes[0, column].semilogx(BAND, 20.0 * np.log10(np.abs(G)), color=colour, label=name)
-            axes[1, column].loglog(BAND, np.abs(1.0 - G), color=colour, label=name)
+            axes[0, column].semilogx(RESPONSE_FREQUENCIES_HZ, 20.0 * np.log10(np.abs(G)), color=colour, label=name)
+            axes[1, column].loglog(RESPONSE_FREQUENCIES_HZ, np.abs(1.0 - G), color=colour, label=name)
     for column, title in enumerate(('estimated over true angle', 'estimated over true rate')):
         axes[0, column].set_title(title)
-        axes[0, column].axhline(-3.0, color=INK, linewidth=0.6, linestyle=':')
+        axes[0, column].axhline(-3.0, color=INK_COLOUR, linewidth=0.6, linestyle=':')
         axes[0, column].set_ylim(-25.0, 5.0)
-        axes[1, column].axvline(FREQUENCY, color=INK, linewidth=0.6, linestyle=':')
+        axes[1, column].axvline(DYNAMIC_ERROR_FREQUENCY_HZ, color=INK_COLOUR, linewidth=0.6, linestyle=':')
         axes[1, column].set_ylim(1e-5, 3.0)
     return drawing.legend(figure)
 
@@ -260,12 +274,12 @@ def bode_figure():
 def sigma_a_figure():
     """Bandwidth of the rate and dynamic error of the angle over sigma_a, with and without a measured rate."""
     figure, axes = new_panels(1, 2, height=3.4, x='sigma_a [deg/s2]', y='bandwidth of the rate [Hz]', sharex=True)
-    sigma_a = np.geomspace(SIGMA_A[0], SIGMA_A[-1], 13)
-    for name, colour in COLOURS.items():
-        values = [measures(s, RATE_SIGMA[name]) for s in sigma_a]
+    sigma_a = np.geomspace(ACCELERATION_SIGMAS_DEG_S2[0], ACCELERATION_SIGMAS_DEG_S2[-1], 13)
+    for name, colour in CASE_COLOURS.items():
+        values = [measures(s, RATE_SIGMAS_DEG_S[name]) for s in sigma_a]
         for panel, metric in zip(axes[0], ('rate_bandwidth_hz', 'dynamic_error_0p2hz')):
             panel.loglog(sigma_a, [value[metric][0] for value in values], color=colour, label=name)
-    axes[0, 1].set_ylabel(f'dynamic error of the angle at {FREQUENCY:g} Hz')
+    axes[0, 1].set_ylabel(f'dynamic error of the angle at {DYNAMIC_ERROR_FREQUENCY_HZ:g} Hz')
     return drawing.legend(figure)
 
 
@@ -274,26 +288,26 @@ def flyby_figure():
     labels = ('rate [deg/s]', 'error of the angle [deg]', 'error of the rate [deg/s]', 'acceleration [deg/s2]')
     figure, axes = new_panels(4, height=8.6, y=labels, sharex=True)
     t, target = flyby()
-    y, y_rate, _ = flown('position-rate', 0)
-    near = np.abs(t - 0.5 * profiles.DURATION) <= 0.2 * profiles.DURATION
+    y, y_rate, _ = flyby_record('position-rate', 0)
+    near = np.abs(t - 0.5 * profiles.RECORD_DURATION_S) <= 0.2 * profiles.RECORD_DURATION_S
     measured = (y_rate, y - target[:, 0], y_rate - target[:, 1], None)
     truth = (target[:, 1], 0.0 * t, 0.0 * t, target[:, 2])
     for panel, values in zip(axes[:, 0], measured):
         if values is not None:
-            panel.plot(t[near], np.degrees(values[near]), color=RAW, linewidth=0.5, label='measured')
+            panel.plot(t[near], np.degrees(values[near]), color=RAW_COLOUR, linewidth=0.5, label='measured')
     for name in ('position', 'position-rate'):
-        out = flown(name, 0)[2]
+        out = flyby_record(name, 0)[2]
         for panel, values in zip(axes[:, 0], (out['rate'], out['angle'] - target[:, 0], out['rate'] - target[:, 1],
                                               out['acceleration'])):
-            panel.plot(t[near], np.degrees(values[near]), color=COLOURS[name], label=name)
+            panel.plot(t[near], np.degrees(values[near]), color=CASE_COLOURS[name], label=name)
     for panel, values in zip(axes[:, 0], truth):
-        panel.plot(t[near], np.degrees(values[near]), color=INK, linestyle='--', label='truth')
-    axes[0, 0].set_title(f'{PROFILE}, one run')
+        panel.plot(t[near], np.degrees(values[near]), color=INK_COLOUR, linestyle='--', label='truth')
+    axes[0, 0].set_title(f'{FLYBY_PROFILE}, one run')
     return drawing.legend(figure)
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Identify the filters of CASES and run `runs` flybys; pool: monte_carlo.Pool, None for this process."""
-    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, FLYBYS, runs, BATCH, progress)
+    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, FLYBY_CASES, runs, BATCH_RUNS, progress)
     measured = {name: measures(*case) for name, case in CASES.items()}
     return Result(rows(measured, errors), figures(), remarks(measured, errors))

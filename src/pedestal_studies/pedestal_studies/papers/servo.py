@@ -10,7 +10,15 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases
@@ -18,71 +26,74 @@ from pedestal_analysis.trials.cases import Case
 from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 
-STEP = 0.174
+STEP_SIZE_RAD = 0.174
 """Of figure 5 [rad]."""
 
-AMPLITUDE = 0.87
+SINE_AMPLITUDE_RAD = 0.87
 """Of figure 6 [rad]."""
 
-FREQUENCIES = {'0p4hz': 0.8 * math.pi, '0p4rads': 0.4}
+SINE_FREQUENCIES_RAD_S = {'0p4hz': 0.8 * math.pi, '0p4rads': 0.4}
 """The two readings of the paper's sine [rad/s]."""
 
-READINGS = {'0p4hz': '0.4 Hz', '0p4rads': '0.4 rad/s'}
+SINE_READINGS = {'0p4hz': '0.4 Hz', '0p4rads': '0.4 rad/s'}
 
-PERIODS = 4
+SINE_PERIODS = 4
 """Of each sine; the first belongs to the transient."""
 
-GUST, GUST_START = 1000.0, 0.2
+GUST_TORQUE_NM, GUST_START_S = 1000.0, 0.2
 """Step of wind torque on the azimuth [Nm], when [s]."""
 
-BAND = 0.02
+SETTLING_BAND = 0.02
 """Of the settling time."""
 
-R1 = {}
+PAPER_R1_PARAMETERS = {}
 """The scenarios as they are."""
 
-R2 = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}
+PAPER_R2_PARAMETERS = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}
 
-ALL = {'acu.azimuth.pid.bandwidth': 54.0, 'acu.azimuth.pid.derivative': 0.45,
-       'adu.azimuth.speed_loop.proportional': 1.5, 'adu.azimuth.speed_loop.integral': 7.0}
+PAPER_ALL_PARAMETERS = {'acu.azimuth.pid.bandwidth': 54.0, 'acu.azimuth.pid.derivative': 0.45,
+                        'adu.azimuth.speed_loop.proportional': 1.5, 'adu.azimuth.speed_loop.integral': 7.0}
 """Found by a search, as the paper prints no gain. A position loop K e + D e' before a rate loop of type 1 falls short
 of the amplitude by (1 + 2 D) (w / K)^2 / 2, 0.2 % with R1; a slow rate loop, tau = J / K_p, gives tau w^2 / K of
 that back."""
 
-DRIVE = {
+DRIVE_PARAMETERS = {
     'adu.azimuth.speed_loop.proportional': 8.0, 'adu.azimuth.speed_loop.integral': 50.0,
     'adu.azimuth.bias.schedule': 'hold_fade', 'adu.azimuth.bias.torque': 12.0, 'adu.azimuth.bias.hold': 14.0,
     'adu.azimuth.bias.out': 45.0}
 """Speed loop and bias of the cases that are ours."""
 
-SHAPER = {
+SHAPER_PARAMETERS = {
     'acu.azimuth.shaper.rate': 2.42, 'acu.azimuth.shaper.acceleration': 31.0, 'acu.azimuth.shaper.jerk': 8000.0,
     'acu.azimuth.shaper.h0': 0.006}
 """A quarter of the torque is reserved for a load heavier than assumed."""
 
-BEST = {
-    **DRIVE, **SHAPER, 'adu.azimuth.speed_loop.disturbance_observer': 400.0,
+BEST_PARAMETERS = {
+    **DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_loop.disturbance_observer': 400.0,
     'acu.azimuth.controller': 'feedforward', 'acu.azimuth.feedforward.bandwidth': 30.0,
     'acu.azimuth.feedforward.integral': 0.2}
 """Each gain bears 1.3 times its value when a knock opens the lash. Beyond that (a bandwidth of 45 rad/s) closing the
 lash takes so much torque that the bias stays faded, and the lash opens again: a limit cycle of some mrad. A faster
 observer (600 rad/s) takes 6 % off the gust and lets the load ring on the gear for 0.2 s."""
 
-FULL_TORQUE = {**BEST, 'acu.azimuth.shaper.acceleration': 38.0, 'acu.azimuth.shaper.jerk': 4000.0,
-               'acu.azimuth.shaper.h0': 0.01}
+FULL_TORQUE_PARAMETERS = {**BEST_PARAMETERS, 'acu.azimuth.shaper.acceleration': 38.0,
+                          'acu.azimuth.shaper.jerk': 4000.0,
+                          'acu.azimuth.shaper.h0': 0.01}
 """Hardly a reserve, so a gentler end of the move."""
 
-ADRC = {**DRIVE, **SHAPER, 'adu.azimuth.speed_loop.proportional': 6.0, 'adu.azimuth.speed_loop.integral': 200.0,
-        'acu.azimuth.controller': 'adrc'}
+ADRC_PARAMETERS = {**DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_loop.proportional': 6.0,
+                   'adu.azimuth.speed_loop.integral': 200.0,
+                   'acu.azimuth.controller': 'adrc'}
 """With its own observer in place of the drive's, and the speed loop it was designed for."""
 
-CASES = {
-    'paper-r1': R1, 'paper-r2': R2, 'paper-all': ALL, 'best': BEST,
-    'best-inertia-plus': {**BEST, 'adu.azimuth.load.inertia': 252.0},
-    'best-inertia-minus': {**BEST, 'adu.azimuth.load.inertia': 168.0},
-    'best-full-torque': FULL_TORQUE, 'adrc': ADRC}
+CASE_PARAMETERS = {
+    'paper-r1': PAPER_R1_PARAMETERS, 'paper-r2': PAPER_R2_PARAMETERS, 'paper-all': PAPER_ALL_PARAMETERS,
+    'best': BEST_PARAMETERS,
+    'best-inertia-plus': {**BEST_PARAMETERS, 'adu.azimuth.load.inertia': 252.0},
+    'best-inertia-minus': {**BEST_PARAMETERS, 'adu.azimuth.load.inertia': 168.0},
+    'best-full-torque': FULL_TORQUE_PARAMETERS, 'adrc': ADRC_PARAMETERS}
 
-TARGETS = {
+METRIC_TARGETS = {
     **{name: {'step_overshoot_percent': '12 +- 1.5', 'step_settling_2percent_s': '0.20 +- 0.03',
               'step_crossings': '1 +- 0', 'sine_0p4hz_max_error_rad': '0.0397 +- 0.002',
               'sine_0p4hz_rms_error_rad': '0.0281 +- 0.001', 'sine_0p4hz_amplitude_rad': '0.868 to 0.8695',
@@ -97,50 +108,52 @@ TARGETS = {
     'best-inertia-plus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
     'best-inertia-minus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
 }
-PAPER = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2, 'max_error_rad': 0.04,
-         'rms_error_rad': 0.0281, 'amplitude_rad': 0.869, 'peak_error_percent': 0.12, 'max_error_percent': 4.6}
-UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}
+PAPER_VALUES = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2, 'max_error_rad': 0.04,
+                'rms_error_rad': 0.0281, 'amplitude_rad': 0.869, 'peak_error_percent': 0.12, 'max_error_percent': 4.6}
+SUFFIX_UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}
 
 
 def step_case(name):
-    """The Case of the step of figure 5 with the parameters of CASES[name]."""
-    return Case(name, 'servo_step', CASES[name])
+    """The Case of the step of figure 5 with the parameters of CASE_PARAMETERS[name]."""
+    return Case(name, 'servo_step', CASE_PARAMETERS[name])
 
 
 def sine_case(name, reading):
-    """The Case of PERIODS of one of READINGS of the paper's sine."""
-    return cases.sine_case(Case(name, 'servo_sine', CASES[name]), FREQUENCIES[reading], PERIODS)
+    """The Case of SINE_PERIODS of one of SINE_READINGS of the paper's sine."""
+    return cases.sine_case(Case(name, 'servo_sine', CASE_PARAMETERS[name]), SINE_FREQUENCIES_RAD_S[reading],
+                           SINE_PERIODS)
 
 
 def gust_case(name, **more):
     """The Case of an axis at rest with a step of wind torque; more: further parameters."""
-    return Case(name, 'servo_step', {**CASES[name], 'acu.azimuth.preset': 0.0, 'adu.wind.gust.kind': 'step',
-                                     'adu.wind.gust.azimuth': GUST, 'adu.wind.gust.start': GUST_START, **more})
+    return Case(name, 'servo_step', {**CASE_PARAMETERS[name], 'acu.azimuth.preset': 0.0, 'adu.wind.gust.kind': 'step',
+                                     'adu.wind.gust.azimuth': GUST_TORQUE_NM, 'adu.wind.gust.start': GUST_START_S,
+                                     **more})
 
 
 def step_metrics(record):
     """{metric: value} of a closed_loop.Run of a step."""
     t, y = record.t, record['adu/truth']['position'][:, 0]
-    return {'step_overshoot_percent': metrics.overshoot_percent(y, STEP),
-            'step_settling_2percent_s': metrics.settling_time(t, y, STEP, BAND),
-            'step_crossings': metrics.crossings(y, STEP)}
+    return {'step_overshoot_percent': metrics.overshoot_percent(y, STEP_SIZE_RAD),
+            'step_settling_2percent_s': metrics.settling_time(t, y, STEP_SIZE_RAD, SETTLING_BAND),
+            'step_crossings': metrics.crossings(y, STEP_SIZE_RAD)}
 
 
 def sine_error(record, w):
     """The sine of figure 6 at w [rad/s] less the true load angle (n,) [rad]."""
-    return AMPLITUDE * np.sin(w * record.t) - record['adu/truth']['position'][:, 0]
+    return SINE_AMPLITUDE_RAD * np.sin(w * record.t) - record['adu/truth']['position'][:, 0]
 
 
 def sine_metrics(record, reading):
-    """{metric: value} of a closed_loop.Run of one of READINGS of the sine."""
-    w = FREQUENCIES[reading]
+    """{metric: value} of a closed_loop.Run of one of SINE_READINGS of the sine."""
+    w = SINE_FREQUENCIES_RAD_S[reading]
     t, error, period = record.t, sine_error(record, w), 2.0 * math.pi / w
     steady = metrics.whole_periods(t, period, period)
     amplitude, fitted = metrics.amplitude_and_period(t[steady], record['adu/truth']['position'][steady, 0], period)
     largest = metrics.peak(error[steady])
     return {f'sine_{reading}_max_error_rad': largest,
-            f'sine_{reading}_max_error_percent': 100.0 * largest / AMPLITUDE,
-            f'sine_{reading}_peak_error_percent': 100.0 * abs(1.0 - amplitude / AMPLITUDE),
+            f'sine_{reading}_max_error_percent': 100.0 * largest / SINE_AMPLITUDE_RAD,
+            f'sine_{reading}_peak_error_percent': 100.0 * abs(1.0 - amplitude / SINE_AMPLITUDE_RAD),
             f'sine_{reading}_rms_error_rad': tracking.rms(error[steady]),
             f'sine_{reading}_amplitude_rad': amplitude, f'sine_{reading}_period_s': fitted,
             f'sine_{reading}_start_error_rad': metrics.peak(error[t < period])}
@@ -149,10 +162,10 @@ def sine_metrics(record, reading):
 def gust_metrics(record):
     """{metric: value} of a closed_loop.Run of a gust."""
     t, y = record.t, record['adu/truth']['position'][:, 0]
-    return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START] - y[t < GUST_START][-1])}
+    return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START_S] - y[t < GUST_START_S][-1])}
 
 
-RUNS = {
+CASE_RUNS = {
     'paper-r1': ('step', '0p4hz', '0p4rads', 'gust'), 'paper-r2': ('step', '0p4rads'),
     'paper-all': ('step', '0p4hz'),
     'best': ('step', '0p4rads', '0p4hz', 'gust'), 'best-inertia-plus': ('step',),
@@ -164,7 +177,7 @@ RUNS = {
 
 def records(cases, progress):
     """{(case, kind of run): closed_loop.Run} of the cases named."""
-    wanted = [(name, kind) for name in cases for kind in RUNS[name]]
+    wanted = [(name, kind) for name in cases for kind in CASE_RUNS[name]]
     done = {}
     for i, (name, kind) in enumerate(wanted):
         progress(i / len(wanted), f'{name}: {kind}')
@@ -173,15 +186,16 @@ def records(cases, progress):
     return done
 
 
-METRICS = {'step': step_metrics, 'gust': gust_metrics,
-           **{reading: functools.partial(sine_metrics, reading=reading) for reading in FREQUENCIES}}
+RUN_METRICS = {'step': step_metrics, 'gust': gust_metrics,
+               **{reading: functools.partial(sine_metrics, reading=reading) for reading in SINE_FREQUENCIES_RAD_S}}
 
 
 def rows(done):
     """The rows of records as of `records`."""
-    return [row(name, metric, value, UNITS[metric.rpartition('_')[2]], PAPER.get(metric.removeprefix(f'sine_{kind}_')),
-                TARGETS.get(name, {}).get(metric))
-            for (name, kind), record in done.items() for metric, value in METRICS[kind](record).items()]
+    return [row(name, metric, value, SUFFIX_UNITS[metric.rpartition('_')[2]],
+                PAPER_VALUES.get(metric.removeprefix(f'sine_{kind}_')),
+                METRIC_TARGETS.get(name, {}).get(metric))
+            for (name, kind), record in done.items() for metric, value in RUN_METRICS[kind](record).items()]
 
 
 def bang_bang(step, adu):
@@ -194,30 +208,30 @@ def bang_bang(step, adu):
     friction = p.friction.coulomb + N * (p.motor_1.friction + p.motor_2.friction)
     up, down = (T - friction) / J, (T + friction) / J
     whole = math.sqrt(2.0 * step * (1.0 / up + 1.0 / down))
-    return whole, whole - math.sqrt(2.0 * BAND * step / down)
+    return whole, whole - math.sqrt(2.0 * SETTLING_BAND * step / down)
 
 
 def remarks(done):
     """Sentences that the rows need, with the limits of the plant."""
     slow = step_metrics(done['paper-r2', 'step'])['step_settling_2percent_s']
     adu = step_case('best').loaded().node_parameters('adu')
-    whole, settled = bang_bang(STEP, adu)
+    whole, settled = bang_bang(STEP_SIZE_RAD, adu)
     gear, bits = adu.azimuth.gear_train, adu.azimuth.encoder.load_bits
     stiffness, damping = 2.0 * gear.stiffness, 2.0 * gear.damping
     zeta = 0.5 * damping / math.sqrt(stiffness * adu.azimuth.load.inertia)
-    swing = GUST / stiffness * (1.0 + math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta * zeta)))
+    swing = GUST_TORQUE_NM / stiffness * (1.0 + math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta * zeta)))
     return [
         "One controller cannot do both of the paper's figures if its sine is 0.4 rad/s: an error of 0.04 rad is that "
-        f'of a gain of {AMPLITUDE * 0.4 / 0.04:.2g} 1/s (paper-r2), whose step takes '
+        f'of a gain of {SINE_AMPLITUDE_RAD * 0.4 / 0.04:.2g} 1/s (paper-r2), whose step takes '
         f'{slow:.3f} s, not 0.2 s. If it is 0.4 Hz, paper-all does all that is printed, the peak of the sine to '
         '0.12 % too; paper-r1, the gains of servo_step and servo_sine, misses that.',
         'peak_error_percent is the shortfall of the amplitude (0.869 of 0.87 rad), max_error_percent the largest '
         'error of the steady sine over the amplitude. The mean square error of 2.81 % is read as 0.0281 rad rms.',
-        f'The 0.4 Hz sine starts from rest with {AMPLITUDE * FREQUENCIES["0p4hz"]:.2f} rad/s: the error of its start '
+        f'The 0.4 Hz sine starts from rest with {SINE_AMPLITUDE_RAD * SINE_FREQUENCIES_RAD_S["0p4hz"]:.2f} rad/s: the error of its start '
         'is v2/(2 a), set by the torque, and no controller removes it.',
         f'Limit of the step: torque. Full torque forwards and back takes {whole:.3f} s, {settled:.3f} s to the 2 % '
         'band. best keeps a quarter of it for a load heavier than known, best-full-torque does not.',
-        f'Limit of the gust: the gear. {GUST:g} Nm bend the two meshes by {GUST / stiffness:.1e} rad, and the load '
+        f'Limit of the gust: the gear. {GUST_TORQUE_NM:g} Nm bend the two meshes by {GUST_TORQUE_NM / stiffness:.1e} rad, and the load '
         f'swings to {swing:.1e} rad on them when the motors stand perfectly still. The aim of 2e-4 rad is not '
         'reached: a quicker observer (600 rad/s) comes to 2.1e-4 and rings.',
         f'Limit of the sine: the encoder step, {2.0 * math.pi / 2**bits:.1e} rad, and, where the rate changes its '
@@ -225,8 +239,9 @@ def remarks(done):
     ]
 
 
-COLOURS = {'paper-r1': TRUTH, 'paper-r2': RAW, 'best': FILTERED, 'adrc': MOTOR_2, 'best-inertia-plus': TRUTH,
-           'best-inertia-minus': MOTOR_1}
+CASE_COLOURS = {'paper-r1': TRUTH_COLOUR, 'paper-r2': RAW_COLOUR, 'best': FILTERED_COLOUR, 'adrc': MOTOR_2_COLOUR,
+                'best-inertia-plus': TRUTH_COLOUR,
+                'best-inertia-minus': MOTOR_1_COLOUR}
 
 
 def figures(done):
@@ -241,11 +256,11 @@ def step_figure(done):
     figure, axes = new_panels(4, height=8.0, y=('azimuth [rad]', *3 * ['torque [Nm]']), sharex=True,
                               height_ratios=(2.2, 1, 1, 1))
     top = axes[0, 0]
-    top.axhline(STEP, color=INK, linewidth=0.8, linestyle='--', label='reference')
+    top.axhline(STEP_SIZE_RAD, color=INK_COLOUR, linewidth=0.8, linestyle='--', label='reference')
     for name, below in zip(names, axes[1:, 0]):
         record = done[name, 'step']
         t = record.t
-        top.plot(t, record['adu/truth']['position'][:, 0], color=COLOURS[name], linewidth=1.4, label=name)
+        top.plot(t, record['adu/truth']['position'][:, 0], color=CASE_COLOURS[name], linewidth=1.4, label=name)
         drawing.draw_torques(below, record)
         below.set_title(f'{name}: torque of the motors')
         below.set_ylim(-100.0, 100.0)
@@ -258,23 +273,24 @@ def sine_figure(done):
     """Figure 6: reference and load, errors of both readings, the error of best on its own scale."""
     figure, axes = new_panels(3, height=7.0, x='time [periods of the sine]', sharex=True, height_ratios=(1.4, 1.2, 1),
                               y=('azimuth [rad]', 'error [mrad]', 'error [\N{MICRO SIGN}rad]'))
-    period = 2.0 * math.pi / FREQUENCIES['0p4hz']
+    period = 2.0 * math.pi / SINE_FREQUENCIES_RAD_S['0p4hz']
     record = done['paper-r1', '0p4hz']
     t = record.t / period
-    axes[0, 0].plot(t, AMPLITUDE * np.sin(FREQUENCIES['0p4hz'] * record.t), color=INK, linestyle='--',
+    axes[0, 0].plot(t, SINE_AMPLITUDE_RAD * np.sin(SINE_FREQUENCIES_RAD_S['0p4hz'] * record.t), color=INK_COLOUR,
+                    linestyle='--',
                     label='reference')
-    axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=TRUTH, linewidth=1.4,
+    axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=TRUTH_COLOUR, linewidth=1.4,
                     label='paper-r1, 0.4 Hz')
     axes[0, 0].set_title('sine of 0.87 rad (figure 6 of the paper)')
     for name, reading, colour, style, scale, panel in (
-            ('paper-r1', '0p4hz', TRUTH, '-', 1e3, 1), ('paper-r2', '0p4rads', INK, '--', 1e3, 1),
-            ('best', '0p4hz', FILTERED, '-', 1e6, 2), ('best', '0p4rads', MOTOR_1, '-', 1e6, 2)):
-        record, w = done[name, reading], FREQUENCIES[reading]
+            ('paper-r1', '0p4hz', TRUTH_COLOUR, '-', 1e3, 1), ('paper-r2', '0p4rads', INK_COLOUR, '--', 1e3, 1),
+            ('best', '0p4hz', FILTERED_COLOUR, '-', 1e6, 2), ('best', '0p4rads', MOTOR_1_COLOUR, '-', 1e6, 2)):
+        record, w = done[name, reading], SINE_FREQUENCIES_RAD_S[reading]
         axes[panel, 0].plot(record.t * w / (2.0 * math.pi), scale * sine_error(record, w), style, color=colour,
-                            label=f'{name}, {READINGS[reading]}')
+                            label=f'{name}, {SINE_READINGS[reading]}')
     axes[2, 0].set_title('best, its start beyond the scale')
     axes[2, 0].set_ylim(-100.0, 100.0)
-    axes[2, 0].set_xlim(0.0, PERIODS)
+    axes[2, 0].set_xlim(0.0, SINE_PERIODS)
     return drawing.legend(figure)
 
 
@@ -285,13 +301,13 @@ def gust_figure(done):
     for name in ('paper-r1', 'adrc', 'best'):
         record = done[name, 'gust']
         y = record['adu/truth']['position'][:, 0]
-        axes.plot(record.t, 1e6 * (y - y[record.t < GUST_START][-1]), color=COLOURS[name], linewidth=1.3,
+        axes.plot(record.t, 1e6 * (y - y[record.t < GUST_START_S][-1]), color=CASE_COLOURS[name], linewidth=1.3,
                   label=name)
     stiffness = 2.0 * step_case('best').loaded().node_parameters('adu').azimuth.gear_train.stiffness
-    axes.axhline(1e6 * GUST / stiffness, color=INK, linewidth=0.8, linestyle='--',
+    axes.axhline(1e6 * GUST_TORQUE_NM / stiffness, color=INK_COLOUR, linewidth=0.8, linestyle='--',
                  label='the gear bent by the gust')
-    axes.set_xlim(GUST_START - 0.05, GUST_START + 0.5)
-    axes.set_title(f'gust: a step of {GUST:g} Nm at {GUST_START:g} s')
+    axes.set_xlim(GUST_START_S - 0.05, GUST_START_S + 0.5)
+    axes.set_title(f'gust: a step of {GUST_TORQUE_NM:g} Nm at {GUST_START_S:g} s')
     return drawing.legend(figure)
 
 
@@ -301,12 +317,13 @@ def inertia_figure(done):
     for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as known'),
                         ('best-inertia-plus', 'load 20 % heavier')):
         record = done[name, 'step']
-        axes[0, 0].plot(record.t, 1e3 * (record['adu/truth']['position'][:, 0] - STEP), color=COLOURS[name],
+        axes[0, 0].plot(record.t, 1e3 * (record['adu/truth']['position'][:, 0] - STEP_SIZE_RAD),
+                        color=CASE_COLOURS[name],
                         label=label)
         torque = record['adu/motor_states']['effort'][:, :2].mean(axis=1)
-        axes[1, 0].plot(record.t, torque, color=COLOURS[name], label=label)
-    for side in (-BAND, BAND):
-        axes[0, 0].axhline(1e3 * side * STEP, color=INK, linewidth=0.8, linestyle='--')
+        axes[1, 0].plot(record.t, torque, color=CASE_COLOURS[name], label=label)
+    for side in (-SETTLING_BAND, SETTLING_BAND):
+        axes[0, 0].axhline(1e3 * side * STEP_SIZE_RAD, color=INK_COLOUR, linewidth=0.8, linestyle='--')
     axes[0, 0].set_xlim(0.0, 0.3)
     axes[0, 0].set_ylim(-8.0, 6.0)
     axes[0, 0].set_title('step of best: the end of the move, 2 % band dashed')
@@ -315,6 +332,6 @@ def inertia_figure(done):
 
 
 def run(progress) -> Result:
-    """Run all CASES."""
-    done = records(CASES, progress)
+    """Run all CASE_PARAMETERS."""
+    done = records(CASE_PARAMETERS, progress)
     return Result(rows(done), figures(done), remarks(done))

@@ -2,9 +2,10 @@
 
 The paper prints T = 0.01 s, the windows of its figures and that the filter begins with the first measured angle and
 rate; flight, noises and parameters of the filter are chosen here. A target flies straight past the antenna and is
-nearest at CULMINATION, inside the paper's figures 2 and 6. Cases <axis>/filtered, the 'current' statistical filter on
+nearest at CULMINATION_TIME_S, inside the paper's figures 2 and 6. Cases <axis>/filtered, the 'current' statistical
+filter on
 angle and rate; <axis>/measured, both as they are measured, and the acceleration as the difference of the measured rate
-over DIFFERENCED steps.
+over DIFFERENCE_STEPS steps.
 
 With x = (angle, rate, acceleration), x+ = Phi x + U abar and the mean acceleration abar as its input, y = H x:
 
@@ -18,41 +19,41 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.filters import motion_models
-from pedestal_analysis.report.figures import FILTERED, INK, RAW, new_panels
+from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_common.graph.topics import AXES
-from pedestal_studies.papers.rate_measurement import ALPHA, SIGMA, differenced, filtered
+from pedestal_studies.papers.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
 from pedestal_studies.rigs import drawing, ensemble
-from pedestal_studies.rigs.ensemble import PERIOD as T
+from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.rigs.rows import Result
 
-RUNS, SEED = 40, 1
+DEFAULT_RUNS, NOISE_SEED = 40, 1
 """Flights; seed of their noise."""
 
-BATCH = 5
+BATCH_RUNS = 5
 """Flights that one worker makes at a time."""
 
-SPEED, ABEAM, HEIGHT, CULMINATION = 300.0, 3000.0, 2500.0, 42.0
+TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, CULMINATION_TIME_S = 300.0, 3000.0, 2500.0, 42.0
 """Of the target [m/s]; its least distance over ground [m]; its height [m]; when it is nearest [s]."""
 
-START, END = 20.0, 100.0
+FLIGHT_START_S, FLIGHT_END_S = 20.0, 100.0
 """The times of the paper's figures [s]; the filter begins at the first."""
 
-SETTLED = 5.0
+SETTLING_TIME_S = 5.0
 """What of it is left out of the rows [s]."""
 
-ZOOM = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
+ZOOM_WINDOWS_S = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
 """Of figures 2 and 6 [s]."""
 
-RATE_SIGMA = math.radians(0.1)
+RATE_SIGMA_RAD_S = math.radians(0.1)
 """Of a measured rate [rad/s]."""
 
-DIFFERENCED = 20
+DIFFERENCE_STEPS = 20
 """Steps over which the measured rate is differenced."""
 
-QUANTITIES = {'angle': 'deg', 'rate': 'deg/s', 'acceleration': 'deg/s2'}
+QUANTITY_UNITS = {'angle': 'deg', 'rate': 'deg/s', 'acceleration': 'deg/s2'}
 
 
 def flight():
@@ -64,8 +65,8 @@ def flight():
         E = atan2(h, rho),  E' = -v h x / (rho r^2),
         E'' = -v^2 h (1 / (rho r^2) - x^2 (3 rho^2 + h^2) / (rho^3 r^4)).
     """
-    t = START + T * np.arange(round((END - START) / T) + 1)
-    v, d, h, x = SPEED, ABEAM, HEIGHT, SPEED * (t - CULMINATION)
+    t = FLIGHT_START_S + T * np.arange(round((FLIGHT_END_S - FLIGHT_START_S) / T) + 1)
+    v, d, h, x = TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, TARGET_SPEED_M_S * (t - CULMINATION_TIME_S)
     rho2 = x * x + d * d
     rho, r2 = np.sqrt(rho2), rho2 + h * h
     azimuth = np.arctan2(x, d), v * d / rho2, -2.0 * v * v * d * x / rho2**2
@@ -74,16 +75,16 @@ def flight():
     return t, {'azimuth': np.column_stack(azimuth), 'elevation': np.column_stack(elevation)}
 
 
-def flown(axis, run):
+def flight_record(axis, run):
     """(measured, filtered) angle, rate and acceleration, each (n, 3), of one flight; the noise depends on axis and run
     alone."""
     t, target = flight()
     truth = target[axis]
-    nu, nu_rate = ensemble.drawn(SEED + AXES.index(axis), run, 1, len(t))[:, 0]
-    y, y_rate = truth[:, 0] + SIGMA * nu, truth[:, 1] + RATE_SIGMA * nu_rate
-    out = filtered(t, truth, y, y_rate, RATE_SIGMA * RATE_SIGMA)
-    difference, _ = differenced(y_rate, DIFFERENCED)
-    return np.column_stack((y, y_rate, difference)), np.column_stack([out[name] for name in QUANTITIES])
+    nu, nu_rate = ensemble.normal_draws(NOISE_SEED + AXES.index(axis), run, 1, len(t))[:, 0]
+    y, y_rate = truth[:, 0] + ANGLE_SIGMA_RAD * nu, truth[:, 1] + RATE_SIGMA_RAD_S * nu_rate
+    out = filtered(t, truth, y, y_rate, RATE_SIGMA_RAD_S * RATE_SIGMA_RAD_S)
+    difference, _ = differenced_rate(y_rate, DIFFERENCE_STEPS)
+    return np.column_stack((y, y_rate, difference)), np.column_stack([out[name] for name in QUANTITY_UNITS])
 
 
 def batch(item):
@@ -91,9 +92,9 @@ def batch(item):
     of runs)."""
     axis, first, count = item
     t, target = flight()
-    counts = t >= START + SETTLED
+    counts = t >= FLIGHT_START_S + SETTLING_TIME_S
     return np.degrees([[[tracking.rms(error) for error in (values - target[axis])[counts].T]
-                        for values in flown(axis, run)] for run in range(first, first + count)])
+                        for values in flight_record(axis, run)] for run in range(first, first + count)])
 
 
 def model(T):
@@ -103,7 +104,7 @@ def model(T):
             np.array([0.5 * T * T - angle, T - rate, 1.0 - kept]))
 
 
-MEASURED = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}
+MEASUREMENT_MATRICES = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}
 """{case: H} of the two kinds of measurement."""
 
 
@@ -124,7 +125,7 @@ def matrices():
     back = np.linalg.inv(unit)
     return {'controllability': (controllability(Phi, U), controllability(unit @ Phi @ back, unit @ U / (T * T))),
             **{f'observability/{name}': (observability(Phi, H), observability(unit @ Phi @ back, H))
-               for name, H in MEASURED.items()}}
+               for name, H in MEASUREMENT_MATRICES.items()}}
 
 
 def rows(errors):
@@ -133,9 +134,9 @@ def rows(errors):
     for axis, of_runs in errors.items():
         for name, column in zip(('measured', 'filtered'), of_runs.transpose(1, 2, 0)):
             table += [row(f'{axis}/{name}', f'{quantity}_rms', values, unit)
-                      for (quantity, unit), values in zip(QUANTITIES.items(), column)]
+                      for (quantity, unit), values in zip(QUANTITY_UNITS.items(), column)]
         table += [row(f'{axis}/filtered', f'{quantity}_reduction', values, '', target='> 1')
-                  for quantity, values in zip(QUANTITIES, (of_runs[:, 0] / of_runs[:, 1]).T)]
+                  for quantity, values in zip(QUANTITY_UNITS, (of_runs[:, 0] / of_runs[:, 1]).T)]
     for name, (matrix, scaled) in matrices().items():
         table += [row(name, 'rank', np.linalg.matrix_rank(scaled), '', target='3 +- 0'),
                   row(name, 'condition', np.linalg.cond(scaled), ''),
@@ -146,7 +147,7 @@ def rows(errors):
 def remarks():
     """Sentences that the rows need, with the matrices in seconds."""
     lines = ['Without the filter the acceleration is the difference of the measured rate over '
-             f'{DIFFERENCED * T:g} s. The paper prints no error: "smooth" and "does not diverge" are its claims.']
+             f'{DIFFERENCE_STEPS * T:g} s. The paper prints no error: "smooth" and "does not diverge" are its claims.']
     for name, (matrix, _) in matrices().items():
         lines += [f'{name}, in seconds:', *('    ' + '  '.join(f'{value:11.4g}' for value in line) for line in matrix)]
     return lines
@@ -162,22 +163,23 @@ def axis_figure(axis, first):
     first of the paper's four figures."""
     figure, axes = new_panels(4, height=9.0)
     t, target = flight()
-    measured, filtered = flown(axis, 0)
+    measured, filtered = flight_record(axis, 0)
     for i, (panel, column) in enumerate(zip(axes[:, 0], (0, 0, 1, 2))):
-        begin, end = ZOOM[axis] if i == 1 else (START, END)
+        begin, end = ZOOM_WINDOWS_S[axis] if i == 1 else (FLIGHT_START_S, FLIGHT_END_S)
         shown = (t >= begin) & (t <= end)
-        for values, colour, label, width in ((measured, RAW, 'measured', 0.5), (filtered, FILTERED, 'filtered', 1.2)):
+        for values, colour, label, width in ((measured, RAW_COLOUR, 'measured', 0.5),
+                                             (filtered, FILTERED_COLOUR, 'filtered', 1.2)):
             panel.plot(t[shown], np.degrees(values[shown, column]), color=colour, label=label, linewidth=width)
-        panel.plot(t[shown], np.degrees(target[axis][shown, column]), color=INK, linestyle='--', linewidth=0.8,
+        panel.plot(t[shown], np.degrees(target[axis][shown, column]), color=INK_COLOUR, linestyle='--', linewidth=0.8,
                    label='truth')
-        name, unit = list(QUANTITIES.items())[column]
+        name, unit = list(QUANTITY_UNITS.items())[column]
         panel.set_ylabel(f'{name} [{unit}]')
         panel.set_title(f'{axis}: {name} (figure {first + i} of the paper)')
     axes[3, 0].set_ylim(*np.degrees(2.0 * np.abs(target[axis][:, 2]).max() * np.array((-1.0, 1.0))))
     return drawing.legend(figure)
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Fly `runs` flights; pool: monte_carlo.Pool, None for this process."""
-    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, AXES, runs, BATCH, progress)
+    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, AXES, runs, BATCH_RUNS, progress)
     return Result(rows(errors), figures(), remarks())

@@ -2,8 +2,9 @@
 
 Each is one compiled kernel of the laws the nodes run: the receiver's smoothing and pattern, the loop of the beam or a
 target filter, the electronic beam. Sample i of the grid is measured over the millisecond that ends at its stamp
-i GRID, against the beam in force in it; a target is given at the middles of these milliseconds. A command stamped
-i GRID is in force from the millisecond after i GRID + delay on.
+i GRID_STEP_S, against the beam in force in it; a target is given at the middles of these milliseconds. A command
+stamped
+i GRID_STEP_S is in force from the millisecond after i GRID_STEP_S + delay on.
 """
 import dataclasses
 import math
@@ -21,18 +22,19 @@ from pedestal_common.compiled import compiled
 from tracking_receiver_sim import monopulse, smoothing
 from tracking_receiver_sim.params import AntennaParameters, ReceiverParameters
 
-GRID = 1e-3
-GRID_NS = round(GRID * 1e9)
+GRID_STEP_S = 1e-3
+GRID_STEP_NS = round(GRID_STEP_S * 1e9)
 
-SMOOTHINGS = {'S0': smoothing.NO_SMOOTHING, 'S1': smoothing.RECURSION, 'S2': smoothing.MOVING_AVERAGE}
+SMOOTHING_CODES = {'S0': smoothing.SMOOTHING_NONE, 'S1': smoothing.SMOOTHING_RECURSION,
+                   'S2': smoothing.SMOOTHING_MOVING_AVERAGE}
 """S0: the last sample, S1: paper 002's eq. (1), S2: the moving average it is called."""
 
-LENGTH = 20
+SMOOTHING_SAMPLES = 20
 """n of the smoothing in samples: the paper's example."""
 
-FULL_SCALE, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
+FULL_SCALE_BEAMWIDTHS, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
 
-SMOOTHERS = np.dtype([('error', smoothing.SMOOTHER)], align=True)
+SMOOTHER_RECORD = np.dtype([('error', smoothing.SMOOTHER_DTYPE)], align=True)
 
 Target = namedtuple('Target', 'angle attitude rate noise')
 """Target and carrier on the grid, each (n,): true angle [rad]; the part of it that the carrier's attitude causes [rad]
@@ -45,17 +47,17 @@ Receiver = namedtuple('Receiver', 'slope beamwidth lost')
 """slope: true over assumed [-]; beamwidth [rad], 0 for a linear receiver; lost: power over that on axis below which
 the signal is lost [-]."""
 
-PaperConstants = namedtuple('PaperConstants', 'form alpha period delta smoothing')
+PaperLoopConstants = namedtuple('PaperLoopConstants', 'form alpha period delta smoothing')
 """The constants of a Paper: code of beam_loop.FORMS, gain [-], period in samples, share of the carrier's rate that is
 compensated [-], code of smoothing.SMOOTHINGS."""
 
-BetterConstants = namedtuple('BetterConstants', 'filter variance period hold delay tau')
+FilterLoopConstants = namedtuple('FilterLoopConstants', 'filter variance period hold delay tau')
 """The constants of a Better: those (1,) of its filter, variance of a measurement [rad2], period and hold in samples,
 delay and low-pass of the acceleration [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Paper:
+class PaperLoop:
     """Paper 002's loop. period, delay: in samples of the grid; slope, beamwidth, lost: as in Receiver; delta: share of
     the carrier's rate that is compensated."""
     alpha: float = 0.1
@@ -72,16 +74,17 @@ class Paper:
         """(beam, smoothed error in the loop), each (n,) [rad], of a target (n,) [rad]; rate (n,) [rad/s]: of its
         motion by the carrier; noise (n,) [rad] of the samples. None for zeros."""
         zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
-        constants = PaperConstants(beam_loop.FORMS.index(self.form), self.alpha, self.period, self.delta,
-                                   SMOOTHINGS[self.smoothing])
-        _paper(constants, Receiver(self.slope, self.beamwidth, self.lost),
-               Target(np.asarray(target), zeros, zeros if rate is None else rate, zeros if noise is None else noise),
-               np.zeros(1, SMOOTHERS), _beam(self.delay, self.period), beam, errors)
+        constants = PaperLoopConstants(beam_loop.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
+                                       SMOOTHING_CODES[self.smoothing])
+        _paper_loop(constants, Receiver(self.slope, self.beamwidth, self.lost),
+                    Target(np.asarray(target), zeros, zeros if rate is None else rate, zeros if noise is None
+                           else noise),
+                    np.zeros(1, SMOOTHER_RECORD), _beam(self.delay, self.period), beam, errors)
         return beam, errors
 
 
 @dataclasses.dataclass(frozen=True)
-class Better:
+class FilterLoop:
     """A loop in which beam in force + error goes into a target filter; the command is the filter's prediction for the
     middle of the interval in which it will be in force.
 
@@ -107,23 +110,25 @@ class Better:
         zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
         late = np.maximum(np.arange(n) - self.late, 0)
         c = axis_filter.constants(FilterParameters(kind='ca', ca=CaParameters(noise=self.jerk)))
-        constants = BetterConstants(c, self.sigma**2 / self.period, self.period, self.hold,
-                                    GRID * (self.delay if self.known is None else self.known), self.tau)
-        _better(constants, Target(np.asarray(target), attitude[late] if self.ins else zeros,
-                                  rate[late] if self.ins else zeros, zeros if noise is None else noise),
-                np.zeros(1, SMOOTHERS), np.zeros(1, axis_filter.FILTER), _beam(self.delay, self.hold), beam, errors)
+        constants = FilterLoopConstants(c, self.sigma**2 / self.period, self.period, self.hold,
+                                        GRID_STEP_S * (self.delay if self.known is None else self.known), self.tau)
+        _filter_loop(constants, Target(np.asarray(target), attitude[late] if self.ins else zeros,
+                                       rate[late] if self.ins else zeros, zeros if noise is None else noise),
+                     np.zeros(1, SMOOTHER_RECORD), np.zeros(1, axis_filter.FILTER_DTYPE), _beam(self.delay, self.hold),
+                     beam, errors)
         return beam, errors
 
 
 def _beam(delay, hold):
     """A Beam at rest at 0; delay, hold: in samples of the grid."""
     return Beam(electronic_beam.initial_state(0.0, 0.0),
-                electronic_beam.constants(GRID, delay * GRID, 2 * hold * GRID), np.zeros(1, electronic_beam.INPUTS),
-                np.zeros(1, electronic_beam.OUTPUTS))
+                electronic_beam.constants(GRID_STEP_S, delay * GRID_STEP_S, 2 * hold * GRID_STEP_S),
+                np.zeros(1, electronic_beam.INPUTS_DTYPE),
+                np.zeros(1, electronic_beam.OUTPUTS_DTYPE))
 
 
 @compiled
-def received(offset, receiver):
+def receiver_reading(offset, receiver):
     """The error [rad] that a Receiver measures for an offset [rad] of the target from the beam: linear without a
     beamwidth, else by its monopulse pattern within full scale; NaN where the signal is lost."""
     slope, beamwidth, lost = receiver
@@ -132,32 +137,32 @@ def received(offset, receiver):
     S, D, _ = monopulse.channels(offset / beamwidth, 0.0, slope * K_M, 1.0, 0.0)
     if S * S < lost:
         return math.nan
-    return beamwidth * max(-FULL_SCALE, min(D / (K_M * S), FULL_SCALE))
+    return beamwidth * max(-FULL_SCALE_BEAMWIDTHS, min(D / (K_M * S), FULL_SCALE_BEAMWIDTHS))
 
 
 @compiled
 def command(u, stamp, due, beam):
     """Put a command, beam [rad] at sample `stamp` of the grid, into the inputs u of the electronic beam; due: whether
     it is a new one."""
-    u.stamp_ns = u.command_stamp_ns = stamp * GRID_NS
+    u.stamp_ns = u.command_stamp_ns = stamp * GRID_STEP_NS
     u.due = 1 if due else 0
     u.position[0] = beam
 
 
 @compiled
-def _paper(constants, receiver, target, smoothers, plant, beam, errors):
+def _paper_loop(constants, receiver, target, smoothers, plant, beam, errors):
     """Paper 002's loop over a Target into beam and errors (n,) [rad]; plant: the Beam."""
     form, alpha, period, delta, kind = constants
-    s, beta, T = smoothers[0].error, constant_gain.benedict_bordner(alpha), period * GRID
+    s, beta, T = smoothers[0].error, constant_gain.benedict_bordner(alpha), period * GRID_STEP_S
     R = v = error = 0.0
     for i in range(len(target.angle)):
         beam[i] = plant.outputs[0].position[0]
-        sample = received(target.angle[i] - beam[i], receiver) + target.noise[i]
+        sample = receiver_reading(target.angle[i] - beam[i], receiver) + target.noise[i]
         if not math.isnan(sample):
             smoothing.begin(s)
-            smoothing.put(s, sample, 1.0 / LENGTH)
+            smoothing.put(s, sample, 1.0 / SMOOTHING_SAMPLES)
         if i % period == 0:
-            error = math.nan if math.isnan(sample) else smoothing.smoothed(s, kind, 1, LENGTH)
+            error = math.nan if math.isnan(sample) else smoothing.smoothed(s, kind, 1, SMOOTHING_SAMPLES)
             R, v = beam_loop.step(form, R, v, error, alpha, beta, T, delta * target.rate[i])
         errors[i] = error
         command(plant.inputs[0], i, i % period == 0, R)
@@ -165,7 +170,7 @@ def _paper(constants, receiver, target, smoothers, plant, beam, errors):
 
 
 @compiled
-def _better(constants, target, smoothers, filters, plant, beam, errors):
+def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
     """The loop on a target filter over a Target into beam and innovations `errors` (n,) [rad]; plant: the Beam."""
     s, f, c = smoothers[0].error, filters[0], constants.filter[0]
     period, hold, rate = constants.period, constants.hold, target.rate
@@ -177,12 +182,13 @@ def _better(constants, target, smoothers, filters, plant, beam, errors):
         # Less the rotation by the carrier it is the angle in the earth frame.
         smoothing.put(s, beam[i] + (target.angle[i] - beam[i] + target.noise[i]) - target.attitude[i], 0.0)
         if i > 0 and constants.tau > 0.0:
-            acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID, constants.tau)
+            acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID_STEP_S,
+                                                           constants.tau)
         if (i + 1) % period == 0:
-            y = smoothing.smoothed(s, smoothing.NO_SMOOTHING, period, period)
+            y = smoothing.smoothed(s, smoothing.SMOOTHING_NONE, period, period)
             if running:
                 m = AxisMeasurement(y, constants.variance, math.nan, 0.0)
-                axis_filter.predict(f, c, period * GRID)
+                axis_filter.predict(f, c, period * GRID_STEP_S)
                 errors[i] = axis_filter.innovation(f, c, m).nu
                 axis_filter.correct(f, c, m)
             else:
@@ -191,16 +197,17 @@ def _better(constants, target, smoothers, filters, plant, beam, errors):
             block = i
         if running and i % hold == 0:
             # From the stamp to the middle of the interval in force.
-            lead = constants.delay + 0.5 * hold * GRID
-            earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID + lead).angle
-            aimed = earth + target.attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID + lead)
+            lead = constants.delay + 0.5 * hold * GRID_STEP_S
+            earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID_STEP_S + lead).angle
+            aimed = (earth + target.attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID_STEP_S
+                                                                           + lead))
         command(plant.inputs[0], i, running and i % hold == 0, aimed)
         electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
 
 
-def stable(loop, size=1e-9, seconds=20.0):
+def is_stable(loop, size=1e-9, seconds=20.0):
     """Whether the paper's loop (Paper) settles after a step of `size` [rad]: its error keeps falling."""
-    n = round(seconds / GRID)
+    n = round(seconds / GRID_STEP_S)
     error = np.abs(size - loop.run(np.full(n, size))[0])
     middle, last = error[n // 3:2 * n // 3].max(), error[2 * n // 3:].max()
     return last <= middle < 1e3 * size
@@ -212,7 +219,7 @@ def delay_limit(loop, highest=400):
     low, high = 0, highest
     while high - low > 1:
         middle = (low + high) // 2
-        if stable(dataclasses.replace(loop, delay=middle)):
+        if is_stable(dataclasses.replace(loop, delay=middle)):
             low = middle
         else:
             high = middle
@@ -226,7 +233,7 @@ def spectral_radius(loop):
     the next period (and of the moving average before it). In sample j = 1 ... period after the update k the command
     k + floor((j - 1 - delay) / period) is in force.
     """
-    M, beta, n = loop.period, constant_gain.benedict_bordner(loop.alpha), LENGTH
+    M, beta, n = loop.period, constant_gain.benedict_bordner(loop.alpha), SMOOTHING_SAMPLES
     first = {'S0': M, 'S1': 1, 'S2': M - n + 1}[loop.smoothing]
     ages = [-((j - 1 - loop.delay) // M) for j in range(first, M + 1)]
     V, E, C = 0, 1, 2

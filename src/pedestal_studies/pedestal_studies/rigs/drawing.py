@@ -18,13 +18,13 @@ def legend(figure):
 
 def draw_torques(axes, record):
     """Draw the torque [Nm] of both azimuth motors of a closed_loop.Run over time."""
-    for i, (colour, style) in enumerate(((figures.MOTOR_1, '-'), (figures.MOTOR_2, '--'))):
+    for i, (colour, style) in enumerate(((figures.MOTOR_1_COLOUR, '-'), (figures.MOTOR_2_COLOUR, '--'))):
         axes.plot(record.t, record['adu/motor_states']['effort'][:, i], style, color=colour, label=f'motor {i + 1}')
 
 
 def save(draw, *paths):
     """Draw a figure once into files; the same bytes every time."""
-    with matplotlib.rc_context({**figures.STYLE, 'svg.hashsalt': paths[0].stem}):
+    with matplotlib.rc_context({**figures.MATPLOTLIB_STYLE, 'svg.hashsalt': paths[0].stem}):
         figure = draw()
         figures.tidy(figure)
         for path in paths:

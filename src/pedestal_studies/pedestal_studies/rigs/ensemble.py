@@ -16,15 +16,15 @@ from acu_tracker.estimation.params import TrackerParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
-PERIOD = 0.01
+MEASUREMENT_PERIOD_S = 0.01
 """Between measurements [s], in all studies of filters."""
 
-INITIAL_RATE = TrackerParameters().initial_rate
+INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
 """Standard deviation of the rate at the start [rad/s]."""
 
 MOMENTS = np.dtype([('runs', 'f8'), ('angle', 'f8'), ('angle2', 'f8'), ('rate', 'f8'), ('rate2', 'f8'),
                     ('acceleration', 'f8'), ('acceleration2', 'f8'), ('raw2', 'f8'), ('variance', 'f8'),
-                    ('rate_variance', 'f8'), ('nis', 'f8'), ('nees', 'f8'), ('mu', 'f8', (axis_filter.BANK,))])
+                    ('rate_variance', 'f8'), ('nis', 'f8'), ('nees', 'f8'), ('mu', 'f8', (axis_filter.BANK_SIZE,))])
 """Sums over runs at one time: errors of angle, rate, acceleration and of the raw angle, their squares, the filter's
 own variances, normalised innovations squared, normalised errors squared of angle and rate, mode probabilities."""
 
@@ -50,15 +50,15 @@ class Noise:
     expected: bool = False
 
 
-def drawn(seed, first, count, n, sensors=2):
+def normal_draws(seed, first, count, n, sensors=2):
     """Standard normal noise (sensors, count, n) of the runs from `first` on; the first sensor is the angle."""
     runs = [np.random.default_rng((seed, first + i)).standard_normal((sensors, n)) for i in range(count)]
     return np.stack(runs, axis=1)
 
 
-def coloured(white, bandwidth):
+def coloured_noise(white, bandwidth):
     """White noise (runs, n) of variance 1 through a first-order lag of -3 dB bandwidth [Hz]; variance 1 again."""
-    rho = math.exp(-2.0 * math.pi * bandwidth * PERIOD)
+    rho = math.exp(-2.0 * math.pi * bandwidth * MEASUREMENT_PERIOD_S)
     rest, _ = lfilter([math.sqrt(1.0 - rho * rho)], [1.0, -rho], white[:, 1:], zi=rho * white[:, :1])
     return np.hstack((white[:, :1], rest))
 
@@ -67,9 +67,9 @@ def records(truth, noise, seed, first, count):
     """Measured angles [rad] and rates [rad/s], each (count, n), of a truth (angle, rate, acceleration), each (n,); the
     rates are NaN without a sensor."""
     angle, rate, _ = truth
-    nu, nu_rate = drawn(seed, first, count, len(angle))
+    nu, nu_rate = normal_draws(seed, first, count, len(angle))
     if noise.bandwidth is not None:
-        nu = coloured(nu, noise.bandwidth)
+        nu = coloured_noise(nu, noise.bandwidth)
     sigma = math.nan if noise.rate_sigma is None else noise.rate_sigma
     return angle + noise.sigma * nu, rate + sigma * nu_rate
 
@@ -84,7 +84,8 @@ def moments(params, t, truth, noise, measured):
                               noise.bandwidth if noise.expected else 0.0)
     series = Series(t, y, np.full(len(t), noise.sigma**2), y_rate, np.full(len(t), (noise.rate_sigma or 0.0) ** 2))
     sums = np.zeros(y.shape, MOMENTS)
-    _add_runs(c, AxisMotion(*truth), series, INITIAL_RATE, np.zeros(len(t), axis_filter.ESTIMATE), sums)
+    _add_runs(c, AxisMotion(*truth), series, INITIAL_RATE_SIGMA_RAD_S, np.zeros(len(t), axis_filter.ESTIMATE_DTYPE),
+              sums)
     return sums
 
 
@@ -127,13 +128,14 @@ def unscented_moments(params, truth, distance, noise, range_sigma, runs):
     have the Noise `noise`, the azimuth with the draws of `records`.
     """
     seed, first, count = runs
-    nu, _, nu_elevation, nu_range = drawn(seed, first, count, len(distance), 4)
+    nu, _, nu_elevation, nu_range = normal_draws(seed, first, count, len(distance), 4)
     if noise.bandwidth is not None:
-        nu, nu_elevation = coloured(nu, noise.bandwidth), coloured(nu_elevation, noise.bandwidth)
+        nu, nu_elevation = coloured_noise(nu, noise.bandwidth), coloured_noise(nu_elevation, noise.bandwidth)
     sums = np.zeros((count, len(distance)), MOMENTS)
     measured = RangedSeries(truth[0] + noise.sigma * nu, noise.sigma * nu_elevation, noise.sigma**2,
                             distance + range_sigma * nu_range, range_sigma**2)
-    _add_unscented_runs(unscented.constants(params), PERIOD, AxisMotion(*truth), measured, INITIAL_RATE**2, sums)
+    _add_unscented_runs(unscented.constants(params), MEASUREMENT_PERIOD_S, AxisMotion(*truth), measured,
+                        INITIAL_RATE_SIGMA_RAD_S**2, sums)
     return sums
 
 
@@ -142,10 +144,10 @@ def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
     """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (runs, n); truth: AxisMotion of arrays
     (n,)."""
     R, R_range = measured.R, measured.R_range
-    out = np.zeros(1, axis_filter.ESTIMATE)
+    out = np.zeros(1, axis_filter.ESTIMATE_DTYPE)
     o = out[0]
     for run in range(len(measured.azimuth)):
-        state = np.zeros(1, unscented.STATE)
+        state = np.zeros(1, unscented.STATE_DTYPE)
         s = state[0]
         for k in range(len(truth.angle)):
             A, E, r = measured.azimuth[run, k], measured.elevation[run, k], measured.ranges[run, k]
@@ -168,7 +170,7 @@ def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
             _add(sums[run, k], o, truth, k, A)
 
 
-def added(sums, more):
+def sum_of_moments(sums, more):
     """Sum of two arrays (n,) of MOMENTS, element by element."""
     return (sums.view('f8') + more.view('f8')).view(MOMENTS)
 

@@ -11,21 +11,22 @@ for that holds for them; only the receiver matters to them as it does to autotra
 """
 import typing
 
-from pedestal_common.graph.modes import TABLE
+from pedestal_common.graph.modes import MODE_ROWS
 
-TENTH, HALF = 0.1, 0.5
+TENTH_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG = 0.1, 0.5
 """Of the beamwidth of the antenna of the study [deg]."""
 
-HALF_PITCH = 1.32
+HALF_PITCH_DEG = 1.32
 """Play of a pinion of 17 teeth and ratio 8 where one is missing: pi / (17 * 8) [deg]."""
 
-SAME = ()
-STANDBY = ('standby',)
+SAME_MODE = ()
+STANDBY_MODE = ('standby',)
 
 
-class Expected(typing.NamedTuple):
+class Expectation(typing.NamedTuple):
     """told: steps within which somebody says something of it, None where nobody has to; end: modes of which the run
-    ends in one 5 s after the fault, SAME: the mode it began in; error: largest one while the mode is kept [deg], None
+    ends in one 5 s after the fault, SAME_MODE: the mode it began in; error: largest one while the mode is kept [deg],
+    None
     where the antenna cannot help it."""
     told: int | None
     end: tuple
@@ -38,122 +39,128 @@ class Expected(typing.NamedTuple):
         return f'{told}, ends in {" or ".join(self.end or (mode,))}{error}'
 
 
-GOES_ON = Expected(None, SAME, TENTH)
-IN_BEAM = Expected(None, SAME, HALF)
-TRIPS = Expected(4, STANDBY, HALF)
+EXPECT_NO_EFFECT = Expectation(None, SAME_MODE, TENTH_BEAMWIDTH_DEG)
+EXPECT_IN_BEAM = Expectation(None, SAME_MODE, HALF_BEAMWIDTH_DEG)
+EXPECT_TRIP = Expectation(4, STANDBY_MODE, HALF_BEAMWIDTH_DEG)
 
-MOVING = ('rate',)
-FOLLOWING = tuple(row.name for row in TABLE if row.follows and not row.by_level)
-STILL = tuple(row.name for row in TABLE if not row.follows and row.name not in MOVING)
-MODES = (*STILL, *MOVING, *FOLLOWING)
+MOVING_MODES = ('rate',)
+FOLLOWING_MODES = tuple(row.name for row in MODE_ROWS if row.follows and not row.by_level)
+STILL_MODES = tuple(row.name for row in MODE_ROWS if not row.follows and row.name not in MOVING_MODES)
+LEVEL_INDEPENDENT_MODES = (*STILL_MODES, *MOVING_MODES, *FOLLOWING_MODES)
 """Still and moving on the deck; following what lies in earth angles, which takes the attitude."""
 
 
-def _always(expected):
+def _in_every_mode(expected):
     """The same in every mode, but that in standby nobody points."""
-    resting = expected._replace(error=max(expected.error or HALF, HALF))
-    return {**dict.fromkeys(MODES, expected), 'standby': resting}
+    resting = expected._replace(error=max(expected.error or HALF_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG))
+    return {**dict.fromkeys(LEVEL_INDEPENDENT_MODES, expected), 'standby': resting}
 
 
-def _moving(expected, still=GOES_ON):
+def _when_moving(expected, still=EXPECT_NO_EFFECT):
     """Where it matters only when the axes move."""
-    return {**_always(still), **dict.fromkeys((*MOVING, *FOLLOWING), expected)}
+    return {**_in_every_mode(still), **dict.fromkeys((*MOVING_MODES, *FOLLOWING_MODES), expected)}
 
 
-def _autotrack(told, error, *end):
+def _in_autotrack(told, error, *end):
     """Where it matters only when the receiver closes the loop."""
-    return {**_always(GOES_ON), 'autotrack': Expected(told, end, error)}
+    return {**_in_every_mode(EXPECT_NO_EFFECT), 'autotrack': Expectation(told, end, error)}
 
 
-_STOPS_OR_NOT = {mode: ('standby', mode) for mode in MODES}
+_STANDBY_OR_SAME_MODE = {mode: ('standby', mode) for mode in LEVEL_INDEPENDENT_MODES}
 
 
-def _attitude(told, error, still=None):
+def _attitude_fault(told, error, still=None):
     """Where the attitude is wrong or gone: without it no target can be followed, so that standby is right; to bridge
     it is right as well."""
-    return {**_always(Expected(still, SAME, TENTH)),
-            **{mode: Expected(told, _STOPS_OR_NOT[mode], error) for mode in FOLLOWING}}
+    return {**_in_every_mode(Expectation(still, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
+            **{mode: Expectation(told, _STANDBY_OR_SAME_MODE[mode], error) for mode in FOLLOWING_MODES}}
 
 
-def _off_heading():
+def _heading_fault():
     """Where the attitude is off by more than half a beamwidth: only autotrack can point better than it is known."""
-    return {**_always(GOES_ON), **{mode: Expected(200, (mode, 'standby'), None) for mode in FOLLOWING},
-            'autotrack': Expected(200, ('autotrack', 'program'), HALF)}
+    return {**_in_every_mode(EXPECT_NO_EFFECT),
+            **{mode: Expectation(200, (mode, 'standby'), None) for mode in FOLLOWING_MODES},
+            'autotrack': Expectation(200, ('autotrack', 'program'), HALF_BEAMWIDTH_DEG)}
 
 
-REACH = {'search': 10.0, 'acquire': 2.0, 'steptrack': HALF}
+LEVEL_MODE_ERRORS_DEG = {'search': 10.0, 'acquire': 2.0, 'steptrack': HALF_BEAMWIDTH_DEG}
 """Largest way from the target to the beam of a mode that goes by the level [deg]: across the area of five beamwidths
 about the expected place; a look-around of 1.2 beamwidths about a peak within 0.7; in the beam. A fade takes the level
 itself: step track has to search for it then and to look around, so that the reach of acquire is its own."""
 
-TO_AUTOTRACK = ('search', 'acquire', 'autotrack')
+MODES_TO_AUTOTRACK = ('search', 'acquire', 'autotrack')
 
-SILENT, WRONG = ('drop', 'freeze', 'nan', 'clock_step'), ('wrong_slope', 'phase_180')
+SIGNAL_LOSS_FAULTS, WRONG_ERROR_FAULTS = ('drop', 'freeze', 'nan', 'clock_step'), ('wrong_slope', 'phase_180')
 """Faults of the receiver without which, and with which no target is found."""
 
 
-def _by_level(node, fault, of_modes):
+def _signal_level_modes(node, fault, of_modes):
     """{mode: Expected} of the modes that go by the level, by those of the others."""
-    program, reaches = of_modes['program'], REACH
+    program, reaches = of_modes['program'], LEVEL_MODE_ERRORS_DEG
     told, error, end = program.told, program.error, program.end
     if node == 'tracking_receiver' and fault == 'fade':
-        told, end, reaches = None, ('program',), {**REACH, 'steptrack': REACH['acquire']}
-    elif node == 'tracking_receiver' and fault in SILENT:
+        (told, end, reaches) = (None, ('program',),
+                                {**LEVEL_MODE_ERRORS_DEG, 'steptrack': LEVEL_MODE_ERRORS_DEG['acquire']})
+    elif node == 'tracking_receiver' and fault in SIGNAL_LOSS_FAULTS:
         told, end = 200, ('program',)
-    elif node == 'tracking_receiver' and fault in WRONG:
+    elif node == 'tracking_receiver' and fault in WRONG_ERROR_FAULTS:
         end = ('program', 'standby')
-    return {mode: Expected(told, end if end == STANDBY else tuple(dict.fromkeys((mode, *TO_AUTOTRACK, *end))),
-                           None if error is None else max(error, reach)) for mode, reach in reaches.items()}
+    return {mode: Expectation(told, end if end == STANDBY_MODE
+                              else tuple(dict.fromkeys((mode, *MODES_TO_AUTOTRACK, *end))),
+                              None if error is None else max(error, reach)) for mode, reach in reaches.items()}
 
 
-def _unstowing(fault, of_modes):
+def _unstow_expectation(fault, of_modes):
     """Return what holds in unstow: the antenna stands as in standby, on its brakes, where a trip may not end it."""
     expected = of_modes['standby']
-    expected = expected._replace(end=expected.end and _STOPS_OR_NOT['unstow'])
+    expected = expected._replace(end=expected.end and _STANDBY_OR_SAME_MODE['unstow'])
     # An inverter that is off is missed when torque is asked for.
     return expected._replace(told=None) if fault == 'adu.motor_loss' else expected
 
 
-_EXPECTED = {
-    'adu.motor_loss': _always(Expected(200, SAME, TENTH)),
-    'adu.encoder_jump': _always(TRIPS),
-    'adu.encoder_stuck': _moving(Expected(200, STANDBY, HALF)),
-    'adu.brake_stuck': {**_always(GOES_ON),
-                        **{mode: Expected(200, _STOPS_OR_NOT[mode], TENTH) for mode in (*MOVING, *FOLLOWING)}},
-    'adu.lost_tooth': {mode: Expected(None, end, HALF_PITCH) for mode, end in _STOPS_OR_NOT.items()},
-    'adu.gust': _always(GOES_ON),
-    'adu.pin_stuck': _always(GOES_ON),                      # the antenna of the study has no stow pins
-    'adu.drop': _moving(Expected(20, SAME, None), Expected(20, SAME, TENTH)),
-    'adu.delay': _moving(IN_BEAM),
-    'adu.freeze': _moving(Expected(100, STANDBY, HALF)),
-    'adu.bias': {mode: Expected(200, end, HALF) for mode, end in _STOPS_OR_NOT.items()},
-    'adu.nan': {**_always(TRIPS), 'rate': TRIPS._replace(end=('standby', 'rate'))},     # who jogs goes on asking
-    'adu.noise': _always(IN_BEAM),
-    'tracking_receiver.drop': _autotrack(100, HALF),
-    'tracking_receiver.delay': _autotrack(None, TENTH),
-    'tracking_receiver.freeze': _autotrack(200, HALF, 'autotrack', 'program'),
-    'tracking_receiver.bias': _autotrack(None, 0.115 + TENTH),
-    'tracking_receiver.nan': _autotrack(100, HALF),
-    'tracking_receiver.noise': _autotrack(None, HALF),
-    'tracking_receiver.fade': _autotrack(100, HALF),
-    'tracking_receiver.wrong_slope': _autotrack(200, HALF, 'program'),
-    'tracking_receiver.phase_180': _autotrack(200, HALF, 'program'),
-    'tracking_receiver.clock_step': _autotrack(100, HALF),
-    'ship_motion.drop': _attitude(60, HALF, 60),
-    'ship_motion.freeze': _attitude(200, HALF, 200),
-    'ship_motion.bias': _always(Expected(40, SAME, TENTH)),
-    'ship_motion.nan': _attitude(60, HALF, 60),
-    'ship_motion.noise': _always(Expected(40, SAME, TENTH)),
-    'ins.drop': _attitude(60, HALF),
-    'ins.delay': _always(GOES_ON),
-    'ins.freeze': _attitude(200, HALF),
-    'ins.bias': _always(GOES_ON),
-    'ins.nan': _attitude(60, HALF),
-    'ins.noise': _off_heading(),
-    'ins.ins_jump': _off_heading(),
-    'ins.clock_step': _attitude(60, HALF),
+_BASE_EXPECTATIONS = {
+    'adu.motor_loss': _in_every_mode(Expectation(200, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
+    'adu.encoder_jump': _in_every_mode(EXPECT_TRIP),
+    'adu.encoder_stuck': _when_moving(Expectation(200, STANDBY_MODE, HALF_BEAMWIDTH_DEG)),
+    'adu.brake_stuck': {**_in_every_mode(EXPECT_NO_EFFECT),
+                        **{mode: Expectation(200, _STANDBY_OR_SAME_MODE[mode],
+                                             TENTH_BEAMWIDTH_DEG) for mode in (*MOVING_MODES, *FOLLOWING_MODES)}},
+    'adu.lost_tooth': {mode: Expectation(None, end, HALF_PITCH_DEG) for mode, end in _STANDBY_OR_SAME_MODE.items()},
+    'adu.gust': _in_every_mode(EXPECT_NO_EFFECT),
+    'adu.pin_stuck': _in_every_mode(EXPECT_NO_EFFECT),                      # the antenna of the study has no stow pins
+    'adu.drop': _when_moving(Expectation(20, SAME_MODE, None), Expectation(20, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
+    'adu.delay': _when_moving(EXPECT_IN_BEAM),
+    'adu.freeze': _when_moving(Expectation(100, STANDBY_MODE, HALF_BEAMWIDTH_DEG)),
+    'adu.bias': {mode: Expectation(200, end, HALF_BEAMWIDTH_DEG) for mode, end in _STANDBY_OR_SAME_MODE.items()},
+    'adu.nan': {**_in_every_mode(EXPECT_TRIP),
+                'rate': EXPECT_TRIP._replace(end=('standby', 'rate'))},     # who jogs goes on asking
+    'adu.noise': _in_every_mode(EXPECT_IN_BEAM),
+    'tracking_receiver.drop': _in_autotrack(100, HALF_BEAMWIDTH_DEG),
+    'tracking_receiver.delay': _in_autotrack(None, TENTH_BEAMWIDTH_DEG),
+    'tracking_receiver.freeze': _in_autotrack(200, HALF_BEAMWIDTH_DEG, 'autotrack', 'program'),
+    'tracking_receiver.bias': _in_autotrack(None, 0.115 + TENTH_BEAMWIDTH_DEG),
+    'tracking_receiver.nan': _in_autotrack(100, HALF_BEAMWIDTH_DEG),
+    'tracking_receiver.noise': _in_autotrack(None, HALF_BEAMWIDTH_DEG),
+    'tracking_receiver.fade': _in_autotrack(100, HALF_BEAMWIDTH_DEG),
+    'tracking_receiver.wrong_slope': _in_autotrack(200, HALF_BEAMWIDTH_DEG, 'program'),
+    'tracking_receiver.phase_180': _in_autotrack(200, HALF_BEAMWIDTH_DEG, 'program'),
+    'tracking_receiver.clock_step': _in_autotrack(100, HALF_BEAMWIDTH_DEG),
+    'ship_motion.drop': _attitude_fault(60, HALF_BEAMWIDTH_DEG, 60),
+    'ship_motion.freeze': _attitude_fault(200, HALF_BEAMWIDTH_DEG, 200),
+    'ship_motion.bias': _in_every_mode(Expectation(40, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
+    'ship_motion.nan': _attitude_fault(60, HALF_BEAMWIDTH_DEG, 60),
+    'ship_motion.noise': _in_every_mode(Expectation(40, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
+    'ins.drop': _attitude_fault(60, HALF_BEAMWIDTH_DEG),
+    'ins.delay': _in_every_mode(EXPECT_NO_EFFECT),
+    'ins.freeze': _attitude_fault(200, HALF_BEAMWIDTH_DEG),
+    'ins.bias': _in_every_mode(EXPECT_NO_EFFECT),
+    'ins.nan': _attitude_fault(60, HALF_BEAMWIDTH_DEG),
+    'ins.noise': _heading_fault(),
+    'ins.ins_jump': _heading_fault(),
+    'ins.clock_step': _attitude_fault(60, HALF_BEAMWIDTH_DEG),
 }
-EXPECTED = {name: {**of_modes, **_by_level(*name.split('.'), of_modes), 'unstow': _unstowing(name, of_modes)}
-            for name, of_modes in _EXPECTED.items()}
+FAULT_EXPECTATIONS = {name: {**of_modes, **_signal_level_modes(*name.split('.'), of_modes),
+                             'unstow': _unstow_expectation(name, of_modes)}
+                      for name, of_modes in _BASE_EXPECTATIONS.items()}
 """{'NODE.FAULT': {mode: Expected}}, of every fault with its defaults that lasts 5 s."""
 

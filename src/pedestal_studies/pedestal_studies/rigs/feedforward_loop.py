@@ -23,31 +23,31 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.trials import monte_carlo
 from pedestal_common.compiled import compiled
 from pedestal_studies.rigs import ensemble, metrics, profiles
-from pedestal_studies.rigs.ensemble import PERIOD as T
-from pedestal_studies.rigs.profiles import RATE, STROKE
+from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
+from pedestal_studies.rigs.profiles import S_MOTION_RATE_RAD_S, S_MOTION_STROKE_RAD
 
-DELAY = 4
+MISS_DELAY_STEPS = 4
 """Age of a miss when it arrives, in T."""
 
-SIGMA = math.radians(0.02)
+MISS_SIGMA_RAD = math.radians(0.02)
 """Of a miss [rad]."""
 
 K_P = 5.0
 """Of the miss [1/s]."""
 
-RATE_LOOP = (2.0 * math.pi * 8.0, 0.7)
+RATE_LOOP_CONSTANTS = (2.0 * math.pi * 8.0, 0.7)
 """w [rad/s], zeta."""
 
-REVERSALS = {'azimuth': 1.0, 'elevation': 1.6}
+REVERSAL_S_BY_AXIS = {'azimuth': 1.0, 'elevation': 1.6}
 """Duration of a reversal [s]: 11 and 6.9 deg/s2 at its peak. The paper does not print it."""
 
-PERIODS = 2
+EVALUATED_PERIODS = 2
 """Periods of the motion that count, after half of one to settle."""
 
-CALM = 2.0
+UNIFORM_RATE_DELAY_S = 2.0
 """After a reversal the rate is called uniform from then on [s]."""
 
-BATCH, SEED = 25, 1
+BATCH_RUNS, NOISE_SEED = 25, 1
 """Runs of one piece of work, and of their noise."""
 
 
@@ -64,31 +64,32 @@ def rate_loop_step(w, zeta):
     return expm(A * T)[:3]
 
 
-K_V, K_A = feedforward_gains(*RATE_LOOP)
+K_V, K_A = feedforward_gains(*RATE_LOOP_CONSTANTS)
 
-STEP = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('mu', 'f8', axis_filter.BANK)], align=True)
+STEP_RECORD = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('mu', 'f8', axis_filter.BANK_SIZE)],
+                       align=True)
 """True angle less antenna [rad]; rate [rad/s] and acceleration [rad/s2] fed forward; probability of each model."""
 
 
 @compiled
 def _follow(target, known, f, c, lead, M, normals, out):
-    """Run the loop: target (n, 3), normals (runs, n) into STEP records out (runs, n); M as of `rate_loop_step`.
+    """Run the loop: target (n, 3), normals (runs, n) into STEP_RECORD records out (runs, n); M as of `rate_loop_step`.
 
     known (n, 2): rate and acceleration to feed forward; (0, 2): those of the filter f, c, `lead` [s] after its miss.
     """
-    R = SIGMA * SIGMA
+    R = MISS_SIGMA_RAD * MISS_SIGMA_RAD
     encoder = np.empty(len(target))
     for i in range(len(normals)):
         theta, omega, omega_dot = target[0]
         for k in range(len(target)):
             encoder[k] = theta
             e, v, a = 0.0, target[0, 1], target[0, 2]
-            j = k - DELAY
+            j = k - MISS_DELAY_STEPS
             if j >= 0:
-                e = target[j, 0] + SIGMA * normals[i, j] - encoder[j]
+                e = target[j, 0] + MISS_SIGMA_RAD * normals[i, j] - encoder[j]
                 y = encoder[j] + e
                 if j == 0:
-                    axis_filter.start(f[0], c[0], y, R, RATE)
+                    axis_filter.start(f[0], c[0], y, R, S_MOTION_RATE_RAD_S)
                 else:
                     axis_filter.predict(f[0], c[0], T)
                     axis_filter.correct(f[0], c[0], AxisMeasurement(y, R, math.nan, math.nan))
@@ -143,38 +144,44 @@ def imm(q_ca, predicted):
 
 
 def motion(axis):
-    """(t (n,) [s], target (n, 3), its period [s]): the S motion of an axis, half a period and PERIODS more."""
-    reversal = REVERSALS[axis]
-    period = 2.0 * (STROKE / RATE + reversal * (1.0 - 2.0 / math.pi))
-    t = T * np.arange(round((0.5 + PERIODS) * period / T))
-    return t, np.column_stack(profiles.s_motion(t, STROKE, RATE, reversal)), period
+    """(t (n,) [s], target (n, 3), its period [s]): the S motion of an axis, half a period and EVALUATED_PERIODS
+    more."""
+    reversal = REVERSAL_S_BY_AXIS[axis]
+    period = 2.0 * (S_MOTION_STROKE_RAD / S_MOTION_RATE_RAD_S + reversal * (1.0 - 2.0 / math.pi))
+    t = T * np.arange(round((0.5 + EVALUATED_PERIODS) * period / T))
+    return t, np.column_stack(profiles.s_motion(t, S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S, reversal)), period
 
 
 def steps_of(axis, source, first, count):
-    """STEP records (count, n) of runs first ... first + count - 1 of a Source on an axis; run i has the noise of i."""
+    """STEP_RECORD records (count, n) of runs first ... first + count - 1 of a Source on an axis; run i has the noise
+    of i."""
     t, target, _ = motion(axis)
-    lead = (DELAY + 0.5) * T if source.predicted else 0.0
+    lead = (MISS_DELAY_STEPS + 0.5) * T if source.predicted else 0.0
     known = np.zeros((0, 2))
     if source.filter is None:
-        at = t + 0.5 * T if source.predicted else t - DELAY * T
-        known = np.column_stack(profiles.s_motion(at, STROKE, RATE, REVERSALS[axis])[1:])
-    [normals] = ensemble.drawn(SEED, first, count, len(t), 1)
-    out = np.zeros((count, len(t)), STEP)
+        at = t + 0.5 * T if source.predicted else t - MISS_DELAY_STEPS * T
+        known = np.column_stack(profiles.s_motion(at, S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S,
+                                                  REVERSAL_S_BY_AXIS[axis])[1:])
+    [normals] = ensemble.normal_draws(NOISE_SEED, first, count, len(t), 1)
+    out = np.zeros((count, len(t)), STEP_RECORD)
     c = axis_filter.constants(source.filter or FilterParameters())
-    _follow(target, known, np.zeros(1, axis_filter.FILTER), c, lead, rate_loop_step(*RATE_LOOP), normals, out)
+    _follow(target, known, np.zeros(1, axis_filter.FILTER_DTYPE), c, lead, rate_loop_step(*RATE_LOOP_CONSTANTS),
+            normals, out)
     return out
 
 
-METRICS = {'miss_rms_deg': 'deg', 'miss_worst_second_deg': 'deg', 'miss_peak_deg': 'deg', 'rate_noise_deg_s': 'deg/s'}
+METRIC_UNITS = {'miss_rms_deg': 'deg', 'miss_worst_second_deg': 'deg', 'miss_peak_deg': 'deg',
+                'rate_noise_deg_s': 'deg/s'}
 """{metric: unit} of a run: the miss over all, in its worst second, its largest; noise of a uniform rate."""
 
 
 def measures(axis, steps):
-    """METRICS of every run, an array (runs, 4), of STEP records (runs, n) on an axis."""
+    """METRIC_UNITS of every run, an array (runs, 4), of STEP_RECORD records (runs, n) on an axis."""
     t, target, period = motion(axis)
     counts = t >= 0.5 * period
     second = round(1.0 / T)
-    reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * RATE, np.ones(round(CALM / T)))[:len(t)] > 0.5
+    reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * S_MOTION_RATE_RAD_S,
+                            np.ones(round(UNIFORM_RATE_DELAY_S / T)))[:len(t)] > 0.5
     miss, noise = steps['miss'][:, counts], (steps['rate'] - target[:, 1])[:, counts & ~reversing]
     values = [(tracking.rms(one), math.sqrt(np.convolve(one * one, np.full(second, 1.0 / second), 'valid').max()),
                metrics.peak(one), tracking.rms(other)) for one, other in zip(miss, noise)]
@@ -182,7 +189,8 @@ def measures(axis, steps):
 
 
 def batch(item):
-    """(sum over the runs of the miss (n,) [rad], METRICS of every run (count, 4)) of an item (axis, source, first run,
+    """(sum over the runs of the miss (n,) [rad], METRIC_UNITS of every run (count, 4)) of an item (axis, source,
+    first run,
     how many)."""
     axis, source, first, count = item
     steps = steps_of(axis, source, first, count)
@@ -192,23 +200,23 @@ def batch(item):
 @dataclasses.dataclass(frozen=True)
 class MissStatistics:
     """Statistics of the runs of a Source on an axis: miss_mean (n,) [rad], at each step the mean over the runs; values
-    (runs, 4), METRICS of every run."""
+    (runs, 4), METRIC_UNITS of every run."""
     axis: str
     miss_mean: np.ndarray
     values: np.ndarray
 
     def of(self, metric):
-        """The values (runs,) of one of METRICS."""
-        return self.values[:, list(METRICS).index(metric)]
+        """The values (runs,) of one of METRIC_UNITS."""
+        return self.values[:, list(METRIC_UNITS).index(metric)]
 
     def mean(self, metric):
-        """The mean over the runs of one of METRICS."""
+        """The mean over the runs of one of METRIC_UNITS."""
         return float(self.of(metric).mean())
 
 
 def statistics(cases, count, pool, progress=lambda share, text: None):
     """{name: MissStatistics} of `count` runs of each of cases {name: (axis, Source)}; pool: monte_carlo.Pool."""
-    pieces = monte_carlo.batches(count, BATCH)
+    pieces = monte_carlo.batches(count, BATCH_RUNS)
     items = [(axis, source, *piece) for axis, source in cases.values() for piece in pieces]
     done = pool.map(batch, items, progress)
     result = {}

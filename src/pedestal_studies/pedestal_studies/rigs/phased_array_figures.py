@@ -1,18 +1,26 @@
 """Figures of the study phased-array: those of paper 002 with S0, S1 and S2 side by side, and of the better loop."""
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs.angle_loop import GRID
+from pedestal_studies.rigs.angle_loop import GRID_STEP_S
 
-COLOURS = (FILTERED, TRUTH, MOTOR_2, MOTOR_1, INK)
-SMOOTHED = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, moving average'}
+LINE_COLOURS = (FILTERED_COLOUR, TRUTH_COLOUR, MOTOR_2_COLOUR, MOTOR_1_COLOUR, INK_COLOUR)
+SMOOTHING_TITLES = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, moving average'}
 
 
 def side_by_side(rows, **options):
     """(figure, axes (rows, 3)) with a column for each smoothing."""
     figure, axes = new_panels(rows, 3, height=1.2 + 2.4 * rows, width=9.6, sharey='row', sharex=True, **options)
-    for column, title in zip(axes.T, SMOOTHED.values()):
+    for column, title in zip(axes.T, SMOOTHING_TITLES.values()):
         column[0].set_title(title, fontsize=10)
     return figure, axes
 
@@ -20,12 +28,12 @@ def side_by_side(rows, **options):
 def steps(done, label, title, seconds):
     """Step responses {Paper: y (n,)} with a column for each smoothing; label(loop) names a line."""
     figure, axes = side_by_side(1, y='beam over step')
-    for panel, S in zip(axes[0], SMOOTHED):
+    for panel, S in zip(axes[0], SMOOTHING_TITLES):
         loops = [loop for loop in done if loop.smoothing == S]
-        for loop, colour in zip(loops, COLOURS):
-            panel.step(GRID * np.arange(len(done[loop])), done[loop], color=colour, linewidth=1.2, where='post',
+        for loop, colour in zip(loops, LINE_COLOURS):
+            panel.step(GRID_STEP_S * np.arange(len(done[loop])), done[loop], color=colour, linewidth=1.2, where='post',
                        label=label(loop))
-        panel.axhline(1.0, color=INK, linewidth=0.6, linestyle='--')
+        panel.axhline(1.0, color=INK_COLOUR, linewidth=0.6, linestyle='--')
         panel.set_xlim(0.0, seconds)
     axes[0, 0].set_ylim(-0.05, 2.3)
     figure.suptitle(title)
@@ -35,12 +43,12 @@ def steps(done, label, title, seconds):
 def lags(done, title, seconds):
     """Errors {label: {S: (as the receiver reads it, true error (n,)) [rad]}}: above the reading, below the truth."""
     figure, axes = side_by_side(2, y=('receiver reads [deg]', 'true error [deg]'))
-    for (label, by_smoothing), colour in zip(done.items(), COLOURS):
-        for column, S in zip(axes.T, SMOOTHED):
+    for (label, by_smoothing), colour in zip(done.items(), LINE_COLOURS):
+        for column, S in zip(axes.T, SMOOTHING_TITLES):
             for panel, error in zip(column, by_smoothing[S]):
-                first = round(seconds[0] / GRID), round(seconds[1] / GRID)
+                first = round(seconds[0] / GRID_STEP_S), round(seconds[1] / GRID_STEP_S)
                 error = np.degrees(error[slice(*first)])
-                panel.plot(GRID * np.arange(*first), error, color=colour, linewidth=0.9, label=label)
+                panel.plot(GRID_STEP_S * np.arange(*first), error, color=colour, linewidth=0.9, label=label)
     figure.suptitle(title)
     return drawing.legend(figure)
 
@@ -50,7 +58,7 @@ def stability(limits):
     figure, axes = new_panels(1, 3, height=3.6, width=9.6, x=('alpha', 'alpha', 'true slope over assumed'),
                               y='largest stable delay [ms]')
     for panel, T in zip(axes[0], (10, 5)):
-        for S, colour in zip(SMOOTHED, COLOURS):
+        for S, colour in zip(SMOOTHING_TITLES, LINE_COLOURS):
             by_alpha = {loop.alpha: both for loop, both in limits.items() if loop.smoothing == S and loop.period == T
                      and loop.slope == 1.0 and loop.form == 'type_1'}
             panel.plot(list(by_alpha), [bisected for bisected, _ in by_alpha.values()], color=colour, label=S)
@@ -60,20 +68,21 @@ def stability(limits):
     by_slope = {loop.slope: both for loop, both in limits.items() if loop.alpha == 0.1 and loop.smoothing == 'S1'
              and loop.period == 10 and loop.form == 'type_1'}
     order = sorted(by_slope)
-    axes[0, 2].plot(order, [by_slope[slope][0] for slope in order], color=TRUTH)
-    axes[0, 2].plot(order, [by_slope[slope][1] for slope in order], 'o', color=TRUTH, markersize=4)
+    axes[0, 2].plot(order, [by_slope[slope][0] for slope in order], color=TRUTH_COLOUR)
+    axes[0, 2].plot(order, [by_slope[slope][1] for slope in order], 'o', color=TRUTH_COLOUR, markersize=4)
     axes[0, 2].set_title('alpha 0.1, T = 10 ms, S1')
     axes[0, 2].set_ylim(0.0, 220.0)
     figure.suptitle('delay until the loop is unstable: bisection (lines) and eigenvalues (dots)')
     return drawing.legend(figure)
 
 
-def better(errors, seconds):
+def filter_loop_errors(errors, seconds):
     """True errors {case: (n,) [rad]} without noise of the paper's loop and of better ones."""
     figure, axes = new_panels(3, height=7.6, y='off by up to [deg]', sharex=True)
-    lines = {'paper': RAW, 'paper-delta': INK, 'type-2': MOTOR_2, 'tracked-10ms': MOTOR_1, 'best': FILTERED}
-    first = slice(*(round(t / GRID) for t in seconds))
-    t = GRID * np.arange(first.start, first.stop)
+    lines = {'paper': RAW_COLOUR, 'paper-delta': INK_COLOUR, 'type-2': MOTOR_2_COLOUR, 'tracked-10ms': MOTOR_1_COLOUR,
+             'best': FILTERED_COLOUR}
+    first = slice(*(round(t / GRID_STEP_S) for t in seconds))
+    t = GRID_STEP_S * np.arange(first.start, first.stop)
     for panel, target, title in zip(axes[:, 0], ('ramp', 'sine', 'sway'),
                                     ('30 deg/s', 'sine of 30 deg/s and 10 deg/s2', 'sway of 10 deg in 8 s')):
         for loop, colour in lines.items():
@@ -82,7 +91,8 @@ def better(errors, seconds):
                                linewidth=1.1, label=loop)
         panel.set_title(title, fontsize=10)
         panel.set_ylim(1e-5, 1.0)
-    axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][first]))), color=TRUTH, linewidth=1.1,
+    axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][first]))), color=TRUTH_COLOUR,
+                        linewidth=1.1,
                         label='best with INS, 5 ms late')
     figure.suptitle('true error without noise, 20 ms of delay (best on the ramp: none)')
     return drawing.legend(figure)
@@ -96,11 +106,12 @@ def envelope(x, width=10):
 def loss(records, seconds):
     """True errors {label: (n,) in beamwidths} of a loop just before and after it loses the target."""
     figure, axes = new_panels(1, height=3.6, y='true error [beamwidths]')
-    panel, first = axes[0, 0], slice(*(round(t / GRID) for t in seconds))
-    for (label, error), colour in zip(records.items(), COLOURS):
-        panel.plot(GRID * np.arange(first.start, first.stop), error[first], color=colour, linewidth=1.0, label=label)
+    panel, first = axes[0, 0], slice(*(round(t / GRID_STEP_S) for t in seconds))
+    for (label, error), colour in zip(records.items(), LINE_COLOURS):
+        panel.plot(GRID_STEP_S * np.arange(first.start, first.stop), error[first], color=colour, linewidth=1.0,
+                   label=label)
     for half in (-0.5, 0.5):
-        panel.axhline(half, color=INK, linewidth=0.8, linestyle='--')
+        panel.axhline(half, color=INK_COLOUR, linewidth=0.8, linestyle='--')
     panel.set_ylim(-1.5, 1.5)
     panel.set_title('no signal beyond half a beamwidth (dashed)')
     return drawing.legend(figure)

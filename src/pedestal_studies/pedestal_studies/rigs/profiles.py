@@ -10,36 +10,37 @@ import numpy as np
 
 PROFILES = ('flyby-500m', 'flyby-60m', 's-turn-500m', 's-20deg')
 
-DURATION = 60.0
+RECORD_DURATION_S = 60.0
 """Of a record [s]."""
 
-SPEED = 15.0
+FLYBY_SPEED_M_S = 15.0
 """Of the flybys [m/s]."""
 
-NEAREST = {'flyby-500m': 500.0, 'flyby-60m': 60.0}
+MIN_FLYBY_DISTANCES_M = {'flyby-500m': 500.0, 'flyby-60m': 60.0}
 """Distance of the flybys when they are nearest [m]."""
 
-TURN_ACCELERATION, TURN_DISTANCE = 3.0, 500.0
+TURN_ACCELERATION_M_S2, TURN_DISTANCE_M = 3.0, 500.0
 """Of the S-turn [m/s2, m]: a bank of 17 deg."""
 
-TURNS, ROLL_TIME = {14.0: 1.0, 22.0: -1.0, 38.0: 1.0, 46.0: 0.0}, 1.0
+TURN_SCHEDULE, ROLL_DURATION_S = {14.0: 1.0, 22.0: -1.0, 38.0: 1.0, 46.0: 0.0}, 1.0
 """When the target rolls [s], into which turn (0: straight on), and how long that takes [s]. The reference gives only
 the acceleration and the distance; straight legs before and after give its numbers for cv and ca."""
 
-STROKE, RATE, REVERSAL = math.radians(20.0), math.radians(3.5), 1.0
+S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S, S_MOTION_REVERSAL_S = math.radians(20.0), math.radians(3.5), 1.0
 """Of paper 003's S motion, from end to end [rad], between its ends [rad/s], and the time of a reversal, ours [s]."""
 
 
 def truth(name, t):
     """(angle, rate, acceleration), each (n,), of a profile at t (n,) [s]; KeyError for an unknown name."""
-    if name in NEAREST:
-        return flyby(t - 0.5 * DURATION, SPEED / NEAREST[name])
-    return {'s-turn-500m': s_turn, 's-20deg': lambda t: s_motion(t, STROKE, RATE, REVERSAL)}[name](t)
+    if name in MIN_FLYBY_DISTANCES_M:
+        return flyby(t - 0.5 * RECORD_DURATION_S, FLYBY_SPEED_M_S / MIN_FLYBY_DISTANCES_M[name])
+    return {'s-turn-500m': s_turn, 's-20deg': lambda t: s_motion(t, S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S,
+                                                                 S_MOTION_REVERSAL_S)}[name](t)
 
 
 def distance(name, t):
     """Distance [m] of a flyby from the antenna at t (n,) [s]; KeyError for another profile."""
-    return np.hypot(NEAREST[name], SPEED * (t - 0.5 * DURATION))
+    return np.hypot(MIN_FLYBY_DISTANCES_M[name], FLYBY_SPEED_M_S * (t - 0.5 * RECORD_DURATION_S))
 
 
 def flyby(t, w):
@@ -53,9 +54,9 @@ def s_turn(t):
     """(angle, rate, acceleration) (n,) of an S-turn at t (n,) [s]: a turn to one side, one twice as long to the other
     side, and a third back to the old course; straight before and after."""
     motion, before = [0.0, 0.0, 0.0], 0.0
-    for at, side in TURNS.items():
-        jump = (side - before) * TURN_ACCELERATION / TURN_DISTANCE
-        motion = [x + jump * more for x, more in zip(motion, _step(t - at, ROLL_TIME))]
+    for at, side in TURN_SCHEDULE.items():
+        jump = (side - before) * TURN_ACCELERATION_M_S2 / TURN_DISTANCE_M
+        motion = [x + jump * more for x, more in zip(motion, _step(t - at, ROLL_DURATION_S))]
         before = side
     return tuple(motion)
 

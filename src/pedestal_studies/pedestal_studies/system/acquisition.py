@@ -13,42 +13,42 @@ from scipy.stats import beta
 
 from acu_tracker.modes import Mode
 from acu_tracker.search.params import SearchParameters
-from acu_tracker.search.pattern import PATTERNS, SPIRAL, SQUARE
-from pedestal_analysis.report.figures import FILTERED, new_panels
-from pedestal_analysis.results.intervals import CONFIDENCE, row
+from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
+from pedestal_analysis.report.figures import FILTERED_COLOUR, new_panels
+from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL, row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
 from pedestal_studies.rigs.rows import Result
 
-RUNS, SEED = 100, 1
+DEFAULT_RUNS, FIRST_SEED = 100, 1
 
-BATCH = 5
+BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
 
-ERRORS, MODE = 'tracking_receiver/angle_error', 'acu/mode'
+ERROR_TOPIC, MODE_TOPIC = 'tracking_receiver/angle_error', 'acu/mode'
 
-FROM_POWER_UP = ('late_tle', 'sidelobe')
-AFTER_LOSS = ('fade', 'blockage', 'manoeuvre_in_coast')
+POWER_UP_CASES = ('late_tle', 'sidelobe')
+SIGNAL_LOSS_CASES = ('fade', 'blockage', 'manoeuvre_in_coast')
 
-ELEVATION = 0.6
+TARGET_ELEVATION_RAD = 0.6
 """Of the target of the search cases [rad]."""
 
-SEARCH = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.acquisition.expected_dbhz': 0.0,
-          'tracking_receiver.receiver.cn0_dbhz': 46.4}
+SEARCH_PARAMETERS = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.acquisition.expected_dbhz': 0.0,
+                     'tracking_receiver.receiver.cn0_dbhz': 46.4}
 """What makes of the scenario sidelobe one of a search."""
 
-SEARCH_DURATION = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}
+SEARCH_DURATIONS_S = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}
 """One round and what follows [s]."""
 
-FOUND = '>= 99'
+FOUND_PERCENT_TARGET = '>= 99'
 """Target of found_percent."""
 
-CASES = (*FROM_POWER_UP, *AFTER_LOSS, 'steptrack_geo', *(f'search-{name}' for name in PATTERNS))
+CASE_NAMES = (*POWER_UP_CASES, *SIGNAL_LOSS_CASES, 'steptrack_geo', *(f'search-{name}' for name in SEARCH_PATTERNS))
 
-IN_THE_BEAM = 0.2
+MAX_FOUND_ERROR_BEAMWIDTHS = 0.2
 """Largest true error of a target that is found [beamwidths]."""
 
-SETTLED = 90.0
+STEPTRACK_SETTLING_TIME_S = 90.0
 """Time [s] after which step track is on its target."""
 
 
@@ -60,10 +60,11 @@ def case_of(name, seed):
     if not name.startswith('search-'):
         return Case(name, name, seed=seed)
     pattern = name.removeprefix('search-')
-    x, e = offset(PATTERNS.index(pattern), rng)
-    return Case(name, 'sidelobe', {**SEARCH, 'acu.search.pattern': pattern, 'scenario.program.elevation_offset': e,
-                                   'scenario.program.azimuth_offset': x / math.cos(ELEVATION)},
-                SEARCH_DURATION[pattern], seed)
+    x, e = offset(SEARCH_PATTERNS.index(pattern), rng)
+    return Case(name, 'sidelobe', {**SEARCH_PARAMETERS, 'acu.search.pattern': pattern,
+                                   'scenario.program.elevation_offset': e,
+                                   'scenario.program.azimuth_offset': x / math.cos(TARGET_ELEVATION_RAD)},
+                SEARCH_DURATIONS_S[pattern], seed)
 
 
 def offset(pattern, rng, beamwidth=0.0175):
@@ -71,7 +72,7 @@ def offset(pattern, rng, beamwidth=0.0175):
     p = SearchParameters()
     while True:
         x, e = rng.uniform(-1.0, 1.0, 2) * p.full * beamwidth
-        if pattern not in (SPIRAL, SQUARE):
+        if pattern not in (PATTERN_SPIRAL, PATTERN_SQUARE):
             return x, e * p.across
         if math.hypot(x, e) <= p.full * beamwidth:
             return x, e
@@ -80,7 +81,7 @@ def offset(pattern, rng, beamwidth=0.0175):
 def tracked_after(run, from_loss):
     """Time [s] from the start, or from the first loss of the signal in autotrack, until the target is tracked for
     good; NaN where it is not at the end."""
-    tracked = (run[MODE] == Mode.AUTOTRACK) & np.isfinite(run[ERRORS]['vector'][:, 0])
+    tracked = (run[MODE_TOPIC] == Mode.AUTOTRACK) & np.isfinite(run[ERROR_TOPIC]['vector'][:, 0])
     if not tracked[-1]:
         return math.nan
     bad = np.flatnonzero(~tracked)
@@ -102,22 +103,22 @@ def batch(item):
     beam at the end; of steptrack_geo the rms of the level lost [dB] and the largest error [beamwidths]."""
     name, first, count = item
     values = []
-    for seed in range(SEED + first, SEED + first + count):
+    for seed in range(FIRST_SEED + first, FIRST_SEED + first + count):
         run = case_of(name, seed).run()
         off = off_axis(run)
         if name == 'steptrack_geo':
-            settled = off[run.t > SETTLED]
+            settled = off[run.t > STEPTRACK_SETTLING_TIME_S]
             values.append((math.sqrt(np.mean((12.0 * settled**2)**2)), settled.max()))
         else:
-            after = tracked_after(run, name in AFTER_LOSS)
-            values.append((after, float(math.isfinite(after) and off[-1] < IN_THE_BEAM)))
+            after = tracked_after(run, name in SIGNAL_LOSS_CASES)
+            values.append((after, float(math.isfinite(after) and off[-1] < MAX_FOUND_ERROR_BEAMWIDTHS)))
     return np.array(values)
 
 
 def least_share(found, runs):
     """Lower end of the CONFIDENCE interval of the share of which `found` of so many runs are a sample (Clopper and
     Pearson, Biometrika 26 (1934) 404)."""
-    return float(beta.ppf(0.5 * (1.0 - CONFIDENCE), found, runs - found + 1)) if found else 0.0
+    return float(beta.ppf(0.5 * (1.0 - CONFIDENCE_LEVEL), found, runs - found + 1)) if found else 0.0
 
 
 def rows(values):
@@ -132,16 +133,16 @@ def rows(values):
         found = second == 1.0
         if found.any():
             table.append(row(name, 'tracked_after_s', first[found], 's'))
-        table += [row(name, 'found_percent', 100.0 * float(found.mean()), '%', target=FOUND),
+        table += [row(name, 'found_percent', 100.0 * float(found.mean()), '%', target=FOUND_PERCENT_TARGET),
                   row(name, 'found_percent_low', 100.0 * least_share(int(found.sum()), len(found)), '%')]
     return table
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH, progress)
+    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASE_NAMES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'time': lambda: time_figure(values)},
-                  [f'Seeds {SEED} to {SEED + runs - 1}. tracked_after_s: of the runs that found their target.'])
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. tracked_after_s: of the runs that found their target.'])
 
 
 def time_figure(values):
@@ -150,7 +151,7 @@ def time_figure(values):
     for name, of_runs in values.items():
         if name != 'steptrack_geo':
             found = of_runs[of_runs[:, 1] == 1.0, 0]
-            axes[0, 0].plot(found, [name] * len(found), '|', color=FILTERED)
+            axes[0, 0].plot(found, [name] * len(found), '|', color=FILTERED_COLOUR)
     axes[0, 0].invert_yaxis()
     axes[0, 0].set_xlim(left=0.0)
     return figure

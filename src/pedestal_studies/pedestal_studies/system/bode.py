@@ -12,7 +12,15 @@ import numpy as np
 
 from acu_tracker.params import AcuParameters
 from adu_drive.params import AduParameters
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_common.graph.topics import AXES
@@ -26,31 +34,32 @@ def controller(name):
     return frequency.case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
-FAST = {'acu.azimuth.feedforward.bandwidth': 40.0}
-STRUCTURE = {**FAST, 'adu.azimuth.structure.inertia_share': 0.5, 'adu.azimuth.structure.frequency': 8.0}
-NOTCH = {**STRUCTURE, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
-         'acu.azimuth.notch.depth': 0.3}
+FAST_LOOP_PARAMETERS = {'acu.azimuth.feedforward.bandwidth': 40.0}
+STRUCTURE_PARAMETERS = {**FAST_LOOP_PARAMETERS, 'adu.azimuth.structure.inertia_share': 0.5,
+                        'adu.azimuth.structure.frequency': 8.0}
+NOTCH_PARAMETERS = {**STRUCTURE_PARAMETERS, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
+                    'acu.azimuth.notch.depth': 0.3}
 """Half of the load swings on the other half; the notch lies where the loop without it has its resonance."""
 
-CASES = {
+LOOP_CASES = {
     'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
     'adrc': (controller('adrc'), AXES),
-    'paper-r1': (frequency.case('paper-r1', 'servo_sine', servo.R1), AXES[:1]),
-    'best': (frequency.case('best', 'servo_sine', servo.BEST), AXES[:1]),
-    'rigid': (frequency.case('rigid', 'leo_pass', FAST), AXES[:1]),
-    'structure': (frequency.case('structure', 'leo_pass', STRUCTURE), AXES[:1]),
-    'structure-notch': (frequency.case('structure-notch', 'leo_pass', NOTCH), AXES[:1])}
+    'paper-r1': (frequency.case('paper-r1', 'servo_sine', servo.PAPER_R1_PARAMETERS), AXES[:1]),
+    'best': (frequency.case('best', 'servo_sine', servo.BEST_PARAMETERS), AXES[:1]),
+    'rigid': (frequency.case('rigid', 'leo_pass', FAST_LOOP_PARAMETERS), AXES[:1]),
+    'structure': (frequency.case('structure', 'leo_pass', STRUCTURE_PARAMETERS), AXES[:1]),
+    'structure-notch': (frequency.case('structure-notch', 'leo_pass', NOTCH_PARAMETERS), AXES[:1])}
 """Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's; a
 faster one with a rigid load, with a flexible one, and with a notch against that."""
 
-MARGIN_BAND = math.sqrt(10.0)
+MARGIN_BAND_FACTOR = math.sqrt(10.0)
 """Band about crossover, in which the margins are read: |L| within this factor of 1, +-10 dB."""
 
 
 def nonlinearity(measured, smaller):
-    """Largest relative change of L between two excitations, within MARGIN_BAND."""
+    """Largest relative change of L between two excitations, within MARGIN_BAND_FACTOR."""
     change = np.abs(smaller.open_loop / measured.open_loop - 1.0)
-    return float(change[np.abs(np.log(np.abs(measured.open_loop))) < math.log(MARGIN_BAND)].max())
+    return float(change[np.abs(np.log(np.abs(measured.open_loop))) < math.log(MARGIN_BAND_FACTOR)].max())
 
 
 def rows(responses):
@@ -62,10 +71,10 @@ def rows(responses):
 def run(progress) -> Result:
     """Measure all loops, each also with half the excitation."""
     drive = AduParameters()
-    parts = {'current loops': (functools.partial(frequency.current, drive), frequency.CURRENT),
-             'speed loops': (functools.partial(frequency.speed, drive), frequency.SPEED)}
-    parts |= {f'position loop {name}': (functools.partial(frequency.position, case, axes), frequency.POSITION)
-              for name, (case, axes) in CASES.items()}
+    parts = {'current loops': (functools.partial(frequency.current, drive), frequency.CURRENT_SWEEP),
+             'speed loops': (functools.partial(frequency.speed, drive), frequency.SPEED_SWEEP)}
+    parts |= {f'position loop {name}': (functools.partial(frequency.position, case, axes), frequency.POSITION_SWEEP)
+              for name, (case, axes) in LOOP_CASES.items()}
     responses, change = {}, {}
     for i, (text, (measure, sweep)) in enumerate(parts.items()):
         progress(i / len(parts), text)
@@ -90,20 +99,25 @@ def drawings(responses, drive):
 
     return {
         'current': chosen('current loops of the azimuth motors',
-                          {'motor 1': ('current/motor_1', MOTOR_1), 'motor 2': ('current/motor_2', MOTOR_2)},
+                          {'motor 1': ('current/motor_1', MOTOR_1_COLOUR), 'motor 2': ('current/motor_2',
+                                                                                       MOTOR_2_COLOUR)},
                           lambda s: w_c / s),
         'speed': chosen('speed loops',
-                        {'azimuth': ('speed/azimuth', FILTERED), 'elevation': ('speed/elevation', TRUTH)},
+                        {'azimuth': ('speed/azimuth', FILTERED_COLOUR), 'elevation': ('speed/elevation',
+                                                                                      TRUTH_COLOUR)},
                         lambda s: (p.speed_loop.proportional + p.speed_loop.integral / s) / (J * s)),
-        'position': chosen('position loops', {'feed-forward (and pid)': ('position/azimuth/feedforward', FILTERED),
-                            'the same, elevation': ('position/elevation/feedforward', TRUTH),
-                            'adrc': ('position/azimuth/adrc', MOTOR_2)},
+        'position': chosen('position loops', {'feed-forward (and pid)': ('position/azimuth/feedforward',
+                                                                         FILTERED_COLOUR),
+                            'the same, elevation': ('position/elevation/feedforward', TRUTH_COLOUR),
+                            'adrc': ('position/azimuth/adrc', MOTOR_2_COLOUR)},
                            lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
-        'structure': chosen('position loop, azimuth, with a flexible load', {'rigid': ('position/azimuth/rigid', RAW),
-                             'flexible': ('position/azimuth/structure', TRUTH),
-                             'flexible, notch': ('position/azimuth/structure-notch', FILTERED)}),
+        'structure': chosen('position loop, azimuth, with a flexible load',
+                            {'rigid': ('position/azimuth/rigid', RAW_COLOUR),
+                             'flexible': ('position/azimuth/structure', TRUTH_COLOUR),
+                             'flexible, notch': ('position/azimuth/structure-notch', FILTERED_COLOUR)}),
         'paper': chosen("position loop, azimuth, paper 000's and ours",
-                        {'paper': ('position/azimuth/paper-r1', RAW), 'best': ('position/azimuth/best', FILTERED)})}
+                        {'paper': ('position/azimuth/paper-r1', RAW_COLOUR), 'best': ('position/azimuth/best',
+                                                                                      FILTERED_COLOUR)})}
 
 
 def decibel(x):
@@ -131,8 +145,8 @@ def bode_figure(title, curves, design):
             f = next(iter(curves.values()))[0].frequency
             L = design(2j * math.pi * f)
             x = L / (1.0 + L) if column else L
-            gain.semilogx(f, decibel(x), color=INK, lw=0.8, ls='--', label='as designed')
-            phase.semilogx(f, degrees(x), color=INK, lw=0.8, ls='--')
+            gain.semilogx(f, decibel(x), color=INK_COLOUR, lw=0.8, ls='--', label='as designed')
+            phase.semilogx(f, degrees(x), color=INK_COLOUR, lw=0.8, ls='--')
         for i, (label, (measured, colour)) in enumerate(curves.items()):
             keep = measured.deviation < 0.2
             f, x = measured.frequency[keep], (measured.closed_loop if column else measured.open_loop)[keep]
@@ -143,14 +157,14 @@ def bode_figure(title, curves, design):
             at = frequency.margins(measured)['crossover_hz'][0]
             if not column and math.isfinite(at):
                 phase_there = float(np.interp(math.log(at), np.log(f), degrees(x)))
-                gain.plot(at, 0.0, 'x', color=INK, ms=6.0)
-                phase.plot(at, phase_there, 'x', color=INK, ms=6.0)
+                gain.plot(at, 0.0, 'x', color=INK_COLOUR, ms=6.0)
+                phase.plot(at, phase_there, 'x', color=INK_COLOUR, ms=6.0)
                 phase.plot([at, at], [-180.0, phase_there], color=colour, lw=0.8, ls=':')
         gain.set_title(loop)
-        gain.axhline(-3.0 if column else 0.0, color=INK, lw=0.6, ls=':')
+        gain.axhline(-3.0 if column else 0.0, color=INK_COLOUR, lw=0.6, ls=':')
         gain.set_ylim(bottom=-40.0)
         if not column:
-            phase.axhline(-180.0, color=INK, lw=0.6, ls=':')
+            phase.axhline(-180.0, color=INK_COLOUR, lw=0.6, ls=':')
         phase.set_ylim(-360.0, 60.0)
         phase.set_yticks(np.arange(-360.0, 1.0, 90.0))
     return drawing.legend(figure)

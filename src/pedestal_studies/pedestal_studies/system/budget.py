@@ -26,20 +26,20 @@ from pedestal_common.graph import topics
 from pedestal_common.parameters import defaults
 from pedestal_studies.rigs.rows import Result
 
-SCENARIO = 'station_real'
-RUNS, SEED = 30, 1
+SCENARIO_NAME = 'station_real'
+DEFAULT_RUNS, FIRST_SEED = 30, 1
 """Runs of what is random; seed of the first."""
 
-SETTLED, EVERY = 15.0, 0.1
+EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1
 """From when on, and how often, the error is taken [s]."""
 
-TIMES = (30, 90, 150, 210, 270)
+TABLE_TIMES_S = (30, 90, 150, 210, 270)
 """Times of the pass [s] at which contributions are shown with their signs."""
 
-ACROSS = ('cross_elevation', 'elevation')
+ERROR_COLUMNS = ('cross_elevation', 'elevation')
 """The two columns of an error."""
 
-MODES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
+MODE_OVERRIDES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
 """{mode: overrides}."""
 
 
@@ -51,7 +51,7 @@ class Term(typing.NamedTuple):
     doc: str
 
 
-TERMS = (
+ERROR_TERMS = (
     Term('encoder-zero', ('adu.*.encoder.error.zero',), False, 'zeros of both encoders'),
     Term('encoder-eccentricity', ('adu.*.encoder.error.eccentricity_sin', 'adu.*.encoder.error.eccentricity_cos'),
          False, 'discs off their centre, once a turn'),
@@ -77,26 +77,26 @@ TERMS = (
                            'tracking_receiver.path.scintillation.angle'), True, 'turbulent air: level, direction'),
     Term('polarisation', ('tracking_receiver.target.polarisation.axial_ratio_db',
                           'tracking_receiver.antenna.polarisation.axial_ratio_db'), False, 'level lost to a mismatch'))
-BY_NAME = {term.name: term for term in TERMS}
-NONE, WHOLE = 'none', 'whole'
+TERM_BY_NAME = {term.name: term for term in ERROR_TERMS}
+NO_TERMS, ALL_TERMS = 'none', 'whole'
 
-BLIND = ('boresight', 'multipath', 'scintillation', 'polarisation')
+RECEIVER_TERMS = ('boresight', 'multipath', 'scintillation', 'polarisation')
 """Terms of the receiver, which program track does not follow."""
 
 
-def felt(mode):
-    """The TERMS that reach the antenna in a mode."""
-    return [term for term in TERMS if not (mode == 'program' and term.name in BLIND)]
+def active_terms(mode):
+    """The ERROR_TERMS that reach the antenna in a mode."""
+    return [term for term in ERROR_TERMS if not (mode == 'program' and term.name in RECEIVER_TERMS)]
 
 
 def documented(mode, random):
     """{name: what it is} of the systematic or of the random contributions in a mode."""
     if random:
         noise = {'noise': 'of the receiver'} if mode == 'autotrack' else {}
-        return noise | {term.name: f'{term.doc}: off its mean' for term in felt(mode) if term.random}
+        return noise | {term.name: f'{term.doc}: off its mean' for term in active_terms(mode) if term.random}
     return {'servo': 'lag, friction, quantisation, structure under the unbalance',
-            **{term.name: term.doc for term in felt(mode) if not term.random},
-            **{f'{term.name}-mean': f'{term.doc}: mean of the seeds' for term in felt(mode) if term.random}}
+            **{term.name: term.doc for term in active_terms(mode) if not term.random},
+            **{f'{term.name}-mean': f'{term.doc}: mean of the seeds' for term in active_terms(mode) if term.random}}
 
 
 def parameters_of(term):
@@ -115,9 +115,9 @@ def switched_off(term):
 
 
 def overrides(mode, on):
-    """Overrides of a mode with one term on (a name), or NONE, or WHOLE."""
-    off = [] if on == WHOLE else [text for term in TERMS if term.name != on for text in switched_off(term)]
-    return [*MODES[mode], *off]
+    """Overrides of a mode with one term on (a name), or NO_TERMS, or ALL_TERMS."""
+    off = [] if on == ALL_TERMS else [text for term in ERROR_TERMS if term.name != on for text in switched_off(term)]
+    return [*MODE_OVERRIDES[mode], *off]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,16 +129,16 @@ class Pass:
 
 
 def _run(mode, on, seed, duration):
-    chosen = scenario.load(SCENARIO, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
+    chosen = scenario.load(SCENARIO_NAME, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
                            duration=duration)
     run = closed_loop.Loop(chosen).run()
-    every = round(EVERY / (run.t[1] - run.t[0]))
-    return run.where(np.arange(len(run.t)) % every == 0).where(run.t[::every] >= SETTLED)
+    every = round(EVALUATION_PERIOD_S / (run.t[1] - run.t[0]))
+    return run.where(np.arange(len(run.t)) % every == 0).where(run.t[::every] >= EVALUATION_START_S)
 
 
-def flown(duration):
+def pass_angles(duration):
     """The Pass of the scenario."""
-    run = _run('program', NONE, SEED, duration)
+    run = _run('program', NO_TERMS, FIRST_SEED, duration)
     azimuth, elevation = np.degrees(run['joint_states']['position'].T)
     return Pass(run.t, azimuth, elevation)
 
@@ -146,7 +146,8 @@ def flown(duration):
 def batch(item, duration=None):
     """Errors (count, n, 2) [deg], cross-elevation and elevation, of an item ((mode, on), first run, count)."""
     (mode, on), first, count = item
-    return np.array([np.degrees(_run(mode, on, SEED + first + i, duration).truth['error']) for i in range(count)])
+    return np.array([np.degrees(_run(mode, on, FIRST_SEED + first + i,
+                                     duration).truth['error']) for i in range(count)])
 
 
 def rms(errors):
@@ -197,23 +198,23 @@ class Budget:
 def budget(mode, runs, duration, pool, progress):
     """The Budget of a mode from so many runs of what is random."""
     of_batch = functools.partial(batch, duration=duration)
-    seeded, once = ([term.name for term in felt(mode) if term.random == kind] for kind in (True, False))
+    seeded, once = ([term.name for term in active_terms(mode) if term.random == kind] for kind in (True, False))
     noisy = mode == 'autotrack'
-    many, few = [*seeded, WHOLE, *[NONE] * noisy], [*once, *[NONE] * (not noisy)]
+    many, few = [*seeded, ALL_TERMS, *[NO_TERMS] * noisy], [*once, *[NO_TERMS] * (not noisy)]
     errors = pool.of_cases(of_batch, [(mode, on) for on in many], runs, 3,
                            lambda share, text: progress(0.8 * share, text))
     errors |= pool.of_cases(of_batch, [(mode, on) for on in few], 1, 1,
                             lambda share, text: progress(0.8 + 0.2 * share, text))
-    base = errors[mode, NONE]
+    base = errors[mode, NO_TERMS]
     return Budget(base, {name: (errors[mode, name] - base[:1])[0] for name in once},
-                  {name: errors[mode, name] - base for name in seeded}, errors[mode, WHOLE])
+                  {name: errors[mode, name] - base for name in seeded}, errors[mode, ALL_TERMS])
 
 
 def _sizes(case, e):
     """Rows of an error (n, 2), or of one of several runs (runs, n, 2)."""
     return [row(case, 'rms_deg', rms(e), 'deg'),
             *(row(case, f'{axis}_rms_deg', tracking.rms(e[..., i], axis=-1), 'deg')
-              for i, axis in enumerate(ACROSS))]
+              for i, axis in enumerate(ERROR_COLUMNS))]
 
 
 def rows(mode, made, place):
@@ -226,29 +227,29 @@ def rows(mode, made, place):
     table += [row(f'{mode}/combined', 'rms_deg', made.combined, 'deg'),
               row(f'{mode}/combined', 'to_whole', pseudo_values(seeds, lambda some: made.of(some).to_whole), '',
                   target='0.9 to 1.1')]
-    for time in TIMES:
+    for time in TABLE_TIMES_S:
         if place.times[0] <= time <= place.times[-1]:
             k = int(np.argmin(np.abs(place.times - time)))
             near, case = slice(max(k - 5, 0), k + 6), f'{mode}/{time}s'
             table += [row(case, 'azimuth_deg', float(place.azimuth[k]), 'deg'),
                       row(case, 'elevation_deg', float(place.elevation[k]), 'deg')]
             table += [row(case, f'{name}_{axis}_deg', float(e[near, i].mean()), 'deg')
-                      for name, e in systematic.items() for i, axis in enumerate(ACROSS)]
+                      for name, e in systematic.items() for i, axis in enumerate(ERROR_COLUMNS)]
     return table
 
 
-def run(progress, runs=RUNS, pool=None, duration=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None, duration=None) -> Result:
     """The budget of every mode; pool: monte_carlo.Pool, None for this process; duration [s]: of the pass, None for the
     scenario's."""
     if runs < 3:
         raise ValueError(f'--runs {runs}: must be at least 3, to tell what is random from what is not')
-    pool, place, made = pool or monte_carlo.Pool(1), flown(duration), {}
-    for i, mode in enumerate(MODES):
+    pool, place, made = pool or monte_carlo.Pool(1), pass_angles(duration), {}
+    for i, mode in enumerate(MODE_OVERRIDES):
         made[mode] = budget(mode, runs, duration, pool,
-                            lambda share, text, i=i: progress((i + share) / len(MODES), text))
+                            lambda share, text, i=i: progress((i + share) / len(MODE_OVERRIDES), text))
     table = [line for mode, of_mode in made.items() for line in rows(mode, of_mode, place)]
     return Result(table, {'budget': functools.partial(figure, made, place)},
-                  [f'Seeds {SEED} to {SEED + runs - 1}; pedestal run {SCENARIO} is the whole of autotrack.'],
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}; pedestal run {SCENARIO_NAME} is the whole of autotrack.'],
                   [line for line in table if not line['case'].endswith('s')])
 
 
@@ -262,7 +263,7 @@ def figure(made, place):
         left.set_title(mode)
         left.set_xlabel('rms [deg]')
         total = sum(of_mode.systematic.values())
-        for i, axis in enumerate(ACROSS):
+        for i, axis in enumerate(ERROR_COLUMNS):
             line, = right.plot(place.times, of_mode.whole.mean(axis=0)[:, i], linewidth=0.7, label=axis)
             right.plot(place.times, total[:, i], '--', color=line.get_color())
         right.set_title('whole (mean of the seeds) and systematic sum (dashed)')

@@ -1,67 +1,78 @@
 """Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
 
-Cases <profile>/<filter>/<noise>, measurements at 100 Hz. Every filter but those of FIXED is tuned for each profile and
+Cases <profile>/<filter>/<noise>, measurements at 100 Hz. Every filter but those of UNTUNED_FILTERS is tuned for each
+profile and
 noise by the procedure of `tuning` for the least angle rms over TUNING_RUNS records of other seeds; imm has its default
 parameters, imm-manoeuvre those of one that expects a manoeuvre any time. `-rate-X`: with an independent rate
 measurement of X deg/s rms. `-expecting`: knows the bandwidth of coloured noise, and has no case with white noise.
-Every run has its own rms and means, after SETTLED.
+Every run has its own rms and means, after SETTLING_TIME_S.
 """
 import dataclasses
 import math
 
 import numpy as np
 
-from acu_tracker.estimation.filters.kinds import KINDS
-from acu_tracker.estimation.filters.motion_models import MODELS
+from acu_tracker.estimation.filters.kinds import FILTER_KINDS
+from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
-from pedestal_analysis.report.figures import FILTERED, INK, MOTOR_1, MOTOR_2, RAW, TRUTH, new_panels
+from pedestal_analysis.report.figures import (
+    FILTERED_COLOUR,
+    INK_COLOUR,
+    MOTOR_1_COLOUR,
+    MOTOR_2_COLOUR,
+    RAW_COLOUR,
+    TRUTH_COLOUR,
+    new_panels,
+)
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
-from pedestal_analysis.tuning import tuning
+from pedestal_analysis.tuning import parameter_search
 from pedestal_common.parameters import build
 from pedestal_studies.rigs import drawing, ensemble, profiles
 from pedestal_studies.rigs.ensemble import Noise
 from pedestal_studies.rigs.rows import Result
 
-RUNS = 200
+DEFAULT_RUNS = 200
 """Of each case."""
 
-BATCH = 25
+BATCH_RUNS = 25
 """Runs that one worker makes at a time."""
 
-SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
+NOISE_SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
 
-SETTLED = 3.0
+SETTLING_TIME_S = 3.0
 """Moments are taken from here on [s]."""
 
-NOISES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
-          for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
+NOISE_CASES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
+               for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
 """rms [deg]; coloured: through a first-order lag of 5 Hz."""
 
-RATES = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
+RATE_SIGMAS_RAD_S = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
 """Filters with a rate measurement: standard deviation of that [rad/s]."""
 
-MANOEUVRE = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0, 'imm.cv.noise': math.radians(0.003),
-             'imm.ca.noise': math.radians(0.1)}
+MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0,
+                        'imm.cv.noise': math.radians(0.003),
+                        'imm.ca.noise': math.radians(0.1)}
 
-EXPECTING = ('ca-expecting', 'imm-expecting')
+NOISE_AWARE_FILTERS = ('ca-expecting', 'imm-expecting')
 
-FILTERS = {**{kind: FilterParameters(kind=kind) for kind in KINDS if kind != 'imm_ukf'},
-           'imm-manoeuvre': build(FilterParameters, {'kind': 'imm', **MANOEUVRE}),
-           **{name: FilterParameters(kind=name.partition('-')[0]) for name in (*RATES, *EXPECTING)}}
+FILTERS = {**{kind: FilterParameters(kind=kind) for kind in FILTER_KINDS if kind != 'imm_ukf'},
+           'imm-manoeuvre': build(FilterParameters, {'kind': 'imm', **MANOEUVRE_PARAMETERS}),
+           **{name: FilterParameters(kind=name.partition('-')[0]) for name in (*RATE_SIGMAS_RAD_S,
+                                                                               *NOISE_AWARE_FILTERS)}}
 
-FIXED = ('imm', 'imm-manoeuvre', 'imm-expecting', 'imm_ukf')
+UNTUNED_FILTERS = ('imm', 'imm-manoeuvre', 'imm-expecting', 'imm_ukf')
 """Filters that are not tuned."""
 
-RANGED = ('flyby-60m', 1.0)
+RANGED_CASE = ('flyby-60m', 1.0)
 """Where imm_ukf is shown, and the standard deviation of the range it measures [m]."""
 
 SHOWN_FILTERS = (*FILTERS, 'imm_ukf')
 
-SHOWN = 'white-0.03'
+SHOWN_NOISE = 'white-0.03'
 """The noise of the figures and of the table of remarks."""
 
-TARGETS = {
+METRIC_TARGETS = {
     ('flyby-500m', 'current_statistical', 'reduction'): '>= 6.5',
     ('flyby-60m', 'current_statistical', 'reduction'): '>= 2.8',
     ('flyby-500m', 'current_statistical-rate-0.1', 'reduction'): '>= 7.3',
@@ -73,23 +84,24 @@ TARGETS = {
     ('s-turn-500m', 'imm', 'angle_rms_deg'): '<= 0.0089', ('s-20deg', 'imm', 'angle_rms_deg'): '<= 0.0155'}
 """Of the noise white-0.03; of imm: 1.15 times the best tuned filter of one model."""
 
-CONSISTENT = (0.8, 1.25)
+CONSISTENCY_LIMITS = (0.8, 1.25)
 """Range of mean NIS per degree of freedom, and of rms error over the filter's own sigma, of a consistent filter."""
 
 
-def freedom(name):
+def degrees_of_freedom(name):
     """Degrees of freedom of the innovation of a filter."""
-    return 1 + (name in RATES)
+    return 1 + (name in RATE_SIGMAS_RAD_S)
 
 
 def times():
     """Instants of the measurements of a record (n,) [s]."""
-    return ensemble.PERIOD * np.arange(round(profiles.DURATION / ensemble.PERIOD))
+    return ensemble.MEASUREMENT_PERIOD_S * np.arange(round(profiles.RECORD_DURATION_S / ensemble.MEASUREMENT_PERIOD_S))
 
 
 def noise_of(noise, name):
-    """The Noise of a name of NOISES, as the filter of a name of FILTERS gets it."""
-    return dataclasses.replace(NOISES[noise], rate_sigma=RATES.get(name), expected=name in EXPECTING)
+    """The Noise of a name of NOISE_CASES, as the filter of a name of FILTERS gets it."""
+    return dataclasses.replace(NOISE_CASES[noise], rate_sigma=RATE_SIGMAS_RAD_S.get(name),
+                               expected=name in NOISE_AWARE_FILTERS)
 
 
 def measured(params, profile, noise, seed, first, count):
@@ -101,7 +113,7 @@ def measured(params, profile, noise, seed, first, count):
 
 def settled(sums):
     """Sum (runs,) of MOMENTS (runs, n) over the time once the filter has settled."""
-    return ensemble.over_time(sums[:, round(SETTLED / ensemble.PERIOD):])
+    return ensemble.over_time(sums[:, round(SETTLING_TIME_S / ensemble.MEASUREMENT_PERIOD_S):])
 
 
 def tune(item):
@@ -116,10 +128,10 @@ def tune(item):
         sums = settled(ensemble.moments(params, t, truth, noise_known, records))
         return math.sqrt(sums['angle2'].sum() / sums['runs'].sum())
 
-    return tuning.tuned(FILTERS[name], angle_rms)[0]
+    return parameter_search.tuned(FILTERS[name], angle_rms)[0]
 
 
-THINNED = 10
+THINNING_STEPS = 10
 """Figures show every tenth measurement."""
 
 
@@ -129,35 +141,36 @@ def batch(item):
     profile, noise, filters, first, count = item
     sums_of = {}
     for name, params in filters.items():
-        sums = measured(params, profile, noise_of(noise, name), SEED, first, count)
-        sums_of[name] = settled(sums), ensemble.over_runs(sums[:, ::THINNED])
-    if profile == RANGED[0]:
+        sums = measured(params, profile, noise_of(noise, name), NOISE_SEED, first, count)
+        sums_of[name] = settled(sums), ensemble.over_runs(sums[:, ::THINNING_STEPS])
+    if profile == RANGED_CASE[0]:
         t = times()
         sums = ensemble.unscented_moments(UkfParameters(), profiles.truth(profile, t), profiles.distance(profile, t),
-                                          NOISES[noise], RANGED[1], (SEED, first, count))
-        sums_of['imm_ukf'] = settled(sums), ensemble.over_runs(sums[:, ::THINNED])
+                                          NOISE_CASES[noise], RANGED_CASE[1], (NOISE_SEED, first, count))
+        sums_of['imm_ukf'] = settled(sums), ensemble.over_runs(sums[:, ::THINNING_STEPS])
     return sums_of
 
 
-def run(progress, runs=RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISES)) -> Result:
-    """on: the profiles, noises: names of NOISES; fewer than all for a quick look."""
+def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE_CASES)) -> Result:
+    """on: the profiles, noises: names of NOISE_CASES; fewer than all for a quick look."""
     pool = pool or monte_carlo.Pool(1)
-    able = {noise: [name for name in FILTERS if NOISES[noise].bandwidth or name not in EXPECTING] for noise in noises}
+    able = {noise: [name for name in FILTERS if NOISE_CASES[noise].bandwidth
+                    or name not in NOISE_AWARE_FILTERS] for noise in noises}
     wanted = [(profile, noise, name) for profile in on for noise in noises for name in able[noise]
-              if name not in FIXED]
-    tuned = {(profile, noise): {name: FILTERS[name] for name in able[noise] if name in FIXED}
+              if name not in UNTUNED_FILTERS]
+    tuned = {(profile, noise): {name: FILTERS[name] for name in able[noise] if name in UNTUNED_FILTERS}
              for profile in on for noise in noises}
     for (profile, noise, name), params in zip(wanted, pool.map(
             tune, wanted, lambda share, text: progress(0.5 * share, f'tuning, {text}'))):
         tuned[profile, noise][name] = params
-    items = [(*key, tuned[key], first, count) for key in tuned for first, count in monte_carlo.batches(runs, BATCH)]
+    items = [(*key, tuned[key], first, count) for key in tuned for first, count in monte_carlo.batches(runs, BATCH_RUNS)]
     of_runs, over_time = {}, {}
     for (profile, noise, *_), sums_of in zip(items, pool.map(
             batch, items, lambda share, text: progress(0.5 + 0.5 * share, f'{runs} runs of each case, {text}'))):
         for name, (sums, thinned) in sums_of.items():
             case = profile, name, noise
             of_runs.setdefault(case, []).append(sums)
-            over_time[case] = ensemble.added(over_time[case], thinned) if case in over_time else thinned
+            over_time[case] = ensemble.sum_of_moments(over_time[case], thinned) if case in over_time else thinned
     values = {case: metrics(np.concatenate(sums)) for case, sums in of_runs.items()}
     means = {case: {metric: float(value.mean()) for metric, (value, _) in measured.items()}
              for case, measured in values.items()}
@@ -180,7 +193,7 @@ def metrics(sums):
 def rows(values):
     """A row for every metric of every case (profile, filter, noise)."""
     return [row('/'.join(case), metric, value, unit,
-                target=TARGETS.get((*case[:2], metric)) if case[2] == SHOWN else None)
+                target=METRIC_TARGETS.get((*case[:2], metric)) if case[2] == SHOWN_NOISE else None)
             for case, measured in values.items() for metric, (value, unit) in measured.items()]
 
 
@@ -199,30 +212,30 @@ def _cell(measured):
 def remarks(values, tuned, runs):
     """Sentences that the rows need, with a table of the profiles; values {case: {metric: mean over the runs}}."""
     lines = [f'{runs} runs of each case. Angle rms [deg] (reduction), rate rms [deg/s], error over own sigma of angle '
-             f'and rate, noise {SHOWN} deg; every case is in the rows of --json.']
-    on = [profile for profile, noise in tuned if noise == SHOWN]
+             f'and rate, noise {SHOWN_NOISE} deg; every case is in the rows of --json.']
+    on = [profile for profile, noise in tuned if noise == SHOWN_NOISE]
     if on:
         lines.append(f'{"":30}' + ''.join(f'{profile:34}' for profile in on).rstrip())
-        lines += [f'{name:30}' + ''.join(_cell(values.get((profile, name, SHOWN))) for profile in on).rstrip()
+        lines += [f'{name:30}' + ''.join(_cell(values.get((profile, name, SHOWN_NOISE))) for profile in on).rstrip()
                   for name in SHOWN_FILTERS]
     for colour in ('white', 'coloured'):
         inconsistent = {}
         for (_, name, noise), measured in values.items():
-            measures = {'NIS': measured['nis_mean'] / freedom(name), 'angle': measured['angle_over_sigma'],
+            measures = {'NIS': measured['nis_mean'] / degrees_of_freedom(name), 'angle': measured['angle_over_sigma'],
                         'rate': measured['rate_over_sigma']}
             if noise.startswith(colour):
                 for what, value in measures.items():
-                    if not CONSISTENT[0] <= value <= CONSISTENT[1]:
+                    if not CONSISTENCY_LIMITS[0] <= value <= CONSISTENCY_LIMITS[1]:
                         inconsistent.setdefault(name, {}).setdefault(what, []).append(value)
         listed = [f'    {name}: '
                   + ', '.join(f'{what} {min(outside):.2f} to {max(outside):.2f}' for what, outside in ranges.items())
                   for name, ranges in inconsistent.items()]
         if listed:
             lines += [f'Not honest under {colour} noise, NIS per degree of freedom or error over own sigma outside '
-                      f'{CONSISTENT[0]:g} to {CONSISTENT[1]:g} in some case:', *listed]
+                      f'{CONSISTENCY_LIMITS[0]:g} to {CONSISTENCY_LIMITS[1]:g} in some case:', *listed]
     pairs = [(values[profile, name, noise]['reduction'],
               values[profile, name, noise.replace('white', 'coloured')]['reduction'])
-             for profile, name, noise in values if noise == SHOWN
+             for profile, name, noise in values if noise == SHOWN_NOISE
              and (profile, name, noise.replace('white', 'coloured')) in values and name == 'current_statistical']
     if pairs:
         lines.append('A reduction is one of white noise at 100 Hz: at the same rms within 5 Hz current_statistical '
@@ -233,8 +246,8 @@ def remarks(values, tuned, runs):
 
 
 def figures(values, over_time):
-    """{name: function that draws it} of the cases with the noise SHOWN; values as of `remarks`."""
-    on = list(dict.fromkeys(profile for profile, _, noise in values if noise == SHOWN))
+    """{name: function that draws it} of the cases with the noise SHOWN_NOISE; values as of `remarks`."""
+    on = list(dict.fromkeys(profile for profile, _, noise in values if noise == SHOWN_NOISE))
     if not on:
         return {}
     return {'errors': lambda: errors_figure(over_time, on), 'rates': lambda: errors_figure(over_time, on, 'rate'),
@@ -243,20 +256,21 @@ def figures(values, over_time):
             'noise': lambda: noise_figure(values, on)}
 
 
-COMPARED = {'current_statistical': RAW, 'current_statistical-rate-0.1': FILTERED, 'imm': TRUTH}
+FILTER_COLOURS = {'current_statistical': RAW_COLOUR, 'current_statistical-rate-0.1': FILTERED_COLOUR,
+                  'imm': TRUTH_COLOUR}
 """Filters of the error figures, with their colours."""
 
 
 def errors_figure(over_time, on, what='angle'):
     """Ensemble of the error over time, mean +-1 sigma, and dashed the filter's own sigma."""
     unit = 'deg' if what == 'angle' else 'deg/s'
-    figure, axes = new_panels(len(on), len(COMPARED), height=1.0 + 1.4 * len(on),
+    figure, axes = new_panels(len(on), len(FILTER_COLOURS), height=1.0 + 1.4 * len(on),
                               y=[f'{profile}\n[{unit}]' for profile in on], sharex=True, sharey='row')
-    t = times()[::THINNED]
-    after = t >= SETTLED
+    t = times()[::THINNING_STEPS]
+    after = t >= SETTLING_TIME_S
     for line, profile in zip(axes, on):
-        for panel, (name, colour) in zip(line, COMPARED.items()):
-            sums = over_time[profile, name, SHOWN][after]
+        for panel, (name, colour) in zip(line, FILTER_COLOURS.items()):
+            sums = over_time[profile, name, SHOWN_NOISE][after]
             mean = np.degrees(sums[what] / sums['runs'])
             sigma = np.degrees(np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - (sums[what] / sums['runs']) ** 2,
                                                   0.0)))
@@ -264,8 +278,8 @@ def errors_figure(over_time, on, what='angle'):
             panel.fill_between(t[after], mean - sigma, mean + sigma, color=colour, alpha=0.35, linewidth=0.0)
             panel.plot(t[after], mean, color=colour, linewidth=0.8)
             for side in (-1.0, 1.0):
-                panel.plot(t[after], side * own_sigma, color=INK, linewidth=0.7, linestyle='--')
-    for panel, name in zip(axes[0], COMPARED):
+                panel.plot(t[after], side * own_sigma, color=INK_COLOUR, linewidth=0.7, linestyle='--')
+    for panel, name in zip(axes[0], FILTER_COLOURS):
         panel.set_title(name)
     return figure
 
@@ -283,7 +297,7 @@ def bars(values, on, metric, label, colour, text):
     """(figure, panels (n,)), a panel of bars for each profile; metric, text(filter, metrics), colour(filter)."""
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
-        measured = {name: values.get((profile, name, SHOWN)) for name in SHOWN_FILTERS}
+        measured = {name: values.get((profile, name, SHOWN_NOISE)) for name in SHOWN_FILTERS}
         drawn = panel.barh(list(measured), [metric(name, at) if at else 0.0 for name, at in measured.items()],
                            color=[colour(name) for name in measured])
         panel.bar_label(drawn, [text(name, at) if at else '' for name, at in measured.items()], padding=2, fontsize=8)
@@ -297,7 +311,7 @@ def bars(values, on, metric, label, colour, text):
 
 
 def _colour(name):
-    return TRUTH if name in FIXED else FILTERED if name in RATES else RAW
+    return TRUTH_COLOUR if name in UNTUNED_FILTERS else FILTERED_COLOUR if name in RATE_SIGMAS_RAD_S else RAW_COLOUR
 
 
 def rms_figure(values, on):
@@ -309,13 +323,13 @@ def rms_figure(values, on):
 def nis_figure(values, on):
     """Mean NIS per degree of freedom of every filter; 1 for a consistent one."""
     def nis(name, at):
-        return at['nis_mean'] / freedom(name)
+        return at['nis_mean'] / degrees_of_freedom(name)
 
     figure, panels = bars(values, on, nis, 'NIS per degree of freedom', _colour,
                           lambda name, at: f'{nis(name, at):.2f}')
     for panel in panels:
-        panel.axvline(1.0, color=INK, linewidth=0.8)
-        panel.axvspan(*CONSISTENT, color=INK, alpha=0.12, linewidth=0.0)
+        panel.axvline(1.0, color=INK_COLOUR, linewidth=0.8)
+        panel.axvspan(*CONSISTENCY_LIMITS, color=INK_COLOUR, alpha=0.12, linewidth=0.0)
     return figure
 
 
@@ -323,11 +337,12 @@ def probabilities_figure(over_time, on):
     """Mode probabilities of the imm, mean over the runs."""
     figure, axes = new_panels(len(on), height=1.0 + 1.2 * len(on), sharex=True, sharey=True)
     for panel, profile in zip(axes[:, 0], on):
-        sums = over_time[profile, 'imm', SHOWN]
-        for j, (name, colour) in enumerate(zip(MODELS, (MOTOR_1, MOTOR_2, RAW, TRUTH))):
+        sums = over_time[profile, 'imm', SHOWN_NOISE]
+        for j, (name, colour) in enumerate(zip(MODEL_NAMES, (MOTOR_1_COLOUR, MOTOR_2_COLOUR, RAW_COLOUR,
+                                                             TRUTH_COLOUR))):
             mu = sums['mu'][:, j] / sums['runs']
             if np.isfinite(mu).any():
-                panel.plot(times()[::THINNED], mu, color=colour, label=name)
+                panel.plot(times()[::THINNING_STEPS], mu, color=colour, label=name)
         panel.set_title(profile)
         panel.set_ylim(0.0, 1.0)
     return drawing.legend(figure)
@@ -337,12 +352,13 @@ def noise_figure(values, on):
     """Reduction of every filter under each noise: its dependence on the bandwidth of the receiver."""
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
-        for noise, colour, marker in zip(NOISES, (RAW, RAW, FILTERED, FILTERED), 'o^o^'):
+        for noise, colour, marker in zip(NOISE_CASES, (RAW_COLOUR, RAW_COLOUR, FILTERED_COLOUR, FILTERED_COLOUR),
+                                         'o^o^'):
             there = [name for name in SHOWN_FILTERS if (profile, name, noise) in values]
             panel.plot([values[profile, name, noise]['reduction'] for name in there], there, marker,
                            color=colour, ms=4.0, linestyle='', label=f'{noise} deg',
                            fillstyle='full' if marker == 'o' else 'none')
-        panel.axvline(1.0, color=INK, linewidth=0.8)
+        panel.axvline(1.0, color=INK_COLOUR, linewidth=0.8)
         panel.margins(x=0.06)
         panel.set_xlim(left=0.0)
         panel.locator_params(axis='x', nbins=4)

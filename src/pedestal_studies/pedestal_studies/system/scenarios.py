@@ -8,63 +8,68 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, RAW, new_panels
+from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_analysis.results import results, tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
-from pedestal_bringup.loop.recorded import Recorded
+from pedestal_bringup.loop.memory_recording import MemoryRecording
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
 
-RUNS, SEED = 40, 1
+DEFAULT_RUNS, FIRST_SEED = 40, 1
 """Runs of each case; seed of the first."""
 
-BATCH = 5
+BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
 
-NEAR = {'tracking_receiver.target.flyby.closest_distance': 60.0, 'tracking_receiver.target.flyby.height': 20.0}
+NEAR_FLYBY_PARAMETERS = {'tracking_receiver.target.flyby.closest_distance': 60.0,
+                         'tracking_receiver.target.flyby.height': 20.0}
 
-QUIET = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.tracker.receiver.sigma_floor': 5e-4,
-         **{f'ins.{name}': 0.0 for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
-                                            'heading_wander')}}
+NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.tracker.receiver.sigma_floor': 5e-4,
+                        **{f'ins.{name}': 0.0 for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
+                                                           'heading_wander')}}
 """Receiver and INS without noise; the filter is told of 5e-4 rad, or it would follow every quirk."""
 
 CASES = {case.name: case for case in (
     Case('leo_pass', 'leo_pass'), Case('ship_pass', 'ship_pass'),
-    Case('ship_pass-late', 'ship_pass', {'ins.latency': 0.02}), Case('ship_pass-quiet', 'ship_pass', QUIET),
+    Case('ship_pass-late', 'ship_pass', {'ins.latency': 0.02}), Case('ship_pass-quiet', 'ship_pass',
+                                                                     NOISELESS_PARAMETERS),
     Case('ship_pass_ss6', 'ship_pass_ss6'), Case('ship_overhead', 'ship_overhead'),
     Case('ship_align_and_track', 'ship_align_and_track'), Case('uav_flyby', 'uav_flyby'),
-    Case('uav_flyby-60m', 'uav_flyby', NEAR))}
+    Case('uav_flyby-60m', 'uav_flyby', NEAR_FLYBY_PARAMETERS))}
 
-TRACKING = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
-ISOLATION = ('isolation_db', 'isolation_limit_db')
-NOISE = ('noise_reduction_cross_elevation', 'noise_reduction_elevation')
-ALIGNMENT = ('aligned_s', 'heading_sigma_at_alignment_deg', 'heading_error_rms_deg', 'autotrack_after_alignment_s')
-MEASURED = {
-    'leo_pass': TRACKING, 'ship_pass': (*TRACKING, *ISOLATION), 'ship_pass-late': (*TRACKING, *ISOLATION),
-    'ship_pass-quiet': ('pointing_rms_deg', 'isolation_db'), 'ship_pass_ss6': (*TRACKING, *ISOLATION),
+TRACKING_METRICS = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
+ISOLATION_METRICS = ('isolation_db', 'isolation_limit_db')
+NOISE_METRICS = ('noise_reduction_cross_elevation', 'noise_reduction_elevation')
+ALIGNMENT_METRICS = ('aligned_s', 'heading_sigma_at_alignment_deg', 'heading_error_rms_deg',
+                     'autotrack_after_alignment_s')
+CASE_METRICS = {
+    'leo_pass': TRACKING_METRICS, 'ship_pass': (*TRACKING_METRICS, *ISOLATION_METRICS),
+    'ship_pass-late': (*TRACKING_METRICS, *ISOLATION_METRICS),
+    'ship_pass-quiet': ('pointing_rms_deg', 'isolation_db'), 'ship_pass_ss6': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_overhead': ('loss_s', 'keyhole_loss_predicted_s', 'loss_to_predicted'),
-    'ship_align_and_track': (*ALIGNMENT, *TRACKING), 'uav_flyby': (*TRACKING, *NOISE),
-    'uav_flyby-60m': (*TRACKING, *NOISE)}
+    'ship_align_and_track': (*ALIGNMENT_METRICS, *TRACKING_METRICS), 'uav_flyby': (*TRACKING_METRICS, *NOISE_METRICS),
+    'uav_flyby-60m': (*TRACKING_METRICS, *NOISE_METRICS)}
 """{case: names of its results}, of analysis/results.py or of `more_results`."""
 
-AT_SEA = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')
+SHIP_CASES = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')
 """Cases whose pointing is compared with that of leo_pass."""
 
-TARGETS = {
+METRIC_TARGETS = {
     **{(case, 'pointing_to_noise'): '<= 0.4' for case in ('leo_pass', 'ship_pass', 'ship_pass-late')},
     ('ship_pass', 'pointing_to_leo_pass'): '<= 1.3', ('ship_pass-late', 'pointing_to_leo_pass'): '<= 1.5',
     ('ship_pass_ss6', 'pointing_to_leo_pass'): '<= 1.5',
     **{(case, 'isolation_db'): '>= 60' for case in ('ship_pass', 'ship_pass-late', 'ship_pass-quiet',
                                                     'ship_pass_ss6')},
     ('ship_overhead', 'loss_to_predicted'): '0.8 to 1.2',
-    **{('uav_flyby', metric): '>= 7' for metric in NOISE}, **{('uav_flyby-60m', metric): '>= 3' for metric in NOISE}}
+    **{('uav_flyby', metric): '>= 7' for metric in NOISE_METRICS},
+    **{('uav_flyby-60m', metric): '>= 3' for metric in NOISE_METRICS}}
 
-MORE_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 'autotrack_after_alignment_s': 's'}
+EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 'autotrack_after_alignment_s': 's'}
 
 
-def more_results(values, run):
+def extra_results(values, run):
     """{name: value} of what no recording is asked for: of a slew through a keyhole, of the time after alignment."""
     more = {}
     slew = run.units['acu'].parts['state']['guidance']['lookahead']['slew']
@@ -82,44 +87,45 @@ def more_results(values, run):
 def measured(case):
     """{name: value} of one run of a Case."""
     scenario, run = case.loaded(), case.run()
-    values = {name: value for name, (value, _) in results.measured(results.of_bag(Recorded(scenario, run))).items()}
-    return {**values, **more_results(values, run)}
+    values = {name: value for name,
+              (value, _) in results.measured(results.of_bag(MemoryRecording(scenario, run))).items()}
+    return {**values, **extra_results(values, run)}
 
 
 def batch(item):
-    """Values (count, len(MEASURED[case])) of an item (case, first run, number of runs)."""
+    """Values (count, len(CASE_METRICS[case])) of an item (case, first run, number of runs)."""
     name, first, count = item
-    runs = [measured(CASES[name].with_seed(SEED + first + i)) for i in range(count)]
-    return np.array([[values[metric] for metric in MEASURED[name]] for values in runs])
+    runs = [measured(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)]
+    return np.array([[values[metric] for metric in CASE_METRICS[name]] for values in runs])
 
 
 def rows(values):
-    """The rows of values {case: (runs, len(MEASURED[case]))}."""
+    """The rows of values {case: (runs, len(CASE_METRICS[case]))}."""
     table = []
     for name, of_runs in values.items():
-        for metric, column in zip(MEASURED[name], of_runs.T):
-            unit = MORE_UNITS[metric] if metric in MORE_UNITS else results.BY_NAME[metric].unit
-            table.append(row(name, metric, column, unit, target=TARGETS.get((name, metric))))
-        if name in AT_SEA:
-            here, there = (values[case][:, MEASURED[case].index('pointing_rms_deg')] for case in (name, 'leo_pass'))
+        for metric, column in zip(CASE_METRICS[name], of_runs.T):
+            unit = EXTRA_METRIC_UNITS[metric] if metric in EXTRA_METRIC_UNITS else results.RESULT_BY_NAME[metric].unit
+            table.append(row(name, metric, column, unit, target=METRIC_TARGETS.get((name, metric))))
+        if name in SHIP_CASES:
+            (here, there) = (values[case][:, CASE_METRICS[case].index('pointing_rms_deg')] for case in (name, 'leo_pass'))
             table.append(row(name, 'pointing_to_leo_pass', here / there, '',
-                             target=TARGETS.get((name, 'pointing_to_leo_pass'))))
+                             target=METRIC_TARGETS.get((name, 'pointing_to_leo_pass'))))
     return table
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH, progress)
+    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'pointing': lambda: pointing_figure(values), 'uav-flyby': flyby_figure},
-                  [f'Seeds {SEED} to {SEED + runs - 1}. ship_pass-late: {CASES["ship_pass-late"].command()}',
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. ship_pass-late: {CASES["ship_pass-late"].command()}',
                    f'uav_flyby-60m: {CASES["uav_flyby-60m"].command()}'])
 
 
 def flyby_figure():
     """Paper 000's figures 7 to 11 on uav_flyby: error and angle before and after the filter, and the azimuth flown."""
     figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
-    case = CASES['uav_flyby'].with_seed(SEED)
-    flown = tracking.read(Recorded(case.loaded(), case.run()))
+    case = CASES['uav_flyby'].with_seed(FIRST_SEED)
+    flown = tracking.read(MemoryRecording(case.loaded(), case.run()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
     true = np.column_stack((flown.cross_elevation, flown.elevation_error))
     for panel, errors, title in ((axes[0, 0], (flown.measured[:, 0], flown.filtered[:, 0], true[:, 0]),
@@ -127,11 +133,12 @@ def flyby_figure():
                                  (axes[1, 0], tuple(angles[:, 1] - true[:, 1] + flown.target_earth[:, 1] for angles in
                                                     (flown.measured, flown.filtered, true)),
                                   'elevation of the target (figures 9, 10)')):
-        for values, colour, label in zip(errors, (RAW, FILTERED, INK), ('receiver', 'filtered', 'truth')):
+        for values, colour, label in zip(errors, (RAW_COLOUR, FILTERED_COLOUR, INK_COLOUR),
+                                         ('receiver', 'filtered', 'truth')):
             panel.plot(flown.t[middle], np.degrees(values[middle]), color=colour, label=label,
                        linewidth=0.6 if label == 'receiver' else 1.2)
         panel.set_title(title)
-    axes[2, 0].plot(flown.t, np.degrees(flown.azimuth), color=FILTERED)
+    axes[2, 0].plot(flown.t, np.degrees(flown.azimuth), color=FILTERED_COLOUR)
     axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
     return drawing.legend(figure)
 
@@ -141,10 +148,10 @@ def pointing_figure(values):
     figure, axes = new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
                               sharey=True)
     for panel, metric in zip(axes[0], ('pointing_rms_deg', 'pointing_max_deg')):
-        shown = [name for name in values if metric in MEASURED[name]]
+        shown = [name for name in values if metric in CASE_METRICS[name]]
         for name in shown:
-            column = values[name][:, MEASURED[name].index(metric)]
-            panel.plot(column, [name] * len(column), '|', color=FILTERED)
+            column = values[name][:, CASE_METRICS[name].index(metric)]
+            panel.plot(column, [name] * len(column), '|', color=FILTERED_COLOUR)
         panel.set_xlim(left=0.0)
     axes[0, 0].invert_yaxis()
     return figure

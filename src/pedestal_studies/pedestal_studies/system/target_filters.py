@@ -8,36 +8,37 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, new_panels
+from pedestal_analysis.report.figures import FILTERED_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
-from pedestal_bringup.loop import recorded
+from pedestal_bringup.loop import memory_recording
 from pedestal_studies.rigs.rows import Result
-from pedestal_studies.system.filters import MANOEUVRE
+from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
 
-RUNS, SEED = 30, 1
+DEFAULT_RUNS, FIRST_SEED = 30, 1
 """Runs of each case; seed of the first."""
 
-BATCH = 5
+BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
 
-FLYBY, ANGLE = 'tracking_receiver.target.flyby', 'tracking_receiver.target.angle'
-FIXED = {'tracking_receiver.target.kind': 'step', f'{ANGLE}.azimuth_amplitude': 0.0,
-         f'{ANGLE}.elevation_amplitude': 0.0, f'{ANGLE}.range': 5e5}
+FLYBY_PREFIX, ANGLE_PREFIX = 'tracking_receiver.target.flyby', 'tracking_receiver.target.angle'
+FIXED_TARGET_PARAMETERS = {'tracking_receiver.target.kind': 'step', f'{ANGLE_PREFIX}.azimuth_amplitude': 0.0,
+                           f'{ANGLE_PREFIX}.elevation_amplitude': 0.0, f'{ANGLE_PREFIX}.range': 5e5}
 """A target that stands still, of the C/N0 of a satellite."""
 
-TARGETS = {
-    'uav-60m': ('uav_flyby', {f'{FLYBY}.closest_distance': 60.0, f'{FLYBY}.height': 20.0}),
-    'uav-150m': ('uav_flyby', {f'{FLYBY}.closest_distance': 150.0, f'{FLYBY}.height': 40.0}),
-    'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED),
-    'leo-ship': ('ship_pass', {}), 'leo-ship-ss6': ('ship_pass_ss6', {}), 'geo-ship': ('ship_pass', FIXED)}
+TARGET_SCENARIOS = {
+    'uav-60m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 60.0, f'{FLYBY_PREFIX}.height': 20.0}),
+    'uav-150m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 150.0, f'{FLYBY_PREFIX}.height': 40.0}),
+    'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED_TARGET_PARAMETERS),
+    'leo-ship': ('ship_pass', {}), 'leo-ship-ss6': ('ship_pass_ss6', {}),
+    'geo-ship': ('ship_pass', FIXED_TARGET_PARAMETERS)}
 """{target: (scenario, its parameters)}."""
 
-TUNED = {'uav-60m': ('ca', 6.3e-3, 2.3e-3), 'uav-150m': ('ca', 1.1e-3, 3.5e-4), 'uav-500m': ('ca', 6e-5, 2e-5),
-         'leo': ('ca', 1.15e-4, 3.7e-5), 'geo': ('cv', 1e-9, 1e-9), 'leo-ship': ('ca', 1.15e-4, 3.7e-5),
-         'leo-ship-ss6': ('ca', 1.15e-4, 3.7e-5), 'geo-ship': ('cv', 1e-9, 1e-9)}
+TUNED_FILTERS = {'uav-60m': ('ca', 6.3e-3, 2.3e-3), 'uav-150m': ('ca', 1.1e-3, 3.5e-4), 'uav-500m': ('ca', 6e-5, 2e-5),
+                 'leo': ('ca', 1.15e-4, 3.7e-5), 'geo': ('cv', 1e-9, 1e-9), 'leo-ship': ('ca', 1.15e-4, 3.7e-5),
+                 'leo-ship-ss6': ('ca', 1.15e-4, 3.7e-5), 'geo-ship': ('cv', 1e-9, 1e-9)}
 """{target: (kind, its noise in azimuth and in elevation)}: the best of cv and ca on the seeds 101 to 103, from a grid
 of noise and, of uav-60m and leo, by `tuning`; on a ship that of leo stays."""
 
@@ -47,25 +48,26 @@ def _both(**changes):
 
 
 def filters(target):
-    """{filter: parameters of the control unit} for a target of TARGETS."""
-    kind, azimuth, elevation = TUNED[target]
+    """{filter: parameters of the control unit} for a target of TARGET_SCENARIOS."""
+    kind, azimuth, elevation = TUNED_FILTERS[target]
     return {'default': {},
             'tuned': {**_both(kind=kind), f'azimuth.filter.{kind}.noise': azimuth,
                       f'elevation.filter.{kind}.noise': elevation},
-            'manoeuvre': _both(kind='imm', **MANOEUVRE), 'current-statistical': _both(kind='current_statistical')}
+            'manoeuvre': _both(kind='imm', **MANOEUVRE_PARAMETERS),
+            'current-statistical': _both(kind='current_statistical')}
 
 
 CASES = {f'{target}/{name}': Case(f'{target}/{name}', at, {
     **parameters, **{f'acu.{key}': value for key, value in changes.items()}})
-    for target, (at, parameters) in TARGETS.items() for name, changes in filters(target).items()}
+    for target, (at, parameters) in TARGET_SCENARIOS.items() for name, changes in filters(target).items()}
 
-HONEST = 1.15
+MAX_POINTING_RATIO = 1.15
 """Largest ratio of the default's pointing to that of the tuned filter."""
 
 
 def pointing(case):
     """Rms of the true pointing error [deg] of one run of a Case, both axes; NaN if autotrack was left."""
-    flown = tracking.read(recorded.record(case.loaded()))
+    flown = tracking.read(memory_recording.record(case.loaded()))
     begun = np.flatnonzero(flown.mode == 'autotrack')
     if not begun.size or np.any(flown.mode[begun[0]:] != 'autotrack'):
         return math.nan
@@ -75,7 +77,7 @@ def pointing(case):
 def batch(item):
     """Pointing (count,) of an item (case, first run, number of runs)."""
     name, first, count = item
-    return np.array([pointing(CASES[name].with_seed(SEED + first + i)) for i in range(count)])
+    return np.array([pointing(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)])
 
 
 def rows(values):
@@ -86,14 +88,15 @@ def rows(values):
         table.append(row(name, 'pointing_rms_deg', of_runs, 'deg'))
         if filter_name != 'tuned':
             table.append(row(name, 'pointing_to_tuned', of_runs / values[f'{target}/tuned'], '',
-                             target=f'<= {HONEST:g}' if filter_name == 'default' else None))
+                             target=f'<= {MAX_POINTING_RATIO:g}' if filter_name == 'default' else None))
     return table
 
 
-def run(progress, runs=RUNS, pool=None) -> Result:
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH, progress)
-    return Result(rows(values), {'pointing': lambda: figure(values)}, [f'Seeds {SEED} to {SEED + runs - 1}.'])
+    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
+    return Result(rows(values), {'pointing': lambda: figure(values)},
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}.'])
 
 
 def figure(values):
@@ -101,7 +104,7 @@ def figure(values):
     drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()
-        axes[0, 0].semilogx(relative, [name] * len(relative), '|', color=FILTERED)
-    axes[0, 0].axvline(HONEST, linewidth=0.8)
+        axes[0, 0].semilogx(relative, [name] * len(relative), '|', color=FILTERED_COLOUR)
+    axes[0, 0].axvline(MAX_POINTING_RATIO, linewidth=0.8)
     axes[0, 0].invert_yaxis()
     return drawn

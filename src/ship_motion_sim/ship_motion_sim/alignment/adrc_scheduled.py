@@ -6,12 +6,12 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import extended_observer, levelling
 
-BANDWIDTH_TIME = 6.0        # w_o t [-]
-W_O_MAX, W_C_MIN = 1.0, 0.1     # [rad/s]
+BANDWIDTH_TIME_PRODUCT = 6.0        # w_o t [-]
+MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1     # [rad/s]
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('t', 'f8'),                            # since the start [s]
-    ('observer', extended_observer.STATE),
+    ('observer', extended_observer.STATE_DTYPE),
     ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
@@ -20,12 +20,12 @@ STATE = np.dtype([
 @compiled
 def bandwidth(t):
     """w_o [rad/s] at t [s] > 0 since the start."""
-    return min(W_O_MAX, BANDWIDTH_TIME / t)
+    return min(MAX_OBSERVER_BANDWIDTH_RAD_S, BANDWIDTH_TIME_PRODUCT / t)
 
 
 @compiled
 def step(s, k, v_east, v_north, h):
-    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONDITIONS."""
+    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE_DTYPE, CONDITIONS."""
     o, r = s.observer, k.velocity_density / h
     s.t += h
     w_o = bandwidth(s.t)
@@ -36,7 +36,7 @@ def step(s, k, v_east, v_north, h):
     extended_observer.predict_covariance(o, k, h)
     extended_observer.correct(o, v_east, v_north, l1, l2, l3, o.p[0] + r, h)
     extended_observer.correct_covariance(o, l1, l2, l3, r)
-    levelling.level(o, k, s.v1, s.v2, max(W_C_MIN, w_o), s.command)
+    levelling.level(o, k, s.v1, s.v2, max(MIN_CONTROL_BANDWIDTH_RAD_S, w_o), s.command)
     s.azimuth = extended_observer.azimuth(o, k)
     s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, 0.0)
     s.level_sigma = math.hypot(level_sigma, extended_observer.tilt(o, k))

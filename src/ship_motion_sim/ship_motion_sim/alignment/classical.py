@@ -11,18 +11,18 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import steady_state
-from ship_motion_sim.alignment.conditions import SIGMA_UNKNOWN
+from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD
 
-RATE_LIMIT = 0.1
+MAX_AZIMUTH_RATE_RAD_S = 0.1
 """Of the command of the azimuth [rad/s], which the first levelling would drive to 0.2."""
 
-CONSTANTS = np.dtype([
+CONSTANTS_DTYPE = np.dtype([
     ('s0', 'f8'),                                       # [rad/s]
     ('K1', 'f8'), ('k2', 'f8'), ('K3', 'f8'), ('K4', 'f8'),
     ('azimuth', 'f8'), ('level', 'f8'), ('residual', 'f8'),     # 1 sigma once settled [rad]
 ], align=True)
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('t', 'f8'),                    # since the start [s]
     ('lagged', 'f8'),               # v_N / (s + K4) [m]
     ('residual', 'f8'),             # azimuth that the loop still corrects, smoothed [rad]
@@ -32,8 +32,8 @@ STATE = np.dtype([
 
 
 def constants(k, s0, h) -> np.ndarray:
-    """The record () of CONSTANTS for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS."""
-    record = np.zeros((), CONSTANTS)
+    """The record () of CONSTANTS_DTYPE for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS."""
+    record = np.zeros((), CONSTANTS_DTYPE)
     g, w_north = float(k['gravity']), float(k['earth_rate'][1])
     K1 = K4 = 2.0 * s0
     k2, K3 = 4.0 * s0**2 / g, 4.0 * s0**4 / g
@@ -59,17 +59,17 @@ def envelope(x):
 
 @compiled
 def step(s, c, k, v_east, v_north, h):
-    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONSTANTS, CONDITIONS."""
+    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE_DTYPE, CONSTANTS_DTYPE, CONDITIONS."""
     s.t += h
     s.lagged += h * (v_north - c.K4 * s.lagged)
     # The damping, and what the strapdown has just made of w_c x v.
     s.taken[0] = h * (c.K1 * v_east + s.command[2] * v_north)
     s.taken[1] = h * (c.K1 * v_north - s.command[2] * v_east)
     s.command[0], s.command[1] = -c.k2 * v_north, c.k2 * v_east
-    s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.lagged, -RATE_LIMIT), RATE_LIMIT)
+    s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.lagged, -MAX_AZIMUTH_RATE_RAD_S), MAX_AZIMUTH_RATE_RAD_S)
     # The loop corrects a steady az at az s0 / 2, except at 180 deg, which the envelope covers.
     s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
-    left = SIGMA_UNKNOWN * envelope(c.s0 * s.t)
+    left = UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(c.s0 * s.t)
     moving = max(s.residual**2 - 9.0 * c.residual**2, 0.0)      # beyond three sigma of its noise
-    s.azimuth_sigma = min(math.sqrt(c.azimuth**2 + moving + left**2), SIGMA_UNKNOWN)
+    s.azimuth_sigma = min(math.sqrt(c.azimuth**2 + moving + left**2), UNKNOWN_AZIMUTH_SIGMA_RAD)
     s.level_sigma = c.level + left

@@ -5,7 +5,7 @@ import numpy as np
 
 from ship_motion_sim import earth
 
-CONDITIONS = np.dtype([
+CONDITIONS_DTYPE = np.dtype([
     ('gravity', 'f8'),                  # [m/s2]
     ('earth_rate', 'f8', (3,)),         # ENU [rad/s]
     ('velocity_density', 'f8'),         # of the velocity disturbance: variance x step [m2/s]
@@ -16,8 +16,8 @@ CONDITIONS = np.dtype([
 
 
 def conditions(p, latitude) -> np.ndarray:
-    """The record () of CONDITIONS of an AlignmentParameters at a latitude [rad]."""
-    record = np.zeros((), CONDITIONS)
+    """The record () of CONDITIONS_DTYPE of an AlignmentParameters at a latitude [rad]."""
+    record = np.zeros((), CONDITIONS_DTYPE)
     record['gravity'], record['earth_rate'] = earth.gravity(latitude), earth.rate(latitude)
     record['velocity_density'] = p.velocity_disturbance**2 * p.step
     record['gyro_noise'], record['gyro_bias'] = p.gyro_noise, p.gyro_bias
@@ -25,5 +25,5 @@ def conditions(p, latitude) -> np.ndarray:
     return record
 
 
-SIGMA_UNKNOWN = math.pi
+UNKNOWN_AZIMUTH_SIGMA_RAD = math.pi
 """Standard deviation [rad] of an azimuth of which nothing is known."""

@@ -9,16 +9,16 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('z', 'f8', (2, 3)),                # east, north: z1, z2, z3
     ('push', 'f8', (2,)),               # b0 u in force since the last step [m/s3]
     ('p', 'f8', (6,)),                  # p11, p12, p13, p22, p23, p33, the same for both channels
     ('surprise', 'f8'),                 # mean of innovation^2 over its expected variance
 ], align=True)
 
-SURPRISE_TIME = 30.0    # time constant of that mean [s]
-CALM = 1.2              # surprise of a sea as expected, its own noise included [-]
-SWELL = 2.0 * math.pi / 16.0    # slowest swell that a stated 1 sigma is honest on [rad/s]
+INNOVATION_TIME_CONSTANT_S = 30.0    # time constant of that mean [s]
+EXPECTED_INNOVATION_RATIO = 1.2              # surprise of a sea as expected, its own noise included [-]
+MIN_SWELL_FREQUENCY_RAD_S = 2.0 * math.pi / 16.0    # slowest swell that a stated 1 sigma is honest on [rad/s]
 
 
 @compiled
@@ -42,32 +42,33 @@ def kalman_gains(p11, p12, p13, r):
 
 
 @compiled
-def surprised(surprise, e_east, e_north, s, h):
+def innovation_ratio(surprise, e_east, e_north, s, h):
     """The running mean, h [s] later, of innovation^2 [m2/s2] over its expected variance s: 1 where the disturbance is
     as expected."""
-    return surprise + h / SURPRISE_TIME * (0.5 * (e_east * e_east + e_north * e_north) / s - surprise)
+    return surprise + h / INNOVATION_TIME_CONSTANT_S * (0.5 * (e_east * e_east + e_north * e_north) / s - surprise)
 
 
 @compiled
 def swell_variance(o, s):
     """Variance of the innovations [m2/s2] beyond that of a sea as expected, s: taken for a swell."""
-    return max(o.surprise - CALM, 0.0) * s
+    return max(o.surprise - EXPECTED_INNOVATION_RATIO, 0.0) * s
 
 
-VELOCITY_SIGMA, LEVEL_SIGMA, AZIMUTH_SIGMA = 0.1, math.radians(5.0), 2.0
+INITIAL_VELOCITY_SIGMA_M_S, INITIAL_LEVEL_SIGMA_RAD, INITIAL_AZIMUTH_SIGMA_RAD = 0.1, math.radians(5.0), 2.0
 """What is known at power-up [m/s], [rad], [rad]: any azimuth."""
 
 
 @compiled
 def start(o, k, level_sigma, azimuth_sigma):
-    """Reset the STATE o at power-up: nothing observed, 1 sigma [rad] of level and azimuth as given; k CONDITIONS."""
+    """Reset the STATE_DTYPE o at power-up: nothing observed, 1 sigma [rad] of level and azimuth as given; k
+    CONDITIONS."""
     for i in range(2):
         o.push[i] = 0.0
         for j in range(3):
             o.z[i, j] = 0.0
     for i in range(6):
         o.p[i] = 0.0
-    o.p[0] = VELOCITY_SIGMA**2
+    o.p[0] = INITIAL_VELOCITY_SIGMA_M_S**2
     o.p[3] = (level_sigma * k.gravity)**2
     o.p[5] = (azimuth_sigma * k.gravity * k.earth_rate[1])**2
     o.surprise = 1.0
@@ -113,7 +114,7 @@ def correct(o, v_east, v_north, l1, l2, l3, s, h):
     """Correct z of both channels with the measured velocities [m/s]; s: expected variance of the innovations [m2/s2].
     """
     e_east, e_north = v_east - o.z[0, 0], v_north - o.z[1, 0]
-    o.surprise = surprised(o.surprise, e_east, e_north, s, h)
+    o.surprise = innovation_ratio(o.surprise, e_east, e_north, s, h)
     for i in range(2):
         z, e = o.z[i], e_east if i == 0 else e_north
         z[0] += l1 * e

@@ -6,9 +6,9 @@
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
 
-DAMPING = 0.8           # c1 [-]
-ACCELERATION = 1e3      # r1 [m/s3]: fhan is linear within r1 / w_c^2
-RATE_LIMIT = 0.5        # of a command [rad/s]
+DAMPING_COEFFICIENT = 0.8           # c1 [-]
+FHAN_LIMIT_M_S3 = 1e3      # r1 [m/s3]: fhan is linear within r1 / w_c^2
+MAX_LEVELLING_RATE_RAD_S = 0.5        # of a command [rad/s]
 
 
 @compiled
@@ -20,10 +20,11 @@ def differentiated(v1, v2, reference, h):
 
 @compiled
 def command(z1, z2, z3, v1, v2, b0, w_c):
-    """u [rad/s], within RATE_LIMIT, that brings z1, z2 to v1, v2 with bandwidth w_c [rad/s] and cancels z3; b0: what u
+    """u [rad/s], within MAX_LEVELLING_RATE_RAD_S, that brings z1, z2 to v1, v2 with bandwidth w_c [rad/s] and cancels
+    z3; b0: what u
     does to x2 [m/s2 per rad]."""
-    u0 = fhan(z1 - v1, DAMPING * (z2 - v2), ACCELERATION, 1.0 / w_c)
-    return min(max((u0 - z3) / b0, -RATE_LIMIT), RATE_LIMIT)
+    u0 = fhan(z1 - v1, DAMPING_COEFFICIENT * (z2 - v2), FHAN_LIMIT_M_S3, 1.0 / w_c)
+    return min(max((u0 - z3) / b0, -MAX_LEVELLING_RATE_RAD_S), MAX_LEVELLING_RATE_RAD_S)
 
 
 @compiled

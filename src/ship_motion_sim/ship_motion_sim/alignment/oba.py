@@ -15,11 +15,11 @@ from pedestal_common.geometry.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import extended_observer, riccati_eso
 
-SWEEPS = 12     # of Jacobi rotations at most; 4 to 6 are enough
+MAX_JACOBI_SWEEPS = 12     # of Jacobi rotations at most; 4 to 6 are enough
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('t', 'f8'),                                        # since the start [s]
-    ('observer', extended_observer.STATE),              # of a_x, a_y: its covariance is the information limit
+    ('observer', extended_observer.STATE_DTYPE),              # of a_x, a_y: its covariance is the information limit
     ('coriolis', 'f8', (3,)),                           # int w_ie x v dt [m/s]
     ('count', 'f8'),
     ('sum_a', 'f8', (3,)), ('sum_b', 'f8', (3,)), ('sum_ab', 'f8', (3, 3)),
@@ -40,7 +40,7 @@ def gravity_integral(t, k):
 
 @compiled
 def step(s, k, a, v, h):
-    """Take one more pair of vectors, h [s] after the last; records STATE, CONDITIONS.
+    """Take one more pair of vectors, h [s] after the last; records STATE_DTYPE, CONDITIONS.
 
     a: int C_b^b0 f dt in b0, less the velocity a log measures [m/s], three floats. The Coriolis force of that velocity
     is left out: 7 m/s tilt the level by 0.1 arcmin. v: the velocity in n that a GNSS measures, zeros without one.
@@ -78,7 +78,7 @@ def jacobi(m, v):
     for i in range(4):
         for j in range(4):
             v[i, j] = 1.0 if i == j else 0.0
-    for _ in range(SWEEPS):
+    for _ in range(MAX_JACOBI_SWEEPS):
         moved = False
         for i in range(3):
             for j in range(i + 1, 4):

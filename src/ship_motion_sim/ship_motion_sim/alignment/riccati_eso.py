@@ -9,11 +9,11 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import extended_observer, levelling
 
-W_C_ALIGNING, W_C_NAVIGATING = 1.0, 0.1
+ALIGNING_BANDWIDTH_RAD_S, NAVIGATING_BANDWIDTH_RAD_S = 1.0, 0.1
 """Bandwidth of the level control [rad/s]: quick to level a deck, slow where only noise is left to follow."""
 
-STATE = np.dtype([
-    ('observer', extended_observer.STATE),
+STATE_DTYPE = np.dtype([
+    ('observer', extended_observer.STATE_DTYPE),
     ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
@@ -33,7 +33,8 @@ def limit(o, k, h):
 
 @compiled
 def step(s, k, v_east, v_north, h, w_c):
-    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE, CONDITIONS. The level control, of
+    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE_DTYPE, CONDITIONS. The level control,
+    of
     bandwidth w_c [rad/s], is known exactly and does not affect the estimate."""
     o = s.observer
     for i in range(2):
@@ -44,7 +45,7 @@ def step(s, k, v_east, v_north, h, w_c):
     levelling.level(o, k, s.v1, s.v2, w_c, s.command)
     s.azimuth = extended_observer.azimuth(o, k)
     # z3 is the integral of l3 / h times the innovations, and so swings with a swell in them.
-    swing = l3 / (h * extended_observer.SWELL)
+    swing = l3 / (h * extended_observer.MIN_SWELL_FREQUENCY_RAD_S)
     s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, swing * swing
                                                             * extended_observer.swell_variance(o, variance))
     s.level_sigma = math.hypot(level_sigma, extended_observer.tilt(o, k))

@@ -12,29 +12,29 @@ from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
 from pedestal_common.parameters import ParameterError
 from ship_motion_sim import earth
 from ship_motion_sim.navigation import ins, navigator
-from ship_motion_sim.navigation.ins import NEVER, RING, UNDER_WAY
+from ship_motion_sim.navigation.ins import LATENCY_RING_FIELDS, LATENCY_RING_SIZE, NO_STAMP
 from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
 
-LONGEST_GAP = 0.1
+MAX_IMU_GAP_S = 0.1
 """Time without a usable IMU message [s] over which its rates may be taken for steady: a deck's angular acceleration of
 0.1 rad/s2 makes that wrong by 0.5 mrad."""
 
-CONSTANTS = np.dtype([
-    ('ship', motion.CONSTANTS),
+CONSTANTS_DTYPE = np.dtype([
+    ('ship', motion.CONSTANTS_DTYPE),
     ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
     ('latency_ns', 'i8'),
     ('increment', 'i8'),                    # 1: the IMU gives mean rates since its last sample, 0: rates at the stamp
     ('aid_noise', 'f8'),                    # [m/s]
-    ('navigator', navigator.CONSTANTS),
-    ('power_up', navigator.STATE),
+    ('navigator', navigator.CONSTANTS_DTYPE),
+    ('power_up', navigator.STATE_DTYPE),
 ], align=True)
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('last_stamp_ns', 'i8'),
-    ('truth', motion.OUTPUTS),              # the ship as the aid measures it
-    *UNDER_WAY,
-    ('navigator', navigator.STATE),
+    ('truth', motion.OUTPUTS_DTYPE),              # the ship as the aid measures it
+    *LATENCY_RING_FIELDS,
+    ('navigator', navigator.STATE_DTYPE),
     ('imu_stamp_ns', 'i8'),                 # of the last IMU message that could be used
     ('last_rate', 'f8', (3,)), ('last_force', 'f8', (3,)),      # in it
     ('angle', 'f8', (3,)), ('force', 'f8', (3,)),   # increments since [rad, m/s]
@@ -44,9 +44,9 @@ STATE = np.dtype([
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS. Raises ParameterError where the azimuth can never become as good as
+    """The record (1,) of CONSTANTS_DTYPE. Raises ParameterError where the azimuth can never become as good as
     alignment.aligned_sigma demands."""
-    record, latitude = np.zeros(1, CONSTANTS), math.radians(params.ship.latitude_deg)
+    record, latitude = np.zeros(1, CONSTANTS_DTYPE), math.radians(params.ship.latitude_deg)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(latitude)
     record['latency_ns'] = round(params.latency * 1e9)
@@ -63,9 +63,9 @@ def constants(params: InsParameters) -> np.ndarray:
 
 
 def initial_state(constants) -> np.ndarray:
-    """The record (1,) of STATE before the first sample; constants: CONSTANTS (1,)."""
-    state = np.zeros(1, STATE)
-    state['last_stamp_ns'] = state['imu_stamp_ns'] = NEVER
+    """The record (1,) of STATE_DTYPE before the first sample; constants: CONSTANTS_DTYPE (1,)."""
+    state = np.zeros(1, STATE_DTYPE)
+    state['last_stamp_ns'] = state['imu_stamp_ns'] = NO_STAMP
     state['navigator'] = constants['power_up']
     return state
 
@@ -73,11 +73,11 @@ def initial_state(constants) -> np.ndarray:
 @compiled
 def measure_aid(c, s, stamp_ns, normals):
     """Put the velocity [m/s] that the aid measures at stamp_ns, with noise, into s.aid; normals: three or more."""
-    if c.navigator.aid == navigator.NO_AID:
+    if c.navigator.aid == navigator.AID_NONE:
         return
     motion.truth(c.ship, 1e-9 * stamp_ns, s.truth)
     for i in range(3):
-        v = s.truth.velocity_deck[i] if c.navigator.aid == navigator.LOG else s.truth.velocity[i]
+        v = s.truth.velocity_deck[i] if c.navigator.aid == navigator.AID_LOG else s.truth.velocity[i]
         s.aid[i] = v + c.aid_noise * normals[i]
 
 
@@ -87,9 +87,9 @@ def integrate(c, s, stamp_ns, rate, force):
 
     Mean rates are the increments themselves; rates at the stamps are integrated by the trapezoidal rule. The first
     message after a power-up ends an interval that began before it, and is not integrated."""
-    dt = 1e-9 * (stamp_ns - s.imu_stamp_ns) if s.imu_stamp_ns != NEVER else 0.0
-    if dt > LONGEST_GAP:
-        s.navigator, s.imu_stamp_ns = c.power_up, NEVER
+    dt = 1e-9 * (stamp_ns - s.imu_stamp_ns) if s.imu_stamp_ns != NO_STAMP else 0.0
+    if dt > MAX_IMU_GAP_S:
+        s.navigator, s.imu_stamp_ns = c.power_up, NO_STAMP
         return False
     if dt > 0.0:
         for i in range(3):
@@ -105,13 +105,13 @@ def integrate(c, s, stamp_ns, rate, force):
 @compiled
 def measure(c, s, stamp_ns, rate, force):
     """Put the navigator's attitude and deck rate at stamp_ns into the ring; rate, force (3,): of the IMU message."""
-    n = s.measured % RING
+    n = s.measured % LATENCY_RING_SIZE
     q, w = s.quaternion, s.angular_velocity
     q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(s.navigator, c.navigator)
     rotation(q[n, 0], q[n, 1], q[n, 2], q[n, 3], s.mat_ed)
     e = c.earth_rate
     ex, ey, ez = to_deck(s.mat_ed, e[0], e[1], e[2])
-    first = s.imu_stamp_ns == NEVER
+    first = s.imu_stamp_ns == NO_STAMP
     for i in range(3):
         # A mean rate is valid half an interval ago: extrapolate it to the stamp.
         half = 0.5 * (rate[i] - s.last_rate[i]) if c.increment == 1 and not first else 0.0
@@ -137,7 +137,7 @@ def step(s, c, i, out, normals):
         if not (math.isfinite(i.angular_velocity[n]) and math.isfinite(i.linear_acceleration[n])):
             out.status = ins.Status.BAD_IMU
     if out.status == ins.Status.OK:
-        if s.measured - s.released == RING:
+        if s.measured - s.released == LATENCY_RING_SIZE:
             s.released += 1
             out.status = ins.Status.BUFFER_FULL
         measure_aid(c, s, i.stamp_ns, normals)
@@ -145,7 +145,7 @@ def step(s, c, i, out, normals):
             out.status = ins.Status.ATTITUDE_LOST
         measure(c, s, i.stamp_ns, i.angular_velocity, i.linear_acceleration)
     if s.released == 0:
-        out.stage = navigator.ALIGNING
+        out.stage = navigator.STAGE_ALIGNING
     for n in range(3):
         out.velocity[n] = s.navigator.strapdown.velocity[n]
         # Integrated, the noise of a gyro is a walk and nothing else.

@@ -16,20 +16,20 @@ from ship_motion_sim import earth, imu
 from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
 
-NORMALS = 9     # standard normals a step takes: three wander, three attitude, three rate
+INS_NORMALS_PER_STEP = 9     # standard normals a step takes: three wander, three attitude, three rate
 STATUS_TEXTS = dict(
     OK='ok', BAD_STAMP='stamp does not advance', BAD_IMU='IMU data are not finite',
     IMU_DISAGREES='IMU disagrees with the ship parameters of the INS',
     BUFFER_FULL='more samples than the latency buffer holds',
     ATTITUDE_LOST='IMU was silent for too long, the attitude is lost: it aligns anew')
-STATUSES = tuple(STATUS_TEXTS.values())
+INS_STATUS_TEXTS = tuple(STATUS_TEXTS.values())
 Status = codes(STATUS_TEXTS)
 
-RING = 256      # samples under way: latency / step, the largest latency at 1 kHz
-NEVER = -2 ** 63
+LATENCY_RING_SIZE = 256      # samples under way: latency / step, the largest latency at 1 kHz
+NO_STAMP = -2 ** 63
 
-CONSTANTS = np.dtype([
-    ('ship', motion.CONSTANTS),
+CONSTANTS_DTYPE = np.dtype([
+    ('ship', motion.CONSTANTS_DTYPE),
     ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
     ('bias', 'f8', (3,)),                   # roll, pitch, yaw [rad]
     ('wander', 'f8', (3,)),                 # rms of the slow error of roll, pitch, yaw [rad]
@@ -42,31 +42,31 @@ CONSTANTS = np.dtype([
     ('walk', 'f8', (3,)),                   # what they wander by [rad/sqrt(s)]
 ], align=True)
 
-UNDER_WAY = [
-    ('measured', 'i8'), ('released', 'i8'),     # samples counted; sample n lies at n % RING
-    ('stamp_ns', 'i8', (RING,)),
-    ('quaternion', 'f8', (RING, 4)),
-    ('angular_velocity', 'f8', (RING, 3)),
-    ('linear_acceleration', 'f8', (RING, 3)),
-    ('variance', 'f8', (RING, 3)),
-    ('stage', 'i8', (RING,)),
+LATENCY_RING_FIELDS = [
+    ('measured', 'i8'), ('released', 'i8'),     # samples counted; sample n lies at n % LATENCY_RING_SIZE
+    ('stamp_ns', 'i8', (LATENCY_RING_SIZE,)),
+    ('quaternion', 'f8', (LATENCY_RING_SIZE, 4)),
+    ('angular_velocity', 'f8', (LATENCY_RING_SIZE, 3)),
+    ('linear_acceleration', 'f8', (LATENCY_RING_SIZE, 3)),
+    ('variance', 'f8', (LATENCY_RING_SIZE, 3)),
+    ('stage', 'i8', (LATENCY_RING_SIZE,)),
 ]
 """Results that wait for their latency to pass."""
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('last_stamp_ns', 'i8'),
     ('wander', 'f8', (3,)),                 # slow error of roll, pitch, yaw [rad]
-    ('truth', motion.OUTPUTS),              # ship at the last stamp
-    *UNDER_WAY,
+    ('truth', motion.OUTPUTS_DTYPE),              # ship at the last stamp
+    *LATENCY_RING_FIELDS,
 ], align=True)
 
-INPUTS = np.dtype([
+INPUTS_DTYPE = np.dtype([
     ('stamp_ns', 'i8'),                     # of the IMU message
     ('angular_velocity', 'f8', (3,)),       # of the IMU message [rad/s]
     ('linear_acceleration', 'f8', (3,)),    # of the IMU message [m/s2]
 ], align=True)
 
-OUTPUTS = np.dtype([
+OUTPUTS_DTYPE = np.dtype([
     ('status', 'i8'),                       # of Status
     ('due', 'i8'),                          # 1: the result below is new; 0: nothing to publish
     ('stamp_ns', 'i8'),                     # of the measurement
@@ -83,8 +83,8 @@ NO_STAGE = -1
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS."""
-    record = np.zeros(1, CONSTANTS)
+    """The record (1,) of CONSTANTS_DTYPE."""
+    record = np.zeros(1, CONSTANTS_DTYPE)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(math.radians(params.ship.latitude_deg))
     record['bias'] = params.roll_bias, params.pitch_bias, -params.heading_bias
@@ -106,9 +106,9 @@ def model_variance(p):
 
 
 def initial_state() -> np.ndarray:
-    """The record (1,) of STATE before the first sample."""
-    state = np.zeros(1, STATE)
-    state['last_stamp_ns'] = NEVER
+    """The record (1,) of STATE_DTYPE before the first sample."""
+    state = np.zeros(1, STATE_DTYPE)
+    state['last_stamp_ns'] = NO_STAMP
     return state
 
 
@@ -117,7 +117,7 @@ def wander(c, s, stamp_ns, normals):
     """Advance the slow errors [rad] to stamp_ns: first-order Gauss-Markov, exact for any step, stationary from the
     start; normals: three or more."""
     kept = 0.0
-    if s.last_stamp_ns != NEVER:
+    if s.last_stamp_ns != NO_STAMP:
         kept = math.exp(-1e-9 * (stamp_ns - s.last_stamp_ns) / c.wander_time)
     fresh = math.sqrt(1.0 - kept * kept)
     for i in range(3):
@@ -135,7 +135,7 @@ def disagrees(truth, c, measured):
 @compiled
 def measure(c, s, stamp_ns, force, normals):
     """Put attitude and rate at stamp_ns, errors added, into the ring, with the IMU's specific force (3,) [m/s2]."""
-    n, truth = s.measured % RING, s.truth
+    n, truth = s.measured % LATENCY_RING_SIZE, s.truth
     roll = truth.roll + c.bias[0] + s.wander[0] + c.noise[0] * normals[3]
     pitch = truth.pitch + c.bias[1] + s.wander[1] + c.noise[1] * normals[4]
     yaw = truth.yaw + c.bias[2] + s.wander[2] + c.noise[2] * normals[5]
@@ -154,11 +154,11 @@ def measure(c, s, stamp_ns, force, normals):
 def release(c, s, now_ns, out):
     """Release the newest sample that is at least the latency old at now_ns; due = 0 where it was released before."""
     out.due = 0
-    while s.released < s.measured and s.stamp_ns[s.released % RING] <= now_ns - c.latency_ns:
+    while s.released < s.measured and s.stamp_ns[s.released % LATENCY_RING_SIZE] <= now_ns - c.latency_ns:
         s.released += 1
         out.due = 1
     if out.due == 1:
-        n = (s.released - 1) % RING
+        n = (s.released - 1) % LATENCY_RING_SIZE
         out.stamp_ns = s.stamp_ns[n]
         for i in range(4):
             out.quaternion[i] = s.quaternion[n, i]
@@ -171,7 +171,8 @@ def release(c, s, now_ns, out):
 
 @compiled
 def step(s, c, i, out, normals):
-    """Take one IMU message. Records STATE, CONSTANTS, INPUTS, OUTPUTS; normals (NORMALS,) standard normals.
+    """Take one IMU message. Records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; normals
+    (INS_NORMALS_PER_STEP,) standard normals.
 
     A stamp that does not advance changes nothing, and a message that is not finite is not measured; the status names
     either.
@@ -188,7 +189,7 @@ def step(s, c, i, out, normals):
     if out.status == Status.OK:
         if disagrees(s.truth, c, i.angular_velocity):
             out.status = Status.IMU_DISAGREES
-        if s.measured - s.released == RING:
+        if s.measured - s.released == LATENCY_RING_SIZE:
             s.released += 1
             out.status = Status.BUFFER_FULL
         measure(c, s, i.stamp_ns, i.linear_acceleration, normals)

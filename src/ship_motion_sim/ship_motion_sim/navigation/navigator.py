@@ -16,45 +16,45 @@ from pedestal_common.geometry.line_of_sight import to_earth
 from pedestal_common.geometry.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import adrc, adrc_scheduled, classical, extended_observer, oba, riccati_eso
-from ship_motion_sim.alignment.conditions import CONDITIONS, SIGMA_UNKNOWN, conditions
-from ship_motion_sim.params import AIDS, METHODS
+from ship_motion_sim.alignment.conditions import CONDITIONS_DTYPE, UNKNOWN_AZIMUTH_SIGMA_RAD, conditions
+from ship_motion_sim.params import INS_METHODS, VELOCITY_AIDS
 
 STAGES = ('aligning', 'aligned')
-ALIGNING, NAVIGATING = range(len(STAGES))
-CLASSICAL, ADRC, ADRC_SCHEDULED, RICCATI_ESO, OBA = map(
-    METHODS.index, ('classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba'))
-NO_AID, LOG, GNSS = range(len(AIDS))
+STAGE_ALIGNING, STAGE_NAVIGATING = range(len(STAGES))
+METHOD_CLASSICAL, METHOD_ADRC, METHOD_ADRC_SCHEDULED, METHOD_RICCATI_ESO, METHOD_OBA = map(
+    INS_METHODS.index, ('classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba'))
+AID_NONE, AID_LOG, AID_GNSS = range(len(VELOCITY_AIDS))
 
-CONSTANTS = np.dtype([
+CONSTANTS_DTYPE = np.dtype([
     ('method', 'i8'), ('aid', 'i8'),            # index into METHODS, AIDS
     ('step', 'f8'),                             # of the laws [s]
     ('aligned_sigma', 'f8'),                    # [rad]
-    ('conditions', CONDITIONS),
-    ('classical', classical.CONSTANTS), ('adrc', adrc.CONSTANTS),
+    ('conditions', CONDITIONS_DTYPE),
+    ('classical', classical.CONSTANTS_DTYPE), ('adrc', adrc.CONSTANTS_DTYPE),
 ], align=True)
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('stage', 'i8'),
     ('begun', 'i8'),                            # 1 once the velocity has been set to the aid's
     ('since', 'f8'),                            # since the laws' last step [s]
     ('free', 'f8'),                             # since navigation began [s]
-    ('strapdown', strapdown.STATE),
+    ('strapdown', strapdown.STATE_DTYPE),
     ('command', 'f8', (3,)),                    # w_c [rad/s]
     ('levelling', 'f8'),                        # w_cN of the gyrocompass, smoothed [rad/s]
     ('azimuth', 'f8'),                          # of n', known so far [rad]
     ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),         # [rad]
     ('aligned_azimuth_sigma', 'f8'), ('aligned_level_sigma', 'f8'),     # when navigation began
     ('no_rate', 'f8', (3,)),                    # zeros: inertial space, and no command
-    ('classical', classical.STATE), ('adrc', adrc.STATE), ('adrc_scheduled', adrc_scheduled.STATE),
-    ('riccati_eso', riccati_eso.STATE), ('oba', oba.STATE),
+    ('classical', classical.STATE_DTYPE), ('adrc', adrc.STATE_DTYPE), ('adrc_scheduled', adrc_scheduled.STATE_DTYPE),
+    ('riccati_eso', riccati_eso.STATE_DTYPE), ('oba', oba.STATE_DTYPE),
 ], align=True)
 
 
 def constants(p, method, aid, latitude) -> np.ndarray:
-    """The record (1,) of CONSTANTS: AlignmentParameters, names out of METHODS and AIDS, latitude [rad]."""
-    record = np.zeros(1, CONSTANTS)
+    """The record (1,) of CONSTANTS_DTYPE: AlignmentParameters, names out of METHODS and AIDS, latitude [rad]."""
+    record = np.zeros(1, CONSTANTS_DTYPE)
     k = conditions(p, latitude)
-    record['method'], record['aid'] = METHODS.index(method), AIDS.index(aid)
+    record['method'], record['aid'] = INS_METHODS.index(method), VELOCITY_AIDS.index(aid)
     record['step'], record['aligned_sigma'] = p.step, p.aligned_sigma
     record['conditions'] = k
     record['classical'] = classical.constants(k, p.classical_bandwidth, p.step)
@@ -63,48 +63,51 @@ def constants(p, method, aid, latitude) -> np.ndarray:
 
 
 def least_azimuth_sigma(c):
-    """The 1 sigma [rad] of azimuth that the method approaches after a long time; c: record of CONSTANTS."""
-    if c['method'] == CLASSICAL:
+    """The 1 sigma [rad] of azimuth that the method approaches after a long time; c: record of CONSTANTS_DTYPE."""
+    if c['method'] == METHOD_CLASSICAL:
         return float(c['classical']['azimuth'])
     k = c['conditions']
     return float(k['gyro_bias'] / k['earth_rate'][1])
 
 
 def initial_state(constants, quaternion) -> np.ndarray:
-    """The record (1,) of STATE at power-up; quaternion (x, y, z, w) deck -> n' as it is taken for true."""
-    state = np.zeros(1, STATE)
+    """The record (1,) of STATE_DTYPE at power-up; quaternion (x, y, z, w) deck -> n' as it is taken for true."""
+    state = np.zeros(1, STATE_DTYPE)
     begin(state[0], constants[0], *map(float, quaternion))
     return state
 
 
 @compiled
 def begin(s, c, qx, qy, qz, qw):
-    """Power-up: records STATE, zero so far, and CONSTANTS."""
-    if c.method == OBA:
+    """Power-up: records STATE_DTYPE, zero so far, and CONSTANTS_DTYPE."""
+    if c.method == METHOD_OBA:
         qx, qy, qz, qw = 0.0, 0.0, 0.0, 1.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
-    s.azimuth_sigma = s.level_sigma = SIGMA_UNKNOWN
+    s.azimuth_sigma = s.level_sigma = UNKNOWN_AZIMUTH_SIGMA_RAD
     for o in (s.adrc.observer, s.adrc_scheduled.observer, s.riccati_eso.observer, s.oba.observer):
-        extended_observer.start(o, c.conditions, extended_observer.LEVEL_SIGMA, extended_observer.AZIMUTH_SIGMA)
+        extended_observer.start(o, c.conditions, extended_observer.INITIAL_LEVEL_SIGMA_RAD,
+                                extended_observer.INITIAL_AZIMUTH_SIGMA_RAD)
 
 
 @compiled
 def aided_velocity(s, c, aid):
-    """(E, N) components in n' [m/s] of the velocity (3,) the aid measures; a GNSS is used once n' is aligned with n.
+    """(E, N) components in n' [m/s] of the velocity (3,) the aid measures; a AID_GNSS is used once n' is aligned with
+    n.
 
-    A GNSS velocity is not rotated by the azimuth estimated since: 7 m/s that rotate with the estimate would feed back
+    A AID_GNSS velocity is not rotated by the azimuth estimated since: 7 m/s that rotate with the estimate would feed
+    back
     into it, enlarged.
     """
-    if c.aid == LOG:
+    if c.aid == AID_LOG:
         east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
         return east, north
-    if c.aid == GNSS:
+    if c.aid == AID_GNSS:
         return aid[0], aid[1]
     return 0.0, 0.0
 
 
 @compiled
-def take(s, m):
+def copy_method_outputs(s, m):
     """Copy the commands, azimuth and 1 sigmas of the method's record m into the state."""
     for i in range(3):
         s.command[i] = m.command[i]
@@ -116,27 +119,27 @@ def align_in_inertial_space(s, c, aid, h):
     """One step of oba, h [s] after the last; aid (3,) [m/s]."""
     a, k = s.strapdown.velocity, c.conditions
     ux = uy = uz = vx = vy = vz = 0.0
-    if c.aid == LOG:
+    if c.aid == AID_LOG:
         ux, uy, uz = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
-    elif c.aid == GNSS:
+    elif c.aid == AID_GNSS:
         vx, vy, vz = aid[0], aid[1], aid[2]
     oba.step(s.oba, k, (a[0] - ux, a[1] - uy, a[2] - uz), (vx, vy, vz), h)
     s.azimuth_sigma, s.level_sigma = s.oba.azimuth_sigma, s.oba.level_sigma
 
 
 @compiled
-def doubt_the_opposite(s, c, h):
+def reject_reversed_azimuth(s, c, h):
     """Declare the gyrocompass's azimuth unknown where the level command shows that az is beyond 60 deg.
 
     At 180 deg of azimuth its loop is at rest too, but the level command to the north is twice the earth's rate there:
     (19) of paper 001, cos az = 1 + w_cN / w_N."""
     s.levelling += c.classical.s0 * h * (s.command[1] - s.levelling)
     if 1.0 + s.levelling / c.conditions.earth_rate[1] < 0.5:
-        s.azimuth_sigma = SIGMA_UNKNOWN
+        s.azimuth_sigma = UNKNOWN_AZIMUTH_SIGMA_RAD
 
 
 @compiled
-def follow(s, c, method, aid, h):
+def step_method(s, c, method, aid, h):
     """One step, h [s] after the last, of a method that commands n'; aid (3,) [m/s]."""
     v, k = s.strapdown.velocity, c.conditions
     east, north = aided_velocity(s, c, aid)
@@ -144,29 +147,30 @@ def follow(s, c, method, aid, h):
         v[0], v[1], s.begun = east, north, 1
     v[2] = 0.0
     v_east, v_north = v[0] - east, v[1] - north
-    if method == CLASSICAL:
+    if method == METHOD_CLASSICAL:
         classical.step(s.classical, c.classical, k, v_east, v_north, h)
         v[0] -= s.classical.taken[0]
         v[1] -= s.classical.taken[1]
-        take(s, s.classical)
-        doubt_the_opposite(s, c, h)
-    elif method == ADRC:
+        copy_method_outputs(s, s.classical)
+        reject_reversed_azimuth(s, c, h)
+    elif method == METHOD_ADRC:
         adrc.step(s.adrc, c.adrc, k, v_east, v_north, h)
-        take(s, s.adrc)
-    elif method == ADRC_SCHEDULED:
+        copy_method_outputs(s, s.adrc)
+    elif method == METHOD_ADRC_SCHEDULED:
         adrc_scheduled.step(s.adrc_scheduled, k, v_east, v_north, h)
-        take(s, s.adrc_scheduled)
+        copy_method_outputs(s, s.adrc_scheduled)
     else:
-        w_c = riccati_eso.W_C_NAVIGATING if s.stage == NAVIGATING else riccati_eso.W_C_ALIGNING
+        w_c = (riccati_eso.NAVIGATING_BANDWIDTH_RAD_S if s.stage == STAGE_NAVIGATING
+               else riccati_eso.ALIGNING_BANDWIDTH_RAD_S)
         riccati_eso.step(s.riccati_eso, k, v_east, v_north, h, w_c)
-        take(s, s.riccati_eso)
+        copy_method_outputs(s, s.riccati_eso)
 
 
 @compiled
 def attitude(s, c):
     """Estimated quaternion (x, y, z, w) deck -> earth."""
     q = s.strapdown.quaternion
-    if c.method == OBA and s.stage == ALIGNING:
+    if c.method == METHOD_OBA and s.stage == STAGE_ALIGNING:
         if s.oba.count < 2.0:
             return q[0], q[1], q[2], q[3]
         return oba.attitude(s.oba, c.conditions, q[0], q[1], q[2], q[3])
@@ -176,11 +180,11 @@ def attitude(s, c):
 @compiled
 def error_velocity(s, c):
     """(E, N) components in n' [m/s] of the velocity that the method attributes to an error of the INS."""
-    if c.method == ADRC:
+    if c.method == METHOD_ADRC:
         return s.adrc.observer.z[0, 0], s.adrc.observer.z[1, 0]
-    if c.method == ADRC_SCHEDULED:
+    if c.method == METHOD_ADRC_SCHEDULED:
         return s.adrc_scheduled.observer.z[0, 0], s.adrc_scheduled.observer.z[1, 0]
-    if c.method == RICCATI_ESO:
+    if c.method == METHOD_RICCATI_ESO:
         return s.riccati_eso.observer.z[0, 0], s.riccati_eso.observer.z[1, 0]
     return 0.0, 0.0
 
@@ -195,11 +199,11 @@ def begin_navigation(s, c, aid):
     cos, sin = math.cos(s.azimuth), math.sin(s.azimuth)
     east, north = v[0] - wrong_east, v[1] - wrong_north
     v[0], v[1], v[2] = cos * east - sin * north, sin * east + cos * north, 0.0
-    if c.method == OBA:
+    if c.method == METHOD_OBA:
         v[0] = v[1] = 0.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
-    s.stage, s.azimuth = NAVIGATING, 0.0
-    if c.aid != NO_AID:
+    s.stage, s.azimuth = STAGE_NAVIGATING, 0.0
+    if c.aid != AID_NONE:
         v[0], v[1] = aided_velocity(s, c, aid)
     for i in range(3):
         s.command[i] = 0.0
@@ -212,7 +216,7 @@ def begin_navigation(s, c, aid):
 
 
 @compiled
-def fly_free(s, k, h):
+def grow_unaided_sigmas(s, k, h):
     """Grow the 1 sigmas of an INS without aid over h [s]: random walk and bias of the gyros, and the earth's rate
     resolved with a heading that is wrong by its 1 sigma, which tilts the level."""
     s.free += h
@@ -224,11 +228,11 @@ def fly_free(s, k, h):
 
 @compiled
 def step(s, c, angle, force, dt, aid):
-    """Process one IMU interval of dt [s]; records STATE, CONSTANTS.
+    """Process one IMU interval of dt [s]; records STATE_DTYPE, CONSTANTS_DTYPE.
 
     angle, force (3,): its increments, FLU [rad, m/s]; aid (3,) [m/s], finite.
     """
-    k, inertial = c.conditions, c.method == OBA and s.stage == ALIGNING
+    k, inertial = c.conditions, c.method == METHOD_OBA and s.stage == STAGE_ALIGNING
     if inertial:
         strapdown.step(s.strapdown, angle, force, dt, s.no_rate, s.no_rate, 0.0)
     else:
@@ -239,12 +243,12 @@ def step(s, c, angle, force, dt, aid):
     h, s.since = s.since, 0.0
     if inertial:
         align_in_inertial_space(s, c, aid, h)
-    elif s.stage == ALIGNING:
-        follow(s, c, c.method, aid, h)
-    elif c.aid == NO_AID:
+    elif s.stage == STAGE_ALIGNING:
+        step_method(s, c, c.method, aid, h)
+    elif c.aid == AID_NONE:
         s.strapdown.velocity[2] = 0.0
-        fly_free(s, k, h)
+        grow_unaided_sigmas(s, k, h)
     else:
-        follow(s, c, RICCATI_ESO, aid, h)
-    if s.stage == ALIGNING and s.azimuth_sigma <= c.aligned_sigma:
+        step_method(s, c, METHOD_RICCATI_ESO, aid, h)
+    if s.stage == STAGE_ALIGNING and s.azimuth_sigma <= c.aligned_sigma:
         begin_navigation(s, c, aid)

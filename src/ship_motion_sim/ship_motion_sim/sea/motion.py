@@ -1,6 +1,6 @@
 """The ship's truth at an instant: position, attitude and their exact derivatives. Stateless.
 
-    outputs = np.zeros(1, OUTPUTS)
+    outputs = np.zeros(1, OUTPUTS_DTYPE)
     truth(constants(params)[0], 12.5, outputs[0])
 """
 import math
@@ -11,26 +11,27 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
 from ship_motion_sim.params import ShipParameters
 from ship_motion_sim.sea import recording, waves
-from ship_motion_sim.sea.waves import COMPONENTS, FREEDOMS, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from ship_motion_sim.sea.waves import FREEDOM_COUNT, HEAVE, PITCH, ROLL, SURGE, SWAY, WAVE_COMPONENT_COUNT, YAW
 
-STATUS = ('ok', 'time is not finite')
-OK, BAD_TIME = range(len(STATUS))
+MOTION_STATUS_TEXTS = ('ok', 'time is not finite')
+MOTION_OK, MOTION_BAD_TIME = range(len(MOTION_STATUS_TEXTS))
 
-CONSTANTS = np.dtype([
-    ('frequency', 'f8', (COMPONENTS,)),             # w_e [rad/s]; components not in use are 0
-    ('phase', 'f8', (COMPONENTS,)),                 # [rad]
-    ('cosine', 'f8', (COMPONENTS, FREEDOMS)),       # Re X [m, rad]
-    ('sine', 'f8', (COMPONENTS, FREEDOMS)),         # -Im X
+CONSTANTS_DTYPE = np.dtype([
+    ('frequency', 'f8', (WAVE_COMPONENT_COUNT,)),             # w_e [rad/s]; components not in use are 0
+    ('phase', 'f8', (WAVE_COMPONENT_COUNT,)),                 # [rad]
+    ('cosine', 'f8', (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)),       # Re X [m, rad]
+    ('sine', 'f8', (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)),         # -Im X
     ('yaw', 'f8'), ('cos_yaw', 'f8'), ('sin_yaw', 'f8'),    # mean heading as REP 103 yaw
     ('speed', 'f8'),
     ('pieces', 'i8'),                               # of a recorded motion; 0: the components it is
-    ('breaks', 'f8', (recording.PIECES + 1,)),      # [s]
-    ('coefficients', 'f8', (recording.PIECES, FREEDOMS, recording.ORDER)),      # [m, rad], highest power first
+    ('breaks', 'f8', (recording.MAX_PIECES + 1,)),      # [s]
+    ('coefficients', 'f8', (recording.MAX_PIECES, FREEDOM_COUNT,
+                            recording.COEFFICIENTS_PER_PIECE)),      # [m, rad], highest power first
 ], align=True)
 
-OUTPUTS = np.dtype([
-    ('status', 'i8'),                               # index into STATUS; not OK: everything else is NaN
-    ('freedoms', 'f8', (3, FREEDOMS)),              # surge, sway, heave [m], roll, pitch, yaw about the mean
+OUTPUTS_DTYPE = np.dtype([
+    ('status', 'i8'),                               # index into MOTION_STATUS_TEXTS; not OK: everything else is NaN
+    ('freedoms', 'f8', (3, FREEDOM_COUNT)),              # surge, sway, heave [m], roll, pitch, yaw about the mean
                                                     # heading [rad]; rows: value, first, second derivative
     ('position', 'f8', (3,)),                       # ENU [m]
     ('velocity', 'f8', (3,)),                       # ENU [m/s]
@@ -45,11 +46,11 @@ OUTPUTS = np.dtype([
 
 
 def constants(params: ShipParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS: the seaway of the seed and the mean course, or a record of both.
+    """The record (1,) of CONSTANTS_DTYPE: the seaway of the seed and the mean course, or a record of both.
 
     Raises csv_table.TableError where a file is needed and cannot be used.
     """
-    record = np.zeros(1, CONSTANTS)
+    record = np.zeros(1, CONSTANTS_DTYPE)
     if params.motion == 'recorded':
         yaw = _put_recorded(record, params.recorded)
     else:
@@ -104,14 +105,14 @@ def sin_cos(angle):
 @compiled
 def sum_components(ship, t, freedoms):
     """freedoms (3, 6) = sum of all components at t and its first and second derivative: one sine and cosine each."""
-    wave = np.empty((2, COMPONENTS))
-    for i in range(COMPONENTS):
+    wave = np.empty((2, WAVE_COMPONENT_COUNT))
+    for i in range(WAVE_COMPONENT_COUNT):
         wave[0, i], wave[1, i] = sin_cos(ship.frequency[i] * t + ship.phase[i])
-    for d in range(FREEDOMS):
+    for d in range(FREEDOM_COUNT):
         freedoms[0, d] = freedoms[1, d] = freedoms[2, d] = 0.0
-    for i in range(COMPONENTS):
+    for i in range(WAVE_COMPONENT_COUNT):
         w, s, c = ship.frequency[i], wave[0, i], wave[1, i]
-        for d in range(FREEDOMS):
+        for d in range(FREEDOM_COUNT):
             x = ship.cosine[i, d] * c + ship.sine[i, d] * s
             freedoms[0, d] += x
             freedoms[1, d] += w * (ship.sine[i, d] * c - ship.cosine[i, d] * s)
@@ -143,10 +144,10 @@ def course_to_earth(ship, along, port):
 
 @compiled
 def truth(ship, t, out):
-    """Fill the record out (OUTPUTS) with the ship (record CONSTANTS) at time t [s]."""
-    out.status = OK if math.isfinite(t) else BAD_TIME
+    """Fill the record out (OUTPUTS_DTYPE) with the ship (record CONSTANTS_DTYPE) at time t [s]."""
+    out.status = MOTION_OK if math.isfinite(t) else MOTION_BAD_TIME
     x = out.freedoms
-    if ship.pieces > 0 and out.status == OK:
+    if ship.pieces > 0 and out.status == MOTION_OK:
         recording.evaluate(ship.breaks, ship.coefficients, ship.pieces, t, x)
     else:
         sum_components(ship, t, x)

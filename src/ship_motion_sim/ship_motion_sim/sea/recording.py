@@ -10,7 +10,8 @@
 
 Between the rows runs a cubic spline through all of them (not-a-knot ends), so rates and accelerations are exact
 derivatives of the motion, and what is recorded is taken for true: smooth a noisy recording before. Outside the record
-the ship comes to rest within HOLD in the attitude of the nearest end: a quintic from its value, rate and acceleration
+the ship comes to rest within COME_TO_REST_TIME_S in the attitude of the nearest end: a quintic from its value, rate
+and acceleration
 to the same value at rest.
 """
 import numpy as np
@@ -19,51 +20,54 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.interval import interval
 from pedestal_common.text_files import csv_table
 
-ROWS = 16384
+MAX_ROWS = 16384
 """Most rows of a recording."""
-PIECES = ROWS + 1
-ORDER = 6
+MAX_PIECES = MAX_ROWS + 1
+COEFFICIENTS_PER_PIECE = 6
 """Coefficients of a piece, the highest power first."""
-HOLD = 5.0
+COME_TO_REST_TIME_S = 5.0
 """Time [s] within which the ship comes to rest before and after the record."""
 
-COLUMNS = {'time_s': (-1e12, 1e12), 'roll_deg': (-80.0, 80.0), 'pitch_deg': (-80.0, 80.0),
-           'heading_deg': (-360.0, 360.0)}
-DISPLACEMENTS = {'surge_m': (-1e3, 1e3), 'sway_m': (-1e3, 1e3), 'heave_m': (-100.0, 100.0)}
-"""Columns of the file with the range of each; those of DISPLACEMENTS may be missing."""
+COLUMN_RANGES = {'time_s': (-1e12, 1e12), 'roll_deg': (-80.0, 80.0), 'pitch_deg': (-80.0, 80.0),
+                 'heading_deg': (-360.0, 360.0)}
+DISPLACEMENT_RANGES = {'surge_m': (-1e3, 1e3), 'sway_m': (-1e3, 1e3), 'heave_m': (-100.0, 100.0)}
+"""Columns of the file with the range of each; those of DISPLACEMENT_RANGES may be missing."""
 
 
 def read(params):
     """(times (n,) [s] from stamp 0 on, surge, sway, heave [m], roll, pitch, yaw (n, 6) [rad], REP 103) of a
     RecordedParameters; yaw is unwrapped. Raises csv_table.TableError."""
-    rows = csv_table.read(params.path, COLUMNS, 4, params.max_gap, 'ship.recorded.max_gap', DISPLACEMENTS)
-    if len(rows) > ROWS:
-        raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {ROWS}; cut or thin it out')
-    column = dict(zip((*COLUMNS, *DISPLACEMENTS), rows.T))
+    rows = csv_table.read(params.path, COLUMN_RANGES, 4, params.max_gap, 'ship.recorded.max_gap', DISPLACEMENT_RANGES)
+    if len(rows) > MAX_ROWS:
+        raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {MAX_ROWS}; cut or thin it out')
+    column = dict(zip((*COLUMN_RANGES, *DISPLACEMENT_RANGES), rows.T))
     time = column['time_s']
     length = time[-1] - time[0]
     if params.start >= length:
         raise csv_table.TableError(f'{params.path}: ship.recorded.start = {params.start:g} s: must be below the '
                                    f'length of the record, {length:.10g} s')
     return time - time[0] - params.start, np.column_stack((
-        *(column[name] for name in DISPLACEMENTS), np.radians(column['roll_deg']), -np.radians(column['pitch_deg']),
+        *(column[name] for name in DISPLACEMENT_RANGES), np.radians(column['roll_deg']),
+        -np.radians(column['pitch_deg']),
         np.unwrap(np.radians(90.0 - column['heading_deg']))))
 
 
 def pieces(times, freedoms):
-    """(breaks (n + 2,), coefficients (n + 1, 6, ORDER)) of freedoms (n, 6) at times (n,), holds included."""
+    """(breaks (n + 2,), coefficients (n + 1, 6, COEFFICIENTS_PER_PIECE)) of freedoms (n, 6) at times (n,), holds
+    included."""
     from scipy.interpolate import BPoly, CubicSpline, PPoly  # slow to import, and most ships move by themselves
     spline = CubicSpline(times, freedoms)
     first, last = times[0], times[-1]
     at_first, at_last = ([spline(time, order) for order in range(3)] for time in (first, last))
     rest = np.zeros(freedoms.shape[1])
     ends = [PPoly.from_bernstein_basis(BPoly.from_derivatives(*segment)) for segment in (
-        ((first - HOLD, first), (np.array([at_first[0], rest, rest]), np.array(at_first))),
-        ((last, last + HOLD), (np.array(at_last), np.array([at_last[0], rest, rest]))))]
-    inside = np.zeros((ORDER, *spline.c.shape[1:]))
+        ((first - COME_TO_REST_TIME_S, first), (np.array([at_first[0], rest, rest]), np.array(at_first))),
+        ((last, last + COME_TO_REST_TIME_S), (np.array(at_last), np.array([at_last[0], rest, rest]))))]
+    inside = np.zeros((COEFFICIENTS_PER_PIECE, *spline.c.shape[1:]))
     inside[2:] = spline.c
     coefficients = np.concatenate((ends[0].c, inside, ends[1].c), axis=1)
-    return np.concatenate(((first - HOLD,), times, (last + HOLD,))), np.ascontiguousarray(
+    return np.concatenate(((first - COME_TO_REST_TIME_S,), times,
+                           (last + COME_TO_REST_TIME_S,))), np.ascontiguousarray(
         np.moveaxis(coefficients, 0, -1))
 
 
@@ -75,7 +79,7 @@ def evaluate(breaks, coefficients, count, t, freedoms):
     s = t - breaks[piece]
     for d in range(freedoms.shape[1]):
         x = dx = half_ddx = 0.0
-        for i in range(ORDER):
+        for i in range(COEFFICIENTS_PER_PIECE):
             half_ddx = half_ddx * s + dx
             dx = dx * s + x
             x = x * s + coefficients[piece, d, i]

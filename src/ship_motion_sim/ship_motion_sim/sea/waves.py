@@ -13,16 +13,16 @@ from pedestal_common.text_files import csv_table
 from ship_motion_sim import earth
 from ship_motion_sim.params import HullParameters, ShipParameters
 
-COMPONENTS = 80
+WAVE_COMPONENT_COUNT = 80
 SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
-FREEDOMS = 6
+FREEDOM_COUNT = 6
 SEA_STATES = {3: (0.88, 7.5), 4: (1.88, 8.8), 5: (3.25, 9.7), 6: (5.0, 12.4)}
 """Sea state -> (Hs [m], Tp [s])."""
 
-SPECTRUM_COLUMNS = {'frequency_hz': (1e-3, 10.0), 'density_m2_per_hz': (0.0, 1e4)}
+SPECTRUM_COLUMN_RANGES = {'frequency_hz': (1e-3, 10.0), 'density_m2_per_hz': (0.0, 1e4)}
 """Of the file of a measured spectrum, with the range of each."""
 
-_FINE = 100     # grid points per component where the spectrum is integrated
+_GRID_STEPS_PER_COMPONENT = 100     # grid points per component where the spectrum is integrated
 
 
 class Waves(typing.NamedTuple):
@@ -46,7 +46,7 @@ def band(tp):
 
 
 def _grid(tp):
-    return np.linspace(*band(tp), COMPONENTS * _FINE + 1)
+    return np.linspace(*band(tp), WAVE_COMPONENT_COUNT * _GRID_STEPS_PER_COMPONENT + 1)
 
 
 def _integral(x, y):
@@ -108,14 +108,14 @@ def transfer(hull: HullParameters, w, mu, speed, gravity):
 
 
 def density(params: ShipParameters):
-    """(w [rad/s], S [m2 s/rad]) on COMPONENTS bins of _FINE steps each: of the sea state, or as measured.
+    """(w [rad/s], S [m2 s/rad]) on WAVE_COMPONENT_COUNT bins of _FINE steps each: of the sea state, or as measured.
 
     A measured density runs in straight lines between its rows. Raises csv_table.TableError.
     """
     if params.spectrum == 'file':
-        frequency, measured = csv_table.read(params.spectrum_file, SPECTRUM_COLUMNS).T
+        frequency, measured = csv_table.read(params.spectrum_file, SPECTRUM_COLUMN_RANGES).T
         w = 2.0 * math.pi * frequency
-        grid = np.linspace(w[0], w[-1], COMPONENTS * _FINE + 1)
+        grid = np.linspace(w[0], w[-1], WAVE_COMPONENT_COUNT * _GRID_STEPS_PER_COMPONENT + 1)
         return grid, np.interp(grid, w, measured / (2.0 * math.pi))
     hs, tp = SEA_STATES.get(params.sea_state, (params.significant_height, params.peak_period))
     grid = _grid(tp)
@@ -123,7 +123,7 @@ def density(params: ShipParameters):
 
 
 def seaway(params: ShipParameters):
-    """The waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (COMPONENTS,).
+    """The waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (WAVE_COMPONENT_COUNT,).
 
     One wave in each of equal bins, at a random place in its bin (equal spacing would repeat after 2 pi / dw), with
     the bin's whole energy: sum a^2/2 = Hs^2/16 for every seed.
@@ -131,10 +131,11 @@ def seaway(params: ShipParameters):
     grid, S = density(params)
     energy = _integral(grid, S)
     random = np.random.default_rng(params.seed)
-    w = grid[0] + (np.arange(COMPONENTS) + random.random(COMPONENTS)) * (grid[-1] - grid[0]) / COMPONENTS
-    amplitude = np.sqrt(2.0 * np.diff(energy[::_FINE]))
-    phase = random.uniform(0.0, 2.0 * math.pi, COMPONENTS)
-    mu = np.radians(params.wave_angle_deg + params.spread_deg * random.standard_normal(COMPONENTS))
+    w = (grid[0] + (np.arange(WAVE_COMPONENT_COUNT) + random.random(WAVE_COMPONENT_COUNT)) * (grid[-1] - grid[0])
+         / WAVE_COMPONENT_COUNT)
+    amplitude = np.sqrt(2.0 * np.diff(energy[::_GRID_STEPS_PER_COMPONENT]))
+    phase = random.uniform(0.0, 2.0 * math.pi, WAVE_COMPONENT_COUNT)
+    mu = np.radians(params.wave_angle_deg + params.spread_deg * random.standard_normal(WAVE_COMPONENT_COUNT))
     return w, amplitude, phase, mu
 
 
@@ -144,14 +145,14 @@ def _plain(params: ShipParameters) -> Waves:
              (ROLL, math.radians(plain.roll_amplitude_deg), plain.roll_period),
              (PITCH, math.radians(plain.pitch_amplitude_deg), plain.pitch_period),
              (YAW, math.radians(plain.yaw_amplitude_deg), plain.yaw_period))
-    response = np.zeros((len(sines), FREEDOMS), complex)
+    response = np.zeros((len(sines), FREEDOM_COUNT), complex)
     for row, (freedom, amplitude, _) in enumerate(sines):
         response[row, freedom] = -1j * amplitude
     return Waves(2.0 * math.pi / np.array([period for _, _, period in sines]), np.zeros(len(sines)), response)
 
 
 def build(params: ShipParameters) -> Waves:
-    """The components of the ship's motion: at most COMPONENTS of them, from waves or plain sines."""
+    """The components of the ship's motion: at most WAVE_COMPONENT_COUNT of them, from waves or plain sines."""
     if params.motion == 'plain':
         return _plain(params)
     w, amplitude, phase, mu = seaway(params)

@@ -1,6 +1,7 @@
 """What the target flies: the course that an orbit or a table of directions prescribes, and the run that goes with it.
 
-An orbit is a cubic Hermite spline through positions and velocities of its interpolation every KNOTS seconds, within
+An orbit is a cubic Hermite spline through positions and velocities of its interpolation every MAX_KNOT_SPACING_S
+seconds, within
 1 mm of it. A table of directions is the cubic spline through its unit vectors, which no zenith and no north disturbs,
 at the range target.angle.range.
 """
@@ -16,9 +17,9 @@ from tracking_receiver_sim.ephemeris import horizon
 from tracking_receiver_sim.track import instant
 from tracking_receiver_sim.track.flight import Flight
 
-KNOTS = 10.0
+MAX_KNOT_SPACING_S = 10.0
 """[s], at most."""
-LONGEST = 86400.0
+MAX_DURATION_S = 86400.0
 """Run [s]."""
 
 
@@ -28,13 +29,13 @@ def of_orbit(ephemeris, target, duration, margin) -> Flight:
     zero = ephemeris.begin + target.track_file.start
     horizon.require(ephemeris, zero, zero + duration)
     begin, end = max(-margin, ephemeris.begin - zero), min(duration + margin, ephemeris.end - zero)
-    knots = np.linspace(begin, end, 2 + int((end - begin) / KNOTS))
+    knots = np.linspace(begin, end, 2 + int((end - begin) / MAX_KNOT_SPACING_S))
     known = np.clip(zero + knots, ephemeris.begin, ephemeris.end)
     r, v = horizon.enu(ephemeris, target.station, known)
     there = np.isfinite(r).all(axis=1)  # a gap may begin where the margin is
     spline = CubicHermiteSpline(knots[there], r[there], v[there])
     _check_acceleration(ephemeris, spline, zero, target.track_file.max_acceleration)
-    t = np.linspace(0.0, duration, 2 + int(duration / KNOTS))
+    t = np.linspace(0.0, duration, 2 + int(duration / MAX_KNOT_SPACING_S))
     east, north, up = spline(t).T
     distance, elevation = np.hypot(np.hypot(east, north), up), arctan2(up, np.hypot(east, north))
     top = int(np.argmax(elevation))
@@ -68,8 +69,9 @@ def run_of_orbit(ephemeris, target, given):
     start = ephemeris.begin + target.track_file.start if said else None
     begin, end = horizon.passage(ephemeris, target.station, start)
     zero = begin if said or begin == ephemeris.begin else math.ceil(begin)
-    duration = max(0.1, min(LONGEST, math.floor(10.0 * (end - zero)) / 10.0))
-    r, _ = horizon.enu(ephemeris, target.station, np.linspace(zero, zero + duration, 1 + int(duration / KNOTS)))
+    duration = max(0.1, min(MAX_DURATION_S, math.floor(10.0 * (end - zero)) / 10.0))
+    (r, _) = horizon.enu(ephemeris, target.station, np.linspace(zero, zero + duration, 1
+                                                                + int(duration / MAX_KNOT_SPACING_S)))
     return {**_station(target), 'target.track_file.start': float(zero - ephemeris.begin), 'duration': duration,
             'receiver.reference_range': _upwards(np.nanmax(np.linalg.norm(r, axis=1)))}
 
@@ -96,7 +98,7 @@ def of_directions(directions, target, _duration, _margin) -> Flight:
 def run_of_directions(directions, target, _given):
     """{parameter: value} of a run from the first row, or from start, to the last."""
     last = directions.t[-1] - directions.t[0] - target.track_file.start
-    return {**_station(target), 'duration': max(0.1, min(LONGEST, (math.ceil(10.0 * last) - 1) / 10.0)),
+    return {**_station(target), 'duration': max(0.1, min(MAX_DURATION_S, (math.ceil(10.0 * last) - 1) / 10.0)),
             'receiver.reference_range': target.angle.range}
 
 

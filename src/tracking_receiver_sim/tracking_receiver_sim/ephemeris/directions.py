@@ -16,18 +16,18 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines, states
 from tracking_receiver_sim.track import instant
 
-NAMES = {'time': ('time', 'utc', 'epoch', 'timestamp', 't'), 'azimuth': ('azimuth', 'az'),
-         'elevation': ('elevation', 'el')}
+COLUMN_NAMES = {'time': ('time', 'utc', 'epoch', 'timestamp', 't'), 'azimuth': ('azimuth', 'az'),
+                'elevation': ('elevation', 'el')}
 """{what: first words of the names of its column}."""
-LIMITS = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}
-JULIAN = 2_400_000.5, 2_536_000.0
+ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}
+JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
 """Julian dates: until 2231."""
-UNIX = 2_440_587.5
+UNIX_EPOCH_JULIAN_DATE = 2_440_587.5
 """Julian date of 1970."""
-LEAST = 4
-LARGEST_STEP = 20.0
+MIN_ROWS = 4
+MAX_STEP_DEG = 20.0
 """Between two rows [deg]: what lies between is not known otherwise."""
-WORD = re.compile(r'[a-z]+|\d+')
+NAME_WORD_PATTERN = re.compile(r'[a-z]+|\d+')
 
 
 class Directions(typing.NamedTuple):
@@ -47,8 +47,8 @@ def is_program(beginning):
     for text in beginning.decode('ascii', 'replace').splitlines():
         words = text.split('#', 1)[0].split()
         if words:
-            return len(words) >= 3 and all(map(lines.NUMBER.fullmatch, words[:3])) and (
-                JULIAN[0] <= float(words[0]) <= JULIAN[1])
+            return len(words) >= 3 and all(map(lines.NUMBER_PATTERN.fullmatch, words[:3])) and (
+                JULIAN_DATE_LIMITS[0] <= float(words[0]) <= JULIAN_DATE_LIMITS[1])
     return False
 
 
@@ -61,13 +61,13 @@ def is_table(beginning):
 
 def read_program(path, _wanted='') -> Directions:
     """The table in a program.txt. Raises TableError."""
-    rows, limits = array.array('d'), {'Julian date': JULIAN, **LIMITS}
+    rows, limits = array.array('d'), {'Julian date': JULIAN_DATE_LIMITS, **ANGLE_LIMITS_DEG}
     for line, text in lines.read(path):
         text = text.split('#', 1)[0].rstrip()
         if text:
             _, azimuth, elevation = lines.numbers(path, line, text, limits)
             day, _, fraction = text.split()[0].partition('.')
-            t = 86400.0 * (float(day) - UNIX) + 86400.0 * float(f'0.{fraction or 0}')
+            t = 86400.0 * (float(day) - UNIX_EPOCH_JULIAN_DATE) + 86400.0 * float(f'0.{fraction or 0}')
             rows.extend((line, t, azimuth, elevation))
     return _directions(path, rows, True, 'sat-nms program')
 
@@ -90,16 +90,16 @@ def read_table(path, _wanted='') -> Directions:
                 if not any(map(str.strip, cells)):
                     continue
                 time, azimuth, elevation = (cells[column] if column < len(cells) else None for column in columns)
-                iso = bool(instant.ISO.fullmatch((time or '').strip()))
+                iso = bool(instant.ISO_TIME_PATTERN.fullmatch((time or '').strip()))
                 if dated is not None and iso != dated:
                     raise csv_table.TableError(f'{path}: line {line}: {heads[0]} = {time!r:.60}: must be '
                                                f'{"UTC as ISO 8601" if dated else "seconds"} as in the lines above')
                 dated = iso
                 t = (instant.seconds(path, line, heads[0], time) if iso else
                      csv_table.number(path, line, heads[0], time, -1e12, 1e12))
-                rows.extend((line, t, csv_table.number(path, line, heads[1], azimuth, *LIMITS['azimuth']),
-                             csv_table.number(path, line, heads[2], elevation, *LIMITS['elevation'])))
-                if len(rows) > 4 * csv_table.MOST_ROWS:
+                rows.extend((line, t, csv_table.number(path, line, heads[1], azimuth, *ANGLE_LIMITS_DEG['azimuth']),
+                             csv_table.number(path, line, heads[2], elevation, *ANGLE_LIMITS_DEG['elevation'])))
+                if len(rows) > 4 * csv_table.MAX_CSV_ROWS:
                     raise csv_table.too_long(path, line)
         except (UnicodeDecodeError, csv.Error) as error:
             raise csv_table.TableError(f'{path}: not a CSV text file: {error}') from None
@@ -108,20 +108,20 @@ def read_table(path, _wanted='') -> Directions:
 
 def _columns(cells):
     """Where time, azimuth and elevation are by the names of the columns; None where one of them is not."""
-    words = [WORD.findall(cell.lower()) or [''] for cell in cells]
+    words = [NAME_WORD_PATTERN.findall(cell.lower()) or [''] for cell in cells]
     places = [next((i for i, name in enumerate(words) if name[0] in names and 'rad' not in name), None)
-              for names in NAMES.values()]
+              for names in COLUMN_NAMES.values()]
     return None if None in places else places
 
 
 def _is_row(cells):
-    return len(cells) == 3 and all(lines.NUMBER.fullmatch(cell.strip()) for cell in cells[1:3]) and bool(
-        lines.NUMBER.fullmatch(cells[0].strip()) or instant.ISO.fullmatch(cells[0].strip()))
+    return len(cells) == 3 and all(lines.NUMBER_PATTERN.fullmatch(cell.strip()) for cell in cells[1:3]) and bool(
+        lines.NUMBER_PATTERN.fullmatch(cells[0].strip()) or instant.ISO_TIME_PATTERN.fullmatch(cells[0].strip()))
 
 
 def _directions(path, rows, dated, form):
-    if len(rows) < 4 * LEAST:
-        raise csv_table.TableError(f'{path}: {len(rows) // 4} rows, must be at least {LEAST}')
+    if len(rows) < 4 * MIN_ROWS:
+        raise csv_table.TableError(f'{path}: {len(rows) // 4} rows, must be at least {MIN_ROWS}')
     line, t, azimuth, elevation = np.array(rows).reshape(-1, 4).T
     line = line.astype(int)
     midnight = 86400.0 * np.floor(t[0] / 86400.0) if dated else 0.0
@@ -135,14 +135,14 @@ def _directions(path, rows, dated, form):
     if gaps.any():
         i = int(np.argmax(gaps)) + 1
         raise csv_table.TableError(f'{path}: line {line[i]}: a gap of {step[i - 1]:g} s before this row, more than '
-                                   f'{states.GAP:g} times the steps before and after it')
+                                   f'{states.GAP_STEP_RATIO:g} times the steps before and after it')
     azimuth, elevation = np.radians(azimuth), np.radians(elevation)
     cosine = (np.sin(elevation[1:]) * np.sin(elevation[:-1])
               + np.cos(elevation[1:]) * np.cos(elevation[:-1]) * np.cos(np.diff(azimuth)))
     apart = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    if apart.max() > LARGEST_STEP:
+    if apart.max() > MAX_STEP_DEG:
         i = int(np.argmax(apart)) + 1
         raise csv_table.TableError(f'{path}: line {line[i]}: {apart[i - 1]:.3g} deg from the row above: must be at '
-                                   f'most {LARGEST_STEP:g} deg')
+                                   f'most {MAX_STEP_DEG:g} deg')
     return Directions(path, line, t, azimuth, elevation, float(midnight) if dated else None,
                       f'{form}: {len(t)} rows')

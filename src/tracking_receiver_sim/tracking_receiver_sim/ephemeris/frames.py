@@ -11,23 +11,23 @@ import numpy as np
 
 from pedestal_common.geometry.geodesy import EARTH_RATE
 
-FIXED = re.compile(r'ITRF(?:-?\d{2}|-?\d{4})?|WGS84')
-INERTIAL = ('EME2000', 'GCRF', 'ICRF', 'TEME', 'TOD')
-SYSTEMS = {'UTC': None, 'TAI': 0.0, 'TT': 32.184, 'GPS': -19.0}
+EARTH_FIXED_PATTERN = re.compile(r'ITRF(?:-?\d{2}|-?\d{4})?|WGS84')
+INERTIAL_FRAMES = ('EME2000', 'GCRF', 'ICRF', 'TEME', 'TOD')
+TIME_SYSTEM_OFFSETS_S = {'UTC': None, 'TAI': 0.0, 'TT': 32.184, 'GPS': -19.0}
 """{time system: its seconds ahead of TAI}."""
 
-AT_ONCE = 2000
+NUTATION_BATCH_SIZE = 2000
 """Instants whose nutation is computed at once: it takes 30 kB for each."""
 
 
 def known(frame):
     """Whether earth_fixed knows a frame."""
-    return frame in INERTIAL or bool(FIXED.fullmatch(frame))
+    return frame in INERTIAL_FRAMES or bool(EARTH_FIXED_PATTERN.fullmatch(frame))
 
 
 def names():
     """The frames that are known, for people."""
-    return f'{", ".join(INERTIAL)} or ITRF with or without its year'
+    return f'{", ".join(INERTIAL_FRAMES)} or ITRF with or without its year'
 
 
 @functools.cache
@@ -37,21 +37,21 @@ def _timescale():
 
 
 def ahead_of_utc(system, day):
-    """Seconds that a time system of SYSTEMS is ahead of UTC on a day since 1970."""
-    if SYSTEMS[system] is None:
+    """Seconds that a time system of TIME_SYSTEM_OFFSETS_S is ahead of UTC on a day since 1970."""
+    if TIME_SYSTEM_OFFSETS_S[system] is None:
         return 0.0
     leaps = round((_timescale().utc(1970, 1, 1 + day).tai - 2440587.5 - day) * 86400.0)
-    return leaps + SYSTEMS[system]
+    return leaps + TIME_SYSTEM_OFFSETS_S[system]
 
 
 def earth_fixed(frame, utc, r, v):
     """Earth-fixed positions [m] and velocities against the earth [m/s], (n, 3) each, of those in a frame that is
     known, at UTC (n,) [s since 1970]."""
-    if FIXED.fullmatch(frame):
+    if EARTH_FIXED_PATTERN.fullmatch(frame):
         return r, v
     positions, velocities = np.empty_like(r), np.empty_like(v)
-    for at in range(0, len(utc), AT_ONCE):
-        some = slice(at, at + AT_ONCE)
+    for at in range(0, len(utc), NUTATION_BATCH_SIZE):
+        some = slice(at, at + NUTATION_BATCH_SIZE)
         mat = _to_fixed(frame, utc[some])
         positions[some] = np.einsum('ijn,nj->ni', mat, r[some])
         velocities[some] = np.einsum('ijn,nj->ni', mat, v[some]) - np.cross([0.0, 0.0, EARTH_RATE], positions[some])

@@ -8,13 +8,13 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import frames, interpolation, states
 from tracking_receiver_sim.track import instant
 
-LOOK = 20.0
+PASS_SEARCH_STEP_S = 20.0
 """Time between two looks [s]; a pass that is shorter may be missed."""
-LOOKS = 500
+PASS_SEARCH_BATCH_SIZE = 500
 """Looks at once; no more are taken after the pass that is sought."""
-LOWEST = 10.0
+MIN_CULMINATION_DEG = 10.0
 """Culmination [deg] below which a pass is not chosen: it stays where refraction and buildings are."""
-ABUTTING = 1e-3
+SEGMENT_GAP_TOLERANCE_S = 1e-3
 """Time between two segments [s] that is no gap."""
 
 
@@ -22,7 +22,7 @@ def enu(ephemeris, station, t):
     """ENU position [m] and velocity against the earth [m/s], (n, 3) each, at t (n,); NaN where no segment holds t."""
     r, v = np.full((2, len(t), 3), np.nan)
     for segment in reversed(ephemeris.segments):
-        mine = (t >= segment.begin - ABUTTING) & (t <= segment.end + ABUTTING)
+        mine = (t >= segment.begin - SEGMENT_GAP_TOLERANCE_S) & (t <= segment.end + SEGMENT_GAP_TOLERANCE_S)
         if mine.any():
             inside = t[mine].clip(segment.t[0], segment.t[-1])
             r[mine], v[mine] = frames.earth_fixed(segment.frame, ephemeris.midnight + inside,
@@ -43,7 +43,7 @@ def require(ephemeris, begin, end):
         return instant.iso(ephemeris.midnight + t)
 
     first, last = ephemeris.segments[0], ephemeris.segments[-1]
-    if begin < ephemeris.begin - ABUTTING or end > ephemeris.end + ABUTTING:
+    if begin < ephemeris.begin - SEGMENT_GAP_TOLERANCE_S or end > ephemeris.end + SEGMENT_GAP_TOLERANCE_S:
         line = first.line[0] if begin < ephemeris.begin else last.line[-1]
         raise csv_table.TableError(f'{ephemeris.path}: line {line}: the run from {said(begin)} to {said(end)} is not '
                                    f'all inside the file, which may be used from {said(ephemeris.begin)} to '
@@ -53,28 +53,29 @@ def require(ephemeris, begin, end):
     for segment in ephemeris.segments:
         gaps += [(segment.t[i], segment.t[i + 1], segment.line[i + 1]) for i in np.flatnonzero(states.gaps(segment.t))]
     for since, until, line in gaps:
-        if until - since > ABUTTING and begin < until and end > since:
+        if until - since > SEGMENT_GAP_TOLERANCE_S and begin < until and end > since:
             raise csv_table.TableError(f'{ephemeris.path}: line {line}: gap of {until - since:g} s above this state, '
                                        f'in the run from {said(begin)} to {said(end)}')
 
 
 def passage(ephemeris, station, start=None):
-    """(t of the beginning, t of the end) of the first pass that climbs above LOWEST, from rise to set or as far as the
+    """(t of the beginning, t of the end) of the first pass that climbs above MIN_CULMINATION_DEG, from rise to set or
+    as far as the
     file goes; start: t at which the run begins in any case, None: the run begins with the pass.
 
     Raises csv_table.TableError where there is none.
     """
-    t = np.append(np.arange(ephemeris.begin, ephemeris.end, LOOK), ephemeris.end)
+    t = np.append(np.arange(ephemeris.begin, ephemeris.end, PASS_SEARCH_STEP_S), ephemeris.end)
     seen = np.full(len(t), np.nan)
-    for at in range(0, len(t), LOOKS):
-        some = slice(at, at + LOOKS)
+    for at in range(0, len(t), PASS_SEARCH_BATCH_SIZE):
+        some = slice(at, at + PASS_SEARCH_BATCH_SIZE)
         seen[some] = elevation(ephemeris, station, t[some])
         edges = np.flatnonzero(np.diff(np.concatenate(([False], seen > 0.0, [False]))))
         for i, j in zip(edges[::2], edges[1::2]):
-            ended = j < at + LOOKS or at + LOOKS >= len(t)
-            if ended and np.degrees(seen[i:j].max()) >= LOWEST and (start is None or t[j - 1] > start):
+            ended = j < at + PASS_SEARCH_BATCH_SIZE or at + PASS_SEARCH_BATCH_SIZE >= len(t)
+            if ended and np.degrees(seen[i:j].max()) >= MIN_CULMINATION_DEG and (start is None or t[j - 1] > start):
                 return _ends(ephemeris, station, t, seen, (i, j), start)
-    raise csv_table.TableError(f'{ephemeris.path}: the orbit does not climb above {LOWEST:g} deg over latitude '
+    raise csv_table.TableError(f'{ephemeris.path}: the orbit does not climb above {MIN_CULMINATION_DEG:g} deg over latitude '
                                f'{station.latitude_deg:g}, longitude {station.longitude_deg:g} deg from '
                                f'{instant.iso(ephemeris.midnight + (ephemeris.begin if start is None else start))} to '
                                f'{instant.iso(ephemeris.midnight + ephemeris.end)}')

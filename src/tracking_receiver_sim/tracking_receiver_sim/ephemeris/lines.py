@@ -6,13 +6,13 @@ import re
 
 from pedestal_common.text_files import csv_table
 
-LONGEST = 1024
+MAX_LINE_CHARS = 1024
 """Characters of a line; the CCSDS books allow 254."""
 
-WORD = re.compile(r'\S+')
-NUMBER = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?', re.ASCII)
-TIME = re.compile(r'(\d{4}-(?:\d\d-\d\d|\d{3}))[T ](\d\d):(\d\d):(\d\d)(?:\.(\d{1,18}))?Z?', re.ASCII)
-YEARS = 1957, 2199
+WORD_PATTERN = re.compile(r'\S+')
+NUMBER_PATTERN = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?', re.ASCII)
+CCSDS_TIME_PATTERN = re.compile(r'(\d{4}-(?:\d\d-\d\d|\d{3}))[T ](\d\d):(\d\d):(\d\d)(?:\.(\d{1,18}))?Z?', re.ASCII)
+YEAR_LIMITS = 1957, 2199
 """Of times."""
 
 
@@ -26,11 +26,11 @@ def read(path, encoding='ASCII'):
     or in another encoding."""
     with csv_table.stream(path) as stream:
         number = 0
-        while line := stream.readline(LONGEST + 1):
+        while line := stream.readline(MAX_LINE_CHARS + 1):
             number += 1
-            if len(line) > LONGEST and not line.endswith(b'\n'):
-                raise csv_table.TableError(f'{path}: line {number}: longer than {LONGEST} characters')
-            if number > csv_table.MOST_ROWS:
+            if len(line) > MAX_LINE_CHARS and not line.endswith(b'\n'):
+                raise csv_table.TableError(f'{path}: line {number}: longer than {MAX_LINE_CHARS} characters')
+            if number > csv_table.MAX_CSV_ROWS:
                 raise csv_table.too_long(path, number)
             try:
                 text = line.decode(encoding).rstrip()
@@ -48,12 +48,12 @@ def numbers(path, line, text, limits):
             if len(values) == len(limits) and all(
                     low <= value <= high for value, (low, high) in zip(values, limits.values())):
                 return values
-    values, words = [], WORD.finditer(text)  # word by word, to say which is wrong
+    values, words = [], WORD_PATTERN.finditer(text)  # word by word, to say which is wrong
     for name, (low, high) in limits.items():
         word = next(words, None)
         if word is None:
             raise wrong(path, line, len(text) + 1, f'{name} is missing')
-        if not NUMBER.fullmatch(word[0]):
+        if not NUMBER_PATTERN.fullmatch(word[0]):
             raise wrong(path, line, word.start() + 1, f'{name} = {word[0]!r:.60}: must be a number')
         value = float(word[0])
         if not low <= value <= high:
@@ -65,7 +65,7 @@ def numbers(path, line, text, limits):
 def instant(path, line, column, name, text):
     """(days since 1970, seconds of the day) of a time as CCSDS writes it, YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss, in
     whatever system. Raises TableError."""
-    match = TIME.fullmatch(text)
+    match = CCSDS_TIME_PATTERN.fullmatch(text)
     try:
         date, hours, minutes, seconds, fraction = match.groups() if match else [''] * 5
         clock = int(hours), int(minutes), int(seconds)
@@ -74,7 +74,7 @@ def instant(path, line, column, name, text):
         days = _days(date)
     except ValueError:
         raise wrong(path, line, column, f'{name} = {text!r:.60}: must be a time such as 2026-11-22T05:00:00.5 or '
-                    f'2026-326T05:00:00.5, from {YEARS[0]} to {YEARS[1]}') from None
+                    f'2026-326T05:00:00.5, from {YEAR_LIMITS[0]} to {YEAR_LIMITS[1]}') from None
     return days, 3600.0 * clock[0] + 60.0 * clock[1] + clock[2] + float(f'0.{fraction or 0}')
 
 
@@ -84,7 +84,7 @@ def _days(text):
     year, *rest = map(int, text.split('-'))
     date = (datetime.date(year, *rest) if len(rest) == 2 else
             datetime.date(year, 1, 1) + datetime.timedelta(days=rest[0] - 1))
-    if date.year != year or not YEARS[0] <= year <= YEARS[1]:
+    if date.year != year or not YEAR_LIMITS[0] <= year <= YEAR_LIMITS[1]:
         raise ValueError
     return (date - datetime.date(1970, 1, 1)).days
 

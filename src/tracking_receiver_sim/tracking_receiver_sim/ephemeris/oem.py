@@ -7,12 +7,12 @@ import numpy as np
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import frames, lines, states
 
-ENTRY = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
-BEGINNING = b'CCSDS_OEM_VERS'
-LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}
+ENTRY_PATTERN = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
+FILE_SIGNATURE = b'CCSDS_OEM_VERS'
+STATE_LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}
 """Of the numbers in a line of data [km], [km/s]."""
-MOST_SEGMENTS = 1000
-REQUIRED = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
+MAX_SEGMENTS = 1000
+REQUIRED_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
 
 
 class _Entry(str):
@@ -54,7 +54,8 @@ def read(path, wanted='') -> states.Ephemeris:
 
 
 def _blocks(path):
-    """Iterator of ({keyword: _Entry}, table (n, 9)) of the segments; a row is line, day, second, numbers of LIMITS."""
+    """Iterator of ({keyword: _Entry}, table (n, 9)) of the segments; a row is line, day, second, numbers of
+    STATE_LIMITS."""
     meta, rows, begun, state, count = {}, array.array('d'), 0, 'header', 0
     for line, text in lines.read(path):
         word = text.split(None, 1)[0]
@@ -66,11 +67,11 @@ def _blocks(path):
             if state == 'data':
                 yield meta, _table(rows)
             count += 1
-            if count > MOST_SEGMENTS:
-                raise csv_table.TableError(f'{path}: line {line}: must be at most {MOST_SEGMENTS} segments')
+            if count > MAX_SEGMENTS:
+                raise csv_table.TableError(f'{path}: line {line}: must be at most {MAX_SEGMENTS} segments')
             meta, rows, begun, state = {}, array.array('d'), line, 'meta'
         elif word == 'META_STOP' and state == 'meta':
-            missing = [name for name in REQUIRED if name not in meta]
+            missing = [name for name in REQUIRED_KEYWORDS if name not in meta]
             if missing:
                 raise csv_table.TableError(f'{path}: line {line}: {missing[0]} is missing in the metadata above')
             meta['line'], state = line, 'data'
@@ -79,7 +80,7 @@ def _blocks(path):
         elif state == 'data' and word != 'COMMENT':
             rows.extend(_row(path, line, text))
         elif word != 'COMMENT':
-            entry = ENTRY.fullmatch(text.strip())
+            entry = ENTRY_PATTERN.fullmatch(text.strip())
             if not entry:
                 raise lines.wrong(path, line, 1, f'{text.strip()!r:.60}: must be KEYWORD = value')
             meta[entry[1]] = _Entry(entry[3], line, text.index('=') + 1 + len(entry[2].split('=')[1]) + 1)
@@ -97,7 +98,7 @@ def _row(path, line, text):
     epoch = text.split(None, 1)[0]
     at = text.index(epoch)
     rest = ' ' * (at + len(epoch)) + text[at + len(epoch):]
-    return line, *lines.instant(path, line, at + 1, 'epoch', epoch), *lines.numbers(path, line, rest, LIMITS)
+    return line, *lines.instant(path, line, at + 1, 'epoch', epoch), *lines.numbers(path, line, rest, STATE_LIMITS)
 
 
 def _segment(path, meta, rows, midnight):
@@ -109,7 +110,7 @@ def _segment(path, meta, rows, midnight):
     if 'REF_FRAME_EPOCH' in meta:
         entry = meta['REF_FRAME_EPOCH']
         raise lines.wrong(path, entry.line, entry.column, 'REF_FRAME_EPOCH: must be absent, frames are of date')
-    _one_of(path, meta, 'TIME_SYSTEM', tuple(frames.SYSTEMS))
+    _one_of(path, meta, 'TIME_SYSTEM', tuple(frames.TIME_SYSTEM_OFFSETS_S))
     ahead = frames.ahead_of_utc(system, midnight)
 
     def seconds(day, second):
@@ -126,10 +127,10 @@ def _interpolation(path, meta):
     """(method, degree), '' and None where the file says none."""
     if 'INTERPOLATION' not in meta:
         return '', None
-    method, degree = _one_of(path, meta, 'INTERPOLATION', states.METHODS), None
+    method, degree = _one_of(path, meta, 'INTERPOLATION', states.INTERPOLATION_METHODS), None
     entry = meta.get('INTERPOLATION_DEGREE')
     if entry is not None:
-        low, high = states.DEGREES
+        low, high = states.DEGREE_LIMITS
         degree = int(entry) if entry.isdecimal() and len(entry) < 4 else 0
         odd = method == 'HERMITE'
         if not low + 2 * odd <= degree <= high or odd and degree % 2 == 0:

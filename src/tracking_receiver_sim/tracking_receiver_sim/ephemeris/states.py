@@ -5,23 +5,24 @@ import numpy as np
 
 from pedestal_common.text_files import csv_table
 
-METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
-DEGREES = 1, 19
-USUAL = 'HERMITE', 7
+INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
+DEGREE_LIMITS = 1, 19
+DEFAULT_INTERPOLATION = 'HERMITE', 7
 """Interpolation where the file says none."""
 
-RADIUS = 6.3e6, 2e9
+RADIUS_LIMITS_M = 6.3e6, 2e9
 """Distance from the centre of the earth [m]: what is lower is in other units."""
 
-GAP = 3.0
+GAP_STEP_RATIO = 3.0
 """A step that is longer than so many of its neighbours is a gap."""
 
 
 def gaps(t):
-    """Which of the n - 1 steps between times (n,) are more than GAP times as long as both of their neighbours."""
+    """Which of the n - 1 steps between times (n,) are more than GAP_STEP_RATIO times as long as both of their
+    neighbours."""
     step = np.diff(t)
     longest = np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0))
-    return (step > GAP * longest) & (longest > 0.0)
+    return (step > GAP_STEP_RATIO * longest) & (longest > 0.0)
 
 
 class Segment(typing.NamedTuple):
@@ -81,18 +82,18 @@ def segment(path, place, table, frame, method, degree, begin=None, end=None) -> 
         raise csv_table.TableError(f'{path}: line {line[i]}, column 1: the time is {t[i] - t[i - 1]:g} s after that '
                                    'of the state above, must be above 0')
     radius = np.linalg.norm(r, axis=1)
-    outside = np.flatnonzero(~((radius >= RADIUS[0]) & (radius <= RADIUS[1])))
+    outside = np.flatnonzero(~((radius >= RADIUS_LIMITS_M[0]) & (radius <= RADIUS_LIMITS_M[1])))
     if outside.size:
         i = int(outside[0])
         raise csv_table.TableError(f'{path}: line {line[i]}: {radius[i] / 1e3:g} km from the centre of the earth, '
-                                   f'must be {RADIUS[0] / 1e3:g} to {RADIUS[1] / 1e3:g} km: in other units?')
+                                   f'must be {RADIUS_LIMITS_M[0] / 1e3:g} to {RADIUS_LIMITS_M[1] / 1e3:g} km: in other units?')
     v = table[:, 5:8] if table.shape[1] == 8 else None
-    chosen = (method or (USUAL[0] if v is not None else 'LAGRANGE')).upper()
+    chosen = (method or (DEFAULT_INTERPOLATION[0] if v is not None else 'LAGRANGE')).upper()
     made = Segment(line, t, r, v, frame, 'LAGRANGE' if chosen == 'LINEAR' else chosen, 1, begin=max(
         t[0], t[0] if begin is None else begin), end=min(t[-1], t[-1] if end is None else end))
     if degree is None:
         most = 2 * len(t) - 1 if made.method == 'HERMITE' else len(t) - 1
-        degree = 1 if chosen == 'LINEAR' else min(USUAL[1], max(1, most))
+        degree = 1 if chosen == 'LINEAR' else min(DEFAULT_INTERPOLATION[1], max(1, most))
     made = made._replace(degree=1 if chosen == 'LINEAR' else degree)
     if len(t) < max(2, made.nodes):
         raise csv_table.TableError(f'{path}: line {place}: {len(t)} states in the segment that begins here, must be '

@@ -13,22 +13,22 @@ import numpy as np
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines, states
 
-BEGINNING = re.compile(rb'stk\.v\.\d+', re.IGNORECASE)
-FRAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
+FILE_SIGNATURE_PATTERN = re.compile(rb'stk\.v\.\d+', re.IGNORECASE)
+FRAME_NAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
 """{CoordinateSystem: our name}."""
-UNITS = {'meters': 1.0, 'kilometers': 1000.0}
-METHODS = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}
+METRES_PER_UNIT = {'meters': 1.0, 'kilometers': 1000.0}
+METHOD_NAMES = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}
 """{InterpolationMethod: our name}; LagrangeVOP, which interpolates what a Kepler orbit leaves over, is refused."""
-DATA = {'ephemeristimepos': False, 'ephemeristimeposvel': True, 'ephemeristimeposvelacc': True}
+STATE_KEYWORDS = {'ephemeristimepos': False, 'ephemeristimeposvel': True, 'ephemeristimeposvelacc': True}
 """{keyword before the states: whether they have velocities}."""
-GEODETIC = 'lla'
+GEODETIC_MARK = 'lla'
 """In the keyword before states in latitude, longitude and height."""
-KNOWN = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmethod', 'interpolationsamplesm1',
-         'interpolationorder', 'centralbody', 'coordinatesystem', 'distanceunit')
-PASSED_OVER = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
-MOST_SEGMENTS = 1000
-MONTHS = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
-EPOCH = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
+READ_KEYWORDS = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmethod', 'interpolationsamplesm1',
+                 'interpolationorder', 'centralbody', 'coordinatesystem', 'distanceunit')
+IGNORED_KEYWORDS = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
+MAX_SEGMENTS = 1000
+MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
+EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
 
 
 def read(path, _wanted='') -> states.Ephemeris:
@@ -47,18 +47,19 @@ def read(path, _wanted='') -> states.Ephemeris:
             break
         elif limits:
             rows.extend((line, *lines.numbers(path, line, text, limits)))
-        elif words[0] in DATA:
-            unit, limits = _limits(path, head, DATA[words[0]])
-        elif words[0] in KNOWN or words[0] in PASSED_OVER:
+        elif words[0] in STATE_KEYWORDS:
+            unit, limits = _limits(path, head, STATE_KEYWORDS[words[0]])
+        elif words[0] in READ_KEYWORDS or words[0] in IGNORED_KEYWORDS:
             value = text.lstrip()[len(words[0]):].lstrip()
             head[words[0]] = line, len(text) - len(value) + 1, value.strip('"')
         elif words[0] != 'begin':
             column = len(text) - len(text.lstrip()) + 1
-            geodetic = 'states in latitude, longitude and height are not read: ' if GEODETIC in words[0] else ''
-            raise lines.wrong(path, line, column, f'{words[0]!r:.40}: {geodetic}must be one of {", ".join(DATA)}, '
+            geodetic = 'states in latitude, longitude and height are not read: ' if GEODETIC_MARK in words[0] else ''
+            raise lines.wrong(path, line, column,
+                              f'{words[0]!r:.40}: {geodetic}must be one of {", ".join(STATE_KEYWORDS)}, '
                               'or a keyword before them')
     if not limits:
-        raise csv_table.TableError(f'{path}: none of {", ".join(DATA)} in it')
+        raise csv_table.TableError(f'{path}: none of {", ".join(STATE_KEYWORDS)} in it')
     table = np.array(rows).reshape(-1, 1 + len(limits))
     table[:, 2:] *= unit
     return _ephemeris(path, head, table)
@@ -66,7 +67,7 @@ def read(path, _wanted='') -> states.Ephemeris:
 
 def _limits(path, head, with_velocity):
     """(unit [m], {name of a number in a line: its limits})."""
-    unit = _choice(path, head, 'distanceunit', UNITS, 'meters')
+    unit = _choice(path, head, 'distanceunit', METRES_PER_UNIT, 'meters')
     limits = {'time': (-1e9, 1e9), **dict.fromkeys('xyz', (-2e9 / unit, 2e9 / unit))}
     if with_velocity:
         limits.update(dict.fromkeys(('vx', 'vy', 'vz'), (-1e5 / unit, 1e5 / unit)))
@@ -78,8 +79,8 @@ def _ephemeris(path, head, table):
         raise csv_table.TableError(f'{path}: ScenarioEpoch is missing')
     begin, second = _epoch(path, *head['scenarioepoch'])
     _choice(path, head, 'centralbody', {'earth': ''}, 'earth')
-    frame = _choice(path, head, 'coordinatesystem', FRAMES, 'fixed')
-    method = _choice(path, head, 'interpolationmethod', METHODS, 'lagrange')
+    frame = _choice(path, head, 'coordinatesystem', FRAME_NAMES, 'fixed')
+    method = _choice(path, head, 'interpolationmethod', METHOD_NAMES, 'lagrange')
     if method == 'HERMITE' and table.shape[1] == 5:
         place = head['interpolationmethod']
         raise lines.wrong(path, place[0], place[1], 'InterpolationMethod = Hermite: must be Lagrange, the states have '
@@ -87,9 +88,9 @@ def _ephemeris(path, head, table):
     degree = _degree(path, head, method)
     table[:, 1] += second
     ends = np.flatnonzero(np.diff(table[:, 1]) == 0.0) + 1
-    if len(ends) >= MOST_SEGMENTS:
-        raise csv_table.TableError(f'{path}: line {table[ends[MOST_SEGMENTS - 1], 0]:.0f}: must be at most '
-                                   f'{MOST_SEGMENTS} segments')
+    if len(ends) >= MAX_SEGMENTS:
+        raise csv_table.TableError(f'{path}: line {table[ends[MAX_SEGMENTS - 1], 0]:.0f}: must be at most '
+                                   f'{MAX_SEGMENTS} segments')
     segments = tuple(states.segment(path, int(part[0, 0]) if len(part) else 0, part, frame, method, degree)
                      for part in np.split(table, ends))
     return states.Ephemeris(path, begin, segments, f'STK ephemeris: {len(table)} states in {frame}, '
@@ -98,11 +99,11 @@ def _ephemeris(path, head, table):
 
 def _epoch(path, line, column, text):
     """(midnight since 1970 [s], seconds past it) of a time as STK writes it."""
-    match = EPOCH.fullmatch(' '.join(text.lower().split()))
+    match = EPOCH_PATTERN.fullmatch(' '.join(text.lower().split()))
     try:
         day, month, year, hours, minutes, seconds = match.groups()
-        date = datetime.date(int(year), MONTHS.index(month) + 1, int(day))
-        if not lines.YEARS[0] <= date.year <= lines.YEARS[1] or int(hours) > 23 or int(minutes) > 59:
+        date = datetime.date(int(year), MONTH_NAMES.index(month) + 1, int(day))
+        if not lines.YEAR_LIMITS[0] <= date.year <= lines.YEAR_LIMITS[1] or int(hours) > 23 or int(minutes) > 59:
             raise ValueError
     except (AttributeError, ValueError):
         raise lines.wrong(path, line, column, f'ScenarioEpoch = {text!r:.60}: must be UTC such as 1 Jun 2026 '
@@ -124,7 +125,7 @@ def _degree(path, head, method):
     if not name:
         return None
     line, column, text = head[name]
-    low, high = states.DEGREES
+    low, high = states.DEGREE_LIMITS
     samples = int(text) + 1 if text.isdecimal() and len(text) < 4 else 0
     degree = 2 * samples - 1 if method == 'HERMITE' and name == 'interpolationsamplesm1' else samples - 1
     if not low <= degree <= high or method == 'HERMITE' and degree % 2 == 0:

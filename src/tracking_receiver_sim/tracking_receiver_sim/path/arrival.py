@@ -12,29 +12,29 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-LIGHT = 299792458.0
+SPEED_OF_LIGHT_M_S = 299792458.0
 """Speed of light [m/s]."""
 
-LOWEST = math.radians(1.0)
+MIN_ELEVATION_RAD = math.radians(1.0)
 """Below this elevation the refraction stays as it is there."""
 
-PATH = np.dtype([('refractivity', 'f8'), ('light_time', 'i8')], align=True)
+PATH_DTYPE = np.dtype([('refractivity', 'f8'), ('light_time', 'i8')], align=True)
 
 
 def constants(p) -> np.ndarray:
     """PATH (1,) of PathParameters."""
-    return np.array([(p.refractivity, p.light_time)], PATH)
+    return np.array([(p.refractivity, p.light_time)], PATH_DTYPE)
 
 
 @compiled
 def refraction(N, elevation):
     """(R [rad], its derivative by the elevation) at the elevation [rad] of a target as it is."""
-    E = min(max(elevation, LOWEST), 0.5 * math.pi)
+    E = min(max(elevation, MIN_ELEVATION_RAD), 0.5 * math.pi)
     degrees, per_N = math.degrees(E), 0.57295787e-4 * N
     bent = per_N * (1.0 / math.tan(E) - 42.5 / (degrees + 0.4)**2.64) - 40.0 / (degrees + 2.7)**4
     slope = (per_N * (-math.radians(1.0) / math.sin(E)**2 + 112.2 / (degrees + 0.4)**3.64)
              + 160.0 / (degrees + 2.7)**5)
-    return math.radians(bent), slope if elevation > LOWEST else 0.0
+    return math.radians(bent), slope if elevation > MIN_ELEVATION_RAD else 0.0
 
 
 @compiled
@@ -61,7 +61,7 @@ def seen(c, r, v):
     """(vector [m], its velocity [m/s]), ENU from the antenna, at which a target at r with the velocity v is seen;
     three floats each; c: record of PATH."""
     if c.light_time != 0:
-        t = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) / LIGHT
+        t = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) / SPEED_OF_LIGHT_M_S
         r = r[0] - v[0] * t, r[1] - v[1] * t, r[2] - v[2] * t
     if c.refractivity > 0.0:
         r, v = _bent(c.refractivity, r, v)

@@ -16,7 +16,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import offsets, to_deck
 
-MULTIPATH = np.dtype([('reflection', 'f8'), ('rough', 'f8'), ('phase', 'f8')], align=True)
+MULTIPATH_DTYPE = np.dtype([('reflection', 'f8'), ('rough', 'f8'), ('phase', 'f8')], align=True)
 """rho; 2 pi sigma_h / lambda; 4 pi h / lambda."""
 
 Image = namedtuple('Image', 'real imaginary dX dE')
@@ -24,9 +24,9 @@ Image = namedtuple('Image', 'real imaginary dX dE')
 
 
 def constants(p) -> np.ndarray:
-    """MULTIPATH (1,) of MultipathParameters."""
+    """MULTIPATH_DTYPE (1,) of MultipathParameters."""
     per_m = 2.0 * math.pi / p.wavelength
-    return np.array([(p.reflection, per_m * p.roughness, 2.0 * per_m * p.height)], MULTIPATH)
+    return np.array([(p.reflection, per_m * p.roughness, 2.0 * per_m * p.height)], MULTIPATH_DTYPE)
 
 
 @compiled

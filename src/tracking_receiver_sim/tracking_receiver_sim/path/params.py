@@ -4,7 +4,7 @@ import math
 
 from pedestal_common.parameters import Parameters, choice, flag, group, parameter
 
-SENSES = ('right', 'left')
+POLARISATION_SENSES = ('right', 'left')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,4 +44,4 @@ class PolarisationParameters(Parameters):
     """The polarisation ellipse of an antenna."""
     axial_ratio_db: float = parameter(0.0, 0.0, 60.0, 'dB', 'long over short axis; 0: circular')
     tilt: float = parameter(0.0, -math.pi, math.pi, 'rad', 'of the long axis, in the frame of the receiving antenna')
-    sense: str = choice('right', SENSES, 'in which it turns')
+    sense: str = choice('right', POLARISATION_SENSES, 'in which it turns')

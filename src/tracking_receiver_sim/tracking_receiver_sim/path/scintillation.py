@@ -12,20 +12,21 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-NORMALS = 3
+NORMALS_PER_STEP = 3
 """Standard normals of a step: level, two axes."""
 
-LOWEST = math.sin(math.radians(4.0))
+MIN_SIN_ELEVATION = math.sin(math.radians(4.0))
 """Below 4 deg it grows no further: where P.618 ends."""
 
-SCINTILLATION = np.dtype([('level', 'f8'), ('angle', 'f8'), ('keep', 'f8'), ('draw', 'f8'), ('on', 'i8')], align=True)
+SCINTILLATION_DTYPE = np.dtype([('level', 'f8'), ('angle', 'f8'), ('keep', 'f8'), ('draw', 'f8'), ('on', 'i8')],
+                               align=True)
 """1-sigma at the zenith [dB], [rad]; the process of unit variance: x = keep x + draw w."""
 
 
 def constants(p, period) -> np.ndarray:
-    """SCINTILLATION (1,) of ScintillationParameters, for steps of period [s]."""
+    """SCINTILLATION_DTYPE (1,) of ScintillationParameters, for steps of period [s]."""
     keep = math.exp(-period / p.time_constant)
-    return np.array([(p.level_db, p.angle, keep, math.sqrt(1.0 - keep * keep), p.on)], SCINTILLATION)
+    return np.array([(p.level_db, p.angle, keep, math.sqrt(1.0 - keep * keep), p.on)], SCINTILLATION_DTYPE)
 
 
 @compiled
@@ -34,8 +35,8 @@ def wander(c, x, sin_E, normals, first):
 
     x (3,): the process, changed; normals: from index `first` on.
     """
-    for i in range(NORMALS):
+    for i in range(NORMALS_PER_STEP):
         x[i] = c.keep * x[i] + c.draw * normals[first + i]
-    s = max(sin_E, LOWEST)
+    s = max(sin_E, MIN_SIN_ELEVATION)
     angle = c.angle / math.sqrt(s)
     return 10.0**(0.05 * c.level * x[0] / s**1.2), angle * x[1], angle * x[2]

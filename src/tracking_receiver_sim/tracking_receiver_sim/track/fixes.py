@@ -9,13 +9,13 @@ import numpy as np
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
-LISTED = 12
+MAX_LISTED_AIRCRAFT = 12
 """Aircraft that are named where a file holds several."""
 
-MOST_AIRCRAFT = 10_000
+MAX_AIRCRAFT = 10_000
 """Of a file."""
 
-LEAST = 4
+MIN_FIXES = 4
 """Fixes of a track."""
 
 
@@ -51,18 +51,18 @@ def read(track, rows) -> Fixes:
     """The fixes of the file of a TrackFileParameters; rows: the reader of its form. Raises csv_table.TableError."""
     log, numbers, names = Log(), array.array('d'), {}
     for line, who, *fix in rows(track.path, log):
-        if len(numbers) >= 6 * csv_table.MOST_ROWS:
+        if len(numbers) >= 6 * csv_table.MAX_CSV_ROWS:
             raise csv_table.too_long(track.path, line)
-        if len(names) > MOST_AIRCRAFT:
-            raise csv_table.TableError(f'{track.path}: line {line}: must be at most {MOST_AIRCRAFT} aircraft')
+        if len(names) > MAX_AIRCRAFT:
+            raise csv_table.TableError(f'{track.path}: line {line}: must be at most {MAX_AIRCRAFT} aircraft')
         number, known_as = names.setdefault(who[:1], (len(names), set()))
         known_as.update(who)
         numbers.extend((line, number, *fix))
     table = np.array(numbers).reshape(-1, 6)
     aircraft, number = _chosen(track, names)
     line, time, *position = table[table[:, 1] == number][:, (0, 2, 3, 4, 5)].T
-    if len(line) < LEAST:
-        raise csv_table.TableError(f'{track.path}: {len(line)} rows, must be at least {LEAST}{_passed_over(log)}')
+    if len(line) < MIN_FIXES:
+        raise csv_table.TableError(f'{track.path}: {len(line)} rows, must be at least {MIN_FIXES}{_passed_over(log)}')
     fixes = Fixes(track.path, line.astype(int), time + log.offset, *position, log.dated,
                   f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
@@ -81,13 +81,13 @@ def _chosen(track, names):
     if not names:
         return '', 0
     labels = [_label(known_as) or 'one without a name' for _, known_as in names.values()]
-    more = f' and {len(labels) - LISTED} more' if len(labels) > LISTED else ''
+    more = f' and {len(labels) - MAX_LISTED_AIRCRAFT} more' if len(labels) > MAX_LISTED_AIRCRAFT else ''
     raise csv_table.TableError(f'{track.path}: aircraft = {track.aircraft!r:.60}: must name one of the {len(labels)} '
-                               f'in the file: {", ".join(labels[:LISTED])}{more}')
+                               f'in the file: {", ".join(labels[:MAX_LISTED_AIRCRAFT])}{more}')
 
 
 def _label(known_as):
-    return ' '.join(sorted(name[:40] for name in known_as if name)[:LISTED])
+    return ' '.join(sorted(name[:40] for name in known_as if name)[:MAX_LISTED_AIRCRAFT])
 
 
 def _passed_over(log):

@@ -22,12 +22,12 @@ from pedestal_common.reproducible import turned
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
-SAMPLES = 4
+SAMPLES_PER_PIECE = 4
 """Of a piece of the spline, for peak speed and range."""
 
-STEPS = (('100 ft', 30.48), ('25 ft', 7.62))
+ALTITUDE_STEPS_M = (('100 ft', 30.48), ('25 ft', 7.62))
 """Steps [m] in which altitudes are broadcast."""
-WITHIN = 0.06
+ALTITUDE_TOLERANCE_M = 0.06
 """A multiple of a step is met within this [m]: logs are rounded to 0.1 m."""
 
 
@@ -88,7 +88,8 @@ def smoothed(time, enu, track):
 
 
 def _samples(breaks):
-    return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(SAMPLES) / SAMPLES).ravel(), breaks[-1])
+    return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(SAMPLES_PER_PIECE)
+                      / SAMPLES_PER_PIECE).ravel(), breaks[-1])
 
 
 def _check_limits(fixes, spline, track):
@@ -111,8 +112,8 @@ def _check_limits(fixes, spline, track):
 
 def _quantisation(fixes, speed):
     whole = bool((fixes.time == np.round(fixes.time)).all())
-    steps = next((name for name, step in STEPS if len(np.unique(fixes.altitude)) >= 3 and
-                  np.abs(fixes.altitude - step * np.round(fixes.altitude / step)).max() < WITHIN), None)
+    steps = next((name for name, step in ALTITUDE_STEPS_M if len(np.unique(fixes.altitude)) >= 3 and
+                  np.abs(fixes.altitude - step * np.round(fixes.altitude / step)).max() < ALTITUDE_TOLERANCE_M), None)
     return ((f', times in whole seconds (half of one is up to {0.5 * speed:.2g} m)' if whole else '')
             + (f', altitudes in steps of {steps}' if steps else ''))
 

@@ -9,15 +9,15 @@ from xml.parsers import expat
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
-PIECE = 1 << 20
+PARSE_CHUNK_BYTES = 1 << 20
 """Bytes that are parsed at once; expat reads a token that is not complete again with each piece."""
 
-DEEPEST, LONGEST = 100, 200
+MAX_XML_DEPTH, MAX_TEXT_CHARS = 100, 200
 """Elements within each other, and characters of a text that is read; a longer one is cut."""
 
-NO_XML = '; an OEM must be in the notation KEYWORD = value, not XML'
+OEM_XML_HINT = '; an OEM must be in the notation KEYWORD = value, not XML'
 
-TEXTS = ('ele', 'time', 'geoidheight', 'name')
+TEXT_ELEMENTS = ('ele', 'time', 'geoidheight', 'name')
 """Elements whose text is read."""
 
 
@@ -28,7 +28,7 @@ def rows(path, log):
     points = _Points(path, log)
     try:
         with csv_table.stream(path) as stream:
-            while piece := stream.read(PIECE):
+            while piece := stream.read(PARSE_CHUNK_BYTES):
                 points.parser.Parse(piece)
                 yield from points.taken()
             points.parser.Parse(b'', True)
@@ -64,12 +64,12 @@ class _Points:
     def start(self, name, attributes):
         name = name.rpartition(':')[2]
         self.path_of_elements.append(name)
-        if len(self.path_of_elements) > DEEPEST:
-            raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: must be at most {DEEPEST} '
+        if len(self.path_of_elements) > MAX_XML_DEPTH:
+            raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: must be at most {MAX_XML_DEPTH} '
                                        'elements within each other')
         if len(self.path_of_elements) == 1 and name != 'gpx':
             raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: element {name!r:.60}: '
-                                       f'must be gpx{NO_XML if name in ("oem", "ndm") else ""}')
+                                       f'must be gpx{OEM_XML_HINT if name in ("oem", "ndm") else ""}')
         if name == 'trk':
             self.tracks += 1
             self.track = f'track {self.tracks}'
@@ -78,8 +78,8 @@ class _Points:
 
     def text(self, text):
         *_, parent, name = ('', '', *self.path_of_elements)
-        if name in TEXTS and parent == ('trk' if name == 'name' else 'trkpt'):
-            self.texts[name] = (self.texts.get(name, '') + text[:LONGEST])[:LONGEST]
+        if name in TEXT_ELEMENTS and parent == ('trk' if name == 'name' else 'trkpt'):
+            self.texts[name] = (self.texts.get(name, '') + text[:MAX_TEXT_CHARS])[:MAX_TEXT_CHARS]
 
     def end(self, name):
         name = self.path_of_elements.pop()

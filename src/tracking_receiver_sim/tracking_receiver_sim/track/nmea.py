@@ -8,11 +8,11 @@ import re
 
 import pynmea2
 
-from pedestal_common.graph.steps import DAY
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files import csv_table
 
-SENTENCE = re.compile(r'\$..(?:GGA|RMC),.*', re.ASCII)
-LONGEST = 1024
+SENTENCE_PATTERN = re.compile(r'\$..(?:GGA|RMC),.*', re.ASCII)
+MAX_LINE_CHARS = 1024
 """Characters of a line; the standard allows 82."""
 
 
@@ -23,7 +23,7 @@ def rows(path, log):
     log.form, log.time_name, log.dated = 'NMEA', 'time', False
     days, last, without_separation = 0, None, False
     for line, text in _lines(path):
-        match = SENTENCE.search(text)
+        match = SENTENCE_PATTERN.search(text)
         if not match:
             continue
         try:
@@ -34,18 +34,18 @@ def rows(path, log):
         if sentence.sentence_type == 'RMC':
             if sentence.status == 'A' and isinstance(sentence.datestamp, datetime.date) and not log.dated:
                 log.dated, midnight = True, datetime.datetime.combine(sentence.datestamp, datetime.time())
-                log.offset = midnight.replace(tzinfo=datetime.timezone.utc).timestamp() - DAY * days
+                log.offset = midnight.replace(tzinfo=datetime.timezone.utc).timestamp() - SECONDS_PER_DAY * days
             continue
         if not sentence.gps_qual or not sentence.lat or not sentence.lon:
             log.passed_over['GGA without a fix'] += 1
             continue
         time = _time_of_day(path, line, sentence)
-        if last is not None and time < last - 0.5 * DAY:
+        if last is not None and time < last - 0.5 * SECONDS_PER_DAY:
             days += 1
         last = time
         without_separation = without_separation or not sentence.geo_sep
         separation = csv_table.number(path, line, 'geoidal separation', sentence.geo_sep or '0', -150.0, 150.0)
-        yield (line, (), time + DAY * days,
+        yield (line, (), time + SECONDS_PER_DAY * days,
                _angle(path, line, 'latitude', sentence.lat, sentence.lat_dir, 'NS', 90.0),
                _angle(path, line, 'longitude', sentence.lon, sentence.lon_dir, 'EW', 180.0),
                separation + csv_table.number(path, line, 'altitude', sentence.altitude, -1000.0, 1e8))
@@ -56,10 +56,10 @@ def rows(path, log):
 def _lines(path):
     with csv_table.stream(path) as stream:
         number = 0
-        while line := stream.readline(LONGEST):
+        while line := stream.readline(MAX_LINE_CHARS):
             number += 1
-            if len(line) == LONGEST and not line.endswith(b'\n'):
-                raise csv_table.TableError(f'{path}: line {number}: longer than {LONGEST} characters')
+            if len(line) == MAX_LINE_CHARS and not line.endswith(b'\n'):
+                raise csv_table.TableError(f'{path}: line {number}: longer than {MAX_LINE_CHARS} characters')
             yield number, line.decode('ascii', 'replace').strip()
 
 

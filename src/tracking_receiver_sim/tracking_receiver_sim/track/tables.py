@@ -1,4 +1,4 @@
-"""Flights as CSV. The name of its column of time says what a file holds: a row of FORMS.
+"""Flights as CSV. The name of its column of time says what a file holds: a row of CSV_LAYOUTS.
 
     our own                     time_s, latitude_deg, longitude_deg, altitude_m: every cell is a number
     traffic (ADS-B)             timestamp, latitude, longitude, geoaltitude or altitude: in feet
@@ -12,17 +12,17 @@ import typing
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
-FOOT = 0.3048
+METRES_PER_FOOT = 0.3048
 """[m]"""
 
-FEET, METRES = (-3000.0, 500_000.0), (-1000.0, 150_000.0)
+ALTITUDE_LIMITS_FT, ALTITUDE_LIMITS_M = (-3000.0, 500_000.0), (-1000.0, 150_000.0)
 """Altitudes of ADS-B."""
 
-EMPTY = ('', 'nan', 'none', 'null')
+EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')
 """What a log writes where it knows nothing."""
 
 
-class Form(typing.NamedTuple):
+class CsvLayout(typing.NamedTuple):
     """Names of the columns; altitudes: the best first, and the unit of both [m]; adsb: cells may be empty, the time is
     UTC and aircraft have an icao24 or a callsign."""
     name: str
@@ -35,9 +35,11 @@ class Form(typing.NamedTuple):
     adsb: bool
 
 
-FORMS = (Form('CSV', 'time_s', 'latitude_deg', 'longitude_deg', ('altitude_m',), 1.0, (-1000.0, 1e8), False),
-         Form('ADS-B', 'timestamp', 'latitude', 'longitude', ('geoaltitude', 'altitude'), FOOT, FEET, True),
-         Form('ADS-B', 'time', 'lat', 'lon', ('geoaltitude', 'baroaltitude'), 1.0, METRES, True))
+CSV_LAYOUTS = (CsvLayout('CSV', 'time_s', 'latitude_deg', 'longitude_deg', ('altitude_m',), 1.0, (-1000.0, 1e8),
+                         False),
+               CsvLayout('ADS-B', 'timestamp', 'latitude', 'longitude', ('geoaltitude', 'altitude'), METRES_PER_FOOT,
+                         ALTITUDE_LIMITS_FT, True),
+               CsvLayout('ADS-B', 'time', 'lat', 'lon', ('geoaltitude', 'baroaltitude'), 1.0, ALTITUDE_LIMITS_M, True))
 
 
 def rows(path, log):
@@ -45,7 +47,7 @@ def rows(path, log):
     fixes.Log in which it is noted what the file is. Raises TableError."""
     with csv_table.opened(path) as reader:
         header = reader.fieldnames or ()
-        form = next((form for form in FORMS if form.time in header), FORMS[0])
+        form = next((form for form in CSV_LAYOUTS if form.time in header), CSV_LAYOUTS[0])
         altitude = next((name for name in form.altitudes if name in header), form.altitudes[0])
         names = form.time, form.latitude, form.longitude, altitude
         csv_table.require(path, reader, names)
@@ -56,7 +58,7 @@ def rows(path, log):
         for row in reader:
             line = reader.line_num
             cells = {name: (row[name] or '').strip() for name in (*names, *identities)} if form.adsb else row
-            if form.adsb and any(cells[name].lower() in EMPTY for name in (*names, *identities[:1])):
+            if form.adsb and any(cells[name].lower() in EMPTY_CELL_TEXTS for name in (*names, *identities[:1])):
                 log.passed_over['row without time, position or aircraft'] += 1
                 continue
             time = (instant.seconds(path, line, form.time, cells[form.time]) if form.adsb else

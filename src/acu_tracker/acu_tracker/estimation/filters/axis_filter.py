@@ -7,26 +7,30 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.filters import constant_gain, imm, kalman, motion_models
-from acu_tracker.estimation.filters.kalman import Gaussian, Past, Symmetric
-from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.kalman import Gaussian, PreviousAngle, Symmetric
+from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
-from acu_tracker.estimation.filters.motion_models import MODELS
+from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 
-BANK = len(MODELS)
+BANK_SIZE = len(MODEL_NAMES)
 
-CONSTANTS = np.dtype([('count', 'i8'), ('bank', 'i8'), ('models', motion_models.MODEL, (BANK,)), ('states', 'i8'),
-                      ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'), ('rate_measurement', 'i8'),
-                      ('colour', 'f8')], align=True)
+CONSTANTS_DTYPE = np.dtype([('count', 'i8'), ('bank', 'i8'), ('models', motion_models.MOTION_MODEL_DTYPE,
+                                                              (BANK_SIZE,)), ('states', 'i8'),
+                            ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'),
+                            ('rate_measurement', 'i8'),
+                            ('colour', 'f8')], align=True)
 """count: models in use, the first of `models`; bank: a number that tells which; states: the most of any of them;
 alpha: 0 but for constant gains; colour: bandwidth of the noise of the angle [rad/s], 0 where it is white."""
 
-FILTER = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
-                   ('x', 'f8', (BANK, 3)), ('p', 'f8', (BANK, 6)), ('mu', 'f8', (BANK,)),
-                   ('x_prior', 'f8', (BANK, 3)), ('p_prior', 'f8', (BANK, 6)), ('mu_prior', 'f8', (BANK,)),
-                   ('y', 'f8'), ('follows', 'i8'), ('past', 'f8', (BANK, 5)), ('weights', 'f8', (BANK,)),
-                   ('walk', 'f8')], align=True)
+FILTER_DTYPE = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
+                         ('x', 'f8', (BANK_SIZE, 3)), ('p', 'f8', (BANK_SIZE, 6)), ('mu', 'f8', (BANK_SIZE,)),
+                         ('x_prior', 'f8', (BANK_SIZE, 3)), ('p_prior', 'f8', (BANK_SIZE, 6)),
+                         ('mu_prior', 'f8', (BANK_SIZE,)),
+                         ('y', 'f8'), ('follows', 'i8'), ('past', 'f8', (BANK_SIZE, 5)),
+                         ('weights', 'f8', (BANK_SIZE,)),
+                         ('walk', 'f8')], align=True)
 """bank, count, states: of the constants that x, p, mu belong to: estimate, covariance (as in kalman.Symmetric) and
 probability of each model, after the last measurement.
 
@@ -36,16 +40,17 @@ kalman.Past of each model, of the same prediction. weights: scratch. walk: varia
 [rad2/s] that the angle gains beside what every model says.
 """
 
-ESTIMATE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
-                     ('covariance', 'f8'), ('rate_variance', 'f8'), ('innovation', 'f8'), ('rate_innovation', 'f8'),
-                     ('nis', 'f8'), ('mu', 'f8', (BANK,))], align=True)
+ESTIMATE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
+                           ('covariance', 'f8'), ('rate_variance', 'f8'), ('innovation', 'f8'),
+                           ('rate_innovation', 'f8'),
+                           ('nis', 'f8'), ('mu', 'f8', (BANK_SIZE,))], align=True)
 """rad, rad/s, rad/s2; variances of angle and rate and their covariance; the innovation [rad], that of the rate
 [rad/s] and nu' S^-1 nu, NaN where nothing was measured; probability of each of MODELS, NaN if not in the bank."""
 
 
 def constants(params, noise_bandwidth=0.0) -> np.ndarray:
     """Constants (1,) of FilterParameters; noise_bandwidth [Hz]: of the measured angle's noise, 0 where it is white."""
-    c, bank = np.zeros(1, CONSTANTS), KINDS[params.kind].bank(params)
+    c, bank = np.zeros(1, CONSTANTS_DTYPE), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models
     c['bank'], c['states'] = np.sum(1 << bank.models['kind']), bank.models['states'].max()
@@ -189,7 +194,7 @@ def correct(f, c, m):
         if g.P.p11 < c.alpha * S:
             g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
         elif rho > 0.0:
-            g = kalman.update_correlated(g, Past(o[0], o[1], o[2], o[3], o[4]), rho, nu, S)
+            g = kalman.update_correlated(g, PreviousAngle(o[0], o[1], o[2], o[3], o[4]), rho, nu, S)
         else:
             g = kalman.update(g, nu, m.variance)
         if not math.isnan(m.rate):
@@ -217,7 +222,7 @@ def outlook(f, c, T):
 
 @compiled
 def probabilities(f, c, mu):
-    """mu (BANK,) = probability of each of MODELS, NaN where it is not in the bank."""
+    """mu (BANK_SIZE,) = probability of each of MODELS, NaN where it is not in the bank."""
     mu[:] = math.nan
     for j in range(c.count):
         mu[c.models[j].kind] = f.mu[j]
@@ -225,12 +230,14 @@ def probabilities(f, c, mu):
 
 @compiled
 def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
-    """The filter over arrays (n,): c (1,) of CONSTANTS; stamps [s], angles [rad], variances, rates [rad/s], variances.
+    """The filter over arrays (n,): c (1,) of CONSTANTS_DTYPE; stamps [s], angles [rad], variances, rates [rad/s],
+    variances.
 
-    out (n,) of ESTIMATE: row k after measurement k. It starts at the first angle; rows before are NaN. A NaN angle,
+    out (n,) of ESTIMATE_DTYPE: row k after measurement k. It starts at the first angle; rows before are NaN. A NaN
+    angle,
     or one whose stamp does not advance, is not taken: its row is the outlook from the last one taken.
     """
-    state = np.zeros(1, FILTER)
+    state = np.zeros(1, FILTER_DTYPE)
     f, model = state[0], c[0]
     f.mu[:] = last = math.nan
     f.count = model.count

@@ -19,7 +19,7 @@ Gaussian = namedtuple('Gaussian', 'x P')
 Transition = namedtuple('Transition', 'f13 f23 f33')
 """Third column of F = [[1, T, f13], [0, 1, f23], [0, 0, f33]]."""
 
-Past = namedtuple('Past', 'x1 p11 c1 c2 c3')
+PreviousAngle = namedtuple('PreviousAngle', 'x1 p11 c1 c2 c3')
 """What is known of the angle at the last measurement: its mean x1 [rad], its variance p11, and the covariances
 c1, c2, c3 of angle, rate and acceleration now with it."""
 
@@ -47,7 +47,7 @@ def predicted_covariance(P, F, Q, T):
 def past(g, F, T):
     """The Past of a Gaussian g at the last measurement, T [s] before the prediction: c = F P H'."""
     P = g.P
-    return Past(g.x.angle, P.p11, P.p11 + T * P.p12 + F.f13 * P.p13, P.p12 + F.f23 * P.p13, F.f33 * P.p13)
+    return PreviousAngle(g.x.angle, P.p11, P.p11 + T * P.p12 + F.f13 * P.p13, P.p12 + F.f23 * P.p13, F.f33 * P.p13)
 
 
 @compiled

@@ -5,7 +5,7 @@ import typing
 import numpy as np
 
 from acu_tracker.estimation.filters import constant_gain, motion_models
-from acu_tracker.estimation.filters.motion_models import MODELS, TABLE
+from acu_tracker.estimation.filters.motion_models import MODEL_NAMES, MODEL_ROWS
 from pedestal_common.parameters import ParameterError
 
 
@@ -45,10 +45,10 @@ def _interacting(params):
     return Bank(np.concatenate(models), params.imm.dwell)
 
 
-KINDS = {
+FILTER_KINDS = {
     'alpha_beta': Kind('constant gains on the model cv', _alpha_beta),
     'alpha_beta_gamma': Kind('constant gains on the model ca', _alpha_beta_gamma),
-    **{model.name: Kind(f'Kalman filter: {model.doc}', functools.partial(_alone, model.name)) for model in TABLE},
+    **{model.name: Kind(f'Kalman filter: {model.doc}', functools.partial(_alone, model.name)) for model in MODEL_ROWS},
     'imm': Kind('interacting models, those of `imm.models`', _interacting),
     'imm_ukf': Kind('interacting unscented filters of the position where the range is measured, otherwise `imm`',
                     _interacting, cartesian=True)}
@@ -57,6 +57,6 @@ KINDS = {
 def named_models(names) -> tuple:
     """Names of the models in a text such as 'cv ca', in the order of MODELS. Raises ParameterError."""
     models = names.split()
-    if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODELS)):
-        raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODELS)}, each once")
-    return tuple(sorted(models, key=MODELS.index))
+    if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODEL_NAMES)):
+        raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODEL_NAMES)}, each once")
+    return tuple(sorted(models, key=MODEL_NAMES.index))

@@ -1,11 +1,12 @@
 """Motion models of a target: F and Q of one axis, X = (angle, rate, acceleration).
 
-Of cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. Another model is a row of TABLE, a law
+Of cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. Another model is a row of MODEL_ROWS, a
+law
 that `discretised` picks, its group in params.py, and its name in topics.MOTION_MODELS, a column of acu/filter.
 
 Corrected against the print of paper 000: q22 has 1/(2 alpha^3); sigma_a^2 goes with the square.
 The closed forms of Q lose all digits for small x = alpha T (q11 is a difference of terms ~1 of size x^5), so
-below SERIES_BELOW the power series is used:
+below MAX_SERIES_ARGUMENT the power series is used:
     q = int_0^T g(s) g(s)' ds,  g = (s^2/2 - alpha s^3/6 + ..., s - alpha s^2/2 + ..., e^(-alpha s)).
 """
 import math
@@ -19,7 +20,8 @@ from pedestal_common.compiled import compiled, inlined
 
 
 class MotionModel(typing.NamedTuple):
-    """A row of TABLE. doc: how the target moves; states: 2 for a model without an acceleration, else 3; initial_sigma:
+    """A row of MODEL_ROWS. doc: how the target moves; states: 2 for a model without an acceleration, else 3;
+    initial_sigma:
     its standard deviation of the acceleration [rad/s2] at the start, a function of its parameters; NaN: that of the
     rate, per second."""
     name: str
@@ -28,19 +30,21 @@ class MotionModel(typing.NamedTuple):
     initial_sigma: typing.Callable
 
 
-TABLE = (
+MODEL_ROWS = (
     MotionModel('cv', 'constant rate, disturbed by white acceleration', 2, lambda params: 0.0),
     MotionModel('ca', 'constant acceleration, disturbed by white jerk', 3, lambda params: math.nan),
     MotionModel('singer', 'an acceleration of mean 0 that lasts 1 / alpha (Singer 1970)', 3,
                 lambda params: params.sigma),
     MotionModel('current_statistical', 'an acceleration that lasts 1 / alpha about a mean, the estimate itself '
                 '(paper 000)', 3, lambda params: params.a_max))
-MODELS = tuple(row.name for row in TABLE)
-CV, CA, SINGER, CURRENT_STATISTICAL = range(len(MODELS))
+MODEL_NAMES = tuple(row.name for row in MODEL_ROWS)
+MODEL_CV, MODEL_CA, MODEL_SINGER, MODEL_CURRENT_STATISTICAL = range(len(MODEL_NAMES))
 
-MODEL = np.dtype([('kind', 'i8'), ('states', 'i8'), ('initial_sigma', 'f8'), ('alpha', 'f8'), ('noise', 'f8'),
-                  ('sigma', 'f8'), ('a_max', 'f8'), ('floor', 'f8')], align=True)
-"""kind: of MODELS, states and initial_sigma of its row, then what its group of the parameters gives; a model reads
+MOTION_MODEL_DTYPE = np.dtype([('kind', 'i8'), ('states', 'i8'), ('initial_sigma', 'f8'), ('alpha', 'f8'),
+                               ('noise', 'f8'),
+                               ('sigma', 'f8'), ('a_max', 'f8'), ('floor', 'f8')], align=True)
+"""kind: of MODEL_NAMES, states and initial_sigma of its row, then what its group of the parameters gives; a model
+reads
 only its own.
 
 noise: cv [rad/s2/sqrt(Hz)] of the white acceleration, ca [rad/s3/sqrt(Hz)] of the white jerk: the square root of a
@@ -50,8 +54,8 @@ two-sided density, int of E[w(t) w(s)] ds = noise^2.
 
 def constants(name, params, **changes) -> np.ndarray:
     """Constants (1,) of the model of a name with its group of the parameters; changes: fields that are otherwise."""
-    m, kind = np.zeros(1, MODEL), MODELS.index(name)
-    m['kind'], m['states'], m['initial_sigma'] = kind, TABLE[kind].states, TABLE[kind].initial_sigma(params)
+    m, kind = np.zeros(1, MOTION_MODEL_DTYPE), MODEL_NAMES.index(name)
+    m['kind'], m['states'], m['initial_sigma'] = kind, MODEL_ROWS[kind].states, MODEL_ROWS[kind].initial_sigma(params)
     for field, value in {**vars(params), **changes}.items():
         m[field] = value
     return m
@@ -61,7 +65,7 @@ Discrete = namedtuple('Discrete', 'mean F Q')
 """A model over T: mean: the Transition of the mean of X, F: that of its covariance, Q: its process noise."""
 
 
-SERIES_BELOW = 0.5
+MAX_SERIES_ARGUMENT = 0.5
 _TERMS = range(14)
 
 
@@ -94,7 +98,7 @@ def fading(alpha, T):
     if T == 0.0:
         return Transition(0.0, 0.0, 1.0)
     x = alpha * T
-    if x < SERIES_BELOW:
+    if x < MAX_SERIES_ARGUMENT:
         return Transition(T * T * _series(_G1, x), T * _series(_G2, x), math.exp(-x))
     e = math.exp(-x)
     return Transition((x - 1.0 + e) / alpha**2, (1.0 - e) / alpha, e)
@@ -106,7 +110,7 @@ def fading_noise(alpha, T):
     if T == 0.0:
         return Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     x = alpha * T
-    if x < SERIES_BELOW:
+    if x < MAX_SERIES_ARGUMENT:
         return Symmetric(T**5 * _series(_Q11, x), T**4 * _series(_Q12, x), T**3 * _series(_Q13, x),
                          T**3 * _series(_Q22, x), T**2 * _series(_Q23, x), T * _series(_Q33, x))
     e = math.exp(-x)
@@ -130,10 +134,10 @@ def acceleration_variance(abar, a_max, floor):
 
 @inlined
 def of_mean(m, T):
-    """Transition of the mean over T [s] of a record of MODEL."""
-    if m.kind == CV:
+    """Transition of the mean over T [s] of a record of MOTION_MODEL_DTYPE."""
+    if m.kind == MODEL_CV:
         return Transition(0.0, 0.0, 0.0)
-    if m.kind == SINGER:
+    if m.kind == MODEL_SINGER:
         return fading(m.alpha, T)
     return Transition(0.5 * T * T, T, 1.0)
 
@@ -179,12 +183,12 @@ def current_statistical(m, abar, T):
 
 @inlined
 def discretised(m, abar, T):
-    """Discrete over T [s] of a record of MODEL; abar: the estimated acceleration [rad/s2]."""
-    if m.kind == CV:
+    """Discrete over T [s] of a record of MOTION_MODEL_DTYPE; abar: the estimated acceleration [rad/s2]."""
+    if m.kind == MODEL_CV:
         return cv(m, T)
-    if m.kind == CA:
+    if m.kind == MODEL_CA:
         return ca(m, T)
-    if m.kind == SINGER:
+    if m.kind == MODEL_SINGER:
         return singer(m, T)
     return current_statistical(m, abar, T)
 

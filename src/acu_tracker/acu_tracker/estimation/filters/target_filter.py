@@ -9,18 +9,19 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.filters import axes_filter, axis_filter, unscented
-from acu_tracker.estimation.filters.kinds import KINDS
+from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
-CONSTANTS = np.dtype([('axis', axis_filter.CONSTANTS, (2,)), ('cartesian', unscented.CONSTANTS),
-                      ('range_share_2', 'f8'), ('wanted', 'i8', (2,))], align=True)
+CONSTANTS_DTYPE = np.dtype([('axis', axis_filter.CONSTANTS_DTYPE, (2,)), ('cartesian', unscented.CONSTANTS_DTYPE),
+                            ('range_share_2', 'f8'), ('wanted', 'i8', (2,))], align=True)
 """range_share_2: square of ukf.range_share; wanted: 1 for an axis of a kind that uses the Cartesian filter."""
 
-FILTER = np.dtype([('axis', axis_filter.FILTER, (2,)), ('cartesian', unscented.STATE), ('running', 'i8'),
-                   ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
+FILTER_DTYPE = np.dtype([('axis', axis_filter.FILTER_DTYPE, (2,)), ('cartesian', unscented.STATE_DTYPE),
+                         ('running', 'i8'),
+                         ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
 """running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate; predicted: time [s]
 by which the prior fields are predicted from the present estimate, NaN where they belong to an older one."""
 
@@ -28,10 +29,10 @@ by which the prior fields are predicted from the present estimate, NaN where the
 def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
     """Constants (1,) of UkfParameters and the FilterParameters of both axes; noise_bandwidth [Hz]: of the measured
     angles, 0 where their noise is white, as the Cartesian filter takes it to be."""
-    c = np.zeros(1, CONSTANTS)
+    c = np.zeros(1, CONSTANTS_DTYPE)
     c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
     c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
-    c['wanted'] = [KINDS[params.kind].cartesian for params in axes]
+    c['wanted'] = [FILTER_KINDS[params.kind].cartesian for params in axes]
     return c
 
 

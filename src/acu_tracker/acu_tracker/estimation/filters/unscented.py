@@ -22,16 +22,16 @@ from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, wrap
 
 N = 9
-MODES = motion_models.CV, motion_models.CA
+MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA
 ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N
 LAMBDA = ALPHA**2 * (N + KAPPA) - N
-SCALE = math.sqrt(N + LAMBDA)
-WEIGHT = 0.5 / (N + LAMBDA)
+SIGMA_POINT_SCALE = math.sqrt(N + LAMBDA)
+SIGMA_POINT_WEIGHT = 0.5 / (N + LAMBDA)
 """Of each of the six moving points."""
-MIDDLE = 1.0 - 6.0 * WEIGHT + 1.0 - ALPHA**2 + BETA
+CENTRE_COVARIANCE_WEIGHT = 1.0 - 6.0 * SIGMA_POINT_WEIGHT + 1.0 - ALPHA**2 + BETA
 """Of the point in the middle and the twelve that measure as it does, in a covariance."""
 
-STATE = np.dtype([
+STATE_DTYPE = np.dtype([
     ('x', 'f8', (2, N)), ('p', 'f8', (2, N, N)), ('mu', 'f8', (2,)),
     ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('mu_prior', 'f8', (2,)),
     ('z', 'f8', (2, 3)), ('s', 'f8', (2, 3, 3)), ('g', 'f8', (2, N, 3)), ('points', 'f8', (2, 3, 3)),
@@ -41,14 +41,15 @@ these as `predict` left them; z, s: what `innovation` expects to be measured, an
 with X. points, weights, mean, covariance: scratch.
 """
 
-CONSTANTS = np.dtype([('models', motion_models.MODEL, (2,)), ('dwell', 'f8'), ('initial_speed', 'f8'),
-                      ('initial_acceleration', 'f8')], align=True)
+CONSTANTS_DTYPE = np.dtype([('models', motion_models.MOTION_MODEL_DTYPE, (2,)), ('dwell', 'f8'),
+                            ('initial_speed', 'f8'),
+                            ('initial_acceleration', 'f8')], align=True)
 
 
 def constants(params) -> np.ndarray:
     """Constants (1,) of UkfParameters."""
-    c = np.zeros(1, CONSTANTS)
-    c['models']['kind'] = MODES
+    c = np.zeros(1, CONSTANTS_DTYPE)
+    c['models']['kind'] = MODE_MODELS
     c['models']['noise'] = params.cv_noise, params.ca_noise
     c['dwell'] = params.dwell
     c['initial_speed'], c['initial_acceleration'] = params.initial_speed, params.initial_acceleration
@@ -174,9 +175,9 @@ def _transformed(x, p, z, s, g, d):
         for i in range(k, N):
             rest = p[i, k]
             for m in range(k):
-                rest -= g[i, m] * g[k, m] / (SCALE * SCALE)
+                rest -= g[i, m] * g[k, m] / (SIGMA_POINT_SCALE * SIGMA_POINT_SCALE)
             g[i, k] = rest
-        root = SCALE / math.sqrt(g[k, k])
+        root = SIGMA_POINT_SCALE / math.sqrt(g[k, k])
         for i in range(N):
             g[i, k] = root * g[i, k] if i >= k else 0.0
     for k in range(3):
@@ -185,16 +186,16 @@ def _transformed(x, p, z, s, g, d):
             a, e, q = _measured(x[0] + sign * g[0, k], x[1] + sign * g[1, k], x[2] + sign * g[2, k])
             d[side, k, 0], d[side, k, 1], d[side, k, 2] = wrap(a - A), e - E, q - r
             for m in range(3):
-                z[m] += WEIGHT * d[side, k, m]
+                z[m] += SIGMA_POINT_WEIGHT * d[side, k, m]
     for a in range(3):
         for b in range(a, 3):
-            total = MIDDLE * z[a] * z[b]
+            total = CENTRE_COVARIANCE_WEIGHT * z[a] * z[b]
             for k in range(3):
                 for side in range(2):
-                    total += WEIGHT * (d[side, k, a] - z[a]) * (d[side, k, b] - z[b])
+                    total += SIGMA_POINT_WEIGHT * (d[side, k, a] - z[a]) * (d[side, k, b] - z[b])
             s[a, b] = s[b, a] = total
     for i in range(N):
-        g0, g1, g2 = WEIGHT * g[i, 0], WEIGHT * g[i, 1], WEIGHT * g[i, 2]
+        g0, g1, g2 = SIGMA_POINT_WEIGHT * g[i, 0], SIGMA_POINT_WEIGHT * g[i, 1], SIGMA_POINT_WEIGHT * g[i, 2]
         for m in range(3):
             g[i, m] = (g0 * (d[0, 0, m] - d[1, 0, m]) + g1 * (d[0, 1, m] - d[1, 1, m])
                        + g2 * (d[0, 2, m] - d[1, 2, m]))
@@ -297,8 +298,8 @@ def range_known(s, share_2):
 def probabilities(s, mu):
     """mu (BANK,) = probability of each of motion_models.MODELS, NaN where it is not in the filter."""
     mu[:] = math.nan
-    for j in range(len(MODES)):
-        mu[MODES[j]] = s.mu[j]
+    for j in range(len(MODE_MODELS)):
+        mu[MODE_MODELS[j]] = s.mu[j]
 
 
 @compiled

@@ -20,7 +20,7 @@ def add_arguments(parser):
 
 def main(options):
     """Ask; the exit code."""
-    return ask(options, options.verb, pairs(options.given), options.node)
+    return send_command(options, options.verb, pairs(options.given), options.node)
 
 
 def pairs(texts) -> dict:
@@ -34,7 +34,7 @@ def pairs(texts) -> dict:
     return given
 
 
-def ask(options, verb, given, node='acu'):
+def send_command(options, verb, given, node='acu'):
     """Ask a node for a verb, say what it replied; the exit code."""
     from pedestal_common.graph import nodes
     able = [row.name for row in nodes.NODES if row.obeys]

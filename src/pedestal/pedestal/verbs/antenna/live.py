@@ -19,8 +19,8 @@ def add_arguments(parser):
 def main(options):
     """Serve until told to end, or write the files; the exit code. Raises FileExistsError where the folder is there."""
     if options.layouts:
-        from pedestal_operator.viewers.frames import VIEWERS
-        shutil.copytree(VIEWERS, options.layouts)
+        from pedestal_operator.viewers.frames import VIEWER_FOLDER
+        shutil.copytree(VIEWER_FOLDER, options.layouts)
         for file in sorted(options.layouts.iterdir()):
             print(file)
         return 0

@@ -28,4 +28,4 @@ def main(options):
     for name, degrees in (('azimuth', options.az), ('elevation', options.el)):
         if degrees is not None:
             given[name] = math.radians(degrees)
-    return ask.ask(options, options.mode, given)
+    return ask.send_command(options, options.mode, given)

@@ -3,7 +3,7 @@ import datetime
 
 from pedestal.verbs import arguments
 
-FILE = 'file'
+START_FROM_FILE = 'file'
 """--start at the UTC of the target."""
 
 
@@ -20,7 +20,7 @@ def add_arguments(parser):
 
 def _utc(text):
     """ISO 8601 in UTC, or `now` -> ns; `file` as it is."""
-    if text == FILE:
+    if text == START_FROM_FILE:
         return text
     if text == 'now':
         moment = datetime.datetime.now(datetime.timezone.utc)
@@ -37,5 +37,5 @@ def main(options):
     from pedestal_bringup.scenario import scenario
     from pedestal_bringup.scenario.program import Plan
     plan = Plan(scenario.load(options.scenario, options.param, duration=options.duration))
-    start = plan.begins() if options.start == FILE else options.start
+    start = plan.begins() if options.start == START_FROM_FILE else options.start
     return watch.send_program(plan, start, arguments.ros_arguments(options))

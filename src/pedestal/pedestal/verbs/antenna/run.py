@@ -28,17 +28,17 @@ def add_arguments(parser):
     parser.add_argument('--pass', dest='which', metavar='WHICH', help='from rise to set: next, the number N or a UTC '
                         '(2019-12-10T12:35) of a pass; list: print the passes. Default with --tle: next')
     arguments.add_params_file(parser)
-    from pedestal_bringup.graph import beside
-    beside.add_arguments(parser)
+    from pedestal_bringup.graph import operator_servers
+    operator_servers.add_arguments(parser)
 
 
-LARGEST_LOSS = 0.01
+MAX_LOST_STEP_SHARE = 0.01
 """Share of its steps that a drive in realtime may lose, beside those of an announced restart."""
 
 
 def main(options):
     """Run, record and print the results; the exit code. Raises RuntimeError where the recording is not complete."""
-    from pedestal_bringup.graph import beside, graph
+    from pedestal_bringup.graph import graph, operator_servers
     from pedestal_bringup.scenario.program import Plan
     from pedestal_common.graph import nodes
     chosen = _chosen(options)
@@ -49,7 +49,7 @@ def main(options):
     plan = Plan(chosen)
     for line in plan.announced():
         print(line)
-    with beside.servers(options, chosen.header, bag):
+    with operator_servers.servers(options, chosen.header, bag):
         outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration))
     # With scipy, which takes half a second: nobody waits for it before the first step.
     from pedestal_analysis.results import results
@@ -58,7 +58,7 @@ def main(options):
     if outcome.stopped:
         print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
         if not outcome.recorder.get('messages'):
-            return stop.EXIT_CODE
+            return stop.STOP_EXIT_CODE
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     parts = [results.of_bag(recording.view(beam)) for beam in beams]
@@ -77,17 +77,17 @@ def main(options):
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                       'mcap_sha256': outcome.recorder['sha256']})
     if outcome.stopped:
-        return stop.EXIT_CODE
+        return stop.STOP_EXIT_CODE
     check = verify(recording)
     if not realtime and check.aborted or not (check.complete or outcome.restarts):
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     if not check.complete:
         print('pedestal: the recording has gaps, a node was started again:\n' + '\n'.join(check.problems),
               file=sys.stderr)
-    planned = chosen.header.duration / chosen.node_parameters(nodes.DRIVE).period
+    planned = chosen.header.duration / chosen.node_parameters(nodes.DRIVE_NODE).period
     disturbed = [check.ending] if check.aborted else []
-    if outcome.losses > LARGEST_LOSS * planned:
-        disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than {LARGEST_LOSS:.0%}, '
+    if outcome.losses > MAX_LOST_STEP_SHARE * planned:
+        disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than {MAX_LOST_STEP_SHARE:.0%}, '
                          'outside announced restarts')
     for reason in disturbed:
         print(f'pedestal: {reason}', file=sys.stderr)
@@ -112,7 +112,7 @@ def _chosen(options):
     draft = scenario.draft(options.scenario)
     if options.tle or options.which:
         now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
-        sky = satellite.Sky(draft.changed(changes), now)
+        sky = satellite.PassSelection(draft.changed(changes), now)
         if options.which == 'list':
             sky.list()
             return None

@@ -9,7 +9,7 @@ from pedestal_common import parameters
 
 def add_arguments(parser):
     """The file, and the numbers of the data sheet."""
-    from pedestal_analysis.tuning.sheet import DataSheet
+    from pedestal_analysis.tuning.data_sheet_format import DataSheet
     parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml')
     for name, field in parameters.flatten(DataSheet):
         unit = field.metadata.get('unit')
@@ -22,13 +22,13 @@ def add_arguments(parser):
 
 def main(options):
     """Write the file. Raises ValueError for what cannot be, FileExistsError where it is there."""
-    from pedestal_analysis.tuning import data_sheet
-    from pedestal_analysis.tuning.sheet import DataSheet
+    from pedestal_analysis.tuning import antenna_from_data_sheet
+    from pedestal_analysis.tuning.data_sheet_format import DataSheet
     if options.file.suffix not in ('.yaml', '.yml'):
         raise ValueError(f'{options.file}: must end in .yaml, as every scenario')
     if options.file.exists():
         raise FileExistsError(f'{options.file} is there already and is not overwritten')
     sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
-    options.file.write_text(data_sheet.new(sheet, options.file.stem, options.command))
+    options.file.write_text(antenna_from_data_sheet.new(sheet, options.file.stem, options.command))
     print(f'written: {options.file}  (pedestal tune {options.file} --loops)')
     return 0

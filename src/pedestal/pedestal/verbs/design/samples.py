@@ -16,10 +16,11 @@ def main(options):
     """Write the files and list them. Raises FileExistsError where one is there."""
     from pedestal import samples
     options.folder.mkdir(parents=True, exist_ok=True)
-    for name in samples.FILES:
+    for name in samples.SAMPLE_FILES:
         if (options.folder / name).exists():
             raise FileExistsError(f'{options.folder / name} is there already and is not overwritten')
-    for name, text in samples.FILES.items():
+    for name, text in samples.SAMPLE_FILES.items():
         (options.folder / name).write_text(text())
-    console.show_list((str(options.folder / name), ' '.join(samples.WHAT[name].split())) for name in samples.FILES)
+    console.show_list((str(options.folder / name),
+                       ' '.join(samples.FILE_DESCRIPTIONS[name].split())) for name in samples.SAMPLE_FILES)
     return 0

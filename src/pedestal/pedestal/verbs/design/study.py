@@ -29,9 +29,9 @@ def main(options):
     if not options.name:
         console.show_list(pedestal_studies.descriptions().items())
         return 0
-    if options.name not in pedestal_studies.NAMES:
-        print(f'pedestal: error: unknown study {options.name!r};{did_you_mean(options.name, pedestal_studies.NAMES)} '
-              f'there are {", ".join(pedestal_studies.NAMES)}', file=sys.stderr)
+    if options.name not in pedestal_studies.STUDY_NAMES:
+        print(f'pedestal: error: unknown study {options.name!r};{did_you_mean(options.name, pedestal_studies.STUDY_NAMES)} '
+              f'there are {", ".join(pedestal_studies.STUDY_NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
     from pedestal_analysis.results import intervals
     from pedestal_studies.rigs import drawing
@@ -59,14 +59,14 @@ def main(options):
 
 def _of_scenario(options):
     """function(progress) of the study for the plant of --scenario."""
-    from pedestal_studies import own_plant
-    if options.name not in own_plant.STUDIES:
+    from pedestal_studies import plant_studies
+    if options.name not in plant_studies.PLANT_STUDIES:
         raise ValueError(f"--scenario: study {options.name} is of the papers' plant; any plant have "
-                         f'{", ".join(own_plant.STUDIES)}')
+                         f'{", ".join(plant_studies.PLANT_STUDIES)}')
     for name in ('runs', 'workers', 'scheduler'):
         if getattr(options, name) is not None:
             raise ValueError(f'--{name}: does not go with --scenario, which is one run of each case')
-    return functools.partial(own_plant.STUDIES[options.name], options.scenario)
+    return functools.partial(plant_studies.PLANT_STUDIES[options.name], options.scenario)
 
 
 def _many_runs(options, study, stack):
@@ -80,5 +80,5 @@ def _many_runs(options, study, stack):
     if asked['runs'] is not None and asked['runs'] < 1:
         raise ValueError(f'--runs {options.runs}: must be at least 1')
     from pedestal_analysis.trials import monte_carlo
-    return {'runs': options.runs or study.RUNS,
+    return {'runs': options.runs or study.DEFAULT_RUNS,
             'pool': stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))}

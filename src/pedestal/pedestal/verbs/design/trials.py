@@ -13,7 +13,7 @@ import sys
 from pedestal.verbs import arguments
 from pedestal_analysis import console
 
-WORST = 10
+WORST_TRIAL_COUNT = 10
 """Trials whose commands are printed."""
 
 
@@ -64,7 +64,7 @@ def main(options):
     for name, table in zip(names, tables):
         rows += [*statistics.of_results(name, table), *statistics.of_questions(name, table),
                  *statistics.of_sensitivity(name, table)]
-    shown = trials_page.read(plans[0], tables[0], by, sides, options.command, WORST)
+    shown = trials_page.read(plans[0], tables[0], by, sides, options.command, WORST_TRIAL_COUNT)
     file = folder / 'trials.html'
     file.write_text(trials_page.page(shown, rows), encoding='utf-8')
     console.show_trials(f'{plans[0].runs} trials: {" against ".join(names)}', rows)

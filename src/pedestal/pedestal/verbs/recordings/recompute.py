@@ -51,6 +51,6 @@ def main(options):
     print('\n'.join(lines))
     if options.explain:
         from pedestal_analysis.reprocess import what_if
-        console.explain(what_if.NUMBERS, {line.split()[0] for line in lines if line})
+        console.explain(what_if.COMPARISON_RESULTS, {line.split()[0] for line in lines if line})
     console.write_json(options.json, {'name': 'recompute', 'rows': rows})
     return 0 if well else 1

@@ -4,7 +4,7 @@ import pathlib
 
 def add_arguments(parser):
     """Bag, which topics, pace, part of the recording."""
-    from pedestal_bringup.graph import beside
+    from pedestal_bringup.graph import operator_servers
     parser.add_argument('bag', type=pathlib.Path)
     into = parser.add_mutually_exclusive_group()
     into.add_argument('--node', nargs='+', action='extend', default=[], metavar='NAME',
@@ -16,9 +16,10 @@ def add_arguments(parser):
     parser.add_argument('--start', type=float, default=0.0, metavar='S', help='begin this far into the recording')
     parser.add_argument('--duration', type=float, metavar='S', help='of the recording; default: to its end')
     parser.add_argument('--paused', action='store_true', help='begin with a pause')
-    parser.add_argument('--page', nargs='?', type=beside.port, const=beside.SERVERS['page'].port, metavar='PORT',
+    parser.add_argument('--page', nargs='?', type=operator_servers.port, const=operator_servers.SERVERS['page'].port,
+                        metavar='PORT',
                         help="show it on the operator's page with a slider, without a graph; default port: "
-                             f"{beside.SERVERS['page'].port}")
+                             f"{operator_servers.SERVERS['page'].port}")
     parser.add_argument('--deadline', type=float, default=60.0, metavar='S',
                         help='wall-clock time a reader or an answer is waited for; default: 60')
 

@@ -4,19 +4,19 @@ import functools
 import numpy as np
 
 from pedestal_bringup.loop import closed_loop
-from pedestal_common.graph.steps import SECOND
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import as_dict
 from pedestal_common.wire import messages
 
-DIAGNOSTICS = 'diagnostics'
+DIAGNOSTICS_TOPIC = 'diagnostics'
 
 
 def record(scenario, beam=''):
     """The Recorded of a scenario.Scenario run in memory; beam: of several, '' for the first."""
-    return Recorded(scenario, closed_loop.Loop(scenario, beam).run())
+    return MemoryRecording(scenario, closed_loop.Loop(scenario, beam).run())
 
 
-class Recorded:
+class MemoryRecording:
     """A closed_loop.Run of a scenario.Scenario, as the view of one beam of its recording.
 
     Of the diagnostics it holds what the control unit announces of keyholes; everything else is in no result.
@@ -34,13 +34,13 @@ class Recorded:
     @functools.cached_property
     def topics(self):
         """{name: type} of what is in it."""
-        of_diagnostics = {DIAGNOSTICS: messages.DiagnosticArray.__msgtype__} if self._keyholes else {}
+        of_diagnostics = {DIAGNOSTICS_TOPIC: messages.DiagnosticArray.__msgtype__} if self._keyholes else {}
         return {**self._run.topics, **of_diagnostics}
 
     def table(self, topic):
         """{column: array (n,)} of a topic, as of a bag (columns.table)."""
-        if topic == DIAGNOSTICS:
-            return {'t': np.array([stamp for stamp, _ in self._keyholes]) / SECOND}
+        if topic == DIAGNOSTICS_TOPIC:
+            return {'t': np.array([stamp for stamp, _ in self._keyholes]) / NS_PER_SECOND}
         if topic not in self._tables:
             self._tables[topic] = self._run.table(topic)
         return self._tables[topic]

@@ -11,22 +11,22 @@ by a threshold, the next one cannot be foreseen: C is P, or stays where it is wh
 """
 import numpy as np
 
-NEXT = 3.0
+MAX_SET_POINT_GAP_S = 3.0
 """Time [s] within which a set-point continues the one before."""
 
-FASTEST = 5.0
+MAX_SET_POINT_RATE_DEG_S = 5.0
 """Rate [deg/s] between two set-points above which the second is a new target."""
 
-REGULAR = 0.3
+PERIOD_TOLERANCE_RATIO = 0.3
 """Of T: by so much it may differ from the one before."""
 
 G, H = 0.5, 0.5
 
-HOLD = 1.5
+MOTION_DURATION_RATIO = 1.5
 """Of T: for so long C moves. Then it stands."""
 
 
-class Course:
+class SetPointFilter:
     """The last set-point, None for none, and the motion that it became part of."""
 
     def __init__(self):
@@ -35,7 +35,7 @@ class Course:
 
     def continues(self, now):
         """Whether a set-point at the time now [s] continues the last one."""
-        return self.set_point is not None and now - self._when < NEXT
+        return self.set_point is not None and now - self._when < MAX_SET_POINT_GAP_S
 
     def place(self, now):
         """C at the time now [s]."""
@@ -46,13 +46,13 @@ class Course:
         P, T = np.array(set_point), max(now - self._when, 1e-3)
         begins, rate, moves, r, regular = P, np.zeros(2), 0.0, np.zeros(2), None
         measured = (P - self.set_point) / T if self.continues(now) else np.full(2, np.inf)
-        if np.abs(measured).max() <= FASTEST:
+        if np.abs(measured).max() <= MAX_SET_POINT_RATE_DEG_S:
             C, regular = self.place(now), T
-            if self._T is not None and abs(T - self._T) <= REGULAR * T:
+            if self._T is not None and abs(T - self._T) <= PERIOD_TOLERANCE_RATIO * T:
                 r = self._r + H * (measured - self._r)
                 rate = r + G * (P - C) / T
                 rate[rate * r < 0.0] = 0.0
-                begins, moves = C, HOLD * T
+                begins, moves = C, MOTION_DURATION_RATIO * T
             else:
                 r, begins = measured, np.where((P - C) * measured < 0.0, C, P)
         self.set_point, self._when, self._T = P, now, regular

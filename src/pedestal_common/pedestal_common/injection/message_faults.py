@@ -6,17 +6,18 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import table
 
-MOST = 32
+MAX_HELD_NUMBERS = 32
 """Numbers that a node holds at most."""
 
-SPOILT = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'), ('held', 'f8', (MOST,)),
-                   ('sigma', 'f8'), ('seed', 'i8')], align=True)
+MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'),
+                                ('held', 'f8', (MAX_HELD_NUMBERS,)),
+                                ('sigma', 'f8'), ('seed', 'i8')], align=True)
 """drop, freeze, nan: 1 while it is so; held: the numbers of the first frozen step, holds: 1 once they are there; sigma
 and seed of white noise, sigma 0: none."""
 
 
 @compiled
-def restore(e):
+def clear(e):
     """Nothing is spoilt from now on; what is held stays, for a freeze that goes on."""
     e.holds = e.freeze
     e.drop, e.freeze, e.nan, e.sigma = 0, 0, 0, 0.0

@@ -4,10 +4,10 @@ import math
 
 from pedestal_common.parameters import Parameters, choice, parameter
 
-LIGHT = 0.299792458
+LIGHT_SPEED_M_GHZ = 0.299792458
 """[m GHz]."""
 
-MISSIONS = ('leo_pass', 'uav_flyby', 'ship_pass')
+TEMPLATE_SCENARIOS = ('leo_pass', 'uav_flyby', 'ship_pass')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,9 +26,9 @@ class DataSheet(Parameters):
     rate_azimuth: float = parameter(140.0, 0.6, 1000.0, 'deg/s', 'largest rate of azimuth')
     rate_elevation: float = parameter(97.0, 0.6, 1000.0, 'deg/s', 'largest rate of elevation')
     encoder_bits: int = parameter(22, 8, 32, 'bit', 'of the load encoders, per turn')
-    like: str = choice('leo_pass', MISSIONS, 'the scenario whose target and site it gets')
+    like: str = choice('leo_pass', TEMPLATE_SCENARIOS, 'the scenario whose target and site it gets')
 
     @property
     def theta(self):
         """Half-power beamwidth [rad]."""
-        return math.radians(self.beamwidth or 70.0 * LIGHT / self.frequency / self.mirror)
+        return math.radians(self.beamwidth or 70.0 * LIGHT_SPEED_M_GHZ / self.frequency / self.mirror)

@@ -2,12 +2,12 @@
 import numpy as np
 import pytest
 
-from pedestal_operator.rotator.course import HOLD, NEXT, Course
+from pedestal_operator.rotator.set_point_filter import MAX_SET_POINT_GAP_S, MOTION_DURATION_RATIO, SetPointFilter
 
 
 def commanded(times, set_points, t):
     """C at times t (n,), (n, 2), where set-points come at times."""
-    course, due, places = Course(), list(zip(times, set_points)), []
+    course, due, places = SetPointFilter(), list(zip(times, set_points)), []
     for now in t:
         while due and due[0][0] <= now:
             at, set_point = due.pop(0)
@@ -37,14 +37,14 @@ def test_what_comes_early_or_late_never_leads_it_back():
 @pytest.mark.parametrize('times', ((0.0, 1.0), (0.0, 0.5, 2.9), (0.0, 4.0, 8.0, 12.0)))
 def test_set_points_without_a_pace_are_gone_to(times):
     """Two of them too: who knows whether a third comes."""
-    course = Course()
+    course = SetPointFilter()
     for i, at in enumerate(times):
         begins, rate, moves = course.take((float(i), 0.0), at)
         assert (begins.tolist(), rate.tolist(), moves) == ([float(i), 0.0], [0.0, 0.0], 0.0)
 
 
 def test_another_target_is_gone_to_at_once():
-    course = Course()
+    course = SetPointFilter()
     for i in range(5):
         course.take((0.5 * i, 10.0), 0.8 * i)
     begins, rate, _ = course.take((120.0, 10.0), 4.0)
@@ -52,9 +52,10 @@ def test_another_target_is_gone_to_at_once():
 
 
 def test_a_stream_that_ends_stands_and_is_over():
-    course = Course()
+    course = SetPointFilter()
     for i in range(6):
         course.take((0.8 * i, 0.0), 0.8 * i)
     ended = 4.0
-    assert course.place(ended + 2.0 * HOLD) == pytest.approx((4.0 + 0.8 * HOLD, 0.0), abs=0.1)
-    assert course.continues(ended + 0.9 * NEXT) and not course.continues(ended + NEXT)
+    assert course.place(ended + 2.0 * MOTION_DURATION_RATIO) == pytest.approx((4.0 + 0.8 * MOTION_DURATION_RATIO, 0.0),
+                                                                              abs=0.1)
+    assert course.continues(ended + 0.9 * MAX_SET_POINT_GAP_S) and not course.continues(ended + MAX_SET_POINT_GAP_S)

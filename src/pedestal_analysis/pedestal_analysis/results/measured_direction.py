@@ -24,7 +24,7 @@ def earth_angles(beam, errors, quaternions=None):
     (n, 4): attitude deck -> earth, None ashore. NaN where one of them is NaN.
     """
     if quaternions is None:
-        quaternions = np.tile(np.array(line_of_sight.ASHORE), (len(beam), 1))
+        quaternions = np.tile(np.array(line_of_sight.ASHORE_ATTITUDE), (len(beam), 1))
     earth = np.empty((len(beam), 2))
     _displaced(np.ascontiguousarray(beam[:, 0]), np.ascontiguousarray(beam[:, 1]), np.ascontiguousarray(errors),
                np.ascontiguousarray(quaternions), earth)

@@ -18,7 +18,7 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, as_dict, build, flatten
 from pedestal_common.text_files import plain_yaml
 
-VOLTAGE_AT_RATED_SPEED, OF_RESISTANCE, OF_INDUCTANCE = 0.85, 0.033, 0.24
+BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
 """Shares of the phase voltage: back-EMF at rated speed; drops at rated torque over resistance and inductance."""
 
 
@@ -26,10 +26,11 @@ def motor(sheet, known):
     """{key: value} of a motor, from a known motor's values {key: value} and the DataSheet."""
     share, pairs, voltage = sheet.motor_torque / 30.0, known['pole_pairs'], known['voltage']
     electrical = pairs * sheet.motor_speed * math.pi / 30.0
-    flux = VOLTAGE_AT_RATED_SPEED * voltage / electrical
+    flux = BACK_EMF_SHARE * voltage / electrical
     current = sheet.motor_torque / (1.5 * pairs * flux)
-    return {'flux_linkage': flux, 'resistance': OF_RESISTANCE * voltage / current,
-            'inductance': OF_INDUCTANCE * voltage / (electrical * current), 'torque_limit': 3.0 * sheet.motor_torque,
+    return {'flux_linkage': flux, 'resistance': RESISTANCE_VOLTAGE_SHARE * voltage / current,
+            'inductance': INDUCTANCE_VOLTAGE_SHARE * voltage / (electrical * current), 'torque_limit': 3.0
+            * sheet.motor_torque,
             'inertia': known['inertia'] * share**(5.0 / 3.0), 'friction': known['friction'] * share,
             'viscous': known['viscous'] * share, 'brake': known['brake'] * share}
 
@@ -66,7 +67,7 @@ def sections(sheet, title):
     if 'program.time_offset' in found['scenario']:  # as far off in beamwidths as there
         found['scenario']['program.time_offset'] *= min(1.0, sheet.theta / 0.0175)
     found['tracking_receiver']['antenna.beamwidth'] = sheet.theta
-    w_s = 2.0 * math.pi * loops.SPEED
+    w_s = 2.0 * math.pi * loops.DEFAULT_SPEED_CROSSOVER_HZ
     for name in AXES:
         values = axis(sheet, name)
         known = getattr(AduParameters(), name)
@@ -76,7 +77,7 @@ def sections(sheet, title):
             raise ParameterError(f'adu.{name}: {error}') from None
         values |= loops.drive_gains(plant, w_s)
         found['adu'] |= {f'{name}.{key}': value for key, value in values.items()}
-        gains = loops.control_gains(plant, w_s, w_s / loops.RATIO)
+        gains = loops.control_gains(plant, w_s, w_s / loops.CROSSOVER_RATIO)
         found['acu'] |= {f'{name}.{key}': value for key, value in gains.items()}
     rounded = {node: {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in own.items()}
                for node, own in found.items()}
@@ -96,7 +97,7 @@ def text(found, head):
     lines = [f'# {line}'.rstrip() for line in head]
     for node, values in found.items():
         fields = dict(flatten(scenario.parameters_of(node)))
-        lines += [node + ':' if node == 'scenario' else f'{parameter_file.ANYWHERE}{node}:', '  ros__parameters:']
+        lines += [node + ':' if node == 'scenario' else f'{parameter_file.ANY_NAMESPACE}{node}:', '  ros__parameters:']
         for key, value in values.items():
             meta = fields[key].metadata
             unit = f'[{meta["unit"]}] ' if meta.get('unit') else ''

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from pedestal_analysis.tuning import loops
-from pedestal_studies import own_plant
+from pedestal_studies import plant_studies
 
 
 def values(path):
@@ -34,7 +34,7 @@ def test_a_plant_steps_is_pushed_and_follows_a_sine(pedestal, tmp_path):
         assert own['step_overshoot_percent'] < 1.0 and 0.05 < own['step_settling_2percent_s'] < 1.0
         free = 0.5 * own['gust_torque_nm'] / plants[axis].whole_inertia * 0.1**2
         assert 0.0 < own['gust_peak_rad'] < free
-        assert 0.0 < own['sine_rms_error_rad'] < 1e-3 * own_plant.AMPLITUDE
+        assert 0.0 < own['sine_rms_error_rad'] < 1e-3 * plant_studies.SINE_AMPLITUDE_RAD
     assert sorted(path.name for path in (tmp_path / 'studies' / 'servo').iterdir()) == ['gust.png', 'sine.png',
                                                                                        'step.png']
 

@@ -1,7 +1,8 @@
 """What pages ask, on its way to the control unit and back: roles, dead men, replies. No ROS here.
 
 A jog has three dead men. The page repeats it while it is held: it is passed on once for each time that it comes, if
-the state that the page saw last is not older than BEHIND. A page that jogged and is silent for SILENT, or
+the state that the page saw last is not older than MAX_STATE_AGE_S. A page that jogged and is silent for
+JOG_TIMEOUT_S, or
 has gone, is stopped here. The control unit's own dead man, 0.5 s, has the last word.
 """
 import math
@@ -11,23 +12,23 @@ from pedestal_common.wire import commands
 from pedestal_common.wire.commands import Reply
 from pedestal_operator.page import page_security
 
-BEHIND = 0.5
+MAX_STATE_AGE_S = 0.5
 """Age [s] of the state that a page saw last beyond which what it holds is not believed."""
 
-SILENT = 0.4
+JOG_TIMEOUT_S = 0.4
 """Time [s] without another jog after which the axes are told to stand."""
 
-PATIENCE = 2.0
+PAGE_REPLY_TIMEOUT_S = 2.0
 """Time [s] within which the control unit replies to a page."""
 
-FASTEST = 10.0
+MAX_JOG_RATE_DEG_S = 10.0
 """Rate [deg/s] of a jog at the most."""
 
-MOST = 20
+MAX_ARGUMENTS = 20
 """Arguments of an ask at the most."""
 
 
-class Asks:
+class PageRequests:
     """ask(who, verb, {argument: value}) -> number of the request; replied(number) -> its Reply or None; tell(client,
     message): what a page is told; jogged() -> whether the antenna still follows a jog."""
 
@@ -49,12 +50,12 @@ class Asks:
 
     def _pass_on(self, client, message, now):
         verb, given, number = message['ask'], message.get('arguments') or {}, message.get('id')
-        if not (isinstance(given, dict) and len(given) <= MOST and _sound(verb) and all(
+        if not (isinstance(given, dict) and len(given) <= MAX_ARGUMENTS and _sound(verb) and all(
                 _sound(name) and isinstance(value, (str, int, float)) and _sound(str(value))
                 for name, value in given.items())):
             self._tell(client, {'error': 'an ask must have a verb and arguments that are numbers or texts'})
             return
-        why = page_security.may(client.role, verb, given)
+        why = page_security.refusal_reason(client.role, verb, given)
         if why:
             self._tell(client, {'id': number, 'verb': verb, 'granted': False, 'reply': why})
             return
@@ -62,15 +63,15 @@ class Asks:
         self._waiting[self._ask(str(client), verb, given)] = client, number, verb, now
 
     def _jog(self, client, rates, now, age):
-        why = page_security.may(client.role, 'rate', {})
+        why = page_security.refusal_reason(client.role, 'rate', {})
         if why:
             self._tell(client, {'verb': 'rate', 'granted': False, 'reply': why})
         elif not (isinstance(rates, list) and len(rates) == 2 and all(
-                type(rate) in (int, float) and abs(rate) <= FASTEST for rate in rates)):
-            self._tell(client, {'error': f'jog: must be two rates of at most {FASTEST:g} deg/s'})
+                type(rate) in (int, float) and abs(rate) <= MAX_JOG_RATE_DEG_S for rate in rates)):
+            self._tell(client, {'error': f'jog: must be two rates of at most {MAX_JOG_RATE_DEG_S:g} deg/s'})
         elif not any(rates):
             self._end_jog(client, now)
-        elif age > BEHIND:
+        elif age > MAX_STATE_AGE_S:
             self._end_jog(client, now)
             self._tell(client, {'verb': 'rate', 'granted': False,
                                 'reply': f'the page is {min(age, 999.0):.1f} s behind the antenna'})
@@ -88,12 +89,12 @@ class Asks:
 
     def look(self, now):
         """Pass replies on; stop who is silent; tell who waits in vain."""
-        for client in [client for client, at in self._jogs.items() if now - at > SILENT]:
+        for client in [client for client, at in self._jogs.items() if now - at > JOG_TIMEOUT_S]:
             self._end_jog(client, now)
         for number, (client, own, verb, at) in list(self._waiting.items()):
             reply = self._replied(number)
-            if reply is None and now - at > PATIENCE:
-                reply = Reply(False, f'the control unit did not reply within {PATIENCE:g} s')
+            if reply is None and now - at > PAGE_REPLY_TIMEOUT_S:
+                reply = Reply(False, f'the control unit did not reply within {PAGE_REPLY_TIMEOUT_S:g} s')
             if reply is not None:
                 del self._waiting[number]
                 self._pass_back(client, own, verb, reply, now)
@@ -107,4 +108,4 @@ class Asks:
 
 def _sound(text):
     """Whether a text can be in a command."""
-    return len(text) <= commands.LONGEST and text.isprintable()
+    return len(text) <= commands.MAX_TEXT_CHARACTERS and text.isprintable()

@@ -1,7 +1,7 @@
 """What pedestal.launch.py asks for and starts, without `launch`, which only a ROS 2 machine has."""
 import typing
 
-from pedestal_bringup.graph import beside, graph, supervisor
+from pedestal_bringup.graph import graph, operator_servers, supervisor
 from pedestal_bringup.graph.processes import Graph
 from pedestal_bringup.graph.start import begins, parameters_of_all
 from pedestal_bringup.scenario import scenario
@@ -17,7 +17,7 @@ class Argument(typing.NamedTuple):
     choices: tuple = ()
 
 
-NO, YES = 'false', 'true'
+SERVER_OFF, SERVER_ON = 'false', 'true'
 
 ARGUMENTS = (
     Argument('scenario', 'name of a scenario that comes with the product, or path of a .yaml', 'leo_pass'),
@@ -27,13 +27,14 @@ ARGUMENTS = (
     Argument('params_file', 'ROS 2 parameter file whose values replace those of the scenario'),
     Argument('bag', 'new folder for the recording; empty: bags/runs/SCENARIO-N'),
     Argument('namespace', 'of all nodes, for example ship_1'),
-    *(Argument(name, f'in realtime: {server.does}' + (f' on 127.0.0.1: {NO}, {YES} (port {server.port}) or a port'
-                                                      if server.port else ''),
-               NO, () if server.port else (NO, YES))
-      for name, server in beside.SERVERS.items()))
+    *(Argument(name,
+               f'in realtime: {server.does}' + (f' on 127.0.0.1: {SERVER_OFF}, {SERVER_ON} (port {server.port}) or a port'
+                                                if server.port else ''),
+               SERVER_OFF, () if server.port else (SERVER_OFF, SERVER_ON))
+      for name, server in operator_servers.SERVERS.items()))
 
 
-def mistaken(names):
+def misspelt_arguments(names):
     """A line on each of the names that launch was given and that look like a misspelt argument: launch takes any."""
     known = [argument.name for argument in ARGUMENTS]
     return [f'no argument {name}:=;{meant}' for name in names
@@ -48,7 +49,7 @@ def _number(given, name, kind, what):
         raise ValueError(f'{name}:={given[name]}: must be {what}') from None
 
 
-def asked(given):
+def load_scenario(given):
     """The Scenario that the texts {argument: value} ask for. Raises ValueError."""
     changes = scenario.file_overrides(given['params_file']) if given['params_file'] else ()
     return scenario.load(given['scenario'], changes,
@@ -59,16 +60,16 @@ def asked(given):
 def servers(given, chosen):
     """[(Server, its parameters)] of those that are asked for. Raises ValueError in lockstep, and where a library is
     missing."""
-    wanted = {name: given[name] for name in beside.SERVERS if given[name].lower() != NO}
-    beside.check(wanted, chosen.header, '{}:=')
+    wanted = {name: given[name] for name in operator_servers.SERVERS if given[name].lower() != SERVER_OFF}
+    operator_servers.check(wanted, chosen.header, '{}:=')
     started = []
     for name, text in wanted.items():
-        server, values = beside.SERVERS[name], {'graph.beams': chosen.header.graph_beams}
+        server, values = operator_servers.SERVERS[name], {'graph.beams': chosen.header.graph_beams}
         if server.port:
             try:
-                values['port'] = server.port if text.lower() == YES else beside.port(text)
+                values['port'] = server.port if text.lower() == SERVER_ON else operator_servers.port(text)
             except ValueError:
-                raise ValueError(f'{name}:={text}: must be {NO}, {YES} or a port, 1 to 65535') from None
+                raise ValueError(f'{name}:={text}: must be {SERVER_OFF}, {SERVER_ON} or a port, 1 to 65535') from None
         started.append((server, values))
     return started
 

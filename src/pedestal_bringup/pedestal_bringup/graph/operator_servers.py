@@ -8,9 +8,9 @@ import sys
 import typing
 
 from pedestal_bringup.graph.processes import RunError, log_folder
-from pedestal_operator.page.page_security import ROLES
+from pedestal_operator.page.page_security import PAGE_ROLES
 
-STOP_TIME = 5.0
+SERVER_STOP_TIMEOUT_S = 5.0
 """Seconds a server has to end."""
 
 
@@ -42,7 +42,7 @@ SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 'rotctld_node', 4
            'easycomm': Server('pedestal_operator.easycomm_node', 'easycomm_node', 4535,
                               'serve EasyComm I, II and III'),
            'page': Server('pedestal_operator.page_node', 'operator_page', 8080,
-                          "serve the operator's page for a browser", says=len(ROLES)),
+                          "serve the operator's page for a browser", says=len(PAGE_ROLES)),
            'foxglove': Server('pedestal_operator.live_node', 'live_node', 8765, 'serve every topic to Foxglove',
                               library='foxglove', extra='pedestal_operator[live]'),
            'frames': Server('pedestal_operator.frames_node', 'frames_node', 0,
@@ -107,7 +107,7 @@ def servers(options, header, bag):
             process.send_signal(signal.SIGTERM)
         for process in processes:
             try:
-                process.wait(STOP_TIME)
+                process.wait(SERVER_STOP_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()

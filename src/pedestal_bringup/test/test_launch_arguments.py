@@ -1,24 +1,24 @@
 """The arguments of pedestal.launch.py as its texts; test/test_colcon.py starts it where there is a `ros2`."""
 import pytest
 
-from pedestal_bringup.graph import beside, launched
+from pedestal_bringup.graph import launch_arguments, operator_servers
 from pedestal_common.text_files import plain_yaml
 
 
 def given(**texts):
-    return {**{argument.name: argument.default for argument in launched.ARGUMENTS}, **texts}
+    return {**{argument.name: argument.default for argument in launch_arguments.ARGUMENTS}, **texts}
 
 
 def test_every_argument_says_what_it_is():
-    assert all(argument.doc for argument in launched.ARGUMENTS)
-    names = [argument.name for argument in launched.ARGUMENTS]
-    assert len(set(names)) == len(names) and set(beside.SERVERS) <= set(names)
+    assert all(argument.doc for argument in launch_arguments.ARGUMENTS)
+    names = [argument.name for argument in launch_arguments.ARGUMENTS]
+    assert len(set(names)) == len(names) and set(operator_servers.SERVERS) <= set(names)
 
 
 def test_what_is_said_takes_the_place_of_what_the_scenario_says(tmp_path):
     file = tmp_path / 'mine.yaml'
     file.write_text('/**/acu:\n  ros__parameters:\n    azimuth.filter.kind: ca\n')
-    plain, changed = launched.asked(given()), launched.asked(given(
+    plain, changed = launch_arguments.load_scenario(given()), launch_arguments.load_scenario(given(
         pacing='realtime', duration='12.5', seed='7', params_file=str(file)))
     assert (plain.name, plain.header.pacing, plain.header.seed) == ('leo_pass', 'lockstep', 1)
     assert (changed.header.pacing, changed.header.duration, changed.header.seed) == ('realtime', 12.5, 7)
@@ -34,7 +34,7 @@ def test_what_is_said_takes_the_place_of_what_the_scenario_says(tmp_path):
     ({'params_file': '/nowhere.yaml'}, '/nowhere.yaml: No such file or directory')])
 def test_a_wrong_value_is_named(texts, told):
     with pytest.raises(ValueError) as refused:
-        launched.asked(given(**texts))
+        launch_arguments.load_scenario(given(**texts))
     assert told in str(refused.value) and '\n' not in str(refused.value)
 
 
@@ -45,20 +45,21 @@ def test_a_wrong_value_is_named(texts, told):
 def test_a_wrong_server_is_named(pacing, texts, told):
     asked = given(pacing=pacing, **texts)
     with pytest.raises(ValueError) as refused:
-        launched.servers(asked, launched.asked(asked))
+        launch_arguments.servers(asked, launch_arguments.load_scenario(asked))
     assert told in str(refused.value)
 
 
 def test_servers_are_those_that_were_asked_for():
     asked = given(pacing='realtime', page='true', rotctld='4600', frames='true')
-    started = {server.executable: values for server, values in launched.servers(asked, launched.asked(asked))}
+    started = {server.executable: values for server, values in launch_arguments.servers(asked,
+                                                                                        launch_arguments.load_scenario(asked))}
     assert started == {'operator_page': {'graph.beams': 0, 'port': 8080}, 'frames_node': {'graph.beams': 0},
                        'rotctld_node': {'graph.beams': 0, 'port': 4600}}
-    assert launched.servers(given(), launched.asked(given())) == []
+    assert launch_arguments.servers(given(), launch_arguments.load_scenario(given())) == []
 
 
 def test_a_misspelt_argument_is_told_apart_from_those_of_other_launch_files():
-    assert launched.mistaken(['scenaro', 'scenario', 'rviz_config']) == [
+    assert launch_arguments.misspelt_arguments(['scenaro', 'scenario', 'rviz_config']) == [
         "no argument scenaro:=; did you mean 'scenario'?"]
 
 
@@ -66,10 +67,10 @@ def test_what_the_nodes_start_with_lies_beside_the_bag(tmp_path, monkeypatch):
     """The operator is given the scenario whole, with every change, under its name."""
     monkeypatch.chdir(tmp_path)
     asked = given(scenario='uav_flyby', seed='7', bag='mine')
-    chosen = launched.asked(asked)
-    file, whole = launched.prepare(asked, chosen)
+    chosen = launch_arguments.load_scenario(asked)
+    file, whole = launch_arguments.prepare(asked, chosen)
     assert plain_yaml.read(file)['/**/recorder']['ros__parameters']['bag'] == 'mine'
-    assert launched.asked(given(scenario=str(whole))) == chosen
+    assert launch_arguments.load_scenario(given(scenario=str(whole))) == chosen
     (tmp_path / 'mine').mkdir()
     with pytest.raises(ValueError, match='bag mine exists already'):
-        launched.prepare(asked, chosen)
+        launch_arguments.prepare(asked, chosen)

@@ -1,8 +1,10 @@
 """Which messages of a topic a node of a realtime graph takes: of the writer in charge, sound and newer than the last.
 
 The first writer is in charge. Another one is dropped and named, whatever it says. A writer that begins anew is taken
-up once the one in charge was silent for SILENCE. One that spoke together with it, or whose numbers are higher than
-that silence explains, is another one, taken up only when it has been alone for ABANDONED and the graph shows nobody
+up once the one in charge was silent for SILENCE_LIMIT_NS. One that spoke together with it, or whose numbers are
+higher than
+that silence explains, is another one, taken up only when it has been alone for CONFIRMED_TAKEOVER_NS and the graph
+shows nobody
 who should not write. Where nobody can say which is which, nothing is taken: what the topic commands comes to a stop.
 No ROS and no clock here.
 """
@@ -10,25 +12,25 @@ import collections
 
 from pedestal_common.realtime.streams import Streams
 
-SILENCE = 200_000_000
+SILENCE_LIMIT_NS = 200_000_000
 """Time [ns] after which the writer in charge is taken for gone, and after which stamps that went back are believed."""
 
-ABANDONED, ABANDONED_UNSEEN = 1_000_000_000, 5_000_000_000
+CONFIRMED_TAKEOVER_NS, UNCONFIRMED_TAKEOVER_NS = 1_000_000_000, 5_000_000_000
 """Time [ns] of silence of the writer in charge after which another one that spoke while it did is taken, if it is the
 only one that speaks: where the graph shows no stranger, and where it does not tell."""
 
-LOOK = 50_000_000
+PUBLISHER_POLL_NS = 50_000_000
 """Time [ns] between two looks at who else may write the topic, for each writer that wants to be in charge."""
 
-UNDECODABLE, STALE, FUTURE, ANOTHER_WRITER, UNCLEAR_WRITER = (
+DROP_UNDECODABLE, DROP_STALE, DROP_FUTURE, DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER = (
     'undecodable', 'stale', 'future', 'another writer', 'writers not told apart')
 """Why a message is dropped."""
 
-ALARMING = ANOTHER_WRITER, UNCLEAR_WRITER
+WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER
 """Reasons that somebody should look after."""
 
 
-class Intake:
+class PublisherGate:
     """The intake of one topic.
 
     decode(data) -> (stamp [ns], or None of a topic without stamps, message); raises ValueError for what is none.
@@ -64,15 +66,15 @@ class Intake:
         self.anew = False
         if not self._paced:
             if self._strangers():
-                return self._drop(ANOTHER_WRITER, '', now)
+                return self._drop(DROP_OTHER_PUBLISHER, '', now)
         elif self._strangers and not self._of_charge(self.writers.of(number, source, now), now):
             return None
         if self._oldest is not None and utc - source > self._oldest:
-            return self._drop(STALE, f'{(utc - source) * 1e-9:.3f} s on its way', now)
+            return self._drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s on its way', now)
         try:
             stamp, message = self._decode(data)
         except ValueError as error:
-            return self._drop(UNDECODABLE, str(error), now)
+            return self._drop(DROP_UNDECODABLE, str(error), now)
         if stamp is not None and not self._in_order(stamp, now, utc):
             return None
         self._note_offset(utc - source)
@@ -83,7 +85,7 @@ class Intake:
         if stream is not None and stream is self.in_charge and self._may_be_another(stream, now):
             self.in_charge = None
         if stream is None:
-            self._drop(UNCLEAR_WRITER, '', now)
+            self._drop(DROP_UNCLEAR_PUBLISHER, '', now)
         elif stream is self.in_charge:
             for other in self._speaking_beside(stream, now):
                 other.known = True
@@ -95,29 +97,30 @@ class Intake:
             self._obeyed = now
             return True
         else:
-            self._drop(ANOTHER_WRITER, '', now)
+            self._drop(DROP_OTHER_PUBLISHER, '', now)
         return False
 
     def _may_be_another(self, stream, now):
         """Whether the writer in charge, silent until now, left out numbers and the graph shows a stranger that was not
         heard yet: this node was held up perhaps, and what comes first is the stranger's."""
-        return (now - self._obeyed >= SILENCE and stream.skipped[1] == stream.last
+        return (now - self._obeyed >= SILENCE_LIMIT_NS and stream.skipped[1] == stream.last
                 and (self._strangers() or 0) > sum(other.known for other in self._speaking_beside(stream, now)))
 
     def _may_take_over(self, stream, now):
         """Whether a writer that is not in charge is from now on."""
         charge = self.in_charge
-        silent = SILENCE if charge is None else now - charge.arrival
+        silent = SILENCE_LIMIT_NS if charge is None else now - charge.arrival
         # What a stranger that has gone said before may come late: then the graph no longer shows it.
         stream.known = stream.known or (charge is not None and stream.last > charge.growth(silent))
-        if silent < (ABANDONED if stream.known else SILENCE):
+        if silent < (CONFIRMED_TAKEOVER_NS if stream.known else SILENCE_LIMIT_NS):
             return False
-        if stream.looked is not None and now - stream.looked < LOOK:
+        if stream.looked is not None and now - stream.looked < PUBLISHER_POLL_NS:
             return False
         stream.looked = now
         strangers, speaking = self._strangers(), self._speaking_beside(stream, now)
         if stream.known:
-            free = not strangers and not speaking and silent >= (ABANDONED_UNSEEN if strangers is None else ABANDONED)
+            free = (not strangers and not speaking and silent >= (UNCONFIRMED_TAKEOVER_NS if strangers is None
+                                                                  else CONFIRMED_TAKEOVER_NS))
         else:
             free = not strangers or strangers <= sum(other.known for other in speaking)
         stream.known = stream.known and not free
@@ -125,13 +128,14 @@ class Intake:
 
     def _speaking_beside(self, stream, now):
         """The other streams that speak."""
-        return [other for other in self.writers.streams if other is not stream and now - other.arrival < SILENCE]
+        return [other for other in self.writers.streams if other is not stream and now
+                - other.arrival < SILENCE_LIMIT_NS]
 
     def _in_order(self, stamp, now, utc):
         """Whether a stamp is later than the last one and not ahead of the time. One that goes back is believed once
-        those that came instead went on for SILENCE."""
+        those that came instead went on for SILENCE_LIMIT_NS."""
         if stamp > utc + self._future:
-            self._drop(FUTURE, f'{(stamp - utc) * 1e-9:.3f} s ahead', now)
+            self._drop(DROP_FUTURE, f'{(stamp - utc) * 1e-9:.3f} s ahead', now)
             return False
         if self._stamp is None or stamp > self._stamp:
             self._stamp, self._back_since = stamp, None
@@ -139,10 +143,10 @@ class Intake:
         if self._back_since is None or stamp <= self._back:
             self._back_since = now
         self._back = stamp
-        if now - self._back_since >= SILENCE:
+        if now - self._back_since >= SILENCE_LIMIT_NS:
             self._stamp, self._back_since, self.anew = stamp, None, True
             return True
-        self._drop(STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
+        self._drop(DROP_STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
         return False
 
     def _note_offset(self, offset):

@@ -43,7 +43,7 @@ def table(deck, c, u, mode, of_all, t, azimuth):
     ATTITUDE; azimuth: raw one of the last reference [rad]."""
     track = tables.of_mode(of_all, mode)
     if mode != Mode.PROGRAM:
-        unpredicted = u.unpredicted[tables.PLACE[mode]]
+        unpredicted = u.unpredicted[tables.TABLE_INDEX[mode]]
         if unpredicted != Reason.NONE:
             return unpredicted, 0
         if (program_track.status(track, t) == Reason.NONE

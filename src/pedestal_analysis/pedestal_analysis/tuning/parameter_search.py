@@ -15,10 +15,10 @@ from acu_tracker.estimation.filters.kinds import named_models
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_common import parameters
 
-TOLERANCE = 0.02
+LOG_TOLERANCE = 0.02
 """Of the logarithms."""
 
-FAILED = 1e300
+FAILED_COST = 1e300
 """Value of a criterion that is not finite; finite itself, so that the simplex can take differences."""
 
 
@@ -54,7 +54,7 @@ def tuned(params, criterion, searched=None):
 
     def cost(x):
         value = criterion(at(x))
-        return value if math.isfinite(value) else FAILED
+        return value if math.isfinite(value) else FAILED_COST
 
     start = [math.log(given[name]) for name in searched]
     grids = [fields[name].metadata['grid'] for name in searched]
@@ -62,8 +62,8 @@ def tuned(params, criterion, searched=None):
         points = itertools.product(*(np.linspace(math.log(low), math.log(high), n) for low, high, n in grids))
         start = min([start, *points], key=cost)
     corners = np.vstack((start, np.asarray(start) + 0.7 * np.eye(len(start))))
-    options = {'initial_simplex': corners, 'xatol': TOLERANCE, 'fatol': math.inf, 'maxfev': 100 * len(start)}
+    options = {'initial_simplex': corners, 'xatol': LOG_TOLERANCE, 'fatol': math.inf, 'maxfev': 100 * len(start)}
     optimum = minimize(cost, start, method='Nelder-Mead', bounds=bounds, options=options)
-    if optimum.fun >= FAILED:
+    if optimum.fun >= FAILED_COST:
         raise ValueError(f'no {", ".join(searched)} gives a finite criterion')
     return at(optimum.x), float(optimum.fun)

@@ -8,7 +8,7 @@ import typing
 from pedestal_common.parameters import ParameterError
 
 
-class Left(typing.NamedTuple):
+class PlantState(typing.NamedTuple):
     """Load angles [rad], turns included; enabled: whether the drive followed commands, or would once its brakes are
     free; pinned: whether a stow pin was not out."""
     azimuth: float
@@ -21,8 +21,8 @@ def read(path):
     """The Left of a file, None where there is none. Raises ParameterError for a file that holds something else."""
     try:
         values = json.loads(pathlib.Path(path).read_text())
-        left = Left(float(values['azimuth']), float(values['elevation']), values['enabled'] is True,
-                    values.get('pinned') is True)
+        left = PlantState(float(values['azimuth']), float(values['elevation']), values['enabled'] is True,
+                          values.get('pinned') is True)
         if not math.isfinite(left.azimuth + left.elevation):
             raise ValueError('an angle is not finite')
     except FileNotFoundError:

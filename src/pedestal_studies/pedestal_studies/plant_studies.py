@@ -1,7 +1,8 @@
 """Studies of your own plant, `pedestal study servo|backlash|bode --scenario FILE`: both axes of a scenario, ashore.
 
 bode      the loops by trials/frequency_response, each axis for itself
-servo     a step of STEP and a sine of AMPLITUDE at FREQUENCY in still air, a step of wind torque of GUST of what the
+servo     a step of STEP_SIZE_RAD and a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ in still air, a step of wind
+torque of GUST_TORQUE_SHARE of what the
           motors have for a short time; of the true angle of the dish
 backlash  the standstill after that step, and what the sine leaves of its reversals, with the bias of the scenario and
           without any
@@ -10,7 +11,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED, INK, TRUTH, new_panels
+from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials.cases import Case
@@ -20,33 +21,34 @@ from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system import bode
 
-STEP, AMPLITUDE, FREQUENCY, GUST = 0.02, 0.02, 0.1, 0.2
+STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
 """[rad], [rad], [Hz], share of both torque limits."""
 
-DURATION, START, BAND, PERIODS = 10.0, (0.0, 0.6), 0.02, 3
+RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6), 0.02, 3
 """Of step and gust [s]; where the axes begin [rad]; of the settling time; of the sine, the first to settle."""
 
-GUST_START, STANDSTILL = 4.0, 5.0
+GUST_START_S, STANDSTILL_START_S = 4.0, 5.0
 """When the gust begins, from when on an axis stands after the step [s]."""
 
-BIASES = {'': {}, '/bias-off': {f'adu.{name}.bias.schedule': 'off' for name in AXES}}
+BIAS_PARAMETERS = {'': {}, '/bias-off': {f'adu.{name}.bias.schedule': 'off' for name in AXES}}
 """{end of the case's name: parameters}: as the scenario is, and without bias."""
 
-AT_REST = {**loops.STILL, 'scenario.program.source': 'none', 'acu.initial_mode': 'preset',
-           **{f'adu.initial_{name}': start for name, start in zip(AXES, START)},
-           **{f'acu.{name}.preset': start for name, start in zip(AXES, START)}}
+REST_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'scenario.program.source': 'none', 'acu.initial_mode': 'preset',
+                   **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
+                   **{f'acu.{name}.preset': start for name, start in zip(AXES, START_ANGLES_RAD)}}
 
-MOVED = {**AT_REST, **{f'acu.{name}.preset': start + STEP for name, start in zip(AXES, START)}}
+STEP_PARAMETERS = {**REST_PARAMETERS, **{f'acu.{name}.preset': start + STEP_SIZE_RAD for name,
+                                         start in zip(AXES, START_ANGLES_RAD)}}
 
-SINE = {**loops.STILL, 'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0,
-        'scenario.program.interval': 0.02, 'tracking_receiver.target.kind': 'sine',
-        'tracking_receiver.target.angle.frequency': FREQUENCY,
-        **{f'adu.initial_{name}': start for name, start in zip(AXES, START)},
-        **{f'tracking_receiver.target.angle.{name}': start for name, start in zip(AXES, START)},
-        **{f'tracking_receiver.target.angle.{name}_amplitude': AMPLITUDE for name in AXES}}
+SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0,
+                   'scenario.program.interval': 0.02, 'tracking_receiver.target.kind': 'sine',
+                   'tracking_receiver.target.angle.frequency': SINE_FREQUENCY_HZ,
+                   **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
+                   **{f'tracking_receiver.target.angle.{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
+                   **{f'tracking_receiver.target.angle.{name}_amplitude': SINE_AMPLITUDE_RAD for name in AXES}}
 
 
-def of_bode(source, progress):
+def bode_study(source, progress):
     """The Result of the study bode for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant, responses = loops.Loops(source), {}
     for i, name in enumerate(AXES):
@@ -58,19 +60,19 @@ def of_bode(source, progress):
             responses[f'{loop}/{name}'] = found
     figures = {loop: lambda loop=loop: bode.bode_figure(
         f'{loop} loops of {plant.name}', {name: (responses[f'{loop}/{name}'], colour) for name, colour in
-                                          zip(AXES, (FILTERED, TRUTH))}, None) for loop in ('speed', 'position')}
+                                          zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))}, None) for loop in ('speed', 'position')}
     return Result(bode.rows(responses), figures)
 
 
-def of_servo(source, progress):
+def servo_study(source, progress):
     """The Result of the study servo for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant = loops.Loops(source)
-    torque = {name: GUST * (p.axis.motor_1.torque_limit + p.axis.motor_2.torque_limit) * p.ratio
+    torque = {name: GUST_TORQUE_SHARE * (p.axis.motor_1.torque_limit + p.axis.motor_2.torque_limit) * p.ratio
               for name, p in plant.plants.items()}
-    runs = {'step': (MOVED, DURATION),
-            'gust': ({**AT_REST, 'adu.wind.gust.kind': 'step', 'adu.wind.gust.start': GUST_START,
-                      **{f'adu.wind.gust.{name}': value for name, value in torque.items()}}, DURATION),
-            'sine': (SINE, PERIODS / FREQUENCY)}
+    runs = {'step': (STEP_PARAMETERS, RUN_DURATION_S),
+            'gust': ({**REST_PARAMETERS, 'adu.wind.gust.kind': 'step', 'adu.wind.gust.start': GUST_START_S,
+                      **{f'adu.wind.gust.{name}': value for name, value in torque.items()}}, RUN_DURATION_S),
+            'sine': (SINE_PARAMETERS, SINE_PERIODS / SINE_FREQUENCY_HZ)}
     flown = {}
     for i, (name, (changes, duration)) in enumerate(runs.items()):
         progress(i / len(runs), name)
@@ -80,11 +82,12 @@ def of_servo(source, progress):
                   {name: lambda name=name: _figure(name, flown[name]) for name in runs})
 
 
-def of_backlash(source, progress):
+def backlash_study(source, progress):
     """The Result of the study backlash for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant, flown = loops.Loops(source), {}
-    runs = {(kind, end): Case(kind, source, {**changes, **bias}, duration) for end, bias in BIASES.items()
-            for kind, changes, duration in (('standstill', MOVED, DURATION), ('sine', SINE, PERIODS / FREQUENCY))}
+    runs = {(kind, end): Case(kind, source, {**changes, **bias}, duration) for end, bias in BIAS_PARAMETERS.items()
+            for kind, changes, duration in (('standstill', STEP_PARAMETERS, RUN_DURATION_S),
+                                            ('sine', SINE_PARAMETERS, SINE_PERIODS / SINE_FREQUENCY_HZ))}
     for done, (key, case) in enumerate(runs.items()):
         progress(done / len(runs), ''.join(key))
         flown[key] = case.run()
@@ -92,8 +95,8 @@ def of_backlash(source, progress):
     for i, name in enumerate(AXES):
         lash = plant.plants[name].axis.gear_train.lash
         rows.append(row(f'{plant.name}/{name}', 'lash_rad', lash, 'rad'))
-        left = {end: metrics.peak(_reversals(flown['sine', end], i)[1]) for end in BIASES}
-        for end in BIASES:
+        left = {end: metrics.peak(_reversals(flown['sine', end], i)[1]) for end in BIAS_PARAMETERS}
+        for end in BIAS_PARAMETERS:
             rows += [row(f'{plant.name}/{name}{end}', 'standstill_peak_to_peak_rad',
                          np.ptp(_standstill(flown['standstill', end], i)[1]), 'rad'),
                      row(f'{plant.name}/{name}{end}', 'reversal_error_rad', left[end], 'rad')]
@@ -104,15 +107,15 @@ def of_backlash(source, progress):
 
 def _standstill(run, i):
     """(times [s], angle less its mean [rad]) of an axis that stands."""
-    stands = run.t >= STANDSTILL
+    stands = run.t >= STANDSTILL_START_S
     angle = _angle(run, i)[stands]
     return run.t[stands], angle - np.mean(angle)
 
 
 def _reversals(run, i):
     """(times [s], error without its fundamental [rad]) of an axis over the whole periods after the first."""
-    steady = metrics.whole_periods(run.t, 1.0 / FREQUENCY, 1.0 / FREQUENCY)
-    return run.t[steady], metrics.residual(run.t[steady], _sine_error(run, i)[steady], 1.0 / FREQUENCY)
+    steady = metrics.whole_periods(run.t, 1.0 / SINE_FREQUENCY_HZ, 1.0 / SINE_FREQUENCY_HZ)
+    return run.t[steady], metrics.residual(run.t[steady], _sine_error(run, i)[steady], 1.0 / SINE_FREQUENCY_HZ)
 
 
 def _bias_figure(kind, cut, flown):
@@ -120,7 +123,8 @@ def _bias_figure(kind, cut, flown):
     figure, axes = new_panels(2, height=4.6, sharex=True,
                               y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
-        for end, colour, label in (('/bias-off', TRUTH, 'without bias'), ('', FILTERED, 'as the scenario is')):
+        for end, colour, label in (('/bias-off', TRUTH_COLOUR, 'without bias'),
+                                   ('', FILTERED_COLOUR, 'as the scenario is')):
             t, left = cut(flown[kind, end], i)
             panel.plot(t, 1e6 * left, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
@@ -129,19 +133,20 @@ def _bias_figure(kind, cut, flown):
 
 def _angle(run, i):
     """True angle (n,) [rad] of an axis from where it begins."""
-    return run['adu/truth']['position'][:, i] - START[i]
+    return run['adu/truth']['position'][:, i] - START_ANGLES_RAD[i]
 
 
 def _sine_error(run, i):
-    return AMPLITUDE * np.sin(2.0 * math.pi * FREQUENCY * run.t) - _angle(run, i)
+    return SINE_AMPLITUDE_RAD * np.sin(2.0 * math.pi * SINE_FREQUENCY_HZ * run.t) - _angle(run, i)
 
 
 def _metrics(flown, i, torque):
     """(metric, value, unit) of an axis."""
     step, gust, sine = (flown[name] for name in ('step', 'gust', 'sine'))
-    after, settled = _angle(gust, i)[gust.t >= GUST_START], sine.t >= 1.0 / FREQUENCY
-    return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP), '%'),
-            ('step_settling_2percent_s', metrics.settling_time(step.t, _angle(step, i), STEP, BAND), 's'),
+    after, settled = _angle(gust, i)[gust.t >= GUST_START_S], sine.t >= 1.0 / SINE_FREQUENCY_HZ
+    return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP_SIZE_RAD), '%'),
+            ('step_settling_2percent_s', metrics.settling_time(step.t, _angle(step, i), STEP_SIZE_RAD, SETTLING_BAND),
+             's'),
             ('gust_torque_nm', torque, 'Nm'), ('gust_peak_rad', metrics.peak(after - after[0]), 'rad'),
             ('sine_max_error_rad', metrics.peak(_sine_error(sine, i)[settled]), 'rad'),
             ('sine_rms_error_rad', tracking.rms(_sine_error(sine, i)[settled]), 'rad')]
@@ -152,12 +157,12 @@ def _figure(kind, run):
     figure, axes = new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         values = _sine_error(run, i) if kind == 'sine' else _angle(run, i)
-        panel.plot(run.t, 1e3 * values, color=FILTERED)
+        panel.plot(run.t, 1e3 * values, color=FILTERED_COLOUR)
         if kind == 'step':
-            panel.axhline(1e3 * STEP, color=INK, lw=0.8, ls='--')
+            panel.axhline(1e3 * STEP_SIZE_RAD, color=INK_COLOUR, lw=0.8, ls='--')
         panel.set_title(f'{kind}, {name}')
     return figure
 
 
-STUDIES = {'backlash': of_backlash, 'bode': of_bode, 'servo': of_servo}
+PLANT_STUDIES = {'backlash': backlash_study, 'bode': bode_study, 'servo': servo_study}
 """{study: function(source, progress) -> Result} of those that measure any plant."""

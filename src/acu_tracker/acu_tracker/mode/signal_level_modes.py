@@ -13,7 +13,7 @@ from acu_tracker.search.pattern import Point
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
-SIDE_LOBE_TIME = 0.3
+SIDE_LOBE_TIME_S = 0.3
 """Time for which the level must be that of a side lobe [s], before autotrack or in it: on its slopes the filter
 diverges within 0.4 s."""
 
@@ -52,12 +52,13 @@ def advance(a, mode, c, u, way):
     record of signals.INPUTS. Whether acquire finds a slope wrong."""
     p, beamwidth = c.p.acquisition, c.p.tracker.receiver.beamwidth
     new = u.error_stamp > a.level.stamp and math.isfinite(u.cn0_dbhz)
-    off_target = not modes.FOLLOWS[mode] or (mode == Mode.SEARCH and acquisition.waiting(a, c.p.search, u.stamp))
+    off_target = (not modes.FOLLOWS_TARGET[mode] or (mode == Mode.SEARCH and acquisition.waiting(a, c.p.search,
+                                                                                                 u.stamp)))
     if u.error_valid:
-        level.forget_noise(a.level, p)
+        level.restart_noise(a.level, p)
     elif off_target:
         acquisition.learn(a, p, u.cn0_dbhz, u.error_stamp)
-    acquisition.hear(a, p, u.cn0_dbhz, u.error_stamp, u.error_valid != 0)
+    acquisition.take_level(a, p, u.cn0_dbhz, u.error_stamp, u.error_valid != 0)
     if mode == Mode.SEARCH and new:
         t = u.error_stamp - p.time_constant
         offset = _offset(a, mode, c, t, expected(a, way, t))
@@ -68,24 +69,24 @@ def advance(a, mode, c, u, way):
         present = a.level.below_loss < p.loss_time
         x, e = step_track.step(a.step_track, c.p.steptrack, beamwidth, p.time_constant, u.stamp,
                                u.cn0_dbhz if new else math.nan, present)
-        acquisition.stand(a, x, e)
+        acquisition.set_offset(a, x, e)
     axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, u.range)
     judged = mode == Mode.PROGRAM or mode == Mode.AUTOTRACK
-    acquisition.judge(a, u.stamp, not judged or not u.error_valid or not side_lobe.suspected(u.cn0_dbhz, axis))
+    acquisition.note_fair_level(a, u.stamp, not judged or not u.error_valid or not side_lobe.suspected(u.cn0_dbhz, axis))
     return mode == Mode.ACQUIRE and a.phase == acquisition.Phase.WRONG_SLOPE
 
 
 @compiled
 def in_side_lobe(a, c, t):
     """Whether autotrack follows a level that is that of a side lobe, at t [s]."""
-    return c.p.acquisition.expected_dbhz > 0.0 and t - a.fair > SIDE_LOBE_TIME
+    return c.p.acquisition.expected_dbhz > 0.0 and t - a.fair > SIDE_LOBE_TIME_S
 
 
 @compiled
 def found(a, mode, c):
     """Whether search may hand over to acquire, or acquire to autotrack."""
     if mode == Mode.SEARCH:
-        return acquisition.passed(a, c.p.acquisition)
+        return acquisition.peak_passed(a, c.p.acquisition)
     return a.phase == acquisition.Phase.CHECKED
 
 
@@ -109,7 +110,7 @@ def end(a, mode, c, t):
 def begin(a, mode, c, t, spread):
     """Enter a mode that goes by the level at t [s]; spread: standard deviation of the expected place [rad], NaN where
     it is not known."""
-    level.forget_times(a.level)
+    level.restart_times(a.level)
     if mode == Mode.SEARCH:
         acquisition.begin_search(a, c.p.search, c.p.tracker.receiver.beamwidth, t, spread)
     elif mode == Mode.ACQUIRE:
@@ -122,7 +123,7 @@ def begin(a, mode, c, t, spread):
 def remember(a, t, u, du):
     """Keep where the target is at t [s]: an ENU unit Vector u and its rate du [1/s]."""
     place.remember(a.place, t, u, du)
-    acquisition.stand(a, 0.0, 0.0)
+    acquisition.set_offset(a, 0.0, 0.0)
 
 
 @compiled

@@ -5,8 +5,8 @@ import pathlib
 import numpy as np
 import pytest
 
-from pedestal_common.realtime import intake
-from pedestal_common.realtime.intake import Intake
+from pedestal_common.realtime import publisher_gate
+from pedestal_common.realtime.publisher_gate import PublisherGate
 
 MS, S = 1_000_000, 1_000_000_000
 T = 5 * MS
@@ -38,7 +38,7 @@ def run(*writers, strangers=lambda: 0):
     """(Intake, {writer: times at which it was taken}, times at which a stream began anew) of writers together."""
     taken = {writer.name: [] for writer in writers}
     anew = []
-    taker = Intake(decode, FUTURE, strangers)
+    taker = PublisherGate(decode, FUTURE, strangers)
     for time, number, stamp, name in sorted(message for writer in writers for message in writer.messages()):
         if taker.take(stamp, number, UTC + time, time, UTC + time) is not None:
             taken[name].append(time)
@@ -59,7 +59,7 @@ def test_a_second_writer_is_dropped_however_fast_it_is(period, number):
     taker, taken, anew = run(Writer('acu', jitter=MS), stranger)
     assert not taken['stranger'] and not anew
     assert len(taken['acu']) > 1960
-    assert taker.dropped[intake.ANOTHER_WRITER] >= 0.95 * len(stranger.times)
+    assert taker.dropped[publisher_gate.DROP_OTHER_PUBLISHER] >= 0.95 * len(stranger.times)
 
 
 @pytest.mark.parametrize('number', [201, 195, 199])
@@ -67,13 +67,13 @@ def test_two_writers_that_cannot_be_told_apart_are_both_dropped(number):
     """A second control unit, with the numbers of the first at the same pace."""
     taker, taken, _ = run(Writer('acu', jitter=MS), Writer('twin', begin=S, number=number, jitter=MS, seed=2))
     assert max(taken['acu'] + taken['twin']) < S + 10 * MS and len(taken['twin']) <= 1
-    assert taker.reason in intake.ALARMING
+    assert taker.reason in publisher_gate.WARNING_DROP_REASONS
 
 
 def test_of_twins_the_one_that_stays_is_taken_again_when_it_is_alone():
     _, taken, _ = run(Writer('acu'), Writer('twin', begin=S, end=2 * S, number=201))
     back = [time for time in taken['acu'] if time > 2 * S]
-    assert intake.ABANDONED <= back[0] - 2 * S <= intake.ABANDONED + 2 * intake.SILENCE and len(back) > 1300
+    assert publisher_gate.CONFIRMED_TAKEOVER_NS <= back[0] - 2 * S <= publisher_gate.CONFIRMED_TAKEOVER_NS + 2 * publisher_gate.SILENCE_LIMIT_NS and len(back) > 1300
 
 
 @pytest.mark.parametrize('period', [T // 20, T // 2, 2 * T // 3])
@@ -136,7 +136,7 @@ def test_a_writer_that_begins_anew_is_taken_at_once(pause):
 
 def test_a_writer_that_begins_anew_without_a_pause_is_taken_after_the_silence():
     _, taken, anew = run(Writer('old', end=2 * S), Writer('new', begin=2 * S))
-    assert 2 * S + intake.SILENCE - 2 * T <= taken['new'][0] <= 2 * S + intake.SILENCE + T
+    assert 2 * S + publisher_gate.SILENCE_LIMIT_NS - 2 * T <= taken['new'][0] <= 2 * S + publisher_gate.SILENCE_LIMIT_NS + T
     assert anew == taken['new'][:1]
 
 
@@ -147,7 +147,7 @@ def test_a_stranger_that_spoke_before_is_not_in_charge(strangers):
     _, taken, anew = run(Writer('old', end=2 * S), Writer('stranger', begin=S), Writer('new', begin=4 * S),
                          strangers=lambda: next(seen, 1) if strangers else None)
     assert not taken['stranger'] and anew == taken['new'][:1]
-    assert 4 * S <= taken['new'][0] <= 4 * S + intake.LOOK + T
+    assert 4 * S <= taken['new'][0] <= 4 * S + publisher_gate.PUBLISHER_POLL_NS + T
 
 
 def test_who_may_be_a_stranger_is_not_taken():
@@ -160,7 +160,8 @@ def test_who_may_be_a_stranger_is_not_taken():
     assert taken['stranger']
 
 
-@pytest.mark.parametrize('strangers, pause', [(lambda: 0, intake.ABANDONED), (lambda: None, intake.ABANDONED_UNSEEN)])
+@pytest.mark.parametrize('strangers, pause', [(lambda: 0, publisher_gate.CONFIRMED_TAKEOVER_NS),
+                                              (lambda: None, publisher_gate.UNCONFIRMED_TAKEOVER_NS)])
 def test_who_spoke_with_the_one_in_charge_is_taken_when_it_is_alone_for_long(strangers, pause):
     """The one in charge was a stranger: it came while the right one was held up, and has gone."""
     right = Writer('right', end=20 * S, number=5000)
@@ -168,12 +169,12 @@ def test_who_spoke_with_the_one_in_charge_is_taken_when_it_is_alone_for_long(str
     stranger = Writer('stranger', begin=3 * S // 2, end=4 * S)
     _, taken, anew = run(stranger, right, strangers=strangers)
     back = [time for time in taken['right'] if time > 4 * S]
-    assert 4 * S + pause - 2 * T <= back[0] <= 4 * S + pause + intake.LOOK + T
+    assert 4 * S + pause - 2 * T <= back[0] <= 4 * S + pause + publisher_gate.PUBLISHER_POLL_NS + T
     assert len(back) > 0.99 * (20 * S - back[0]) / T
 
 
 def test_a_cut_cable_is_no_other_writer():
-    taker = Intake(decode, FUTURE)
+    taker = PublisherGate(decode, FUTURE)
     for k in [*range(400), *range(2400, 3000)]:
         assert taker.take(UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) is not None
         assert not taker.anew
@@ -184,7 +185,7 @@ def test_a_cut_cable_is_no_other_writer():
 @pytest.mark.parametrize('lost', [1, 10, 19])
 def test_a_silent_writer_may_lose_some_when_it_speaks_again(pause, lost):
     """The cable was cut, and the first messages went while the hosts still looked for each other."""
-    taker = Intake(decode, FUTURE)
+    taker = PublisherGate(decode, FUTURE)
     for k in [*range(400), 401, *range(402 + lost, 800)]:
         now = k * T + (pause if k > 400 else 0)
         assert taker.take(UTC + now, k + 1, UTC + now, now, UTC + now) is not None and not taker.anew
@@ -193,7 +194,7 @@ def test_a_silent_writer_may_lose_some_when_it_speaks_again(pause, lost):
 
 def test_a_frozen_reader_takes_up_where_the_writer_is():
     """It finds what its queue kept, all at one time."""
-    taker = Intake(decode, FUTURE)
+    taker = PublisherGate(decode, FUTURE)
     for k in range(400):
         taker.take(UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T)
     wake = 4400 * T
@@ -202,26 +203,26 @@ def test_a_frozen_reader_takes_up_where_the_writer_is():
 
 
 def test_stamps_of_the_future_are_dropped_and_do_no_harm():
-    taker = Intake(decode, FUTURE)
+    taker = PublisherGate(decode, FUTURE)
     for k in range(1000):
         wrong = k in (300, 500)
         stamp = UTC + k * T + (3600 * S if wrong else 0)
         assert (taker.take(stamp, k + 1, UTC + k * T, k * T, UTC + k * T) is None) == wrong
-    assert taker.dropped == {intake.FUTURE: 2}
+    assert taker.dropped == {publisher_gate.DROP_FUTURE: 2}
     assert '3600.000 s ahead' in taker.detail
 
 
 def test_a_future_within_the_limit_costs_no_more_than_its_time():
-    taker = Intake(decode, FUTURE)
+    taker = PublisherGate(decode, FUTURE)
     taken = [taker.take(UTC + k * T + (45 * MS if k == 300 else 0), k + 1, UTC + k * T, k * T, UTC + k * T) is not None
              for k in range(400)]
     assert taken == [True] * 301 + [False] * 9 + [True] * 90
-    assert taker.dropped == {intake.STALE: 9}
+    assert taker.dropped == {publisher_gate.DROP_STALE: 9}
 
 
 def test_stamps_that_went_back_for_good_are_believed_after_the_silence():
     """The clock of the writer's host was set back by an hour."""
-    taker = Intake(decode, FUTURE)
+    taker = PublisherGate(decode, FUTURE)
     taken = {}
     for k in range(1000):
         stamp = UTC + k * T - (3600 * S if k >= 500 else 0)
@@ -231,10 +232,10 @@ def test_stamps_that_went_back_for_good_are_believed_after_the_silence():
 
 
 def test_what_is_no_message_is_dropped_and_counted():
-    taker = Intake(decode, FUTURE)
+    taker = PublisherGate(decode, FUTURE)
     taken = [taker.take(None if k % 3 else UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) for k in range(300)]
     assert sum(one is not None for one in taken) == 100
-    assert taker.dropped == {intake.UNDECODABLE: 200} and taker.detail == 'no message'
+    assert taker.dropped == {publisher_gate.DROP_UNDECODABLE: 200} and taker.detail == 'no message'
 
 
 def test_losses_of_two_writers_are_those_of_each():
@@ -245,13 +246,13 @@ def test_losses_of_two_writers_are_those_of_each():
 def test_beside_a_stranger_nothing_is_taken_of_a_topic_without_a_pace():
     """Its number fits the right writer as well, whose next text could have come at any time."""
     strangers = 0
-    taker = Intake(lambda text: (None, text), FUTURE, lambda: strangers, paced=False)
+    taker = PublisherGate(lambda text: (None, text), FUTURE, lambda: strangers, paced=False)
 
     def take(text, number, time):
         return taker.take(text, number, UTC + time, time, UTC + time)
     assert take('enabled', 1, 0) == 'enabled'
     strangers = 1
-    assert take('disabled', 2, 60 * S) is None and taker.reason == intake.ANOTHER_WRITER
+    assert take('disabled', 2, 60 * S) is None and taker.reason == publisher_gate.DROP_OTHER_PUBLISHER
     strangers = 0
     assert take('stopping', 2, 70 * S) == 'stopping'
 
@@ -284,7 +285,7 @@ def test_a_writer_that_begins_anew_beside_a_stranger_is_taken():
 @pytest.mark.parametrize('held', [50 * MS, 150 * MS, 500 * MS])
 def test_a_burst_after_a_pause_of_which_most_is_lost_is_the_same_writer(held):
     """Its writer was held up, and catches up faster than the reader's queue holds."""
-    taker = Intake(decode, FUTURE, lambda: 0)
+    taker = PublisherGate(decode, FUTURE, lambda: 0)
 
     def take(number, time):
         return taker.take(UTC + number * T, number, UTC + time, time, UTC + time) is not None

@@ -7,27 +7,27 @@ from rclpy.qos import DurabilityPolicy
 
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node import middleware
-from pedestal_common.node.unit import ERROR, WARN
-from pedestal_common.realtime import intake
-from pedestal_common.wire.commands import LATEST
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
+from pedestal_common.realtime import publisher_gate
+from pedestal_common.wire.commands import MAX_COMMAND_AGE_NS
 
-FRESH = 2_000_000_000
+DROP_REPORT_NS = 2_000_000_000
 """Time [ns] for which the diagnostics speak of a message that was dropped."""
 
-UNKNOWN = '_NODE_NAME_UNKNOWN_'
+UNDISCOVERED_NODE_NAME = '_NODE_NAME_UNKNOWN_'
 """What rmw calls a node that is not discovered yet."""
 
-DISCOVERY = 10_000_000_000
+MAX_DISCOVERY_NS = 10_000_000_000
 """Time [ns] for which a text waits until the graph names every writer of its topic: it is said once only, often before
 its writer is discovered."""
 
-LOOK = 0.02
+DISCOVERY_POLL_S = 0.02
 """Time [s] between two looks at who writes a text."""
 
-HELD = 1000
+MAX_HELD_TEXTS = 1000
 """Texts that wait at the most."""
 
-REMEMBERED = 100
+MAX_RECENT_MESSAGES = 100
 """Messages of a topic with two subscriptions that are known again when the other one brings them."""
 
 
@@ -51,9 +51,9 @@ def subscribe(node, link, ros_name, take, role):
         return node.create_subscription(middleware.message_class(link.type), ros_name, pair(callback), profile,
                                         raw=True, **events)
     latched = middleware.qos(link.rate, role)
-    if not topics.QOS[link.rate].unlatched:
+    if not topics.QOS_BY_RATE[link.rate].unlatched:
         return [open_with(latched, take)]
-    heard = collections.deque(maxlen=REMEMBERED)
+    heard = collections.deque(maxlen=MAX_RECENT_MESSAGES)
 
     def take_once(data, info):
         message = info['source_timestamp'], info['publication_sequence_number']
@@ -66,7 +66,7 @@ def subscribe(node, link, ros_name, take, role):
     return [open_with(latched, take_once, event_callbacks=unmatched), open_with(volatile, take_once)]
 
 
-class Listener:
+class TopicSubscriber:
     """Hears one topic and hands on what its Intake takes: take(message, whether it begins anew).
 
     node: the shell.Shell that listens; link: nodes.Link of the topic, which ROS calls ros_name; decode: see Intake
@@ -76,13 +76,15 @@ class Listener:
         self.link, self._node, self._ros_name, self._take = link, node, ros_name, take
         everybodys = len(link.writers) > 1 or link.rate in ('once', 'command')
         self._expected = any(writer in node.graph.members for writer in link.writers)
-        text = link.rate in topics.BETWEEN_STEPS and self._expected
-        self.intake = intake.Intake(decode, round(node.graph.future * 1e9), None if everybodys else self._count,
-                                    paced=not text, oldest=LATEST if link.rate == 'command' else None)
-        self._held, self._missed = collections.deque(maxlen=HELD), 0
+        text = link.rate in topics.EVENT_RATES and self._expected
+        self.intake = publisher_gate.PublisherGate(decode, round(node.graph.future * 1e9), None if everybodys
+                                                   else self._count,
+                                                   paced=not text, oldest=MAX_COMMAND_AGE_NS
+                                                   if link.rate == 'command' else None)
+        self._held, self._missed = collections.deque(maxlen=MAX_HELD_TEXTS), 0
         self.callback = self._hold if text else self._hear
         if text:
-            node.every(LOOK, self._look)
+            node.every(DISCOVERY_POLL_S, self._look)
 
     def open(self, subscribe):
         """Begin to hear. subscribe() makes the subscriptions with `callback`."""
@@ -96,9 +98,9 @@ class Listener:
     def _look(self):
         """Hear the texts that wait, once every writer has a name. What was said beside a stranger is not taken; once
         it has gone a subscription anew brings the last text again."""
-        while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > DISCOVERY):
+        while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > MAX_DISCOVERY_NS):
             self._hear(*self._held.popleft()[1:])
-        missed = self.intake.dropped[intake.ANOTHER_WRITER]
+        missed = self.intake.dropped[publisher_gate.DROP_OTHER_PUBLISHER]
         if missed > self._missed and not self.strangers():
             self._missed = missed
             for subscription in self._subscriptions:
@@ -106,7 +108,7 @@ class Listener:
             self._subscriptions = self._subscribe()
 
     def _undiscovered(self):
-        return any(UNKNOWN in name for name in self._node.writers_of(self._ros_name))
+        return any(UNDISCOVERED_NODE_NAME in name for name in self._node.writers_of(self._ros_name))
 
     def _hear(self, data, info):
         taker = self.intake
@@ -114,7 +116,7 @@ class Listener:
         message = taker.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
         if message is not None:
             self._take(message, taker.anew)
-        elif taker.reason in intake.ALARMING:
+        elif taker.reason in publisher_gate.WARNING_DROP_REASONS:
             self._node.diagnose_now()
 
     def strangers(self):
@@ -122,7 +124,7 @@ class Listener:
         if not self._expected:
             return []
         return [name for name in self._node.writers_of(self._ros_name)
-                if name not in self.link.writers and name != nodes.STAND_IN]
+                if name not in self.link.writers and name != nodes.REPLAY_NODE]
 
     def _count(self):
         """As Intake wants it. Who is not discovered yet may be a stranger."""
@@ -131,13 +133,13 @@ class Listener:
     def finding(self, now):
         """(level, text) of what was dropped lately; None where nothing was."""
         taker = self.intake
-        if taker.dropped_at is None or now - taker.dropped_at > FRESH:
+        if taker.dropped_at is None or now - taker.dropped_at > DROP_REPORT_NS:
             return None
         reason, count = taker.reason, taker.dropped[taker.reason]
-        if reason not in intake.ALARMING:
-            return WARN, f'{self.link.name}: {count} dropped: {reason}: {taker.detail}'
+        if reason not in publisher_gate.WARNING_DROP_REASONS:
+            return LEVEL_WARN, f'{self.link.name}: {count} dropped: {reason}: {taker.detail}'
         who = ', '.join(self.strangers() if self._expected else self._node.writers_of(self._ros_name)) or 'it has gone'
-        return ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
+        return LEVEL_ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
 
     def values(self):
         """[(key, text)] for the diagnostics: what was dropped so far, the smallest time from sent to heard."""

@@ -5,9 +5,9 @@ import shlex
 import pytest
 
 from pedestal_analysis.results import results
-from pedestal_analysis.tuning import data_sheet, loops
-from pedestal_analysis.tuning.sheet import DataSheet
-from pedestal_bringup.loop import recorded
+from pedestal_analysis.tuning import antenna_from_data_sheet, loops
+from pedestal_analysis.tuning.data_sheet_format import DataSheet
+from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_common.parameters import as_dict
 
@@ -16,8 +16,8 @@ SHIPPED = ('uav_tracker_3m', 'leo_station_7m', 'ship_terminal_1m2')
 
 def test_the_data_sheet_of_the_known_antenna_gives_it_back():
     """Paper 000's motor and the plant around it, but for what the scaling rounds: 3 % of inductance and resistance."""
-    found = data_sheet.sections(DataSheet(), 'known')
-    chosen = scenario.parse('known', data_sheet.text(found, ['known']))
+    found = antenna_from_data_sheet.sections(DataSheet(), 'known')
+    chosen = scenario.parse('known', antenna_from_data_sheet.text(found, ['known']))
     for axis in loops.AXES:
         known = as_dict(getattr(scenario.load('leo_pass').node_parameters('adu'), axis))
         made = as_dict(getattr(chosen.node_parameters('adu'), axis))
@@ -31,7 +31,7 @@ def test_a_motor_turns_at_its_rated_speed_and_torque():
     """Phasor of a synchronous machine, i_d = 0: the voltage at rated speed and torque is below what there is."""
     known = as_dict(scenario.load('leo_pass').node_parameters('adu').azimuth.motor_1)
     for torque, speed in ((30.0, 1500.0), (3.0, 3000.0), (200.0, 600.0)):
-        made = data_sheet.motor(DataSheet(motor_torque=torque, motor_speed=speed), known)
+        made = antenna_from_data_sheet.motor(DataSheet(motor_torque=torque, motor_speed=speed), known)
         w = known['pole_pairs'] * speed * math.pi / 30.0
         current = torque / (1.5 * known['pole_pairs'] * made['flux_linkage'])
         u_q = w * made['flux_linkage'] + made['resistance'] * current
@@ -42,7 +42,7 @@ def test_a_motor_turns_at_its_rated_speed_and_torque():
 @pytest.mark.parametrize('name', SHIPPED)
 def test_what_ships_tracks_within_a_twentieth_of_its_beam(name):
     chosen = scenario.load(name)
-    found = results.measured(results.of_bag(recorded.record(chosen)))
+    found = results.measured(results.of_bag(memory_recording.record(chosen)))
     beamwidth = math.degrees(chosen.node_parameters('tracking_receiver').antenna.beamwidth)
     assert found['pointing_rms_deg'][0] < 0.05 * beamwidth and found['loss_s'][0] == 0.0
     assert found['evaluated_time_s'][0] > 0.9 * chosen.header.duration

@@ -10,10 +10,10 @@ from acu_tracker.estimation.filters import measurement
 from acu_tracker.geometry import attitude, attitude_error, direction, encoders
 from pedestal_common.compiled import compiled
 
-ON_TARGET = 0.5
+MAX_OFFSET_BEAMWIDTHS = 0.5
 """Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""
 
-NOWHERE = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
+UNKNOWN_POINTING = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled
@@ -34,7 +34,7 @@ def take_attitude(s, p, u):
     if not u.attitude_valid:
         return flags | signals.Flag.ATTITUDE, False
     outcome = attitude.take(s, p, u.stamp, u.attitude_stamp, u.quaternion, u.deck_rate, u.aligning)
-    return flags | (signals.Flag.ATTITUDE if outcome == attitude.INVALID else 0), outcome == attitude.NEW
+    return flags | (signals.Flag.ATTITUDE if outcome == attitude.SAMPLE_INVALID else 0), outcome == attitude.SAMPLE_NEW
 
 
 @compiled
@@ -60,29 +60,29 @@ def error_at(s, receiver, u, by_level, offset):
     """
     wrong = _wrong_level(s, u) if by_level else 0
     if wrong or not u.error_valid:
-        return wrong, False, NOWHERE
+        return wrong, False, UNKNOWN_POINTING
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
-        return signals.Flag.ERROR, False, NOWHERE
-    if offset > ON_TARGET * receiver.beamwidth:
-        return 0, False, NOWHERE
+        return signals.Flag.ERROR, False, UNKNOWN_POINTING
+    if offset > MAX_OFFSET_BEAMWIDTHS * receiver.beamwidth:
+        return 0, False, UNKNOWN_POINTING
     known, at = encoders.at(s, u.error_stamp - receiver.beam_age)
     return 0 if known else signals.Flag.ERROR_STAMP, known, at
 
 
 @compiled
-def tell_error(o, outcome, innovation):
+def write_innovation(o, outcome, innovation):
     """Put the Innovation of an error into the outputs; the flag of its outcome of target.take, 0: it is accepted."""
     for i in range(2):
         one = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
         o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(one.S)
-    if outcome == target.NO_ATTITUDE:
+    if outcome == target.OUTCOME_NO_ATTITUDE:
         return signals.Flag.ATTITUDE
-    if outcome == target.STALE:
+    if outcome == target.OUTCOME_STALE:
         return signals.Flag.ERROR_STAMP
-    if outcome == target.NOISY:
+    if outcome == target.OUTCOME_NOISY:
         return signals.Flag.ERROR_NOISY
-    return signals.Flag.ERROR_GATED if outcome == target.GATED else 0
+    return signals.Flag.ERROR_GATED if outcome == target.OUTCOME_GATED else 0
 
 
 @compiled
