@@ -1,7 +1,7 @@
 """The pages of the documentation that are made of the code: parameters of every node, verbs, laws.
 
-`python -m tools.book FOLDER` (make book) copies docs/ there and writes these pages under reference/. CONTRIBUTING.md, which
-lies outside docs/, becomes the page contributing.md.
+`python -m tools.book FOLDER` (make book) copies docs/ there and writes these pages under reference/.
+CONTRIBUTING.md, which lies outside docs/, becomes the page contributing.md.
 """
 import argparse
 import ast
