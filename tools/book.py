@@ -1,11 +1,13 @@
 """The pages of the documentation that are made of the code: parameters of every node, verbs, laws.
 
-`python -m tools.book FOLDER` (make book) copies docs/ there and writes them beside it, under reference/.
+`python -m tools.book FOLDER` (make book) copies docs/ there and writes these pages under reference/.
+CONTRIBUTING.md, which lies outside docs/, becomes the page contributing.md.
 """
 import argparse
 import ast
 import inspect
 import pathlib
+import re
 import shutil
 import sys
 
@@ -90,11 +92,20 @@ def _laws(module):
             for node in compiled if not node.name.startswith('_')] if compiled else None
 
 
+def contributing_page(root):
+    """Return CONTRIBUTING.md for the folder of the pages; links to other files outside docs/ become plain text."""
+    text = (root / 'CONTRIBUTING.md').read_text().replace('](docs/', '](')
+    return re.sub(r'\[([^]]*)\]\([A-Z][^)]*\)', r'\1', text)
+
+
 def main(folder, root='.') -> int:
     """Write all pages of the book into a folder."""
     root, folder = pathlib.Path(root), pathlib.Path(folder)
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(root / 'docs', folder)
+    (folder / 'contributing.md').write_text(contributing_page(root))
+    for page in folder.glob('*.md'):
+        page.write_text(page.read_text().replace('](../CONTRIBUTING.md)', '](contributing.md)'))
     (folder / 'reference').mkdir()
     for name, lines in (('parameters', parameter_page()), ('verbs', verb_page()), ('laws', law_page(root))):
         (folder / 'reference' / f'{name}.md').write_text('\n'.join(lines) + '\n')
