@@ -1,5 +1,5 @@
 # make demo    set up, run the main scenario as separate nodes, record it, check the recording, write the report
-# make quick   set up, lint, run the tests of all laws: a minute
+# make quick   set up, lint, check types, run the tests of all laws: a minute and a half
 # make test    set up, lint, run every test
 # make update-references  record bags/reference anew and print the difference that is accepted with it
 # make docs    write the tables of README.md and docs/ anew from the tables of the code and from docs/rows.json
@@ -34,7 +34,7 @@ IN_TURN := --dist loadfile --no-loadscope-reorder
 # try its test again and again.
 LIMITED := .venv/bin/python test/limited.py
 PYTEST_IN_TURN = .venv/bin/python -m pytest $(IN_TURN) --max-worker-restart 0 $(PYTEST)
-LINT = .venv/bin/ruff check . && .venv/bin/codespell
+LINT = .venv/bin/ruff check . && .venv/bin/codespell && .venv/bin/mypy
 # Containers often set it: every process would compile the sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -100,7 +100,7 @@ clean:
 
 .venv/tests: .venv/installed
 	@echo 'Installing what the tests use into .venv ...'
-	.venv/bin/python $(PIP) ruff codespell py-spy pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),'$(package)[test]')
+	.venv/bin/python $(PIP) ruff codespell mypy py-spy pytest-timeout pytest-xdist $(foreach package,$(PACKAGES),'$(package)[test]')
 	@touch $@
 
 .venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip
