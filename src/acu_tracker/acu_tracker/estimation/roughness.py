@@ -2,10 +2,10 @@
 
     q = mean over the last errors of (nu_k - nu_k-1)^2 / 2R
 
-q is the mean of both axes, and 1 for white noise of the variance R (von Neumann, Distribution of the ratio of the mean
-square successive difference to the variance, Annals of Mathematical Statistics 12 (1941) 367). Slow changes cancel in
-the difference: a target that turns, a slope of the wrong sign, a bias. Because the filter ignores noisy errors, the
-part of such noise that passes the gate does not mislead it.
+q is the mean of both axes, and 1 for white noise of the variance R. Slow changes cancel in the difference: a target
+that turns, a slope of the wrong sign, a bias. Because the filter ignores noisy errors, the part of such noise that
+passes the gate does not mislead it. Source: von Neumann, Distribution of the ratio of the mean square successive
+difference to the variance, Annals of Mathematical Statistics 12 (1941) 367.
 """
 import numpy as np
 
