@@ -7,24 +7,24 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 
 LEVELLED_DECK_DTYPE = np.dtype([('mean', 'f8', (4,)), ('spread', 'f8'), ('since', 'f8'), ('latest', 'f8')], align=True)
-"""mean: quaternion (x, y, z, w) levelled deck -> earth; spread: mean square of the deck's tilt from it [rad2];
-since, latest: stamps [s] of the first and the last attitude in it, latest -inf before there is one."""
+"""mean: quaternion (x, y, z, w) levelled deck -> earth; spread: mean square of the deck's tilt from it [rad2].
+`since`, `latest`: stamps [s] of the first and the last attitude in the mean, latest -inf before the first."""
 
 
 def initialise(s):
-    """Ashore, and no attitude of a ship yet; s (n,) of LEVELLED_DECK_DTYPE."""
+    """Start ashore, before any attitude of a ship; s (n,) of LEVELLED_DECK_DTYPE."""
     s['mean'], s['latest'] = ASHORE_ATTITUDE, -math.inf
 
 
 @compiled
-def take(s, stamp, q, mean_time, anew):
-    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s]. anew: it begins with this
+def take(s, stamp, q, mean_time, restart):
+    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s]; restart: begin with this
     one.
 
-    A ship whose mean is not known yet is taken to be level.
+    A ship whose mean is not known yet is assumed to be level.
     """
     mean = s.mean
-    if anew or not s.latest > -math.inf:
+    if restart or not s.latest > -math.inf:
         s.since = stamp
         heading = math.hypot(q[2], q[3])
         mean[0] = mean[1] = 0.0
