@@ -122,8 +122,7 @@ def _search(h, c, path, count, azimuth, travel):
     """Search the first `count` rows of a Path for a keyhole and hidden sectors; travel: of the azimuth after these
     rows.
 
-    A plan becomes final when its slew begins within `notice`; the forecast that no wrap of the azimuth fits is final
-    at once.
+    A plan becomes final when its slew begins within `notice`. If no wrap of the azimuth fits, this is forecast at once.
     """
     if count < 3:
         return

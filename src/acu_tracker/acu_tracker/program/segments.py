@@ -39,8 +39,8 @@ class Segments:
         if kept:
             if followed:
                 self._check_turnaround(kept[-1], new)
-            if new.times[0] - kept[-1].times[-1] <= MAX_GAP_INTERVALS * min(_last_interval(kept[-1]), new.times[1]
-                                                                            - new.times[0]):
+            interval = min(_last_interval(kept[-1]), new.times[1] - new.times[0])
+            if new.times[0] - kept[-1].times[-1] <= MAX_GAP_INTERVALS * interval:
                 last = kept.pop()
                 new = checked(np.append(last.times, new.times), np.vstack((last.angles, new.angles)))
         self._pieces = [*kept, new]
@@ -56,7 +56,8 @@ class Segments:
             rate = abs(math.remainder(way, 2.0 * math.pi) if i == 0 else way) / time
             acceleration = abs(rate_after - rate_before) / time
             if rate > max_rate:
-                raise TurnaroundError(f'turnaround too fast: {axis} {rate:g} rad/s; must be at most {max_rate:g} rad/s')
+                raise TurnaroundError(f'turnaround too fast: {axis} {rate:g} rad/s; must be at most '
+                                      f'{max_rate:g} rad/s')
             if acceleration > max_acceleration:
                 raise TurnaroundError(f'turnaround too fast: {axis} {acceleration:g} rad/s2; must be at most '
                                       f'{max_acceleration:g} rad/s2')
