@@ -1,5 +1,5 @@
-"""Estimation of the direction of the target and of its motion: the angle filters, the Cartesian filter, and their
-choice.
+"""Estimation of the direction of the target and of its motion:
+the angle filters, the Cartesian filter, and their choice.
 
 Symbols
     X = (x1 x2 x3)  estimate of one axis: angle, rate, acceleration                     [rad, rad/s, rad/s2]

@@ -17,8 +17,8 @@ DIVERGENCE_ERROR_COUNT = 100
 """Number of errors in the mean m. A filter without a fault reaches m = 1.25 in its worst half second."""
 
 MAX_COUNTED_ERROR = 12.5
-"""Largest contribution of one error to m [-]: half the default gate. This avoids an alarm after a few errors with
-interference."""
+"""Largest contribution of one error to m [-]: half the default gate.
+This avoids an alarm after a few errors with interference."""
 
 DIVERGENCE_LIMIT = 7.0
 """Largest m of a filter in touch with its target [-]. A filter without an acceleration state reaches 6.1 on a target
@@ -44,8 +44,8 @@ def take(s, innovation):
 
 @compiled
 def diverges(s, without_signal):
-    """Return True if the filter has diverged. without_signal: the filter coasts, and no known cause explains the loss.
-    """
+    """Return True if the filter has diverged. without_signal:
+    the filter coasts, and no known cause explains the loss."""
     return s.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
 
 

@@ -1,5 +1,5 @@
-"""Detection of a receiver that repeats its message while the beam moves: real errors have noise, and change with the
-beam."""
+"""Detection of a receiver that repeats its message while the beam moves:
+real errors have noise, and change with the beam."""
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -13,8 +13,8 @@ REPETITION_TRAVEL_RAD = 3e-3
 
 @compiled
 def take(s, u, at):
-    """Take an error of signals.INPUTS that was measured at a Pointing of the beam; return True if it is a repetition.
-    """
+    """Take an error of signals.INPUTS that was measured at a Pointing of the beam;
+    return True if it is a repetition."""
     if u.cross_elevation != s.message[0] or u.elevation != s.message[1] or u.cn0_dbhz != s.message[2]:
         s.message[0], s.message[1], s.message[2] = u.cross_elevation, u.elevation, u.cn0_dbhz
         s.at[0], s.at[1] = at.A, at.E

@@ -18,8 +18,8 @@ ROUGHNESS_ERROR_COUNT = 10
 """Number of errors in the mean q."""
 
 MAX_COUNTED_DIFFERENCE = 100.0
-"""Largest contribution of one difference to q [-]. Because one outlier makes two differences, this leaves it to the
-gate."""
+"""Largest contribution of one difference to q [-]. Because one outlier makes two differences,
+this leaves it to the gate."""
 
 
 @compiled

@@ -1,17 +1,17 @@
 """Detection of receiver errors with the wrong sign, by the smoothness of the target's direction with either sign.
 
-Beam b and error e are measured. The target is at z+ = b + e if the slope is right, and at z- = b - e if it is
-reversed. A straight line is fitted to the last values of each; its squared innovations over the variance R of e are
-averaged:
+Beam b and error e are measured. The target is at z+ = b + e if the slope is right, and at z- = b - e if it
+is reversed. A straight line is fitted to the last values of each; its squared innovations over the
+variance R of e are averaged:
 
     J+ = mean of (nu_b + nu_e)^2 / R,    J- = mean of (nu_b - nu_e)^2 / R
 
-Right slope: the beam is H z+, H the closed loop of type II, so that z- = (2 H - 1) z+. Except while H lags, z- is at
-least as rough as z+, however the target turns. Outliers and noise are in both alike. Reversed slope: the errors drive
-the beam away from a target that stays smooth in z-, while z+ moves away twice as fast. The comparison is a likelihood
-ratio of two hypotheses (Willsky, A survey of design methods for failure detection in dynamic systems, Automatica 12
-(1976) 601). Each axis of the receiver is judged by itself, in earth axes, because the deck's motion has no effect
-there.
+Right slope: the beam is H z+, H the closed loop of type II, so that z- = (2 H - 1) z+. Except while H lags, z- is
+at least as rough as z+, however the target turns. Outliers and noise are in both alike. Reversed slope: the
+errors drive the beam away from a target that stays smooth in z-, while z+ moves away twice as fast. The
+comparison is a likelihood ratio of two hypotheses (Willsky, A survey of design methods for failure detection in
+dynamic systems, Automatica 12 (1976) 601). Each axis of the receiver is judged by itself, in earth axes, because
+the deck's motion has no effect there.
 """
 import math
 from collections import namedtuple

@@ -74,8 +74,8 @@ def _measured_rates(g, moves, deck, u, at):
 def take(g, p, c, deck, u, at, measured, restart_gap):
     """Filter the receiver's error of INPUTS u.
 
-    Return (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY or OUTCOME_NO_ATTITUDE; the
-    Innovation).
+    Return (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE,
+    OUTCOME_NOISY or OUTCOME_NO_ATTITUDE; the Innovation).
 
     p, c: records of SharedParameters and of tracker.CONSTANTS_DTYPE; deck: record of ATTITUDE_DTYPE; at: Pointing of
     the antenna when the error was measured; restart_gap: as in tracker.observe. `measured`: deck angles (azimuth,

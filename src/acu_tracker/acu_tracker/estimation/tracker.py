@@ -27,8 +27,8 @@ OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY =
 
 
 def gate_of_one(gate):
-    """Return the gate of one degree of freedom that is exceeded as rarely as `gate` with two, e^(-gate/2); chi-square
-    [-].
+    """Return the gate of one degree of freedom that is exceeded as rarely as `gate` with two,
+    e^(-gate/2); chi-square [-].
 
     The tail at x is erfc(z) with z^2 = x/2, so that x - 2 log(e^z^2 erfc(z)) = gate; e^z^2 erfc(z) does not underflow.
     """
@@ -81,12 +81,12 @@ def move(t, c, motion):
 
 @compiled
 def _accepted_rate(t, p, c, i, rate, chi_square):
-    """Return the rate [rad/s] measured on axis i if it is accepted, else NaN; chi_square: of the rate, given the
-    angle.
+    """Return the rate [rad/s] measured on axis i if it is accepted, else NaN;
+    chi_square: of the rate, given the angle.
 
-    Only a rate estimated from angles alone can show that a measured rate is wrong. Therefore rates are used after
-    lock_count consecutive rates agreed with it. This avoids that a stuck or biased sensor misleads a filter that has
-    just started.
+    Only a rate estimated from angles alone can show that a measured rate is wrong. Therefore rates are used
+    after lock_count consecutive rates agreed with it. This avoids that a stuck or biased sensor misleads a
+    filter that has just started.
     """
     if math.isnan(chi_square):
         return math.nan
@@ -178,8 +178,8 @@ def locked(t, p, since_accepted):
 
 @compiled
 def outlook(t, c, stamp):
-    """Return the predicted Motion at a stamp [s]; before the last accepted measurement, the Motion at that
-    measurement."""
+    """Return the predicted Motion at a stamp [s]; before the last accepted measurement,
+    the Motion at that measurement."""
     return target_filter.outlook(t.filter, c.filter, max(stamp - t.stamp, 0.0))
 
 

@@ -1,5 +1,5 @@
-"""The attitude of the deck: the last measurements of the INS, interpolated or extrapolated to any instant near them.
-"""
+"""The attitude of the deck: the last measurements of the INS,
+interpolated or extrapolated to any instant near them."""
 import math
 
 import numpy as np
@@ -53,15 +53,15 @@ def smoothed_acceleration(before, w, w_before, T, tau):
 
 @compiled
 def rotation_angle(w, dw, T):
-    """Return the angle [rad] by which the deck rotates in T [s] at a rate w [rad/s] with its derivative dw [rad/s2].
-    """
+    """Return the angle [rad] by which the deck rotates in T [s] at a rate w [rad/s] with its
+    derivative dw [rad/s2]."""
     return T * w + 0.5 * T * T * dw
 
 
 @compiled
 def rotated(q, r):
-    """Return the quaternion (x, y, z, w) of a deck of attitude q (4,) after the rotation vector r [rad] (FLU): q (x)
-    exp(r/2)."""
+    """Return the quaternion (x, y, z, w) of a deck of attitude q (4,) after the rotation vector r [rad]
+    (FLU): q (x) exp(r/2)."""
     rx, ry, rz = r
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
@@ -70,8 +70,8 @@ def rotated(q, r):
 
 @compiled
 def _repeats(s, q, w):
-    """Keep a sample of the INS; return True if it equals the previous sample although its rates show a turning deck.
-    """
+    """Keep a sample of the INS; return True if it equals the previous sample although its
+    rates show a turning deck."""
     same, turns = True, False
     for i in range(7):
         x = q[i] if i < 4 else w[i - 4]
@@ -160,8 +160,8 @@ def at(s, p, t):
 
 @compiled
 def on_deck(s, p, t, motion):
-    """Return the Motion on the deck at t [s] of a Motion in earth angles; ashore, or without an attitude, the same
-    Motion."""
+    """Return the Motion on the deck at t [s] of a Motion in earth angles;
+    ashore, or without an attitude, the same Motion."""
     known, deck = at(s, p, t)
     if s.stabilised and known:
         return angles(deck_reference.on_deck(deck, line_of_sight(motion)))

@@ -1,5 +1,5 @@
-"""A commanded direction, from an operator, a program or another antenna, extrapolated by its rates for a limited time.
-"""
+"""A commanded direction, from an operator, a program or another antenna,
+extrapolated by its rates for a limited time."""
 import math
 
 import numpy as np
@@ -40,6 +40,6 @@ def motion_at(d, t):
     """Return the Motion of the direction at t [s]."""
     since = t - d.stamp if math.isfinite(d.stamp) else 0.0
     moved = min(max(since, 0.0), d.moves)
-    goes = 1.0 if since < d.moves else 0.0
-    return Motion(AxisMotion(d.angle[0] + d.rate[0] * moved, d.rate[0] * goes, 0.0),
-                  AxisMotion(d.angle[1] + d.rate[1] * moved, d.rate[1] * goes, 0.0))
+    moving = 1.0 if since < d.moves else 0.0
+    return Motion(AxisMotion(d.angle[0] + d.rate[0] * moved, d.rate[0] * moving, 0.0),
+                  AxisMotion(d.angle[1] + d.rate[1] * moved, d.rate[1] * moving, 0.0))

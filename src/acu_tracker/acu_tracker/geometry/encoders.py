@@ -14,8 +14,8 @@ Pointing = namedtuple('Pointing', 'A E dA dE')
 
 @compiled
 def take(s, stamp, position, velocity):
-    """Take angles (2,) [rad] and rates (2,) [rad/s] of a step into the history; return False if they are not finite.
-    """
+    """Take angles (2,) [rad] and rates (2,) [rad/s] of a step into the history;
+    return False if they are not finite."""
     valid = math.isfinite(position[0] + position[1] + velocity[0] + velocity[1])
     if valid:
         row = push(s, stamp)

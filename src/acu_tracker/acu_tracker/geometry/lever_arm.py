@@ -59,8 +59,8 @@ def to_ins(s, u, du):
 
 @compiled
 def earth_angles_to_antenna(s, mat_ed, motion):
-    """Return the Motion in earth angles at the antenna of a Motion at the INS; mat_ed: Rotation deck -> earth; the
-    rates stay."""
+    """Return the Motion in earth angles at the antenna of a Motion at the INS;
+    mat_ed: Rotation deck -> earth; the rates stay."""
     A, E = motion.azimuth.angle, motion.elevation.angle
     e, n, u = earth_direction(A, E)
     r = rotated(mat_ed, vector(s.arm))

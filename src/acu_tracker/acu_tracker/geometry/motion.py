@@ -64,8 +64,8 @@ def earth_angles(sight):
 
 @compiled
 def normalised(v, dv, ddv):
-    """Return the LineOfSight along a vector v of any length, with its derivatives: n = v / |v|, n' = (v' - n (n.v')) /
-    |v|."""
+    """Return the LineOfSight along a vector v of any length, with its derivatives:
+    n = v / |v|, n' = (v' - n (n.v')) / |v|."""
     k = 1.0 / math.sqrt(dot(v, v))
     n, dv, ddv = times(k, v), times(k, dv), times(k, ddv)
     along = dot(n, dv)
@@ -77,8 +77,8 @@ def normalised(v, dv, ddv):
 
 @compiled
 def motion_of_position(p, v, a):
-    """Return the Motion in earth angles of an ENU position p [m], its velocity v and acceleration a, seen from the
-    origin."""
+    """Return the Motion in earth angles of an ENU position p [m],
+    its velocity v and acceleration a, seen from the origin."""
     r = math.sqrt(dot(p, p))
     u = Vector(p.x / r, p.y / r, p.z / r)
     dr = dot(u, v)

@@ -19,8 +19,8 @@ SLEW_LIMITS_DTYPE = np.dtype([('rate', 'f8'), ('acceleration', 'f8'), ('low', 'f
 half_beam: half the beamwidth [rad]."""
 
 SLEW_CANDIDATE_COUNT, REFINEMENT_COUNT, SLEW_SAMPLE_COUNT, BISECTION_COUNT = 48, 4, 160, 24
-"""Numbers of candidates for t1, of refinements of t1, of samples in which a slew is evaluated, of bisections for t2.
-"""
+"""Numbers of candidates for t1, of refinements of t1, of samples in which a slew is
+evaluated, of bisections for t2."""
 
 PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP, PLAN_BEYOND_PATH = range(4)
 """Outcomes of `plan`: no keyhole, a slew planned, no azimuth wrap that fits, a keyhole that ends beyond the path."""

@@ -18,8 +18,8 @@ def initialise(s):
 
 @compiled
 def take(s, stamp, q, mean_time, restart):
-    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s]; restart: begin with this
-    one.
+    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s];
+    restart: begin with this one.
 
     A ship whose mean is not known yet is assumed to be level.
     """

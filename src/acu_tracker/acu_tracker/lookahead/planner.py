@@ -67,8 +67,8 @@ def clear_plan(h):
 
 @compiled
 def another_program(h, program):
-    """Return True if the program differs from that of the previous call, in its number of rows, its first or its last
-    row."""
+    """Return True if the program differs from that of the previous call, in its number of rows,
+    its first or its last row."""
     last = len(program.times) - 1
     same = h.program[0] == last
     h.program[0] = last
@@ -82,15 +82,15 @@ def another_program(h, program):
 
 @compiled
 def due(h, t):
-    """Return True if a look-ahead is due at t [s]: LOOK_AHEAD_PERIOD_S after the last one, and after the end of a
-    slew."""
+    """Return True if a look-ahead is due at t [s]: LOOK_AHEAD_PERIOD_S after the last one,
+    and after the end of a slew."""
     return not (t - h.looked < LOOK_AHEAD_PERIOD_S or (h.forecast == FORECAST_KEYHOLE and t <= h.slew.t2))
 
 
 @compiled
 def look_along_program(h, c, t, azimuth, way):
-    """Search a bridge.Way for a keyhole and hidden sectors from t [s] on; azimuth: of the axis at t, on the deck
-    [rad]."""
+    """Search a bridge.Way for a keyhole and hidden sectors from t [s] on;
+    azimuth: of the axis at t, on the deck [rad]."""
     path, program = _begin(h, c, t), way.program
     count = paths.along_program(path, h.next_level, way)
     travel = Travel(0.0, 0.0)
@@ -119,10 +119,10 @@ def _begin(h, c, t):
 
 @compiled
 def _search(h, c, path, count, azimuth, travel):
-    """Search the first `count` rows of a Path for a keyhole and hidden sectors; travel: of the azimuth after these
-    rows.
+    """Search the first `count` rows of a Path for a keyhole and hidden sectors;
+    travel: of the azimuth after these rows.
 
-    A plan becomes final when its slew begins within `notice`. If no wrap of the azimuth fits, this is forecast at once.
+    A plan becomes final when its slew begins within `notice`. If no wrap of the azimuth fits, that is forecast now.
     """
     if count < 3:
         return

@@ -49,8 +49,8 @@ def true_deck_share(slew, t):
 
 @compiled
 def best_elevation(azimuth, sight):
-    """Return the AxisMotion of the elevation at which a beam at an azimuth (AxisMotion) is closest to a LineOfSight in
-    FLU.
+    """Return the AxisMotion of the elevation at which a beam at an azimuth (AxisMotion) is closest
+    to a LineOfSight in FLU.
 
     An elevation beyond pi/2 is past the zenith. E = atan2(z, b), where b = x cos a - y sin a is the part of the
     direction along the beam's azimuth.

@@ -15,8 +15,8 @@ from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
 
 BRIDGE_DTYPE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], align=True)
-"""axis: of the rotation, ENU, with the sine of its angle as its length; cos: cosine of the angle; valid: 0 without a
-rotation."""
+"""axis: of the rotation, ENU, with the sine of its angle as its length; cos: cosine of the angle;
+valid: 0 without a rotation."""
 
 Way = namedtuple('Way', 'program valid axis cos')
 """A ProgramTrack, rotated if valid; fields as of BRIDGE_DTYPE."""
@@ -27,8 +27,8 @@ MIN_PROGRAM_COSINE = math.cos(math.radians(3.0))
 
 @compiled
 def begin(b, program, t, u):
-    """Find the rotation that puts the program at the ENU unit vector u at t [s]; not valid beyond MIN_PROGRAM_COSINE.
-    """
+    """Find the rotation that puts the program at the ENU unit vector u at t [s];
+    not valid beyond MIN_PROGRAM_COSINE."""
     b.valid = 0
     if program_track.status(program, t) == Reason.NONE:
         v = program_track.direction(program, t)

@@ -73,8 +73,8 @@ class Predicted(typing.NamedTuple):
 
 
 class Predictor:
-    """Predictions by PredictionParameters, for stamps counted from `epoch` [ns of UTC]; epoch 0: the UTC of stamps is
-    unknown."""
+    """Predictions by PredictionParameters, for stamps counted from `epoch` [ns of UTC];
+    epoch 0: the UTC of stamps is unknown."""
 
     def __init__(self, parameters, epoch=0):
         self.parameters, self.epoch = parameters, epoch
@@ -110,8 +110,8 @@ class Predictor:
         return _table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
     def diagnostic_values(self, stamp):
-        """Return [(key, text)] at a stamp [s]: azimuth and elevation of the sun, if UTC is known, and the elements, if
-        any."""
+        """Return [(key, text)] at a stamp [s]: azimuth and elevation of the sun, if UTC is known,
+        and the elements, if any."""
         sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._known else ()
         lines = ('line_1', 'line_2') if self._satellite is not None else ()
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),

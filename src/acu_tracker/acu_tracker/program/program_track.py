@@ -19,8 +19,8 @@ STEEP_ELEVATION_RAD = math.radians(80.0)
 
 
 class ProgramTrack(typing.NamedTuple):
-    """times (n,) [s], increasing; angles (n, 2) [rad]: azimuth and elevation in the earth's frame. n = 0: no program.
-    """
+    """times (n,) [s], increasing; angles (n, 2) [rad]: azimuth and elevation in the earth's
+    frame. n = 0: no program."""
     times: np.ndarray
     angles: np.ndarray
 
@@ -33,8 +33,8 @@ class ProgramTrackError(ValueError):
 
 
 def checked(times, angles):
-    """Return the ProgramTrack of times (n,) [s] and angles (n, 2) [rad azimuth, elevation]. Raises ProgramTrackError.
-    """
+    """Return the ProgramTrack of times (n,) [s] and angles (n, 2) [rad azimuth, elevation].
+    Raises ProgramTrackError."""
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
         raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
@@ -85,8 +85,8 @@ def _slope(program, i, axis):
 
 @compiled
 def _hermite(y0, d, m0, m1, x, T):
-    """Return the AxisMotion at the fraction x of an interval of T [s], from y0 to y0 + d with slopes m0 / T and m1 / T
-    at its ends."""
+    """Return the AxisMotion at the fraction x of an interval of T [s],
+    from y0 to y0 + d with slopes m0 / T and m1 / T at its ends."""
     c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
     return AxisMotion(y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
                       (2.0 * c2 + 6.0 * x * c3) / (T * T))

@@ -46,14 +46,14 @@ class Segments:
         self._pieces = [*kept, new]
 
     def _check_turnaround(self, before, after):
-        """Raise TurnaroundError if the axes would exceed their rate or acceleration on their way from one segment to
-        the next, on average over that time."""
+        """Raise TurnaroundError if the axes would exceed their rate or acceleration,
+        on average between one segment and the next."""
         time = after.times[0] - before.times[-1]
         for i, axis in enumerate(AXES):
             max_rate, max_acceleration = self._limits[i]
             rate_before, rate_after = _rate(before, -2, i), _rate(after, 0, i)
-            way = after.angles[0, i] - before.angles[-1, i]
-            rate = abs(math.remainder(way, 2.0 * math.pi) if i == 0 else way) / time
+            distance = after.angles[0, i] - before.angles[-1, i]
+            rate = abs(math.remainder(distance, 2.0 * math.pi) if i == 0 else distance) / time
             acceleration = abs(rate_after - rate_before) / time
             if rate > max_rate:
                 raise TurnaroundError(f'turnaround too fast: {axis} {rate:g} rad/s; must be at most '
@@ -63,8 +63,8 @@ class Segments:
                                       f'{max_acceleration:g} rad/s2')
 
     def at(self, t):
-        """Return (the piece to follow at t [s], whether rows are missing at t, stamp [s] at which another piece
-        follows).
+        """Return (the piece to follow at t [s], whether rows are missing at t,
+        stamp [s] at which another piece follows).
 
         The piece is the first that has not ended, or the last.
         """
@@ -76,8 +76,8 @@ class Segments:
 
 
 def _rows(piece, begin, end):
-    """Return the rows of a piece from three before `begin` [s], but at least its last three, to `end` [s] (exclusive).
-    """
+    """Return the rows of a piece from three before `begin` [s], but at least its last three,
+    to `end` [s] (exclusive)."""
     first = max(min(int(np.searchsorted(piece.times, begin)), len(piece.times)) - 3, 0)
     last = int(np.searchsorted(piece.times, end))
     return ProgramTrack(piece.times[first:last], piece.angles[first:last])
@@ -88,6 +88,7 @@ def _last_interval(piece):
 
 
 def _rate(piece, row, i):
-    """Rate [rad/s] of axis i between a row of a piece and the next."""
-    way = piece.angles[row + 1, i] - piece.angles[row, i]
-    return (math.remainder(way, 2.0 * math.pi) if i == 0 else way) / (piece.times[row + 1] - piece.times[row])
+    """Return the rate [rad/s] of axis i between a row of a piece and the next."""
+    distance = piece.angles[row + 1, i] - piece.angles[row, i]
+    distance = math.remainder(distance, 2.0 * math.pi) if i == 0 else distance
+    return distance / (piece.times[row + 1] - piece.times[row])

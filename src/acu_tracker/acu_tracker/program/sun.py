@@ -6,8 +6,8 @@
     epsilon    obliquity of the ecliptic
     R          distance [AU]
 
-The Astronomical Almanac (US Naval Observatory, HM Nautical Almanac Office), section C, "Low precision formulas for the
-Sun".
+The Astronomical Almanac (US Naval Observatory, HM Nautical Almanac Office), section C,
+"Low precision formulas for the Sun".
 """
 import numpy as np
 

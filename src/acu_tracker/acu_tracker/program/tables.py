@@ -21,8 +21,8 @@ TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.
 
 
 def shifted(track, offset):
-    """Return a ProgramTrack with an offset (time [s], azimuth, elevation [rad]); elevations are limited to the zenith.
-    """
+    """Return a ProgramTrack with an offset (time [s], azimuth, elevation [rad]);
+    elevations are limited to the zenith."""
     if not any(offset):
         return track
     time, *angles = offset

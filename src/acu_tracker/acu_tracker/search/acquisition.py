@@ -45,8 +45,8 @@ MAX_RISE_TIME_S = 1.0
 """Longest time for which a level may keep rising [s]."""
 
 CIRCLE_RADIUS_BEAMWIDTHS, CIRCLE_PERIOD_S, CIRCLE_TURN_COUNT = 0.1, 0.5, 2.0
-"""Circle of the slope check: radius [beamwidths], time of a turn [s], number of turns; the circle opens in the first.
-"""
+"""Circle of the slope check: radius [beamwidths], time of a turn [s], number of turns;
+the circle opens in the first."""
 
 MIN_CHECK_ERROR_COUNT = 50
 """Least number of errors in a slope check."""
@@ -141,8 +141,8 @@ def waiting(s, p, t):
 
 @compiled
 def note_peak(s, offset):
-    """Keep the offset (x, e) [rad] if the level is the highest so far; offset: of the beam when the receiver measured
-    it."""
+    """Keep the offset (x, e) [rad] if the level is the highest so far;
+    offset: of the beam when the receiver measured it."""
     if s.level.z > s.peak:
         s.peak = s.level.z
         s.centre[0], s.centre[1] = offset
@@ -216,9 +216,9 @@ def _go_to_peak(s, beamwidth, t):
     """After the steps to either side, go to the peak, and check the slopes there unless it was far."""
     far = False
     for i in range(2):
-        way = step_track.peak(s.levels[1 + 2 * i], s.levels[2 + 2 * i], PEAK_STEP_BEAMWIDTHS * beamwidth, beamwidth)
-        far |= abs(way) > PEAK_STEP_BEAMWIDTHS * beamwidth
-        s.centre[i] += min(max(way, -MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth), MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth)
+        move = step_track.peak(s.levels[1 + 2 * i], s.levels[2 + 2 * i], PEAK_STEP_BEAMWIDTHS * beamwidth, beamwidth)
+        far |= abs(move) > PEAK_STEP_BEAMWIDTHS * beamwidth
+        s.centre[i] += min(max(move, -MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth), MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth)
     if far and s.peaks < MAX_PEAK_COUNT:
         _peak(s, t)
     else:

@@ -6,8 +6,8 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def sigma(azimuth_variance, elevation_variance, elevation):
-    """Return the larger standard deviation [rad] of the two across the line of sight; variances [rad2] of the angles.
-    """
+    """Return the larger standard deviation [rad] of the two across the line of sight;
+    variances [rad2] of the angles."""
     c = math.cos(elevation)
     return math.sqrt(max(azimuth_variance * c * c, elevation_variance))
 

@@ -27,9 +27,9 @@ SPEED_RISE_TIME_S = 0.2
 """Time in which the beam reaches its speed, and in which it stops [s]."""
 
 Area = namedtuple('Area', 'pattern radius across pitch speed')
-"""Area and pattern of a search. pattern: its code; radius: half length along the track, across: half width [rad]
-(raster and sector; the others use the radius both ways). `pitch`: distance between neighbouring lines [rad]; speed
-[rad/s]."""
+"""Area and pattern of a search. pattern: its code; radius: half length along the track, across: half width
+[rad] (raster and sector; the others use the radius both ways). `pitch`: distance between neighbouring
+lines [rad]; speed [rad/s]."""
 
 Point = namedtuple('Point', 'x y dx dy')
 """Offset [rad] along x and y, and its rate [rad/s]."""
@@ -85,8 +85,8 @@ def point(area, t):
 
 @compiled
 def _turn_of(area):
-    """Return the angle [rad] at which the spiral has reached the radius, and half a pitch more, so that all of its
-    edge is seen."""
+    """Return the angle [rad] at which the spiral has reached the radius, and half a pitch more,
+    so that all of its edge is seen."""
     return 2.0 * math.pi * (area.radius / area.pitch + 0.5)
 
 
@@ -99,8 +99,8 @@ def spiral_length(theta, pitch):
 
 @compiled
 def _on_spiral(area, t):
-    """Return the Point of the spiral: the length is v t after the rise, and Newton's method finds the angle of this
-    length."""
+    """Return the Point of the spiral: the length is v t after the rise,
+    and Newton's method finds the angle of this length."""
     v, k, end = area.speed, 0.5 * area.pitch / math.pi, _turn_of(area)
     length, rate = v * (t - 0.5 * SPEED_RISE_TIME_S), v
     if t < SPEED_RISE_TIME_S:
@@ -172,11 +172,11 @@ def _on_leg(area, i, t):
     L, T, a = _leg_length(area, i), _leg_time(area, i), area.speed / SPEED_RISE_TIME_S
     rise = min(SPEED_RISE_TIME_S, 0.5 * T)
     if t < rise:
-        way, rate = 0.5 * a * t * t, a * t
+        distance, rate = 0.5 * a * t * t, a * t
     elif T - t < rise:
-        way, rate = L - 0.5 * a * (T - t) * (T - t), a * (T - t)
+        distance, rate = L - 0.5 * a * (T - t) * (T - t), a * (T - t)
     else:
-        way, rate = a * rise * (t - 0.5 * rise), a * rise
-    part, speed = (way / L, rate / L) if L > 0.0 else (1.0, 0.0)
+        distance, rate = a * rise * (t - 0.5 * rise), a * rise
+    part, speed = (distance / L, rate / L) if L > 0.0 else (1.0, 0.0)
     dx, dy = x1 - x0, y1 - y0
     return Point(x0 + part * dx, y0 + part * dy, speed * dx, speed * dy)

@@ -49,8 +49,8 @@ def motion_at(s, t):
 
 @compiled
 def track(motion):
-    """Return the direction [rad] in which a target with this Motion moves, from cross-elevation towards elevation; 0
-    at rest."""
+    """Return the direction [rad] in which a target with this Motion moves,
+    from cross-elevation towards elevation; 0 at rest."""
     return math.atan2(motion.elevation.rate, motion.azimuth.rate * math.cos(motion.elevation.angle))
 
 

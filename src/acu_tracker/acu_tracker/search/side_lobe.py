@@ -1,9 +1,9 @@
 """Detection of a signal in a side lobe of the beam, and search of the main lobe.
 
-The first side lobe of a dish is 18 to 25 dB down at 1.5 to 2 b. It has a false null of the difference channels, which
-an antenna can track all day (anchors.md section 5). It is detected by a level that range and gain do not explain. If
-these are unknown, the beam looks around at six places 1.2 b off; seen from the side lobe one of them is within the
-main lobe.
+The first side lobe of a dish is 18 to 25 dB down at 1.5 to 2 b. It has a false null of the difference channels,
+which an antenna can track all day (anchors.md section 5). It is detected by a level that range and gain do not
+explain. If these are unknown, the beam looks around at six places 1.2 b off; seen from the side lobe one of them
+is within the main lobe.
 """
 import math
 

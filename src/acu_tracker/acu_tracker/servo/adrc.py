@@ -51,7 +51,7 @@ def observed(z, y, u, v3, w_o, w_s, h):
 
 @compiled
 def rate(z, v1, v2, v2_m, w_c, w_s):
-    """Return the rate command [rad/s] from z (3,) towards v1 [rad], v2 [rad/s] at t_k; v2_m [rad/s] at t_m is fed
-    forward."""
+    """Return the rate command [rad/s] from z (3,) towards v1 [rad], v2 [rad/s] at t_k;
+    v2_m [rad/s] at t_m is fed forward."""
     u0 = w_c * w_c * (v1 - z[0]) + 2.0 * w_c * (v2 - z[1])
     return v2_m + (z[1] - v2) + (u0 - z[2]) / w_s

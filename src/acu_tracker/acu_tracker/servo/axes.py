@@ -16,8 +16,8 @@ def now(axis):
 
 @compiled
 def start_from_actual(axis, c, u, immobile, begins, silence):
-    """Set targets := actual: of both axes if the loop begins, and in every step of an axis that cannot follow its
-    commands.
+    """Set targets := actual: of both axes if the loop begins,
+    and in every step of an axis that cannot follow its commands.
 
     This avoids that the reference of such an axis runs ahead, so that the axis catches up at once when it can follow
     again. Arguments: immobile, whether each axis cannot follow commands; silence, whether the last command is too old

@@ -22,8 +22,8 @@ def braking_distance(v, a, t):
 
 @compiled
 def stopping_rate(d, a, t):
-    """Return the largest rate [rad/s] towards a limit d [rad] ahead from which an axis stops before it; 0 behind it.
-    """
+    """Return the largest rate [rad/s] towards a limit d [rad] ahead from which an axis stops
+    before it; 0 behind it."""
     if d <= 0.0:
         return 0.0
     return math.sqrt(a * t * (a * t) + 2.0 * a * d) - a * t
@@ -31,15 +31,15 @@ def stopping_rate(d, a, t):
 
 @compiled
 def inside(u, y, ends, a, t):
-    """Return a rate command u [rad/s] limited so that an axis at y [rad] stops between its Ends; outside it only leads
-    back."""
+    """Return a rate command u [rad/s] limited so that an axis at y [rad] stops between its Ends;
+    outside it only leads back."""
     return min(max(u, -stopping_rate(y - ends.low, a, t)), stopping_rate(ends.high - y, a, t))
 
 
 @compiled
 def time_to(y, dy, ends):
-    """Return the time [s] until an axis at y [rad] is at a limit if it keeps its rate dy [rad/s]; 0 behind it, inf:
-    never."""
+    """Return the time [s] until an axis at y [rad] is at a limit if it keeps its rate dy [rad/s];
+    0 behind it, inf: never."""
     if y > ends.high or y < ends.low:
         return 0.0
     if dy > 0.0:

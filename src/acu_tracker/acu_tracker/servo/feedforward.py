@@ -17,22 +17,22 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def fed(v, a, k_v, k_a):
-    """Return the rate [rad/s] fed forward of a reference rate v [rad/s] and acceleration a [rad/s2]; k_v [-], k_a [s].
-    """
+    """Return the rate [rad/s] fed forward of a reference rate v [rad/s] and acceleration a
+    [rad/s2]; k_v [-], k_a [s]."""
     return k_v * v + k_a * a
 
 
 @compiled
 def rate(e, integral, fed_forward, K_p):
-    """Return the rate command [rad/s] of an error e [rad], its integral and the rate fed forward [rad/s]; K_p [1/s].
-    """
+    """Return the rate command [rad/s] of an error e [rad],
+    its integral and the rate fed forward [rad/s]; K_p [1/s]."""
     return fed_forward + K_p * e + integral
 
 
 @compiled
 def torque(v, a, c):
-    """Return the load torque [Nm] = J a + Tc tanh(v / v_s) of a reference of rate v [rad/s] and acceleration a
-    [rad/s2].
+    """Return the load torque [Nm] = J a + Tc tanh(v / v_s) of a reference of rate v [rad/s] and
+    acceleration a [rad/s2].
 
     c: record of FeedforwardParameters.
     """

@@ -57,8 +57,8 @@ def at(text, A):
 
 
 def table(text) -> np.ndarray:
-    """Return the FLOOR_DTYPE (1,) of a text as in FLOOR_DOC: in each cell the highest of its ends and of the points in
-    it."""
+    """Return the FLOOR_DTYPE (1,) of a text as in FLOOR_DOC: in each cell the highest of its ends
+    and of the points in it."""
     A, f = points(text)
     floor = np.zeros(1, FLOOR_DTYPE)
     if A:
@@ -112,8 +112,8 @@ def of_azimuth(floor, limits, A, E):
 
 @compiled
 def of_elevation(floor, limits, A, ahead, target):
-    """Return the Ends of the elevation at azimuth A: above the floor from A to the azimuth's stop, `ahead`, and to its
-    target [rad]."""
+    """Return the Ends of the elevation at azimuth A: above the floor from A to the azimuth's stop, `ahead`,
+    and to its target [rad]."""
     if not floor.given:
         return Ends(limits.low, limits.high)
     top = max(highest(floor, A, ahead), highest(floor, A, target)) + FLOOR_CLEARANCE_RAD

@@ -11,13 +11,13 @@ import numpy as np
 from pedestal_common.compiled import compiled
 
 FROZEN_DTYPE = np.dtype([('last', 'f8', (6,)), ('since', 'f8'), ('travel', 'f8', (2,)), ('frozen', 'i8')], align=True)
-"""last: angles [rad], rates [rad/s] and torques [Nm] of the step before; travel: x of azimuth and elevation [rad].
-`since`: stamp from which a travel is beyond FROZEN_TEST_TRAVEL_RAD [s]; frozen: 1 after this lasted too long, until
-its reset."""
+"""last: angles [rad], rates [rad/s] and torques [Nm] of the step before; travel: x of azimuth and elevation
+[rad]. `since`: stamp from which a travel is beyond FROZEN_TEST_TRAVEL_RAD [s]; frozen: 1 after this lasted too
+long, until its reset."""
 
 FROZEN_TEST_TRAVEL_RAD = 3e-3
-"""Travel [rad] within which a measurement must change: ten times the lash of a gear, a sixth of a beamwidth of a
-degree."""
+"""Travel [rad] within which a measurement must change: ten times the lash of a gear,
+a sixth of a beamwidth of a degree."""
 
 
 @compiled

@@ -1,7 +1,7 @@
 """Second-order notch in the feedback, against a structural resonance.
 
-N(s) = (s^2 + 2 depth width w s + w^2) / (s^2 + 2 width w s + w^2), `depth` at w and 1 far from it; bilinear, prewarped
-to w.
+N(s) = (s^2 + 2 depth width w s + w^2) / (s^2 + 2 width w s + w^2), `depth` at w and 1 far from it;
+bilinear, prewarped to w.
 """
 import math
 

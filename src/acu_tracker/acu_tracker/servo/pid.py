@@ -14,15 +14,15 @@ def gains(c):
 
 @compiled
 def integrated(integral, e, dt, K_p, K_i):
-    """Return the integral [rad/s] dt [s] later; without a K_i its value from a hand-over decays with the bandwidth
-    K_p."""
+    """Return the integral [rad/s] dt [s] later; without a K_i its value from a hand-over decays
+    with the bandwidth K_p."""
     return integral + dt * K_i * e if K_i > 0.0 else integral / (1.0 + dt * K_p)
 
 
 @compiled
 def derivative(D, e, e_before, dt, derivative_time):
-    """Return D, the rate of the error [rad/s] through a lag of derivative_time [s] (backward Euler), dt [s] after
-    e_before."""
+    """Return D, the rate of the error [rad/s] through a lag of derivative_time [s] (backward Euler),
+    dt [s] after e_before."""
     return (derivative_time * D + e - e_before) / (derivative_time + dt)
 
 

@@ -57,8 +57,8 @@ def slowed(params, delay):
 
 @compiled
 def limited(wanted, before, dt, rate, acceleration):
-    """Return (rate command [rad/s], rate limited, acceleration limited): within +-rate and a change of acceleration *
-    dt."""
+    """Return (rate command [rad/s], rate limited, acceleration limited):
+    within +-rate and a change of acceleration * dt."""
     u = min(max(wanted, -rate), rate)
     rate_limited = u != wanted
     step = acceleration * dt
@@ -106,8 +106,8 @@ def _initialise_feedback(axis, t_k, y, dy):
 
 @compiled
 def stop(axis, p, dt):
-    """Return the Command that brings the rate to zero within the acceleration limit, dt [s] after the last; reset the
-    integral."""
+    """Return the Command that brings the rate to zero within the acceleration limit,
+    dt [s] after the last; reset the integral."""
     axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, p.limits.rate, p.limits.acceleration)
     axis.integral = 0.0
     return Command(axis.command, 0.0, AxisMotion(axis.reference.angle, 0.0, 0.0), False, False, acceleration_limited)

@@ -1,5 +1,5 @@
-"""The shaped reference of one axis and its history: the encoder is compared with the reference planned for its
-instant.
+"""The shaped reference of one axis and its history: the encoder is compared with the reference
+planned for its instant.
 
 A controller of the raw target uses no reference. The reference then stays at the antenna's own angle and rate, so that
 another controller begins there.

@@ -79,10 +79,10 @@ def beyond(s, t):
 
 @compiled
 def command(s, i, rate, t, dt, hold):
-    """Take the command [rad/s] of axis i at t [s].
+    """Take the command [rad/s] of axis i at t [s]. hold: longest time for which a command stays in force [s].
 
-    hold [s]: longest time for which a command stays in force; dt [s]: time for which the drive had the previous
-    command. dt is at most a period, because a control unit that was late does not make the missed steps.
+    dt [s]: time for which the drive had the previous command. It is at most a period, because a control unit that was
+    late does not make the missed steps.
     """
     a = min(dt / ENVELOPE_TIME_CONSTANT_S, 1.0)
     if rate >= s.high[i]:

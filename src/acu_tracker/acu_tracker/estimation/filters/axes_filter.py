@@ -1,5 +1,5 @@
-"""The target filter of the angles: one `axis_filter` each for azimuth and elevation; f and c are their records (2,).
-"""
+"""The target filter of the angles: one `axis_filter` each for azimuth and elevation;
+f and c are their records (2,)."""
 import math
 
 from acu_tracker.estimation.filters import axis_filter

@@ -20,9 +20,9 @@ CONSTANTS_DTYPE = np.dtype([('count', 'i8'), ('bank', 'i8'),
                             ('models', motion_models.MOTION_MODEL_DTYPE, (BANK_SIZE,)), ('states', 'i8'),
                             ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'),
                             ('rate_measurement', 'i8'), ('colour', 'f8')], align=True)
-"""count: number of models in use, the first of `models`; bank: number that identifies their set; states: the most
-states of any of them. `alpha`: 0 except for constant gains; colour: bandwidth of the noise of the angle [rad/s], 0 for
-white noise."""
+"""count: number of models in use, the first of `models`; bank: number that identifies their set; states: the
+most states of any of them. `alpha`: 0 except for constant gains; colour: bandwidth of the noise of the angle
+[rad/s], 0 for white noise."""
 
 FILTER_DTYPE = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
                          ('x', 'f8', (BANK_SIZE, 3)), ('p', 'f8', (BANK_SIZE, 6)), ('mu', 'f8', (BANK_SIZE,)),
@@ -51,8 +51,8 @@ MODEL_NAMES, NaN if it is not in the bank.
 
 
 def constants(params, noise_bandwidth=0.0) -> np.ndarray:
-    """Return the constants (1,) of FilterParameters; noise_bandwidth [Hz]: of the noise of the measured angle, 0 for
-    white noise."""
+    """Return the constants (1,) of FilterParameters; noise_bandwidth [Hz]:
+    of the noise of the measured angle, 0 for white noise."""
     c, bank = np.zeros(1, CONSTANTS_DTYPE), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models

@@ -9,8 +9,8 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def benedict_bordner(alpha):
-    """Return beta of the alpha-beta filter with the best compromise of noise and ramp transient (Benedict, Bordner
-    1962)."""
+    """Return beta of the alpha-beta filter with the best compromise of noise and ramp transient
+    (Benedict, Bordner 1962)."""
     return alpha * alpha / (2.0 - alpha)
 
 

@@ -13,8 +13,8 @@ from pedestal_common.compiled import compiled, inlined
 
 @compiled
 def switching(T, dwell, count):
-    """Return (stay, switch): probabilities that a model still holds after T [s], and that a given other model has
-    replaced it.
+    """Return (stay, switch): probabilities that a model still holds after T [s],
+    and that a given other model has replaced it.
 
     A chain in continuous time leaves a model after `dwell` [s] on average, for each other model with equal
     probability: near exp(-T / dwell) for short T, 1 / count for long T.
@@ -65,8 +65,8 @@ def mean(weights, x, count):
 
 @inlined
 def combine(weights, x, p, count):
-    """Return the Gaussian with mean and covariance of the weighted models (eq. 10, 11); x (n, 3), p (n, 6) as in
-    Symmetric."""
+    """Return the Gaussian with mean and covariance of the weighted models (eq. 10, 11);
+    x (n, 3), p (n, 6) as in Symmetric."""
     x1, x2, x3 = mean(weights, x, count)
     p11 = p12 = p13 = p22 = p23 = p33 = 0.0
     for i in range(count):
@@ -82,8 +82,8 @@ def combine(weights, x, p, count):
 
 @compiled
 def weigh(mu_prior, log_likelihoods, count, mu):
-    """Set mu[j] to the probability of model j after the measurement (eq. 9), from the logarithms of its likelihoods.
-    """
+    """Set mu[j] to the probability of model j after the measurement (eq. 9),
+    from the logarithms of its likelihoods."""
     best = -math.inf
     for j in range(count):
         mu[j] = math.log(mu_prior[j]) + log_likelihoods[j]

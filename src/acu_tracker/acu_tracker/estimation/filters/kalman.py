@@ -1,9 +1,9 @@
-"""Kalman filter of three states (angle, rate, acceleration); the angle is measured, and the rate if a sensor measures
-it.
+"""Kalman filter of three states (angle, rate, acceleration);
+the angle is measured, and the rate if a sensor measures it.
 
-The covariance is kept as its upper triangle, symmetric by construction, and every product of 3 x 3 matrices is written
-out. Two measurements of one instant are taken one after the other, which is exact because their errors are
-independent.
+The covariance is kept as its upper triangle, symmetric by construction, and every product of 3 x 3 matrices
+is written out. Two measurements of one instant are taken one after the other, which is exact because their
+errors are independent.
 """
 import math
 from collections import namedtuple
@@ -59,8 +59,8 @@ def _corrected(x, k1, k2, k3, nu):
 
 @compiled
 def update(g, nu, R):
-    """Return the Gaussian after an innovation nu [rad] of the angle of variance R, H = [1 0 0] (paper 000, eq. 8, 9,
-    10).
+    """Return the Gaussian after an innovation nu [rad] of the angle of variance R,
+    H = [1 0 0] (paper 000, eq. 8, 9, 10).
 
     K = P H' / S; the measured row of P is P H' R / S, which is p1j - K1 p1j without the difference.
     """
@@ -86,8 +86,8 @@ def update_correlated(g, o, rho, nu, S):
 
 @compiled
 def update_rate(g, nu, R):
-    """Return the Gaussian after an innovation nu [rad/s] of the rate of variance R, H = [0 1 0] (paper 004, eq. 34).
-    """
+    """Return the Gaussian after an innovation nu [rad/s] of the rate of variance R,
+    H = [0 1 0] (paper 004, eq. 34)."""
     P, S = g.P, g.P.p22 + R
     k1, k2, k3 = P.p12 / S, P.p22 / S, P.p23 / S
     return Gaussian(_corrected(g.x, k1, k2, k3, nu),
@@ -113,6 +113,6 @@ def update_with_gain(g, nu, R, K):
 
 @compiled
 def log_likelihood(nu, S):
-    """Return the logarithm of the normal density of an innovation nu of variance S, less the constant -log(2 pi) / 2.
-    """
+    """Return the logarithm of the normal density of an innovation nu of variance S,
+    less the constant -log(2 pi) / 2."""
     return -0.5 * (nu * nu / S + math.log(S))

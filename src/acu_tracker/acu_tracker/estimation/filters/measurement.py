@@ -44,8 +44,8 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
 
 @compiled
 def attitude_variances(verticals, tilt, heading):
-    """Return the variances (across, along) of a direction that follow from the variances of the attitude, in their
-    unit.
+    """Return the variances (across, along) of a direction that follow from the variances of the
+    attitude, in their unit.
 
     tilt: about every horizontal axis; heading: about the vertical. A turn about one axis of the direction moves it
     along the other. verticals: of estimate_frame.

@@ -1,8 +1,8 @@
 """Motion models of a target: F and Q of one axis, X = (angle, rate, acceleration).
 
 In cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. A further model needs a row of
-MODEL_ROWS, a law that `discretised` selects, its group in params.py, and its name in topics.MOTION_MODELS, a column of
-acu/filter.
+MODEL_ROWS, a law that `discretised` selects, its group in params.py, and its name in topics.MOTION_MODELS,
+a column of acu/filter.
 
 Corrections to the print of paper 000: q22 has 1/(2 alpha^3); sigma_a^2 contains the square. For small x = alpha T the
 closed forms of Q lose all digits (q11 is a difference of terms of about 1 and of size x^5). Below MAX_SERIES_ARGUMENT
@@ -68,8 +68,8 @@ _TERMS = range(14)
 
 
 def _coefficients(first, count):
-    """Return c_k of the series sum c_k (-x)^k of one q: n! (n + 1) c_k = count(n), a sum of binomials, n = k + first.
-    """
+    """Return c_k of the series sum c_k (-x)^k of one q: n! (n + 1) c_k = count(n),
+    a sum of binomials, n = k + first."""
     return tuple(count(k + first) / (math.factorial(k + first) * (k + first + 1)) for k in _TERMS)
 
 
@@ -124,8 +124,8 @@ def fading_noise(alpha, T):
 
 @compiled
 def acceleration_variance(abar, a_max, floor):
-    """Return sigma_a^2 of the modified Rayleigh density about the mean acceleration abar (paper 000, eq. 5, with the
-    square).
+    """Return sigma_a^2 of the modified Rayleigh density about the mean acceleration abar (paper 000,
+    eq. 5, with the square).
 
     At abar = a_max it is zero, and the filter would ignore its measurements; therefore sigma_a >= floor a_max.
     Accelerations in rad/s2.
@@ -196,7 +196,7 @@ def discretised(m, abar, T):
 
 @compiled
 def initial_variance(m, rate_sigma):
-    """Return the variance of the acceleration [rad2/s4] at the start; rate_sigma: standard deviation of the rate
-    [rad/s]."""
+    """Return the variance of the acceleration [rad2/s4] at the start;
+    rate_sigma: standard deviation of the rate [rad/s]."""
     sigma = rate_sigma if math.isnan(m.initial_sigma) else m.initial_sigma
     return sigma * sigma

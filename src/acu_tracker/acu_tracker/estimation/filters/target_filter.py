@@ -1,5 +1,5 @@
-"""The target filter in use: the filters of the axes, or the Cartesian filter if the kind has it and a range is
-measured.
+"""The target filter in use: the filters of the axes, or the Cartesian filter if the kind has it
+and a range is measured.
 
 The Cartesian filter starts with the first range from the estimate of the axes' filters. It is used once its standard
 deviation of the rate is half of theirs. The axes' filters keep running beside it, and take over from its estimate when
@@ -70,8 +70,8 @@ def axes_azimuth(f):
 
 @compiled
 def innovation(f, c, m):
-    """Return the Innovation of a Measurement against the prediction; rate_chi_square is always that of the axis's
-    filter."""
+    """Return the Innovation of a Measurement against the prediction;
+    rate_chi_square is always that of the axis's filter."""
     axes = axes_filter.innovation(f.axis, c.axis, m)
     if not f.running:
         return axes
@@ -112,8 +112,8 @@ def expected(f):
 
 @compiled
 def outlook(f, c, T):
-    """Return the Motion T [s] >= 0 after the last measurement: `expected` after `predict`, which is omitted where
-    possible."""
+    """Return the Motion T [s] >= 0 after the last measurement:
+    `expected` after `predict`, which is omitted where possible."""
     if f.predicted == T or f.used[0] or f.used[1]:
         predict(f, c, T)
         return expected(f)
@@ -165,8 +165,8 @@ def select(f, c, m):
 
 @compiled
 def _use_cartesian(f, c):
-    """Use the Cartesian estimate for the axes of such a kind once its standard deviation of the rate is half of the
-    axis's."""
+    """Use the Cartesian estimate for the axes of such a kind once its standard deviation of the rate
+    is half of the axis's."""
     if (f.used[0] or not c.wanted[0]) and (f.used[1] or not c.wanted[1]):
         return
     predict(f, c, 0.0)

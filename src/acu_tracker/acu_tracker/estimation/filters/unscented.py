@@ -120,8 +120,8 @@ def _mixed(x, p, w, x_out, p_out):
 
 @compiled
 def _moved(x, p, m, T):
-    """Set x = F x and p = F p F' + Q of a model over T [s] in place; the motion is the same in the three directions.
-    """
+    """Set x = F x and p = F p F' + Q of a model over T [s] in place;
+    the motion is the same in the three directions."""
     model = motion_models.discretised(m, 0.0, T)
     (f13, f23, f33), Q = model.F, model.Q
     for i in range(3):
@@ -318,8 +318,8 @@ def expected(s):
 
 @compiled
 def _projected(p, g, h, v):
-    """Return the AxisVariances of two numbers linear in position and velocity: g x and h x + v dx, each a tuple (3,).
-    """
+    """Return the AxisVariances of two numbers linear in position and velocity:
+    g x and h x + v dx, each a tuple (3,)."""
     gg = gh = hh = 0.0
     for a in range(3):
         for b in range(3):
