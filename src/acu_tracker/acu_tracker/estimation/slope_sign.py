@@ -110,7 +110,7 @@ def take(s, t, beam, error, variance, gap):
         _begin(s, beam.u, error)
         return False
     n = s.n = min(s.n + 1, LINE_ERROR_COUNT)
-    # Gains of the least squares of n points; of the last n, as they fade, from LINE_ERROR_COUNT on.
+    # Gains of a least-squares fit to n points; from LINE_ERROR_COUNT points on, old points fade.
     alpha, beta = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1))
     nu = Vector(_innovation(s, 0, beam.u.x, T, alpha, beta), _innovation(s, 1, beam.u.y, T, alpha, beta),
                 _innovation(s, 2, beam.u.z, T, alpha, beta))

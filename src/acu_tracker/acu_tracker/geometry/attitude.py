@@ -109,7 +109,7 @@ def take(s, p, t_k, stamp, q, w, aligning):
     if _repeats(s, q, w):
         return SAMPLE_INVALID
     row = push(h, stamp)
-    # One sign of the quaternion, so that neighbours can be averaged.
+    # Neighbouring quaternions get the same sign, so that they can be averaged.
     dot = 0.0
     for i in range(4):
         dot += q[i] * h.sample[last, i]

@@ -42,7 +42,7 @@ def take(s, stamp, q, mean_time, restart):
             norm += mean[i] * mean[i]
         for i in range(4):
             mean[i] /= math.sqrt(norm)
-        # The difference between the two decks' vertical axes, in the two horizontal directions.
+        # x, y: difference between the two decks' vertical axes in the two horizontal directions.
         x = 2.0 * (q[0] * q[2] - q[3] * q[1] - mean[0] * mean[2] + mean[3] * mean[1])
         y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
         s.spread += T / (min(stamp - s.since, mean_time) + T) * (x * x + y * y - s.spread)

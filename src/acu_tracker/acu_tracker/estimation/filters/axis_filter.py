@@ -178,7 +178,7 @@ def innovation(f, c, m):
         U += w * (p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + d1 * d1)
         p12 += w * (p[1] - rho * o[3] + d1 * d2)
     nu, nu_rate, S = m.angle - rho * f.y - u, m.rate - x.rate, U + (1.0 - rho * rho) * m.variance
-    # The rate given the angle.
+    # Innovation of the rate, given the angle.
     more = nu_rate - p12 / S * nu
     return AxisInnovation(nu, S, nu * nu / S, nu_rate, more * more / (P.p22 + m.rate_variance - p12 * p12 / S))
 

@@ -86,7 +86,7 @@ def start(s, c, estimate, r, R_range):
     E, dE, _ = estimate.motion.elevation
     sight = line_of_sight(estimate.motion)
     u, du, ddu = sight
-    # The centripetal share that keeps the range constant.
+    # The centripetal acceleration keeps the range constant.
     k = dot(du, du)
     x = s.x[1]
     x[0], x[1], x[2] = times(r, u)
