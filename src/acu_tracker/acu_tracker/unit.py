@@ -302,7 +302,7 @@ class Acu(Unit):
 
     def take_elements(self, line_1, line_2):
         """Predict by other elements, in whose lines _ stands for a blank. Raises ValueError."""
-        self._predict_by(self.predictor.by(line_1.replace('_', ' '), line_2.replace('_', ' ')))
+        self._predict_by(self.predictor.with_elements(line_1.replace('_', ' '), line_2.replace('_', ' ')))
         self.lay_tables()
 
     def admit(self, command):
@@ -328,7 +328,7 @@ class Acu(Unit):
 
     def _refusal(self, mode, reason):
         """Why a mode is refused, in words."""
-        more = self.predictor.explained(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
+        more = self.predictor.refusal_details(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
         return modes.REASONS[reason] + (f', {more}' if more else '')
 
     @property

@@ -53,5 +53,5 @@ def test_the_control_unit_names_what_it_does_not_believe(noise, refused):
     unit.inputs['ins/error']['position'] = noise
     assert unit.inputs['tracking_receiver/angle_error']['stamp'] == records.NO_STAMP
     unit.step(np.zeros(1, np.int64), unit.inputs, unit.outputs)
-    assert unit.parts['state']['tracking']['attitude']['error']['told'] == (not refused)
+    assert unit.parts['state']['tracking']['attitude']['error']['published'] == (not refused)
     assert ('attitude_error' in unit.diagnose().message) == refused

@@ -39,10 +39,10 @@ def test_the_sun_of_nrel_over_a_station():
     motion = program_track.motion_at(track, 0.0)
     assert math.degrees(motion.azimuth.angle) % 360.0 == pytest.approx(194.34024, abs=0.01)
     assert math.degrees(motion.elevation.angle) == pytest.approx(39.872046, abs=0.01)
-    told = dict(predictor('2003-10-17T19:30:30', ('', ''), station=station).told(0.0))
+    told = dict(predictor('2003-10-17T19:30:30', ('', ''), station=station).diagnostic_values(0.0))
     assert float(told['sun_azimuth_deg']) % 360.0 == pytest.approx(194.34024, abs=0.01)
     assert float(told['sun_elevation_deg']) == pytest.approx(39.872046, abs=0.01)
-    assert predictor('', ('', '')).told(0.0) == []
+    assert predictor('', ('', '')).diagnostic_values(0.0) == []
 
 
 def test_the_satellite_agrees_with_skyfield():
@@ -84,14 +84,14 @@ def test_why_there_is_no_table():
     assert Predictor(predictor('').parameters, 1575969720 * 10**9).satellite(0.0).reason == Reason.NONE
     old = predictor('2019-12-30T00:00:00')
     assert old.satellite(0.0).reason == Reason.TOO_OLD
-    assert old.explained(Mode.TLE, Reason.TOO_OLD, 0.0) == 'they are 20.3 days off, 14 are allowed'
+    assert old.refusal_details(Mode.TLE, Reason.TOO_OLD, 0.0) == 'epoch 20.3 days from now; must be at most 14'
     assert predictor('2019-12-30T00:00:00', oldest=30.0).satellite(0.0).reason == Reason.NONE
 
 
 def test_the_next_rise_is_where_the_elevation_passes_zero():
     ours = predictor('2019-12-10T06:00:00')
-    said = ours.explained(Mode.TLE, Reason.BELOW_HORIZON, 0.0)
-    rise = orbit.instant('rise', said.removeprefix('it rises at '))
+    said = ours.refusal_details(Mode.TLE, Reason.BELOW_HORIZON, 0.0)
+    rise = orbit.instant('rise', said.removeprefix('next rise at '))
     t = (rise - orbit.instant('start', '2019-12-10T06:00:00')).total_seconds()
     before, after = ours._satellite_angles(np.array([t - 1.0, t + 1.0]))[:, 1]
     assert before < 0.0 < after
@@ -99,7 +99,7 @@ def test_the_next_rise_is_where_the_elevation_passes_zero():
 
 def test_the_polar_night_has_no_sunrise():
     ours = predictor('2019-12-21T12:00:00', station=StationParameters(latitude_deg=85.0))
-    assert ours.explained(Mode.SUN, Reason.BELOW_HORIZON, 0.0) == 'it does not rise within 2 days'
+    assert ours.refusal_details(Mode.SUN, Reason.BELOW_HORIZON, 0.0) == 'no rise within 2 days'
 
 
 def test_orbits_of_a_day_have_fewer_rows_a_second():

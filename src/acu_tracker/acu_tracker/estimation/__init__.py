@@ -1,4 +1,5 @@
-"""Where the target is and how it moves: the filters of the angles, the Cartesian one, and which of them is used.
+"""Estimation of the direction of the target and of its motion:
+the angle filters, the Cartesian filter, and their choice.
 
 Symbols
     X = (x1 x2 x3)  estimate of one axis: angle, rate, acceleration                     [rad, rad/s, rad/s2]
@@ -11,6 +12,5 @@ Symbols
     sigma_a         standard deviation of the acceleration about abar                   [rad/s2]
     mu, cbar        `imm`: probability of a model; its prediction                       [-]
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
-In `constant_gain` alone alpha, beta, gamma are the constant gains of angle, rate and acceleration, as its textbooks
-write them.
+    alpha, beta, gamma (in `constant_gain` only, as in its textbooks): gains of angle, rate and acceleration
 """

@@ -1,40 +1,42 @@
-"""Whether a filter that the antenna follows has lost touch with its target, seen in its innovations.
+"""Divergence of the filter that the antenna follows, detected in its innovations.
 
     m = mean over the last errors of (nu_A^2 / S_A + nu_E^2 / S_E) / 2
 
-is 1 as long as the filter knows its errors, whatever they are. An error of the wrong sign, turned in its axes or three
-times too large drives the antenna away from its target instead: m is large before the beam has left it, and still is
-when the signal goes, so that nothing is left to coast on.
+m is 1 while the errors are as large as the filter expects. An error with the wrong sign, with turned axes or three
+times too large drives the antenna away from its target. Then m is large before the beam leaves the target, and still
+large when the signal is lost. This avoids coasting on a wrong estimate.
 """
 import numpy as np
 
 from pedestal_common.compiled import compiled
 
 DIVERGENCE_DTYPE = np.dtype([('m', 'f8'), ('diverged', 'i8')], align=True)
-"""m: the mean [-]; diverged: 1 since it was too large, until it is reset."""
+"""m: the mean [-]; diverged: 1 from the detection of a divergence until its reset."""
 
 DIVERGENCE_ERROR_COUNT = 100
-"""Number of errors that the mean is taken over. Honest filters reach 1.25 in their worst half second."""
+"""Number of errors in the mean m. A filter without a fault reaches m = 1.25 in its worst half second."""
 
 MAX_COUNTED_ERROR = 12.5
-"""More does not count of one error, half the default gate: an interference of some errors is none of the filter."""
+"""Largest contribution of one error to m [-]: half the default gate.
+This avoids an alarm after a few errors with interference."""
 
 DIVERGENCE_LIMIT = 7.0
-"""Largest m. A filter that knows no acceleration, on a target that reverses, reaches 6.1 and keeps it in the beam."""
+"""Largest m of a filter in touch with its target [-]. A filter without an acceleration state reaches 6.1 on a target
+that reverses, and keeps the target in the beam."""
 
 COASTING_DIVERGENCE_LIMIT = 2.0
-"""Largest m with which the filter may coast."""
+"""Largest m with which the filter may coast [-]."""
 
 
 @compiled
 def restart(s):
-    """Autotrack begins: nothing is held against the filter."""
+    """Set m to 1 when autotrack begins."""
     s.m = 1.0
 
 
 @compiled
 def take(s, innovation):
-    """Take the Innovation of an error; NaN where there was no prediction."""
+    """Add the Innovation of an error to the mean; NaN (no prediction) is ignored."""
     x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
     if x == x:
         s.m += (min(x, MAX_COUNTED_ERROR) - s.m) / DIVERGENCE_ERROR_COUNT
@@ -42,17 +44,18 @@ def take(s, innovation):
 
 @compiled
 def diverges(s, without_signal):
-    """Return whether the filter has diverged by now. without_signal: it coasts, and nothing explains why."""
+    """Return True if the filter has diverged. without_signal:
+    the filter coasts, and no known cause explains the loss."""
     return s.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
 
 
 @compiled
 def latch(s):
-    """Hold against the filter, until `release`, that it has diverged."""
+    """Latch the divergence until `release`."""
     s.diverged = 1
 
 
 @compiled
 def release(s):
-    """Reset what was held against the filter."""
+    """Reset the latched divergence."""
     s.diverged = 0

@@ -1,4 +1,4 @@
-"""Parameters of the target filter: of the kind of each axis, of the Cartesian one, of gate and lock."""
+"""Parameters of the target filter: of the kinds of axis filter, of the Cartesian filter, of gate and lock."""
 import dataclasses
 import math
 
@@ -6,35 +6,36 @@ from acu_tracker.estimation.filters.kinds import FILTER_KINDS, named_models
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 _DEG = math.pi / 180.0
-_ALPHA = '1/s', 'manoeuvre frequency: one over the time an acceleration lasts'
+_ALPHA = '1/s', 'manoeuvre frequency: reciprocal of the duration of an acceleration'
 
 
 @dataclasses.dataclass(frozen=True)
 class AlphaBetaParameters(Parameters):
-    """alpha_beta and alpha_beta_gamma: alpha sets the other gains (Benedict-Bordner; Kalata)."""
+    """Filters alpha_beta and alpha_beta_gamma: alpha determines the other gains (Benedict-Bordner; Kalata)."""
 
-    alpha: float = parameter(0.15, 1e-3, 0.999, '', 'share of an innovation that the angle takes',
+    alpha: float = parameter(0.15, 1e-3, 0.999, '', 'gain of the angle: share of the innovation',
                              grid=(0.003, 0.8, 8))
 
 
 @dataclasses.dataclass(frozen=True)
 class CvParameters(Parameters):
-    """Constant rate."""
+    """Model of constant rate."""
 
-    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s2/sqrt(Hz)', 'of the white acceleration',
+    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s2/sqrt(Hz)', 'root density of the white acceleration',
                              grid=(1e-6, 1.0, 7))
 
 
 @dataclasses.dataclass(frozen=True)
 class CaParameters(Parameters):
-    """Constant acceleration."""
+    """Model of constant acceleration."""
 
-    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s3/sqrt(Hz)', 'of the white jerk', grid=(1e-6, 10.0, 8))
+    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s3/sqrt(Hz)', 'root density of the white jerk',
+                             grid=(1e-6, 10.0, 8))
 
 
 @dataclasses.dataclass(frozen=True)
 class SingerParameters(Parameters):
-    """An acceleration of mean zero and limited duration."""
+    """Model of an acceleration of mean zero and limited duration."""
 
     alpha: float = parameter(0.5, 1e-4, 100.0, *_ALPHA, grid=(0.03, 3.0, 3))
     sigma: float = parameter(0.3 * _DEG, 1e-7, 100.0, 'rad/s2', 'standard deviation of the acceleration',
@@ -43,24 +44,25 @@ class SingerParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class CurrentStatisticalParameters(Parameters):
-    """An acceleration of limited duration about its present estimate (paper 000)."""
+    """Model of an acceleration of limited duration about its present estimate (paper 000)."""
 
     alpha: float = parameter(0.1, 1e-4, 100.0, *_ALPHA, grid=(0.03, 3.0, 3))
-    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', '1.2 to 1.7 x the peak acceleration of the target',
+    a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', 'largest acceleration: 1.2 to 1.7 x the peak of the target',
                              grid=(1e-4, 1.0, 5))
-    floor: float = parameter(0.3, 0.0, 1.0, '', 'least sigma_a over a_max; without it the filter locks')
+    floor: float = parameter(0.3, 0.0, 1.0, '', 'least sigma_a over a_max; with 0 the filter may ignore measurements')
 
 
 @dataclasses.dataclass(frozen=True)
 class ImmParameters(Parameters):
     """Several interacting models, each with its own parameters.
 
-    The defaults are rungs of a ladder of noise levels, from a satellite that stands still to a target that turns
-    round, each 30 to 300 times as noisy as the one before: their probabilities adapt Q to the innovations.
+    The defaults form a ladder of noise levels, from a satellite that stands still to a target that reverses. Each
+    level is 30 to 300 times as noisy as the level before. The probabilities of the models adapt Q to the innovations.
     """
 
-    models: str = text('cv ca singer current_statistical', 'two or more of cv, ca, singer, current_statistical')
-    dwell: float = parameter(3000.0, 1e-3, 1e6, 's', 'mean time that one model holds')
+    models: str = text('cv ca singer current_statistical', 'models in use: two or more of cv, ca, singer, '
+                      'current_statistical')
+    dwell: float = parameter(3000.0, 1e-3, 1e6, 's', 'mean time for which one model is valid')
     cv: CvParameters = group(CvParameters, noise=1e-5 * _DEG)
     ca: CaParameters = group(CaParameters, noise=2.5e-3 * _DEG)
     singer: SingerParameters = group(SingerParameters, alpha=0.1, sigma=0.25 * _DEG)
@@ -74,11 +76,11 @@ class ImmParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class FilterParameters(Parameters):
-    """Filter of an axis: its kind, and for every kind its parameters; all may be changed while it runs."""
+    """Filter of an axis: its kind, and the parameters of every kind. All of them can be changed at run time."""
 
-    kind: str = choice('imm', FILTER_KINDS, 'of the filter; may be changed while it runs')
-    rate_measurement: bool = flag(False, 'use the measured rate of the target, where there is one (paper 004); '
-                                  'imm_ukf does while it has no range')
+    kind: str = choice('imm', FILTER_KINDS, 'kind of the filter; can be changed while it runs')
+    rate_measurement: bool = flag(False, 'use of the measured rate of the target, if there is one (paper 004); '
+                                  'with imm_ukf in the filters of the axes only')
     alpha_beta: AlphaBetaParameters = group(AlphaBetaParameters)
     alpha_beta_gamma: AlphaBetaParameters = group(AlphaBetaParameters)
     cv: CvParameters = group(CvParameters)
@@ -90,37 +92,43 @@ class FilterParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class UkfParameters(Parameters):
-    """Cartesian CV and CA of filter kind imm_ukf, where the receiver measures the range."""
+    """Cartesian models CV and CA of filter kind imm_ukf, for a receiver that measures the range."""
 
-    cv_noise: float = parameter(0.1, 1e-6, 1e4, 'm/s2/sqrt(Hz)', 'white acceleration of a target that flies straight')
-    ca_noise: float = parameter(3.0, 1e-6, 1e5, 'm/s3/sqrt(Hz)', 'white jerk of a target that turns')
-    dwell: float = parameter(5.0, 1e-3, 1e4, 's', 'how long it does either')
+    cv_noise: float = parameter(0.1, 1e-6, 1e4, 'm/s2/sqrt(Hz)', 'root density of the white acceleration of a target '
+                                'that flies straight')
+    ca_noise: float = parameter(3.0, 1e-6, 1e5, 'm/s3/sqrt(Hz)', 'root density of the white jerk of a target that '
+                                'turns')
+    dwell: float = parameter(5.0, 1e-3, 1e4, 's', 'mean time for which one of the two is valid')
     initial_speed: float = parameter(100.0, 1e-3, 1e5, 'm/s', 'standard deviation of the radial speed at the start')
-    initial_acceleration: float = parameter(5.0, 1e-6, 1e4, 'm/s2', 'of the acceleration at the start')
-    range_share: float = parameter(0.1, 1e-6, 1.0, '', 'standard deviation of the range over the range above which '
-                                   'the filter of the angles takes over')
+    initial_acceleration: float = parameter(5.0, 1e-6, 1e4, 'm/s2', 'standard deviation of the acceleration at '
+                                            'the start')
+    range_share: float = parameter(0.1, 1e-6, 1.0, '', 'standard deviation of the range over the range, above which '
+                                   'the filters of the axes take over')
 
 
 @dataclasses.dataclass(frozen=True)
 class ReceiverModelParameters(Parameters):
-    """The control unit's model of the receiver's thermal noise: sigma = theta3 / (k_m sqrt(2 C/N0 tau))."""
+    """Model of the receiver's thermal noise in the control unit: sigma = theta3 / (k_m sqrt(2 C/N0 tau))."""
 
     beamwidth: float = parameter(0.0175, 1e-5, 1.0, 'rad', '3 dB beamwidth theta3 of the sum pattern')
     slope: float = parameter(1.6, 0.1, 10.0, '', 'monopulse slope k_m: difference over sum per beamwidth')
-    integration: float = parameter(0.005, 1e-6, 10.0, 's', 'integration time tau of one error')
-    sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not fall with C/N0 (encoder, phase)')
-    noise_bandwidth: float = parameter(0.0, 0.0, 1000.0, 'Hz', 'of the lag that the noise has been through; 0: white')
-    age: float = parameter(0.0, 0.0, 0.5, 's', 'an error is the one of this long before its stamp: of a beam that '
-                           'stands, the middle of the samples it is the mean of')
-    beam_age: float = parameter(0.0, 0.0, 0.5, 's', 'the encoders that belong to it are those of this long before: of '
-                                'a beam that stands, the mean of those in the samples')
+    integration: float = parameter(0.005, 1e-6, 10.0, 's', 'integration time tau of one measured error')
+    sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not depend on C/N0 (encoder, phase)')
+    noise_bandwidth: float = parameter(0.0, 0.0, 1000.0, 'Hz', 'bandwidth of the first-order lag that filtered the '
+                                       'noise; 0: white noise')
+    age: float = parameter(0.0, 0.0, 0.5, 's', 'age of an error at its stamp; of a beam that is held between steps, '
+                           'the mean age of the samples')
+    beam_age: float = parameter(0.0, 0.0, 0.5, 's', 'age, at the stamp of an error, of the encoder angles that belong '
+                                'to it; of a beam that is held between steps, their mean age in the samples')
 
 
 @dataclasses.dataclass(frozen=True)
 class AttitudeModelParameters(Parameters):
-    """The control unit's model of an INS, on a ship, that does not tell how its error changes. The part that changes
-    from sample to sample is in every measurement. What changes slowly cancels, because the target is measured and
-    pointed at with the same attitude; but as it changes the target seems to walk."""
+    """Error model of an INS, for a ship whose INS does not publish the statistics of its error.
+
+    The part that changes from sample to sample is in every measurement. The slow part cancels, because the target is
+    measured and pointed at with the same attitude; its changes, however, look like a motion of the target.
+    """
 
     tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')
     heading_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of heading, per sample')
@@ -131,24 +139,24 @@ class AttitudeModelParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class TrackerParameters(Parameters):
-    """The target filter, its gates and the conditions of a lock."""
+    """Target filter, its gates and the conditions of its lock."""
 
-    gate: float = parameter(25.0, 1.0, 1e6, '', "largest nu' S^-1 nu of the two angles that is believed; of a rate or "
-                            'a range the one as rarely exceeded')
-    gate_restart: int = parameter(20, 1, 100000, '', 'errors refused in a row before the filter restarts on them')
+    gate: float = parameter(25.0, 1.0, 1e6, '', "largest accepted nu' S^-1 nu of the two angles; the gate of a rate "
+                            'or a range is exceeded as rarely')
+    gate_restart: int = parameter(20, 1, 100000, '', 'number of consecutive gated errors at which the filter restarts')
     restart_gap: float = parameter(1.0, 1e-3, 1000.0, 's', 'gap between errors after which the filter restarts')
     initial_rate: float = parameter(0.1, 1e-6, 100.0, 'rad/s', 'standard deviation of the rate at the start')
-    lock_count: int = parameter(100, 1, 100000, '', 'errors believed in a row before program hands over, and rates '
-                                'that agree with them in a row before they are used')
+    lock_count: int = parameter(100, 1, 100000, '', 'number of consecutive accepted errors before program hands over, '
+                                'and of consecutive plausible rates before rates are used')
     coast_after: float = parameter(0.1, 1e-3, 100.0, 's', 'time without an error after which autotrack coasts')
-    coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack is left')
-    handover: bool = flag(True, 'program hands over to autotrack by itself once locked')
+    coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack ends')
+    handover: bool = flag(True, 'automatic hand-over from program to autotrack after lock')
     receiver: ReceiverModelParameters = group(ReceiverModelParameters)
     attitude: AttitudeModelParameters = group(AttitudeModelParameters)
     ukf: UkfParameters = group(UkfParameters)
 
     def check(self):
-        """Raise ParameterError where autotrack would end before it coasts."""
+        """Raise ParameterError if autotrack would end before it coasts."""
         if self.coast_time < self.coast_after:
             raise ParameterError(f'coast_time = {self.coast_time:g} s: must be at least coast_after = '
                                  f'{self.coast_after:g} s')

@@ -1,36 +1,37 @@
-"""Whether the receiver's errors are noise: far rougher from one to the next than its model says they are.
+"""Detection of errors that are only noise: their change from one to the next is far larger than the receiver model's.
 
-    q = mean over the last ones of (nu_k - nu_k-1)^2 / 2R
+    q = mean over the last errors of (nu_k - nu_k-1)^2 / 2R
 
-of both axes together is 1 for white noise of the variance R (von Neumann, Distribution of the ratio of the mean
-square successive difference to the variance, Annals of Mathematical Statistics 12 (1941) 367). What changes slowly, a
-target that turns, a slope of the wrong sign, a bias, cancels in the difference; what the gate lets through of noise
-many times its size does not mislead a filter that leaves it alone.
+q is the mean of both axes, and 1 for white noise of the variance R. Slow changes cancel in the difference: a target
+that turns, a slope of the wrong sign, a bias. Because the filter ignores noisy errors, the part of such noise that
+passes the gate does not mislead it. Source: von Neumann, Distribution of the ratio of the mean square successive
+difference to the variance, Annals of Mathematical Statistics 12 (1941) 367.
 """
 import numpy as np
 
 from pedestal_common.compiled import compiled
 
 ROUGHNESS_DTYPE = np.dtype([('nu', 'f8', (2,)), ('q', 'f8')], align=True)
-"""nu: innovations of the error before [rad], NaN: there was none; q [-]."""
+"""nu: innovations of the previous error [rad], NaN for none; q: the mean [-]."""
 
 ROUGHNESS_ERROR_COUNT = 10
-"""Number of errors that the mean is taken over."""
+"""Number of errors in the mean q."""
 
 MAX_COUNTED_DIFFERENCE = 100.0
-"""More does not count of one difference, so that one outlier, which makes two, is left to the gate."""
+"""Largest contribution of one difference to q [-]. Because one outlier makes two differences,
+this leaves it to the gate."""
 
 
 @compiled
 def restart(s):
-    """A filter begins: nothing is held against the errors."""
+    """Set q to 1 when a filter begins."""
     s.nu[0] = s.nu[1] = np.nan
     s.q = 1.0
 
 
 @compiled
 def take(s, innovation, m):
-    """q after the Innovation of a Measurement."""
+    """Add the Innovation of a Measurement to the mean; return q."""
     x = 0.0
     for i in range(2):
         nu = innovation.axis[i].nu

@@ -1,15 +1,17 @@
-"""Whether the errors that the loop is closed on have the wrong sign, seen in which of two directions moves smoothly.
+"""Detection of receiver errors with the wrong sign, by the smoothness of the target's direction with either sign.
 
-Beam b and error e are measured; the target is at z+ = b + e if the slope is right, at z- = b - e if it is reversed. A
-straight line is fitted to the last errors of each, and its innovations squared over the variance R of e are averaged:
+Beam b and error e are measured. The target is at z+ = b + e if the slope is right, and at z- = b - e if it
+is reversed. A straight line is fitted to the last values of each; its squared innovations over the
+variance R of e are averaged:
 
     J+ = mean of (nu_b + nu_e)^2 / R,    J- = mean of (nu_b - nu_e)^2 / R
 
-A target may turn as it likes: the beam is H z+ of what it follows, so that z- = (2 H - 1) z+ is at least as rough, H
-being the closed loop of type II, but for the while that H lags; an outlier or noise is in both alike. Reversed errors
-drive the beam away from a target that stays smooth in z-, while z+ runs away twice as fast: a likelihood ratio of two
-hypotheses (Willsky, A survey of design methods for failure detection in dynamic systems, Automatica 12 (1976) 601).
-Each axis of the receiver for itself, the beam in earth axes, where the deck's motion does not count.
+Right slope: the beam is H z+, H the closed loop of type II, so that z- = (2 H - 1) z+. Except while H lags, z- is
+at least as rough as z+, however the target turns. Outliers and noise are in both alike. Reversed slope: the
+errors drive the beam away from a target that stays smooth in z-, while z+ moves away twice as fast. The
+comparison is a likelihood ratio of two hypotheses (Willsky, A survey of design methods for failure detection in
+dynamic systems, Automatica 12 (1976) 601). Each axis of the receiver is judged by itself, in earth axes, because
+the deck's motion has no effect there.
 """
 import math
 from collections import namedtuple
@@ -20,35 +22,39 @@ from acu_tracker.geometry.vector import Vector, dot, rotated
 from pedestal_common.compiled import compiled
 
 SLOPE_SIGN_DTYPE = np.dtype([('stamp', 'f8'), ('n', 'i8'), ('line', 'f8', (5, 2)), ('J', 'f8', (2, 2))], align=True)
-"""stamp of the last error [s], -inf: there was none; n: errors in the lines, value and rate of the beam's unit vector
-(ENU) and of both errors [rad]; J+ and J- of both axes [-]."""
+"""stamp: of the last error [s], -inf for none; n: number of errors in the lines; line: value and rate of the beam's
+unit vector (ENU) and of both errors [rad]; J: J+ and J- of both axes [-]."""
 
 LINE_ERROR_COUNT = 200
-"""Errors that a line remembers: so many that the beam's way counts before its speed does."""
+"""Number of errors in the memory of a line. With so many the beam's travel counts before its speed does."""
 
 SLOPE_ERROR_COUNT = 100
-"""Number of errors that J is taken over; a reversal of the target is over in the mean of them."""
+"""Number of errors in the means J; a reversal of the target is shorter than these means."""
 
 MIN_ERROR_COUNT = 60
-"""Errors since autotrack began, or the signal came back, before which nothing is said: means of a few are no ratio."""
+"""Number of errors, after the begin of autotrack or the return of the signal, before the first verdict. Means of fewer
+errors do not give a useful ratio."""
 
 MAX_ERROR_BEAMWIDTHS = 0.5
-"""Largest error that is looked at [beamwidths]."""
+"""Largest error that is used [beamwidths]."""
 
 REVERSED_SLOPE_RATIO, REVERSED_SLOPE_MARGIN, CROSS_AXIS_LEAKAGE = 5.0, 0.5, 0.1
-"""Slope reversed: J+ > REVERSED_SLOPE_RATIO J- and J+ > J- + REVERSED_SLOPE_MARGIN + CROSS_AXIS_LEAKAGE (J+ + J- of
-the other axis). A target that reverses is a
-while ahead of the beam: at 11 deg/s2 J+ reaches 2.8 J- in 30 closed loops of uav_flyby, and without noise 2.9 at a
-bandwidth of 20 rad/s, 4.6 at 10. Of what the other axis does some is seen, as the beam's axes turn on its way: 0.0015
-where a beam of 1 deg on a rolling deck comes from half its width off, without noise."""
+"""Limits of a reversed slope [-]: J+ > REVERSED_SLOPE_RATIO J- and J+ > J- + REVERSED_SLOPE_MARGIN +
+CROSS_AXIS_LEAKAGE (J+ + J- of the other axis).
+
+A target that reverses is ahead of the beam for a while. At 11 deg/s2 J+ then reaches 2.8 J- in 30 closed loops of
+uav_flyby; without noise it reaches 2.9 J- at a bandwidth of 20 rad/s, 4.6 J- at 10 rad/s. Because the beam's axes turn
+on its way, a part of the other axis leaks in. This part is 0.0015 without noise, where a beam of 1 deg on a rolling
+deck comes from half its width off.
+"""
 
 Beam = namedtuple('Beam', 'u across up')
-"""Unit Vectors (ENU) along a beam, and of its cross-elevation and elevation."""
+"""Unit Vectors (ENU) along a beam, and along its cross-elevation and elevation."""
 
 
 @compiled
 def beam(mat_ed, A, E):
-    """The Beam at deck angles A, E [rad] on a deck of attitude mat_ed, a Rotation deck -> earth."""
+    """Return the Beam at deck angles A, E [rad]; mat_ed: Rotation deck -> earth."""
     sA, cA, sE, cE = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
     return Beam(rotated(mat_ed, Vector(cE * cA, -cE * sA, sE)), rotated(mat_ed, Vector(-sA, -cA, 0.0)),
                 rotated(mat_ed, Vector(-sE * cA, sE * sA, cE)))
@@ -56,19 +62,19 @@ def beam(mat_ed, A, E):
 
 @compiled
 def near(u, beamwidth):
-    """Whether an error of signals.INPUTS is on the straight part of its curve; beamwidth [rad]."""
+    """Return True if an error of signals.INPUTS is on the straight part of its curve; beamwidth [rad]."""
     return math.hypot(u.cross_elevation, u.elevation) < MAX_ERROR_BEAMWIDTHS * beamwidth
 
 
 @compiled
 def restart(s):
-    """Autotrack begins: nothing is held against the slope."""
+    """Clear the memory when autotrack begins."""
     s.stamp = -math.inf
 
 
 @compiled
 def _innovation(s, i, y, T, alpha, beta):
-    """Innovation of y against line i, which takes it; T [s] since the one before."""
+    """Update line i with y; return the innovation of y. T: time since the previous value [s]."""
     expected = s.line[i, 0] + T * s.line[i, 1]
     nu = y - expected
     s.line[i, 0] = expected + alpha * nu
@@ -78,7 +84,7 @@ def _innovation(s, i, y, T, alpha, beta):
 
 @compiled
 def _begin(s, u, error):
-    """The first error: the lines begin where they are."""
+    """Begin the lines at the first error."""
     s.n = 1
     s.J[0, 0] = s.J[0, 1] = s.J[1, 0] = s.J[1, 1] = 0.0
     for i, y in enumerate((u.x, u.y, u.z, error[0], error[1])):
@@ -87,14 +93,15 @@ def _begin(s, u, error):
 
 @compiled
 def _reversed(J, other):
-    """Whether J+ and J- of an axis say that its slope is; other: those of the other axis."""
-    return J[0] > REVERSED_SLOPE_RATIO * J[1] and J[0] > J[1] + REVERSED_SLOPE_MARGIN + CROSS_AXIS_LEAKAGE * (other[0] + other[1])
+    """Return True if J+ and J- of an axis (J) show a reversed slope; other: J+ and J- of the other axis."""
+    least = J[1] + REVERSED_SLOPE_MARGIN + CROSS_AXIS_LEAKAGE * (other[0] + other[1])
+    return J[0] > REVERSED_SLOPE_RATIO * J[1] and J[0] > least
 
 
 @compiled
 def take(s, t, beam, error, variance, gap):
-    """Take an error (cross-elevation, elevation) [rad] of a variance [rad2], measured at t [s] from a Beam; whether a
-    slope is reversed. After more than a gap [s] without any it begins anew."""
+    """Take an error (cross-elevation, elevation) [rad] of a variance [rad2], measured at t [s] from a Beam; return
+    True if a slope is reversed. The lines restart after more than a gap [s] without errors."""
     T = t - s.stamp
     if T <= 0.0:
         return False
@@ -103,7 +110,7 @@ def take(s, t, beam, error, variance, gap):
         _begin(s, beam.u, error)
         return False
     n = s.n = min(s.n + 1, LINE_ERROR_COUNT)
-    # Gains of the least squares of n points; of the last n, as they fade, from LINE_ERROR_COUNT on.
+    # Gains of a least-squares fit to n points; from LINE_ERROR_COUNT points on, old points fade.
     alpha, beta = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1))
     nu = Vector(_innovation(s, 0, beam.u.x, T, alpha, beta), _innovation(s, 1, beam.u.y, T, alpha, beta),
                 _innovation(s, 2, beam.u.z, T, alpha, beta))

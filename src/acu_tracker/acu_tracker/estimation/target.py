@@ -1,7 +1,7 @@
-"""The target between the deck, where it is measured and pointed at, and the frame in which it is filtered.
+"""The target: conversion between the deck, for measurement and pointing, and the frame of its filter.
 
-With a measured range the estimate is the line of sight of the INS, otherwise that of the antenna (`lever_arm`); its
-angles are those of the earth, near the zenith those of a tilted frame (`estimate_frame`).
+With a measured range the estimate is the line of sight of the INS, otherwise that of the antenna (`lever_arm`). Its
+angles are earth angles, near the zenith angles in a tilted frame (`estimate_frame`).
 """
 import math
 from collections import namedtuple
@@ -29,24 +29,23 @@ from pedestal_common.geometry import line_of_sight as pointing
 TARGET_DTYPE = np.dtype([('tracker', tracker.TRACKER_DTYPE), ('frame', estimate_frame.FRAME_DTYPE),
                          ('lever_arm', lever_arm.LEVER_ARM_DTYPE)], align=True)
 
-(OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY, OUTCOME_NO_ATTITUDE) = (tracker.OUTCOME_GATED, tracker.OUTCOME_STALE,
-                                                                      tracker.OUTCOME_NOISY, tracker.OUTCOME_NOISY + 1)
-"""Outcomes of `take`: those of the tracker, or OUTCOME_NO_ATTITUDE."""
+OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = tracker.OUTCOME_GATED, tracker.OUTCOME_STALE, tracker.OUTCOME_NOISY
+OUTCOME_NO_ATTITUDE = OUTCOME_NOISY + 1
+"""Outcome of `take` without an attitude; the other outcomes are those of the tracker."""
 
 Source = namedtuple('Source', 'framed motion')
-"""The Motion of the target that is pointed at: in the frame of the estimate (framed 1) or in earth angles (framed
-0)."""
+"""The Motion of the target to point at: in the frame of the estimate (framed 1) or in earth angles (framed 0)."""
 
 
 def initialise(g):
-    """No estimate; g (n,) of TARGET_DTYPE."""
+    """Start without an estimate; g (n,) of TARGET_DTYPE."""
     g['frame']['mat'] = np.eye(3)
 
 
 @compiled
 def _measured_direction(g, p, mat_ed, distance, azimuth, elevation):
-    """(azimuth, elevation) [rad] in the frame of a direction given by deck angles [rad]; mat_ed: Rotation deck ->
-    earth; distance: measured range [m], NaN: none."""
+    """Return (azimuth, elevation) [rad] in the filter's frame of a direction in deck angles [rad]; mat_ed: Rotation
+    deck -> earth; distance: measured range [m], NaN for none."""
     x, y, z = pointing.direction(azimuth, elevation)
     v = lever_arm.from_ins(g.lever_arm, p.lever_arm, distance, g.tracker.running, Vector(x, y, z))
     v = rotated(mat_ed, v)
@@ -58,8 +57,8 @@ def _measured_direction(g, p, mat_ed, distance, azimuth, elevation):
 
 @compiled
 def _measured_rates(g, moves, deck, u, at):
-    """(azimuth, elevation) rates [rad/s] of the target in the frame, from those of the antenna and of the error;
-    moves: whether the deck does, of this Attitude."""
+    """Return (azimuth, elevation) rates [rad/s] of the target in the filter's frame, from the rates of the antenna and
+    of the error. moves: whether the deck moves; deck: its Attitude; at: Pointing of the antenna."""
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, u.cross_elevation, u.elevation, u.error_rate[0],
                                   u.error_rate[1])
     v, dv = Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5])
@@ -73,13 +72,14 @@ def _measured_rates(g, moves, deck, u, at):
 
 @compiled
 def take(g, p, c, deck, u, at, measured, restart_gap):
-    """Filter the receiver's error of INPUTS u: (STARTED, ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY or
-    OUTCOME_NO_ATTITUDE; its
-    Innovation).
+    """Filter the receiver's error of INPUTS u.
 
-    p, c: records of SharedParameters and of tracker.CONSTANTS; deck: ATTITUDE; at: Pointing of the antenna when the
-    error was measured; measured: deck angles (azimuth, elevation) [rad] of the target, the antenna displaced by the
-    error; restart_gap: as in tracker.observe.
+    Return (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE,
+    OUTCOME_NOISY or OUTCOME_NO_ATTITUDE; the Innovation).
+
+    p, c: records of SharedParameters and of tracker.CONSTANTS_DTYPE; deck: record of ATTITUDE_DTYPE; at: Pointing of
+    the antenna when the error was measured; restart_gap: as in tracker.observe. `measured`: deck angles (azimuth,
+    elevation) [rad] of the target, which are the antenna's, displaced by the error.
     """
     e = p.tracker.receiver
     t = u.error_stamp - e.age
@@ -134,19 +134,19 @@ def _choose_frame(g, c):
 
 @compiled
 def outlook(g, c, t):
-    """The Source that the filter predicts for t [s]."""
+    """Return the Source that the filter predicts for t [s]."""
     return Source(1, tracker.outlook(g.tracker, c, t))
 
 
 @compiled
 def earth_outlook(g, c, t):
-    """LineOfSight in ENU that the filter predicts for t [s]."""
+    """Return the LineOfSight in ENU that the filter predicts for t [s]."""
     return estimate_frame.to_earth(g.frame, tracker.outlook(g.tracker, c, t))
 
 
 @compiled
 def on_deck(g, p, deck, t, source):
-    """Motion on the deck (ATTITUDE) at t [s] of a Source; p: record of SharedParameters."""
+    """Return the Motion on the deck (record of ATTITUDE_DTYPE) at t [s] of a Source; p: record of SharedParameters."""
     if source.framed and (g.frame.tilted or g.lever_arm.range != 0.0):
         framed = estimate_frame.of_deck(g.frame, attitude.at(deck, p, t)[1])
         return angles(lever_arm.to_antenna(g.lever_arm, deck_reference.on_deck(framed, line_of_sight(source.motion))))
@@ -155,7 +155,7 @@ def on_deck(g, p, deck, t, source):
 
 @compiled
 def levelled_azimuth(g, level, source):
-    """AxisMotion of the azimuth of a Source on a deck that stands still, level: Rotation deck -> earth."""
+    """Return the azimuth AxisMotion of a Source on a deck at rest; level: Rotation deck -> earth."""
     still = Attitude(level, ZERO_VECTOR, ZERO_VECTOR)
     if source.framed:
         still = estimate_frame.of_deck(g.frame, still)
@@ -164,7 +164,7 @@ def levelled_azimuth(g, level, source):
 
 @compiled
 def read(g, p, c, deck, t):
-    """Estimate at t [s] in earth angles of the antenna."""
+    """Return the Estimate at t [s] in earth angles of the antenna."""
     framed, variances = tracker.read(g.tracker, c, t)
     motion, (azimuth, elevation) = framed, variances
     if g.frame.tilted:

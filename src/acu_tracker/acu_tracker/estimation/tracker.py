@@ -12,23 +12,23 @@ from acu_tracker.estimation.filters.measurement import NO_INNOVATION, Measuremen
 from pedestal_common.compiled import compiled
 
 CONSTANTS_DTYPE = np.dtype([('filter', target_filter.CONSTANTS_DTYPE), ('gates', 'f8', (2,))], align=True)
-"""gates: largest nu' S^-1 nu that is accepted, of the two angles, of one rate or range."""
+"""gates: largest accepted nu' S^-1 nu [-], of the two angles and of one rate or range."""
 
 TRACKER_DTYPE = np.dtype([('filter', target_filter.FILTER_DTYPE), ('stamp', 'f8'), ('running', 'i8'),
-                          ('converged', 'i8'),
-                          ('roughness', roughness.ROUGHNESS_DTYPE),
+                          ('converged', 'i8'), ('roughness', roughness.ROUGHNESS_DTYPE),
                           ('accepted_in_a_row', 'i8'), ('gated_in_a_row', 'i8'), ('rates_in_a_row', 'i8', (2,)),
                           ('gated', 'i8'), ('rates_gated', 'i8'), ('ranges_gated', 'i8')], align=True)
-"""stamp: of the last accepted measurement [s]; accepted_in_a_row, gated_in_a_row: measurements since the other
-happened; rates_in_a_row: rates of an axis that agreed with its angles; gated, rates_gated, ranges_gated: in all."""
+"""stamp: of the last accepted measurement [s]; accepted_in_a_row, gated_in_a_row: number of consecutive measurements
+with this outcome; rates_in_a_row: number of consecutive rates of an axis that agreed with its angles; gated,
+rates_gated, ranges_gated: total numbers."""
 
 OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = range(5)
 """Outcomes of `observe`."""
 
 
 def gate_of_one(gate):
-    """The gate of one degree of freedom with the false-alarm probability of `gate` at two, e^(-gate/2); chi-square
-    [-].
+    """Return the gate of one degree of freedom that is exceeded as rarely as `gate` with two,
+    e^(-gate/2); chi-square [-].
 
     The tail at x is erfc(z) with z^2 = x/2, so that x - 2 log(e^z^2 erfc(z)) = gate; e^z^2 erfc(z) does not underflow.
     """
@@ -45,7 +45,7 @@ def gate_of_one(gate):
 
 
 def constants(params, axes) -> np.ndarray:
-    """Constants (1,) of TrackerParameters and the FilterParameters of both axes."""
+    """Return the constants (1,) of TrackerParameters and the FilterParameters of both axes."""
     c = np.zeros(1, CONSTANTS_DTYPE)
     c['filter'] = target_filter.constants(params.ukf, axes, params.receiver.noise_bandwidth)
     c['gates'] = params.gate, gate_of_one(params.gate)
@@ -60,7 +60,7 @@ def stop(t):
 
 @compiled
 def recount(t):
-    """Count the accepted measurements from 0 again, so that the lock takes lock_count new ones."""
+    """Reset the count of accepted measurements, so that the lock takes lock_count new ones."""
     t.accepted_in_a_row = 0
 
 
@@ -81,10 +81,12 @@ def move(t, c, motion):
 
 @compiled
 def _accepted_rate(t, p, c, i, rate, chi_square):
-    """A rate [rad/s] measured on axis i where it is accepted, else NaN; chi_square: of the rate, given the angle.
+    """Return the rate [rad/s] measured on axis i if it is accepted, else NaN;
+    chi_square: of the rate, given the angle.
 
-    Only the rate estimated from angles alone can show that a measured rate is wrong. So rates are used once lock_count
-    in a row agreed with it: a stuck or biased sensor must not mislead a filter that has just started.
+    Only a rate estimated from angles alone can show that a measured rate is wrong. Therefore rates are used
+    after lock_count consecutive rates agreed with it. This avoids that a stuck or biased sensor misleads a
+    filter that has just started.
     """
     if math.isnan(chi_square):
         return math.nan
@@ -98,7 +100,7 @@ def _accepted_rate(t, p, c, i, rate, chi_square):
 
 @compiled
 def _with_accepted_rates(t, p, c, m, innovation):
-    """The Measurement with the rates that pass their own gates."""
+    """Return the Measurement with only the rates that pass their own gates."""
     (a, e), (i_a, i_e) = m.axis, innovation.axis
     a = with_rate(a, _accepted_rate(t, p, c, 0, a.rate, i_a.rate_chi_square))
     e = with_rate(e, _accepted_rate(t, p, c, 1, e.rate, i_e.rate_chi_square))
@@ -107,11 +109,12 @@ def _with_accepted_rates(t, p, c, m, innovation):
 
 @compiled
 def observe(t, p, c, m, restart_gap):
-    """Take a Measurement: (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE or OUTCOME_NOISY; its
-    Innovation, NaN where nothing was predicted).
+    """Take a Measurement.
 
-    Errors that are noise (`roughness`) are left alone. The direction is accepted or gated, and then each of range and
-    rates by itself. The filter restarts after gate_restart gated ones in a row, and after restart_gap [s] without any.
+    Return (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE or OUTCOME_NOISY; the Innovation, NaN where
+    nothing was predicted). Errors that are only noise (`roughness`) are ignored. The direction is accepted or gated,
+    and then each of range and rates by itself. The filter restarts at gate_restart consecutive gated errors, and after
+    restart_gap [s] without accepted ones.
     """
     T = m.stamp - t.stamp
     if t.running and T <= 0.0:
@@ -155,10 +158,10 @@ def observe(t, p, c, m, restart_gap):
 
 @compiled
 def _converged(f, k, m, initial_rate):
-    """Whether the standard deviation of the rates across the line of sight is a quarter of that at the start.
+    """Return True if the standard deviation of the rates across the line of sight is a quarter of that at the start.
 
-    The angle is no criterion: a filter of high bandwidth never estimates it much better than it is measured. The
-    variance of the azimuth grows as 1/cos2 of the elevation.
+    The angle is no criterion, because a filter of high bandwidth never estimates it much better than it is measured.
+    The variance of the azimuth grows as 1/cos2 of the elevation.
     """
     target_filter.predict(f, k, 0.0)
     azimuth, elevation = target_filter.read(f).variances
@@ -168,21 +171,20 @@ def _converged(f, k, m, initial_rate):
 
 @compiled
 def locked(t, p, since_accepted):
-    """Enough measurements accepted in a row, converged, and the last one not longer ago than coast_after.
-
-    since_accepted: time since then, beyond the receiver's latency [s].
-    """
+    """Return True if enough consecutive measurements were accepted, the last at most coast_after ago, and the filter
+    has converged. since_accepted: time since the last, beyond the receiver's latency [s]."""
     return t.running and t.accepted_in_a_row >= p.lock_count and t.converged and since_accepted <= p.coast_after
 
 
 @compiled
 def outlook(t, c, stamp):
-    """Predicted Motion at a stamp [s]; before the last accepted measurement, the Motion at that measurement."""
+    """Return the predicted Motion at a stamp [s]; before the last accepted measurement,
+    the Motion at that measurement."""
     return target_filter.outlook(t.filter, c.filter, max(stamp - t.stamp, 0.0))
 
 
 @compiled
 def read(t, c, stamp):
-    """Estimate (Motion and variances) at a stamp [s], predicted as in `outlook`."""
+    """Return the Estimate (Motion and variances) at a stamp [s], predicted as in `outlook`."""
     target_filter.predict(t.filter, c.filter, max(stamp - t.stamp, 0.0))
     return target_filter.read(t.filter)

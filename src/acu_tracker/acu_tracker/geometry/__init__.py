@@ -1,4 +1,4 @@
-"""Directions and their rates between earth, deck and the frame of the filter.
+"""Directions and their rates in the frames of the earth, the deck and the filter.
 
 Symbols
     u, du, ddu      unit vector towards the target and its derivatives                  [-, 1/s, 1/s2]

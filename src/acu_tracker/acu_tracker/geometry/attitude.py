@@ -1,4 +1,5 @@
-"""The attitude of the deck: the INS's last measurements, interpolated or extrapolated to any instant near them."""
+"""The attitude of the deck: the last measurements of the INS,
+interpolated or extrapolated to any instant near them."""
 import math
 
 import numpy as np
@@ -12,26 +13,26 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 from pedestal_common.geometry.quaternion import product
 
-ATTITUDE_DTYPE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('told', 'f8', (7,)),
+ATTITUDE_DTYPE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('sample', 'f8', (7,)),
                            ('aligned', 'i8'), ('jump', attitude_jump.ATTITUDE_JUMP_DTYPE),
                            ('error', attitude_error.ATTITUDE_ERROR_DTYPE)], align=True)
-"""stabilised: 1 on a ship, 0 ashore, where the attitude never changes; history: quaternion (x, y, z, w) deck -> earth,
-w [rad/s], dw [rad/s2] of the last steps, as they are believed; told: the last q and w as they came; aligned: whether
-the INS was; error: how its error changes.
-"""
+"""stabilised: 1 on a ship, 0 ashore, where the attitude never changes. `history`: quaternion (x, y, z, w) deck ->
+earth, w [rad/s], dw [rad/s2] of the last steps, after the correction of jumps. `sample`: the last q and w as received;
+aligned: whether the INS was aligned; jump: `attitude_jump`; error: `attitude_error`."""
 
 MIN_TURN_RATE_RAD_S = 1e-6
-"""Rate [rad/s] of a deck from which its attitude changes from one measurement to the next."""
+"""Rate of the deck [rad/s] above which its attitude changes from one measurement to the next."""
 
 UNKNOWN_VECTOR = Vector(math.nan, math.nan, math.nan)
+"""Vector without a value."""
 
 SAMPLE_INVALID, SAMPLE_REPEATED, SAMPLE_NEW = range(3)
-"""What `take` makes of an attitude."""
+"""Outcomes of `take`."""
 
 
 @compiled
 def put(s, stabilised):
-    """Put the pedestal on a ship or ashore; whether that is new."""
+    """Set whether the pedestal is on a ship (stabilised) or ashore; return True if this is a change."""
     new = s.stabilised != stabilised
     s.stabilised = stabilised
     return new
@@ -39,26 +40,28 @@ def put(s, stabilised):
 
 @compiled
 def newest(s):
-    """Return the quaternion (4,) and rates that were taken last."""
+    """Return the quaternion (4,) and rates of the last sample."""
     return s.history.sample[s.history.newest]
 
 
 @compiled
 def smoothed_acceleration(before, w, w_before, T, tau):
-    """Angular acceleration [rad/s2] from two rates [rad/s] T [s] apart, low-passed with tau [s]; before: its value T
-    ago."""
+    """Return the angular acceleration [rad/s2] from two rates [rad/s] T [s] apart, low-passed with tau [s]; before:
+    its value T ago."""
     return before + T / (tau + T) * ((w - w_before) / T - before)
 
 
 @compiled
 def rotation_angle(w, dw, T):
-    """Angle [rad] by which the deck rotates in T [s] at a rate w [rad/s] with its derivative dw [rad/s2]."""
+    """Return the angle [rad] by which the deck rotates in T [s] at a rate w [rad/s] with its
+    derivative dw [rad/s2]."""
     return T * w + 0.5 * T * T * dw
 
 
 @compiled
 def rotated(q, r):
-    """Quaternion (x, y, z, w) of a deck of attitude q (4,) after the rotation vector r [rad] (FLU): q (x) exp(r/2)."""
+    """Return the quaternion (x, y, z, w) of a deck of attitude q (4,) after the rotation vector r [rad]
+    (FLU): q (x) exp(r/2)."""
     rx, ry, rz = r
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
@@ -67,19 +70,20 @@ def rotated(q, r):
 
 @compiled
 def _repeats(s, q, w):
-    """Whether an INS says once more what it said before, though it says that the deck turns. Keeps what it says."""
+    """Keep a sample of the INS; return True if it equals the previous sample although its
+    rates show a turning deck."""
     same, turns = True, False
     for i in range(7):
         x = q[i] if i < 4 else w[i - 4]
-        same &= x == s.told[i]
+        same &= x == s.sample[i]
         turns |= i >= 4 and abs(x) > MIN_TURN_RATE_RAD_S
-        s.told[i] = x
+        s.sample[i] = x
     return same and turns
 
 
 @compiled
 def _correct_jump(s, row, last, T):
-    """Turn the quaternion in a row of the history into the one that is believed, T [s] after that in row `last`."""
+    """Correct the quaternion in a row of the history for jumps; row `last` is the sample T [s] before."""
     a, b = s.history.sample[last], s.history.sample[row]
     predicted = rotated(a, (0.5 * T * (a[4] + b[4]), 0.5 * T * (a[5] + b[5]), 0.5 * T * (a[6] + b[6])))
     b[0], b[1], b[2], b[3] = attitude_jump.jump_corrected(s.jump, predicted, (b[0], b[1], b[2], b[3]), T)
@@ -87,12 +91,12 @@ def _correct_jump(s, row, last, T):
 
 @compiled
 def take(s, p, t_k, stamp, q, w, aligning):
-    """Take a measured quaternion q (4,) and rate w (3,) [rad/s] into the history: SAMPLE_INVALID, SAMPLE_REPEATED or
-    SAMPLE_NEW.
+    """Take a measured quaternion q (4,) and rate w (3,) [rad/s] into the history; return SAMPLE_INVALID,
+    SAMPLE_REPEATED or SAMPLE_NEW.
 
-    SAMPLE_INVALID: not finite, no unit quaternion, older than the last or younger than the step t_k [s], or the
-    numbers of
-    the last though the deck turns. aligning: whether the INS is, so that its attitude may jump.
+    Invalid samples: not finite, no unit quaternion, older than the last sample, later than the step t_k [s], or equal
+    to the last sample while the deck turns. SAMPLE_REPEATED: the stamp of the last sample. aligning: whether the INS
+    aligns, so that its attitude may jump.
     """
     norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if not (abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
@@ -105,7 +109,7 @@ def take(s, p, t_k, stamp, q, w, aligning):
     if _repeats(s, q, w):
         return SAMPLE_INVALID
     row = push(h, stamp)
-    # One sign of the quaternion, so that neighbours can be averaged.
+    # Neighbouring quaternions get the same sign, so that they can be averaged.
     dot = 0.0
     for i in range(4):
         dot += q[i] * h.sample[last, i]
@@ -127,8 +131,8 @@ def take(s, p, t_k, stamp, q, w, aligning):
 
 @compiled
 def at(s, p, t):
-    """(whether there is an attitude at t [s], between two samples or predicted from the last; the Attitude, deck ->
-    earth, of NaN where there is none)."""
+    """Return (whether the attitude at t [s] is known, between two samples or predicted from the last; the Attitude,
+    deck -> earth, of NaN if unknown)."""
     if not s.stabilised:
         return True, Attitude(turn(ASHORE_ATTITUDE[0], ASHORE_ATTITUDE[1], ASHORE_ATTITUDE[2], ASHORE_ATTITUDE[3]),
                               ZERO_VECTOR, ZERO_VECTOR)
@@ -156,7 +160,8 @@ def at(s, p, t):
 
 @compiled
 def on_deck(s, p, t, motion):
-    """Return the Motion on the deck at t [s] of a Motion in earth angles; ashore, or without an attitude, itself."""
+    """Return the Motion on the deck at t [s] of a Motion in earth angles;
+    ashore, or without an attitude, the same Motion."""
     known, deck = at(s, p, t)
     if s.stabilised and known:
         return angles(deck_reference.on_deck(deck, line_of_sight(motion)))

@@ -1,5 +1,4 @@
-"""The azimuth wrap: which of the angles that differ by whole revolutions an axis with more than one of travel
-takes."""
+"""The azimuth wrap: choice among angles that differ by whole revolutions, for an axis with more than one of travel."""
 import math
 from collections import namedtuple
 
@@ -12,9 +11,9 @@ Travel = namedtuple('Travel', 'below above')
 
 @compiled
 def nearest(azimuth, near, low, high, travel):
-    """The wrap of an azimuth [rad], nearest to `near`, from which a Travel stays inside low..high [rad].
+    """Return the wrap of an azimuth [rad], nearest to `near`, from which a Travel stays inside low..high [rad].
 
-    Where none holds the whole travel, one that holds the azimuth itself; otherwise simply the nearest.
+    If no wrap holds the whole travel, return one that holds the azimuth itself; otherwise the nearest.
     """
     closest = near + wrap(azimuth - near)
     best, score = closest, math.inf

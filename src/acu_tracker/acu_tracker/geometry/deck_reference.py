@@ -12,15 +12,14 @@ from pedestal_common.geometry import line_of_sight
 
 ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
 
-
 Attitude = namedtuple('Attitude', 'mat w dw')
-"""Rotation from the deck to the frame the target is given in; rate w [rad/s] and angular acceleration dw
+"""Rotation from the deck to the frame in which the target is given; rate w [rad/s] and angular acceleration dw
 [rad/s2] of the deck, FLU."""
 
 
 @compiled
 def on_deck(attitude, sight):
-    """LineOfSight in FLU of a LineOfSight in the frame of the attitude."""
+    """Return the LineOfSight in FLU of a LineOfSight in the frame of the attitude."""
     u, du = rotated_back(attitude.mat, sight.u), rotated_back(attitude.mat, sight.du)
     ddu = rotated_back(attitude.mat, sight.ddu)
     wu, dwu = cross(attitude.w, u), cross(attitude.dw, u)
@@ -29,8 +28,8 @@ def on_deck(attitude, sight):
 
 @compiled
 def fixed_rates(w, A, E):
-    """Rates (dA, dE) [rad/s] of the deck angles of an earth-fixed direction, now at A, E [rad], while the deck rotates
-    at w [rad/s] (FLU)."""
+    """Return the rates (dA, dE) [rad/s] of the deck angles of an earth-fixed direction, now at A, E [rad], while the
+    deck rotates at w [rad/s] (FLU)."""
     u = Vector(*line_of_sight.direction(A, E))
     motion = angles(LineOfSight(u, times(-1.0, cross(w, u)), ZERO_VECTOR))
     return motion.azimuth.rate, motion.elevation.rate
@@ -38,8 +37,10 @@ def fixed_rates(w, A, E):
 
 @compiled
 def earth_rates(attitude, u, du):
-    """Rates (dA, dE) [rad/s] of the earth angles of a FLU unit vector u that moves by du [1/s] on the deck:
-    u_e' = M (u' + w x u)."""
+    """Return the rates (dA, dE) [rad/s] of the earth angles of a FLU unit vector u that moves by du [1/s] on the deck.
+
+    u_e' = M (u' + w x u).
+    """
     wu = cross(attitude.w, u)
     du = Vector(du.x + wu.x, du.y + wu.y, du.z + wu.z)
     motion = earth_angles(LineOfSight(rotated(attitude.mat, u), rotated(attitude.mat, du), ZERO_VECTOR))

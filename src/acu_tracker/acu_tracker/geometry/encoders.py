@@ -6,7 +6,7 @@ from acu_tracker.geometry.history import bracket, history_type, interpolated, pu
 from pedestal_common.compiled import compiled
 
 ENCODERS_DTYPE = history_type(4)
-"""Azimuth, elevation [rad], their rates [rad/s], deck angles."""
+"""History of the deck angles: azimuth, elevation [rad], and their rates [rad/s]."""
 
 Pointing = namedtuple('Pointing', 'A E dA dE')
 """Deck angles of the antenna [rad] and their rates [rad/s]."""
@@ -14,7 +14,8 @@ Pointing = namedtuple('Pointing', 'A E dA dE')
 
 @compiled
 def take(s, stamp, position, velocity):
-    """Take angles (2,) [rad] and rates (2,) [rad/s] of a step into the history; False where they are not finite."""
+    """Take angles (2,) [rad] and rates (2,) [rad/s] of a step into the history;
+    return False if they are not finite."""
     valid = math.isfinite(position[0] + position[1] + velocity[0] + velocity[1])
     if valid:
         row = push(s, stamp)
@@ -25,7 +26,7 @@ def take(s, stamp, position, velocity):
 
 @compiled
 def at(s, t):
-    """(whether t [s] lies among the last steps, the Pointing then)."""
+    """Return (whether t [s] is among the last steps, the Pointing at t)."""
     rows = bracket(s, t)
     known = rows[0] >= 0
     if not known:
@@ -36,5 +37,5 @@ def at(s, t):
 
 @compiled
 def taken(s, stamp):
-    """Whether the encoders of the step at this stamp [s] are in the history."""
+    """Return True if the encoders of the step at this stamp [s] are in the history."""
     return s.count > 0 and s.stamp[s.newest] == stamp

@@ -1,8 +1,8 @@
-"""The frame of the target filter: the earth's, or near the zenith one whose equator lies along the target's motion.
+"""The frame of the target filter: the earth's, or near the zenith a frame with its equator along the target's motion.
 
 Azimuth and elevation are singular at the zenith. Above TILT_ELEVATION_RAD the filter changes to a frame in which the
-target moves
-along the equator, and back below LEVEL_ELEVATION_RAD. In it a great circle is an azimuth of constant rate.
+target moves along the equator, and back below LEVEL_ELEVATION_RAD. In this frame a great circle is an azimuth of
+constant rate.
 """
 import math
 
@@ -15,15 +15,15 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
 
 TILT_ELEVATION_RAD, LEVEL_ELEVATION_RAD = math.radians(75.0), math.radians(70.0)
-"""Elevation in the earth's frame [rad] above which the frame is tilted, below which it is not any more."""
+"""Elevations in the earth's frame [rad]: above the first the frame is tilted, below the second it is level again."""
 
 FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8')], align=True)
-"""mat: frame -> earth; tilted: 0 where both are the same."""
+"""mat: rotation frame -> earth; tilted: 0 while the frame is the earth's."""
 
 
 @compiled
 def level(f):
-    """Make the frame the earth's."""
+    """Set the frame to the earth's."""
     f.tilted = 0
     for i in range(3):
         for j in range(3):
@@ -32,12 +32,12 @@ def level(f):
 
 @compiled
 def tilt(f, u, du):
-    """Lay the equator from the ENU unit vector u along its rate du [1/s], azimuth 0 at u."""
+    """Lay the equator from the ENU unit vector u along its rate du [1/s], with azimuth 0 at u."""
     W = math.sqrt(dot(du, du))
     if W > 0.0:
         along = Vector(du.x / W, du.y / W, du.z / W)
     else:
-        # It stands still: any direction is as good, so take east.
+        # The target stands still: any direction will do, so take east.
         rho = math.sqrt(u.y * u.y + u.z * u.z)
         along = Vector(rho, -u.x * u.y / rho, -u.x * u.z / rho) if rho > 0.0 else Vector(0.0, 0.0, 0.0)
     up = cross(along, u)
@@ -49,7 +49,7 @@ def tilt(f, u, du):
 
 @compiled
 def to_earth(f, motion):
-    """LineOfSight in ENU of a Motion in the frame."""
+    """Return the LineOfSight in ENU of a Motion in the frame."""
     sight = line_of_sight(motion)
     if not f.tilted:
         return sight
@@ -59,7 +59,7 @@ def to_earth(f, motion):
 
 @compiled
 def to_frame(f, sight):
-    """Motion in the frame of a LineOfSight in ENU; the inverse of to_earth."""
+    """Return the Motion in the frame of a LineOfSight in ENU; the inverse of to_earth."""
     if f.tilted:
         mat = rotation(f.mat)
         sight = LineOfSight(rotated_back(mat, sight.u), rotated_back(mat, sight.du), rotated_back(mat, sight.ddu))
@@ -68,7 +68,7 @@ def to_frame(f, sight):
 
 @compiled
 def direction_to_frame(f, azimuth, elevation):
-    """(azimuth, elevation) [rad] in the frame of a direction's earth angles."""
+    """Return (azimuth, elevation) [rad] in the frame of a direction's earth angles."""
     e, n, u = earth_direction(azimuth, elevation)
     v = rotated_back(rotation(f.mat), Vector(e, n, u))
     return math.atan2(v.x, v.y), math.atan2(v.z, math.hypot(v.x, v.y))
@@ -76,15 +76,16 @@ def direction_to_frame(f, azimuth, elevation):
 
 @compiled
 def verticals(f, azimuth, elevation):
-    """(across, along): components on the earth's vertical of the unit vectors along which azimuth and elevation of a
-    direction in the frame grow; both angles [rad]. Of a level frame 0 and the cosine of the elevation."""
+    """Return (across, along): components along the earth's vertical of the unit vectors in which azimuth and elevation
+    of a direction in the frame grow; both angles [rad]. In a level frame they are 0 and the cosine of the elevation.
+    """
     s, c, z = math.sin(azimuth), math.cos(azimuth), f.mat[2]
     return z[0] * c - z[1] * s, z[2] * math.cos(elevation) - (z[0] * s + z[1] * c) * math.sin(elevation)
 
 
 @compiled
 def of_deck(f, attitude):
-    """The Attitude, deck -> frame, of an Attitude deck -> earth."""
+    """Return the Attitude, deck -> frame, of an Attitude deck -> earth."""
     mat, (x, y, z) = rotation(f.mat), transposed(attitude.mat)
     columns = Rotation(rotated_back(mat, x), rotated_back(mat, y), rotated_back(mat, z))
     return Attitude(transposed(columns), attitude.w, attitude.dw)
@@ -92,13 +93,13 @@ def of_deck(f, attitude):
 
 @compiled
 def earth_variances(f, framed, earth, p_A, p_E):
-    """Variances [rad2] of azimuth and elevation in the earth's frame of those in the frame, p_A and p_E.
+    """Return the variances [rad2] of azimuth and elevation in the earth's frame from those in the frame, p_A and p_E.
 
-    framed, earth: the Motion of the target in either. The frame's own correlation is not known and taken as none.
+    framed, earth: the Motion of the target in each frame. The correlation in the frame is unknown and taken as zero.
     """
     A, E = framed.azimuth.angle, framed.elevation.angle
     azimuth, elevation = earth.azimuth.angle, earth.elevation.angle
-    # Unit vectors of both frames in the direction of growing azimuth.
+    # Unit vectors of both frames in the direction of growing azimuth, and the cosine c of the angle between them.
     across = rotated(rotation(f.mat), Vector(math.cos(A), -math.sin(A), 0.0))
     c = across.x * math.cos(azimuth) - across.y * math.sin(azimuth)
     p_across = p_A * math.cos(E)**2

@@ -1,20 +1,22 @@
-"""Stamped samples of the last steps, and their interpolation at an instant."""
+"""Stamped samples of the last steps, and their interpolation to an instant."""
 import numpy as np
 
 from pedestal_common.compiled import compiled
 
 HISTORY_LENGTH = 64
+"""Number of samples in a history."""
 
 
 def history_type(width) -> np.dtype:
-    """Ring of HISTORY_LENGTH stamps [s] with `width` numbers each; `count` in use, `newest` the row of the last."""
+    """Return the dtype of a ring of HISTORY_LENGTH stamps [s] with `width` numbers each; `count`: number of rows in
+    use; `newest`: row of the last."""
     return np.dtype([('stamp', 'f8', (HISTORY_LENGTH,)), ('sample', 'f8', (HISTORY_LENGTH, width)),
                      ('newest', 'i8'), ('count', 'i8')], align=True)
 
 
 @compiled
 def push(history, stamp):
-    """Append a stamp [s] newer than all others: the row of its sample, which the caller fills."""
+    """Append a stamp [s] newer than all others; return the row of its sample, which the caller fills."""
     history.newest = (history.newest + 1) % HISTORY_LENGTH
     history.stamp[history.newest] = stamp
     history.count = min(history.count + 1, HISTORY_LENGTH)
@@ -23,7 +25,7 @@ def push(history, stamp):
 
 @compiled
 def bracket(history, t):
-    """(older row, newer row, fraction between them) around the instant t [s]; rows -1 where t is outside."""
+    """Return (older row, newer row, fraction between them) around the instant t [s]; rows -1 if t is outside."""
     newer = history.newest
     if history.count == 0 or not t <= history.stamp[newer]:
         return -1, -1, 0.0
@@ -39,7 +41,7 @@ def bracket(history, t):
 
 @compiled
 def interpolated(history, rows, column):
-    """A column of the samples, interpolated linearly; rows: as of `bracket`, valid."""
+    """Return a column of the samples, interpolated linearly; rows: valid rows of `bracket`."""
     i, j, f = rows
     a, b = history.sample[i, column], history.sample[j, column]
     return a + f * (b - a)

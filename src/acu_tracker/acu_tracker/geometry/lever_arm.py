@@ -1,4 +1,4 @@
-"""The arm r from the INS to the antenna, where the range is measured.
+"""The arm r from the INS to the antenna, used if the range is measured.
 
 The antenna of a rolling ship moves, so that a near target appears to move by r / range. Seen from the INS it does not.
 """
@@ -12,21 +12,21 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction, wrap
 
 LEVER_ARM_DTYPE = np.dtype([('arm', 'f8', (3,)), ('range', 'f8')], align=True)
-"""arm: r over the range of the INS, FLU [-]; range: that range [m], 0 where none was measured."""
+"""arm: r over the range from the INS, FLU [-]; range: that range [m], 0 if it was not measured."""
 
 RANGE_SMOOTHING_SHARE = 0.05
-"""Share of a measured range that the smoothed one takes."""
+"""Share of a new range in the smoothed range [-]."""
 
 
 @compiled
 def from_ins(s, r, measured, running, v):
-    """The direction from the INS of a unit vector v (FLU) measured at the antenna: a Vector of length about 1.
+    """Return the direction from the INS of a unit vector v (FLU) measured at the antenna: a Vector of length about 1.
 
-    r: the arm, record x, y, z [m]; measured: range of the antenna [m], NaN: none; running: whether a filter runs.
+    r: the arm, record x, y, z [m]; measured: range of the antenna [m], NaN for none; running: whether a filter runs.
 
     With a range the estimate is the line of sight from the INS, which the deck's rotation does not move: R = |rho u +
-    r| is smoothed, and the arm added. Only a filter that starts with a range does so, so that one estimate never mixes
-    both lines of sight.
+    r| is smoothed, and the arm is added. Only a filter that starts with a range does so. This avoids an estimate that
+    mixes both lines of sight.
     """
     along, r2 = v.x * r.x + v.y * r.y + v.z * r.z, r.x * r.x + r.y * r.y + r.z * r.z
     known = measured > 0.0
@@ -46,20 +46,21 @@ def from_ins(s, r, measured, running, v):
 
 @compiled
 def to_antenna(s, sight):
-    """LineOfSight at the antenna of one at the INS, both FLU: v = u - r; the range is taken as constant."""
+    """Return the LineOfSight at the antenna of one at the INS, both FLU: v = u - r; the range is taken as constant."""
     return normalised(minus(sight.u, vector(s.arm)), sight.du, sight.ddu)
 
 
 @compiled
 def to_ins(s, u, du):
-    """(u, du) at the INS of a unit vector u and its rate du [1/s] at the antenna, both FLU."""
+    """Return (u, du) at the INS of a unit vector u and its rate du [1/s] at the antenna, both FLU."""
     sight = normalised(Vector(u.x + s.arm[0], u.y + s.arm[1], u.z + s.arm[2]), du, Vector(0.0, 0.0, 0.0))
     return sight.u, sight.du
 
 
 @compiled
 def earth_angles_to_antenna(s, mat_ed, motion):
-    """Motion in earth angles at the antenna of one at the INS, mat_ed: Rotation deck -> earth; the rates stay."""
+    """Return the Motion in earth angles at the antenna of a Motion at the INS;
+    mat_ed: Rotation deck -> earth; the rates stay."""
     A, E = motion.azimuth.angle, motion.elevation.angle
     e, n, u = earth_direction(A, E)
     r = rotated(mat_ed, vector(s.arm))

@@ -13,7 +13,7 @@ AxisMotion = namedtuple('AxisMotion', 'angle rate acceleration')
 """Angle [rad], rate [rad/s] and acceleration [rad/s2] of one axis."""
 
 Motion = namedtuple('Motion', 'azimuth elevation')
-"""Both axes; motion[0] is azimuth, motion[1] elevation."""
+"""Motion of both axes; motion[0] is azimuth, motion[1] elevation."""
 
 LineOfSight = namedtuple('LineOfSight', 'u du ddu')
 """Unit vector u [-] towards the target, its first [1/s] and second [1/s2] derivative."""
@@ -21,7 +21,7 @@ LineOfSight = namedtuple('LineOfSight', 'u du ddu')
 
 @compiled
 def line_of_sight(motion):
-    """LineOfSight in ENU of a Motion in earth angles."""
+    """Return the LineOfSight in ENU of a Motion in earth angles."""
     A, dA, ddA = motion.azimuth
     E, dE, ddE = motion.elevation
     sA, cA, sE, cE = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
@@ -36,13 +36,13 @@ def line_of_sight(motion):
 
 @compiled
 def north_west_up(v):
-    """North-west-up components of an ENU vector; FLU, where deck angles were passed as earth angles."""
+    """Return the north-west-up components of an ENU vector; FLU, if deck angles were passed as earth angles."""
     return Vector(v.y, -v.x, v.z)
 
 
 @compiled
 def angles(sight):
-    """Motion of a LineOfSight in FLU or north-west-up.
+    """Return the Motion of a LineOfSight in FLU or north-west-up.
 
     Singular at the zenith: within 1e-6 rad of it the rates are those at 1e-6 rad.
     """
@@ -58,13 +58,14 @@ def angles(sight):
 
 @compiled
 def earth_angles(sight):
-    """Motion of a LineOfSight in ENU."""
+    """Return the Motion of a LineOfSight in ENU."""
     return angles(LineOfSight(north_west_up(sight.u), north_west_up(sight.du), north_west_up(sight.ddu)))
 
 
 @compiled
 def normalised(v, dv, ddv):
-    """LineOfSight along a vector v of any length with its derivatives: n = v / |v|, n' = (v' - n (n.v')) / |v|, ..."""
+    """Return the LineOfSight along a vector v of any length, with its derivatives:
+    n = v / |v|, n' = (v' - n (n.v')) / |v|."""
     k = 1.0 / math.sqrt(dot(v, v))
     n, dv, ddv = times(k, v), times(k, dv), times(k, ddv)
     along = dot(n, dv)
@@ -76,7 +77,8 @@ def normalised(v, dv, ddv):
 
 @compiled
 def motion_of_position(p, v, a):
-    """Motion in earth angles of an ENU position p [m], its velocity v and acceleration a, seen from the origin."""
+    """Return the Motion in earth angles of an ENU position p [m],
+    its velocity v and acceleration a, seen from the origin."""
     r = math.sqrt(dot(p, p))
     u = Vector(p.x / r, p.y / r, p.z / r)
     dr = dot(u, v)

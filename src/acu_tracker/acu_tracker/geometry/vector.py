@@ -13,7 +13,7 @@ Rotation = namedtuple('Rotation', 'x y z')
 
 @compiled
 def vector(row):
-    """The Vector of an array (3,)."""
+    """Return the Vector of an array (3,)."""
     return Vector(row[0], row[1], row[2])
 
 
@@ -33,42 +33,42 @@ def turn(x, y, z, w):
 
 @compiled
 def minus(a, b):
-    """a - b."""
+    """Return a - b."""
     return Vector(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
 @compiled
 def times(k, a):
-    """k a, k a number."""
+    """Return k a, k a number."""
     return Vector(k * a.x, k * a.y, k * a.z)
 
 
 @compiled
 def dot(a, b):
-    """a . b."""
+    """Return a . b."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
 @compiled
 def cross(a, b):
-    """a x b."""
+    """Return a x b."""
     return Vector(*line_of_sight.cross(a.x, a.y, a.z, b.x, b.y, b.z))
 
 
 @compiled
 def transposed(mat):
-    """M', of a Rotation M."""
+    """Return M' of a Rotation M."""
     return Rotation(Vector(mat.x.x, mat.y.x, mat.z.x), Vector(mat.x.y, mat.y.y, mat.z.y),
                     Vector(mat.x.z, mat.y.z, mat.z.z))
 
 
 @compiled
 def rotated(mat, a):
-    """M a, of a Rotation M."""
+    """Return M a, of a Rotation M."""
     return Vector(dot(mat.x, a), dot(mat.y, a), dot(mat.z, a))
 
 
 @compiled
 def rotated_back(mat, a):
-    """M' a, of a Rotation M."""
+    """Return M' a, of a Rotation M."""
     return rotated(transposed(mat), a)

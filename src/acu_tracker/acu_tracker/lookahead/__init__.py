@@ -1,4 +1,4 @@
-"""What lies ahead of the deck: keyholes, hidden sectors.
+"""Look-ahead on the deck: keyholes and hidden sectors on the future path of the target.
 
 Symbols
     W, E0           rate of a target along its great circle, its highest elevation      [rad/s], [rad]

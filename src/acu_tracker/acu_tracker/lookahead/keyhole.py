@@ -15,28 +15,31 @@ from pedestal_common.geometry.line_of_sight import wrap
 
 SLEW_LIMITS_DTYPE = np.dtype([('rate', 'f8'), ('acceleration', 'f8'), ('low', 'f8'), ('high', 'f8'), ('highest', 'f8'),
                               ('half_beam', 'f8')], align=True)
-"""What a slew may use: rate [rad/s], acceleration [rad/s2], azimuth from low to high, elevation up to highest [rad];
+"""Limits of a slew: rate [rad/s], acceleration [rad/s2], azimuth from low to high, elevation up to highest [rad];
 half_beam: half the beamwidth [rad]."""
 
 SLEW_CANDIDATE_COUNT, REFINEMENT_COUNT, SLEW_SAMPLE_COUNT, BISECTION_COUNT = 48, 4, 160, 24
+"""Numbers of candidates for t1, of refinements of t1, of samples in which a slew is
+evaluated, of bisections for t2."""
 
 PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP, PLAN_BEYOND_PATH = range(4)
 """Outcomes of `plan`: no keyhole, a slew planned, no azimuth wrap that fits, a keyhole that ends beyond the path."""
 
 Passage = namedtuple('Passage', 'path azimuth limits after tilt')
-"""A keyhole to be slewed through.
+"""A keyhole that needs a slew.
 
-path: a completed Path; azimuth: of the axis at its first row [rad]; limits: record of SLEW_LIMITS_DTYPE; after: when
-following is possible again [s]; tilt: rms about one axis of the deck's tilt [rad], normally distributed, which a
-slew cannot follow."""
+path: a completed Path; azimuth: of the axis at its first row [rad]; limits: record of SLEW_LIMITS_DTYPE; after: time
+from which following is possible again [s]. `tilt`: rms tilt of the deck about one axis [rad], normally distributed,
+which a slew cannot follow.
+"""
 
 
 @compiled
-def _lay(slew, passage, way, t1):
-    """Fit a slew from t1 [s] to the first instant, from passage.after on, at which it can meet the target: whether
-    there is one.
+def _fit(slew, passage, turn, t1):
+    """Fit a slew that leaves the target at t1 [s] and meets it at the first possible instant from passage.after on;
+    return False if there is none.
 
-    way: 1 clockwise, -1 counter-clockwise. azimuth1 is set within +-pi.
+    turn: 1 clockwise, -1 counter-clockwise. azimuth1 is set within +-pi.
     """
     path, k = passage.path, passage.limits
     A1, v1 = paths.azimuth_at(path, t1, k.rate)
@@ -44,12 +47,12 @@ def _lay(slew, passage, way, t1):
     for i in range(BISECTION_COUNT):
         t2 = late if i == 0 else early if i == 1 else 0.5 * (early + late)
         A2, v2 = paths.azimuth_at(path, t2, k.rate)
-        D = way * (A2 - A1)
+        D = turn * (A2 - A1)
         D -= 2.0 * math.pi * math.floor(D / (2.0 * math.pi))
-        tried = slews.peak_rate(D, t2 - t1, way * v1, way * v2, k.acceleration)
+        tried = slews.peak_rate(D, t2 - t1, turn * v1, turn * v2, k.acceleration)
         if tried <= k.rate:
             late, v = t2, tried
-            slew.t2, slew.azimuth2, slew.rate2 = t2, A1 + way * D, v2
+            slew.t2, slew.azimuth2, slew.rate2 = t2, A1 + turn * D, v2
             if i == 1:
                 break
         elif i == 0:
@@ -57,8 +60,8 @@ def _lay(slew, passage, way, t1):
         else:
             early = t2
     slew.t1, slew.azimuth1, slew.rate1 = t1, A1, v1
-    slew.peak, slew.acceleration = way * v, k.acceleration
-    return v >= max(way * v1, way * slew.rate2) - 1e-6 * k.rate
+    slew.peak, slew.acceleration = turn * v, k.acceleration
+    return v >= max(turn * v1, turn * slew.rate2) - 1e-6 * k.rate
 
 
 @compiled
@@ -73,7 +76,7 @@ def _unwrap(slew, path, azimuth):
 
 @compiled
 def _fits(slew, path, low, high):
-    """Whether an unwrapped slew and the travel of the path after it stay inside low..high [rad]."""
+    """Return True if an unwrapped slew and the travel of the path after it stay inside low..high [rad]."""
     i = min(int((slew.t2 - path.t0) / path.h) + 1, len(path.rows) - 1)
     end = slew.azimuth2 - path.rows[i, 3]
     return (low <= min(slew.azimuth1, end + path.rows[i, 4])
@@ -81,9 +84,12 @@ def _fits(slew, path, low, high):
 
 
 @compiled
-def _judge(slew, passage, samples):
-    """Set cost, loss and worst of a fitted slew: cost = integral of x^8 / (1 + x^8), x the pointing offset in half
-    beamwidths, a smooth form of the loss that still ranks slews without one."""
+def _evaluate(slew, passage, samples):
+    """Set cost, loss and worst of a fitted slew.
+
+    cost = integral of x^8 / (1 + x^8), x the pointing offset in half beamwidths. This smooth form of the loss also
+    ranks slews without a loss.
+    """
     k = passage.limits
     T = (slew.t2 - slew.t1) / samples
     cost = loss = worst = 0.0
@@ -102,23 +108,23 @@ def _judge(slew, passage, samples):
 
 
 @compiled
-def _attempt(slew, passage, way, t1, samples):
-    """Fit, unwrap and judge a slew that leaves at t1 [s]: (whether there is one, its cost, inf where it does not fit
-    the limits)."""
-    if t1 < passage.path.t0 or not _lay(slew, passage, way, t1):
+def _attempt(slew, passage, turn, t1, samples):
+    """Fit, unwrap and evaluate a slew that leaves at t1 [s]; return (whether there is one, its cost, inf if it does
+    not fit the limits)."""
+    if t1 < passage.path.t0 or not _fit(slew, passage, turn, t1):
         return False, math.inf
     _unwrap(slew, passage.path, passage.azimuth)
     if not _fits(slew, passage.path, passage.limits.low, passage.limits.high):
         return True, math.inf
-    _judge(slew, passage, samples)
+    _evaluate(slew, passage, samples)
     return True, slew.cost
 
 
 @compiled
 def find(path, rate, acceleration):
-    """(first row, last row, largest rate [rad/s]) between which following a path takes more than rate [rad/s] or
-    acceleration [rad/s2]; rows -1 for none. Excesses further apart than half a revolution takes are two keyholes.
-    """
+    """Return (first row, last row, largest rate [rad/s]) of the keyhole, in which following a path takes more than
+    rate [rad/s] or acceleration [rad/s2]; rows -1 for none. Two excesses further apart than the time of half a
+    revolution are two keyholes."""
     first, last, needed, before = -1, -1, 0.0, 0.0
     for i in range(1, len(path.rows)):
         dA = (path.rows[i, 3] - path.rows[i - 1, 3]) / path.h
@@ -133,11 +139,12 @@ def find(path, rate, acceleration):
 
 @compiled
 def plan(slew, path, azimuth, limits, tilt):
-    """Find the keyhole of a completed Path, and the best slew through it: PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP or
-    PLAN_BEYOND_PATH.
+    """Find the keyhole of a completed Path and the best slew through it; return PLAN_NO_KEYHOLE, PLAN_SLEW,
+    PLAN_NO_WRAP or PLAN_BEYOND_PATH.
 
-    slew: records (2,) of SLEW, the first for the best, the second to try; the other arguments as in Passage. Bounded:
-    two directions, SLEW_CANDIDATE_COUNT + 9 REFINEMENT_COUNT slews of SLEW_SAMPLE_COUNT each.
+    slew: records (2,) of SLEW_DTYPE, the first for the best slew, the second for trials; other arguments as in
+    Passage. The effort is bounded: two directions, SLEW_CANDIDATE_COUNT + 9 REFINEMENT_COUNT slews of
+    SLEW_SAMPLE_COUNT samples each.
     """
     first, last, needed = find(path, limits.rate, limits.acceleration)
     if first < 0:
@@ -146,31 +153,31 @@ def plan(slew, path, azimuth, limits, tilt):
     t_in, t_out = path.t0 + first * path.h, path.t0 + last * path.h
     passage = Passage(path, azimuth, limits, t_out, tilt)
     natural = path.rows[last, 3] - path.rows[first, 3]
-    # Leaving earlier than a whole revolution takes cannot help.
+    # Leaving earlier than the time of a whole revolution has no advantage.
     width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / SLEW_CANDIDATE_COUNT
-    laid, least, other = False, math.inf, math.inf
+    feasible, least, other = False, math.inf, math.inf
     for side in range(2):
-        way = math.copysign(1.0, natural) * (1.0 - 2.0 * side)
+        turn = math.copysign(1.0, natural) * (1.0 - 2.0 * side)
         centre, cost, step = t_in - 0.5 * SLEW_CANDIDATE_COUNT * width, math.inf, width
         for level in range(REFINEMENT_COUNT + 1):
-            # The whole interval, then finer about the best so far, at last the best itself with more samples.
+            # The whole interval, then finer about the best so far, finally the best alone with more samples.
             around = 0 if level == REFINEMENT_COUNT else SLEW_CANDIDATE_COUNT // 2 if level == 0 else 4
             middle = centre
             for k in range(-around, around + 1):
                 t1 = min(middle + k * step, t_in)
-                (possible, here) = _attempt(trial, passage, way, t1, SLEW_SAMPLE_COUNT if around > 0 else 10
-                                            * SLEW_SAMPLE_COUNT)
-                laid |= possible and side == 0
+                samples = SLEW_SAMPLE_COUNT if around > 0 else 10 * SLEW_SAMPLE_COUNT
+                possible, here = _attempt(trial, passage, turn, t1, samples)
+                feasible |= possible and side == 0
                 if here < cost:
                     centre, cost = t1, here
             if cost == math.inf:
                 break
             step *= 0.25
-        if not laid:
+        if not feasible:
             return PLAN_BEYOND_PATH
         if cost < math.inf:
             other = max(least, cost)
-            # Where both directions cost the same, the target's own.
+            # If both directions cost the same, the target's own is used.
             if trial.cost < 0.999 * least:
                 least = trial.cost
                 trial.long_way = side

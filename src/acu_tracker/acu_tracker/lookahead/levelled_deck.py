@@ -7,24 +7,24 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 
 LEVELLED_DECK_DTYPE = np.dtype([('mean', 'f8', (4,)), ('spread', 'f8'), ('since', 'f8'), ('latest', 'f8')], align=True)
-"""mean: quaternion (x, y, z, w) levelled deck -> earth; spread: mean square of the deck's tilt from it [rad2];
-since, latest: stamps [s] of the first and the last attitude in it, latest -inf before there is one."""
+"""mean: quaternion (x, y, z, w) levelled deck -> earth; spread: mean square of the deck's tilt from it [rad2].
+`since`, `latest`: stamps [s] of the first and the last attitude in the mean, latest -inf before the first."""
 
 
 def initialise(s):
-    """Ashore, and no attitude of a ship yet; s (n,) of LEVELLED_DECK_DTYPE."""
+    """Start ashore, before any attitude of a ship; s (n,) of LEVELLED_DECK_DTYPE."""
     s['mean'], s['latest'] = ASHORE_ATTITUDE, -math.inf
 
 
 @compiled
-def take(s, stamp, q, mean_time, anew):
-    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s]. anew: it begins with this
-    one.
+def take(s, stamp, q, mean_time, restart):
+    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s];
+    restart: begin with this one.
 
-    A ship whose mean is not known yet is taken to be level.
+    A ship whose mean is not known yet is assumed to be level.
     """
     mean = s.mean
-    if anew or not s.latest > -math.inf:
+    if restart or not s.latest > -math.inf:
         s.since = stamp
         heading = math.hypot(q[2], q[3])
         mean[0] = mean[1] = 0.0
@@ -42,7 +42,7 @@ def take(s, stamp, q, mean_time, anew):
             norm += mean[i] * mean[i]
         for i in range(4):
             mean[i] /= math.sqrt(norm)
-        # The difference between the two decks' vertical axes, in the two horizontal directions.
+        # x, y: difference between the two decks' vertical axes in the two horizontal directions.
         x = 2.0 * (q[0] * q[2] - q[3] * q[1] - mean[0] * mean[2] + mean[3] * mean[1])
         y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
         s.spread += T / (min(stamp - s.since, mean_time) + T) * (x * x + y * y - s.spread)

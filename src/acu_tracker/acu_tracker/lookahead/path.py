@@ -9,16 +9,16 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
 PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6
-
+"""Size of the path of a look-ahead."""
 
 Path = namedtuple('Path', 'rows t0 h')
-"""rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), and set by `complete`
-the unwrapped azimuth, the least and the largest azimuth from there to the end [rad]."""
+"""rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), and three columns set by
+`complete`. They are the unwrapped azimuth, and the least and the largest azimuth from there to the end [rad]."""
 
 
 @compiled
 def along_program(path, mat, way):
-    """Lay out the path of a bridge.Way: how many rows it covers.
+    """Lay out the path of a bridge.Way; return the number of rows that it covers.
 
     mat (3, 3): levelled deck -> earth.
     """
@@ -33,7 +33,7 @@ def along_program(path, mat, way):
 
 @compiled
 def along_great_circle(path, mat, u, du):
-    """Lay out the path of an ENU unit vector u that keeps its rate du [1/s]: how many rows it covers, all."""
+    """Lay out the path of an ENU unit vector u that keeps its rate du [1/s]; return the number of rows."""
     W, level = math.sqrt(dot(du, du)), rotation(mat)
     for i in range(len(path.rows)):
         path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, turned(u, du, W, W * i * path.h))
@@ -42,7 +42,7 @@ def along_great_circle(path, mat, u, du):
 
 @compiled
 def complete(path, travel):
-    """Fill the azimuth columns; travel: the Travel of the azimuth once the path has ended."""
+    """Fill the azimuth columns; travel: the Travel of the azimuth after the end of the path."""
     rows, n = path.rows, len(path.rows)
     before = math.atan2(-rows[0, 1], rows[0, 0])
     rows[0, 3] = before
@@ -56,7 +56,7 @@ def complete(path, travel):
 
 @compiled
 def at(path, t):
-    """(u, du [1/s]) of the path at t [s], in straight lines between its rows."""
+    """Return (u, du [1/s]) of the path at t [s], in straight lines between its rows."""
     i = min(max(int((t - path.t0) / path.h), 0), len(path.rows) - 2)
     f = (t - path.t0) / path.h - i
     a = Vector(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
@@ -67,7 +67,7 @@ def at(path, t):
 
 @compiled
 def azimuth_at(path, t, rate):
-    """(azimuth [rad], its rate within +-rate [rad/s]) of the path at t [s]."""
+    """Return (azimuth [rad], its rate within +-rate [rad/s]) of the path at t [s]."""
     u, du = at(path, t)
     dA = (u.y * du.x - u.x * du.y) / max(u.x * u.x + u.y * u.y, 1e-12)
     return math.atan2(-u.y, u.x), min(max(dA, -rate), rate)
@@ -75,5 +75,5 @@ def azimuth_at(path, t, rate):
 
 @compiled
 def end(path):
-    """Time of the last row [s]."""
+    """Return the time of the last row [s]."""
     return path.t0 + (len(path.rows) - 1) * path.h

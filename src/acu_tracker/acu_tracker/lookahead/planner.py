@@ -1,9 +1,8 @@
 """The look-ahead: a keyhole that the antenna must slew through, sectors of the deck that will hide the target.
 
-Once in LOOK_AHEAD_PERIOD_S the next `horizon` seconds of the target's path are laid out on the levelled deck: along
-the program
-track, in autotrack rotated so that it begins at the estimate, or along the great circle of the estimate where there is
-no program. The levelled deck is the mean attitude of the ship; a planned slew keeps the one it was made for.
+Every LOOK_AHEAD_PERIOD_S the next `horizon` seconds of the target's path are laid out on the levelled deck. The path
+is the program track, which in autotrack is rotated to begin at the estimate. Without a program it is the great circle
+of the estimate. The levelled deck is the mean attitude of the ship; a planned slew keeps the deck it was planned on.
 """
 import math
 
@@ -22,29 +21,28 @@ LOOK_AHEAD_PERIOD_S = 1.0
 """Time between two look-aheads [s]."""
 
 FORECAST_TEXTS = ('none', 'keyhole', 'no turn')
+"""Texts of the forecasts."""
 FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
 PLANNER_DTYPE = np.dtype([
     ('deck', levelled_deck.LEVELLED_DECK_DTYPE), ('looked', 'f8'),
     ('forecast', 'i8'), ('forecasts', 'i8'), ('slew', slews.SLEW_DTYPE), ('level', 'f8', (3, 3)),
-    ('deck_motion', 'f8'),
-    ('hidden', 'f8', (2,)), ('blockages', 'i8'), ('program', 'f8', (7,)),
+    ('deck_motion', 'f8'), ('hidden', 'f8', (2,)), ('blockages', 'i8'), ('program', 'f8', (7,)),
     ('next_slew', slews.SLEW_DTYPE, (2,)), ('next_level', 'f8', (3, 3)),
     ('rows', 'f8', (paths.PATH_ROW_COUNT, paths.PATH_COLUMN_COUNT)),
 ], align=True)
-"""looked: when the path was last laid out [s]; forecast: one of FORECAST_TEXTS, counted by forecasts; slew: while it
-is
-FORECAST_KEYHOLE, on the levelled deck `level` (levelled deck -> earth), deck_motion: the deck's tilt from there then
-[rad rms];
-hidden: from when until when [s] a sector will hide the target, NaN none, counted by blockages; program: what
-`another_program` compares the last one by; next_slew, next_level, rows: those of the look-ahead under way."""
+"""looked: time of the last look-ahead [s]; forecast: index in FORECAST_TEXTS; forecasts: number of forecasts so far.
+`slew`: while the forecast is FORECAST_KEYHOLE, on the levelled deck `level` (levelled deck -> earth); deck_motion: rms
+tilt of the deck from `level` at that time [rad]. `hidden`: begin and end [s] of the time in which a sector will hide
+the target, NaN for none; blockages: their number so far. `program`: key of the last program for `another_program`.
+`next_slew`, `next_level`, `rows`: work space of a look-ahead."""
 
 CONSTANTS_DTYPE = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyhole.SLEW_LIMITS_DTYPE),
                             ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of AcuParameters."""
+    """Return the constants (1,) of AcuParameters."""
     c, k, a = np.zeros(1, CONSTANTS_DTYPE), params.keyhole, params.azimuth
     c['horizon'], c['notice'] = k.horizon, k.notice
     c['limits'] = (k.share * a.shaper.rate, k.share * a.shaper.acceleration, a.limits.low, a.limits.high,
@@ -54,7 +52,7 @@ def constants(params) -> np.ndarray:
 
 
 def initialise(h):
-    """Nothing planned, nothing known; h (n,) of PLANNER_DTYPE."""
+    """Start without a plan; h (n,) of PLANNER_DTYPE."""
     levelled_deck.initialise(h['deck'])
     h['looked'], h['hidden'] = -math.inf, math.nan
 
@@ -69,7 +67,8 @@ def clear_plan(h):
 
 @compiled
 def another_program(h, program):
-    """Whether the program differs from that of the previous call, in its number of rows, its first or its last row."""
+    """Return True if the program differs from that of the previous call, in its number of rows,
+    its first or its last row."""
     last = len(program.times) - 1
     same = h.program[0] == last
     h.program[0] = last
@@ -83,34 +82,35 @@ def another_program(h, program):
 
 @compiled
 def due(h, t):
-    """Whether to look ahead at t [s]: LOOK_AHEAD_PERIOD_S after the last time, and not before a slew has ended."""
+    """Return True if a look-ahead is due at t [s]: LOOK_AHEAD_PERIOD_S after the last one,
+    and after the end of a slew."""
     return not (t - h.looked < LOOK_AHEAD_PERIOD_S or (h.forecast == FORECAST_KEYHOLE and t <= h.slew.t2))
 
 
 @compiled
 def look_along_program(h, c, t, azimuth, way):
-    """Look for a keyhole and hidden sectors from t [s] on along a bridge.Way; azimuth: of the axis at t, on the deck
-    [rad]."""
+    """Search a bridge.Way for a keyhole and hidden sectors from t [s] on;
+    azimuth: of the axis at t, on the deck [rad]."""
     path, program = _begin(h, c, t), way.program
     count = paths.along_program(path, h.next_level, way)
     travel = Travel(0.0, 0.0)
     if count >= 3 and t + count * path.h < program.times[-1]:
         travel = program_track.azimuth_travel(program, t + (count - 1) * path.h)
-    _look(h, c, path, count, azimuth, travel)
+    _search(h, c, path, count, azimuth, travel)
 
 
 @compiled
 def look_along_great_circle(h, c, t, azimuth, u, du):
-    """Look ahead from t [s] on along the great circle of an ENU unit vector u with its rate du [1/s]; azimuth as
-    above."""
+    """Search the great circle of an ENU unit vector u with its rate du [1/s] from t [s] on; azimuth: of the axis at t,
+    on the deck [rad]."""
     path = _begin(h, c, t)
     count = paths.along_great_circle(path, h.next_level, u, du)
-    _look(h, c, path, count, azimuth, Travel(0.0, 0.0))
+    _search(h, c, path, count, azimuth, Travel(0.0, 0.0))
 
 
 @compiled
 def _begin(h, c, t):
-    """The Path that is to be laid out from t [s] on; the levelled deck is the mean of now."""
+    """Return the Path to be laid out from t [s] on; the levelled deck is the present mean."""
     q = h.deck.mean
     h.looked = t
     rotation(q[0], q[1], q[2], q[3], h.next_level)
@@ -118,16 +118,17 @@ def _begin(h, c, t):
 
 
 @compiled
-def _look(h, c, path, count, azimuth, travel):
-    """Look for a keyhole and hidden sectors on the first `count` rows of a Path; travel: of the azimuth after them.
+def _search(h, c, path, count, azimuth, travel):
+    """Search the first `count` rows of a Path for a keyhole and hidden sectors;
+    travel: of the azimuth after these rows.
 
-    A slew is kept once it begins within `notice`, or as soon as it is known that no wrap of the azimuth fits.
+    A plan becomes final when its slew begins within `notice`. If no wrap of the azimuth fits, that is forecast now.
     """
     if count < 3:
         return
     path = paths.Path(path.rows[:count], path.t0, path.h)
     paths.complete(path, travel)
-    _look_for_sectors(h, c.sectors, path)
+    _find_sectors(h, c.sectors, path)
     outcome = keyhole.plan(h.next_slew, path, azimuth, c.limits, math.sqrt(0.5 * h.deck.spread))
     if outcome == keyhole.PLAN_SLEW and h.next_slew[0].t1 - path.t0 <= c.notice:
         h.slew = h.next_slew[0]
@@ -143,9 +144,8 @@ def _look(h, c, path, count, azimuth, travel):
 
 
 @compiled
-def _look_for_sectors(h, sectors, path):
-    """Find the first interval in which the path is hidden; it counts as new when it begins after the last has
-    ended."""
+def _find_sectors(h, sectors, path):
+    """Find the first interval in which the path is hidden; it counts as new if it begins after the end of the last."""
     first = last = -1
     for i in range(len(path.rows)):
         A, E = angles(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
@@ -158,18 +158,19 @@ def _look_for_sectors(h, sectors, path):
         h.hidden[:] = math.nan
     else:
         begin = path.t0 + first * path.h
-        if not begin <= h.hidden[1]:        # NaN: there was none
+        if not begin <= h.hidden[1]:        # NaN: no sector before
             h.blockages += 1
         h.hidden[0], h.hidden[1] = begin, path.t0 + last * path.h
 
 
 @compiled
 def slewing(h, t):
-    """Whether a slew is under way at t [s]."""
+    """Return True if a slew is under way at t [s]."""
     return h.forecast == FORECAST_KEYHOLE and h.slew.t1 <= t <= h.slew.t2
 
 
 @compiled
 def motion_at(h, c, t, target, level):
-    """(Motion of the axes at t [s] of a slew under way, pointing offset [rad]); target, level as in slew.motion_at."""
+    """Return (Motion of the axes at t [s] of a slew under way, pointing offset [rad]); target, level as in
+    slew.motion_at."""
     return slews.motion_at(h.slew, t, target, level, c.limits.highest)

@@ -1,5 +1,7 @@
-"""A slew through the keyhole: the azimuth leaves the target, slews at its limits and meets the target again; the
-elevation takes the angle at which the beam is closest to the target."""
+"""A slew through the keyhole: the azimuth leaves the target, slews at its limits and meets the target again.
+
+The elevation takes the angle at which the beam is closest to the target.
+"""
 import math
 
 import numpy as np
@@ -13,16 +15,17 @@ SLEW_DTYPE = np.dtype([('t1', 'f8'), ('t2', 'f8'), ('azimuth1', 'f8'), ('azimuth
                        ('culmination', 'f8'), ('highest', 'f8'), ('needed', 'f8'),
                        ('loss', 'f8'), ('worst', 'f8'), ('cost', 'f8'), ('other_cost', 'f8'), ('long_way', 'i8')],
                       align=True)
-"""Leaves the target at t1 [s] with azimuth1 [rad], rate1 [rad/s], meets it at t2; peak: its largest rate, signed;
-acceleration [rad/s2] in which it is reached; culmination [s] and highest [rad]: elevation there on the levelled deck;
-needed: largest azimuth rate that following would take [rad/s]; loss: expected time [s] further than half a beamwidth
-off; worst: largest pointing offset [rad]; cost: share of signal lost, in seconds, other_cost: of the other direction,
-inf where the limits forbid it; long_way: 1 where the slew goes against the target's own direction."""
+"""t1, azimuth1, rate1: time [s] at which the slew leaves the target, azimuth [rad] and rate [rad/s] there; t2,
+azimuth2, rate2: the same where it meets the target. `peak`: largest rate, signed [rad/s]; acceleration: to the peak
+[rad/s2]; culmination, highest: time [s] and elevation [rad] of the target's highest point on the levelled deck.
+`needed`: largest azimuth rate of following without a slew [rad/s]; loss: expected time [s] further than half a
+beamwidth off; worst: largest pointing offset [rad]. `cost`: share of signal lost, in seconds; other_cost: of the other
+direction, inf if the limits forbid it; long_way: 1 if the slew goes against the target's own direction."""
 
 
 @compiled
 def azimuth_at(slew, t):
-    """AxisMotion of the azimuth at t1 <= t <= t2 [s]: accelerated, at its peak rate, decelerated."""
+    """Return the AxisMotion of the azimuth at t1 <= t <= t2 [s]: accelerated, at its peak rate, decelerated."""
     sign = math.copysign(1.0, slew.peak)
     a = sign * slew.acceleration
     begun, left = t - slew.t1, slew.t2 - t
@@ -37,7 +40,8 @@ def azimuth_at(slew, t):
 
 @compiled
 def true_deck_share(slew, t):
-    """AxisMotion [1, 1/s, 1/s2] of how far a slew follows the true deck at t [s]: 1 at its ends, 0 in its middle."""
+    """Return the AxisMotion [1, 1/s, 1/s2] of the share to which a slew follows the true deck at t [s]: 1 at its ends,
+    0 in its middle."""
     T = slew.t2 - slew.t1
     x = 1.0 - 2.0 * (t - slew.t1) / T
     return AxisMotion(x**4, -8.0 * x**3 / T, 48.0 * x * x / (T * T))
@@ -45,7 +49,8 @@ def true_deck_share(slew, t):
 
 @compiled
 def best_elevation(azimuth, sight):
-    """AxisMotion of the elevation at which a beam at an azimuth (AxisMotion) is closest to a LineOfSight in FLU.
+    """Return the AxisMotion of the elevation at which a beam at an azimuth (AxisMotion) is closest
+    to a LineOfSight in FLU.
 
     An elevation beyond pi/2 is past the zenith. E = atan2(z, b), where b = x cos a - y sin a is the part of the
     direction along the beam's azimuth.
@@ -63,8 +68,8 @@ def best_elevation(azimuth, sight):
 
 @compiled
 def pointing_offset(azimuth, u, highest):
-    """Angle [rad] between a target u (FLU) and the beam at a deck azimuth [rad] whose elevation, at most `highest`, is
-    the best."""
+    """Return the angle [rad] between a target u (FLU) and the beam at a deck azimuth [rad], at the best elevation up
+    to `highest` [rad]."""
     sa, ca = math.sin(azimuth), math.cos(azimuth)
     b, c = ca * u.x - sa * u.y, sa * u.x + ca * u.y
     if math.atan2(u.z, b) <= highest:
@@ -76,11 +81,11 @@ def pointing_offset(azimuth, u, highest):
 
 @compiled
 def motion_at(slew, t, target, level, highest):
-    """(Motion of the axes at t [s] on a slew, pointing offset [rad] from the target).
+    """Return (Motion of the axes at t [s] on a slew, pointing offset [rad] from the target).
 
-    target: Motion on the true deck; level: AxisMotion of its azimuth on the levelled one, on which the slew was
-    planned. At its ends the slew meets the target on the true deck; in its middle the true deck has no share in it.
-    highest: the largest elevation [rad].
+    target: Motion on the true deck; level: AxisMotion of its azimuth on the levelled deck of the plan. At its ends the
+    slew meets the target on the true deck; in its middle the true deck has no share in it. `highest`: the largest
+    elevation [rad].
     """
     azimuth, g = azimuth_at(slew, t), true_deck_share(slew, t)
     D = wrap(target.azimuth.angle - level.angle)
@@ -97,8 +102,8 @@ def motion_at(slew, t, target, level, highest):
 
 @compiled
 def peak_rate(D, T, v1, v2, a):
-    """Cruising rate of a slew by D [rad] in T [s] that begins at v1, ends at v2 [rad/s] and changes rate by a
-    [rad/s2]; inf where T is too short.
+    """Return the cruising rate of a slew by D [rad] in T [s] that begins at v1, ends at v2 [rad/s] and changes rate by
+    a [rad/s2]; inf if T is too short.
 
     D = v T - (v - v1)^2 / (2 a) - (v - v2)^2 / (2 a), the smaller root of v.
     """

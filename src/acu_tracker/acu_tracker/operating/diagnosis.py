@@ -58,7 +58,7 @@ def _values(unit, faults, invalid):
     for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
         values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
     return [*values, ('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['guidance']['lookahead']),
-            *unit.predictor.told(unit.now * 1e-9),
+            *unit.predictor.diagnostic_values(unit.now * 1e-9),
             *((f'refused {mode}', why) for mode, why in unit.refusals().items())]
 
 

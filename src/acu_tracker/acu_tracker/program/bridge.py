@@ -1,7 +1,7 @@
 """The program track, rotated by the smallest angle that puts it where the target was last tracked.
 
-It bridges an outage of the receiver with the shape of the program at the place of the estimate: for many seconds that
-is better than the filter's own rate and acceleration.
+It bridges an outage of the receiver with the shape of the program at the place of the estimate. For many seconds this
+is more accurate than the filter's own rate and acceleration.
 """
 import math
 from collections import namedtuple
@@ -15,19 +15,20 @@ from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
 
 BRIDGE_DTYPE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], align=True)
-"""axis: ENU, of the length of the rotation's sine; cos: of its angle; valid: 0 where there is none."""
+"""axis: of the rotation, ENU, with the sine of its angle as its length; cos: cosine of the angle;
+valid: 0 without a rotation."""
 
 Way = namedtuple('Way', 'program valid axis cos')
-"""A ProgramTrack, rotated where valid; fields as of BRIDGE_DTYPE."""
+"""A ProgramTrack, rotated if valid; fields as of BRIDGE_DTYPE."""
 
 MIN_PROGRAM_COSINE = math.cos(math.radians(3.0))
-"""Cosine of the largest angle between program and estimate at which the program is used."""
+"""Cosine of the largest angle between program and estimate for which the program is used [-]."""
 
 
 @compiled
 def begin(b, program, t, u):
-    """Find the rotation that puts the program at the ENU unit vector u at t [s]; not valid beyond
-    MIN_PROGRAM_COSINE."""
+    """Find the rotation that puts the program at the ENU unit vector u at t [s];
+    not valid beyond MIN_PROGRAM_COSINE."""
     b.valid = 0
     if program_track.status(program, t) == Reason.NONE:
         v = program_track.direction(program, t)
@@ -38,19 +39,19 @@ def begin(b, program, t, u):
 
 @compiled
 def clear(b):
-    """Follow the program as it is."""
+    """Follow the program without a rotation."""
     b.valid = 0
 
 
 @compiled
 def way(b, program):
-    """Return the Way of the program as it is bridged now."""
+    """Return the Way of the program with the present rotation."""
     return Way(program, b.valid, vector(b.axis), b.cos)
 
 
 @compiled
 def _rotated(w, v):
-    """An ENU Vector of the program after the rotation (Rodrigues)."""
+    """Return an ENU Vector of the program after the rotation (Rodrigues)."""
     axis = w.axis
     d = cross(axis, v)
     k = dot(axis, v) / (1.0 + w.cos)
@@ -59,14 +60,14 @@ def _rotated(w, v):
 
 @compiled
 def direction(w, t):
-    """ENU unit Vector of a Way at t [s]."""
+    """Return the ENU unit Vector of a Way at t [s]."""
     u = program_track.direction(w.program, t)
     return _rotated(w, u) if w.valid else u
 
 
 @compiled
 def motion_at(w, t):
-    """Motion in earth angles of a Way at t [s]."""
+    """Return the Motion in earth angles of a Way at t [s]."""
     motion = program_track.motion_at(w.program, t)
     if not w.valid:
         return motion

@@ -1,7 +1,7 @@
-"""What the control unit predicts itself, as tables of earth angles: a satellite by its elements, and the sun.
+"""Predictions of the control unit, as tables of earth angles: a satellite by its elements, and the sun.
 
-A table begins a little before it is made and is made anew in its second half, while its target is below the horizon
-if it ever is: nothing follows it then. The refraction of the air is left out.
+A table begins shortly before the time at which it is made. It is replaced in its second half, if possible while its
+target is below the horizon, because then no mode follows it. Refraction is neglected.
 """
 import dataclasses
 import datetime
@@ -22,35 +22,35 @@ from pedestal_common.parameters import ParameterError, Parameters, group, parame
 from pedestal_common.reproducible import arctan2, turned
 
 TABLE_ROW_COUNT = 2400
-"""Of a table."""
+"""Number of rows of a table."""
 
 TABLE_LEAD_TIME_S = 10.0
-"""Time [s] before now at which a table begins."""
+"""Time before the present at which a table begins [s]."""
 
 ROWS_PER_ORBIT = 5400
 """Rows per revolution of a satellite: 1 s of a low one."""
 
 SUN_ROW_INTERVAL_S = 30.0
-"""Time [s] between two rows of the sun, which moves by 0.13 deg in it."""
+"""Time between two rows of the sun [s], in which it moves by 0.13 deg."""
 
 RISE_SEARCH_SPAN_S = 2.0 * SECONDS_PER_DAY
-"""Time ahead [s] in which the next rise is looked for."""
+"""Time ahead in which the next rise is searched [s]."""
 
 RISE_SEARCH_STEP_S = 20.0
-"""Time [s] between two looks for it."""
+"""Time step in the search of the next rise [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class PredictionParameters(Parameters):
-    """Of the modes tle and sun."""
-    line_1: str = text('', 'first line of the elements (TLE) of mode tle; empty: none')
-    line_2: str = text('', 'second line of the elements')
-    start_time: str = text('', 'UTC of stamp 0, ISO 8601; empty: in realtime that of the stamps')
-    oldest: float = parameter(14.0, 0.1, 365.0, 'd', 'largest time between the epoch of the elements and now')
+    """Parameters of the modes tle and sun."""
+    line_1: str = text('', 'first line of the elements (TLE) of mode tle; empty: no satellite')
+    line_2: str = text('', 'second line of the elements (TLE) of mode tle')
+    start_time: str = text('', 'UTC of stamp 0, ISO 8601; empty: in realtime the UTC of the stamps')
+    oldest: float = parameter(14.0, 0.1, 365.0, 'd', 'largest allowed time between the epoch of the elements and now')
     station: StationParameters = group(StationParameters)
 
     def check(self):
-        """Raise ParameterError for elements, or a time, that are none."""
+        """Raise ParameterError for invalid elements or an invalid time."""
         try:
             if self.line_1 or self.line_2:
                 orbit.satellite(self)
@@ -61,8 +61,11 @@ class PredictionParameters(Parameters):
 
 
 class Predicted(typing.NamedTuple):
-    """A table, NONE of modes.REASONS or why there is none, and the stamps [s] from which on it holds and at which it
-    is to be made anew."""
+    """A predicted table.
+
+    reason: NONE of modes.REASONS, or why there is no table; since, until: stamps [s] from which it is valid, and at
+    which it must be replaced.
+    """
     track: ProgramTrack
     reason: int
     since: float = -math.inf
@@ -70,14 +73,15 @@ class Predicted(typing.NamedTuple):
 
 
 class Predictor:
-    """Predicts by PredictionParameters, for stamps counted from `epoch` [ns of UTC]; 0: they count from no time."""
+    """Predictions by PredictionParameters, for stamps counted from `epoch` [ns of UTC];
+    epoch 0: the UTC of stamps is unknown."""
 
     def __init__(self, parameters, epoch=0):
         self.parameters, self.epoch = parameters, epoch
         self._satellite = orbit.satellite(parameters) if parameters.line_1 else None
 
-    def by(self, line_1, line_2):
-        """A Predictor by other elements. Raises ValueError where they are none."""
+    def with_elements(self, line_1, line_2):
+        """Return a Predictor by other elements. Raises ValueError if they are invalid."""
         return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2), self.epoch)
 
     @property
@@ -87,11 +91,11 @@ class Predictor:
 
     @property
     def _known(self):
-        """Whether UTC is known; in lockstep stamps count from 0."""
+        """True if UTC is known; in lockstep stamps count from 0."""
         return self.parameters.start_time != '' or self.epoch > 0
 
     def satellite(self, stamp) -> Predicted:
-        """The Predicted of the satellite for a stamp [s]."""
+        """Return the Predicted of the satellite for a stamp [s]."""
         if self._satellite is None or not self._known:
             return Predicted(NO_TRACK, Reason.NO_ELEMENTS if self._known else Reason.NO_UTC)
         interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / ROWS_PER_ORBIT, 1), 1.0)
@@ -100,33 +104,34 @@ class Predictor:
         return _table(self._satellite_angles, stamp, interval)
 
     def sun(self, stamp) -> Predicted:
-        """The Predicted of the sun for a stamp [s]."""
+        """Return the Predicted of the sun for a stamp [s]."""
         if not self._known:
             return Predicted(NO_TRACK, Reason.NO_UTC)
         return _table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
-    def told(self, stamp):
-        """[(key, text)] at a stamp [s]: where the sun is, unless UTC is not known, and the elements, if any."""
+    def diagnostic_values(self, stamp):
+        """Return [(key, text)] at a stamp [s]: azimuth and elevation of the sun, if UTC is known,
+        and the elements, if any."""
         sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._known else ()
         lines = ('line_1', 'line_2') if self._satellite is not None else ()
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
                 *((line, getattr(self.parameters, line)) for line in lines)]
 
-    def explained(self, mode, reason, stamp):
-        """What a refusal of a mode for a reason at a stamp [s] should say beside it; '' for nothing."""
+    def refusal_details(self, mode, reason, stamp):
+        """Return the details of a refusal of a mode for a reason at a stamp [s]; '' for none."""
         if reason == Reason.NO_UTC:
-            return 'say `prediction.start_time`'
+            return 'set `prediction.start_time`'
         if reason == Reason.TOO_OLD:
-            return f'they are {abs(self._age(stamp)):.1f} days off, {self.parameters.oldest:g} are allowed'
+            return f'epoch {abs(self._age(stamp)):.1f} days from now; must be at most {self.parameters.oldest:g}'
         if reason == Reason.BELOW_HORIZON:
             rises = _next_rise(self._satellite_angles if mode == Mode.TLE else self._sun_angles, stamp)
             if math.isnan(rises):
-                return f'it does not rise within {RISE_SEARCH_SPAN_S / SECONDS_PER_DAY:g} days'
-            return f'it rises at {orbit.iso(*self._julian(rises))}'
+                return f'no rise within {RISE_SEARCH_SPAN_S / SECONDS_PER_DAY:g} days'
+            return f'next rise at {orbit.iso(*self._julian(rises))}'
         return ''
 
     def _julian(self, stamp):
-        """(Julian day, fraction) of a stamp [s]."""
+        """Return (Julian day, fraction) of a stamp [s]."""
         start = self.parameters.start_time
         begin = (orbit.instant('start_time', start) if start else
                  datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=self.epoch
@@ -135,17 +140,17 @@ class Predictor:
         return julian, fraction + stamp / SECONDS_PER_DAY
 
     def _age(self, stamp):
-        """Time [days] from the epoch of the elements to a stamp [s]."""
+        """Return the time [days] from the epoch of the elements to a stamp [s]."""
         julian, fraction = self._julian(stamp)
         return julian - self._satellite.jdsatepoch + fraction - self._satellite.jdsatepochF
 
     def _satellite_angles(self, times):
-        """Azimuth and elevation (n, 2) [rad] of the satellite at stamps (n,) [s]. Raises TargetError."""
+        """Return azimuth and elevation (n, 2) [rad] of the satellite at stamps (n,) [s]. Raises TargetError."""
         julian, fraction = self._julian(0.0)
         return _angles(orbit.enu(self._satellite, self.parameters.station, julian, fraction, times)[0])
 
     def _sun_angles(self, times):
-        """Azimuth and elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
+        """Return azimuth and elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
         origin, to_enu = station_frame(self.parameters.station)
@@ -155,13 +160,13 @@ class Predictor:
 
 
 def _angles(enu):
-    """Azimuth and elevation (n, 2) [rad] of ENU positions (n, 3)."""
+    """Return azimuth and elevation (n, 2) [rad] of ENU positions (n, 3)."""
     east, north, up = enu.T
     return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)
 
 
 def _table(angles_at, stamp, interval):
-    """The Predicted of angles_at(times), with a row every interval [s]."""
+    """Return the Predicted of angles_at(times), with a row every interval [s]."""
     times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
     try:
         angles = angles_at(times)
@@ -174,7 +179,7 @@ def _table(angles_at, stamp, interval):
 
 
 def _next_rise(angles_at, stamp):
-    """Stamp [s] of the next rise after a stamp, to a second; NaN where there is none."""
+    """Return the stamp [s] of the next rise after a stamp, to a second; NaN if there is none."""
     times = stamp + np.arange(0.0, RISE_SEARCH_SPAN_S, RISE_SEARCH_STEP_S)
     try:
         elevation = angles_at(times)[:, 1]

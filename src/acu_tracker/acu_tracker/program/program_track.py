@@ -13,12 +13,14 @@ from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_direction, wrap
 
 MAX_PROGRAM_ROWS = 100_000
+"""Largest number of rows of a program."""
 STEEP_ELEVATION_RAD = math.radians(80.0)
-"""Elevation of the rows above which directions are interpolated."""
+"""Elevation of the rows above which directions are interpolated [rad]."""
 
 
 class ProgramTrack(typing.NamedTuple):
-    """times (n,) [s], growing; angles (n, 2) [rad]: azimuth and elevation in the earth's frame. n = 0: no program."""
+    """times (n,) [s], increasing; angles (n, 2) [rad]: azimuth and elevation in the earth's
+    frame. n = 0: no program."""
     times: np.ndarray
     angles: np.ndarray
 
@@ -31,7 +33,8 @@ class ProgramTrackError(ValueError):
 
 
 def checked(times, angles):
-    """The ProgramTrack of times (n,) [s] and angles (n, 2) [rad azimuth, elevation]; raises ProgramTrackError."""
+    """Return the ProgramTrack of times (n,) [s] and angles (n, 2) [rad azimuth, elevation].
+    Raises ProgramTrackError."""
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
         raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
@@ -53,7 +56,7 @@ def checked(times, angles):
 
 @compiled
 def status(program, t):
-    """NONE if the program covers t [s], otherwise the reason (of modes.REASONS)."""
+    """Return NONE if the program covers t [s], otherwise the reason (of modes.REASONS)."""
     if len(program.times) < 2:
         return Reason.NO_PROGRAM
     if t < program.times[0]:
@@ -69,7 +72,7 @@ def _difference(program, i, axis):
 
 @compiled
 def _slope(program, i, axis):
-    """Rate at row i of the parabola through its neighbours; at the ends through the nearest three rows."""
+    """Return the rate at row i of the parabola through its neighbours; at the ends through the nearest three rows."""
     times = program.times
     if len(times) == 2:
         return _difference(program, 0, axis) / (times[1] - times[0])
@@ -82,9 +85,8 @@ def _slope(program, i, axis):
 
 @compiled
 def _hermite(y0, d, m0, m1, x, T):
-    """AxisMotion at the fraction x of an interval of T [s], from y0 to y0 + d with slopes m0 / T and m1 / T at its
-    ends.
-    """
+    """Return the AxisMotion at the fraction x of an interval of T [s],
+    from y0 to y0 + d with slopes m0 / T and m1 / T at its ends."""
     c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
     return AxisMotion(y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
                       (2.0 * c2 + 6.0 * x * c3) / (T * T))
@@ -92,7 +94,7 @@ def _hermite(y0, d, m0, m1, x, T):
 
 @compiled
 def interpolated(program, t, axis):
-    """AxisMotion of axis 0 (azimuth, the short way round) or 1 (elevation) at t [s]."""
+    """Return the AxisMotion of axis 0 (azimuth, the short way round) or 1 (elevation) at t [s]."""
     times = program.times
     i = interval(times, t)
     T = times[i + 1] - times[i]
@@ -102,13 +104,13 @@ def interpolated(program, t, axis):
 
 @compiled
 def _component(program, i, axis):
-    """Component (0 east, 1 north, 2 up) of the unit vector of row i."""
+    """Return a component (0 east, 1 north, 2 up) of the unit vector of row i."""
     return earth_direction(program.angles[i, 0], program.angles[i, 1])[axis]
 
 
 @compiled
 def _component_slope(program, i, axis):
-    """`_slope` of a component."""
+    """Return the `_slope` of a component."""
     times = program.times
     m = min(max(i, 1), len(times) - 2)
     before, after = times[m] - times[m - 1], times[m + 1] - times[m]
@@ -120,7 +122,7 @@ def _component_slope(program, i, axis):
 
 @compiled
 def _interpolated_component(program, i, t, axis):
-    """A component, its rate and acceleration at t between rows i and i + 1, interpolated as the angles are."""
+    """Return a component, its rate and acceleration at t between rows i and i + 1, interpolated as the angles are."""
     times = program.times
     T = times[i + 1] - times[i]
     y0 = _component(program, i, axis)
@@ -130,9 +132,11 @@ def _interpolated_component(program, i, t, axis):
 
 @compiled
 def motion_at(program, t):
-    """Motion in earth angles at t [s]. Between two rows above STEEP_ELEVATION_RAD, where the azimuth may change by
-    any amount,
-    the unit vector is interpolated instead of the angles."""
+    """Return the Motion in earth angles at t [s].
+
+    Between two rows above STEEP_ELEVATION_RAD the unit vector is interpolated instead of the angles, because there the
+    azimuth may change by any amount.
+    """
     i = interval(program.times, t)
     if min(program.angles[i, 1], program.angles[i + 1, 1]) < STEEP_ELEVATION_RAD or len(program.times) < 3:
         return Motion(interpolated(program, t, 0), interpolated(program, t, 1))
@@ -145,7 +149,7 @@ def motion_at(program, t):
 
 @compiled
 def direction(program, t):
-    """ENU unit Vector at t [s]."""
+    """Return the ENU unit Vector at t [s]."""
     motion = motion_at(program, t)
     e, n, u = earth_direction(motion.azimuth.angle, motion.elevation.angle)
     return Vector(e, n, u)
@@ -153,7 +157,7 @@ def direction(program, t):
 
 @compiled
 def azimuth_travel(program, t):
-    """Travel of the azimuth from its value at t [s] until the end of the program."""
+    """Return the Travel of the azimuth from its value at t [s] until the end of the program."""
     first = interval(program.times, t)
     here = interpolated(program, t, 0).angle - program.angles[first, 0]
     at, below, above = 0.0, 0.0, 0.0

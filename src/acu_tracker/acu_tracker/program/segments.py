@@ -1,4 +1,4 @@
-"""The program track in segments, as they are sent: appended while it runs, with gaps where rows are missing."""
+"""The program track in segments, as they are received: appended while it runs, with gaps where rows are missing."""
 import math
 
 import numpy as np
@@ -7,12 +7,11 @@ from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, ProgramTra
 from pedestal_common.graph.topics import AXES
 
 MAX_GAP_INTERVALS = 3.0
-"""A segment goes on with the one before where its first row is at most so many of their intervals, the shorter one,
-later."""
+"""Largest gap between two segments that are joined, in row intervals [-]; the shorter interval of the two counts."""
 
 
 class TurnaroundError(ProgramTrackError):
-    """A segment begins where the axes cannot be in time; the message names axis, value and what is allowed."""
+    """A segment that begins where the axes cannot be in time; the message names axis, value and limit."""
 
 
 class Segments:
@@ -26,10 +25,12 @@ class Segments:
         self._pieces = []
 
     def append(self, times, angles, now, followed):
-        """Take a segment. One that begins now or before is another program and takes the place of all; one that begins
-        later takes the place of the rows from its first one on, and goes on with those before where there is no gap.
-        now: stamp [s]; followed: whether the track is, so that turnarounds count. Raises ProgramTrackError, and
-        nothing is changed."""
+        """Take a segment. Raises ProgramTrackError, without a change.
+
+        A segment that begins at `now` [s] or before is another program and replaces all pieces. A later segment
+        replaces the rows from its first row on, and is joined to the rows before it unless there is a gap. `followed`:
+        whether a mode follows the track, so that turnarounds are checked.
+        """
         new = checked(times, angles)
         if new.times[0] <= now:
             self._pieces = [new]
@@ -38,31 +39,35 @@ class Segments:
         if kept:
             if followed:
                 self._check_turnaround(kept[-1], new)
-            if new.times[0] - kept[-1].times[-1] <= MAX_GAP_INTERVALS * min(_last_interval(kept[-1]), new.times[1]
-                                                                            - new.times[0]):
+            interval = min(_last_interval(kept[-1]), new.times[1] - new.times[0])
+            if new.times[0] - kept[-1].times[-1] <= MAX_GAP_INTERVALS * interval:
                 last = kept.pop()
                 new = checked(np.append(last.times, new.times), np.vstack((last.angles, new.angles)))
         self._pieces = [*kept, new]
 
     def _check_turnaround(self, before, after):
-        """Raise TurnaroundError where the axes would have to turn or to accelerate faster than they are allowed to on
-        their way from one segment to the next: at a constant acceleration in the mean."""
+        """Raise TurnaroundError if the axes would exceed their rate or acceleration,
+        on average between one segment and the next."""
         time = after.times[0] - before.times[-1]
         for i, axis in enumerate(AXES):
-            most_rate, most_acceleration = self._limits[i]
-            left, came = _rate(before, -2, i), _rate(after, 0, i)
-            way = after.angles[0, i] - before.angles[-1, i]
-            rate = abs(math.remainder(way, 2.0 * math.pi) if i == 0 else way) / time
-            acceleration = abs(came - left) / time
-            if rate > most_rate:
-                raise TurnaroundError(f'turnaround too fast: {axis} {rate:g} rad/s; must be at most {most_rate:g}')
-            if acceleration > most_acceleration:
+            max_rate, max_acceleration = self._limits[i]
+            rate_before, rate_after = _rate(before, -2, i), _rate(after, 0, i)
+            distance = after.angles[0, i] - before.angles[-1, i]
+            rate = abs(math.remainder(distance, 2.0 * math.pi) if i == 0 else distance) / time
+            acceleration = abs(rate_after - rate_before) / time
+            if rate > max_rate:
+                raise TurnaroundError(f'turnaround too fast: {axis} {rate:g} rad/s; must be at most '
+                                      f'{max_rate:g} rad/s')
+            if acceleration > max_acceleration:
                 raise TurnaroundError(f'turnaround too fast: {axis} {acceleration:g} rad/s2; must be at most '
-                                      f'{most_acceleration:g}')
+                                      f'{max_acceleration:g} rad/s2')
 
     def at(self, t):
-        """(the piece to follow at t [s], whether rows are missing there, stamp [s] from which on another one is): the
-        first that has not ended, or the last."""
+        """Return (the piece to follow at t [s], whether rows are missing at t,
+        stamp [s] at which another piece follows).
+
+        The piece is the first that has not ended, or the last.
+        """
         for number, piece in enumerate(self._pieces):
             if t < piece.times[-1] or number + 1 == len(self._pieces):
                 more = number + 1 < len(self._pieces)
@@ -71,7 +76,8 @@ class Segments:
 
 
 def _rows(piece, begin, end):
-    """The rows of a piece from three before `begin` [s], its last three at least, until before `end` [s]."""
+    """Return the rows of a piece from three before `begin` [s], but at least its last three,
+    to `end` [s] (exclusive)."""
     first = max(min(int(np.searchsorted(piece.times, begin)), len(piece.times)) - 3, 0)
     last = int(np.searchsorted(piece.times, end))
     return ProgramTrack(piece.times[first:last], piece.angles[first:last])
@@ -82,6 +88,7 @@ def _last_interval(piece):
 
 
 def _rate(piece, row, i):
-    """Rate [rad/s] of axis i between a row of a piece and the next."""
-    way = piece.angles[row + 1, i] - piece.angles[row, i]
-    return (math.remainder(way, 2.0 * math.pi) if i == 0 else way) / (piece.times[row + 1] - piece.times[row])
+    """Return the rate [rad/s] of axis i between a row of a piece and the next."""
+    distance = piece.angles[row + 1, i] - piece.angles[row, i]
+    distance = math.remainder(distance, 2.0 * math.pi) if i == 0 else distance
+    return distance / (piece.times[row + 1] - piece.times[row])

@@ -1,4 +1,4 @@
-"""Where the sun is: the low-precision formula of the Astronomical Almanac, within 0.01 deg from 1950 to 2050.
+"""Position of the sun: the low-precision formula of the Astronomical Almanac, within 0.01 deg from 1950 to 2050.
 
     n          days since 2000-01-01 12:00 (J2000)
     L, g       mean longitude, corrected for aberration, and mean anomaly of the sun
@@ -6,8 +6,8 @@
     epsilon    obliquity of the ecliptic
     R          distance [AU]
 
-The Astronomical Almanac (US Naval Observatory, HM Nautical Almanac Office), section C, "Low precision formulas for the
-Sun".
+The Astronomical Almanac (US Naval Observatory, HM Nautical Almanac Office), section C,
+"Low precision formulas for the Sun".
 """
 import numpy as np
 
@@ -17,11 +17,11 @@ AU = 149_597_870_700.0
 """Astronomical unit [m]."""
 
 J2000 = 2451545.0
-"""Julian date."""
+"""Julian date of the epoch J2000 [d]."""
 
 
 def position(n):
-    """Geocentric position (m, 3) [m], equator and equinox of date, at days n (m,) since J2000."""
+    """Return the geocentric position (m, 3) [m], equator and equinox of date, at days n (m,) since J2000."""
     L, g = np.radians(280.460 + 0.9856474 * n), np.radians(357.528 + 0.9856003 * n)
     longitude = L + np.radians(1.915 * sin(g) + 0.020 * sin(2.0 * g))
     obliquity = np.radians(23.439 - 4e-7 * n)

@@ -9,18 +9,20 @@ from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from pedestal_common.compiled import compiled
 
 TABLE_MODES = tuple(row for row in modes.MODE_ROWS if row.table)
+"""Rows of modes.MODE_ROWS of the modes that follow a table."""
 
 Tables = collections.namedtuple('Tables', [row.name for row in TABLE_MODES])
-"""One ProgramTrack for each mode that follows a table, that of the program first."""
+"""One ProgramTrack for each mode that follows a table, the program first."""
 
 NO_TABLES = Tables(*(NO_TRACK for _ in TABLE_MODES))
 
 TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.MODE_ROWS)
-"""For each mode the place of its table among them, that of the program where it follows none."""
+"""Index in Tables of the table of each mode; 0, the program, for a mode that follows none."""
 
 
 def shifted(track, offset):
-    """A ProgramTrack with an offset (time [s], azimuth, elevation [rad]); not beyond the zenith."""
+    """Return a ProgramTrack with an offset (time [s], azimuth, elevation [rad]);
+    elevations are limited to the zenith."""
     if not any(offset):
         return track
     time, *angles = offset
@@ -31,5 +33,5 @@ def shifted(track, offset):
 
 @compiled
 def of_mode(tables, mode):
-    """The table that a mode follows; of one that follows none the program."""
+    """Return the table that a mode follows; the program if it follows none."""
     return tables[TABLE_INDEX[mode]]

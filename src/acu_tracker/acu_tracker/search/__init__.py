@@ -1,8 +1,8 @@
 """Search, acquisition and loss of a target by the level of its signal.
 
-`level` tells signal from noise, `pattern` leads the beam over an area in which the target may be, `side_lobe` and
-`slope_check` judge what was found before the loop is closed on it, `step_track` follows a level where there is no
-angle error, `coast` says how long an estimate without signal is worth pointing at. `acquisition` composes them.
+Modules: `level` separates signal from noise. `pattern` leads the beam over an area that may contain the target.
+`side_lobe` and `slope_check` judge a signal before the loop is closed on it. `step_track` follows a level if there is
+no angle error. `coast` limits the time of pointing without a signal. `acquisition` combines them.
 
     b       half-power beamwidth                                            [rad]
     z       level of the sum channel, C/N0                                  [dB-Hz]

@@ -1,15 +1,15 @@
-"""From a lost target to one that the loop may be closed on: search, acquire, step track, as offsets of the beam.
+"""From a lost target to a signal on which the loop may be closed: search, acquire, step track, as offsets of the beam.
 
-Search leads the beam over the last place, the small area and the full one. Where the level has passed its peak,
-acquire goes back to it and
+Search leads the beam over the last place, the small area and the full one. After the level has passed its peak,
+acquire returns to the peak and
 
     settles         until the level is that of the new place,
-    looks around    unless the expected level says that this is the main lobe; goes to the better place and settles,
+    looks around    unless the expected level shows the main lobe; goes to the best place and settles,
     peaks           by the level at a step to either side of both axes, as step track does,
-    checks          the sign of the slopes on a small circle, and goes to where the errors lead.
+    checks          the sign of the slopes on a small circle, and goes to the direction of the errors.
 
-Every offset is about the expected place of the target, which the caller knows; it is demanded at once, and the shaper
-of each axis makes the way to it smooth.
+Every offset is relative to the expected place of the target, which the caller supplies. It is demanded at once; the
+shaper of each axis smooths the motion.
 """
 import math
 
@@ -27,38 +27,39 @@ ACQUISITION_DTYPE = np.dtype([
     ('level', level.LEVEL_DTYPE), ('slopes', slope_check.SLOPES_DTYPE), ('step_track', step_track.STEP_TRACK_DTYPE),
     ('place', place.PLACE_DTYPE), ('began', 'f8'), ('radius', 'f8'), ('peak', 'f8'), ('centre', 'f8', (2,)),
     ('phase', 'i8'), ('since', 'f8'), ('look', 'i8'), ('levels', 'f8', (1 + side_lobe.LOOK_AROUND_PLACES,)),
-    ('looks', 'i8'),
-    ('peaks', 'i8'), ('doubts', 'i8'), ('fair', 'f8'),
+    ('looks', 'i8'), ('peaks', 'i8'), ('wrong_slopes', 'i8'), ('fair', 'f8'),
 ], align=True)
-"""place: the expected one without a program; began: search or acquire [s]; radius: of the small area [rad]; peak: the
-highest level on the way [dB-Hz]; centre: offset of the place where it was, in cross-elevation and elevation [rad];
-phase of acquire, entered at `since` [s]; look: place of the look-around or the peak that the beam is at, levels: at
-those before; looks, peaks: how many times it did; doubts: how many times the slopes were wrong;
-fair: when the level of autotrack was last that of the main lobe [s]."""
+"""place: the expected one without a program; began: begin of search or acquire [s]; radius: of the small area [rad].
+`peak`: highest level so far [dB-Hz]; centre: offset of its place, in cross-elevation and elevation [rad]. `phase`: of
+acquire, entered at `since` [s]; look: number of the place in the phase; levels: at the places before it. `looks`,
+`peaks`: numbers of look-arounds and of peaks so far; wrong_slopes: number of wrong slope checks. `fair`: time at which
+the level of autotrack was last that of the main lobe [s]."""
 
 LEVEL_SETTLING_LAGS = 4.0
-"""Time constants after which a level is that of a new place."""
+"""Number of time constants after which a level is that of a new place."""
 
 PEAK_DROP_DB = 1.0
-"""How far the level falls behind its peak before the beam goes back [dB]."""
+"""Drop of the level behind its peak at which the beam returns [dB]."""
 
 MAX_RISE_TIME_S = 1.0
-"""Longest time that a level may keep on rising [s]."""
+"""Longest time for which a level may keep rising [s]."""
 
 CIRCLE_RADIUS_BEAMWIDTHS, CIRCLE_PERIOD_S, CIRCLE_TURN_COUNT = 0.1, 0.5, 2.0
-"""Of the slope check: radius [beamwidths], time of a turn [s], and their number; in the first the circle opens."""
+"""Circle of the slope check: radius [beamwidths], time of a turn [s], number of turns;
+the circle opens in the first."""
 
 MIN_CHECK_ERROR_COUNT = 50
-"""Of the slope check."""
+"""Least number of errors in a slope check."""
 
 MAX_LOOK_AROUND_COUNT = 4
-"""Times that acquire looks around before it checks what it has."""
+"""Number of look-arounds after which acquire continues with the present place."""
 
 PEAK_STEP_BEAMWIDTHS, MAX_PEAK_MOVE_BEAMWIDTHS = 0.3, 0.7
-"""Of a peak: the steps to either side and the farthest way to go [beamwidths]; a way beyond PEAK_STEP_BEAMWIDTHS is
-gone in two."""
+"""Step to either side of a peak, and longest move to it [beamwidths]; after a move beyond PEAK_STEP_BEAMWIDTHS the
+peak is repeated."""
 
 MAX_PEAK_COUNT = 3
+"""Largest number of peaks before a slope check."""
 
 PEAK_OFFSETS_BEAMWIDTHS = ((0.0, 0.0), (PEAK_STEP_BEAMWIDTHS, 0.0), (-PEAK_STEP_BEAMWIDTHS, 0.0),
                            (0.0, PEAK_STEP_BEAMWIDTHS), (0.0, -PEAK_STEP_BEAMWIDTHS))
@@ -66,28 +67,28 @@ PEAK_OFFSETS_BEAMWIDTHS = ((0.0, 0.0), (PEAK_STEP_BEAMWIDTHS, 0.0), (-PEAK_STEP_
 
 
 def initialise(s):
-    """Nothing heard yet; s (n,) of ACQUISITION_DTYPE."""
+    """Start before the first level; s (n,) of ACQUISITION_DTYPE."""
     s['level']['stamp'] = -math.inf
 
 
 @compiled
 def take_level(s, p, z, stamp, locked):
-    """Take the level z [dB-Hz] of a stamp [s]; locked: whether the receiver gives errors. p: record of
+    """Take the level z [dB-Hz] of a stamp [s]; locked: whether the receiver measures angle errors. p: record of
     AcquisitionParameters."""
     level.take(s.level, p, z, stamp, locked)
 
 
 @compiled
 def learn(s, p, z, stamp):
-    """Take a level [dB-Hz] that is noise alone, of a stamp [s], before it is heard."""
+    """Take a level [dB-Hz] of a stamp [s] that is noise only; call it before `take_level`."""
     if stamp > s.level.stamp and math.isfinite(z) and math.isfinite(s.level.stamp):
         level.learn(s.level, p, z, min(stamp - s.level.stamp, p.time_constant))
 
 
 @compiled
 def begin_search(s, p, beamwidth, t, sigma):
-    """Search from t [s] on; sigma: standard deviation of the expected place [rad], NaN where it is not known.
-    p: record of SearchParameters."""
+    """Start a search at t [s]; sigma: standard deviation of the expected place [rad], NaN if unknown. p: record of
+    SearchParameters."""
     s.began = t
     s.radius = p.small * beamwidth
     if 2.0 * sigma > s.radius:
@@ -99,7 +100,7 @@ def begin_search(s, p, beamwidth, t, sigma):
 
 @compiled
 def area(s, p, tau, beamwidth, full):
-    """The pattern.Area of the small or the full stage; tau: time constant of the level [s]."""
+    """Return the pattern.Area of the small or the full stage; tau: time constant of the level [s]."""
     radius = p.full * beamwidth if full else s.radius
     return Area(p.pattern, radius, p.across * radius, p.pitch * beamwidth,
                 pattern.highest_speed(beamwidth, tau, p.speed))
@@ -107,7 +108,7 @@ def area(s, p, tau, beamwidth, full):
 
 @compiled
 def searched(s, p, tau, beamwidth, t):
-    """(Point of the beam along and across the track at t [s], whether all rounds are over); p: record of
+    """Return (Point of the beam along and across the track at t [s], whether all rounds are over); p: record of
     SearchParameters."""
     small, full = area(s, p, tau, beamwidth, False), area(s, p, tau, beamwidth, True)
     T_small, T_full = pattern.duration(small), pattern.duration(full)
@@ -121,27 +122,27 @@ def searched(s, p, tau, beamwidth, t):
 
 @compiled
 def set_offset(s, x, e):
-    """Put the beam at an offset (x, e) [rad] from the expected place."""
+    """Set the offset (x, e) [rad] of the beam from the expected place."""
     s.centre[0], s.centre[1] = x, e
 
 
 @compiled
 def note_fair_level(s, t, fair):
-    """Keep at t [s] whether the level of autotrack is fair."""
+    """Keep t [s] if the level of autotrack is fair."""
     if fair:
         s.fair = t
 
 
 @compiled
 def waiting(s, p, t):
-    """Whether the search at t [s] still stands on the last place."""
+    """Return True while the search at t [s] still stays at the last place."""
     return t < s.began + p.wait
 
 
 @compiled
 def note_peak(s, offset):
-    """Keep the offset (x, e) [rad], where the beam was when the receiver took what its level now shows, if that is
-    the highest level so far."""
+    """Keep the offset (x, e) [rad] if the level is the highest so far;
+    offset: of the beam when the receiver measured it."""
     if s.level.z > s.peak:
         s.peak = s.level.z
         s.centre[0], s.centre[1] = offset
@@ -149,14 +150,14 @@ def note_peak(s, offset):
 
 @compiled
 def peak_passed(s, p):
-    """Whether a signal has been there and its peak is behind the beam. p: record of AcquisitionParameters."""
+    """Return True if there was a signal and the beam has passed its peak. p: record of AcquisitionParameters."""
     return level.detected(s.level, p) and (s.level.z < s.peak - PEAK_DROP_DB or s.level.above_detect > MAX_RISE_TIME_S)
 
 
 @compiled
 def begin_acquire(s, t):
-    """Acquire from t [s] on what is at the centre."""
-    s.began, s.looks, s.peaks, s.doubts = t, 0, 0, 0
+    """Start to acquire the signal at the centre at t [s]."""
+    s.began, s.looks, s.peaks, s.wrong_slopes = t, 0, 0, 0
     s.levels[:] = -math.inf
     _enter(s, Phase.SETTLE, t)
 
@@ -168,7 +169,7 @@ def _enter(s, phase, t):
 
 @compiled
 def acquire(s, p, beamwidth, t, distance):
-    """Bring acquire to t [s]; distance: measured range of the target [m], NaN where there is none. p: record of
+    """Advance acquire to t [s]; distance: measured range of the target [m], NaN for none. p: record of
     AcquisitionParameters."""
     settled = t - s.since >= LEVEL_SETTLING_LAGS * p.time_constant
     if s.phase == Phase.SETTLE and settled:
@@ -188,12 +189,12 @@ def acquire(s, p, beamwidth, t, distance):
         elif s.phase == Phase.PEAK and s.look >= len(PEAK_OFFSETS_BEAMWIDTHS):
             _go_to_peak(s, beamwidth, t)
     elif s.phase == Phase.CHECK and t - s.since >= CIRCLE_TURN_COUNT * CIRCLE_PERIOD_S:
-        _judge(s, t)
+        _apply_verdict(s, t)
 
 
 @compiled
 def _go_to_best(s, beamwidth, t):
-    """After a look around: settle at the better place, or peak here where there is none."""
+    """After a look-around, settle at the best place, or peak here if no place is better."""
     chosen = side_lobe.best(s.levels)
     x, e = side_lobe.place(chosen, beamwidth)
     s.centre[0] += x
@@ -212,12 +213,12 @@ def _peak(s, t):
 
 @compiled
 def _go_to_peak(s, beamwidth, t):
-    """After the steps to either side: go to the peak, and check the slopes there unless it was far."""
+    """After the steps to either side, go to the peak, and check the slopes there unless it was far."""
     far = False
     for i in range(2):
-        way = step_track.peak(s.levels[1 + 2 * i], s.levels[2 + 2 * i], PEAK_STEP_BEAMWIDTHS * beamwidth, beamwidth)
-        far |= abs(way) > PEAK_STEP_BEAMWIDTHS * beamwidth
-        s.centre[i] += min(max(way, -MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth), MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth)
+        move = step_track.peak(s.levels[1 + 2 * i], s.levels[2 + 2 * i], PEAK_STEP_BEAMWIDTHS * beamwidth, beamwidth)
+        far |= abs(move) > PEAK_STEP_BEAMWIDTHS * beamwidth
+        s.centre[i] += min(max(move, -MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth), MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth)
     if far and s.peaks < MAX_PEAK_COUNT:
         _peak(s, t)
     else:
@@ -226,18 +227,18 @@ def _go_to_peak(s, beamwidth, t):
 
 
 @compiled
-def _judge(s, t):
-    """After the circle: where the slopes are right go to where the errors lead, where they are wrong twice give up."""
+def _apply_verdict(s, t):
+    """After the circle, go to the direction of the errors if the slopes are right; give up if they are wrong twice."""
     verdict = slope_check.verdict(s.slopes, MIN_CHECK_ERROR_COUNT)
     if verdict == slope_check.VERDICT_RIGHT:
-        # The mean error over whole turns is that at the centre: there the errors are on the straight part of their
-        # curve, and fit together for the filter.
+        # The mean error over whole turns is the error at the centre. There the errors are on the straight part of
+        # their curve, and consistent for the filter.
         s.centre[0] += s.slopes.e[0]
         s.centre[1] += s.slopes.e[1]
         s.phase = Phase.CHECKED
     elif verdict == slope_check.VERDICT_WRONG:
-        s.doubts += 1
-        if s.doubts > 1:
+        s.wrong_slopes += 1
+        if s.wrong_slopes > 1:
             s.phase = Phase.WRONG_SLOPE
         else:
             s.peaks = 0
@@ -246,7 +247,7 @@ def _judge(s, t):
 
 @compiled
 def acquired(s, beamwidth, t):
-    """Point of the beam at t [s] in cross-elevation and elevation."""
+    """Return the Point of the beam at t [s] in cross-elevation and elevation."""
     x, e = s.centre[0], s.centre[1]
     if s.phase == Phase.LOOK_AROUND:
         aside, up = side_lobe.place(s.look, beamwidth)
@@ -263,15 +264,15 @@ def acquired(s, beamwidth, t):
 @compiled
 def take_error(s, expected, error):
     """Take an error of the receiver while the slopes are checked; expected: offset of the target's expected place from
-    the beam when it was measured, both (cross-elevation, elevation) [rad]."""
+    the beam at the time of the measurement, both (cross-elevation, elevation) [rad]."""
     if s.phase == Phase.CHECK:
         slope_check.take(s.slopes, expected, error)
 
 
 @compiled
 def failed(s, p, t):
-    """Whether acquire gives up at t [s]: no signal at the centre any more, or no end within the timeout. p: record of
+    """Return True if acquire gives up at t [s]: the signal at the centre is lost, or the timeout is over. p: record of
     AcquisitionParameters."""
-    settled = (s.phase != Phase.LOOK_AROUND and s.phase != Phase.PEAK and t - s.since > LEVEL_SETTLING_LAGS
-               * p.time_constant)
+    at_centre = s.phase != Phase.LOOK_AROUND and s.phase != Phase.PEAK
+    settled = at_centre and t - s.since > LEVEL_SETTLING_LAGS * p.time_constant
     return t - s.began > p.timeout or (settled and s.level.below_loss >= p.loss_time)

@@ -1,12 +1,12 @@
-"""The level of the signal: what of it is noise, and whether there is a target in the beam.
+"""The level of the signal: its noise, and the presence of a target in the beam.
 
 Off target the level z has a mean m and a variance V, learnt over the last `learn_time` by n samples of length T,
 
     w = max(1/n, T / learn_time),    d = z - m,    m += w d,    V = (1 - w) (V + w d^2)
 
-(Finch, Incremental calculation of weighted mean and variance, 2009, section 9). Above it stand three thresholds
-(operations.md 2.2): detect = m + 4 sqrt(V), track = detect + 1 dB, loss = detect - 2 dB, but no lower than
-m + 2 sqrt(V), where the noise itself would hold the target.
+(Finch, Incremental calculation of weighted mean and variance, 2009, section 9). There are three thresholds above it
+(operations.md 2.2): detect = m + 4 sqrt(V), track = detect + 1 dB, loss = detect - 2 dB. The threshold loss is at
+least m + 2 sqrt(V), because below that the noise itself would hold the target.
 """
 import math
 from collections import namedtuple
@@ -17,33 +17,33 @@ from pedestal_common.compiled import compiled
 
 LEVEL_DTYPE = np.dtype([('mean', 'f8'), ('variance', 'f8'), ('samples', 'i8'), ('learnt', 'f8'),
                         ('z', 'f8'), ('stamp', 'f8'), ('above_detect', 'f8'), ('above_track', 'f8'),
-                        ('below_loss', 'f8'),
-                        ('present', 'i8')], align=True)
-"""mean, variance: m [dB-Hz], V [dB2] of so many samples, learnt for so long [s]; z: the last level, of this stamp [s];
-above_detect, above_track, below_loss: for how long it has been there [s]; present: whether there is a target."""
+                        ('below_loss', 'f8'), ('present', 'i8')], align=True)
+"""mean, variance: m [dB-Hz], V [dB2]; samples, learnt: their number and total length [s]; z, stamp: the last level and
+its stamp [s]. `above_detect`, `above_track`, `below_loss`: time for which the level has been there [s]; present:
+whether there is a target."""
 
 Thresholds = namedtuple('Thresholds', 'detect track loss')
-"""[dB-Hz]."""
+"""Thresholds of the level [dB-Hz]."""
 
 DETECTION_SIGMAS = 4.0
-"""Of the noise, that a target must stand above its mean."""
+"""Height of the detection threshold above the mean noise, in standard deviations of the noise."""
 
 MIN_LOSS_SIGMAS = 2.0
-"""Of the noise, above which the threshold of the loss stands."""
+"""Least height of the loss threshold above the mean noise, in standard deviations of the noise."""
 
 TRACK_MARGIN_DB, LOSS_MARGIN_DB = 1.0, -2.0
-"""Of the thresholds above detection [dB]."""
+"""Heights of the thresholds track and loss above the detection threshold [dB]."""
 
 
 @compiled
 def known(s, p):
-    """Whether the noise has been learnt."""
+    """Return True if the noise has been learnt."""
     return s.learnt >= p.learn_time
 
 
 @compiled
 def thresholds(s):
-    """Thresholds above the noise that was learnt."""
+    """Return the Thresholds above the learnt noise."""
     sigma = math.sqrt(s.variance)
     detect = s.mean + DETECTION_SIGMAS * sigma
     return Thresholds(detect, detect + TRACK_MARGIN_DB, max(detect + LOSS_MARGIN_DB, s.mean + MIN_LOSS_SIGMAS * sigma))
@@ -51,8 +51,8 @@ def thresholds(s):
 
 @compiled
 def learn(s, p, z, T):
-    """Take a level z [dB-Hz] off target, T [s] after the one before; once the noise is known, one that stands above it
-    is none. p: record of AcquisitionParameters."""
+    """Take a level z [dB-Hz] off target, T [s] after the last; a level above the known noise is ignored. p: record of
+    AcquisitionParameters."""
     if known(s, p) and z > thresholds(s).detect:
         return
     s.samples += 1
@@ -65,15 +65,15 @@ def learn(s, p, z, T):
 
 @compiled
 def take(s, p, z, stamp, locked):
-    """Take the level z [dB-Hz] of a stamp [s]; one that is not newer changes nothing.
+    """Take the level z [dB-Hz] of a stamp [s]; a stamp that is not newer has no effect.
 
-    locked: whether the receiver gives angle errors. Until the noise is known this alone tells that there is a target.
+    locked: whether the receiver measures angle errors. Until the noise is known, only this shows a target.
     """
     T = stamp - s.stamp if math.isfinite(s.stamp) else 0.0
     if not T >= 0.0 or not math.isfinite(z):
         return
     s.z, s.stamp = z, stamp
-    # After a gap a level speaks for no more than the time over which it was smoothed.
+    # After a gap a level represents no more than the time over which it was smoothed.
     T = min(T, p.time_constant)
     at = thresholds(s)
     if not known(s, p):
@@ -89,19 +89,19 @@ def take(s, p, z, stamp, locked):
 
 @compiled
 def detected(s, p):
-    """Whether something has been above the noise for acquire_time: a reason to look closer."""
+    """Return True if the level has been above the noise for acquire_time, so that acquire begins."""
     return s.above_detect >= p.acquire_time and s.above_detect > 0.0
 
 
 @compiled
 def restart_noise(s, p):
-    """Learn anew what was not learnt to its end: a signal has come."""
+    """Restart to learn the noise if it is not known yet, because a signal has come."""
     if not known(s, p):
         s.samples, s.learnt, s.mean, s.variance = 0, 0.0, 0.0, 0.0
 
 
 @compiled
 def restart_times(s):
-    """Count the times anew: the beam has moved to another place."""
+    """Restart the times, because the beam has moved to another place."""
     s.above_detect = s.above_track = s.below_loss = 0.0
     s.present = 0

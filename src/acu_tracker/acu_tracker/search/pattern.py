@@ -1,12 +1,12 @@
 """Search patterns: the path of the beam about the expected place of the target, a pure function of time.
 
-The path passes every place of the area within half a pitch, the square some beside its centre within 0.57 of one. The
-beam moves at a constant speed
+The path passes every place of the area within half a pitch; the square passes a few places near its centre within 0.57
+of a pitch. The beam moves at a constant speed
 
     v <= b / (4 tau)
 
 along its path, so that the target is within the beam for about four time constants of the level (operations.md 2.2).
-It starts from rest in SPEED_RISE_TIME_S, and rests for an instant in each corner: offset and rate have no jump.
+The beam starts from rest in SPEED_RISE_TIME_S, and rests for an instant in each corner: offset and rate have no jump.
 """
 import math
 from collections import namedtuple
@@ -15,16 +15,21 @@ from pedestal_common.compiled import compiled
 
 SEARCH_PATTERNS = ('spiral', 'raster', 'square', 'sector')
 PATTERN_SPIRAL, PATTERN_RASTER, PATTERN_SQUARE, PATTERN_SECTOR = range(len(SEARCH_PATTERNS))
-"""spiral: Archimedean; raster: lines along the track of the target, the middle one first, as a late prediction is off
-along its track; square: expanding, along the track and across; sector: lines from one edge of the area to the other.
+"""Shapes of a pattern.
+
+    spiral      Archimedean
+    raster      lines along the track of the target, the middle line first: a late prediction is off along the track
+    square      expanding, along the track and across
+    sector      lines from one edge of the area to the other
 """
 
 SPEED_RISE_TIME_S = 0.2
-"""Time in which the beam reaches its speed, and in which it comes to rest [s]."""
+"""Time in which the beam reaches its speed, and in which it stops [s]."""
 
 Area = namedtuple('Area', 'pattern radius across pitch speed')
-"""What is searched, how: code of a pattern; half length along the track, half width across [rad] (raster and sector;
-the others take the radius both ways); distance of neighbouring lines [rad]; speed [rad/s]."""
+"""Area and pattern of a search. pattern: its code; radius: half length along the track, across: half width
+[rad] (raster and sector; the others use the radius both ways). `pitch`: distance between neighbouring
+lines [rad]; speed [rad/s]."""
 
 Point = namedtuple('Point', 'x y dx dy')
 """Offset [rad] along x and y, and its rate [rad/s]."""
@@ -32,20 +37,20 @@ Point = namedtuple('Point', 'x y dx dy')
 
 @compiled
 def highest_speed(beamwidth, time_constant, share):
-    """Speed of the beam [rad/s]: share (at most 1) of b / (4 tau)."""
+    """Return the speed of the beam [rad/s]: share (at most 1) of b / (4 tau)."""
     return share * beamwidth / (4.0 * time_constant)
 
 
 @compiled
 def rotated(p, angle):
-    """A Point turned by an angle [rad]: from along and across the track to cross-elevation and elevation."""
+    """Return a Point turned by an angle [rad]: from along and across the track to cross-elevation and elevation."""
     s, c = math.sin(angle), math.cos(angle)
     return Point(c * p.x - s * p.y, s * p.x + c * p.y, c * p.dx - s * p.dy, s * p.dx + c * p.dy)
 
 
 @compiled
 def circle(radius, period, t):
-    """Point at t [s] of a circle about the centre, entered along a radius that grows for one period [s]."""
+    """Return the Point at t [s] of a circle about the centre, entered along a radius that grows for one period [s]."""
     w = 2.0 * math.pi / period
     r, dr = (radius * t / period, radius / period) if t < period else (radius, 0.0)
     s, c = math.sin(w * t), math.cos(w * t)
@@ -54,7 +59,7 @@ def circle(radius, period, t):
 
 @compiled
 def duration(area):
-    """How long a pattern takes [s]."""
+    """Return the duration of a pattern [s]."""
     if area.pattern == PATTERN_SPIRAL:
         return spiral_length(_turn_of(area), area.pitch) / area.speed + 0.5 * SPEED_RISE_TIME_S
     T, n = 0.0, vertices(area)
@@ -65,7 +70,7 @@ def duration(area):
 
 @compiled
 def point(area, t):
-    """Point of a pattern at t [s] after its begin; after its `duration` it rests where it ended."""
+    """Return the Point of a pattern at t [s] after its begin; after its `duration` it stays at its end."""
     if area.pattern == PATTERN_SPIRAL:
         return _on_spiral(area, t)
     n = vertices(area)
@@ -80,23 +85,26 @@ def point(area, t):
 
 @compiled
 def _turn_of(area):
-    """Angle [rad] at which the spiral has reached the radius, and half a pitch more so that its edge is seen all
-    round."""
+    """Return the angle [rad] at which the spiral has reached the radius, and half a pitch more,
+    so that all of its edge is seen."""
     return 2.0 * math.pi * (area.radius / area.pitch + 0.5)
 
 
 @compiled
 def spiral_length(theta, pitch):
-    """Length [rad] of r = k theta, k = pitch / (2 pi), from the centre to the angle theta [rad]:
-    k/2 (theta sqrt(1 + theta^2) + asinh theta)."""
+    """Return the length [rad] of r = k theta, k = pitch / (2 pi), from the centre to the angle theta [rad]: k/2 (theta
+    sqrt(1 + theta^2) + asinh theta)."""
     return 0.25 * pitch / math.pi * (theta * math.sqrt(1.0 + theta * theta) + math.asinh(theta))
 
 
 @compiled
 def _on_spiral(area, t):
-    """Point of the spiral: the length is v t after the rise, and Newton's method finds the angle that has it."""
+    """Return the Point of the spiral: the length is v t after the rise,
+    and Newton's method finds the angle of this length."""
     v, k, end = area.speed, 0.5 * area.pitch / math.pi, _turn_of(area)
-    (length, rate) = (0.5 * v * t * t / SPEED_RISE_TIME_S, v * t / SPEED_RISE_TIME_S) if t < SPEED_RISE_TIME_S else (v * (t - 0.5 * SPEED_RISE_TIME_S), v)
+    length, rate = v * (t - 0.5 * SPEED_RISE_TIME_S), v
+    if t < SPEED_RISE_TIME_S:
+        length, rate = 0.5 * v * t * t / SPEED_RISE_TIME_S, v * t / SPEED_RISE_TIME_S
     theta = min(length / k, math.sqrt(2.0 * length / k))
     for _ in range(6):
         theta -= (spiral_length(theta, area.pitch) - length) / (k * math.sqrt(1.0 + theta * theta))
@@ -109,13 +117,13 @@ def _on_spiral(area, t):
 
 @compiled
 def lines_aside(area):
-    """Lines of a raster or a sector on one side of the middle one."""
+    """Return the number of lines of a raster or a sector on one side of the middle line."""
     return max(math.ceil(area.across / area.pitch - 0.5), 0)
 
 
 @compiled
 def vertices(area):
-    """Number of corners of a pattern of straight legs, with its begin and its end."""
+    """Return the number of corners of a pattern of straight legs, with its begin and its end."""
     if area.pattern == PATTERN_SQUARE:
         return 4 * max(math.ceil(area.radius / area.pitch - 0.5), 1) + 3
     return 4 * lines_aside(area) + 3
@@ -123,13 +131,13 @@ def vertices(area):
 
 @compiled
 def vertex(area, i):
-    """(x, y) [rad] of corner i, 0 the centre."""
+    """Return (x, y) [rad] of corner i, 0 the centre."""
     if i == 0:
         return 0.0, 0.0
     if area.pattern == PATTERN_SQUARE:
         # Legs of 1, 1, 2, 2, 3, 3 ... pitches, each a quarter of a turn on.
         return _alternating((i + 1) // 2) * area.pitch, _alternating(i // 2) * area.pitch
-    # Boustrophedon: the corners of a line are its two ends, and the next line begins at the side where one ended.
+    # Boustrophedon: the corners of a line are its two ends, and the next line begins at the side where it ended.
     line = (i - 1) // 2
     x = area.radius if (i + line) % 2 == 1 else -area.radius
     return x, (_alternating(line) if area.pattern == PATTERN_RASTER else line - lines_aside(area)) * area.pitch
@@ -137,7 +145,7 @@ def vertex(area, i):
 
 @compiled
 def _alternating(n):
-    """0, 1, -1, 2, -2 ... of n = 0, 1, 2, 3, 4 ..."""
+    """Return 0, 1, -1, 2, -2 ... for n = 0, 1, 2, 3, 4 ..."""
     return (n + 1) // 2 if n % 2 == 1 else -(n // 2)
 
 
@@ -150,24 +158,25 @@ def _leg_length(area, i):
 
 @compiled
 def _leg_time(area, i):
-    """Time [s] from corner i - 1 to corner i, from rest to rest with the acceleration v / SPEED_RISE_TIME_S."""
+    """Return the time [s] from corner i - 1 to corner i, from rest to rest with the acceleration v /
+    SPEED_RISE_TIME_S."""
     L, v = _leg_length(area, i), area.speed
     return L / v + SPEED_RISE_TIME_S if L > v * SPEED_RISE_TIME_S else 2.0 * math.sqrt(L * SPEED_RISE_TIME_S / v)
 
 
 @compiled
 def _on_leg(area, i, t):
-    """Point of the leg to corner i, t [s] after it began."""
+    """Return the Point of the leg to corner i, t [s] after its begin."""
     x0, y0 = vertex(area, i - 1)
     x1, y1 = vertex(area, i)
     L, T, a = _leg_length(area, i), _leg_time(area, i), area.speed / SPEED_RISE_TIME_S
     rise = min(SPEED_RISE_TIME_S, 0.5 * T)
     if t < rise:
-        way, rate = 0.5 * a * t * t, a * t
+        distance, rate = 0.5 * a * t * t, a * t
     elif T - t < rise:
-        way, rate = L - 0.5 * a * (T - t) * (T - t), a * (T - t)
+        distance, rate = L - 0.5 * a * (T - t) * (T - t), a * (T - t)
     else:
-        way, rate = a * rise * (t - 0.5 * rise), a * rise
-    part, speed = (way / L, rate / L) if L > 0.0 else (1.0, 0.0)
+        distance, rate = a * rise * (t - 0.5 * rise), a * rise
+    part, speed = (distance / L, rate / L) if L > 0.0 else (1.0, 0.0)
     dx, dy = x1 - x0, y1 - y0
     return Point(x0 + part * dx, y0 + part * dy, speed * dx, speed * dy)

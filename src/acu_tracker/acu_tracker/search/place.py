@@ -1,9 +1,9 @@
-"""The expected place of a target without a program: from where it was last known to be on along its great circle.
+"""The expected place of a target without a program: on from its last known place along its great circle.
 
-Of a rate that is not measured any more nothing is known in the end: it is expected to fade, as that of a Singer model
-does (Singer 1970, with the rate in the place of the acceleration), so that the target has moved by
+The last known rate becomes less and less certain. It is expected to fade, as in a Singer model (Singer 1970, with the
+rate in the place of the acceleration), so that the target has moved by
 
-    W tau (1 - exp(-T/tau)),    W: its rate when it was last seen, T ago.
+    W tau (1 - exp(-T/tau)),    W: its rate at the last measurement, T ago.
 """
 import math
 
@@ -19,6 +19,7 @@ PLACE_DTYPE = np.dtype([('u', 'f8', (3,)), ('du', 'f8', (3,)), ('stamp', 'f8')],
 """ENU unit vector u [-] of the target at a stamp [s], and its rate du [1/s]."""
 
 ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
+"""Vector of length 0."""
 
 RATE_FADE_TIME_S = 10.0
 """Time constant with which the expected rate fades [s]."""
@@ -26,7 +27,7 @@ RATE_FADE_TIME_S = 10.0
 
 @compiled
 def remember(s, t, u, du):
-    """The target is at the ENU unit Vector u with its rate du [1/s] at t [s]."""
+    """Keep that the target is at the ENU unit Vector u with its rate du [1/s] at t [s]."""
     s.u[0], s.u[1], s.u[2] = u
     s.du[0], s.du[1], s.du[2] = du
     s.stamp = t
@@ -34,7 +35,7 @@ def remember(s, t, u, du):
 
 @compiled
 def motion_at(s, t):
-    """Motion in earth angles at t [s], not before it was last known."""
+    """Return the Motion in earth angles at t [s], not before the last known place."""
     u, du = vector(s.u), vector(s.du)
     W, left = math.sqrt(dot(du, du)), math.exp((s.stamp - t) / RATE_FADE_TIME_S)
     angle = W * RATE_FADE_TIME_S * (1.0 - left)
@@ -48,14 +49,15 @@ def motion_at(s, t):
 
 @compiled
 def track(motion):
-    """Direction [rad] in which a target with this Motion moves, from cross-elevation towards elevation; 0 at rest."""
+    """Return the direction [rad] in which a target with this Motion moves,
+    from cross-elevation towards elevation; 0 at rest."""
     return math.atan2(motion.elevation.rate, motion.azimuth.rate * math.cos(motion.elevation.angle))
 
 
 @compiled
 def displaced(motion, p):
-    """The Motion of a beam at an offset from a target: a pattern.Point p in cross-elevation and elevation. What the
-    pattern adds to the accelerations is left out."""
+    """Return the Motion of a beam at an offset from a target: a pattern.Point p in cross-elevation and elevation. The
+    accelerations of the pattern are neglected."""
     n = line_of_sight.displaced_motion(motion.azimuth.angle, motion.elevation.angle, motion.azimuth.rate,
                                        motion.elevation.rate, p.x, p.y, p.dx, p.dy)
     beam = angles(LineOfSight(Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]), ZERO_VECTOR))

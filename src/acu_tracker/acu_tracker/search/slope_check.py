@@ -1,12 +1,12 @@
-"""Whether the receiver's errors lead to the target, checked before the loop is closed on them.
+"""Check that the receiver's errors lead to the target, before the loop is closed on them.
 
-The beam moves in a way that is known about the expected place of the target, which is at an offset d from the beam.
-The errors e should follow it one for one. With the sums over the samples, less their means,
+The beam moves in a known way about the expected place of the target, which is at an offset d from the beam. The errors
+e should follow it one for one. With the sums over the samples, less their means,
 
     K = S_ed S_dd^-1,    S_ed = sum (e - e') (d - d')^T,    S_dd = sum (d - d') (d - d')^T
 
-is the matrix of slopes (least squares): 1 on its diagonal where all is well, negative where a sign is wrong, and
-cos(beta) where the axes of the errors are turned by beta. An error of the prediction is in the means alone.
+is the matrix of slopes (least squares). Its diagonal is 1 without a fault, negative if a sign is wrong, and cos(beta)
+if the axes of the errors are turned by beta. An error of the prediction is in the means only.
 """
 import numpy as np
 
@@ -14,18 +14,18 @@ from pedestal_common.compiled import compiled
 
 SLOPES_DTYPE = np.dtype([('n', 'i8'), ('d', 'f8', (2,)), ('e', 'f8', (2,)), ('dd', 'f8', (3,)), ('ed', 'f8', (2, 2))],
                         align=True)
-"""n samples, their means d', e' [rad], the sums S_dd (xx, xe, ee) and S_ed [rad2]."""
+"""n: number of samples; d, e: their means d', e' [rad]; dd, ed: the sums S_dd (xx, xe, ee) and S_ed [rad2]."""
 
 MIN_SLOPE = 0.5
-"""Slope below which the loop is not closed: axes turned by 60 deg, which takes a whole phase margin."""
+"""Slope below which the loop is not closed [-]: axes turned by 60 deg, which use up the phase margin."""
 
 VERDICT_UNKNOWN, VERDICT_RIGHT, VERDICT_WRONG = range(3)
-"""Verdicts."""
+"""Verdicts of the check."""
 
 
 @compiled
 def restart(s):
-    """No samples."""
+    """Clear the samples."""
     s.n = 0
     s.d[:] = 0.0
     s.e[:] = 0.0
@@ -54,7 +54,7 @@ def take(s, d, e):
 
 @compiled
 def slopes(s):
-    """(K_xx, K_ee) [1]; NaN while the beam has not moved in two directions."""
+    """Return (K_xx, K_ee) [1]; NaN before the beam has moved in two directions."""
     det = s.dd[0] * s.dd[2] - s.dd[1] * s.dd[1]
     return ((s.ed[0, 0] * s.dd[2] - s.ed[0, 1] * s.dd[1]) / det,
             (s.ed[1, 1] * s.dd[0] - s.ed[1, 0] * s.dd[1]) / det)
@@ -62,7 +62,7 @@ def slopes(s):
 
 @compiled
 def verdict(s, samples):
-    """VERDICT_RIGHT or VERDICT_WRONG once there are so many samples, VERDICT_UNKNOWN before."""
+    """Return VERDICT_RIGHT or VERDICT_WRONG after this number of samples, VERDICT_UNKNOWN before."""
     if s.n < samples:
         return VERDICT_UNKNOWN
     x, e = slopes(s)

@@ -1,12 +1,12 @@
-"""Step track: the beam climbs the hill of the level, for a receiver that measures no angle errors.
+"""Step track: the beam climbs to the peak of the level, for a receiver that measures no angle errors.
 
-Once a cycle the beam stands one step d to either side of its place, first in cross-elevation, then in elevation, and
+Once a cycle the beam stays one step d to either side of its place, first in cross-elevation, then in elevation, and
 averages the level z there. The main lobe is a parabola in decibels, 12 (theta/b)^2, so that the peak is at
 
     theta0 = (z+ - z-) b^2 / (48 d)
 
-from where the beam was. It goes there by one step at most, and stays where theta0 is within the deadband. Step, cycle
-and deadband are those of the GD 7200 (operations.md 2.2): 8 % of the beamwidth, 2 min, as large as the step.
+from the place of the beam. The beam moves there by one step at most, and stays if theta0 is within the deadband. Step,
+cycle and deadband of the GD 7200 (operations.md 2.2) are 8 % of the beamwidth, 2 min, and as large as the step.
 """
 import numpy as np
 
@@ -14,19 +14,20 @@ from pedestal_common.compiled import compiled
 
 STEP_TRACK_DTYPE = np.dtype([('place', 'f8', (2,)), ('began', 'f8'), ('phase', 'i8'), ('since', 'f8'),
                              ('sum', 'f8'), ('samples', 'i8'), ('plus', 'f8')], align=True)
-"""place: offset of the beam between its steps [rad]; began: the cycle [s]; phase: one of the following; since: when
-the beam went to its place of the phase [s]; sum of so many levels there [dB-Hz]; plus: the mean on the plus side."""
+"""place: offset of the beam between its steps [rad]; began: begin of the cycle [s]; phase: index in STEP_PHASES.
+`since`: time at which the beam went to its place of the phase [s]; sum, samples: sum of the levels there [dB-Hz] and
+their number; plus: the mean on the plus side."""
 
 STEP_PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus', 'elevation minus', 'rest')
 REST_PHASE = len(STEP_PHASES) - 1
 
 STEP_SETTLING_LAGS = 5.0
-"""Time constants of the level after which it is that of a new place."""
+"""Number of time constants after which a level is that of a new place."""
 
 
 @compiled
 def start(s, t, x, e):
-    """Begin at t [s] at an offset [rad], with a cycle at once."""
+    """Start at t [s] at an offset [rad], with an immediate cycle."""
     s.place[0], s.place[1] = x, e
     s.began = t
     _enter(s, 0, t)
@@ -39,14 +40,17 @@ def _enter(s, phase, t):
 
 @compiled
 def peak(z_plus, z_minus, step, beamwidth):
-    """theta0 [rad]: where the peak is by the levels one step [rad] to either side [dB]."""
+    """Return theta0 [rad], the place of the peak, from the levels one step [rad] to either side [dB]."""
     return (z_plus - z_minus) * beamwidth * beamwidth / (48.0 * step)
 
 
 @compiled
 def step(s, p, beamwidth, tau, t, z, present):
-    """(x, e) offset of the beam [rad] at t [s]; z: level that was measured since the last step, NaN where there is
-    none; present: whether there is a signal to step on. p: record of StepTrackParameters; tau: of the level [s]."""
+    """Return the offset (x, e) of the beam [rad] at t [s].
+
+    z: level measured since the last step, NaN for none; present: whether there is a signal. p: record of
+    StepTrackParameters; tau: time constant of the level [s].
+    """
     d = p.step * beamwidth
     if not present or (s.phase == REST_PHASE and t - s.began < p.cycle):
         if not present:

@@ -1,4 +1,4 @@
-"""The position loop of an axis and the laws it is made of.
+"""The position loop of an axis and its laws.
 
 Symbols
     e, u, y         error of the axis, rate command, encoder angle                      [rad], [rad/s], [rad]
@@ -14,6 +14,6 @@ Symbols
     b0, u0          `adrc`: gain of the plant, w_s; the wanted acceleration             [1/s], [rad/s2]
     R, alpha, beta  `beam_loop`: angle of the beam, gains on angle and rate             [rad], [-], [-]
     delta, V        `beam_loop`: share compensated of V, the apparent rate of a fixed target [-], [rad/s]
-    d, a, t         `ends`: way to the end of travel, braking, time given to react      [rad], [rad/s2], [s]
-    w, width, depth `notch`: centre, damping of its poles, what is left at the centre   [rad/s], [-], [-]
+    d, a, t         `ends`: distance to the end of travel, braking, reaction time       [rad], [rad/s2], [s]
+    w, width, depth `notch`: centre, damping of its poles, gain at the centre           [rad/s], [-], [-]
 """

@@ -1,13 +1,15 @@
 """Active disturbance rejection: TD, ESO and NLC of paper 001, equations (7) to (11), for a drive with a rate loop.
 
-The model of the drive is of second order: its rate loop is a lag of bandwidth w_s (b0 = w_s), and the torque that is
-fed forward gives it the acceleration v3 of the reference:
-    y'' = w_s (u - y') + v3 + z3.
-The known part of y'' is in the observer's model, so that z3 holds the disturbance alone. The paper's y'' = z3 + b0 u
-leaves -w_s y' and v3 to z3 as well: they change as the target moves, and the observer follows them with a lag.
+The model of the drive is of second order. Its rate loop is a lag of bandwidth w_s (b0 = w_s), and the torque fed
+forward gives it the acceleration v3 of the reference:
+
+    y'' = w_s (u - y') + v3 + z3
+
+The known part of y'' is in the observer's model, so that z3 holds the disturbance only. The paper's y'' = z3 + b0 u
+leaves -w_s y' and v3 to z3 as well; these change as the target moves, and the observer follows them with a lag.
 
 TD (7)(8)   the shaper: fhan with the target's own rate and acceleration fed forward; v1, v2, v3 are its result
-ESO (9)     linear instead of fal, all poles at exp(-w_o h), fed with the command as it was limited
+ESO (9)     linear instead of fal, all poles at exp(-w_o h); its input is the limited command
 NLC (11)    u0 = v3 + w_c^2 (v1 - z1) + 2 w_c (v2 - z2): fhan (h1 = 1/w_c) in its linear zone, which the paper's never
             leaves; u = (u0 - known part - z3) / b0, where the paper prints u0 - z3 / b0
 """
@@ -18,7 +20,7 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def observer_gains(w_o, w_s, h):
-    """(l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles of the observer at p = exp(-w_o h).
+    """Return (l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles of the observer at p = exp(-w_o h).
 
     w_o, w_s [rad/s]: poles of the observer and of the drive's rate loop; h [s]: its step.
 
@@ -35,8 +37,8 @@ def observer_gains(w_o, w_s, h):
 
 @compiled
 def observed(z, y, u, v3, w_o, w_s, h):
-    """z = (z1, z2, z3) [rad, rad/s, rad/s2] after the encoder angle y [rad], h [s] after z (3,), with u [rad/s] and v3
-    [rad/s2] in force meanwhile."""
+    """Return z = (z1, z2, z3) [rad, rad/s, rad/s2] after the encoder angle y [rad], h [s] after z (3,), with u [rad/s]
+    and v3 [rad/s2] in force meanwhile."""
     z1, z2, z3 = z[0], z[1], z[2]
     g = -math.expm1(-w_s * h) / w_s
     settled = u + (v3 + z3) / w_s
@@ -49,6 +51,7 @@ def observed(z, y, u, v3, w_o, w_s, h):
 
 @compiled
 def rate(z, v1, v2, v2_m, w_c, w_s):
-    """Rate command [rad/s] from z (3,) towards v1 [rad], v2 [rad/s] at t_k; v2_m [rad/s] at t_m is fed forward."""
+    """Return the rate command [rad/s] from z (3,) towards v1 [rad], v2 [rad/s] at t_k;
+    v2_m [rad/s] at t_m is fed forward."""
     u0 = w_c * w_c * (v1 - z[0]) + 2.0 * w_c * (v2 - z[1])
     return v2_m + (z[1] - v2) + (u0 - z[2]) / w_s

@@ -1,6 +1,6 @@
-"""Both axes of the antenna: where they start from, and their commands. axis: records (2,) of position_loop.AXIS.
+"""Both axes of the antenna: their start and their commands. axis: records (2,) of position_loop.AXIS_LOOP_DTYPE.
 
-c, u, o: records of control_unit.CONSTANTS, of signals.INPUTS and OUTPUTS.
+c, u, o: records of control_unit.CONSTANTS_DTYPE, of signals.INPUTS_DTYPE and OUTPUTS_DTYPE.
 """
 from acu_tracker.geometry.motion import Motion
 from acu_tracker.servo import floor, position_loop, reference
@@ -16,22 +16,26 @@ def now(axis):
 
 @compiled
 def start_from_actual(axis, c, u, immobile, begins, silence):
-    """Targets := actual, of both axes where they begin anew; of one that does not obey in every step until it does, or
-    it would wind up behind its commands and make good for them at once when it hears them again. immobile: whether it
-    does not, of each; silence: whether no command was heard for long."""
+    """Set targets := actual: of both axes if the loop begins,
+    and in every step of an axis that cannot follow its commands.
+
+    This avoids that the reference of such an axis runs ahead, so that the axis catches up at once when it can follow
+    again. Arguments: immobile, whether each axis cannot follow commands; silence, whether the last command is too old
+    to be in force.
+    """
     for i in range(2):
-        rate, disobeys = u.velocity[i], immobile[i] and not begins
-        if disobeys:
+        rate, powerless = u.velocity[i], immobile[i] and not begins
+        if powerless:
             rate = position_loop.realised(axis[i].command, rate)
-        if silence or disobeys:
+        if silence or powerless:
             position_loop.replace_command(axis[i], rate)
-        if begins or disobeys:
+        if begins or powerless:
             position_loop.initialise(axis[i], c.axis[i].p, u.stamp, u.position[i], rate)
 
 
 @compiled
 def follow(axis, c, u, o, motion, now, beam):
-    """Run the position loops of both axes towards a Motion; now: the Instants; beam: of each axis the error [rad] and
+    """Run the position loops of both axes towards a Motion; now: the Instants. beam: of each axis the error [rad] and
     the rate of the deck [rad/s], and whether its own loop is closed."""
     (error, V, closed), now_ends = beam, floor.ends(c, u, motion.azimuth.angle)
     for i in range(2):
@@ -41,14 +45,14 @@ def follow(axis, c, u, o, motion, now, beam):
 
 @compiled
 def rest(axis, c, o, dt):
-    """Bring both axes to rest; dt [s]: since the last command."""
+    """Bring both axes to rest; dt [s]: time since the last command."""
     for i in range(2):
         _write(o, i, position_loop.stop(axis[i], c.axis[i].p, dt))
 
 
 @compiled
 def _write(o, i, command):
-    """The Command of axis i into the outputs."""
+    """Write the Command of axis i to the outputs."""
     o.rate[i], o.torque[i] = command.rate, command.torque
     o.reference[i, 0], o.reference[i, 1], o.reference[i, 2] = command.reference
     o.angle_limited[i], o.rate_limited[i] = command.angle_limited, command.rate_limited

@@ -1,6 +1,6 @@
 """The floor of the elevation over the azimuth, for every mode: straight lines through the points of a table.
 
-Where the floor rises, the elevation does before the azimuth goes there, and the azimuth waits in front of it.
+Where the floor rises, the elevation rises before the azimuth goes there, and the azimuth waits in front of it.
 """
 import math
 
@@ -11,26 +11,29 @@ from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
 
 MAX_FLOOR_POINTS = 64
+"""Largest number of points of a floor."""
 FLOOR_DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
              'clockwise within a turn, straight lines between; empty: elevation.limits.low')
 
 CELL_COUNT = 720
-"""Of a turn, in which the floor is looked up: half a degree."""
+"""Number of cells of a turn in which the floor is looked up: half a degree each."""
 
 CELL_WIDTH_RAD = 2.0 * math.pi / CELL_COUNT
+"""Width of a cell [rad]."""
 
 FLOOR_DTYPE = np.dtype([('given', 'i8'), ('highest', 'f8', (CELL_COUNT,))], align=True)
-"""given: whether there is one; highest: of the floor in each cell [rad], that of azimuth 0 to CELL_WIDTH_RAD first."""
+"""given: whether there is a floor; highest: highest value of the floor in each cell [rad], beginning with azimuth 0 to
+CELL_WIDTH_RAD."""
 
 MAX_AZIMUTH_RAD = 1e3
-"""Azimuth [rad] that no travel holds: an infinite one has no cell, its conversion to a whole number is undefined."""
+"""Azimuth [rad] beyond every travel. This avoids the undefined conversion of an infinite azimuth to a cell number."""
 
 FLOOR_CLEARANCE_RAD = 1e-3
-"""Elevation [rad] by which the floor is cleared, so that the azimuth does not wait for the last encoder step."""
+"""Elevation above the floor [rad]. This avoids that the azimuth waits for the last encoder step."""
 
 
 def points(text):
-    """Azimuths and elevations (n,) [rad] of a text as in FLOOR_DOC, ((), ()) of an empty one. Raises
+    """Return azimuths and elevations (n,) [rad] of a text as in FLOOR_DOC, ((), ()) of an empty text. Raises
     ParameterError."""
     parts = [part.split() for part in text.split(';') if part.strip()]
     if len(parts) > MAX_FLOOR_POINTS:
@@ -42,19 +45,20 @@ def points(text):
     A, f = zip(*rows) if rows else ((), ())
     if rows and not (all(a < b for a, b in zip(A, A[1:])) and A[-1] - A[0] < 2.0 * math.pi
                      and all(abs(a) <= 2.0 * math.pi and abs(e) <= 0.5 * math.pi for a, e in rows)):
-        raise ParameterError(f'floor = {text!r}: azimuths must grow, within one turn and 6.2832 rad, elevations be '
-                             'within 1.5708 rad')
+        raise ParameterError(f'floor = {text!r}: azimuths must increase, within one turn and -6.2832 to 6.2832 rad; '
+                             'elevations must be -1.5708 to 1.5708 rad')
     return A, f
 
 
 def at(text, A):
-    """The floor of a text as in FLOOR_DOC at an azimuth [rad]; -inf where there is none."""
+    """Return the floor of a text as in FLOOR_DOC at an azimuth [rad]; -inf if there is none."""
     azimuths, elevations = points(text)
     return np.interp(A, azimuths, elevations, period=2.0 * math.pi) if azimuths else -math.inf
 
 
 def table(text) -> np.ndarray:
-    """FLOOR_DTYPE (1,) of a text as in FLOOR_DOC: in each cell the highest of its ends and of the points in it."""
+    """Return the FLOOR_DTYPE (1,) of a text as in FLOOR_DOC: in each cell the highest of its ends
+    and of the points in it."""
     A, f = points(text)
     floor = np.zeros(1, FLOOR_DTYPE)
     if A:
@@ -67,14 +71,14 @@ def table(text) -> np.ndarray:
 
 @compiled
 def _cell(A):
-    """The cell of an azimuth [rad], not yet brought into one turn; one beyond every travel counts as MAX_AZIMUTH_RAD
-    away."""
+    """Return the cell of an azimuth [rad], not yet wrapped to one turn; an azimuth beyond every travel counts as
+    MAX_AZIMUTH_RAD."""
     return math.floor(min(max(A, -MAX_AZIMUTH_RAD), MAX_AZIMUTH_RAD) / CELL_WIDTH_RAD)
 
 
 @compiled
 def highest(floor, A, B):
-    """The highest of the floor [rad] between two azimuths [rad]."""
+    """Return the highest value of the floor [rad] between two azimuths [rad]."""
     first, last = _cell(min(A, B)), _cell(max(A, B))
     top = -math.inf
     for i in range(first, min(last, first + CELL_COUNT - 1) + 1):
@@ -84,22 +88,22 @@ def highest(floor, A, B):
 
 @compiled
 def above(floor, A, E):
-    """Whether the floor is above an elevation at an azimuth [rad]."""
+    """Return True if the floor is above an elevation at an azimuth [rad]."""
     return floor.given != 0 and floor.highest[_cell(A) % CELL_COUNT] > E
 
 
 @compiled
 def of_azimuth(floor, limits, A, E):
-    """Ends of the azimuth at A: its limits, or where the floor gets above the elevation E [rad]. Where it is above it
-    already, the azimuth may leave."""
+    """Return the Ends of the azimuth at A: its limits, or where the floor rises above the elevation E [rad]. If the
+    floor at A is above E already, the azimuth may leave."""
     if not floor.given or above(floor, A, E):
         return Ends(limits.low, limits.high)
     first = last = _cell(A)
-    while last - first < CELL_COUNT and floor.highest[(first
-                                                       - 1) % CELL_COUNT] <= E and first * CELL_WIDTH_RAD > limits.low:
+    while (last - first < CELL_COUNT and floor.highest[(first - 1) % CELL_COUNT] <= E
+           and first * CELL_WIDTH_RAD > limits.low):
         first -= 1
-    while last - first < CELL_COUNT and floor.highest[(last + 1) % CELL_COUNT] <= E and (last
-                                                                                         + 1) * CELL_WIDTH_RAD < limits.high:
+    while (last - first < CELL_COUNT and floor.highest[(last + 1) % CELL_COUNT] <= E
+           and (last + 1) * CELL_WIDTH_RAD < limits.high):
         last += 1
     if last - first >= CELL_COUNT:
         return Ends(limits.low, limits.high)
@@ -108,8 +112,8 @@ def of_azimuth(floor, limits, A, E):
 
 @compiled
 def of_elevation(floor, limits, A, ahead, target):
-    """Ends of the elevation at azimuth A: above the floor from there to where the azimuth stops, `ahead`, and to its
-    target [rad]."""
+    """Return the Ends of the elevation at azimuth A: above the floor from A to the azimuth's stop, `ahead`,
+    and to its target [rad]."""
     if not floor.given:
         return Ends(limits.low, limits.high)
     top = max(highest(floor, A, ahead), highest(floor, A, target)) + FLOOR_CLEARANCE_RAD
@@ -118,8 +122,8 @@ def of_elevation(floor, limits, A, ahead, target):
 
 @compiled
 def ends(c, u, azimuth):
-    """(Ends of the azimuth, of the elevation) now, with the azimuth on its way to an angle [rad]. c, u: constants and
-    inputs of the control unit."""
+    """Return (Ends of the azimuth, of the elevation) at present, with the azimuth on its way to an angle [rad]. c, u:
+    constants and inputs of the control unit."""
     a, e, A, dA = c.axis[0].p.limits, c.axis[1].p.limits, u.position[0], u.velocity[0]
     ahead = A + math.copysign(braking_distance(abs(dA), c.axis[0].braking, c.axis[0].reaction), dA)
     return of_azimuth(c.floor, a, A, u.position[1]), of_elevation(c.floor, e, A, ahead, azimuth)
@@ -127,7 +131,7 @@ def ends(c, u, azimuth):
 
 @compiled
 def by_hand(c, u, azimuth):
-    """Ends of a point that is moved by hand, now at an azimuth [rad]: as of `ends`, but that the azimuth goes on where
-    the elevation can rise above the floor."""
+    """Return the Ends of a point that is moved by hand, now at an azimuth [rad]: as of `ends`, except that the azimuth
+    goes on where the elevation can rise above the floor."""
     _, of_elevation_now = ends(c, u, azimuth)
     return of_azimuth(c.floor, c.axis[0].p.limits, u.position[0], c.axis[1].p.limits.high), of_elevation_now

@@ -1,7 +1,7 @@
-"""Second-order notch on the feedback, against a structural resonance.
+"""Second-order notch in the feedback, against a structural resonance.
 
-N(s) = (s^2 + 2 depth width w s + w^2) / (s^2 + 2 width w s + w^2), `depth` at w and 1 far from it; bilinear, prewarped
-to w.
+N(s) = (s^2 + 2 depth width w s + w^2) / (s^2 + 2 width w s + w^2), `depth` at w and 1 far from it;
+bilinear, prewarped to w.
 """
 import math
 
@@ -9,7 +9,7 @@ from pedestal_common.compiled import compiled
 
 
 def coefficients(frequency, width, depth, period):
-    """(b0, b1, b2, a1, a2) for steps of period [s]; frequency [Hz], below 0.5 / period; 0: no notch."""
+    """Return (b0, b1, b2, a1, a2) for steps of period [s]; frequency [Hz], below 0.5 / period; 0: no notch."""
     if frequency == 0.0:
         return 1.0, 0.0, 0.0, 0.0, 0.0
     w = 2.0 * math.pi * frequency
@@ -22,7 +22,7 @@ def coefficients(frequency, width, depth, period):
 
 @compiled
 def removed(x, memory, c):
-    """x less the notch's output, any unit; memory (4,): the last two x and y; c (5,): as of `coefficients`."""
+    """Return x less the notch's output, any unit; memory (4,): the last two x and y; c (5,): as of `coefficients`."""
     y = c[0] * x + c[1] * memory[0] + c[2] * memory[1] - c[3] * memory[2] - c[4] * memory[3]
     memory[0], memory[1], memory[2], memory[3] = x, memory[0], y, memory[2]
     return x - y

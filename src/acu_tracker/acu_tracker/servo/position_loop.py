@@ -1,9 +1,8 @@
-"""The position loop of one axis: selects the controller, hands over without a bump, keeps the limits.
+"""The position loop of one axis: it selects the controller, hands over without a bump, and keeps the limits.
 
-`pid` acts on the raw target at t_k. `feedforward` and `adrc` act on the shaped reference as it was planned for t_k and
-feed the one of t_m forward.
-`beam` steers an electronic beam, which has no dynamics: the command is the raw target at t_m or, in autotrack of the
-forms type_1 and type_2, the beam of paper 002's loop on the receiver's error.
+`pid` acts on the raw target at t_k. `feedforward` and `adrc` act on the shaped reference as planned for t_k, and feed
+the reference of t_m forward. `beam` steers an electronic beam, which has no dynamics. Its command is the raw target at
+t_m or, in autotrack of the forms type_1 and type_2, the beam of paper 002's loop on the receiver's error.
 """
 import dataclasses
 from collections import namedtuple
@@ -26,29 +25,28 @@ AXIS_LOOP_DTYPE = np.dtype([
     ('notch', 'f8', (4,)),
 ], align=True)
 
-
 Instants = namedtuple('Instants', 't_k t_m dt')
-"""t_k: stamp of the drive step, t_m: middle of the interval in which its command is in force; dt since the step
-before [s]."""
+"""t_k: stamp of the drive step [s]; t_m: middle of the interval in which its command is in force [s]; dt: time since
+the step before [s]."""
 
 Feedback = namedtuple('Feedback', 'y dy error V closed ends')
-"""Of one axis at t_k: encoder angle y [rad] and rate dy [rad/s].
+"""Feedback of one axis at t_k: encoder angle y [rad] and rate dy [rad/s].
 
-error: of the receiver in this angle [rad], NaN where none came; V: rate [rad/s] at which the deck's motion moves a
-fixed target; closed: whether a beam closes its own loop on both; ends: the Ends of its travel now."""
+error: of the receiver in this angle [rad], NaN if none came; V: rate [rad/s] at which the deck's motion moves a fixed
+target. `closed`: whether a beam closes its own loop on both; ends: the present Ends of its travel.
+"""
 
 Command = namedtuple('Command', 'rate torque reference angle_limited rate_limited acceleration_limited')
-"""rate [rad/s] and load torque [Nm]; reference: the AxisMotion that is compared with the encoder at t_k, of a beam
-the command; angle_limited, rate_limited, acceleration_limited: what was limited."""
-
+"""rate [rad/s] and load torque [Nm]; reference: the AxisMotion that is compared with the encoder at t_k, for a beam
+the command. `angle_limited`, `rate_limited`, `acceleration_limited`: whether this was limited."""
 
 MAX_DELAY_PHASE_RAD = 0.5
-"""Largest bandwidth times delay of the command [rad]: what it takes of the phase margin of a loop."""
+"""Largest bandwidth times delay of the command [rad]: loss of phase margin of a loop."""
 
 
 def slowed(params, delay):
-    """AxisParameters whose loops a delay of the command [s] leaves stable, none faster than MAX_DELAY_PHASE_RAD /
-    delay."""
+    """Return AxisParameters whose loops are stable with a delay of the command [s]: none is faster than
+    MAX_DELAY_PHASE_RAD / delay."""
     if delay == 0.0:
         return params
     loops = {name: getattr(params, name) for name in ('pid', 'feedforward', 'adrc')}
@@ -59,7 +57,8 @@ def slowed(params, delay):
 
 @compiled
 def limited(wanted, before, dt, rate, acceleration):
-    """(rate command [rad/s], rate limited, acceleration limited): within +-rate and a change of acceleration * dt."""
+    """Return (rate command [rad/s], rate limited, acceleration limited):
+    within +-rate and a change of acceleration * dt."""
     u = min(max(wanted, -rate), rate)
     rate_limited = u != wanted
     step = acceleration * dt
@@ -69,22 +68,23 @@ def limited(wanted, before, dt, rate, acceleration):
 
 @compiled
 def realised(command, dy):
-    """What an axis at a rate dy makes of its command, both [rad/s]: no more than that, and no motion against it."""
+    """Return the part of a command that an axis at a rate dy realises, both [rad/s]: at most the command, and no
+    motion against it."""
     return min(max(dy, min(command, 0.0)), max(command, 0.0))
 
 
 @compiled
 def replace_command(axis, rate):
-    """Take the rate command in force for another [rad/s]: what the axis has made of it."""
+    """Replace the rate command in force by the realised one [rad/s]."""
     axis.command = rate
 
 
 @compiled
 def initialise(axis, p, t_k, y, dy):
-    """Targets := actual: the controller starts from the encoder's angle y [rad] and rate dy [rad/s] at t_k [s].
+    """Set targets := actual: the controller starts from the encoder's angle y [rad] and rate dy [rad/s] at t_k [s].
 
-    A beam keeps its last command: the beam in force lags it by the delay, and would feed back into it for ever.
-    p: record of AxisParameters, here and below.
+    A beam keeps its last command, because the beam in force lags it by the delay and would be fed back into it for
+    ever. p: record of AxisParameters, here and below.
     """
     axis.controller = p.controller
     if p.controller == CONTROLLER_BEAM and axis.reference.planned.count > 0:
@@ -106,8 +106,8 @@ def _initialise_feedback(axis, t_k, y, dy):
 
 @compiled
 def stop(axis, p, dt):
-    """Command that brings the rate to zero within the acceleration limit, dt [s] after the last; resets the
-    integral."""
+    """Return the Command that brings the rate to zero within the acceleration limit,
+    dt [s] after the last; reset the integral."""
     axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, p.limits.rate, p.limits.acceleration)
     axis.integral = 0.0
     return Command(axis.command, 0.0, AxisMotion(axis.reference.angle, 0.0, 0.0), False, False, acceleration_limited)
@@ -115,16 +115,16 @@ def stop(axis, p, dt):
 
 @compiled
 def instant(p, t_k, t_m):
-    """The instant [s] at which the controller needs the raw target: t_k for pid, else t_m."""
+    """Return the instant [s] at which the controller needs the raw target: t_k for pid, else t_m."""
     return t_k if p.controller == CONTROLLER_PID else t_m
 
 
 @compiled
 def follow(axis, c, target, feedback, now):
-    """Command of one step towards a raw target, an AxisMotion at `instant`; now: the Instants.
+    """Return the Command of one step towards a raw target, an AxisMotion at `instant`; now: the Instants.
 
-    c: record of the axis's constants, p its AxisParameters, notch its coefficients, reaction the time [s] given
-    in front of a limit, braking the deceleration [rad/s2] there.
+    c: record of the axis's constants, p its AxisParameters, notch its coefficients, reaction the time [s] allowed in
+    front of a limit, braking the deceleration [rad/s2] there.
     """
     if c.p.controller == CONTROLLER_BEAM:
         return _steer(axis, c.p, target, feedback, now.dt)
@@ -133,7 +133,7 @@ def follow(axis, c, target, feedback, now):
 
 @compiled
 def _steer(axis, p, target, feedback, T):
-    """Command of an electronic beam: the raw target at t_m, or the beam of its own loop on the error."""
+    """Return the Command of an electronic beam: the raw target at t_m, or the beam of its own loop on the error."""
     b, r = p.beam, axis.reference
     beta, compensation = constant_gain.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
     axis.controller = CONTROLLER_BEAM
@@ -152,10 +152,10 @@ def _steer(axis, p, target, feedback, T):
 
 @compiled
 def _step(axis, c, target, feedback, now):
-    """One step of an axis with motors.
+    """Return the Command of one step of an axis with motors.
 
-    Anti-windup: where the realised command differs from the wanted one, the integral only moves towards it; the
-    observer of adrc is fed with the realised command.
+    Anti-windup: if the realised command differs from the wanted one, the integral only moves towards it; the observer
+    of adrc receives the realised command.
     """
     p, r, y, dy = c.p, axis.reference, feedback.y, feedback.dy
     handover = axis.controller != p.controller
@@ -166,7 +166,7 @@ def _step(axis, c, target, feedback, now):
         v, angle_limited = _held_inside(target, feedback.ends.low, feedback.ends.high)
     else:
         angle_limited, rate_limited, acceleration_limited = reference.follow(r, p, target, now.t_m, axis.command,
-                                                                                 feedback.ends)
+                                                                             feedback.ends)
         torque = feedforward.torque(r.rate, r.acceleration, p.feedforward)
         v = reference.planned(r, now.t_k)
     e = v.angle - y
@@ -191,7 +191,7 @@ def _step(axis, c, target, feedback, now):
 
 @compiled
 def _held_inside(target, low, high):
-    """(AxisMotion of a raw target, held at the ends of travel low, high [rad]; whether it is)."""
+    """Return (AxisMotion of a raw target, held at the ends of travel low, high [rad]; whether it is held)."""
     held = not low <= target.angle <= high
     if held:
         return AxisMotion(min(max(target.angle, low), high), 0.0, 0.0), held
@@ -200,7 +200,7 @@ def _held_inside(target, low, high):
 
 @compiled
 def _control_law(axis, p, e, v):
-    """(rate command before notch and limits, what of it is fed forward) [rad/s]; e = v.angle - encoder, v at t_k."""
+    """Return (rate command before notch and limits, its part fed forward) [rad/s]; e = v.angle - encoder, v at t_k."""
     if p.controller == CONTROLLER_PID:
         return pid.rate(e, axis.integral, axis.derivative, p.pid.bandwidth, p.pid.derivative), 0.0
     r = axis.reference
@@ -228,7 +228,7 @@ def _transfer(axis, p, e, v, feedback, t_k):
 
 @compiled
 def _update(axis, p, e, y, now):
-    """Bring the states of the running controller to t_k."""
+    """Advance the states of the running controller to t_k."""
     if p.controller == CONTROLLER_ADRC:
         h = now.t_k - axis.observed
         if h > 0.0:

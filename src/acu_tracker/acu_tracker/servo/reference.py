@@ -1,8 +1,8 @@
-"""The shaped reference of one axis and its history: the encoder is compared with the reference planned for its
-instant.
+"""The shaped reference of one axis and its history: the encoder is compared with the reference
+planned for its instant.
 
-A controller of the raw target uses no reference: it is kept at the antenna's own angle and rate, so that another
-controller begins there.
+A controller of the raw target uses no reference. The reference then stays at the antenna's own angle and rate, so that
+another controller begins there.
 """
 import numpy as np
 
@@ -13,14 +13,16 @@ from pedestal_common.compiled import compiled
 
 REFERENCE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('planned', history_type(4))],
                            align=True)
-"""The shaped reference at its newest stamp [rad, rad/s, rad/s2]; planned: it and the rate command [rad/s], at t_m."""
+"""angle, rate, acceleration: the shaped reference at its newest stamp [rad, rad/s, rad/s2]; planned: history, at t_m,
+of the reference and the rate command [rad/s]."""
 
 COMMAND_COLUMN = 3
+"""Column of the rate command in the history."""
 
 
 @compiled
 def now(r):
-    """The AxisMotion of the newest stamp."""
+    """Return the AxisMotion of the newest stamp."""
     return AxisMotion(r.angle, r.rate, r.acceleration)
 
 
@@ -47,7 +49,7 @@ def initialise(r, stamp, y, dy, command):
 
 @compiled
 def follow(r, p, target, stamp, command, ends):
-    """Shape an AxisMotion that is to be met at a stamp [s], between its Ends: (angle, rate, acceleration limited).
+    """Shape an AxisMotion to be met at a stamp [s], between its Ends; return (angle, rate, acceleration limited).
 
     p: record of AxisParameters.
     """
@@ -69,7 +71,7 @@ def commanded(r, command):
 
 @compiled
 def _around(history, t):
-    """(older row, newer row, fraction between them) at t [s]; the oldest where t lies before it."""
+    """Return (older row, newer row, fraction between them) at t [s]; the oldest row if t is before it."""
     i, j, f = bracket(history, t)
     if i < 0:
         i = j = (history.newest + 1 - history.count) % HISTORY_LENGTH
@@ -78,7 +80,7 @@ def _around(history, t):
 
 @compiled
 def planned(r, t):
-    """AxisMotion that was planned for t [s]; the angle by a cubic Hermite."""
+    """Return the AxisMotion planned for t [s]; the angle by a cubic Hermite."""
     i, j, f = rows = _around(r.planned, t)
     a, b = r.planned.sample[i], r.planned.sample[j]
     T = r.planned.stamp[j] - r.planned.stamp[i]
@@ -89,6 +91,6 @@ def planned(r, t):
 
 @compiled
 def in_force(r, t):
-    """(rate command [rad/s], acceleration [rad/s2] of the reference) at t [s]."""
+    """Return (rate command [rad/s], acceleration [rad/s2] of the reference) at t [s]."""
     rows = _around(r.planned, t)
     return interpolated(r.planned, rows, COMMAND_COLUMN), interpolated(r.planned, rows, 2)

@@ -1,7 +1,7 @@
-"""On-line command shaper: a reference the axis can follow, within rate, acceleration and jerk.
+"""On-line command shaper: a reference that the axis can follow, within rate, acceleration and jerk.
 
-Han's fhan acts on shaped minus raw; the raw rate and acceleration are fed forward, so a raw reference
-within the limits is followed without lag, and a jump is made in minimum time without overshoot.
+Han's fhan acts on shaped minus raw; the raw rate and acceleration are fed forward. Therefore a raw reference within
+the limits is followed without lag, and a jump is made in minimum time without overshoot.
 """
 import math
 
@@ -10,12 +10,13 @@ from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
 
 SUB_STEP_COUNT = 4
+"""Number of steps of the shaper in a step of the drive."""
 
 
 @compiled
 def toward_rate_limit(gap, h, jerk):
-    """Largest acceleration [rad/s2] that jerk [rad/s3] can reduce to 0 before the rate has grown by gap [rad/s], in
-    steps of h [s].
+    """Return the largest acceleration [rad/s2] that jerk [rad/s3] can reduce to 0 before the rate has grown by gap
+    [rad/s], in steps of h [s].
 
     a^2/(2 j) + a h/2 = gap; the last part of a step costs up to j h^2/8 more.
     """
@@ -28,8 +29,8 @@ def toward_rate_limit(gap, h, jerk):
 
 @compiled
 def held_inside(raw, low, high, braking, lag):
-    """(AxisMotion, whether it was changed): a raw one that could not stop before a limit low, high [rad] is set onto
-    the limit; braking [rad/s2], lag [s] until it begins."""
+    """Return (AxisMotion, whether it was changed): a raw target that could not stop before a limit low, high [rad] is
+    set onto the limit; braking [rad/s2], lag: time until braking begins [s]."""
     stop = raw.angle + raw.rate * (abs(raw.rate) / (2.0 * braking) + lag)
     if raw.angle > high or (raw.rate > 0.0 and stop > high):
         return AxisMotion(high, 0.0, 0.0), True
@@ -40,7 +41,7 @@ def held_inside(raw, low, high, braking, lag):
 
 @compiled
 def shape(before, raw, dt, limits):
-    """(AxisMotion, rate limited, acceleration limited) of the shaped reference dt [s] after `before`.
+    """Return (AxisMotion, rate limited, acceleration limited) of the shaped reference dt [s] after `before`.
 
     raw: the AxisMotion to be followed, at the end of dt; limits: record of ShaperParameters.
     """

@@ -1,1 +1,1 @@
-"""The target filters: their laws, one axis of them, both axes, and the table of their kinds."""
+"""The target filters: their laws, the filter of one axis, of both axes, and the table of filter kinds."""

@@ -1,4 +1,5 @@
-"""The target filter of angles: an `axis_filter` each for azimuth and elevation, f and c their records (2,)."""
+"""The target filter of the angles: one `axis_filter` each for azimuth and elevation;
+f and c are their records (2,)."""
 import math
 
 from acu_tracker.estimation.filters import axis_filter
@@ -9,7 +10,7 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def start(f, c, m, rate_sigma):
-    """Begin at a Measurement, the rates unknown to rate_sigma [rad/s]."""
+    """Start at a Measurement; rate_sigma: standard deviation of the unknown rates [rad/s]."""
     for i in range(2):
         axis_filter.start(f[i], c[i], m.axis[i].angle, m.axis[i].variance, rate_sigma)
 
@@ -23,7 +24,7 @@ def predict(f, c, T):
 
 @compiled
 def innovation(f, c, m):
-    """Innovation of a Measurement against the prediction; its range is NaN, as these filters have none."""
+    """Return the Innovation of a Measurement against the prediction; its range is NaN, as these filters have none."""
     return Innovation((axis_filter.innovation(f[0], c[0], m.axis[0]), axis_filter.innovation(f[1], c[1], m.axis[1])),
                       math.nan, math.nan)
 
@@ -37,18 +38,18 @@ def correct(f, c, m):
 
 @compiled
 def expected(f):
-    """Motion at the instant of the last `predict`."""
+    """Return the Motion at the instant of the last `predict`."""
     return Motion(axis_filter.expected_motion(f[0]), axis_filter.expected_motion(f[1]))
 
 
 @compiled
 def outlook(f, c, T):
-    """Motion T [s] >= 0 after the last measurement; the prior fields stay."""
+    """Return the Motion T [s] >= 0 after the last measurement; the prior fields stay."""
     return Motion(axis_filter.outlook(f[0], c[0], T), axis_filter.outlook(f[1], c[1], T))
 
 
 @compiled
 def read(f):
-    """Estimate at the instant of the last `predict`."""
+    """Return the Estimate at the instant of the last `predict`."""
     azimuth, elevation = axis_filter.expected(f[0]), axis_filter.expected(f[1])
     return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(azimuth), axis_filter.variances(elevation)))

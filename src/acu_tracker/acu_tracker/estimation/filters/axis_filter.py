@@ -1,6 +1,6 @@
 """The target filter of one axis, of any of `kinds`: each is a bank of motion models, a single filter a bank of one.
 
-The state stays at the last measurement that was accepted; `predict` and `outlook` extrapolate from there.
+The state stays at the last accepted measurement; `predict` and `outlook` extrapolate from there.
 """
 import math
 
@@ -16,40 +16,43 @@ from pedestal_common.compiled import compiled
 
 BANK_SIZE = len(MODEL_NAMES)
 
-CONSTANTS_DTYPE = np.dtype([('count', 'i8'), ('bank', 'i8'), ('models', motion_models.MOTION_MODEL_DTYPE,
-                                                              (BANK_SIZE,)), ('states', 'i8'),
+CONSTANTS_DTYPE = np.dtype([('count', 'i8'), ('bank', 'i8'),
+                            ('models', motion_models.MOTION_MODEL_DTYPE, (BANK_SIZE,)), ('states', 'i8'),
                             ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'),
-                            ('rate_measurement', 'i8'),
-                            ('colour', 'f8')], align=True)
-"""count: models in use, the first of `models`; bank: a number that tells which; states: the most of any of them;
-alpha: 0 but for constant gains; colour: bandwidth of the noise of the angle [rad/s], 0 where it is white."""
+                            ('rate_measurement', 'i8'), ('colour', 'f8')], align=True)
+"""count: number of models in use, the first of `models`; bank: number that identifies their set; states: the
+most states of any of them. `alpha`: 0 except for constant gains; colour: bandwidth of the noise of the angle
+[rad/s], 0 for white noise."""
 
 FILTER_DTYPE = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
                          ('x', 'f8', (BANK_SIZE, 3)), ('p', 'f8', (BANK_SIZE, 6)), ('mu', 'f8', (BANK_SIZE,)),
                          ('x_prior', 'f8', (BANK_SIZE, 3)), ('p_prior', 'f8', (BANK_SIZE, 6)),
-                         ('mu_prior', 'f8', (BANK_SIZE,)),
-                         ('y', 'f8'), ('follows', 'i8'), ('past', 'f8', (BANK_SIZE, 5)),
-                         ('weights', 'f8', (BANK_SIZE,)),
-                         ('walk', 'f8')], align=True)
-"""bank, count, states: of the constants that x, p, mu belong to: estimate, covariance (as in kalman.Symmetric) and
-probability of each model, after the last measurement.
+                         ('mu_prior', 'f8', (BANK_SIZE,)), ('y', 'f8'), ('follows', 'i8'),
+                         ('past', 'f8', (BANK_SIZE, 5)), ('weights', 'f8', (BANK_SIZE,)), ('walk', 'f8')], align=True)
+"""State of the filter.
 
-x_prior, p_prior, mu_prior: predicted by T [s] from there. `predict` sets them, `expected`, `innovation`, `correct` use
-them. y: the last measured angle [rad]; follows: 1 where the noise of the next one is correlated with its; past: the
-kalman.Past of each model, of the same prediction. weights: scratch. walk: variance per second
-[rad2/s] that the angle gains beside what every model says.
+bank, count, states: of the constants that x, p, mu belong to. `x`, `p`, `mu`: estimate, covariance (as in
+kalman.Symmetric) and probability of each model, after the last measurement. `x_prior`, `p_prior`, `mu_prior`:
+predicted by T [s] from there. `predict` sets these; `expected`, `innovation`, `correct` use them. `y`: the last
+measured angle [rad]; follows: 1 if the noise of the next angle is correlated with the noise of y. `past`:
+kalman.PreviousAngle of each model, of the same prediction. `weights`: scratch. `walk`: variance per second [rad2/s]
+that the angle gains in addition to every model.
 """
 
 ESTIMATE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
                            ('covariance', 'f8'), ('rate_variance', 'f8'), ('innovation', 'f8'),
-                           ('rate_innovation', 'f8'),
-                           ('nis', 'f8'), ('mu', 'f8', (BANK_SIZE,))], align=True)
-"""rad, rad/s, rad/s2; variances of angle and rate and their covariance; the innovation [rad], that of the rate
-[rad/s] and nu' S^-1 nu, NaN where nothing was measured; probability of each of MODELS, NaN if not in the bank."""
+                           ('rate_innovation', 'f8'), ('nis', 'f8'), ('mu', 'f8', (BANK_SIZE,))], align=True)
+"""Estimate of the filter [rad, rad/s, rad/s2].
+
+variance, covariance, rate_variance: variances of angle and rate, and their covariance. `innovation` [rad],
+`rate_innovation` [rad/s], `nis` (nu' S^-1 nu): NaN where nothing was measured. `mu`: probability of each of
+MODEL_NAMES, NaN if it is not in the bank.
+"""
 
 
 def constants(params, noise_bandwidth=0.0) -> np.ndarray:
-    """Constants (1,) of FilterParameters; noise_bandwidth [Hz]: of the measured angle's noise, 0 where it is white."""
+    """Return the constants (1,) of FilterParameters; noise_bandwidth [Hz]:
+    of the noise of the measured angle, 0 for white noise."""
     c, bank = np.zeros(1, CONSTANTS_DTYPE), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models
@@ -61,7 +64,7 @@ def constants(params, noise_bandwidth=0.0) -> np.ndarray:
 
 @compiled
 def _put(x, p, j, g):
-    """Row j of x (n, 3), p (n, 6) := a Gaussian."""
+    """Set row j of x (n, 3), p (n, 6) to a Gaussian."""
     x[j, 0], x[j, 1], x[j, 2] = g.x
     P = g.P
     p[j, 0], p[j, 1], p[j, 2], p[j, 3], p[j, 4], p[j, 5] = P.p11, P.p12, P.p13, P.p22, P.p23, P.p33
@@ -85,7 +88,7 @@ def _open_acceleration(f, c, rate_sigma):
 
 @compiled
 def start(f, c, y, R, rate_sigma):
-    """Begin at a measured angle y [rad] of variance R, the rate unknown to rate_sigma [rad/s]."""
+    """Start at a measured angle y [rad] of variance R; rate_sigma: standard deviation of the unknown rate [rad/s]."""
     _fill(f, c, Gaussian(AxisMotion(y, 0.0, 0.0), Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
     _open_acceleration(f, c, rate_sigma)
     f.y, f.follows = y, 1
@@ -93,9 +96,9 @@ def start(f, c, y, R, rate_sigma):
 
 @compiled
 def transfer(f, c, rate_sigma):
-    """Where the bank has changed, start its models from the combined estimate and covariance of the old bank.
+    """If the bank has changed, start its models from the combined estimate and covariance of the old bank.
 
-    An acceleration that the old bank did not estimate has the variance of a `start` with rate_sigma [rad/s].
+    An acceleration that the old bank did not estimate gets the variance of a `start` with rate_sigma [rad/s].
     """
     if f.bank != c.bank:
         unknown = f.states == 2
@@ -119,7 +122,7 @@ def move(f, c, motion):
 
 @compiled
 def predict(f, c, T):
-    """The bank T [s] >= 0 after its last measurement, into the prior fields; the state itself stays."""
+    """Predict the bank to T [s] >= 0 after its last measurement, into the prior fields; the state itself stays."""
     f.T = T
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
@@ -138,32 +141,32 @@ def predict(f, c, T):
 
 @compiled
 def expected(f):
-    """Gaussian of the prediction: mean and covariance of the bank."""
+    """Return the Gaussian of the prediction: mean and covariance of the bank."""
     return imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
 
 
 @compiled
 def expected_motion(f):
-    """The AxisMotion of `expected`."""
+    """Return the AxisMotion of `expected`."""
     return imm.mean(f.mu_prior, f.x_prior, f.count)
 
 
 @compiled
 def variances(g):
-    """The AxisVariances of a Gaussian."""
+    """Return the AxisVariances of a Gaussian."""
     return AxisVariances(g.P.p11, g.P.p12, g.P.p22)
 
 
 @compiled
 def _correlation(f, c):
-    """rho: correlation of the noise of a measurement now with that of the last one, of noise through a first-order
-    lag; 0 where it is white."""
+    """Return rho, the correlation of the noise of a measurement now with that of the last one, for noise through a
+    first-order lag; 0 for white noise."""
     return math.exp(-c.colour * f.T) if c.colour > 0.0 and f.follows else 0.0
 
 
 @compiled
 def innovation(f, c, m):
-    """AxisInnovation of an AxisMeasurement against the prediction, y_k - rho y_k-1 in the place of the angle."""
+    """Return the AxisInnovation of an AxisMeasurement against the prediction; y_k - rho y_k-1 replaces the angle."""
     rho = _correlation(f, c)
     x, P = expected(f)
     u = U = p12 = 0.0
@@ -175,7 +178,7 @@ def innovation(f, c, m):
         U += w * (p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + d1 * d1)
         p12 += w * (p[1] - rho * o[3] + d1 * d2)
     nu, nu_rate, S = m.angle - rho * f.y - u, m.rate - x.rate, U + (1.0 - rho * rho) * m.variance
-    # The rate given the angle.
+    # Innovation of the rate, given the angle.
     more = nu_rate - p12 / S * nu
     return AxisInnovation(nu, S, nu * nu / S, nu_rate, more * more / (P.p22 + m.rate_variance - p12 * p12 / S))
 
@@ -190,7 +193,7 @@ def correct(f, c, m):
         g = Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
         nu, S = m.angle - rho * f.y - (x[0] - rho * o[0]), p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + own
         f.weights[j] = kalman.log_likelihood(nu, S)
-        # Constant gains, but for a start (or after a gap) that deserves more: a growing memory until alpha is reached.
+        # Constant gains; after a start or a gap Kalman's larger gain, a growing memory, until alpha is reached.
         if g.P.p11 < c.alpha * S:
             g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
         elif rho > 0.0:
@@ -208,7 +211,7 @@ def correct(f, c, m):
 
 @compiled
 def outlook(f, c, T):
-    """AxisMotion that `predict` expects T [s] >= 0 after the last measurement; the prior fields stay."""
+    """Return the AxisMotion that `predict` expects T [s] >= 0 after the last measurement; the prior fields stay."""
     angle = rate = acceleration = 0.0
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
@@ -222,7 +225,7 @@ def outlook(f, c, T):
 
 @compiled
 def probabilities(f, c, mu):
-    """mu (BANK_SIZE,) = probability of each of MODELS, NaN where it is not in the bank."""
+    """Set mu (BANK_SIZE,) to the probability of each of MODEL_NAMES, NaN if it is not in the bank."""
     mu[:] = math.nan
     for j in range(c.count):
         mu[c.models[j].kind] = f.mu[j]
@@ -230,12 +233,11 @@ def probabilities(f, c, mu):
 
 @compiled
 def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
-    """The filter over arrays (n,): c (1,) of CONSTANTS_DTYPE; stamps [s], angles [rad], variances, rates [rad/s],
-    variances.
+    """Filter arrays (n,): stamps t [s], angles y [rad] and variances R, rates y_rate [rad/s] and variances R_rate.
 
-    out (n,) of ESTIMATE_DTYPE: row k after measurement k. It starts at the first angle; rows before are NaN. A NaN
-    angle,
-    or one whose stamp does not advance, is not taken: its row is the outlook from the last one taken.
+    c: (1,) of CONSTANTS_DTYPE. out (n,) of ESTIMATE_DTYPE: row k after measurement k. The filter starts at the first
+    angle; earlier rows are NaN. It ignores an angle that is NaN or whose stamp does not advance; that row is the
+    outlook from the last accepted angle.
     """
     state = np.zeros(1, FILTER_DTYPE)
     f, model = state[0], c[0]

@@ -1,6 +1,6 @@
 """Filters of constant gain: X += (alpha, beta / T, gamma / (2 T^2)) nu, predicted at constant rate or acceleration.
 
-One number, alpha, sets each; a relation gives the others.
+alpha determines beta and gamma by a relation.
 """
 import math
 
@@ -9,19 +9,20 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def benedict_bordner(alpha):
-    """beta of the alpha-beta filter that is best for its noise in the transient of a ramp (Benedict, Bordner 1962)."""
+    """Return beta of the alpha-beta filter with the best compromise of noise and ramp transient
+    (Benedict, Bordner 1962)."""
     return alpha * alpha / (2.0 - alpha)
 
 
 @compiled
 def kalata(alpha):
-    """(beta, gamma) of the alpha-beta-gamma filter: the steady Kalman filter of a constant acceleration that takes an
-    independent step at every measurement (Kalata 1984)."""
+    """Return (beta, gamma) of the alpha-beta-gamma filter: the steady Kalman filter of a constant acceleration that
+    takes an independent step at every measurement (Kalata 1984)."""
     beta = 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
     return beta, beta * beta / alpha
 
 
 @compiled
 def gain(alpha, beta, gamma, T):
-    """(k1 [-], k2 [1/s], k3 [1/s2]) over T [s]."""
+    """Return (k1 [-], k2 [1/s], k3 [1/s2]) over T [s]."""
     return (alpha, beta / T, gamma / (2.0 * T * T))

@@ -1,8 +1,8 @@
 """Interacting multiple models: a bank of filters, each weighted by its probability (Blom, Bar-Shalom 1988).
 
-Paper 003, eq. 5 to 11, with what its print lacks: the mixing before the prediction; in eq. 11 the weights are the
-probabilities and the spread of the models is added (its reversed second factor subtracts it). Probabilities are
-weighed by logarithms of likelihoods, so that a measurement far from all models still tells which is nearer.
+Paper 003, eq. 5 to 11, with two corrections. The mixing before the prediction is added. In eq. 11 the weights are the
+probabilities, and the spread of the models is added (the reversed second factor of the print subtracts it).
+Probabilities are weighted by logarithms of likelihoods, so that even a measurement far from all models ranks them.
 """
 import math
 
@@ -13,10 +13,11 @@ from pedestal_common.compiled import compiled, inlined
 
 @compiled
 def switching(T, dwell, count):
-    """(stay, switch): probability that a model still holds after T [s], and that one certain other has taken over.
+    """Return (stay, switch): probabilities that a model still holds after T [s],
+    and that a given other model has replaced it.
 
-    A chain in continuous time that leaves a model after `dwell` [s] on average, for any other alike: near
-    exp(-T / dwell) for short T, 1 / count for long.
+    A chain in continuous time leaves a model after `dwell` [s] on average, for each other model with equal
+    probability: near exp(-T / dwell) for short T, 1 / count for long T.
     """
     if count == 1:
         return 1.0, 0.0
@@ -26,9 +27,10 @@ def switching(T, dwell, count):
 
 @inlined
 def mix(mu, count, stay, switch, j, weights):
-    """weights[i] = probability that model i held before, given that j holds now; returns cbar_j, that of j now.
+    """Set weights[i] to the probability that model i held before, given that j holds now; return cbar_j, the
+    probability of j now.
 
-    A model that cannot hold now (at once after a measurement that ruled it out) keeps its own state.
+    A model that cannot hold now (just after a measurement that excluded it) keeps its own state.
     """
     total = 0.0
     for i in range(count):
@@ -44,7 +46,7 @@ def mix(mu, count, stay, switch, j, weights):
 
 @inlined
 def alone(x, p, j):
-    """What `combine` gives of model j alone, to the sign of a zero."""
+    """Return what `combine` returns for model j alone; only the sign of a zero may differ."""
     return Gaussian(AxisMotion(0.0 + x[j, 0], 0.0 + x[j, 1], 0.0 + x[j, 2]),
                     Symmetric(0.0 + p[j, 0], 0.0 + p[j, 1], 0.0 + p[j, 2], 0.0 + p[j, 3], 0.0 + p[j, 4],
                               0.0 + p[j, 5]))
@@ -52,7 +54,7 @@ def alone(x, p, j):
 
 @inlined
 def mean(weights, x, count):
-    """AxisMotion that is the mean of the weighted models (eq. 10); x (n, 3)."""
+    """Return the AxisMotion that is the mean of the weighted models (eq. 10); x (n, 3)."""
     x1 = x2 = x3 = 0.0
     for i in range(count):
         x1 += weights[i] * x[i, 0]
@@ -63,7 +65,8 @@ def mean(weights, x, count):
 
 @inlined
 def combine(weights, x, p, count):
-    """Gaussian with mean and covariance of the weighted models (eq. 10, 11); x (n, 3), p (n, 6) as in Symmetric."""
+    """Return the Gaussian with mean and covariance of the weighted models (eq. 10, 11);
+    x (n, 3), p (n, 6) as in Symmetric."""
     x1, x2, x3 = mean(weights, x, count)
     p11 = p12 = p13 = p22 = p23 = p33 = 0.0
     for i in range(count):
@@ -79,7 +82,8 @@ def combine(weights, x, p, count):
 
 @compiled
 def weigh(mu_prior, log_likelihoods, count, mu):
-    """mu[j] = probability of model j after the measurement (eq. 9), from the logarithms of its likelihoods."""
+    """Set mu[j] to the probability of model j after the measurement (eq. 9),
+    from the logarithms of its likelihoods."""
     best = -math.inf
     for j in range(count):
         mu[j] = math.log(mu_prior[j]) + log_likelihoods[j]

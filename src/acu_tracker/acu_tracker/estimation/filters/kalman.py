@@ -1,8 +1,9 @@
-"""Kalman filter of three states (angle, rate, acceleration): the angle is measured, the rate where a sensor gives it.
+"""Kalman filter of three states (angle, rate, acceleration);
+the angle is measured, and the rate if a sensor measures it.
 
-The covariance is kept as its upper triangle, symmetric by construction, and every product of 3 x 3 matrices is
-multiplied out. Two measurements of one instant are taken one after the other, which is exact as their errors are
-independent.
+The covariance is kept as its upper triangle, symmetric by construction, and every product of 3 x 3 matrices
+is written out. Two measurements of one instant are taken one after the other, which is exact because their
+errors are independent.
 """
 import math
 from collections import namedtuple
@@ -14,26 +15,26 @@ Symmetric = namedtuple('Symmetric', 'p11 p12 p13 p22 p23 p33')
 """Upper triangle of a symmetric 3 x 3 matrix, a covariance of angle, rate and acceleration."""
 
 Gaussian = namedtuple('Gaussian', 'x P')
-"""What is known of one axis: its mean x = (x1, x2, x3) [rad, rad/s, rad/s2] and covariance P."""
+"""Estimate of one axis: its mean x = (x1, x2, x3) [rad, rad/s, rad/s2] and covariance P."""
 
 Transition = namedtuple('Transition', 'f13 f23 f33')
 """Third column of F = [[1, T, f13], [0, 1, f23], [0, 0, f33]]."""
 
 PreviousAngle = namedtuple('PreviousAngle', 'x1 p11 c1 c2 c3')
-"""What is known of the angle at the last measurement: its mean x1 [rad], its variance p11, and the covariances
-c1, c2, c3 of angle, rate and acceleration now with it."""
+"""Estimate of the angle at the last measurement: its mean x1 [rad], its variance p11, and the covariances c1, c2, c3
+of the present angle, rate and acceleration with it."""
 
 
 @compiled
 def predicted_mean(x, F, T):
-    """F x over T [s]."""
+    """Return F x over T [s]."""
     return AxisMotion(x.angle + T * x.rate + F.f13 * x.acceleration, x.rate + F.f23 * x.acceleration,
                       F.f33 * x.acceleration)
 
 
 @compiled
 def predicted_covariance(P, F, Q, T):
-    """F P F' + Q over T [s] (paper 000, eq. 7)."""
+    """Return F P F' + Q over T [s] (paper 000, eq. 7)."""
     a11 = P.p11 + T * P.p12 + F.f13 * P.p13
     a12 = P.p12 + T * P.p22 + F.f13 * P.p23
     a13 = P.p13 + T * P.p23 + F.f13 * P.p33
@@ -45,20 +46,21 @@ def predicted_covariance(P, F, Q, T):
 
 @compiled
 def past(g, F, T):
-    """The Past of a Gaussian g at the last measurement, T [s] before the prediction: c = F P H'."""
+    """Return the PreviousAngle of a Gaussian g at the last measurement, T [s] before the prediction: c = F P H'."""
     P = g.P
     return PreviousAngle(g.x.angle, P.p11, P.p11 + T * P.p12 + F.f13 * P.p13, P.p12 + F.f23 * P.p13, F.f33 * P.p13)
 
 
 @compiled
 def _corrected(x, k1, k2, k3, nu):
-    """x + K nu."""
+    """Return x + K nu."""
     return AxisMotion(x.angle + k1 * nu, x.rate + k2 * nu, x.acceleration + k3 * nu)
 
 
 @compiled
 def update(g, nu, R):
-    """The Gaussian after an innovation nu [rad] of the angle of variance R, H = [1 0 0] (paper 000, eq. 8, 9, 10).
+    """Return the Gaussian after an innovation nu [rad] of the angle of variance R,
+    H = [1 0 0] (paper 000, eq. 8, 9, 10).
 
     K = P H' / S; the measured row of P is P H' R / S, which is p1j - K1 p1j without the difference.
     """
@@ -70,10 +72,10 @@ def update(g, nu, R):
 
 @compiled
 def update_correlated(g, o, rho, nu, S):
-    """The Gaussian after a measured angle whose noise is rho times that of the last one, and noise of its own.
+    """Return the Gaussian after an angle whose noise is rho times the noise of the last angle, plus independent noise.
 
-    y_k - rho y_k-1 is H X_k - rho H X_k-1 and the noise of its own alone (Bryson, Henrikson 1968): nu [rad] is its
-    innovation, S the variance of that; o: the Past. K = (P H' - rho c) / S, P -= K S K'.
+    y_k - rho y_k-1 is H X_k - rho H X_k-1 and the independent noise alone (Bryson, Henrikson 1968). nu [rad] is its
+    innovation, S the variance of nu; o: the PreviousAngle. K = (P H' - rho c) / S, P -= K S K'.
     """
     P = g.P
     k1, k2, k3 = (P.p11 - rho * o.c1) / S, (P.p12 - rho * o.c2) / S, (P.p13 - rho * o.c3) / S
@@ -84,7 +86,8 @@ def update_correlated(g, o, rho, nu, S):
 
 @compiled
 def update_rate(g, nu, R):
-    """The Gaussian after an innovation nu [rad/s] of the rate of variance R, H = [0 1 0] (paper 004, eq. 34)."""
+    """Return the Gaussian after an innovation nu [rad/s] of the rate of variance R,
+    H = [0 1 0] (paper 004, eq. 34)."""
     P, S = g.P, g.P.p22 + R
     k1, k2, k3 = P.p12 / S, P.p22 / S, P.p23 / S
     return Gaussian(_corrected(g.x, k1, k2, k3, nu),
@@ -93,8 +96,10 @@ def update_rate(g, nu, R):
 
 @compiled
 def update_with_gain(g, nu, R, K):
-    """The Gaussian after an innovation nu of the angle, with any gain K = (k1, k2, k3) [-, 1/s, 1/s2]:
-    P = (1 - K H) P (1 - K H)' + K R K' (Joseph), multiplied out."""
+    """Return the Gaussian after an innovation nu of the angle, with any gain K = (k1, k2, k3) [-, 1/s, 1/s2].
+
+    P = (1 - K H) P (1 - K H)' + K R K' (Joseph), written out.
+    """
     P, S = g.P, g.P.p11 + R
     k1, k2, k3 = K
     return Gaussian(_corrected(g.x, k1, k2, k3, nu),
@@ -108,5 +113,6 @@ def update_with_gain(g, nu, R, K):
 
 @compiled
 def log_likelihood(nu, S):
-    """Logarithm of the normal density of an innovation nu of variance S, less the constant -log(2 pi) / 2."""
+    """Return the logarithm of the normal density of an innovation nu of variance S,
+    less the constant -log(2 pi) / 2."""
     return -0.5 * (nu * nu / S + math.log(S))

@@ -1,4 +1,4 @@
-"""The kinds of target filter: one row each, which says of what an axis's bank of motion models is made."""
+"""The table of filter kinds: each row defines the bank of motion models of an axis."""
 import functools
 import typing
 
@@ -10,16 +10,19 @@ from pedestal_common.parameters import ParameterError
 
 
 class Bank(typing.NamedTuple):
-    """models (count,): records of motion_models.MODEL; dwell: mean time that one of several holds [s]; gains: alpha,
-    beta, gamma [-] of a filter of constant gains, alpha 0 for Kalman's."""
+    """The motion models of an axis.
+
+    models (count,): records of motion_models.MOTION_MODEL_DTYPE; dwell: mean time for which one of several models
+    holds [s]; gains: alpha, beta, gamma [-] of a filter of constant gains, alpha 0 for a Kalman filter.
+    """
     models: np.ndarray
     dwell: float = 0.0
     gains: tuple = (0.0, 0.0, 0.0)
 
 
 class Kind(typing.NamedTuple):
-    """doc: what it is; bank: function of FilterParameters that makes the Bank of an axis; cartesian: use the Cartesian
-    filter too."""
+    """A row of FILTER_KINDS. doc: its meaning; bank: function of FilterParameters that returns the Bank of an axis;
+    cartesian: True if the Cartesian filter is used as well."""
     doc: str
     bank: typing.Callable
     cartesian: bool = False
@@ -55,7 +58,7 @@ FILTER_KINDS = {
 
 
 def named_models(names) -> tuple:
-    """Names of the models in a text such as 'cv ca', in the order of MODELS. Raises ParameterError."""
+    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES. Raises ParameterError."""
     models = names.split()
     if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODEL_NAMES)):
         raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODEL_NAMES)}, each once")

@@ -6,15 +6,15 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
 AxisMeasurement = namedtuple('AxisMeasurement', 'angle variance rate rate_variance')
-"""Measured angle [rad] and rate [rad/s] of one axis with their variances; a rate that is NaN was not measured."""
+"""Measured angle [rad] and rate [rad/s] of one axis with their variances; the rate is NaN if it was not measured."""
 
 Measurement = namedtuple('Measurement', 'stamp axis range range_variance')
-"""stamp [s]; axis: the AxisMeasurement of both; range [m] and its variance, NaN where it was not measured."""
+"""stamp [s]; axis: the AxisMeasurement of both; range [m] and its variance, NaN if it was not measured."""
 
 AxisInnovation = namedtuple('AxisInnovation', 'nu S chi_square rate rate_chi_square')
-"""Innovation nu of the angle [rad] and its variance S, chi_square = nu^2 / S; rate [rad/s]: that of the rate, NaN
-where none was used; rate_chi_square: what the rate, given the angle, adds to nu' S^-1 nu of both. Each of the two
-is chi-square of one degree of freedom."""
+"""nu: innovation of the angle [rad]; S: its variance; chi_square = nu^2 / S; rate: innovation of the rate [rad/s], NaN
+where none was used. rate_chi_square: contribution of the rate, given the angle, to nu' S^-1 nu of both. Each of the
+two is chi-square of one degree of freedom."""
 
 Innovation = namedtuple('Innovation', 'axis range_nu range_S')
 """axis: the AxisInnovation of both; range_nu [m] and its variance range_S; NaN where nothing was compared."""
@@ -31,8 +31,11 @@ NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)
 
 @compiled
 def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
-    """Variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0 [dB-Hz]: a floor and thermal
-    noise, which grows with the distance from the beam's axis. receiver: record of ReceiverModelParameters."""
+    """Return the variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0 [dB-Hz].
+
+    It is the sum of a floor and of thermal noise, which grows with the distance from the beam's axis. receiver: record
+    of ReceiverModelParameters.
+    """
     slope = receiver.slope / receiver.beamwidth
     offset = slope * math.hypot(cross_elevation, elevation)
     thermal = (1.0 + offset * offset) / (slope * slope * 2.0 * 10.0**(0.1 * cn0_dbhz) * receiver.integration)
@@ -41,16 +44,19 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
 
 @compiled
 def attitude_variances(verticals, tilt, heading):
-    """Variances (across, along) of a direction from those of the attitude it was measured with, in their unit: `tilt`
-    about every horizontal axis, `heading` about the vertical. A turn about either axis of the direction moves it along
-    the other; verticals: as of estimate_frame."""
+    """Return the variances (across, along) of a direction that follow from the variances of the
+    attitude, in their unit.
+
+    tilt: about every horizontal axis; heading: about the vertical. A turn about one axis of the direction moves it
+    along the other. verticals: of estimate_frame.
+    """
     across, along = verticals
     return tilt + along * along * (heading - tilt), tilt + across * across * (heading - tilt)
 
 
 @compiled
 def with_azimuth_near(m, near):
-    """The Measurement, its azimuth on the wrap that is nearest to `near` [rad]."""
+    """Return the Measurement with its azimuth on the wrap nearest to `near` [rad]."""
     a = m.axis[0]
     a = AxisMeasurement(near + wrap(a.angle - near), a.variance, a.rate, a.rate_variance)
     return Measurement(m.stamp, (a, m.axis[1]), m.range, m.range_variance)
@@ -58,11 +64,11 @@ def with_azimuth_near(m, near):
 
 @compiled
 def with_rate(a, rate):
-    """The AxisMeasurement with another rate [rad/s]."""
+    """Return the AxisMeasurement with another rate [rad/s]."""
     return AxisMeasurement(a.angle, a.variance, rate, a.rate_variance)
 
 
 @compiled
 def nis(i):
-    """Normalised innovation squared of an AxisInnovation: of the angle, and of the rate where one was used."""
+    """Return the normalised innovation squared of an AxisInnovation: of the angle, and of the rate if it was used."""
     return i.chi_square + i.rate_chi_square if i.rate == i.rate else i.chi_square

@@ -1,12 +1,12 @@
 """Motion models of a target: F and Q of one axis, X = (angle, rate, acceleration).
 
-Of cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. Another model is a row of MODEL_ROWS, a
-law
-that `discretised` picks, its group in params.py, and its name in topics.MOTION_MODELS, a column of acu/filter.
+In cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. A further model needs a row of
+MODEL_ROWS, a law that `discretised` selects, its group in params.py, and its name in topics.MOTION_MODELS,
+a column of acu/filter.
 
-Corrected against the print of paper 000: q22 has 1/(2 alpha^3); sigma_a^2 goes with the square.
-The closed forms of Q lose all digits for small x = alpha T (q11 is a difference of terms ~1 of size x^5), so
-below MAX_SERIES_ARGUMENT the power series is used:
+Corrections to the print of paper 000: q22 has 1/(2 alpha^3); sigma_a^2 contains the square. For small x = alpha T the
+closed forms of Q lose all digits (q11 is a difference of terms of about 1 and of size x^5). Below MAX_SERIES_ARGUMENT
+the power series is used:
     q = int_0^T g(s) g(s)' ds,  g = (s^2/2 - alpha s^3/6 + ..., s - alpha s^2/2 + ..., e^(-alpha s)).
 """
 import math
@@ -20,10 +20,9 @@ from pedestal_common.compiled import compiled, inlined
 
 
 class MotionModel(typing.NamedTuple):
-    """A row of MODEL_ROWS. doc: how the target moves; states: 2 for a model without an acceleration, else 3;
-    initial_sigma:
-    its standard deviation of the acceleration [rad/s2] at the start, a function of its parameters; NaN: that of the
-    rate, per second."""
+    """A row of MODEL_ROWS. doc: motion of the target; states: 2 for a model without an acceleration, else 3.
+    `initial_sigma`: function of its parameters that returns the standard deviation of the acceleration [rad/s2] at the
+    start; NaN: that of the rate, per second."""
     name: str
     doc: str
     states: int
@@ -35,17 +34,15 @@ MODEL_ROWS = (
     MotionModel('ca', 'constant acceleration, disturbed by white jerk', 3, lambda params: math.nan),
     MotionModel('singer', 'an acceleration of mean 0 that lasts 1 / alpha (Singer 1970)', 3,
                 lambda params: params.sigma),
-    MotionModel('current_statistical', 'an acceleration that lasts 1 / alpha about a mean, the estimate itself '
-                '(paper 000)', 3, lambda params: params.a_max))
+    MotionModel('current_statistical', 'an acceleration that lasts 1 / alpha about its estimated mean (paper 000)', 3,
+                lambda params: params.a_max))
 MODEL_NAMES = tuple(row.name for row in MODEL_ROWS)
 MODEL_CV, MODEL_CA, MODEL_SINGER, MODEL_CURRENT_STATISTICAL = range(len(MODEL_NAMES))
 
 MOTION_MODEL_DTYPE = np.dtype([('kind', 'i8'), ('states', 'i8'), ('initial_sigma', 'f8'), ('alpha', 'f8'),
-                               ('noise', 'f8'),
-                               ('sigma', 'f8'), ('a_max', 'f8'), ('floor', 'f8')], align=True)
-"""kind: of MODEL_NAMES, states and initial_sigma of its row, then what its group of the parameters gives; a model
-reads
-only its own.
+                               ('noise', 'f8'), ('sigma', 'f8'), ('a_max', 'f8'), ('floor', 'f8')], align=True)
+"""kind: of MODEL_NAMES; states and initial_sigma: of its row; then the values of its group of parameters. A model
+reads only its own.
 
 noise: cv [rad/s2/sqrt(Hz)] of the white acceleration, ca [rad/s3/sqrt(Hz)] of the white jerk: the square root of a
 two-sided density, int of E[w(t) w(s)] ds = noise^2.
@@ -53,7 +50,7 @@ two-sided density, int of E[w(t) w(s)] ds = noise^2.
 
 
 def constants(name, params, **changes) -> np.ndarray:
-    """Constants (1,) of the model of a name with its group of the parameters; changes: fields that are otherwise."""
+    """Return the constants (1,) of the named model with its group of parameters; changes: fields with other values."""
     m, kind = np.zeros(1, MOTION_MODEL_DTYPE), MODEL_NAMES.index(name)
     m['kind'], m['states'], m['initial_sigma'] = kind, MODEL_ROWS[kind].states, MODEL_ROWS[kind].initial_sigma(params)
     for field, value in {**vars(params), **changes}.items():
@@ -62,15 +59,17 @@ def constants(name, params, **changes) -> np.ndarray:
 
 
 Discrete = namedtuple('Discrete', 'mean F Q')
-"""A model over T: mean: the Transition of the mean of X, F: that of its covariance, Q: its process noise."""
+"""A model over T. mean: the Transition of the mean of X; F: the Transition of its covariance; Q: its process noise."""
 
 
 MAX_SERIES_ARGUMENT = 0.5
+"""Largest x = alpha T of the power series [-]."""
 _TERMS = range(14)
 
 
 def _coefficients(first, count):
-    """c_k of the series sum c_k (-x)^k of one q: n! (n + 1) c_k = count(n), a sum of binomials, n = k + first."""
+    """Return c_k of the series sum c_k (-x)^k of one q: n! (n + 1) c_k = count(n),
+    a sum of binomials, n = k + first."""
     return tuple(count(k + first) / (math.factorial(k + first) * (k + first + 1)) for k in _TERMS)
 
 
@@ -94,7 +93,7 @@ def _series(c, x):
 
 @inlined
 def fading(alpha, T):
-    """Transition of an acceleration that fades with e^(-alpha T), alpha [1/s], T [s] (paper 000, eq. 2)."""
+    """Return the Transition of an acceleration that fades with e^(-alpha T), alpha [1/s], T [s] (paper 000, eq. 2)."""
     if T == 0.0:
         return Transition(0.0, 0.0, 1.0)
     x = alpha * T
@@ -106,7 +105,7 @@ def fading(alpha, T):
 
 @inlined
 def fading_noise(alpha, T):
-    """q in Q = 2 alpha sigma_a^2 q over T [s], alpha [1/s] (paper 000, eq. 4)."""
+    """Return q in Q = 2 alpha sigma_a^2 q over T [s], alpha [1/s] (paper 000, eq. 4)."""
     if T == 0.0:
         return Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     x = alpha * T
@@ -125,16 +124,18 @@ def fading_noise(alpha, T):
 
 @compiled
 def acceleration_variance(abar, a_max, floor):
-    """sigma_a^2 of the modified Rayleigh density about the mean acceleration abar (paper 000, eq. 5, with the square).
+    """Return sigma_a^2 of the modified Rayleigh density about the mean acceleration abar (paper 000,
+    eq. 5, with the square).
 
-    At abar = a_max it is zero and the filter would lock, hence sigma_a >= floor a_max. Accelerations in rad/s2.
+    At abar = a_max it is zero, and the filter would ignore its measurements; therefore sigma_a >= floor a_max.
+    Accelerations in rad/s2.
     """
     return max((4.0 - math.pi) / math.pi * max(a_max - abs(abar), 0.0)**2, (floor * a_max)**2)
 
 
 @inlined
 def of_mean(m, T):
-    """Transition of the mean over T [s] of a record of MOTION_MODEL_DTYPE."""
+    """Return the Transition of the mean over T [s] of a record of MOTION_MODEL_DTYPE."""
     if m.kind == MODEL_CV:
         return Transition(0.0, 0.0, 0.0)
     if m.kind == MODEL_SINGER:
@@ -144,14 +145,14 @@ def of_mean(m, T):
 
 @inlined
 def cv(m, T):
-    """Discrete of constant rate over T [s]."""
+    """Return the Discrete of constant rate over T [s]."""
     F, k = of_mean(m, T), m.noise * m.noise
     return Discrete(F, F, Symmetric(k * T * T * T / 3.0, k * T * T / 2.0, 0.0, k * T, 0.0, 0.0))
 
 
 @inlined
 def ca(m, T):
-    """Discrete of constant acceleration over T [s]."""
+    """Return the Discrete of constant acceleration over T [s]."""
     F, k, T2 = of_mean(m, T), m.noise * m.noise, T * T
     return Discrete(F, F, Symmetric(k * T2 * T2 * T / 20.0, k * T2 * T2 / 8.0, k * T2 * T / 6.0, k * T2 * T / 3.0,
                                     k * T2 / 2.0, k * T))
@@ -159,21 +160,21 @@ def ca(m, T):
 
 @inlined
 def _fading_acceleration(alpha, variance, T):
-    """(F, Q) of an acceleration of this variance [rad2/s4] that lasts 1 / alpha [s]."""
+    """Return (F, Q) of an acceleration of this variance [rad2/s4] that lasts 1 / alpha [s]."""
     k, q = 2.0 * alpha * variance, fading_noise(alpha, T)
     return fading(alpha, T), Symmetric(k * q.p11, k * q.p12, k * q.p13, k * q.p22, k * q.p23, k * q.p33)
 
 
 @inlined
 def singer(m, T):
-    """Discrete of an acceleration of mean 0 over T [s]."""
+    """Return the Discrete of an acceleration of mean 0 over T [s]."""
     F, Q = _fading_acceleration(m.alpha, m.sigma * m.sigma, T)
     return Discrete(F, F, Q)
 
 
 @inlined
 def current_statistical(m, abar, T):
-    """Discrete of an acceleration about its mean abar [rad/s2], the estimate, over T [s].
+    """Return the Discrete over T [s] of an acceleration about its mean abar [rad/s2], the estimate.
 
     The mean moves by Phi X + U abar = Phi1 X, Phi1 that of constant acceleration (paper 000, eq. 6, 11).
     """
@@ -183,7 +184,7 @@ def current_statistical(m, abar, T):
 
 @inlined
 def discretised(m, abar, T):
-    """Discrete over T [s] of a record of MOTION_MODEL_DTYPE; abar: the estimated acceleration [rad/s2]."""
+    """Return the Discrete over T [s] of a record of MOTION_MODEL_DTYPE; abar: the estimated acceleration [rad/s2]."""
     if m.kind == MODEL_CV:
         return cv(m, T)
     if m.kind == MODEL_CA:
@@ -195,6 +196,7 @@ def discretised(m, abar, T):
 
 @compiled
 def initial_variance(m, rate_sigma):
-    """Variance of the acceleration [rad2/s4] at the start, the rate known to rate_sigma [rad/s]."""
+    """Return the variance of the acceleration [rad2/s4] at the start;
+    rate_sigma: standard deviation of the rate [rad/s]."""
     sigma = rate_sigma if math.isnan(m.initial_sigma) else m.initial_sigma
     return sigma * sigma

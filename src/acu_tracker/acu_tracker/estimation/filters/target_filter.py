@@ -1,8 +1,9 @@
-"""The target filter in use: that of the axes, or the Cartesian one where the kind has it and a range is measured.
+"""The target filter in use: the filters of the axes, or the Cartesian filter if the kind has it
+and a range is measured.
 
-The Cartesian filter starts with the first range from the estimate of the axes' filters, and is used once its standard
+The Cartesian filter starts with the first range from the estimate of the axes' filters. It is used once its standard
 deviation of the rate is half of theirs. The axes' filters keep running beside it, and take over from its estimate when
-it has lost the range. Measured rates go to the axes' filters alone.
+it has lost the range. Measured rates go to the axes' filters only.
 """
 import math
 
@@ -20,15 +21,14 @@ CONSTANTS_DTYPE = np.dtype([('axis', axis_filter.CONSTANTS_DTYPE, (2,)), ('carte
 """range_share_2: square of ukf.range_share; wanted: 1 for an axis of a kind that uses the Cartesian filter."""
 
 FILTER_DTYPE = np.dtype([('axis', axis_filter.FILTER_DTYPE, (2,)), ('cartesian', unscented.STATE_DTYPE),
-                         ('running', 'i8'),
-                         ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
-"""running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate; predicted: time [s]
-by which the prior fields are predicted from the present estimate, NaN where they belong to an older one."""
+                         ('running', 'i8'), ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
+"""running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate. `predicted`: time [s] by
+which the prior fields are predicted from the present estimate, NaN if they belong to an older one."""
 
 
 def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
-    """Constants (1,) of UkfParameters and the FilterParameters of both axes; noise_bandwidth [Hz]: of the measured
-    angles, 0 where their noise is white, as the Cartesian filter takes it to be."""
+    """Return the constants (1,) of UkfParameters and the FilterParameters of both axes; noise_bandwidth [Hz]: of the
+    noise of the measured angles, 0 for white noise. The Cartesian filter always assumes white noise."""
     c = np.zeros(1, CONSTANTS_DTYPE)
     c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
     c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
@@ -38,7 +38,7 @@ def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
 
 @compiled
 def start(f, c, m, rate_sigma):
-    """Begin at a Measurement, the rates unknown to rate_sigma [rad/s]."""
+    """Start at a Measurement; rate_sigma: standard deviation of the unknown rates [rad/s]."""
     axes_filter.start(f.axis, c.axis, m, rate_sigma)
     f.running = f.used[0] = f.used[1] = 0
     f.predicted = math.nan
@@ -46,8 +46,8 @@ def start(f, c, m, rate_sigma):
 
 @compiled
 def walk(f, azimuth, elevation):
-    """From now on the measured angles walk, as of an INS whose error changes slowly, by these variances per second
-    [rad2/s]. The Cartesian filter takes them to stay."""
+    """Set the variances per second [rad2/s] by which the measured angles walk from now on, for an INS whose error
+    changes slowly. The Cartesian filter neglects them."""
     f.axis[0].walk, f.axis[1].walk = azimuth, elevation
 
 
@@ -64,13 +64,14 @@ def predict(f, c, T):
 
 @compiled
 def axes_azimuth(f):
-    """Azimuth [rad] that the axis's own filter predicted; measured azimuths are unwrapped to it."""
+    """Return the azimuth [rad] that the axis's own filter predicted; measured azimuths are unwrapped to it."""
     return axis_filter.expected_motion(f.axis[0]).angle
 
 
 @compiled
 def innovation(f, c, m):
-    """Innovation of a Measurement against the prediction; rate_chi_square is always that of the axis's filter."""
+    """Return the Innovation of a Measurement against the prediction;
+    rate_chi_square is always that of the axis's filter."""
     axes = axes_filter.innovation(f.axis, c.axis, m)
     if not f.running:
         return axes
@@ -89,7 +90,7 @@ def _chosen_innovation(used, own, cartesian):
 
 @compiled
 def correct(f, c, m):
-    """Correct the prediction with a Measurement that `innovation` was called with."""
+    """Correct the prediction with the Measurement that `innovation` was called with."""
     axes_filter.correct(f.axis, c.axis, m)
     if f.running:
         unscented.correct(f.cartesian, m)
@@ -98,7 +99,7 @@ def correct(f, c, m):
 
 @compiled
 def expected(f):
-    """Motion at the instant of the last `predict`; the azimuth on the wrap of the axis's filter."""
+    """Return the Motion at the instant of the last `predict`; the azimuth on the wrap of the axis's filter."""
     axes = axes_filter.expected(f.axis)
     if not (f.used[0] or f.used[1]):
         return axes
@@ -111,7 +112,8 @@ def expected(f):
 
 @compiled
 def outlook(f, c, T):
-    """Motion T [s] >= 0 after the last measurement, as `expected` after `predict`, which is spared where it can be."""
+    """Return the Motion T [s] >= 0 after the last measurement:
+    `expected` after `predict`, which is omitted where possible."""
     if f.predicted == T or f.used[0] or f.used[1]:
         predict(f, c, T)
         return expected(f)
@@ -120,7 +122,7 @@ def outlook(f, c, T):
 
 @compiled
 def read(f):
-    """Estimate at the instant of the last `predict`."""
+    """Return the Estimate at the instant of the last `predict`."""
     axes = axes_filter.read(f.axis)
     if not (f.used[0] or f.used[1]):
         return axes
@@ -130,7 +132,7 @@ def read(f):
 
 @compiled
 def probabilities(f, c, mu):
-    """mu (2, BANK) = probability of each of MODELS on both axes, NaN where it is not in the filter."""
+    """Set mu (2, BANK_SIZE) to the probability of each of MODEL_NAMES on both axes, NaN if it is not in the filter."""
     for i in range(2):
         axis_filter.probabilities(f.axis[i], c.axis[i], mu[i])
         if f.used[i]:
@@ -139,7 +141,7 @@ def probabilities(f, c, mu):
 
 @compiled
 def usable(c, m):
-    """The Measurement without the rates that the kinds do not use, and without a range that is not valid."""
+    """Return the Measurement without the rates that the kinds do not use, and without a range that is not valid."""
     azimuth = with_rate(m.axis[0], m.axis[0].rate if c.axis[0].rate_measurement else math.nan)
     elevation = with_rate(m.axis[1], m.axis[1].rate if c.axis[1].rate_measurement else math.nan)
     ranged = m.range > 0.0 and m.range_variance > 0.0
@@ -163,9 +165,8 @@ def select(f, c, m):
 
 @compiled
 def _use_cartesian(f, c):
-    """Use the Cartesian estimate for an axis of such a kind once its standard deviation of the rate is half the
-    axis's.
-    """
+    """Use the Cartesian estimate for the axes of such a kind once its standard deviation of the rate
+    is half of the axis's."""
     if (f.used[0] or not c.wanted[0]) and (f.used[1] or not c.wanted[1]):
         return
     predict(f, c, 0.0)
@@ -177,8 +178,8 @@ def _use_cartesian(f, c):
 
 @compiled
 def _leave_cartesian(f, c, azimuth, elevation):
-    """Move the filters of these axes (azimuth, elevation: 1 for yes) to the Cartesian estimate and stop using it;
-    where that is NaN they stay where they are."""
+    """Move the filters of these axes (azimuth, elevation: 1 for yes) to the Cartesian estimate, unless it is NaN, and
+    stop using it."""
     if not (azimuth or elevation):
         return
     predict(f, c, 0.0)
@@ -208,8 +209,8 @@ def transfer(f, c, rate_sigma, running):
 
 @compiled
 def move(f, c, motion):
-    """Change to a frame in which the target has this Motion now; the covariances stay. The Cartesian filter, which
-    works in the old frame, stops."""
+    """Change to a frame in which the target has this Motion now; the covariances stay. The Cartesian filter stops,
+    because it works in the old frame."""
     f.running = f.used[0] = f.used[1] = 0
     for i in range(2):
         axis_filter.move(f.axis[i], c.axis[i], motion[i])

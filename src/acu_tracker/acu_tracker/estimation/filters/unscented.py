@@ -1,14 +1,14 @@
 """The Cartesian target filter: an IMM of two unscented filters, CV and CA; azimuth, elevation and range measured.
 
 X = (east north up, velocity, acceleration) [m, m/s, m/s2] of each mode, relative to the antenna; CV keeps its
-acceleration at zero. Without a range the two angles are taken alone, and the range grows uncertain.
+acceleration at zero. Without a range only the two angles are used, and the variance of the range grows.
 
-The unscented filter in general (Merwe's points; Wan and Van der Merwe 2000), and what is special about this one:
-the motion is linear, so that the transform of the prediction is F P F' + Q exactly; the points of the measurement are
-drawn from the predicted P, after Q. With P = L L' (L lower triangular) they are X +- sqrt(n + lambda) L_k, and only
-k = 1, 2, 3 move the position, which is all that is measured: 7 of the 19 points are evaluated, and the other 12 count
-with the one in the middle. Angles are taken relative to that one, so that the azimuth may wrap.
-With alpha = 1, kappa = 3 - n, beta = 2 no weight of the seven is negative, and S is positive whatever the geometry.
+The unscented filter (Merwe's points; Wan and Van der Merwe 2000) has two simplifications here. Because the motion is
+linear, the transform of the prediction is F P F' + Q exactly. The points of the measurement are drawn from the
+predicted P, after Q. With P = L L' (L lower triangular) they are X +- sqrt(n + lambda) L_k. Only k = 1, 2, 3 move the
+position, and only the position is measured: 7 of the 19 points are evaluated, and the other 12 have the measurement of
+the centre point. Angles are relative to those of the centre point, so that the azimuth may wrap. With alpha = 1, kappa
+= 3 - n, beta = 2 no weight of the seven is negative, and S is positive for every geometry.
 """
 import math
 
@@ -27,27 +27,28 @@ ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N
 LAMBDA = ALPHA**2 * (N + KAPPA) - N
 SIGMA_POINT_SCALE = math.sqrt(N + LAMBDA)
 SIGMA_POINT_WEIGHT = 0.5 / (N + LAMBDA)
-"""Of each of the six moving points."""
+"""Weight of each of the six points that move the position [-]."""
 CENTRE_COVARIANCE_WEIGHT = 1.0 - 6.0 * SIGMA_POINT_WEIGHT + 1.0 - ALPHA**2 + BETA
-"""Of the point in the middle and the twelve that measure as it does, in a covariance."""
+"""Weight in a covariance [-] of the centre point and of the twelve points with the same measurement as the centre."""
 
 STATE_DTYPE = np.dtype([
     ('x', 'f8', (2, N)), ('p', 'f8', (2, N, N)), ('mu', 'f8', (2,)),
     ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('mu_prior', 'f8', (2,)),
     ('z', 'f8', (2, 3)), ('s', 'f8', (2, 3, 3)), ('g', 'f8', (2, N, 3)), ('points', 'f8', (2, 3, 3)),
     ('weights', 'f8', (2,)), ('mean', 'f8', (N,)), ('covariance', 'f8', (N, N))], align=True)
-"""x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, mu_prior:
-these as `predict` left them; z, s: what `innovation` expects to be measured, and its covariance; g: its covariance
-with X. points, weights, mean, covariance: scratch.
+"""State of both modes.
+
+x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, mu_prior: as
+predicted by `predict`. `z`, `s`, `g`: expected measurement in `innovation`, its covariance, and its covariance with X.
+`points`, `weights`, `mean`, `covariance`: scratch.
 """
 
 CONSTANTS_DTYPE = np.dtype([('models', motion_models.MOTION_MODEL_DTYPE, (2,)), ('dwell', 'f8'),
-                            ('initial_speed', 'f8'),
-                            ('initial_acceleration', 'f8')], align=True)
+                            ('initial_speed', 'f8'), ('initial_acceleration', 'f8')], align=True)
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of UkfParameters."""
+    """Return the constants (1,) of UkfParameters."""
     c = np.zeros(1, CONSTANTS_DTYPE)
     c['models']['kind'] = MODE_MODELS
     c['models']['noise'] = params.cv_noise, params.ca_noise
@@ -60,8 +61,8 @@ def constants(params) -> np.ndarray:
 def _spread(p, along, onward, variances):
     """Add the AxisVariances of one coordinate and its rate to the covariance p.
 
-    A unit of it moves the position by along (3,) and the velocity by onward (3,), a unit of its rate the velocity by
-    along.
+    A unit of the coordinate moves the position by along (3,) and the velocity by onward (3,); a unit of its rate moves
+    the velocity by along.
     """
     s11, s12, s22 = variances
     for i in range(3):
@@ -75,16 +76,17 @@ def _spread(p, along, onward, variances):
 
 @compiled
 def start(s, c, estimate, r, R_range):
-    """Begin at an Estimate of the angles and a first range r [m] of variance R_range.
+    """Start at an Estimate of the angles and a first range r [m] of variance R_range.
 
-    `expected` continues from that Estimate: CA starts with the acceleration of a target at a constant range, CV
-    without. The radial speed is 0 to within c.initial_speed, the acceleration known to within c.initial_acceleration.
+    `expected` continues from that Estimate. CA starts with the acceleration of a target at a constant range, CV with
+    none. Standard deviations at the start: c.initial_speed of the radial speed, which is 0; c.initial_acceleration of
+    the acceleration.
     """
     A, dA, _ = estimate.motion.azimuth
     E, dE, _ = estimate.motion.elevation
     sight = line_of_sight(estimate.motion)
     u, du, ddu = sight
-    # The centripetal share that keeps the range constant.
+    # The centripetal acceleration keeps the range constant.
     k = dot(du, du)
     x = s.x[1]
     x[0], x[1], x[2] = times(r, u)
@@ -108,7 +110,7 @@ def start(s, c, estimate, r, R_range):
 
 @compiled
 def _mixed(x, p, w, x_out, p_out):
-    """Mean and covariance of two modes with weights w (2,) into x_out, p_out."""
+    """Write mean and covariance of two modes with weights w (2,) to x_out, p_out."""
     for a in range(N):
         x_out[a] = w[0] * x[0, a] + w[1] * x[1, a]
         for b in range(a, N):
@@ -118,7 +120,8 @@ def _mixed(x, p, w, x_out, p_out):
 
 @compiled
 def _moved(x, p, m, T):
-    """x = F x and p = F p F' + Q of a model over T [s] in place; the motion is the same in the three directions."""
+    """Set x = F x and p = F p F' + Q of a model over T [s] in place;
+    the motion is the same in the three directions."""
     model = motion_models.discretised(m, 0.0, T)
     (f13, f23, f33), Q = model.F, model.Q
     for i in range(3):
@@ -148,7 +151,7 @@ def _moved(x, p, m, T):
 
 @compiled
 def predict(s, c, T):
-    """Mix the modes and predict them by T [s] into the prior fields; what was estimated stays as it is."""
+    """Mix the modes and predict them by T [s] into the prior fields; the estimate stays as it is."""
     stay, switch = imm.switching(T, c.dwell, 2)
     for j in range(2):
         s.mu_prior[j] = imm.mix(s.mu, 2, stay, switch, j, s.weights)
@@ -158,15 +161,18 @@ def predict(s, c, T):
 
 @compiled
 def _measured(east, north, up):
-    """(azimuth, elevation, range) of a position."""
+    """Return (azimuth, elevation, range) of a position."""
     azimuth, elevation = earth_angles(east, north, up)
     return azimuth, elevation, math.sqrt(east * east + north * north + up * up)
 
 
 @compiled
 def _transformed(x, p, z, s, g, d):
-    """Unscented transform of the prediction x, p to the measurement: mean z (3,), covariance s (3, 3) without R, and
-    that with X, g (9, 3). d (2, 3, 3): how the points at +L_k and -L_k measure, against the one in the middle."""
+    """Transform the prediction x, p to the measurement (unscented): mean z (3,), covariance s (3, 3) without R.
+
+    g (9, 3): covariance of the measurement with X; d (2, 3, 3): measurements of the points at +L_k and -L_k, relative
+    to that of the centre point.
+    """
     A, E, r = _measured(x[0], x[1], x[2])
     z[0] = z[1] = z[2] = 0.0
     s[:, :] = 0.0
@@ -206,7 +212,7 @@ def _transformed(x, p, z, s, g, d):
 
 @compiled
 def innovation(s, m):
-    """Innovation of a Measurement against the prediction of both modes together.
+    """Return the Innovation of a Measurement against the prediction of both modes together.
 
     A range that is NaN was not measured; its variance is then that of a perfect one. Rates are not used.
     """
@@ -222,7 +228,7 @@ def innovation(s, m):
 
 @compiled
 def _compared(s, i, y):
-    """(nu, S) of what was measured as component i (azimuth, elevation, range), of both modes with their spread."""
+    """Return (nu, S) of a measured component i (azimuth, elevation, range) against both modes, with their spread."""
     d = s.z[1, i] - s.z[0, i]
     if i == 0:
         d = wrap(d)
@@ -239,7 +245,7 @@ def _axis_innovation(s, i, m):
 
 @compiled
 def _corrected(s, j, azimuth, elevation, range_):
-    """Take the measurement into mode j; its log-likelihood, less what all modes have alike.
+    """Correct mode j with the measurement; return its log-likelihood, without the terms that are equal for all modes.
 
     S = G G'; G^-1 nu are the standardised innovations n, the gain times G is w: X += w n, P -= w w'.
     """
@@ -272,8 +278,7 @@ def _corrected(s, j, azimuth, elevation, range_):
 
 @compiled
 def correct(s, m):
-    """Correct with the Measurement that `innovation` was called with; where its range is NaN, with the angles
-    alone."""
+    """Correct with the Measurement that `innovation` was called with; if its range is NaN, with the angles only."""
     for j in range(2):
         s.weights[j] = _corrected(s, j, m.axis[0].angle, m.axis[1].angle, m.range)
     imm.weigh(s.mu_prior, s.weights, 2, s.mu)
@@ -281,7 +286,8 @@ def correct(s, m):
 
 @compiled
 def range_known(s, share_2):
-    """Whether the standard deviation of the range is at most a share (its square) of the range in both modes."""
+    """Return True if, in both modes, the standard deviation of the range is at most a share of the range; share_2:
+    square of the share."""
     for j in range(2):
         x, p = s.x[j], s.p[j]
         spread = 0.0
@@ -296,7 +302,7 @@ def range_known(s, share_2):
 
 @compiled
 def probabilities(s, mu):
-    """mu (BANK,) = probability of each of motion_models.MODELS, NaN where it is not in the filter."""
+    """Set mu (BANK_SIZE,) to the probability of each of motion_models.MODEL_NAMES, NaN if it is not in the filter."""
     mu[:] = math.nan
     for j in range(len(MODE_MODELS)):
         mu[MODE_MODELS[j]] = s.mu[j]
@@ -304,7 +310,7 @@ def probabilities(s, mu):
 
 @compiled
 def expected(s):
-    """Motion in earth angles of the prediction, both modes together; the azimuth in (-pi, pi]."""
+    """Return the Motion in earth angles of the prediction, both modes together; the azimuth in (-pi, pi]."""
     _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
     x = s.mean
     return motion_of_position(Vector(x[0], x[1], x[2]), Vector(x[3], x[4], x[5]), Vector(x[6], x[7], x[8]))
@@ -312,7 +318,8 @@ def expected(s):
 
 @compiled
 def _projected(p, g, h, v):
-    """AxisVariances of two numbers linear in position and velocity: g x and h x + v dx, each (3,) a tuple."""
+    """Return the AxisVariances of two numbers linear in position and velocity:
+    g x and h x + v dx, each a tuple (3,)."""
     gg = gh = hh = 0.0
     for a in range(3):
         for b in range(3):
@@ -324,8 +331,8 @@ def _projected(p, g, h, v):
 
 @compiled
 def variances(s):
-    """(AxisVariances of both axes, variance of the range [m2]) of the prediction, linearised, both modes with their
-    spread."""
+    """Return (AxisVariances of both axes, variance of the range [m2]) of the prediction of both modes, linearised and
+    with their spread."""
     _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
     x, p = s.mean, s.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]
