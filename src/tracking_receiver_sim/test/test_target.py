@@ -194,8 +194,8 @@ GOOD = [(float(k), 47.4, 8.5, 600.0) for k in range(6)]
     (GOOD[:3] + [(3.0, 95.0, 8.5, 600.0)], r'line 5: latitude_deg = 95: must be -90 to 90'),
     (GOOD[:3] + [(3.0, 47.4, -200.0, 600.0)], r'line 5: longitude_deg = -200'),
     (GOOD[:3] + [(3.0, 47.4, 8.5, -9000.0)], r'line 5: altitude_m = -9000'),
-    (GOOD[:3], r'3 rows, must be at least 4'),
-    ([], r'0 rows')])
+    (GOOD[:3], r'3 fixes, must be at least 4'),
+    ([], r'0 fixes')])
 def test_broken_track(tmp_path, rows, message):
     path = write_track(tmp_path / 'broken.csv', rows)
     with pytest.raises(csv_table.TableError, match='broken.csv: ' + message) as raised:

@@ -61,10 +61,15 @@ STATE_DTYPE = np.dtype([
     ('ring_rate', 'f8', (RESULT_RING_SIZE, 2)), ('ring_range', 'f8', RESULT_RING_SIZE),
     ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3), ('scintillation', 'f8', scintillation.NORMALS_PER_STEP)],
                        align=True)
-"""State of the receiver. error_known: 1 if cross_elevation, elevation hold the true error at stamp_ns [rad] and
-direction the target in FLU [m]; timer_ns: time past a lock level; written, released: number of results put into and
-released from the ring since the start; antenna: ENU position of the antenna against the station [m];
-antenna_velocity: FLU [m/s]."""
+"""State of the receiver.
+
+    error_known         1 if cross_elevation, elevation hold the true error at stamp_ns [rad], direction the target in
+                        FLU [m]
+    timer_ns            time past a lock level
+    written, released   number of results put into and released from the ring since the start
+    antenna             position of the antenna against the station, ENU [m]
+    antenna_velocity    velocity of the antenna, FLU [m/s]
+"""
 
 CONSTANTS_DTYPE = np.dtype([
     ('target', target.TARGET_DTYPE),
@@ -81,18 +86,29 @@ CONSTANTS_DTYPE = np.dtype([
     ('latency_ns', 'i8'),
     ('rate_measured', 'i8'), ('rate_sigma', 'f8'), ('range_measured', 'i8'), ('range_sigma', 'f8'),
     ('range_variance', 'f8'), ('lever_arm', 'f8', 3), ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
-"""Constants of the receiver. slope: true k_m; angle_scale: theta3 over the k_m that the receiver assumes; sign: 1 or
--1, of each difference channel; boresight: null of the differences off the beam, cross-elevation and elevation [rad];
-first_noise: index of the first normal of rate and range, and of the scintillation; power, acquire_power, lose_power:
-carrier power in one sample over noise power in one sample; range_variance: in single precision."""
+"""Constants of the receiver.
+
+    slope               true k_m
+    angle_scale         theta3 over the k_m that the receiver assumes
+    sign                1 or -1, of each difference channel
+    boresight           null of the differences off the beam, cross-elevation and elevation [rad]
+    first_noise         index of the first normal of rate and range, and of the scintillation
+    power, acquire_power, lose_power    carrier power over noise power in one sample
+    range_variance      variance of the range [m2], in single precision
+"""
 
 INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
                          ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3), ('azimuth_rate', 'f8'),
                          ('elevation_rate', 'f8'),
                          ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
-"""Inputs of a step. stamp_ns: stamp of the step; valid: 1 if the beam is known and fresh; azimuth, elevation and their
-rates: true beam on the deck [rad], [rad/s]; mat_ed: true attitude deck -> earth; position: base_link against the
-station, ENU [m]; twist_linear, twist_angular: velocity of base_link [m/s] and rate of the deck [rad/s], FLU."""
+"""Inputs of a step.
+
+    valid                           1 if the beam is known and fresh
+    azimuth, elevation, .._rate     true beam on the deck [rad], [rad/s]
+    mat_ed                          true attitude deck -> earth
+    position                        base_link against the station, ENU [m]
+    twist_linear, twist_angular     velocity of base_link [m/s] and rate of the deck [rad/s], FLU
+"""
 
 OUTPUTS_DTYPE = np.dtype([
     ('due', 'i8'), ('stamp_ns', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
@@ -101,9 +117,8 @@ OUTPUTS_DTYPE = np.dtype([
     ('target_valid', 'i8'), ('target_position', 'f8', 3), ('target_velocity', 'f8', 3)], align=True)
 """Outputs of a step. due: 1 if a result comes out in this step. The result consists of stamp_ns (of its measurement),
 errors [rad], C/N0, locked, rate of the errors [rad/s] and range [m], rounded to the single precision of its topic.
-Errors, rate and range are NaN while not locked; rate and range also if not measured.
-The rest belongs to this step: status (index into STATUS_TEXT_BY_CODE), true error [rad], target ENU [m, m/s]; NaN if
-not known."""
+Errors, rate and range are NaN while not locked, rate and range also if not measured. The rest belongs to this step:
+status (index into STATUS_TEXT_BY_CODE), true error [rad], target ENU [m, m/s], NaN if not known."""
 
 
 def constants(params, period, built) -> np.ndarray:

@@ -48,9 +48,11 @@ TARGET_DTYPE = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))
 class Target(typing.NamedTuple):
     """A target built for one run.
 
-    constants: (1,) TARGET_DTYPE record; breaks: (n + 1,) times [s]; coefficients: (4, n, 3), highest power first,
-    of (t - breaks[i]), ENU [m]; start_time: UTC of stamp 0 in ISO 8601, empty if the target has no date; summary: two
-    lines about the file and the track of a track_file, empty for other kinds.
+        constants       (1,) record of TARGET_DTYPE
+        breaks          (n + 1,) times [s]
+        coefficients    (4, n, 3), highest power first, of (t - breaks[i]), ENU [m]
+        start_time      UTC of stamp 0 in ISO 8601, empty if the target has no date
+        summary         two lines about the file and the track of a track_file, empty for other kinds
     """
     constants: np.ndarray
     breaks: np.ndarray

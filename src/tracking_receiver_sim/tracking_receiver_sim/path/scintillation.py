@@ -2,9 +2,11 @@
 process each.
 
 Level [dB]: sigma at the elevation E is that of the zenith over sin^1.2 E (ITU-R P.618, section 2.4.1). The value at
-the zenith contains the factors of humidity, frequency and aperture. Direction: the variance is proportional to the
-length of the path through the turbulence, so sigma is proportional to 1 / sqrt(sin E) (Tatarskii, The Effects of the
-Turbulent Atmosphere on Wave Propagation, angle of arrival: 2.91 D^(-1/3) times the integral of C_n^2 along the path).
+the zenith contains the factors of humidity, frequency and aperture.
+
+Direction: the variance is proportional to the length of the path through the turbulence, so sigma is proportional to
+1 / sqrt(sin E). Tatarskii, The Effects of the Turbulent Atmosphere on Wave Propagation, angle of arrival:
+2.91 D^(-1/3) times the integral of C_n^2 along the path.
 """
 import math
 
@@ -21,7 +23,7 @@ MIN_SIN_ELEVATION = math.sin(math.radians(4.0))
 SCINTILLATION_DTYPE = np.dtype([('level', 'f8'), ('angle', 'f8'), ('keep', 'f8'), ('draw', 'f8'), ('on', 'i8')],
                                align=True)
 """Constants of the scintillation. level, angle: 1-sigma at the zenith [dB], [rad]; keep, draw: factors of the process
-of unit variance, x = keep x + draw w; on: 1 if level or angle is above 0."""
+of unit variance, x = keep x + draw w."""
 
 
 def constants(p, period) -> np.ndarray:
