@@ -41,7 +41,8 @@ def read(params):
     """
     rows = csv_table.read(params.path, COLUMN_RANGES, 4, params.max_gap, 'ship.recorded.max_gap', DISPLACEMENT_RANGES)
     if len(rows) > MAX_ROWS:
-        raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {MAX_ROWS}; cut or thin it out')
+        raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {MAX_ROWS}: shorten '
+                                   'the file or reduce its rate')
     column = dict(zip((*COLUMN_RANGES, *DISPLACEMENT_RANGES), rows.T))
     time = column['time_s']
     length = time[-1] - time[0]

@@ -1,6 +1,6 @@
 """Flights as CSV. The name of the column of time selects the layout of a file, a row of CSV_LAYOUTS.
 
-    our own                     time_s, latitude_deg, longitude_deg, altitude_m: every cell is a number
+    native                      time_s, latitude_deg, longitude_deg, altitude_m: every cell is a number
     traffic (ADS-B)             timestamp, latitude, longitude, geoaltitude or altitude: in feet
     OpenSky state vectors       time, lat, lon, geoaltitude or baroaltitude: in metres
 
